@@ -1,0 +1,44 @@
+"""warpspace: see and steer how a machine tool's geometric errors bend the space it works in.
+
+Names are loaded when first used, so that ``import warpspace`` costs next to nothing.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from warpspace.exceptions import SceneError, WarpspaceError
+    from warpspace.field.evaluate import ErrorField
+    from warpspace.scene.library import load_scene, scene_names
+    from warpspace.scene.model import Scene
+    from warpspace.scene.pipeline import evaluate
+
+_HOME = {
+    "ErrorField": "warpspace.field.evaluate",
+    "Scene": "warpspace.scene.model",
+    "SceneError": "warpspace.exceptions",
+    "WarpspaceError": "warpspace.exceptions",
+    "evaluate": "warpspace.scene.pipeline",
+    "load_scene": "warpspace.scene.library",
+    "scene_names": "warpspace.scene.library",
+}
+
+__all__ = [
+    "ErrorField",
+    "Scene",
+    "SceneError",
+    "WarpspaceError",
+    "__version__",
+    "evaluate",
+    "load_scene",
+    "scene_names",
+]
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401 - whatever the name stands for
+    """Load a public name from its module."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'warpspace' has no attribute {name!r}")
+    return getattr(import_module(_HOME[name]), name)

@@ -1,0 +1,5 @@
+"""Run the command line as ``python -m warpspace``."""
+
+from warpspace.cli import main
+
+main()

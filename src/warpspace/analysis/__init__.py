@@ -1,0 +1,1 @@
+"""Numbers drawn from error fields and Jacobians."""

@@ -1,0 +1,49 @@
+"""Statistics of an error field."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from warpspace.field.evaluate import ErrorField
+
+
+@dataclass(frozen=True, slots=True)
+class Statistics:
+    """Summary of the length of the position error over a field.
+
+    Attributes
+    ----------
+    mean_um, rms_um, p95_um, max_um : float, µm
+        Mean, root mean square, 95th percentile and largest.
+    max_at_mm : tuple of float, (3,), mm
+        Nominal point in R of the largest.
+    """
+
+    mean_um: float
+    rms_um: float
+    p95_um: float
+    max_um: float
+    max_at_mm: tuple[float, float, float]
+
+
+def statistics(field: ErrorField) -> Statistics:
+    """Summarise a field.
+
+    Parameters
+    ----------
+    field : ErrorField
+
+    Returns
+    -------
+    Statistics
+    """
+    norm = field.norm_um.reshape(-1)
+    worst = int(np.argmax(norm))
+    x, y, z = (float(value) for value in field.nominal_mm.reshape(-1, 3)[worst])
+    return Statistics(
+        float(norm.mean()),
+        float(np.sqrt(np.mean(norm**2))),
+        float(np.percentile(norm, 95.0)),
+        float(norm[worst]),
+        (x, y, z),
+    )

@@ -1,0 +1,177 @@
+"""Command `field`: errors at points, or over the grid of the working volume."""
+
+from typing import TYPE_CHECKING
+
+import click
+
+from warpspace.cli.options import (
+    at_option,
+    json_option,
+    loop_option,
+    parse_point,
+    print_json,
+    scene_argument,
+)
+from warpspace.exceptions import OptionError
+
+if TYPE_CHECKING:
+    from warpspace.field.evaluate import ErrorField
+    from warpspace.scene.model import Scene
+    from warpspace.units import Array
+
+MAX_LISTED = 20
+COLUMNS = (
+    *("x_mm", "y_mm", "z_mm", "error_x_um", "error_y_um", "error_z_um", "norm_um"),
+    *("orientation_x_urad", "orientation_y_urad", "orientation_z_urad"),
+)
+
+
+@click.command()
+@scene_argument()
+@at_option
+@click.option("--grid", type=int, help="Nodes per axis of the working volume, 2 to 101.  [21]")
+@loop_option
+@click.option("--exact", is_flag=True, help="Full rotations and all products, not the first order.")
+@click.option(
+    "--frame",
+    type=click.Choice(("machine", "workpiece")),
+    default="machine",
+    show_default=True,
+    help="Frame of the resulting vectors.",
+)
+@click.option("--csv", "csv_path", type=click.Path(), help="Write the points to this CSV file.")
+@json_option
+def field(  # noqa: PLR0913 - the options of the command
+    scene: str,
+    points: tuple[str, ...],
+    grid: int | None,
+    loop: str,
+    frame: str,
+    csv_path: str | None,
+    *,
+    exact: bool,
+    as_json: bool,
+) -> None:
+    """Evaluate the errors of SCENE at points or over a grid.
+
+    Errors are actual − nominal, in µm; the orientation error is the rotation vector of the tool
+    axis, in µrad. Without --at the grid of the working volume is evaluated.
+    """
+    from dataclasses import asdict
+
+    from warpspace.analysis.statistics import statistics
+    from warpspace.scene.library import load_scene
+
+    if points and grid is not None:
+        raise OptionError("--at and --grid exclude each other; give one of them")
+    loaded = load_scene(scene)
+    axes, result = _evaluate(loaded, points, grid, loop=loop, frame=frame, exact=exact)
+    summary = statistics(result)
+    if csv_path is not None:
+        _write_csv(csv_path, axes, result)
+    if as_json:
+        print_json({"points": _rows(axes, result), "statistics": asdict(summary)})
+        return
+    rows = _rows(axes, result)
+    click.echo(f"{loaded.title} · {loop} loop · {'exact' if exact else 'first order'}")
+    for row in rows[:MAX_LISTED] if points else []:
+        at = " ".join(f"{name}={value:g}" for name, value in row["axes"].items())
+        error = ", ".join(f"{value:+.3f}" for value in row["error_um"])
+        tilt = ", ".join(f"{value:+.3f}" for value in row["orientation_urad"])
+        click.echo(f"  {at}: ({error}) µm, |E| {row['norm_um']:.3f} µm, tilt ({tilt}) µrad")
+    if points and len(rows) > MAX_LISTED:
+        click.echo(f"  … {len(rows) - MAX_LISTED} more; --csv or --json has all")
+    worst = ", ".join(f"{value:g}" for value in summary.max_at_mm)
+    click.echo(
+        f"  {len(rows)} points: mean {summary.mean_um:.2f}, RMS {summary.rms_um:.2f},"
+        f" P95 {summary.p95_um:.2f}, max {summary.max_um:.2f} µm at ({worst}) mm"
+    )
+
+
+def _evaluate(  # noqa: PLR0913 - what a user chose
+    scene: "Scene",
+    points: tuple[str, ...],
+    grid: int | None,
+    *,
+    loop: str,
+    frame: str,
+    exact: bool,
+) -> "tuple[dict[str, Array], ErrorField]":
+    """Evaluate at the points given or over the grid; axis positions and field, both flat."""
+    import numpy as np
+
+    from warpspace.field.evaluate import ErrorField
+    from warpspace.field.grid import DEFAULT_NODES, build_grid
+    from warpspace.kinematics.model import complete_coordinates
+    from warpspace.scene.pipeline import evaluate
+
+    if points:
+        full = [
+            complete_coordinates(scene.machine, parse_point(text), scene.workspace.positions)
+            for text in points
+        ]
+        axes = {name: np.array([point[name] for point in full]) for name in scene.machine.axes}
+        return axes, evaluate(scene, at=axes, loop=loop, exact=exact, frame=frame)
+    nodes = DEFAULT_NODES if grid is None else grid
+    built = build_grid(scene.model, scene.workspace, nodes)
+    axes = {
+        name: np.broadcast_to(value, built.shape).reshape(-1)
+        for name, value in built.coordinates.items()
+    }
+    found = evaluate(scene, grid=nodes, loop=loop, exact=exact, frame=frame)
+    flat = ErrorField(
+        found.nominal_mm.reshape(-1, 3),
+        found.error_um.reshape(-1, 3),
+        found.orientation_urad.reshape(-1, 3),
+    )
+    return axes, flat
+
+
+def _rows(axes: "dict[str, Array]", result: "ErrorField") -> list[dict[str, object]]:
+    """Spell each point as the JSON output has it."""
+    positions = [dict(zip(axes, row, strict=True)) for row in zip(*axes.values(), strict=True)]
+    return [
+        {
+            "axes": {name: float(value) for name, value in position.items()},
+            "nominal_mm": nominal,
+            "error_um": error,
+            "norm_um": norm,
+            "orientation_urad": orientation,
+        }
+        for position, nominal, error, norm, orientation in zip(
+            positions,
+            result.nominal_mm.tolist(),
+            result.error_um.tolist(),
+            result.norm_um.tolist(),
+            result.orientation_urad.tolist(),
+            strict=True,
+        )
+    ]
+
+
+def _write_csv(path: str, axes: "dict[str, Array]", result: "ErrorField") -> None:
+    """Write axis positions, nominal points, errors and orientation, one row a point."""
+    import numpy as np
+
+    from warpspace.outputs.files import write_atomically
+
+    table = np.column_stack(
+        [
+            *axes.values(),
+            result.nominal_mm,
+            result.error_um,
+            result.norm_um,
+            result.orientation_urad,
+        ]
+    )
+    names = [f"{name}_{'mm' if name in 'XYZ' else 'deg'}" for name in axes]
+    with write_atomically(path) as temporary:
+        np.savetxt(
+            temporary,
+            table,
+            delimiter=",",
+            fmt="%.9g",
+            header=",".join([*names, *COLUMNS]),
+            comments="",
+            encoding="utf-8",
+        )

@@ -1,0 +1,99 @@
+"""Arguments and options that several commands share."""
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import click
+from click.shell_completion import CompletionItem
+
+from warpspace.exceptions import OptionError
+
+Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+LOOPS = ("tool", "workpiece", "relative")
+COMPONENTS = ("norm", "x", "y", "z")
+
+
+class SceneName(click.ParamType):
+    """A bundled scene or a path; the shell completes both."""
+
+    name = "scene"
+
+    def shell_complete(
+        self,
+        ctx: click.Context,  # noqa: ARG002 - signature of click
+        param: click.Parameter,  # noqa: ARG002
+        incomplete: str,
+    ) -> list[CompletionItem]:
+        """Offer the bundled names, and files."""
+        from warpspace.scene.library import scene_names
+
+        names = [name for name in scene_names() if name.startswith(incomplete)]
+        return [CompletionItem(name) for name in names] or [CompletionItem(incomplete, type="file")]
+
+
+def scene_argument(name: str = "scene", **kwargs: Any) -> Decorator:  # noqa: ANN401 - click's
+    """Add a SCENE argument."""
+    return click.argument(name, type=SceneName(), **kwargs)
+
+
+json_option = click.option(
+    "--json", "as_json", is_flag=True, help="Print exactly one JSON object on stdout."
+)
+loop_option = click.option(
+    "--loop",
+    type=click.Choice(LOOPS),
+    default="tool",
+    show_default=True,
+    help="Structural loop: tool point, workpiece point, or tool relative to workpiece.",
+)
+at_option = click.option(
+    "--at",
+    "points",
+    multiple=True,
+    metavar="X=..,Y=..",
+    help="Axis positions in mm and degrees, for instance X=0,Y=-225,Z=-480. Repeatable. Axes left"
+    " out stand at their place in the scene (the middle of a range).",
+)
+
+
+def parse_point(text: str) -> dict[str, float]:
+    """Read axis positions as a user types them.
+
+    Parameters
+    ----------
+    text : str
+        For instance ``X=0,Y=-225,B=30``.
+
+    Returns
+    -------
+    dict of str to float, mm or degrees
+
+    Raises
+    ------
+    OptionError
+        If it cannot be read.
+    """
+    expected = "expected axis=number pairs with commas between, for instance X=0,Y=-225,B=30"
+    found: dict[str, float] = {}
+    for part in text.replace(";", ",").split(","):
+        name, equals, number = part.partition("=")
+        name = name.strip().upper()
+        try:
+            value = float(number)
+        except ValueError:
+            value = math.nan
+        if not equals or not math.isfinite(value) or len(name) != 1:
+            raise OptionError(f"--at {text!r}: {part.strip()!r} cannot be read; {expected}")
+        if name in found:
+            raise OptionError(f"--at {text!r}: axis {name} is given twice")
+        if abs(value) > 1e5:  # noqa: PLR2004 - 100 m: beyond any machine
+            raise OptionError(f"--at {text!r}: {value:g}; expected at most ±100000 mm or degrees")
+        found[name] = value
+    return found
+
+
+def print_json(value: Mapping[str, object]) -> None:
+    """Print one JSON object; numbers that are not finite are refused rather than misspelt."""
+    click.echo(json.dumps(value, ensure_ascii=False, allow_nan=False))

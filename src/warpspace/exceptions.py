@@ -1,0 +1,94 @@
+"""Every exception that warpspace raises on purpose.
+
+All derive from `WarpspaceError`, whose text is fit to be shown to a user as it is: it names what
+was given, what was expected and, where there is one, the near miss.
+"""
+
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
+
+
+class WarpspaceError(Exception):
+    """Base of all errors with a message meant for the user."""
+
+
+class ChainError(WarpspaceError):
+    """A kinematic chain string that describes no machine."""
+
+
+class OptionError(WarpspaceError):
+    """A value given by a user (option, argument, widget) that cannot be used."""
+
+
+class RenderError(WarpspaceError):
+    """A picture that could not be drawn on this system."""
+
+
+class OutputError(WarpspaceError):
+    """A file that could not be written."""
+
+
+class UnknownNameError(WarpspaceError):
+    """A name that is not among the known ones.
+
+    Parameters
+    ----------
+    what : str
+        What kind of thing was asked for, for instance "parameter".
+    name : str
+        The name asked for.
+    known : iterable of str
+        The names there are.
+    """
+
+    def __init__(self, what: str, name: str, known: Iterable[str]) -> None:
+        self.name = name
+        self.known = tuple(known)
+        super().__init__(f"unknown {what} {name!r}{near_miss(name, self.known)}")
+
+
+class SceneError(WarpspaceError):
+    """A scene or machine file with one or more problems.
+
+    Parameters
+    ----------
+    source : str
+        File name (or bundled name) the problems were found in.
+    problems : sequence of str
+        One line each: key, value and what was expected.
+    """
+
+    def __init__(self, source: str, problems: Sequence[str]) -> None:
+        self.source = source
+        self.problems = tuple(problems)
+        if len(self.problems) == 1:
+            text = f"{source}: {self.problems[0]}"
+        else:
+            lines = "".join(f"\n  - {problem}" for problem in self.problems)
+            text = f"{source}: {len(self.problems)} problems{lines}"
+        super().__init__(text)
+
+
+def near_miss(name: str, known: Iterable[str]) -> str:
+    """Give the tail of a message about an unknown name.
+
+    Parameters
+    ----------
+    name : str
+        The name that was asked for.
+    known : iterable of str
+        The names there are.
+
+    Returns
+    -------
+    str
+        ``": did you mean 'EC0Y'?"``, or the list of known names where none is near.
+    """
+    names = list(known)
+    folded = {candidate.casefold(): candidate for candidate in names}
+    close = get_close_matches(name.casefold(), folded, n=2, cutoff=0.6)
+    if close:
+        return ": did you mean " + " or ".join(repr(folded[match]) for match in close) + "?"
+    if 0 < len(names) <= 24:  # noqa: PLR2004 - a list that still fits a line
+        return "; expected one of " + ", ".join(names)
+    return ""

@@ -1,0 +1,1 @@
+"""Error fields: errors over points, paths and the grid of the working volume."""

@@ -1,0 +1,269 @@
+"""Errors at given coordinates: the first-order basis, and the field it gives for an error set."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from warpspace.kinematics import transforms
+from warpspace.kinematics.chain import branch_pose, exact_error, nominal_point
+from warpspace.kinematics.firstorder import jacobian
+from warpspace.kinematics.model import Coordinates, Loop, Model
+from warpspace.machine.errors import ErrorSet
+from warpspace.machine.parameters import parameter
+from warpspace.units import Array
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorField:
+    """Errors over a batch of points.
+
+    Attributes
+    ----------
+    nominal_mm : ndarray, [..., 3], mm
+        Nominal points in R.
+    error_um : ndarray, [..., 3], µm
+        Position error, actual − nominal.
+    orientation_urad : ndarray, [..., 3], µrad
+        Orientation error of the tool axis: the small rotation vector that turns it, right-hand
+        rule. It has no part about the tool axis itself; its norm is the tilt.
+    """
+
+    nominal_mm: Array
+    error_um: Array
+    orientation_urad: Array
+
+    @property
+    def norm_um(self) -> Array:
+        """Length of the position error, [...], µm."""
+        return np.linalg.norm(self.error_um, axis=-1)
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorBasis:
+    """First-order response of a batch of points to every parameter.
+
+    Attributes
+    ----------
+    keys : tuple of str, (K,)
+        Parameter keys.
+    nominal_mm : ndarray, [..., 3], mm
+        Nominal points in R.
+    position : ndarray, [K, ..., 3], µm per µm or µrad of amplitude
+        The curve of each parameter along its axis is folded in.
+    orientation : ndarray, [K, ..., 3], µrad per µm or µrad of amplitude
+    """
+
+    keys: tuple[str, ...]
+    nominal_mm: Array
+    position: Array
+    orientation: Array
+
+    def evaluate(self, amplitudes: Array) -> ErrorField:
+        """Add up the response to a vector of amplitudes.
+
+        Parameters
+        ----------
+        amplitudes : ndarray, [K], µm or µrad
+
+        Returns
+        -------
+        ErrorField
+        """
+        return ErrorField(
+            self.nominal_mm,
+            self._combine(amplitudes, self.position),
+            self._combine(amplitudes, self.orientation),
+        )
+
+    def _combine(self, amplitudes: Array, response: Array) -> Array:
+        """One matrix-vector product, [..., 3]."""
+        flat = response.reshape(len(self.keys), self.nominal_mm.size)
+        return (amplitudes @ flat).reshape(self.nominal_mm.shape)
+
+    def contributions(self, amplitudes: Array, index: tuple[int, ...] = ()) -> Array:
+        """Split the position error at one node into the parameters, [K, 3], µm."""
+        chosen = self.position[(slice(None), *index)]
+        return amplitudes[:, None] * chosen.reshape(len(self.keys), 3)
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """How errors are looked at: the loop, the frame of the result and the point held still.
+
+    Attributes
+    ----------
+    loop : Loop
+    frame : str
+        "machine" for results in R, "workpiece" for results in the nominal workpiece frame.
+    reference : mapping of str to float or None
+        Axis coordinates of the point whose position error is subtracted everywhere; None is
+        absolute. Orientation errors stay absolute.
+    """
+
+    loop: Loop = Loop.TOOL
+    frame: str = "machine"
+    reference: Mapping[str, float] | None = None
+
+
+def error_values(model: Model, errors: ErrorSet, coordinates: Coordinates) -> dict[str, Array]:
+    """Evaluate the error functions of a set at axis positions.
+
+    Parameters
+    ----------
+    model : Model
+    errors : ErrorSet
+    coordinates : mapping of str to ndarray, [...], mm or degrees
+
+    Returns
+    -------
+    dict of str to ndarray, [...], µm or µrad
+        Parameters whose axis the machine does not have are left out.
+    """
+    axes = model.machine.axes
+    return {
+        key: errors.evaluate(key, coordinates[parameter(key).axis])
+        for key in errors
+        if parameter(key).axis in axes
+    }
+
+
+def _result_rotation(model: Model, view: View, coordinates: Coordinates) -> Array | None:
+    """Rotation from R to the frame of the result, [..., 3, 3]; None for R itself."""
+    if view.frame == "machine":
+        return None
+    pose = branch_pose(model, "workpiece", coordinates)[..., :3, :3]
+    return np.swapaxes(pose, -1, -2)
+
+
+def _reference_point(
+    model: Model, view: View, coordinates: Coordinates
+) -> tuple[dict[str, Array], Array] | None:
+    """Coordinates and nominal tool point of the reference; None for an absolute view."""
+    if view.reference is None:
+        return None
+    held = {
+        name: np.asarray(view.reference[name]) if name in view.reference else values
+        for name, values in coordinates.items()
+    }
+    return held, nominal_point(model, Loop.TOOL, held)
+
+
+def build_basis(
+    model: Model,
+    errors: ErrorSet,
+    keys: Sequence[str],
+    coordinates: Coordinates,
+    view: View | None = None,
+    point_mm: Array | None = None,
+) -> ErrorBasis:
+    """Compute the first-order response to every parameter.
+
+    Parameters
+    ----------
+    model : Model
+    errors : ErrorSet
+        Gives the curve of each parameter along its axis; its amplitudes are not used.
+    keys : sequence of str, (K,)
+    coordinates : mapping of str to ndarray, [...], mm or degrees
+    view : View, optional
+    point_mm : ndarray, [..., 3], mm, optional
+        Nominal points in R; by default the functional point of the loop.
+
+    Returns
+    -------
+    ErrorBasis
+    """
+    view = view or View()
+    point = nominal_point(model, view.loop, coordinates) if point_mm is None else point_mm
+    position, orientation = _shaped_jacobian(model, errors, keys, coordinates, view, point)
+    reference = _reference_point(model, view, coordinates)
+    if reference is not None:
+        held, held_point = reference
+        position = position - _shaped_jacobian(model, errors, keys, held, view, held_point)[0]
+    rotation = _result_rotation(model, view, coordinates)
+    if rotation is not None:
+        position = transforms.rotate(rotation, position)
+        orientation = transforms.rotate(rotation, orientation)
+    nominal = np.broadcast_to(point, position.shape[1:])
+    return ErrorBasis(tuple(keys), nominal, position, orientation)
+
+
+def _shaped_jacobian(  # noqa: PLR0913 - the inputs of the Jacobian and the curves
+    model: Model,
+    errors: ErrorSet,
+    keys: Sequence[str],
+    coordinates: Coordinates,
+    view: View,
+    point: Array,
+) -> tuple[Array, Array]:
+    """Jacobian with the unit curve of each parameter folded in, [K, ..., 3] twice."""
+    position, orientation = jacobian(model, view.loop, keys, coordinates, point)
+    for index, key in enumerate(keys):
+        function = errors.functions.get(key)
+        if function is not None:
+            shape = function.shape(coordinates[parameter(key).axis])[..., None]
+            position[index] *= shape
+            orientation[index] *= shape
+    return position, orientation
+
+
+def amplitudes_of(errors: ErrorSet, keys: Sequence[str]) -> Array:
+    """Collect the amplitudes of a set in the order of the keys, [K], µm or µrad."""
+    return np.array([errors.amplitude(key) for key in keys], dtype=float)
+
+
+def evaluate_exact(
+    model: Model,
+    errors: ErrorSet,
+    coordinates: Coordinates,
+    view: View | None = None,
+    point_mm: Array | None = None,
+) -> ErrorField:
+    """Evaluate the field with the exact chain.
+
+    Parameters
+    ----------
+    model : Model
+    errors : ErrorSet
+    coordinates : mapping of str to ndarray, [...], mm or degrees
+    view : View, optional
+    point_mm : ndarray, [..., 3], mm, optional
+        Nominal points in R; by default the functional point of the loop.
+
+    Returns
+    -------
+    ErrorField
+    """
+    view = view or View()
+    point = nominal_point(model, view.loop, coordinates) if point_mm is None else point_mm
+    values = error_values(model, errors, coordinates)
+    error, orientation = exact_error(model, view.loop, coordinates, values, point)
+    reference = _reference_point(model, view, coordinates)
+    if reference is not None:
+        held, held_point = reference
+        held_values = error_values(model, errors, held)
+        error = error - exact_error(model, view.loop, held, held_values, held_point)[0]
+    rotation = _result_rotation(model, view, coordinates)
+    if rotation is not None:
+        error = transforms.rotate(rotation, error)
+        orientation = transforms.rotate(rotation, orientation)
+    shape = np.broadcast_shapes(error.shape, point.shape)
+    return ErrorField(
+        np.broadcast_to(point, shape),
+        np.broadcast_to(error, shape),
+        np.broadcast_to(orientation, shape),
+    )
+
+
+def evaluate_first_order(
+    model: Model,
+    errors: ErrorSet,
+    coordinates: Coordinates,
+    view: View | None = None,
+    point_mm: Array | None = None,
+) -> ErrorField:
+    """Evaluate the field with the first-order model; see `evaluate_exact` for the parameters."""
+    keys = tuple(key for key in errors if parameter(key).axis in model.machine.axes)
+    basis = build_basis(model, errors, keys, coordinates, view, point_mm)
+    return basis.evaluate(amplitudes_of(errors, keys))

@@ -1,0 +1,128 @@
+"""The working volume and the grid of axis positions laid over it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from warpspace.exceptions import OptionError
+from warpspace.kinematics.chain import nominal_point
+from warpspace.kinematics.model import Loop, Model
+from warpspace.machine.parameters import LINEAR_AXES
+from warpspace.units import Array
+
+MIN_NODES, MAX_NODES, DEFAULT_NODES = 2, 101, 21
+
+
+@dataclass(frozen=True, slots=True)
+class Workspace:
+    """Axis coordinates of the working volume, and the positions it is drawn at.
+
+    Attributes
+    ----------
+    ranges : mapping of str to tuple of float, (2,), mm or degrees
+        Lower and upper end per axis; equal where the axis stands still.
+    """
+
+    ranges: Mapping[str, tuple[float, float]]
+
+    @property
+    def positions(self) -> dict[str, float]:
+        """Position of the axes that stand still, the middle of those that move."""
+        return {axis: (low + high) / 2.0 for axis, (low, high) in self.ranges.items()}
+
+    def moved(self, positions: Mapping[str, float]) -> "Workspace":
+        """Give the workspace with some axes standing at other positions, mm or degrees."""
+        moved = {axis: (value, value) for axis, value in positions.items()}
+        return Workspace({**self.ranges, **moved})
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """Nodes of the working volume.
+
+    Attributes
+    ----------
+    coordinates : dict of str to ndarray, mm or degrees
+        Axis positions, shaped to broadcast to `shape`.
+    shape : tuple of int, (3,)
+        Nodes along x, y and z of the volume.
+    nominal_mm : ndarray, [nx, ny, nz, 3], mm
+        Nominal tool point in R at each node.
+    """
+
+    coordinates: dict[str, Array]
+    shape: tuple[int, int, int]
+    nominal_mm: Array
+
+    @property
+    def extent_mm(self) -> Array:
+        """Edge lengths of the nominal volume in R, [3], mm."""
+        return np.ptp(self.nominal_mm.reshape(-1, 3), axis=0)
+
+    @property
+    def longest_edge_mm(self) -> float:
+        """Longest edge of the nominal volume, mm."""
+        return float(self.extent_mm.max())
+
+
+def node_counts(nodes: int | Sequence[int]) -> tuple[int, int, int]:
+    """Check the number of nodes per axis.
+
+    Parameters
+    ----------
+    nodes : int or sequence of int, (3,)
+
+    Returns
+    -------
+    tuple of int, (3,)
+
+    Raises
+    ------
+    OptionError
+        If a count is outside 2 … 101.
+    """
+    counts = (nodes, nodes, nodes) if isinstance(nodes, int) else tuple(nodes)
+    if len(counts) != len(LINEAR_AXES) or any(not MIN_NODES <= n <= MAX_NODES for n in counts):
+        given = nodes if isinstance(nodes, int) else " × ".join(map(str, counts))
+        raise OptionError(f"grid: {given} nodes; expected {MIN_NODES} to {MAX_NODES} per axis")
+    return counts[0], counts[1], counts[2]
+
+
+def build_grid(
+    model: Model, workspace: Workspace, nodes: int | Sequence[int] = DEFAULT_NODES
+) -> Grid:
+    """Lay a grid over the working volume.
+
+    Parameters
+    ----------
+    model : Model
+    workspace : Workspace
+        Linear axes with a range are gridded; every other axis stands at its position.
+    nodes : int or sequence of int, (3,), optional
+        Nodes along X, Y and Z; an axis that stands still has one.
+
+    Returns
+    -------
+    Grid
+
+    Raises
+    ------
+    OptionError
+        If the number of nodes is out of range.
+    """
+    counts = node_counts(nodes)
+    positions = workspace.positions
+    coordinates = {name: np.asarray(positions.get(name, 0.0)) for name in model.machine.axes}
+    shape = [1, 1, 1]
+    for index, name in enumerate(LINEAR_AXES):
+        low, high = workspace.ranges.get(name, (0.0, 0.0))
+        if name not in model.machine.axes or low == high:
+            continue
+        shape[index] = counts[index]
+        along = [1, 1, 1]
+        along[index] = counts[index]
+        coordinates[name] = np.linspace(low, high, counts[index]).reshape(along)
+    full = (shape[0], shape[1], shape[2])
+    nominal = nominal_point(model, Loop.TOOL, coordinates)
+    return Grid(coordinates, full, np.broadcast_to(nominal, (*full, 3)).copy())

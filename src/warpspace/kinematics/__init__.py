@@ -1,0 +1,1 @@
+"""How errors travel along the kinematic chain: exactly, and to first order."""

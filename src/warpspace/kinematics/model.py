@@ -1,0 +1,87 @@
+"""What the kinematic functions work on: a machine, its functional points and its conventions."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from warpspace.exceptions import UnknownNameError
+from warpspace.machine.description import ORIGIN, Machine, Vector
+from warpspace.units import Array
+
+Coordinates = Mapping[str, Array]
+"""Axis letter to positions, [...]: mm for linear axes, **degrees** for rotary ones, broadcastable."""
+
+
+class Loop(StrEnum):
+    """Which structural loop an error is looked at through."""
+
+    TOOL = "tool"
+    WORKPIECE = "workpiece"
+    RELATIVE = "relative"
+
+
+class ComponentErrors(StrEnum):
+    """Where component errors sit: on the moving body, or in fixed directions before it."""
+
+    AFTER_MOTION = "after_motion"
+    BEFORE_MOTION = "before_motion"
+
+
+TOOL_AXIS: Vector = (0.0, 0.0, 1.0)
+"""Direction of the tool axis in the tool frame."""
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """A machine with the points and conventions its errors are evaluated with.
+
+    Attributes
+    ----------
+    machine : Machine
+    component_errors : ComponentErrors
+        Order of motion and component errors.
+    tool_point_mm : tuple of float, (3,), mm
+        Functional point in the tool frame.
+    workpiece_point_mm : tuple of float, (3,), mm
+        Functional point in the workpiece frame.
+    """
+
+    machine: Machine
+    component_errors: ComponentErrors = ComponentErrors.AFTER_MOTION
+    tool_point_mm: Vector = ORIGIN
+    workpiece_point_mm: Vector = ORIGIN
+
+
+def complete_coordinates(
+    machine: Machine, given: Mapping[str, ArrayLike], default: Mapping[str, float] | None = None
+) -> dict[str, Array]:
+    """Give every axis of the machine a position.
+
+    Parameters
+    ----------
+    machine : Machine
+    given : mapping of str to array_like, [...], mm or degrees
+        Positions by axis letter.
+    default : mapping of str to float, optional
+        Positions of the axes not given; zero where absent.
+
+    Returns
+    -------
+    dict of str to ndarray, [...], mm or degrees
+
+    Raises
+    ------
+    UnknownNameError
+        If an axis is given that the machine does not have.
+    """
+    for name in given:
+        if name not in machine.axes:
+            raise UnknownNameError("axis", name, machine.axes)
+    fallback = default or {}
+    return {
+        name: np.asarray(given.get(name, fallback.get(name, 0.0)), dtype=float)
+        for name in machine.axes
+    }

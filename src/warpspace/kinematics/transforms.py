@@ -1,0 +1,150 @@
+"""Batched kernels on homogeneous transformations.
+
+Every function takes and gives arrays whose leading dimensions are any batch shape; a transformation
+is [..., 4, 4] and acts on column vectors: ``T_parent_child`` takes child coordinates to parent.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from warpspace.units import Array
+
+_SMALL = 1e-9
+
+
+def translation(vector: ArrayLike) -> Array:
+    """Build pure translations.
+
+    Parameters
+    ----------
+    vector : array_like, [..., 3], mm
+
+    Returns
+    -------
+    ndarray, [..., 4, 4]
+    """
+    values = np.asarray(vector, dtype=float)
+    out = np.zeros((*values.shape[:-1], 4, 4))
+    out[..., range(4), range(4)] = 1.0
+    out[..., :3, 3] = values
+    return out
+
+
+def axis_rotation(index: int, angle_rad: ArrayLike) -> Array:
+    """Build rotations about a coordinate axis, right-hand rule.
+
+    Parameters
+    ----------
+    index : int
+        0, 1 or 2 for x, y or z.
+    angle_rad : array_like, [...], rad
+
+    Returns
+    -------
+    ndarray, [..., 3, 3]
+    """
+    angle = np.asarray(angle_rad, dtype=float)
+    j, k = (index + 1) % 3, (index + 2) % 3
+    out = np.zeros((*angle.shape, 3, 3))
+    out[..., index, index] = 1.0
+    cosine, sine = np.cos(angle), np.sin(angle)
+    out[..., j, j] = cosine
+    out[..., k, k] = cosine
+    out[..., k, j] = sine
+    out[..., j, k] = -sine
+    return out
+
+
+def skew(vector: ArrayLike) -> Array:
+    """Build the cross-product matrices, so that ``skew(a) @ b == a × b``.
+
+    Parameters
+    ----------
+    vector : array_like, [..., 3]
+
+    Returns
+    -------
+    ndarray, [..., 3, 3]
+    """
+    x, y, z = np.moveaxis(np.asarray(vector, dtype=float), -1, 0)
+    zero = np.zeros_like(x)
+    rows = [np.stack(row, -1) for row in ((zero, -z, y), (z, zero, -x), (-y, x, zero))]
+    return np.stack(rows, -2)
+
+
+def vector_rotation(rotation_rad: ArrayLike) -> Array:
+    """Build full rotations from rotation vectors (Rodrigues' formula).
+
+    Parameters
+    ----------
+    rotation_rad : array_like, [..., 3], rad
+        Direction is the axis of rotation, length the angle.
+
+    Returns
+    -------
+    ndarray, [..., 3, 3]
+    """
+    values = np.asarray(rotation_rad, dtype=float)
+    angle = np.linalg.norm(values, axis=-1)[..., None, None]
+    safe = np.where(angle < _SMALL, 1.0, angle)
+    first = np.where(angle < _SMALL, 1.0, np.sin(safe) / safe)
+    second = np.where(angle < _SMALL, 0.5, 2.0 * (np.sin(safe / 2.0) / safe) ** 2)
+    cross = skew(values)
+    return np.eye(3) + first * cross + second * (cross @ cross)
+
+
+def rigid(rotation: Array, position_mm: ArrayLike) -> Array:
+    """Join rotations and positions.
+
+    Parameters
+    ----------
+    rotation : ndarray, [..., 3, 3]
+    position_mm : array_like, [..., 3], mm
+
+    Returns
+    -------
+    ndarray, [..., 4, 4]
+    """
+    position = np.asarray(position_mm, dtype=float)
+    batch = np.broadcast_shapes(rotation.shape[:-2], position.shape[:-1])
+    out = np.zeros((*batch, 4, 4))
+    out[..., :3, :3] = rotation
+    out[..., :3, 3] = position
+    out[..., 3, 3] = 1.0
+    return out
+
+
+def inverse(transform: Array) -> Array:
+    """Invert rigid transformations, [..., 4, 4], without solving."""
+    turned = np.swapaxes(transform[..., :3, :3], -1, -2)
+    return rigid(turned, -rotate(turned, transform[..., :3, 3]))
+
+
+def apply(transform: Array, point_mm: ArrayLike) -> Array:
+    """Take points from child to parent coordinates.
+
+    Parameters
+    ----------
+    transform : ndarray, [..., 4, 4]
+    point_mm : array_like, [..., 3], mm
+
+    Returns
+    -------
+    ndarray, [..., 3], mm
+    """
+    return rotate(transform[..., :3, :3], point_mm) + transform[..., :3, 3]
+
+
+def rotate(rotation: Array, vector: ArrayLike) -> Array:
+    """Rotate vectors.
+
+    Parameters
+    ----------
+    rotation : ndarray, [..., 3, 3]
+    vector : array_like, [..., 3]
+
+    Returns
+    -------
+    ndarray, [..., 3]
+    """
+    return np.einsum("...ij,...j->...i", rotation, np.asarray(vector, dtype=float))

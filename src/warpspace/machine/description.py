@@ -1,0 +1,235 @@
+"""Description of a machine: its kinematic chain, frame offsets, travels and directions."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from warpspace.exceptions import ChainError, UnknownNameError
+from warpspace.machine.parameters import AXES, LINEAR_AXES, PARAMETERS, default_keys
+
+Vector = tuple[float, float, float]
+Range = tuple[float, float]
+
+ORIGIN: Vector = (0.0, 0.0, 0.0)
+FIXED_FRAMES = ("S", "t", "w")
+"""Frames without motion: spindle and tool at the end of the tool branch, workpiece of the other."""
+
+DEFAULT_TRAVEL: Mapping[str, Range] = {
+    **dict.fromkeys("XYZ", (-250.0, 250.0)),
+    **dict.fromkeys("AB", (-90.0, 90.0)),
+    "C": (0.0, 360.0),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Chain:
+    """Order of the axes from the workpiece through the frame to the tool.
+
+    Attributes
+    ----------
+    workpiece : tuple of str
+        Axes that carry the workpiece, from the frame outwards.
+    tool : tuple of str
+        Axes that carry the tool, from the frame outwards.
+    """
+
+    workpiece: tuple[str, ...]
+    tool: tuple[str, ...]
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """All axes of the machine in the order X Y Z A B C."""
+        present = {*self.workpiece, *self.tool}
+        return tuple(axis for axis in AXES if axis in present)
+
+    def __str__(self) -> str:
+        """Write the chain in its canonical spelling, for instance ``wCBFXYZt``."""
+        return f"w{''.join(reversed(self.workpiece))}F{''.join(self.tool)}t"
+
+
+def parse_chain(text: str) -> Chain:
+    """Read a kinematic chain written from the workpiece over the frame to the tool.
+
+    Parameters
+    ----------
+    text : str
+        For instance ``wCBFXYZt``, ``(w)CBFXYZ(t)`` or ``[w C' B' b X Y Z t]``. Brackets, primes,
+        blanks, hyphens and a small ``b`` for the frame are accepted.
+
+    Returns
+    -------
+    Chain
+
+    Raises
+    ------
+    ChainError
+        If it does not run from w to t over one frame with one to six different axes.
+    """
+    bare = re.sub(r"[\s()\[\]{}'’′\-–_]", "", text)  # noqa: RUF001 - primes as people type them
+    expected = "expected w, axes out of X Y Z A B C, F (or b), axes, t; for instance wCBFXYZt"
+    matched = re.fullmatch(r"[wW]([A-Z]*?)(b|F)([A-EG-Z]*)[tT]", bare)
+    if matched is None:
+        raise ChainError(f"chain {text!r} cannot be read; {expected}")
+    workpiece, _, tool = matched.groups()
+    axes = workpiece + tool
+    unknown = sorted({letter for letter in axes if letter not in AXES})
+    if unknown:
+        raise ChainError(f"chain {text!r} has unknown axis {', '.join(unknown)}; {expected}")
+    twice = sorted({letter for letter in axes if axes.count(letter) > 1})
+    if twice:
+        raise ChainError(f"chain {text!r} has axis {', '.join(twice)} twice; expected each once")
+    if not axes:
+        raise ChainError(f"chain {text!r} has no axis; expected one to six")
+    return Chain(tuple(reversed(workpiece)), tuple(tool))
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """One axis of motion.
+
+    Attributes
+    ----------
+    name : str
+        X Y Z (linear) or A B C (rotary, about x y z).
+    offset_mm : tuple of float, (3,)
+        Origin of its frame in the frame before it, mm.
+    travel : tuple of float, (2,)
+        Lower and upper end, mm or degrees.
+    direction : int
+        +1, or −1 for an axis that moves against its name.
+    """
+
+    name: str
+    offset_mm: Vector
+    travel: Range
+    direction: int = 1
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether it translates."""
+        return self.name in LINEAR_AXES
+
+    @property
+    def index(self) -> int:
+        """Index 0, 1 or 2 of the coordinate direction along or about which it moves."""
+        return AXES.index(self.name) % 3
+
+    @property
+    def unit(self) -> str:
+        """Unit of its position in files and on screen."""
+        return "mm" if self.is_linear else "°"
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """A machine tool as a rigid-body kinematic chain.
+
+    Attributes
+    ----------
+    chain : Chain
+        Order and side of the axes.
+    axes : mapping of str to Axis
+        The axes by name, in the order X Y Z A B C.
+    fixed_mm : mapping of str to tuple of float, (3,)
+        Origins of S (spindle) and t (tool) at the end of the tool branch, and w (workpiece) at the
+        end of the workpiece branch, each in the frame before it, mm.
+    name, title : str
+        Short name and full name.
+    body_dir : str
+        Folder with the schematic bodies, empty where there are none.
+    """
+
+    chain: Chain
+    axes: Mapping[str, Axis]
+    fixed_mm: Mapping[str, Vector] = field(default_factory=dict[str, Vector])
+    name: str = "machine"
+    title: str = ""
+    body_dir: str = ""
+
+    def axis(self, name: str) -> Axis:
+        """Look up an axis by its letter.
+
+        Raises
+        ------
+        UnknownNameError
+            If the machine has no such axis.
+        """
+        try:
+            return self.axes[name]
+        except KeyError:
+            raise UnknownNameError("axis", name, self.axes) from None
+
+    def branch(self, side: str) -> tuple[Axis, ...]:
+        """List the axes of a branch, from the frame outwards.
+
+        Parameters
+        ----------
+        side : str
+            "tool" or "workpiece".
+        """
+        names = self.chain.tool if side == "tool" else self.chain.workpiece
+        return tuple(self.axes[name] for name in names)
+
+    def end_offsets_mm(self, side: str) -> tuple[Vector, ...]:
+        """List the fixed offsets behind the last axis of a branch, mm."""
+        names = ("S", "t") if side == "tool" else ("w",)
+        return tuple(self.fixed_mm.get(name, ORIGIN) for name in names)
+
+    @property
+    def parameter_keys(self) -> tuple[str, ...]:
+        """Keys of the error parameters the machine has by default."""
+        return default_keys(self.chain.axes)
+
+    @property
+    def allowed_keys(self) -> tuple[str, ...]:
+        """Keys of all parameters that may be given, every constant of every axis included."""
+        return tuple(key for key, row in PARAMETERS.items() if row.axis in self.axes)
+
+
+def build_machine(
+    chain: str | Chain,
+    *,
+    offset_mm: Mapping[str, Vector] | None = None,
+    travel: Mapping[str, Range] | None = None,
+    direction: Mapping[str, int] | None = None,
+    name: str = "machine",
+    title: str = "",
+    body_dir: str = "",
+) -> Machine:
+    """Put a machine together from its chain and the tables that go with it.
+
+    Parameters
+    ----------
+    chain : str or Chain
+        Order of the axes, for instance ``wCBFXYZt``.
+    offset_mm : mapping of str to tuple of float, (3,), optional
+        Origin of each frame (axes, S, t, w) in the frame before it, mm. Absent is zero.
+    travel : mapping of str to tuple of float, (2,), optional
+        Lower and upper end of each axis, mm or degrees.
+    direction : mapping of str to int, optional
+        +1 or −1; absent is +1.
+    name, title, body_dir : str, optional
+        Short name, full name, folder of the schematic bodies.
+
+    Returns
+    -------
+    Machine
+
+    Raises
+    ------
+    ChainError
+        If the chain cannot be read.
+    """
+    parsed = parse_chain(chain) if isinstance(chain, str) else chain
+    offsets, travels, directions = offset_mm or {}, travel or {}, direction or {}
+    axes = {
+        axis: Axis(
+            axis,
+            offsets.get(axis, ORIGIN),
+            travels.get(axis, DEFAULT_TRAVEL[axis]),
+            directions.get(axis, 1),
+        )
+        for axis in parsed.axes
+    }
+    fixed = {frame: offsets.get(frame, ORIGIN) for frame in FIXED_FRAMES}
+    return Machine(parsed, axes, fixed, name, title or name, body_dir)

@@ -1,0 +1,310 @@
+"""From a raw document to a scene: every section validated, everything cross-checked."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from warpspace.exceptions import ChainError, SceneError
+from warpspace.field.grid import Workspace
+from warpspace.kinematics.model import ComponentErrors, Model
+from warpspace.machine import errors as functions
+from warpspace.machine.description import (
+    FIXED_FRAMES,
+    Machine,
+    build_machine,
+    parse_chain,
+)
+from warpspace.machine.parameters import AXES, LINEAR_AXES, PARAMETERS
+from warpspace.machine.tolerances import TOLERANCE_CLASSES, Tolerance, ToleranceSet
+from warpspace.scene import schema
+from warpspace.scene.files import read_csv_column
+from warpspace.scene.model import Scene
+from warpspace.scene.sections import Problems
+
+SECTIONS = (
+    "title",
+    "description",
+    "machine",
+    "convention",
+    "workspace",
+    "points_mm",
+    "errors",
+    "tolerances",
+    "view",
+)
+Raw = Mapping[str, object]
+
+
+def build_scene(
+    raw: Raw, name: str, source: str, machine: Machine | None, folder: Path | None
+) -> Scene:
+    """Build a scene from a parsed document.
+
+    Parameters
+    ----------
+    raw : mapping of str to object
+        The document.
+    name : str
+        Name of the scene.
+    source : str
+        What the document is called in messages.
+    machine : Machine or None
+        The machine the document names; None where it is inline.
+    folder : Path or None
+        Folder that CSV names are relative to; None where CSV files are not allowed.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    SceneError
+        With all problems of the document.
+    """
+    problems = Problems()
+    for key in raw:
+        if key not in SECTIONS:
+            problems.unknown("", key, SECTIONS, "key")
+    if machine is None:
+        machine = machine_of(raw.get("machine"), "machine", name, problems)
+    if machine is None:
+        _check_names(raw, problems)
+        raise SceneError(source, problems.lines or ["machine: is missing"])
+    texts = {
+        key: problems.validate("text", key, raw[key])
+        for key in ("title", "description")
+        if key in raw
+    }
+    convention = problems.validate("convention", "convention", raw.get("convention", {}))
+    points = problems.validate("points_mm", "points_mm", raw.get("points_mm", {}))
+    view = problems.validate("view", "view", raw.get("view", {}))
+    workspace = _workspace(problems.table("workspace", raw.get("workspace")), machine, problems)
+    errors = _errors(raw.get("errors"), machine, workspace, folder, problems)
+    tolerances = _tolerances(raw.get("tolerances"), machine, problems)
+    reference = _reference(view, machine, problems)
+    if problems.lines:
+        raise SceneError(source, problems.lines)
+    model = Model(
+        machine, ComponentErrors(convention.component_errors), points.tool, points.workpiece
+    )
+    return Scene(
+        name=name,
+        title=texts.get("title") or name,
+        model=model,
+        workspace=workspace,
+        errors=errors,
+        tolerances=tolerances,
+        trace_points_mm=tuple(points.traces),
+        exaggeration=None if view.exaggeration == "auto" else float(view.exaggeration),
+        reference=reference,
+        description=texts.get("description") or "",
+        notes=_notes(machine, workspace),
+    )
+
+
+def machine_of(
+    raw: object, key: str, name: str, problems: Problems, body_dir: str = ""
+) -> Machine | None:
+    """Build a machine from its table; note problems and give None where it cannot be.
+
+    Parameters
+    ----------
+    raw : object
+        The table.
+    key : str
+        Where it stands; empty for a file of its own.
+    name : str
+        Name of the machine.
+    problems : Problems
+    body_dir : str, optional
+        Folder of the machine's schematic bodies.
+    """
+    if raw is None:
+        problems.add(key, 'is missing; expected a machine name or a [machine] table with "chain"')
+        return None
+    section = problems.validate("machine", key, raw)
+    if section is None:
+        return None
+    prefix = f"{key}." if key else ""
+    try:
+        chain = parse_chain(section.chain)
+    except ChainError as error:
+        problems.add(f"{prefix}chain", str(error))
+        return None
+    for part, known in (
+        ("offset_mm", (*chain.axes, *FIXED_FRAMES)),
+        ("travel", chain.axes),
+        ("direction", chain.axes),
+    ):
+        for axis in getattr(section, part):
+            if axis not in known:
+                problems.unknown(f"{prefix}{part}", axis, known, "frame of this machine")
+    return build_machine(
+        chain,
+        offset_mm=section.offset_mm,
+        travel=section.travel,
+        direction=section.direction,
+        name=name,
+        title=section.title or name,
+        body_dir=body_dir,
+    )
+
+
+def _check_names(raw: Raw, problems: Problems) -> None:
+    """Check what can be checked of a document whose machine is unusable."""
+    for key in problems.table("errors", raw.get("errors")):
+        if key not in PARAMETERS:
+            problems.unknown("errors", key, PARAMETERS, "error parameter")
+
+
+def _workspace(raw: Raw, machine: Machine, problems: Problems) -> Workspace:
+    """Read the working volume; an axis that is not given has its travel, a rotary one zero."""
+    ranges = {
+        name: axis.travel if axis.is_linear else (0.0, 0.0) for name, axis in machine.axes.items()
+    }
+    for name, value in raw.items():
+        key = f"workspace.{name}"
+        if name not in machine.axes:
+            problems.unknown("workspace", name, machine.axes, "axis of this machine")
+        elif (valid := problems.validate("range", key, value)) is not None:
+            if isinstance(valid, tuple) and name not in LINEAR_AXES:
+                problems.add(key, "expected one position in degrees for a rotary axis", value)
+            else:
+                ranges[name] = valid if isinstance(valid, tuple) else (valid, valid)
+    return Workspace(ranges)
+
+
+def _known_parameters(raw: object, section: str, machine: Machine, problems: Problems) -> Raw:
+    """Give the entries of a table whose keys are parameters of the machine."""
+    known: dict[str, object] = {}
+    for key, value in problems.table(section, raw).items():
+        if section == "tolerances" and key == "default":
+            continue
+        if key not in PARAMETERS:
+            problems.unknown(section, key, machine.allowed_keys, "error parameter")
+        elif key not in machine.allowed_keys:
+            axis = PARAMETERS[key].axis
+            problems.add(f"{section}.{key}", f"the machine {machine.chain} has no axis {axis}")
+        else:
+            known[key] = value
+    return known
+
+
+def _errors(
+    raw: object, machine: Machine, workspace: Workspace, folder: Path | None, problems: Problems
+) -> functions.ErrorSet:
+    """Read the error functions, each over the range of its axis."""
+    found: dict[str, functions.ErrorFunction] = {}
+    for key, value in _known_parameters(raw, "errors", machine, problems).items():
+        where = f"errors.{key}"
+        spec = problems.validate("error", where, value)
+        if spec is None:
+            continue
+        row = PARAMETERS[key]
+        if row.is_constant and not isinstance(spec, float | int):
+            problems.add(where, "is constant along its axis; expected a number", value)
+            continue
+        low, high = workspace.ranges[row.axis]
+        span = (low, high) if low < high else machine.axes[row.axis].travel
+        function = _function(spec, span, where, folder, problems)
+        if function is None:
+            continue
+        peak = function.amplitude
+        if not abs(peak) <= schema.MAX_ERROR:
+            problems.add(
+                where,
+                f"reaches {peak:g} {row.unit} within {span[0]:g} … {span[1]:g};"
+                f" expected at most ±{schema.MAX_ERROR:g}",
+            )
+        found[key] = function
+    return functions.ErrorSet(found)
+
+
+def _function(
+    spec: Any,  # noqa: ANN401 - one of the specs of the schema
+    span: tuple[float, float],
+    where: str,
+    folder: Path | None,
+    problems: Problems,
+) -> functions.ErrorFunction | None:
+    """Build one error function from its validated spelling."""
+    match spec:
+        case float() | int():
+            return functions.Constant(span, float(spec))
+        case schema.RampSpec():
+            return functions.Ramp(span, spec.ramp)
+        case schema.PolySpec():
+            return functions.Poly(span, tuple(spec.poly))
+        case schema.HarmonicsSpec():
+            return functions.Harmonics(span, tuple(spec.harmonics))
+        case schema.TableSpec():
+            return functions.Table(span, tuple(spec.table))
+        case _:
+            return _csv_table(spec, span, where, folder, problems)
+
+
+def _csv_table(
+    spec: schema.CsvSpec,
+    span: tuple[float, float],
+    where: str,
+    folder: Path | None,
+    problems: Problems,
+) -> functions.ErrorFunction | None:
+    """Read the CSV column an error follows."""
+    if folder is None:
+        problems.add(where, "CSV files are not read here; expected the values as { table = }")
+        return None
+    try:
+        points = read_csv_column(folder / spec.csv, spec.column, schema.MAX_ERROR)
+    except SceneError as error:
+        for problem in error.problems:
+            problems.add(where, f"{error.source}: {problem}")
+        return None
+    return functions.Table(span, tuple(points))
+
+
+def _tolerances(raw: object, machine: Machine, problems: Problems) -> ToleranceSet:
+    """Read the tolerance set."""
+    table = problems.table("tolerances", raw)
+    default: dict[str, float] = {}
+    if "default" in table:
+        section = problems.validate("default", "tolerances.default", table["default"])
+        if section is not None:
+            values = {name: getattr(section, name) for name in TOLERANCE_CLASSES}
+            default = {name: value for name, value in values.items() if value is not None}
+    own: dict[str, Tolerance] = {}
+    for key, value in _known_parameters(table, "tolerances", machine, problems).items():
+        valid = problems.validate("tolerance", f"tolerances.{key}", value)
+        if valid is not None:
+            narrow = isinstance(valid, float | int)
+            own[key] = (
+                Tolerance(0.0, float(valid)) if narrow else Tolerance(valid.centre, valid.half_width)
+            )
+    return ToleranceSet(default, own)
+
+
+def _reference(view: Any, machine: Machine, problems: Problems) -> dict[str, float] | None:  # noqa: ANN401
+    """Read the point held still."""
+    if view is None or view.reference == "absolute":
+        return None
+    for axis in view.reference:
+        if axis not in machine.axes:
+            problems.unknown("view.reference", axis, machine.axes, "axis of this machine")
+    return dict(view.reference)
+
+
+def _notes(machine: Machine, workspace: Workspace) -> tuple[str, ...]:
+    """Remark on axes that are drawn outside their travel."""
+    notes: list[str] = []
+    for name in (axis for axis in AXES if axis in machine.axes):
+        (low, high), (first, last) = workspace.ranges[name], machine.axes[name].travel
+        if low < first or high > last:
+            unit = machine.axes[name].unit
+            notes.append(
+                f"workspace.{name} {low:g} … {high:g} {unit} reaches beyond the travel"
+                f" {first:g} … {last:g} {unit}"
+            )
+    return tuple(notes)
+
+

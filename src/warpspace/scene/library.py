@@ -1,0 +1,141 @@
+"""Finding scenes and machines: bundled by name, or any file by path."""
+
+from pathlib import Path
+
+from warpspace.exceptions import SceneError, near_miss
+from warpspace.machine.description import Machine
+from warpspace.resources import assets_dir, scenes_dir
+from warpspace.scene.build import build_scene, machine_of
+from warpspace.scene.files import MAX_SCENE_BYTES, parse_toml, read_text
+from warpspace.scene.model import Scene
+from warpspace.scene.sections import Problems
+
+
+def scene_names() -> tuple[str, ...]:
+    """List the bundled scenes, the reference machine's first."""
+    return tuple(sorted((path.stem for path in scenes_dir().glob("*.toml")), key=_order))
+
+
+def _order(name: str) -> tuple[bool, str]:
+    """Sort the teaching scenes behind the machine's."""
+    return (not name.startswith("dvf"), name)
+
+
+def machine_names() -> tuple[str, ...]:
+    """List the bundled machines."""
+    return tuple(sorted(path.parent.name for path in assets_dir().glob("machines/*/machine.toml")))
+
+
+def load_machine(name: str, source: str = "") -> Machine:
+    """Load a bundled machine.
+
+    Parameters
+    ----------
+    name : str
+        Name of a folder below ``assets/machines``.
+    source : str, optional
+        File that names it, for messages.
+
+    Returns
+    -------
+    Machine
+
+    Raises
+    ------
+    SceneError
+        If there is no such machine or its file has problems.
+    """
+    if name not in machine_names():
+        problem = f"machine = {name!r}: unknown machine{near_miss(name, machine_names())}"
+        raise SceneError(source or name, [problem])
+    folder = assets_dir() / "machines" / name
+    path = folder / "machine.toml"
+    raw = parse_toml(read_text(path, MAX_SCENE_BYTES), str(path))
+    problems = Problems()
+    machine = machine_of(raw, "", name, problems, body_dir=str(folder))
+    if machine is None or problems.lines:
+        raise SceneError(str(path), problems.lines)
+    return machine
+
+
+def scene_path(name_or_path: str | Path) -> Path:
+    """Find the file of a scene.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        A bundled name, or the path of a file.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    SceneError
+        If it is neither; the message names the near misses.
+    """
+    text = str(name_or_path)
+    if text in scene_names():
+        return scenes_dir() / f"{text}.toml"
+    path = Path(name_or_path)
+    try:
+        exists = path.exists()
+    except (OSError, ValueError):
+        exists = False
+    if not exists:
+        names = scene_names()
+        hint = near_miss(text, names) or f"; bundled scenes: {', '.join(names)}"
+        raise SceneError(text or "''", [f"no such scene or file{hint}"])
+    return path
+
+
+def load_scene(name_or_path: str | Path) -> Scene:
+    """Load a scene by its bundled name or its path.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    SceneError
+        With every problem of the file: key, value and what was expected.
+    """
+    path = scene_path(name_or_path)
+    return parse_scene(read_text(path, MAX_SCENE_BYTES), path.stem, str(path), path.parent)
+
+
+def parse_scene(
+    text: str, name: str, source: str | None = None, folder: Path | None = None
+) -> Scene:
+    """Build a scene from TOML text, for instance an upload.
+
+    Parameters
+    ----------
+    text : str
+    name : str
+        Name of the scene.
+    source : str, optional
+        What the text is called in messages.
+    folder : Path, optional
+        Folder that CSV names are relative to; without it CSV files are refused.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    SceneError
+        With every problem of the text.
+    """
+    source = source or name
+    raw = parse_toml(text, source)
+    given = raw.get("machine")
+    machine = load_machine(given, source) if isinstance(given, str) else None
+    return build_scene(raw, name, source, machine, folder)

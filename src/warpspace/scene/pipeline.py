@@ -1,0 +1,160 @@
+"""The whole flow in one screenful: scene → coordinates → basis or exact chain → field → numbers."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from warpspace.analysis.statistics import Statistics, statistics
+from warpspace.exceptions import OptionError
+from warpspace.field.evaluate import (
+    ErrorBasis,
+    ErrorField,
+    View,
+    build_basis,
+    evaluate_exact,
+    evaluate_first_order,
+)
+from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid
+from warpspace.kinematics.model import Loop, complete_coordinates
+from warpspace.scene.model import Scene
+
+FRAMES = ("machine", "workpiece")
+
+
+@dataclass(frozen=True, slots=True)
+class ScenePicture:
+    """A scene evaluated over its grid: all that a picture of it is drawn from.
+
+    Attributes
+    ----------
+    scene : Scene
+    grid : Grid
+    field : ErrorField
+    statistics : Statistics
+    view : View
+    """
+
+    scene: Scene
+    grid: Grid
+    field: ErrorField
+    statistics: Statistics
+    view: View
+
+
+def evaluate(  # noqa: PLR0913 - keyword-only choices of a user
+    scene: Scene,
+    *,
+    at: Mapping[str, ArrayLike] | None = None,
+    grid: int | Sequence[int] | None = None,
+    loop: Loop | str = Loop.TOOL,
+    exact: bool = False,
+    frame: str = "machine",
+) -> ErrorField:
+    """Evaluate the error field of a scene at points or over the grid of its working volume.
+
+    Parameters
+    ----------
+    scene : Scene
+    at : mapping of str to array_like, [...], mm or degrees, optional
+        Axis positions; an axis that is not given stands at its position in the scene's workspace,
+        the middle of a range. Without it the grid is evaluated.
+    grid : int or sequence of int, (3,), optional
+        Nodes per axis of the working volume; 21 by default.
+    loop : Loop or str, optional
+        "tool", "workpiece" or "relative". At points the workpiece loop takes the scene's functional
+        workpiece point; over the grid the workpiece points that nominally coincide with the nodes.
+    exact : bool, optional
+        Full rotations and all products instead of the first order.
+    frame : str, optional
+        "machine" for results in R, "workpiece" for the nominal workpiece frame.
+
+    Returns
+    -------
+    ErrorField
+        Arrays of shape [..., 3], the batch being that of `at` or of the grid.
+
+    Raises
+    ------
+    OptionError, UnknownNameError
+        If an argument names something that does not exist.
+    """
+    if at is not None and grid is not None:
+        raise OptionError("give either points (at) or a grid, not both")
+    view = choose_view(scene, loop, frame)
+    solve = evaluate_exact if exact else evaluate_first_order
+    if at is not None:
+        given = complete_coordinates(scene.machine, at, scene.workspace.positions)
+        return solve(scene.model, scene.errors, given, view)
+    nodes = build_grid(scene.model, scene.workspace, DEFAULT_NODES if grid is None else grid)
+    return solve(scene.model, scene.errors, nodes.coordinates, view, nodes.nominal_mm)
+
+
+def choose_view(scene: Scene, loop: Loop | str, frame: str = "machine") -> View:
+    """Build a view of a scene from a user's words.
+
+    Raises
+    ------
+    OptionError
+        If the loop or the frame does not exist.
+    """
+    if loop not in [*Loop]:
+        raise OptionError(f"loop {loop!r}; expected one of {', '.join(Loop)}")
+    if frame not in FRAMES:
+        raise OptionError(f"frame {frame!r}; expected one of {', '.join(FRAMES)}")
+    return scene.view(Loop(loop), frame)
+
+
+def grid_basis(scene: Scene, grid: Grid, view: View | None = None) -> ErrorBasis:
+    """Compute the response of every node of a grid to every parameter of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    grid : Grid
+    view : View, optional
+        The tool loop by default.
+
+    Returns
+    -------
+    ErrorBasis
+    """
+    return build_basis(
+        scene.model,
+        scene.errors,
+        scene.parameter_keys,
+        grid.coordinates,
+        view or scene.view(),
+        grid.nominal_mm,
+    )
+
+
+def evaluate_picture(
+    scene: Scene, *, grid: int = DEFAULT_NODES, loop: Loop | str = Loop.TOOL
+) -> ScenePicture:
+    """Evaluate all that a picture of a scene is drawn from.
+
+    Parameters
+    ----------
+    scene : Scene
+    grid : int, optional
+        Nodes per axis.
+    loop : Loop or str, optional
+
+    Returns
+    -------
+    ScenePicture
+    """
+    view = choose_view(scene, loop)
+    nodes = build_grid(scene.model, scene.workspace, grid)
+    field = evaluate_first_order(
+        scene.model, scene.errors, nodes.coordinates, view, nodes.nominal_mm
+    )
+    return ScenePicture(scene, nodes, field, statistics(field), view)
+
+
+def linearisation_error_um(scene: Scene, grid: int = DEFAULT_NODES) -> float:
+    """Largest difference between the exact chain and the first order over the grid, µm."""
+    exact = evaluate(scene, grid=grid, exact=True)
+    return float(np.abs(exact.error_um - evaluate(scene, grid=grid).error_um).max())
