@@ -1,0 +1,1 @@
+"""Geometry of the pictures, numpy only: both renderers draw what is computed here."""

@@ -1,0 +1,146 @@
+"""Colour scales: numbers to colours, the same in the browser and in the figures."""
+
+import math
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from cmap import Colormap
+from numpy.typing import NDArray
+
+from warpspace.exceptions import OptionError
+from warpspace.units import MICROMETRE, Array
+
+SEQUENTIAL = "viridis"
+DIVERGING = "crameri:vik"
+COMPONENTS = ("norm", "x", "y", "z")
+_STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
+_INTERVALS = 10
+LEVELS = 256
+Bytes = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True)
+class ColourScale:
+    """A colour map over a range of values.
+
+    Attributes
+    ----------
+    low, high : float
+        Values at the ends, in `unit`.
+    diverging : bool
+        Whether it has a neutral middle (signed values) rather than a dark end (lengths).
+    label : str
+        What the values are.
+    unit : str
+    """
+
+    low: float
+    high: float
+    diverging: bool = False
+    label: str = "|E|"
+    unit: str = MICROMETRE
+
+    @property
+    def name(self) -> str:
+        """Name of the colour map."""
+        return DIVERGING if self.diverging else SEQUENTIAL
+
+    def colours(self, values: Array) -> Bytes:
+        """Map values to colours.
+
+        Parameters
+        ----------
+        values : ndarray, [...]
+            Values beyond the ends take the colour of the end.
+
+        Returns
+        -------
+        ndarray of uint8, [..., 3]
+            sRGB.
+        """
+        table = _table(self.name)
+        return table[np.rint(self.fraction(values) * (LEVELS - 1)).astype(np.intp)]
+
+    def fraction(self, values: Array) -> Array:
+        """Place values on the scale, 0 at the low and 1 at the high end, clipped."""
+        return np.clip((np.asarray(values) - self.low) / (self.high - self.low), 0.0, 1.0)
+
+    @property
+    def ticks(self) -> tuple[float, ...]:
+        """Round values to label, from the low to the high end."""
+        step = nice_step(self.high - self.low)
+        first, last = math.ceil(self.low / step - 1e-9), math.floor(self.high / step + 1e-9)
+        return tuple(round(step * i, 12) for i in range(first, last + 1))
+
+
+@cache
+def _table(name: str) -> Bytes:
+    """The colours of a map, [256, 3]."""
+    return (np.asarray(Colormap(name).lut(LEVELS))[:, :3] * 255.0 + 0.5).astype(np.uint8)
+
+
+def colour_table(*, diverging: bool = False) -> Bytes:
+    """Give the colours of a scale from its low to its high end, [256, 3] of uint8, sRGB."""
+    return _table(DIVERGING if diverging else SEQUENTIAL)
+
+
+def nice_step(span: float) -> float:
+    """Choose a round step (1, 2, 2.5, 5 × 10ⁿ) that divides a span into at most ten."""
+    raw = span / _INTERVALS
+    decade = 10.0 ** math.floor(math.log10(raw))
+    return next(step * decade for step in _STEPS if step * decade >= raw * (1.0 - 1e-9))
+
+
+def component_values(error: Array, component: str) -> Array:
+    """Pick what a map shows of an error.
+
+    Parameters
+    ----------
+    error : ndarray, [..., 3], µm or µrad
+    component : str
+        "norm", "x", "y" or "z".
+
+    Returns
+    -------
+    ndarray, [...]
+
+    Raises
+    ------
+    OptionError
+        If there is no such component.
+    """
+    if component not in COMPONENTS:
+        raise OptionError(f"component {component!r}; expected one of {', '.join(COMPONENTS)}")
+    if component == "norm":
+        return np.linalg.norm(error, axis=-1)
+    return error[..., "xyz".index(component)]
+
+
+def build_scale(
+    largest: float, component: str, *, quantity: str = "E", unit: str = MICROMETRE
+) -> ColourScale:
+    """Choose a scale with round ends for values up to a largest magnitude.
+
+    Parameters
+    ----------
+    largest : float
+        Largest magnitude to show; of several maps where they are compared.
+    component : str
+        "norm" gives a sequential scale from zero, a signed component a symmetric diverging one.
+    quantity : str, optional
+        Symbol of what is shown.
+    unit : str, optional
+
+    Returns
+    -------
+    ColourScale
+        From 0 to 1 (or −1 to 1) where everything is zero.
+    """
+    top = 1.0
+    if math.isfinite(largest) and largest > 0.0:
+        step = nice_step(largest if component == "norm" else 2.0 * largest)
+        top = step * math.ceil(largest / step * (1.0 - 1e-9))
+    if component == "norm":
+        return ColourScale(0.0, top, diverging=False, label=f"|{quantity}|", unit=unit)
+    return ColourScale(-top, top, diverging=True, label=f"{quantity}_{component}", unit=unit)

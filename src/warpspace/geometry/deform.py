@@ -1,0 +1,68 @@
+"""Exaggerated displacement: the one place where errors become something to look at."""
+
+import math
+
+import numpy as np
+
+from warpspace.units import MM_PER_UM, Array
+
+TARGET_FRACTION = 0.1
+"""Largest displacement on screen, as a fraction of the volume's longest edge, that auto aims at."""
+NEUTRAL_EXAGGERATION = 1000.0
+"""What auto chooses where nothing is displaced."""
+MAX_EXAGGERATION = 1e6
+_ROUND = (1.0, 2.0, 5.0, 10.0)
+
+
+def deform(nominal_mm: Array, error_um: Array, exaggeration: float) -> Array:
+    """Displace points by their exaggerated error.
+
+    Parameters
+    ----------
+    nominal_mm : ndarray, [..., 3], mm
+    error_um : ndarray, [..., 3], µm
+    exaggeration : float
+        Display factor; 1 is true scale.
+
+    Returns
+    -------
+    ndarray, [..., 3], mm
+        Where the points are drawn.
+    """
+    return nominal_mm + (exaggeration * MM_PER_UM) * error_um
+
+
+def auto_exaggeration(largest_um: float, longest_edge_mm: float) -> float:
+    """Choose a round display factor.
+
+    Parameters
+    ----------
+    largest_um : float, µm
+        Largest displacement.
+    longest_edge_mm : float, mm
+        Longest edge of the volume.
+
+    Returns
+    -------
+    float
+        The number 1, 2 or 5 × 10ⁿ nearest (in ratio) to the one that makes the largest displacement
+        a tenth of the longest edge; 1000 where nothing is displaced.
+    """
+    if not largest_um > 0.0 or not longest_edge_mm > 0.0:
+        return NEUTRAL_EXAGGERATION
+    wanted = TARGET_FRACTION * longest_edge_mm / (largest_um * MM_PER_UM)
+    wanted = min(max(wanted, 1.0), MAX_EXAGGERATION)
+    decade = 10.0 ** math.floor(math.log10(wanted))
+    return min((step * decade for step in _ROUND), key=lambda value: abs(math.log(value / wanted)))
+
+
+def round_down(value: float) -> float:
+    """Give the largest 1, 2 or 5 × 10ⁿ that is not above a positive value (scale bars)."""
+    decade = 10.0 ** math.floor(math.log10(value))
+    return max(step * decade for step in _ROUND if step * decade <= value * (1.0 + 1e-9))
+
+
+def bounds_mm(*points_mm: Array) -> Array:
+    """Give the box around sets of points, [2, 3], mm: lower and upper corner."""
+    flat = np.concatenate([points.reshape(-1, 3) for points in points_mm])
+    return np.stack([flat.min(axis=0), flat.max(axis=0)])
