@@ -89,6 +89,6 @@ def near_miss(name: str, known: Iterable[str]) -> str:
     close = get_close_matches(name.casefold(), folded, n=2, cutoff=0.6)
     if close:
         return ": did you mean " + " or ".join(repr(folded[match]) for match in close) + "?"
-    if 0 < len(names) <= 24:  # noqa: PLR2004 - a list that still fits a line
+    if 0 < len(names) <= 24:
         return "; expected one of " + ", ".join(names)
     return ""

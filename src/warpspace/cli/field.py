@@ -41,7 +41,7 @@ COLUMNS = (
 )
 @click.option("--csv", "csv_path", type=click.Path(), help="Write the points to this CSV file.")
 @json_option
-def field(  # noqa: PLR0913 - the options of the command
+def field(
     scene: str,
     points: tuple[str, ...],
     grid: int | None,
@@ -72,23 +72,17 @@ def field(  # noqa: PLR0913 - the options of the command
     if as_json:
         print_json({"points": _rows(axes, result), "statistics": asdict(summary)})
         return
-    rows = _rows(axes, result)
     click.echo(f"{loaded.title} · {loop} loop · {'exact' if exact else 'first order'}")
-    for row in rows[:MAX_LISTED] if points else []:
-        at = " ".join(f"{name}={value:g}" for name, value in row["axes"].items())
-        error = ", ".join(f"{value:+.3f}" for value in row["error_um"])
-        tilt = ", ".join(f"{value:+.3f}" for value in row["orientation_urad"])
-        click.echo(f"  {at}: ({error}) µm, |E| {row['norm_um']:.3f} µm, tilt ({tilt}) µrad")
-    if points and len(rows) > MAX_LISTED:
-        click.echo(f"  … {len(rows) - MAX_LISTED} more; --csv or --json has all")
+    if points:
+        _list_points(axes, result)
     worst = ", ".join(f"{value:g}" for value in summary.max_at_mm)
     click.echo(
-        f"  {len(rows)} points: mean {summary.mean_um:.2f}, RMS {summary.rms_um:.2f},"
+        f"  {result.norm_um.size} points: mean {summary.mean_um:.2f}, RMS {summary.rms_um:.2f},"
         f" P95 {summary.p95_um:.2f}, max {summary.max_um:.2f} µm at ({worst}) mm"
     )
 
 
-def _evaluate(  # noqa: PLR0913 - what a user chose
+def _evaluate(
     scene: "Scene",
     points: tuple[str, ...],
     grid: int | None,
@@ -147,6 +141,18 @@ def _rows(axes: "dict[str, Array]", result: "ErrorField") -> list[dict[str, obje
             strict=True,
         )
     ]
+
+
+def _list_points(axes: "dict[str, Array]", result: "ErrorField") -> None:
+    """Print the first points, one line each."""
+    norm = result.norm_um
+    for index in range(min(norm.size, MAX_LISTED)):
+        at = " ".join(f"{name}={values[index]:g}" for name, values in axes.items())
+        error = ", ".join(f"{value:+.3f}" for value in result.error_um[index])
+        tilt = ", ".join(f"{value:+.3f}" for value in result.orientation_urad[index])
+        click.echo(f"  {at}: ({error}) µm, |E| {norm[index]:.3f} µm, tilt ({tilt}) µrad")
+    if norm.size > MAX_LISTED:
+        click.echo(f"  … {norm.size - MAX_LISTED} more; --csv or --json has all")
 
 
 def _write_csv(path: str, axes: "dict[str, Array]", result: "ErrorField") -> None:

@@ -15,7 +15,7 @@ LOOPS = ("tool", "workpiece", "relative")
 COMPONENTS = ("norm", "x", "y", "z")
 
 
-class SceneName(click.ParamType):
+class SceneName(click.ParamType[str]):
     """A bundled scene or a path; the shell completes both."""
 
     name = "scene"
@@ -33,7 +33,7 @@ class SceneName(click.ParamType):
         return [CompletionItem(name) for name in names] or [CompletionItem(incomplete, type="file")]
 
 
-def scene_argument(name: str = "scene", **kwargs: Any) -> Decorator:  # noqa: ANN401 - click's
+def scene_argument(name: str = "scene", **kwargs: Any) -> Decorator:
     """Add a SCENE argument."""
     return click.argument(name, type=SceneName(), **kwargs)
 
@@ -88,7 +88,7 @@ def parse_point(text: str) -> dict[str, float]:
             raise OptionError(f"--at {text!r}: {part.strip()!r} cannot be read; {expected}")
         if name in found:
             raise OptionError(f"--at {text!r}: axis {name} is given twice")
-        if abs(value) > 1e5:  # noqa: PLR2004 - 100 m: beyond any machine
+        if abs(value) > 1e5:
             raise OptionError(f"--at {text!r}: {value:g}; expected at most ±100000 mm or degrees")
         found[name] = value
     return found

@@ -189,7 +189,7 @@ def build_basis(
     return ErrorBasis(tuple(keys), nominal, position, orientation)
 
 
-def _shaped_jacobian(  # noqa: PLR0913 - the inputs of the Jacobian and the curves
+def _shaped_jacobian(
     model: Model,
     errors: ErrorSet,
     keys: Sequence[str],

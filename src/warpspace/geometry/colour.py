@@ -76,7 +76,7 @@ class ColourScale:
 
 @cache
 def _table(name: str) -> Bytes:
-    """The colours of a map, [256, 3]."""
+    """Read the colours of a map, [256, 3]."""
     return (np.asarray(Colormap(name).lut(LEVELS))[:, :3] * 255.0 + 0.5).astype(np.uint8)
 
 

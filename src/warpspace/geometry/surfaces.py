@@ -83,7 +83,10 @@ def triangulate(faces: list[Index]) -> Surface:
     triangles: list[Index] = []
     for face in faces:
         a, b, c, d = face[:-1, :-1], face[1:, :-1], face[1:, 1:], face[:-1, 1:]
-        triangles += [np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)]
+        triangles += [
+            np.stack([a, b, c], -1).reshape(-1, 3),
+            np.stack([a, c, d], -1).reshape(-1, 3),
+        ]
     nodes, numbered = np.unique(np.concatenate(triangles), return_inverse=True)
     return Surface(nodes, numbered.reshape(-1, 3))
 
@@ -160,7 +163,8 @@ def box_edges(shape: Shape) -> list[Index]:
     list of ndarray, [n]
         Flat grid indices along each edge; twelve for a full volume.
     """
-    return grid_lines(shape, (max(shape),) * 3)
+    whole = max(shape)
+    return grid_lines(shape, (whole, whole, whole))
 
 
 def grid_lines(shape: Shape, every: tuple[int, int, int]) -> list[Index]:

@@ -131,7 +131,7 @@ def _traces_of(
     return [Trace(axis, point, {**held, tilting: tilt}, closed) for tilt in tilts]
 
 
-def _group(  # noqa: PLR0913 - one branch and all that belongs to it
+def _group(
     model: Model,
     side: str,
     loop: Loop,
@@ -148,7 +148,9 @@ def _group(  # noqa: PLR0913 - one branch and all that belongs to it
         high = min(high, low + FULL_TURN_DEG)
         coordinates[name] = np.stack(
             [
-                low + (high - low) * sweep if trace.axis == name else np.full(samples, trace.at[name])
+                low + (high - low) * sweep
+                if trace.axis == name
+                else np.full(samples, trace.at[name])
                 for trace in traces
             ]
         )

@@ -12,7 +12,7 @@ from warpspace.machine.description import ORIGIN, Machine, Vector
 from warpspace.units import Array
 
 Coordinates = Mapping[str, Array]
-"""Axis letter to positions, [...]: mm for linear axes, **degrees** for rotary ones, broadcastable."""
+"""Axis letter to positions, [...], broadcastable: mm for linear axes, degrees for rotary ones."""
 
 
 class Loop(StrEnum):

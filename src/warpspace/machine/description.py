@@ -65,7 +65,7 @@ def parse_chain(text: str) -> Chain:
     ChainError
         If it does not run from w to t over one frame with one to six different axes.
     """
-    bare = re.sub(r"[\s()\[\]{}'’′\-–_]", "", text)  # noqa: RUF001 - primes as people type them
+    bare = re.sub(r"[\s()\[\]{}'’′\-–_]", "", text)
     expected = "expected w, axes out of X Y Z A B C, F (or b), axes, t; for instance wCBFXYZt"
     matched = re.fullmatch(r"[wW]([A-Z]*?)(b|F)([A-EG-Z]*)[tT]", bare)
     if matched is None:

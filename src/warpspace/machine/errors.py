@@ -106,7 +106,7 @@ class Constant(ErrorFunction):
 
 @dataclass(frozen=True)
 class Ramp(ErrorFunction):
-    """Zero at the lower end of the span, the value at the upper one, a straight line through both."""
+    """Zero at the lower end of the span, the value at the upper one, linear between and beyond."""
 
     value: float = 0.0
 
@@ -141,7 +141,8 @@ class Poly(ErrorFunction):
 
     def evaluate(self, position: Array) -> Array:
         """Give the value of the polynomial."""
-        return polynomial.polyval(np.asarray(position, dtype=float), np.array(self.coefficients))
+        value = polynomial.polyval(np.asarray(position, dtype=float), np.array(self.coefficients))
+        return np.asarray(value, dtype=float)
 
     def scaled(self, factor: float) -> Self:
         """Multiply all coefficients."""

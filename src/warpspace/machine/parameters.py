@@ -139,9 +139,7 @@ def _component(letter: str, axis: str) -> Parameter:
         name = f"angular positioning of {axis}" if along else f"tilt of {axis} about {low}"
     else:
         name = f"axial error of {axis}" if along else f"radial error of {axis} in {low}"
-    source = (
-        "ISO 230-1; thesis table 4-2" if axis != "A" else "ISO 230-1, 3.4 (not in the thesis)"
-    )
+    source = "ISO 230-1; thesis table 4-2" if axis != "A" else "ISO 230-1, 3.4 (not in the thesis)"
     kind = ErrorKind.ROTATION if rotation else ErrorKind.TRANSLATION
     return Parameter(f"E{letter}{axis}", f"{_GREEK[letter]}{axis}", name, axis, kind, source)
 
@@ -175,7 +173,9 @@ def _constant(letter: str, axis: str) -> Parameter:
 
 def _build_table() -> dict[str, Parameter]:
     """Build all rows there can be: six component and six constant errors of six axes."""
-    rows = [build(letter, axis) for axis in AXES for build in (_component, _constant) for letter in AXES]
+    rows = [
+        build(letter, axis) for axis in AXES for build in (_component, _constant) for letter in AXES
+    ]
     return {row.key: row for row in rows}
 
 

@@ -2,7 +2,7 @@
 
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from warpspace.exceptions import OutputError
 
 
 @contextmanager
-def write_atomically(path: str | Path) -> Iterator[Path]:
+def write_atomically(path: str | Path) -> Generator[Path]:
     """Give a temporary file beside the target; rename it onto the target when all went well.
 
     Parameters
@@ -35,7 +35,9 @@ def write_atomically(path: str | Path) -> Iterator[Path]:
         raise OutputError(f"{target}: the folder {target.parent} does not exist")
     temporary: Path | None = None
     try:
-        handle, name = tempfile.mkstemp(suffix=target.suffix, prefix=".warpspace-", dir=target.parent)
+        handle, name = tempfile.mkstemp(
+            suffix=target.suffix, prefix=".warpspace-", dir=target.parent
+        )
         os.close(handle)
         temporary = Path(name)
         yield temporary

@@ -222,7 +222,7 @@ def _errors(
 
 
 def _function(
-    spec: Any,  # noqa: ANN401 - one of the specs of the schema
+    spec: Any,
     span: tuple[float, float],
     where: str,
     folder: Path | None,
@@ -279,12 +279,14 @@ def _tolerances(raw: object, machine: Machine, problems: Problems) -> ToleranceS
         if valid is not None:
             narrow = isinstance(valid, float | int)
             own[key] = (
-                Tolerance(0.0, float(valid)) if narrow else Tolerance(valid.centre, valid.half_width)
+                Tolerance(0.0, float(valid))
+                if narrow
+                else Tolerance(valid.centre, valid.half_width)
             )
     return ToleranceSet(default, own)
 
 
-def _reference(view: Any, machine: Machine, problems: Problems) -> dict[str, float] | None:  # noqa: ANN401
+def _reference(view: Any, machine: Machine, problems: Problems) -> dict[str, float] | None:
     """Read the point held still."""
     if view is None or view.reference == "absolute":
         return None
@@ -306,5 +308,3 @@ def _notes(machine: Machine, workspace: Workspace) -> tuple[str, ...]:
                 f" {first:g} … {last:g} {unit}"
             )
     return tuple(notes)
-
-

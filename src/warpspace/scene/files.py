@@ -96,7 +96,7 @@ def read_csv_column(path: Path, column: str, limit: float) -> list[tuple[float, 
         rows = [row for row in csv.reader(text.splitlines(), strict=True) if row]
     except csv.Error as error:
         raise SceneError(source, [f"is not valid CSV: {error}"]) from None
-    if len(rows) < 2:  # noqa: PLR2004 - a header and one row
+    if len(rows) < 2:
         raise SceneError(source, ["expected a header and at least one row"])
     header = [name.strip() for name in rows[0]]
     if column not in header[1:]:
@@ -106,13 +106,16 @@ def read_csv_column(path: Path, column: str, limit: float) -> list[tuple[float, 
     for number, row in enumerate(rows[1:], start=2):
         if len(row) != len(header):
             raise SceneError(
-                source, [f"row {number} has {len(row)} fields; expected {len(header)} as the header"]
+                source,
+                [f"row {number} has {len(row)} fields; expected {len(header)} as the header"],
             )
         position, value = (_number(source, number, row[at]) for at in (0, index))
         if points and position <= points[-1][0]:
             raise SceneError(
                 source,
-                [f"row {number}: position {position:g} after {points[-1][0]:g}; expected ascending"],
+                [
+                    f"row {number}: position {position:g} after {points[-1][0]:g}; expected ascending"
+                ],
             )
         if abs(value) > limit:
             raise SceneError(source, [f"row {number}: {value:g}; expected at most ±{limit:g}"])

@@ -43,7 +43,7 @@ class ScenePicture:
     view: View
 
 
-def evaluate(  # noqa: PLR0913 - keyword-only choices of a user
+def evaluate(
     scene: Scene,
     *,
     at: Mapping[str, ArrayLike] | None = None,

@@ -3,6 +3,7 @@
 Each section is validated on its own, so that every problem of a file is found in one reading.
 """
 
+from itertools import pairwise
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag
@@ -35,7 +36,7 @@ def _ascending_range(value: tuple[float, float]) -> tuple[float, float]:
 
 def _sorted_rows(rows: list[tuple[float, float]]) -> list[tuple[float, float]]:
     """Refuse table rows whose positions do not ascend."""
-    for number, (low, high) in enumerate(zip(rows, rows[1:], strict=False), start=2):
+    for number, (low, high) in enumerate(pairwise(rows), start=2):
         if not low[0] < high[0]:
             raise PydanticCustomError(
                 "unsorted",

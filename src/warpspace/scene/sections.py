@@ -72,7 +72,7 @@ class Problems:
         prefix = f"{section}." if section else ""
         self.lines.append(f"{prefix}{name}: unknown {what}{near_miss(name, known)}")
 
-    def validate(self, adapter: str, key: str, value: object) -> Any:  # noqa: ANN401 - per section
+    def validate(self, adapter: str, key: str, value: object) -> Any:
         """Validate one value.
 
         Parameters
