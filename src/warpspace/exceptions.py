@@ -7,6 +7,9 @@ was given, what was expected and, where there is one, the near miss.
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 
+SHOWN_PROBLEMS = 40
+"""Problems of a file that a message lists; it counts the others."""
+
 
 class WarpspaceError(Exception):
     """Base of all errors with a message meant for the user."""
@@ -64,8 +67,10 @@ class SceneError(WarpspaceError):
         if len(self.problems) == 1:
             text = f"{source}: {self.problems[0]}"
         else:
-            lines = "".join(f"\n  - {problem}" for problem in self.problems)
-            text = f"{source}: {len(self.problems)} problems{lines}"
+            lines = [f"\n  - {problem}" for problem in self.problems[:SHOWN_PROBLEMS]]
+            if len(self.problems) > SHOWN_PROBLEMS:
+                lines.append(f"\n  … and {len(self.problems) - SHOWN_PROBLEMS} more")
+            text = f"{source}: {len(self.problems)} problems{''.join(lines)}"
         super().__init__(text)
 
 

@@ -4,16 +4,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from warpspace.exceptions import ChainError, SceneError
+from warpspace.exceptions import SceneError
 from warpspace.field.grid import Workspace
 from warpspace.kinematics.model import ComponentErrors, Model
 from warpspace.machine import errors as functions
-from warpspace.machine.description import (
-    FIXED_FRAMES,
-    Machine,
-    build_machine,
-    parse_chain,
-)
+from warpspace.machine.description import Machine, build_machine
 from warpspace.machine.parameters import AXES, LINEAR_AXES, PARAMETERS
 from warpspace.machine.tolerances import TOLERANCE_CLASSES, Tolerance, ToleranceSet
 from warpspace.scene import schema
@@ -33,10 +28,17 @@ SECTIONS = (
     "view",
 )
 Raw = Mapping[str, object]
+STAND_IN = build_machine("wFXYZABCt")
+"""Has every axis there is: with it the rest of a document is checked whose machine is unusable."""
 
 
 def build_scene(
-    raw: Raw, name: str, source: str, machine: Machine | None, folder: Path | None
+    raw: Raw,
+    name: str,
+    source: str,
+    machine: Machine | None,
+    folder: Path | None,
+    problems: Problems,
 ) -> Scene:
     """Build a scene from a parsed document.
 
@@ -49,9 +51,11 @@ def build_scene(
     source : str
         What the document is called in messages.
     machine : Machine or None
-        The machine the document names; None where it is inline.
+        The machine of the scene; None where it is unusable, which is among the problems.
     folder : Path or None
         Folder that CSV names are relative to; None where CSV files are not allowed.
+    problems : Problems
+        What was found so far.
 
     Returns
     -------
@@ -62,15 +66,10 @@ def build_scene(
     SceneError
         With all problems of the document.
     """
-    problems = Problems()
     for key in raw:
         if key not in SECTIONS:
             problems.unknown("", key, SECTIONS, "key")
-    if machine is None:
-        machine = machine_of(raw.get("machine"), "machine", name, problems)
-    if machine is None:
-        _check_names(raw, problems)
-        raise SceneError(source, problems.lines or ["machine: is missing"])
+    machine = machine or STAND_IN
     texts = {
         key: problems.validate("text", key, raw[key])
         for key in ("title", "description")
@@ -82,7 +81,7 @@ def build_scene(
     workspace = _workspace(problems.table("workspace", raw.get("workspace")), machine, problems)
     errors = _errors(raw.get("errors"), machine, workspace, folder, problems)
     tolerances = _tolerances(raw.get("tolerances"), machine, problems)
-    reference = _reference(view, machine, problems)
+    reference = _reference(view, workspace, problems)
     if problems.lines:
         raise SceneError(source, problems.lines)
     model = Model(
@@ -101,61 +100,6 @@ def build_scene(
         description=texts.get("description") or "",
         notes=_notes(machine, workspace),
     )
-
-
-def machine_of(
-    raw: object, key: str, name: str, problems: Problems, body_dir: str = ""
-) -> Machine | None:
-    """Build a machine from its table; note problems and give None where it cannot be.
-
-    Parameters
-    ----------
-    raw : object
-        The table.
-    key : str
-        Where it stands; empty for a file of its own.
-    name : str
-        Name of the machine.
-    problems : Problems
-    body_dir : str, optional
-        Folder of the machine's schematic bodies.
-    """
-    if raw is None:
-        problems.add(key, 'is missing; expected a machine name or a [machine] table with "chain"')
-        return None
-    section = problems.validate("machine", key, raw)
-    if section is None:
-        return None
-    prefix = f"{key}." if key else ""
-    try:
-        chain = parse_chain(section.chain)
-    except ChainError as error:
-        problems.add(f"{prefix}chain", str(error))
-        return None
-    for part, known in (
-        ("offset_mm", (*chain.axes, *FIXED_FRAMES)),
-        ("travel", chain.axes),
-        ("direction", chain.axes),
-    ):
-        for axis in getattr(section, part):
-            if axis not in known:
-                problems.unknown(f"{prefix}{part}", axis, known, "frame of this machine")
-    return build_machine(
-        chain,
-        offset_mm=section.offset_mm,
-        travel=section.travel,
-        direction=section.direction,
-        name=name,
-        title=section.title or name,
-        body_dir=body_dir,
-    )
-
-
-def _check_names(raw: Raw, problems: Problems) -> None:
-    """Check what can be checked of a document whose machine is unusable."""
-    for key in problems.table("errors", raw.get("errors")):
-        if key not in PARAMETERS:
-            problems.unknown("errors", key, PARAMETERS, "error parameter")
 
 
 def _workspace(raw: Raw, machine: Machine, problems: Problems) -> Workspace:
@@ -256,7 +200,9 @@ def _csv_table(
         problems.add(where, "CSV files are not read here; expected the values as { table = }")
         return None
     try:
-        points = read_csv_column(folder / spec.csv, spec.column, schema.MAX_ERROR)
+        points = read_csv_column(
+            folder / spec.csv, spec.column, schema.MAX_ERROR, schema.MAX_POINTS
+        )
     except SceneError as error:
         for problem in error.problems:
             problems.add(where, f"{error.source}: {problem}")
@@ -286,14 +232,15 @@ def _tolerances(raw: object, machine: Machine, problems: Problems) -> ToleranceS
     return ToleranceSet(default, own)
 
 
-def _reference(view: Any, machine: Machine, problems: Problems) -> dict[str, float] | None:
-    """Read the point held still."""
+def _reference(view: Any, workspace: Workspace, problems: Problems) -> dict[str, float] | None:
+    """Read the point held still: a linear axis that is not given stands in its middle."""
     if view is None or view.reference == "absolute":
         return None
     for axis in view.reference:
-        if axis not in machine.axes:
-            problems.unknown("view.reference", axis, machine.axes, "axis of this machine")
-    return dict(view.reference)
+        if axis not in workspace.ranges:
+            problems.unknown("view.reference", axis, workspace.ranges, "axis of this machine")
+    middle = {name: q for name, q in workspace.positions.items() if name in LINEAR_AXES}
+    return {**middle, **view.reference}
 
 
 def _notes(machine: Machine, workspace: Workspace) -> tuple[str, ...]:

@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from warpspace.exceptions import SceneError, near_miss
-from warpspace.machine.description import Machine
-from warpspace.resources import assets_dir, scenes_dir
-from warpspace.scene.build import build_scene, machine_of
+from warpspace.resources import scenes_dir
+from warpspace.scene.build import build_scene
 from warpspace.scene.files import MAX_SCENE_BYTES, parse_toml, read_text
+from warpspace.scene.machines import load_machine, machine_names, machine_of
 from warpspace.scene.model import Scene
 from warpspace.scene.sections import Problems
 
@@ -19,43 +19,6 @@ def scene_names() -> tuple[str, ...]:
 def _order(name: str) -> tuple[bool, str]:
     """Sort the teaching scenes behind the machine's."""
     return (not name.startswith("dvf"), name)
-
-
-def machine_names() -> tuple[str, ...]:
-    """List the bundled machines."""
-    return tuple(sorted(path.parent.name for path in assets_dir().glob("machines/*/machine.toml")))
-
-
-def load_machine(name: str, source: str = "") -> Machine:
-    """Load a bundled machine.
-
-    Parameters
-    ----------
-    name : str
-        Name of a folder below ``assets/machines``.
-    source : str, optional
-        File that names it, for messages.
-
-    Returns
-    -------
-    Machine
-
-    Raises
-    ------
-    SceneError
-        If there is no such machine or its file has problems.
-    """
-    if name not in machine_names():
-        problem = f"machine = {name!r}: unknown machine{near_miss(name, machine_names())}"
-        raise SceneError(source or name, [problem])
-    folder = assets_dir() / "machines" / name
-    path = folder / "machine.toml"
-    raw = parse_toml(read_text(path, MAX_SCENE_BYTES), str(path))
-    problems = Problems()
-    machine = machine_of(raw, "", name, problems, body_dir=str(folder))
-    if machine is None or problems.lines:
-        raise SceneError(str(path), problems.lines)
-    return machine
 
 
 def scene_path(name_or_path: str | Path) -> Path:
@@ -80,13 +43,13 @@ def scene_path(name_or_path: str | Path) -> Path:
         return scenes_dir() / f"{text}.toml"
     path = Path(name_or_path)
     try:
-        exists = path.exists()
+        exists = bool(text) and path.exists()
     except (OSError, ValueError):
         exists = False
     if not exists:
         names = scene_names()
         hint = near_miss(text, names) or f"; bundled scenes: {', '.join(names)}"
-        raise SceneError(text or "''", [f"no such scene or file{hint}"])
+        raise SceneError(text or '""', [f"no such scene or file{hint}"])
     return path
 
 
@@ -136,6 +99,13 @@ def parse_scene(
     """
     source = source or name
     raw = parse_toml(text, source)
+    problems = Problems()
     given = raw.get("machine")
-    machine = load_machine(given, source) if isinstance(given, str) else None
-    return build_scene(raw, name, source, machine, folder)
+    if not isinstance(given, str):
+        machine = machine_of(given, "machine", name, problems)
+    elif given in machine_names():
+        machine = load_machine(given)
+    else:
+        machine = None
+        problems.unknown_value("machine", given, machine_names(), "machine")
+    return build_scene(raw, name, source, machine, folder, problems)

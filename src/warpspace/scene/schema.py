@@ -6,7 +6,15 @@ Each section is validated on its own, so that every problem of a file is found i
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+)
 from pydantic_core import PydanticCustomError
 
 MAX_ERROR = 1e5
@@ -15,21 +23,47 @@ MAX_LENGTH_MM = 1e5
 MAX_EXAGGERATION = 1e7
 MAX_POINTS = 100_000
 MAX_TRACES = 64
+MAX_ORDER = 1000
+MIN_SPAN = 1e-6
+"""Millimetres or degrees: a range narrower than a nanometre is empty."""
 MAX_TEXT = 4000
+
+
+def _entries(spelling: str) -> BeforeValidator:
+    """Refuse a list that has not as many entries as its spelling, for instance "[x, y, z]"."""
+    count = spelling.count(",") + 1
+
+    def check(value: object) -> object:
+        if not isinstance(value, list | tuple) or len(value) != count:
+            raise PydanticCustomError("entries", "expected {spelling}", {"spelling": spelling})
+        return value
+
+    return BeforeValidator(check)
+
+
+def _whole_number(value: object) -> object:
+    """Refuse what only equals 1 or -1."""
+    if type(value) is not int:
+        raise PydanticCustomError("direction", "expected 1 or -1")
+    return value
+
 
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Length = Annotated[Finite, Field(ge=-MAX_LENGTH_MM, le=MAX_LENGTH_MM)]
 ErrorValue = Annotated[Finite, Field(ge=-MAX_ERROR, le=MAX_ERROR)]
 HalfWidth = Annotated[Finite, Field(ge=0, le=MAX_ERROR)]
-Point = tuple[Length, Length, Length]
+Point = Annotated[tuple[Length, Length, Length], _entries("[x, y, z]")]
 Text = Annotated[str, Field(strict=True, max_length=MAX_TEXT)]
-TableRow = tuple[Finite, ErrorValue]
-HarmonicTerm = tuple[Annotated[Finite, Field(ge=0, le=1000)], ErrorValue, Finite]
+TableRow = Annotated[tuple[Length, ErrorValue], _entries("[position, value]")]
+HarmonicTerm = Annotated[
+    tuple[Annotated[Finite, Field(ge=0, le=MAX_ORDER)], ErrorValue, Length],
+    _entries("[order, amplitude, phase]"),
+]
 
 
 def _ascending_range(value: tuple[float, float]) -> tuple[float, float]:
     """Refuse a range that is empty or upside down."""
-    if not value[0] < value[1]:
+    if value[1] - value[0] < MIN_SPAN:
         raise PydanticCustomError("empty_range", "expected [lower, upper] with lower < upper")
     return value
 
@@ -40,13 +74,15 @@ def _sorted_rows(rows: list[tuple[float, float]]) -> list[tuple[float, float]]:
         if not low[0] < high[0]:
             raise PydanticCustomError(
                 "unsorted",
-                "row {number}: position {high} after {low}; expected ascending positions",
+                "row {number} has position {high} after {low}; expected ascending positions",
                 {"number": number, "low": low[0], "high": high[0]},
             )
     return rows
 
 
-Span = Annotated[tuple[Length, Length], AfterValidator(_ascending_range)]
+Span = Annotated[
+    tuple[Length, Length], _entries("[lower, upper]"), AfterValidator(_ascending_range)
+]
 
 
 class Section(BaseModel):
@@ -89,6 +125,9 @@ class CsvSpec(Section):
 
 
 FUNCTION_KEYS = ("ramp", "poly", "harmonics", "table", "csv")
+ERROR_FORMS = (
+    "a number or one of { ramp = }, { poly = }, { harmonics = }, { table = }, { csv = , column = }"
+)
 
 
 def _which_function(value: object) -> str | None:
@@ -108,8 +147,7 @@ ErrorSpec = Annotated[
     Discriminator(
         _which_function,
         custom_error_type="error_function",
-        custom_error_message="expected a number or one of { ramp = }, { poly = }, { harmonics = },"
-        " { table = }, { csv = , column = }",
+        custom_error_message=f"expected {ERROR_FORMS}",
     ),
 ]
 
@@ -122,7 +160,7 @@ class MachineSection(Section):
     chain: Annotated[str, Field(strict=True, max_length=100)]
     offset_mm: dict[str, Point] = {}
     travel: dict[str, Span] = {}
-    direction: dict[str, Literal[1, -1]] = {}
+    direction: dict[str, Annotated[Literal[1, -1], BeforeValidator(_whole_number)]] = {}
 
 
 class ConventionSection(Section):
@@ -154,21 +192,12 @@ class ToleranceSpec(Section):
     half_width: HalfWidth
 
 
-def _auto_or_number(value: float) -> float:
-    """Refuse a display factor of zero."""
-    if value <= 0:
-        raise PydanticCustomError("exaggeration", 'expected "auto" or a number above 0')
-    return value
-
-
 class ViewSection(Section):
     """How the scene is first shown."""
 
     exaggeration: Annotated[
         Annotated[Literal["auto"], Tag("word")]
-        | Annotated[
-            Finite, Field(le=MAX_EXAGGERATION), AfterValidator(_auto_or_number), Tag("number")
-        ],
+        | Annotated[Finite, Field(gt=0, le=MAX_EXAGGERATION), Tag("number")],
         Discriminator(lambda value: "word" if isinstance(value, str) else "number"),
     ] = "auto"
     reference: Annotated[
@@ -185,5 +214,13 @@ ToleranceValue = Annotated[
     Annotated[HalfWidth, Tag("number")] | Annotated[ToleranceSpec, Tag("range")],
     Discriminator(lambda value: "range" if isinstance(value, dict) else "number"),
 ]
-TAGS = frozenset({"number", "word", "axes", "range", *FUNCTION_KEYS})
-"""Union tags that pydantic puts into error locations and no file contains as such."""
+TAG_AT = {"error": 0, "range": 0, "tolerance": 0, "view": 1}
+"""Which part of a pydantic location is the tag of a union and no key, per kind of value."""
+ALTERNATIVES = {
+    "error": ERROR_FORMS,
+    "range": "a number or [lower, upper]",
+    "tolerance": "a half width or { centre = , half_width = }",
+    "exaggeration": '"auto" or a number above 0',
+    "reference": '"absolute" or axis coordinates, for instance { X = 0, Y = 0, Z = -280 }',
+}
+"""All that a union takes, per kind of value or field of a section."""

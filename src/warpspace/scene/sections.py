@@ -5,19 +5,27 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from warpspace.exceptions import near_miss
+from warpspace.exceptions import SHOWN_PROBLEMS, near_miss
 from warpspace.scene.schema import (
-    TAGS,
+    ALTERNATIVES,
+    TAG_AT,
     ConventionSection,
+    CsvSpec,
     DefaultTolerances,
     ErrorSpec,
+    HarmonicsSpec,
     MachineSection,
     PointsSection,
+    PolySpec,
+    RampSpec,
     RangeSpec,
+    TableSpec,
     Text,
+    ToleranceSpec,
     ToleranceValue,
     ViewSection,
 )
+from warpspace.scene.words import location, spell_value
 
 _ADAPTERS: dict[str, TypeAdapter[Any]] = {
     "text": TypeAdapter(Text),
@@ -30,26 +38,34 @@ _ADAPTERS: dict[str, TypeAdapter[Any]] = {
     "default": TypeAdapter(DefaultTolerances),
     "view": TypeAdapter(ViewSection),
 }
-_SHOWN = 60
 _EXPECTED = {
-    "float_type": "expected a number",
-    "int_type": "expected a whole number",
     "string_type": "expected a text",
     "dict_type": "expected a table",
     "model_type": "expected a table",
     "model_attributes_type": "expected a table",
     "list_type": "expected a list",
-    "tuple_type": "expected a list",
     "finite_number": "expected a finite number",
-    "missing": "is missing",
-    "union_tag_invalid": "expected another kind of value",
+    "too_short": "expected at least {min_length}, not {actual_length} entries",
+    "too_long": "expected at most {max_length} entries",
+    "string_too_short": "expected at least {min_length} character",
+    "string_too_long": "expected at most {max_length} characters",
+    "less_than_equal": "expected at most {le:g}",
+    "greater_than_equal": "expected at least {ge:g}",
+    "greater_than": "expected a number above {gt:g}",
 }
+_WRONG_TYPE = frozenset({"float_type", "literal_error"})
 _FIELDS = {
-    name: frozenset(model.model_fields)
+    name: tuple(model.model_fields)
     for name, model in (
+        ("ramp", RampSpec),
+        ("poly", PolySpec),
+        ("harmonics", HarmonicsSpec),
+        ("table", TableSpec),
+        ("csv", CsvSpec),
         ("machine", MachineSection),
         ("convention", ConventionSection),
         ("points_mm", PointsSection),
+        ("tolerance", ToleranceSpec),
         ("default", DefaultTolerances),
         ("view", ViewSection),
     )
@@ -64,13 +80,17 @@ class Problems:
 
     def add(self, key: str, text: str, value: object = ...) -> None:
         """Note one problem: key, value and what was expected."""
-        shown = "" if value is ... else f" = {shorten(value)}"
+        shown = "" if value is ... else f" = {spell_value(value)}"
         self.lines.append(f"{key}{shown}: {text}" if key else text)
 
     def unknown(self, section: str, name: str, known: Iterable[str], what: str) -> None:
         """Note a name that is not among the known ones."""
-        prefix = f"{section}." if section else ""
-        self.lines.append(f"{prefix}{name}: unknown {what}{near_miss(name, known)}")
+        hint = near_miss(name, known) if len(self.lines) < SHOWN_PROBLEMS else ""
+        self.lines.append(f"{location(section, [name])}: unknown {what}{hint}")
+
+    def unknown_value(self, key: str, value: str, known: Iterable[str], what: str) -> None:
+        """Note a value that is not among the known names."""
+        self.add(key, f"unknown {what}{near_miss(value, known)}", value)
 
     def validate(self, adapter: str, key: str, value: object) -> Any:
         """Validate one value.
@@ -97,19 +117,19 @@ class Problems:
 
     def _note(self, adapter: str, key: str, item: Mapping[str, Any]) -> None:
         """Put one pydantic finding into the words of the file."""
-        where = location(key, item["loc"])
-        kind = str(item["type"])
+        kind, parts = str(item["type"]), tuple(item["loc"])
+        tag_at = TAG_AT.get(adapter)
+        where = location(key, parts, tag_at)
         if kind == "extra_forbidden":
-            parent, _, name = where.rpartition(".")
-            self.unknown(parent, name, _FIELDS.get(adapter, ()), "key")
+            known = _FIELDS.get(str(parts[0]) if adapter == "error" else adapter, ())
+            self.unknown(location(key, parts[:-1], tag_at), str(parts[-1]), map(str, known), "key")
         elif kind == "missing":
             self.add(where, "is missing")
-        elif kind in ("tuple_type", "too_long", "missing_argument") and "actual" in item:
-            self.add(where, str(item["msg"]).lower(), item["input"])
         else:
-            message = str(item["msg"])
-            text = _EXPECTED.get(kind, message[0].lower() + message[1:])
-            self.add(where, text.replace("input should be", "expected"), item["input"])
+            union = (
+                None if tag_at is None or len(parts) != tag_at + 1 else (adapter, *parts)[tag_at]
+            )
+            self.add(where, _expected(kind, item, union), item["input"])
 
     def table(self, key: str, value: object) -> dict[str, object]:
         """Give a table as a dictionary; note a problem and give an empty one for anything else."""
@@ -121,18 +141,14 @@ class Problems:
         return {}
 
 
-def location(key: str, parts: Iterable[int | str]) -> str:
-    """Spell a location as it stands in the file, without the tags of unions."""
-    text = key
-    for part in parts:
-        if isinstance(part, int):
-            text += f"[{part}]"
-        elif part not in TAGS or (part in ("ramp", "poly", "table") and text.endswith(f".{part}")):
-            text += f".{part}" if text else part
-    return text
-
-
-def shorten(value: object) -> str:
-    """Show a value from a file in at most a line."""
-    text = repr(value)
-    return text if len(text) <= _SHOWN else text[: _SHOWN - 1] + "…"
+def _expected(kind: str, item: Mapping[str, Any], union: int | str | None) -> str:
+    """Say what was expected where pydantic found something else."""
+    huge = isinstance(item["input"], int) and not isinstance(item["input"], bool)
+    if union in ALTERNATIVES and kind in _WRONG_TYPE and not (huge and kind == "float_type"):
+        return f"expected {ALTERNATIVES[str(union)]}"
+    if kind == "float_type":
+        return "is too large; expected a finite number" if huge else "expected a number"
+    context = dict(item.get("ctx", {}))
+    if kind == "literal_error":
+        return f"expected {context['expected']}".replace("'", '"')
+    return _EXPECTED[kind].format(**context) if kind in _EXPECTED else str(item["msg"])

@@ -1,0 +1,95 @@
+"""Machines: bundled by name, or built from the table of a scene."""
+
+from warpspace.exceptions import ChainError, SceneError, UnknownNameError
+from warpspace.machine.description import FIXED_FRAMES, Machine, build_machine, parse_chain
+from warpspace.resources import assets_dir
+from warpspace.scene.files import MAX_SCENE_BYTES, parse_toml, read_text
+from warpspace.scene.sections import Problems
+
+
+def machine_names() -> tuple[str, ...]:
+    """List the bundled machines."""
+    return tuple(sorted(path.parent.name for path in assets_dir().glob("machines/*/machine.toml")))
+
+
+def load_machine(name: str) -> Machine:
+    """Load a bundled machine.
+
+    Parameters
+    ----------
+    name : str
+        Name of a folder below ``assets/machines``.
+
+    Returns
+    -------
+    Machine
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such machine.
+    SceneError
+        If its file has problems.
+    """
+    if name not in machine_names():
+        raise UnknownNameError("machine", name, machine_names())
+    folder = assets_dir() / "machines" / name
+    path = folder / "machine.toml"
+    raw = parse_toml(read_text(path, MAX_SCENE_BYTES), str(path))
+    problems = Problems()
+    machine = machine_of(raw, "", name, problems, body_dir=str(folder))
+    if machine is None or problems.lines:
+        raise SceneError(str(path), problems.lines)
+    return machine
+
+
+def machine_of(
+    raw: object, key: str, name: str, problems: Problems, body_dir: str = ""
+) -> Machine | None:
+    """Build a machine from its table; note problems and give None where it cannot be.
+
+    Parameters
+    ----------
+    raw : object
+        The table.
+    key : str
+        Where it stands; empty for a file of its own.
+    name : str
+        Name of the machine.
+    problems : Problems
+    body_dir : str, optional
+        Folder of the machine's schematic bodies.
+    """
+    expected = 'expected a machine name or a [machine] table with "chain"'
+    if raw is None:
+        problems.add(key, f"is missing; {expected}")
+        return None
+    if not isinstance(raw, dict):
+        problems.add(key, expected, raw)
+        return None
+    section = problems.validate("machine", key, raw)
+    if section is None:
+        return None
+    prefix = f"{key}." if key else ""
+    try:
+        chain = parse_chain(section.chain)
+    except ChainError as error:
+        problems.add(f"{prefix}chain", str(error))
+        return None
+    for part, known in (
+        ("offset_mm", (*chain.axes, *FIXED_FRAMES)),
+        ("travel", chain.axes),
+        ("direction", chain.axes),
+    ):
+        for axis in getattr(section, part):
+            if axis not in known:
+                problems.unknown(f"{prefix}{part}", axis, known, "frame of this machine")
+    return build_machine(
+        chain,
+        offset_mm=section.offset_mm,
+        travel=section.travel,
+        direction=section.direction,
+        name=name,
+        title=section.title or name,
+        body_dir=body_dir,
+    )
