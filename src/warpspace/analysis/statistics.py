@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorField
 
 
@@ -36,8 +37,15 @@ def statistics(field: ErrorField) -> Statistics:
     Returns
     -------
     Statistics
+
+    Raises
+    ------
+    OptionError
+        If the field has no point.
     """
     norm = field.norm_um.reshape(-1)
+    if norm.size == 0:
+        raise OptionError("statistics of no points; expected at least one")
     worst = int(np.argmax(norm))
     x, y, z = (float(value) for value in field.nominal_mm.reshape(-1, 3)[worst])
     return Statistics(

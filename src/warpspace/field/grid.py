@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from operator import index as whole_number
 
 import numpy as np
 
@@ -82,11 +83,21 @@ def node_counts(nodes: int | Sequence[int]) -> tuple[int, int, int]:
     OptionError
         If a count is outside 2 … 101.
     """
-    counts = (nodes, nodes, nodes) if isinstance(nodes, int) else tuple(nodes)
+    try:
+        counts = _counts(nodes)
+    except TypeError:
+        raise OptionError(f"grid: {nodes!r}; expected whole numbers of nodes") from None
     if len(counts) != len(LINEAR_AXES) or any(not MIN_NODES <= n <= MAX_NODES for n in counts):
-        given = nodes if isinstance(nodes, int) else " × ".join(map(str, counts))
+        given = " × ".join(map(str, counts)) if isinstance(nodes, Sequence) else nodes
         raise OptionError(f"grid: {given} nodes; expected {MIN_NODES} to {MAX_NODES} per axis")
     return counts[0], counts[1], counts[2]
+
+
+def _counts(nodes: int | Sequence[int]) -> tuple[int, ...]:
+    """Give one whole number per linear axis, whatever kind of integer was given."""
+    if isinstance(nodes, Sequence):
+        return tuple(map(whole_number, nodes))
+    return (whole_number(nodes),) * len(LINEAR_AXES)
 
 
 def build_grid(

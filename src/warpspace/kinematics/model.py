@@ -7,7 +7,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpspace.exceptions import UnknownNameError
+from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.machine.description import ORIGIN, Machine, Vector
 from warpspace.units import Array
 
@@ -76,12 +76,28 @@ def complete_coordinates(
     ------
     UnknownNameError
         If an axis is given that the machine does not have.
+    OptionError
+        If a position is no finite number, or the batches do not fit together.
     """
     for name in given:
         if name not in machine.axes:
             raise UnknownNameError("axis", name, machine.axes)
-    fallback = default or {}
-    return {
-        name: np.asarray(given.get(name, fallback.get(name, 0.0)), dtype=float)
-        for name in machine.axes
-    }
+    complete = {**dict.fromkeys(machine.axes, 0.0), **(default or {}), **given}
+    positions = {name: _finite(name, complete[name]) for name in machine.axes}
+    try:
+        np.broadcast_shapes(*(values.shape for values in positions.values()))
+    except ValueError:
+        shapes = ", ".join(f"{name} {values.shape}" for name, values in positions.items())
+        raise OptionError(f"axis positions of shapes {shapes}; expected one batch shape") from None
+    return positions
+
+
+def _finite(name: str, value: ArrayLike) -> Array:
+    """Give the positions of one axis as an array of finite numbers."""
+    try:
+        positions = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        positions = np.asarray(np.nan)
+    if not np.isfinite(positions).all():
+        raise OptionError(f"axis {name} at {value!r}; expected finite numbers")
+    return positions

@@ -18,6 +18,10 @@ from warpspace.units import Array
 
 SPAN_SAMPLES = 721
 """Positions at which the peak of a curve is looked for: every half degree of a turn."""
+MAX_SAMPLES = 200_001
+SAMPLES_PER_WAVE = 16
+NEGLIGIBLE = 1e-12
+"""Peak in µm or µrad below which a curve counts as zero: no number may be divided by it."""
 
 
 @dataclass(frozen=True)
@@ -56,13 +60,18 @@ class ErrorFunction(ABC):
     @property
     def amplitude(self) -> float:
         """Largest value over the span, with its sign, µm or µrad."""
-        values = self.evaluate(np.linspace(*self.span, SPAN_SAMPLES))
+        values = self.evaluate(np.linspace(*self.span, self.samples))
         return float(values[np.argmax(np.abs(values))])
+
+    @property
+    def samples(self) -> int:
+        """Number of positions over the span at which the peak is looked for."""
+        return SPAN_SAMPLES
 
     def with_amplitude(self, amplitude: float) -> "ErrorFunction":
         """Give the same curve with another amplitude; a flat zero curve becomes a constant."""
         present = self.amplitude
-        if present == 0.0:
+        if abs(present) < NEGLIGIBLE:
             return Constant(self.span, amplitude)
         return self.scaled(amplitude / present)
 
@@ -103,6 +112,10 @@ class Constant(ErrorFunction):
         """The value itself."""
         return self.value
 
+    def with_amplitude(self, amplitude: float) -> ErrorFunction:
+        """Give another constant."""
+        return replace(self, value=amplitude)
+
 
 @dataclass(frozen=True)
 class Ramp(ErrorFunction):
@@ -140,8 +153,11 @@ class Poly(ErrorFunction):
     coefficients: tuple[float, ...] = ()
 
     def evaluate(self, position: Array) -> Array:
-        """Give the value of the polynomial."""
-        value = polynomial.polyval(np.asarray(position, dtype=float), np.array(self.coefficients))
+        """Give the value of the polynomial; infinite where no number can hold it."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            value = polynomial.polyval(
+                np.asarray(position, dtype=float), np.array(self.coefficients)
+            )
         return np.asarray(value, dtype=float)
 
     def scaled(self, factor: float) -> Self:
@@ -177,6 +193,13 @@ class Harmonics(ErrorFunction):
     def scaled(self, factor: float) -> Self:
         """Multiply all amplitudes."""
         return replace(self, terms=tuple((n, factor * a, phase) for n, a, phase in self.terms))
+
+    @property
+    def samples(self) -> int:
+        """Number of positions that resolves the shortest wave."""
+        highest = max((order for order, _, _ in self.terms), default=0.0)
+        waves = highest * (self.span[1] - self.span[0]) / 360.0
+        return int(min(max(SPAN_SAMPLES, SAMPLES_PER_WAVE * waves + 1), MAX_SAMPLES))
 
     def to_toml(self) -> object:
         """Spell it as ``{ harmonics = [[n, A, φ], …] }``."""

@@ -13,12 +13,15 @@ from warpspace.field.evaluate import (
     ErrorField,
     View,
     build_basis,
+    error_values,
     evaluate_exact,
     evaluate_first_order,
 )
 from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid
-from warpspace.kinematics.model import Loop, complete_coordinates
+from warpspace.kinematics.model import Coordinates, Loop, complete_coordinates
+from warpspace.machine.parameters import parameter
 from warpspace.scene.model import Scene
+from warpspace.scene.schema import MAX_ERROR
 
 FRAMES = ("machine", "workpiece")
 
@@ -86,9 +89,22 @@ def evaluate(
     solve = evaluate_exact if exact else evaluate_first_order
     if at is not None:
         given = complete_coordinates(scene.machine, at, scene.workspace.positions)
+        _check_magnitude(scene, given)
         return solve(scene.model, scene.errors, given, view)
     nodes = build_grid(scene.model, scene.workspace, DEFAULT_NODES if grid is None else grid)
     return solve(scene.model, scene.errors, nodes.coordinates, view, nodes.nominal_mm)
+
+
+def _check_magnitude(scene: Scene, coordinates: Coordinates) -> None:
+    """Refuse positions so far out that an error curve leaves what a rigid-body model holds."""
+    for key, values in error_values(scene.model, scene.errors, coordinates).items():
+        peak = np.abs(values).max(initial=0.0)
+        if not peak <= MAX_ERROR:
+            row = parameter(key)
+            raise OptionError(
+                f"{key} reaches {peak:.3g} {row.unit} at the positions given for {row.axis};"
+                f" expected at most ±{MAX_ERROR:g}"
+            )
 
 
 def choose_view(scene: Scene, loop: Loop | str, frame: str = "machine") -> View:
