@@ -101,7 +101,9 @@ def _evaluate(
 
     if points:
         full = [
-            complete_coordinates(scene.machine, parse_point(text), scene.workspace.positions)
+            complete_coordinates(
+                scene.machine, parse_point(text, scene.machine.axes), scene.workspace.positions
+            )
             for text in points
         ]
         axes = {name: np.array([point[name] for point in full]) for name in scene.machine.axes}

@@ -46,7 +46,7 @@ def main() -> None:
     except click.exceptions.Exit as stop:
         sys.exit(stop.exit_code)
     except click.exceptions.NoArgsIsHelpError as error:
-        click.echo(error.format_message())
+        click.echo(error.format_message(), err=True)
         sys.exit(BAD_INPUT)
     except click.ClickException as error:
         error.show()
@@ -60,6 +60,9 @@ def main() -> None:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
+    except OSError as error:
+        click.echo(f"warpspace: {error.filename or 'output'}: {error.strerror or error}", err=True)
+        sys.exit(BAD_INPUT)
     except MemoryError:
         click.echo("warpspace: not enough memory for this; try a smaller grid", err=True)
         sys.exit(BAD_INPUT)

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 import click
@@ -58,13 +58,15 @@ at_option = click.option(
 )
 
 
-def parse_point(text: str) -> dict[str, float]:
+def parse_point(text: str, axes: Collection[str]) -> dict[str, float]:
     """Read axis positions as a user types them.
 
     Parameters
     ----------
     text : str
         For instance ``X=0,Y=-225,B=30``.
+    axes : collection of str
+        Letters of the axes there are.
 
     Returns
     -------
@@ -86,6 +88,9 @@ def parse_point(text: str) -> dict[str, float]:
             value = math.nan
         if not equals or not math.isfinite(value) or len(name) != 1:
             raise OptionError(f"--at {text!r}: {part.strip()!r} cannot be read; {expected}")
+        if name not in axes:
+            known = ", ".join(axes)
+            raise OptionError(f"--at {text!r}: unknown axis {name}; expected one of {known}")
         if name in found:
             raise OptionError(f"--at {text!r}: axis {name} is given twice")
         if abs(value) > 1e5:

@@ -29,8 +29,12 @@ def write_atomically(path: str | Path) -> Generator[Path]:
         If the target cannot be written; the message names it and the reason.
     """
     target = Path(path)
+    if target.is_symlink():
+        target = target.resolve()  # the link stays, the file behind it is replaced
     if target.is_dir():
-        raise OutputError(f"{target}: is a folder; expected the name of a file to write")
+        raise OutputError(f"{path}: is a folder; expected the name of a file to write")
+    if target.exists() and not target.is_file():
+        raise OutputError(f"{path}: is no regular file; expected the name of a file to write")
     if not target.parent.is_dir():
         raise OutputError(f"{target}: the folder {target.parent} does not exist")
     temporary: Path | None = None
