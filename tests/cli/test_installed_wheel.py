@@ -1,0 +1,110 @@
+"""The wheel works by itself: installed, run from another folder, with its own scenes."""
+
+import os
+import subprocess
+import sys
+import sysconfig
+import tarfile
+import venv
+import zipfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+# The dependencies are borrowed from the running interpreter's site-packages. A path in a .pth
+# file does not run the .pth files found there, so the editable install stays out of sight.
+BORROWED = sysconfig.get_path("purelib"), sysconfig.get_path("platlib")
+
+
+def run(command: Sequence[str | Path], folder: Path) -> str:
+    environment = {k: v for k, v in os.environ.items() if k not in {"PYTHONPATH", "PYTHONHOME"}}
+    result = subprocess.run(
+        command,
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=240,
+        check=False,
+    )
+    assert result.returncode == 0, f"{command}\n{result.stdout}\n{result.stderr}"
+    return result.stdout
+
+
+@dataclass(frozen=True)
+class Installation:
+    bin: Path
+    root: Path
+    elsewhere: Path
+
+    def python(self, *arguments: str) -> str:
+        return run([self.bin / "python", *arguments], self.elsewhere)
+
+    def warpspace(self, *arguments: str) -> str:
+        return run([self.bin / "warpspace", *arguments], self.elsewhere)
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("wheel")
+    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "wheel", "--no-deps"]
+    run([*pip, "--no-build-isolation", "--wheel-dir", str(folder), str(REPOSITORY)], folder)
+    (built,) = folder.glob("*.whl")
+    return built
+
+
+@pytest.fixture(scope="module")
+def installation(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Installation:
+    root = tmp_path_factory.mktemp("installed")
+    venv.create(root, with_pip=False, symlinks=True)
+    python = root / "bin" / "python"
+    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--python", str(python)]
+    run([*pip, "install", "--no-deps", "--no-index", str(wheel)], root)
+    (site_packages,) = root.glob("lib/python*/site-packages")
+    borrowed = "\n".join(dict.fromkeys(BORROWED))
+    (site_packages / "borrowed.pth").write_text(borrowed + "\n", encoding="utf-8")
+    return Installation(python.parent, root, tmp_path_factory.mktemp("elsewhere"))
+
+
+def bundled() -> list[str]:
+    files = (
+        path.relative_to(REPOSITORY).as_posix()
+        for folder in ("scenes", "assets")
+        for path in (REPOSITORY / folder).rglob("*.toml")
+    )
+    return sorted(files)
+
+
+def test_wheel_carries_scenes_and_machines(wheel: Path):
+    with zipfile.ZipFile(wheel) as archive:
+        names = set(archive.namelist())
+    assert "warpspace/py.typed" in names
+    assert bundled()
+    assert {f"warpspace/_data/{name}" for name in bundled()} <= names
+
+
+def test_sdist_carries_scenes_and_machines(tmp_path: Path):
+    build = "import sys; from hatchling.build import build_sdist; build_sdist(sys.argv[1])"
+    run([sys.executable, "-c", build, str(tmp_path)], REPOSITORY)
+    (sdist,) = tmp_path.glob("*.tar.gz")
+    with tarfile.open(sdist) as archive:
+        names = {name.partition("/")[2] for name in archive.getnames()}
+    assert set(bundled()) <= names
+
+
+def test_data_comes_from_the_installed_package(installation: Installation):
+    code = "from warpspace import resources as r; print(r.scenes_dir(), r.assets_dir(), sep='\\n')"
+    folders = [Path(line) for line in installation.python("-c", code).splitlines()]
+    assert all(folder.is_relative_to(installation.root.resolve()) for folder in folders)
+    assert all(folder.is_dir() for folder in folders)
+
+
+def test_module_lists_scenes_elsewhere(installation: Installation):
+    assert "dvf5000_first" in installation.python("-m", "warpspace", "scenes")
+
+
+def test_command_checks_a_bundled_scene_elsewhere(installation: Installation):
+    installation.warpspace("check", "dvf5000_first")

@@ -1,0 +1,124 @@
+"""What every test shares: off-screen drawing, hypothesis profiles, no skips in CI."""
+
+import os
+import sys
+
+# Both are read when matplotlib and VTK are first imported.
+os.environ["MPLBACKEND"] = "Agg"
+if sys.platform == "linux":
+    os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = "vtkEGLRenderWindow"
+
+import shutil
+import subprocess
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, NoReturn
+
+import hypothesis
+import pytest
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+IN_CI = bool(os.environ.get("CI"))
+
+hypothesis.settings.register_profile("local", deadline=None)
+hypothesis.settings.register_profile("ci", deadline=None, derandomize=True)
+hypothesis.settings.load_profile("ci" if IN_CI else "local")
+
+CHROMIUM_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+# Software WebGL, and no calls home.
+CHROMIUM_ARGS = (
+    "--no-sandbox",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+)
+# In a process of its own, since a machine without OpenGL may end it.
+RENDERER_PROBE = """
+import vtkmodules.vtkRenderingOpenGL2
+from vtkmodules.vtkRenderingCore import vtkRenderWindow
+window = vtkRenderWindow()
+window.SetOffScreenRendering(True)
+window.Render()
+print(window.GetClassName() if window.SupportsOpenGL() else "")
+"""
+
+
+def _unavailable(what: str) -> NoReturn:
+    """Skip where a developer's machine lacks something, fail where CI does."""
+    if IN_CI:
+        pytest.fail(f"CI skips nothing: {what}", pytrace=False)
+    pytest.skip(what)
+
+
+@pytest.fixture(scope="session")
+def chromium_path() -> str:
+    """Path of the Chromium that the browser tests drive."""
+    for name in CHROMIUM_NAMES:
+        if path := shutil.which(name):
+            return path
+    _unavailable("no Chromium found (Debian package chromium)")
+
+
+@pytest.fixture(scope="session")
+def browser(chromium_path: str) -> "Iterator[Browser]":
+    """One headless Chromium for all browser tests of a run."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(
+            executable_path=chromium_path, args=list(CHROMIUM_ARGS)
+        )
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture
+def page(browser: "Browser") -> "Iterator[Page]":
+    """A fresh page of 1600 × 900 in a context of its own."""
+    context = browser.new_context(viewport={"width": 1600, "height": 900})
+    yield context.new_page()
+    context.close()
+
+
+@pytest.fixture(scope="session")
+def renderer() -> str:
+    """Name of the VTK window class that draws off screen here."""
+    try:
+        probe = subprocess.run(
+            [sys.executable, "-c", RENDERER_PROBE],
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        _unavailable("VTK hangs when it draws off screen")
+    if probe.returncode != 0 or not (name := probe.stdout.strip()):
+        _unavailable("VTK cannot draw off screen (Debian packages libegl1 libgl1-mesa-dri)")
+    return name
+
+
+def _skipped(config: pytest.Config) -> list[pytest.TestReport]:
+    reporter = config.pluginmanager.get_plugin("terminalreporter")
+    return reporter.stats.get("skipped", []) if reporter else []
+
+
+def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
+    """Fail a CI run that skipped a test."""
+    on_worker = hasattr(session.config, "workerinput")
+    if IN_CI and not on_worker and _skipped(session.config) and exitstatus == pytest.ExitCode.OK:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def pytest_terminal_summary(
+    terminalreporter: pytest.TerminalReporter, config: pytest.Config
+) -> None:
+    """Say why a CI run with skipped tests failed."""
+    if IN_CI and (skipped := _skipped(config)):
+        terminalreporter.section("skipped in CI", red=True)
+        terminalreporter.line(f"{len(skipped)} skipped, and CI skips nothing: the run fails.")
