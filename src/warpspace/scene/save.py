@@ -1,0 +1,164 @@
+"""Scenes back into the file format: the text reloads to the identical scene."""
+
+from collections.abc import Mapping, Sequence
+from typing import cast
+
+import tomli_w
+
+from warpspace.exceptions import SceneError
+from warpspace.machine.description import DEFAULT_TRAVEL, ORIGIN, Machine
+from warpspace.machine.errors import Poly, Ramp
+from warpspace.machine.parameters import PARAMETERS, Parameter
+from warpspace.machine.tolerances import Tolerance
+from warpspace.scene.machines import load_machine, machine_names
+from warpspace.scene.model import Scene
+
+_WRAP = 8
+"""Entries of a list that stand on one line."""
+
+
+def scene_to_toml(scene: Scene) -> str:
+    """Spell a scene as the text of a scene file.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    str
+        TOML. A bundled machine is named, any other is written inline; errors that came from CSV
+        files are written as tables, so that the text needs no other file.
+
+    Notes
+    -----
+    `warpspace.scene.library.parse_scene` with the same name gives an equal scene back, every number
+    to the last bit. One thing the format cannot say is a ramp over another range than that of its
+    axis in the working volume; it is written as the polynomial it is.
+    """
+    bundled = _is_bundled(scene.machine)
+    head: dict[str, object] = {"title": scene.title}
+    if bundled:
+        head["machine"] = scene.machine.name
+    if scene.description:
+        head["description"] = scene.description
+    parts = [tomli_w.dumps(head, multiline_strings="\r" not in scene.description)]
+    if not bundled:
+        parts += _machine_sections(scene.machine)
+    parts.append(
+        _section("convention", {"component_errors": str(scene.model.component_errors.value)})
+    )
+    ranges = {
+        axis: low if low == high else [low, high]
+        for axis, (low, high) in scene.workspace.ranges.items()
+    }
+    parts.append(_section("workspace", ranges))
+    points = {
+        "tool": scene.model.tool_point_mm,
+        "workpiece": scene.model.workpiece_point_mm,
+        "traces": scene.trace_points_mm,
+    }
+    parts.append(_section("points_mm", points))
+    parts += [_errors_section(scene), _tolerances_section(scene)]
+    view = {
+        "exaggeration": "auto" if scene.exaggeration is None else scene.exaggeration,
+        "reference": "absolute" if scene.reference is None else scene.reference,
+    }
+    parts.append(_section("view", view))
+    return "\n".join(part for part in parts if part)
+
+
+def _is_bundled(machine: Machine) -> bool:
+    """Tell whether naming a machine is enough."""
+    if machine.name not in machine_names():
+        return False
+    try:
+        return load_machine(machine.name) == machine
+    except SceneError:
+        return False
+
+
+def _machine_sections(machine: Machine) -> list[str]:
+    """Spell a machine inline."""
+    offsets = {name: axis.offset_mm for name, axis in machine.axes.items()} | dict(machine.fixed_mm)
+    travel = {
+        name: axis.travel
+        for name, axis in machine.axes.items()
+        if axis.travel != DEFAULT_TRAVEL[name]
+    }
+    direction = {name: axis.direction for name, axis in machine.axes.items() if axis.direction != 1}
+    return [
+        _section("machine", {"title": machine.title, "chain": str(machine.chain)}),
+        _section("machine.offset_mm", {k: v for k, v in offsets.items() if v != ORIGIN}),
+        _section("machine.travel", travel),
+        _section("machine.direction", direction),
+    ]
+
+
+def _errors_section(scene: Scene) -> str:
+    """Spell the error functions, each with its thesis symbol and unit behind it."""
+    values = {key: _function(scene, key) for key in scene.errors}
+    return _section("errors", values, PARAMETERS)
+
+
+def _function(scene: Scene, key: str) -> object:
+    """Spell one error function."""
+    function = scene.errors.functions[key]
+    if isinstance(function, Ramp) and function.span != _span(scene, key):
+        low, high = function.span
+        slope = function.value / (high - low)
+        function = Poly(function.span, (-slope * low, slope))
+    return function.to_toml()
+
+
+def _span(scene: Scene, key: str) -> tuple[float, float]:
+    """Range that the reader will give the function of a parameter."""
+    axis = PARAMETERS[key].axis
+    low, high = scene.workspace.ranges[axis]
+    return (low, high) if low < high else scene.machine.axes[axis].travel
+
+
+def _tolerances_section(scene: Scene) -> str:
+    """Spell the tolerance set."""
+    values: dict[str, object] = {}
+    if scene.tolerances.default:
+        values["default"] = scene.tolerances.default
+    for key, own in scene.tolerances.own.items():
+        values[key] = (
+            own.half_width
+            if own == Tolerance(0.0, own.half_width)
+            else {
+                "centre": own.centre,
+                "half_width": own.half_width,
+            }
+        )
+    return _section("tolerances", values, PARAMETERS)
+
+
+def _section(
+    name: str, values: Mapping[str, object], remarks: Mapping[str, Parameter] | None = None
+) -> str:
+    """Spell a table with one entry a line; empty where there is none."""
+    if not values:
+        return ""
+    lines = [f"[{name}]"]
+    for key, value in values.items():
+        row = (remarks or {}).get(key)
+        remark = f"  # {row.symbol}, {row.name}, {row.unit}" if row else ""
+        lines.append(f"{key} = {_inline(value)}{remark}")
+    return "\n".join(lines) + "\n"
+
+
+def _inline(value: object) -> str:
+    """Spell a value on one line (a long list on several)."""
+    if isinstance(value, Mapping):
+        table = cast("Mapping[str, object]", value)
+        return "{ " + ", ".join(f"{key} = {_inline(entry)}" for key, entry in table.items()) + " }"
+    if isinstance(value, (list, tuple)):
+        entries = [_inline(entry) for entry in cast("Sequence[object]", value)]
+        if len(entries) <= _WRAP:
+            return "[" + ", ".join(entries) + "]"
+        return "[\n" + "".join(f"  {entry},\n" for entry in entries) + "]"
+    if isinstance(value, str):
+        return tomli_w.dumps({"value": value}).split("=", 1)[1].strip()
+    return repr(value) if isinstance(value, int) else repr(float(cast("float", value)))

@@ -1,0 +1,92 @@
+"""A scene written as TOML reloads to the identical scene."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from warpspace import evaluate, load_scene, scene_names
+from warpspace.machine.errors import Constant, ErrorSet, Harmonics, Poly, Ramp, Table
+from warpspace.machine.tolerances import Tolerance, ToleranceSet
+from warpspace.scene.library import parse_scene
+from warpspace.scene.save import scene_to_toml
+
+finite = st.floats(-1e3, 1e3, allow_subnormal=False)
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_every_bundled_scene_reloads_identically(name: str) -> None:
+    scene = load_scene(name)
+    assert parse_scene(scene_to_toml(scene), name) == scene
+
+
+@settings(max_examples=40)
+@given(
+    title=st.text(max_size=60),
+    value=finite,
+    centre=finite,
+    half=st.floats(0, 1e3),
+    rows=st.lists(st.tuples(finite, finite), min_size=1, max_size=20, unique_by=lambda row: row[0]),
+    exaggeration=st.none() | st.floats(1e-3, 1e6),
+)
+def test_any_numbers_and_any_title_survive(title, value, centre, half, rows, exaggeration) -> None:
+    scene = load_scene("dvf5000_nominal")
+    x, c = scene.workspace.ranges["X"], scene.machine.axes["C"].travel
+    changed = replace(
+        scene,
+        title=title or "untitled",
+        description=f'{title}\nsecond line \\ " \'\'\' """',
+        errors=ErrorSet(
+            {
+                "EC0Y": Constant(scene.workspace.ranges["Y"], value),
+                "EAX": Ramp(x, value),
+                "EXX": Poly(x, (value, 1e-7)),
+                "EXC": Harmonics(c, ((1.0, value, 90.0), (2.0, 0.1 + 0.2, 0.0))),
+                "EYX": Table(x, tuple(sorted(rows))),
+            }
+        ),
+        tolerances=ToleranceSet(
+            {"rotation": half}, {"EAX": Tolerance(centre, half), "EBX": Tolerance(0.0, half)}
+        ),
+        exaggeration=exaggeration,
+        reference={"X": value, "Y": 0.5, "Z": -280.0, "B": 0.0, "C": 0.0},
+    )
+    assert parse_scene(scene_to_toml(changed), scene.name) == changed
+
+
+def test_an_inline_machine_is_written_inline() -> None:
+    text = """
+title = "three axes"
+[machine]
+chain = "wFXZYt"
+[machine.offset_mm]
+X = [1, 2, 3]
+t = [0, 0, -100]
+[machine.direction]
+Z = -1
+[machine.travel]
+X = [-100, 100]
+[errors]
+EB0Z = 12.5
+"""
+    scene = parse_scene(text, "three")
+    again = parse_scene(scene_to_toml(scene), "three")
+    assert again == scene
+    assert again.machine.axes["Z"].direction == -1
+
+
+def test_a_ramp_over_another_range_keeps_its_values() -> None:
+    scene = load_scene("dvf5000_nominal")
+    moved = replace(scene, errors=ErrorSet({"EAX": Ramp((-100.0, 300.0), 7.0)}))
+    again = parse_scene(scene_to_toml(moved), scene.name)
+    np.testing.assert_allclose(
+        evaluate(again, grid=3).error_um, evaluate(moved, grid=3).error_um, rtol=1e-12, atol=1e-12
+    )
+
+
+def test_errors_carry_symbol_name_and_unit_as_remarks() -> None:
+    text = scene_to_toml(load_scene("dvf5000_first"))
+    assert "EAX = { ramp = 5.5 }  # ε_xX, roll of X, µrad" in text
+    assert 'machine = "dvf5000"' in text
