@@ -3,6 +3,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+SCENE ?= dvf5000_first
 ARGS ?=
 
 # pip puts the pinned versions of constraints.txt into .venv; the stamps let it run again only
@@ -17,8 +18,8 @@ PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
 
-view: $(RUN_STAMP) ## open the app (options and another scene: make view ARGS="--port 8080")
-	$(BIN)/warpspace view dvf5000_first $(ARGS)
+view: $(RUN_STAMP) ## open the app (make view SCENE=teach_squareness ARGS="--port 8080")
+	$(BIN)/warpspace view $(SCENE) $(ARGS)
 
 test: system-packages $(DEV_STAMP) ## install what is missing, then lint, type-check and test everything
 	$(MAKE) --no-print-directory lint
