@@ -8,7 +8,7 @@ import numpy as np
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, exact_error, nominal_point
 from warpspace.kinematics.firstorder import jacobian
-from warpspace.kinematics.model import Coordinates, Loop, Model
+from warpspace.kinematics.model import Coordinates, Loop, Model, batch_shape
 from warpspace.machine.errors import ErrorSet
 from warpspace.machine.parameters import parameter
 from warpspace.units import Array
@@ -248,7 +248,7 @@ def evaluate_exact(
     if rotation is not None:
         error = transforms.rotate(rotation, error)
         orientation = transforms.rotate(rotation, orientation)
-    shape = np.broadcast_shapes(error.shape, point.shape)
+    shape = np.broadcast_shapes((*batch_shape(coordinates), 3), error.shape, point.shape)
     return ErrorField(
         np.broadcast_to(point, shape),
         np.broadcast_to(error, shape),

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warpspace.kinematics.chain import AxisFrames, branch_frames, tool_axis
-from warpspace.kinematics.model import ComponentErrors, Coordinates, Loop, Model
+from warpspace.kinematics.model import ComponentErrors, Coordinates, Loop, Model, batch_shape
 from warpspace.machine.parameters import Parameter, parameter
 from warpspace.units import UM_PER_MM_URAD, Array
 
@@ -156,9 +156,7 @@ def jacobian(
     First order in all errors; `warpspace.kinematics.chain.exact_error` has all of them.
     """
     point = np.asarray(point_mm, dtype=float)
-    shape = np.broadcast_shapes(
-        (*np.broadcast_shapes(*(np.shape(value) for value in coordinates.values())), 3), point.shape
-    )
+    shape = np.broadcast_shapes((*batch_shape(coordinates), 3), point.shape)
     position = np.zeros((len(keys), *shape))
     orientation = np.zeros((len(keys), *shape))
     about = tool_axis(model, coordinates)

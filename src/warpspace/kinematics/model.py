@@ -55,6 +55,11 @@ class Model:
     workpiece_point_mm: Vector = ORIGIN
 
 
+def batch_shape(coordinates: Coordinates) -> tuple[int, ...]:
+    """Give the batch shape that the positions of all axes broadcast to."""
+    return np.broadcast_shapes(*(np.shape(values) for values in coordinates.values()))
+
+
 def complete_coordinates(
     machine: Machine, given: Mapping[str, ArrayLike], default: Mapping[str, float] | None = None
 ) -> dict[str, Array]:
@@ -85,7 +90,7 @@ def complete_coordinates(
     complete = {**dict.fromkeys(machine.axes, 0.0), **(default or {}), **given}
     positions = {name: _finite(name, complete[name]) for name in machine.axes}
     try:
-        np.broadcast_shapes(*(values.shape for values in positions.values()))
+        batch_shape(positions)
     except ValueError:
         shapes = ", ".join(f"{name} {values.shape}" for name, values in positions.items())
         raise OptionError(f"axis positions of shapes {shapes}; expected one batch shape") from None

@@ -1,0 +1,89 @@
+"""Hypothesis strategies for machines with any chain, and the one finite-difference helper."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from hypothesis import strategies as st
+
+from warpspace.kinematics.chain import exact_error
+from warpspace.kinematics.model import ComponentErrors, Loop, Model
+from warpspace.machine.description import FIXED_FRAMES, Chain, build_machine
+from warpspace.machine.parameters import AXES, LINEAR_AXES
+
+MAX_OFFSET_MM = 1000.0
+MAX_LINEAR_MM = 500.0
+STEP = 50.0
+"""Step of the central difference, µm or µrad: cubic terms and rounding are both far below 1e-6."""
+
+
+def lengths(limit: float = MAX_OFFSET_MM) -> st.SearchStrategy[float]:
+    """Lengths in mm within ± limit, in steps of a micrometre."""
+    return st.integers(-int(limit * 1000), int(limit * 1000)).map(lambda um: um / 1000.0)
+
+
+def vectors(limit: float = MAX_OFFSET_MM) -> st.SearchStrategy[tuple[float, float, float]]:
+    """Vectors in mm."""
+    return st.tuples(lengths(limit), lengths(limit), lengths(limit))
+
+
+@st.composite
+def chains(draw: st.DrawFn) -> Chain:
+    """Chains of one to six axes, in any order, on either side."""
+    order = draw(st.permutations(AXES))
+    count = draw(st.integers(1, len(AXES)))
+    split = draw(st.integers(0, count))
+    return Chain(tuple(order[:split]), tuple(order[split:count]))
+
+
+@st.composite
+def models(draw: st.DrawFn, component_errors: ComponentErrors | None = None) -> Model:
+    """Machines with any chain, offsets and directions, their points and a convention."""
+    chain = draw(chains())
+    frames = (*chain.axes, *FIXED_FRAMES)
+    machine = build_machine(
+        chain,
+        offset_mm={frame: draw(vectors()) for frame in frames},
+        direction={axis: draw(st.sampled_from((1, -1))) for axis in chain.axes},
+    )
+    convention = component_errors or draw(st.sampled_from(ComponentErrors))
+    return Model(machine, convention, draw(vectors(300.0)), draw(vectors(300.0)))
+
+
+def positions(
+    model: Model, shape: tuple[int, ...] = ()
+) -> st.SearchStrategy[dict[str, np.ndarray]]:
+    """Positions of all axes of a model, in a batch of a shape."""
+    size = int(np.prod(shape))
+
+    def one(axis: str) -> st.SearchStrategy[np.ndarray]:
+        limit = MAX_LINEAR_MM if axis in LINEAR_AXES else 180.0
+        values = st.lists(lengths(limit), min_size=size, max_size=size)
+        return values.map(lambda found: np.array(found).reshape(shape))
+
+    return st.fixed_dictionaries({axis: one(axis) for axis in model.machine.axes})
+
+
+def central_differences(
+    model: Model,
+    loop: Loop,
+    keys: Sequence[str],
+    coordinates: dict[str, np.ndarray],
+    point_mm: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Derivatives of the exact chain, at zero errors, for single coordinates.
+
+    Returns
+    -------
+    position, orientation : ndarray, [K, 3]
+        Per unit of each parameter, like `warpspace.kinematics.firstorder.jacobian`.
+    """
+    steps = STEP * np.eye(len(keys))
+
+    def at(sign: float) -> tuple[np.ndarray, np.ndarray]:
+        values = {key: sign * steps[index] for index, key in enumerate(keys)}
+        return exact_error(model, loop, coordinates, values, point_mm)
+
+    (up, up_tilt), (down, down_tilt) = at(1.0), at(-1.0)
+    shape = (len(keys), 3)
+    position = np.broadcast_to((up - down) / (2.0 * STEP), shape)
+    return position, np.broadcast_to((up_tilt - down_tilt) / (2.0 * STEP), shape)
