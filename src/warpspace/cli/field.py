@@ -20,10 +20,6 @@ if TYPE_CHECKING:
     from warpspace.units import Array
 
 MAX_LISTED = 20
-COLUMNS = (
-    *("x_mm", "y_mm", "z_mm", "error_x_um", "error_y_um", "error_z_um", "norm_um"),
-    *("orientation_x_urad", "orientation_y_urad", "orientation_z_urad"),
-)
 
 
 @click.command()
@@ -68,7 +64,9 @@ def field(
     axes, result = _evaluate(loaded, points, grid, loop=loop, frame=frame, exact=exact)
     summary = statistics(result)
     if csv_path is not None:
-        _write_csv(csv_path, axes, result)
+        from warpspace.outputs.exports.table import write_field_csv
+
+        write_field_csv(csv_path, axes, result)
     if as_json:
         print_json({"points": _rows(axes, result), "statistics": asdict(summary)})
         return
@@ -155,31 +153,3 @@ def _list_points(axes: "dict[str, Array]", result: "ErrorField") -> None:
         click.echo(f"  {at}: ({error}) µm, |E| {norm[index]:.3f} µm, tilt ({tilt}) µrad")
     if norm.size > MAX_LISTED:
         click.echo(f"  … {norm.size - MAX_LISTED} more; --csv or --json has all")
-
-
-def _write_csv(path: str, axes: "dict[str, Array]", result: "ErrorField") -> None:
-    """Write axis positions, nominal points, errors and orientation, one row a point."""
-    import numpy as np
-
-    from warpspace.outputs.files import write_atomically
-
-    table = np.column_stack(
-        [
-            *axes.values(),
-            result.nominal_mm,
-            result.error_um,
-            result.norm_um,
-            result.orientation_urad,
-        ]
-    )
-    names = [f"{name}_{'mm' if name in 'XYZ' else 'deg'}" for name in axes]
-    with write_atomically(path) as temporary:
-        np.savetxt(
-            temporary,
-            table,
-            delimiter=",",
-            fmt="%.9g",
-            header=",".join([*names, *COLUMNS]),
-            comments="",
-            encoding="utf-8",
-        )

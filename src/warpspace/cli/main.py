@@ -7,6 +7,7 @@ import click
 
 from warpspace import __version__
 from warpspace.cli.check import check, scenes
+from warpspace.cli.export import export
 from warpspace.cli.field import field
 from warpspace.cli.snapshot import snapshot
 from warpspace.cli.view import view
@@ -35,7 +36,7 @@ def cli() -> None:
     """
 
 
-for command in (view, snapshot, field, check, scenes):
+for command in (view, snapshot, field, export, check, scenes):
     cli.add_command(command)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from warpspace.exceptions import OutputError, near_miss
+from warpspace.exceptions import OutputError
 
 
 def check_target(path: str | Path, endings: Sequence[str] = (), *, overwrite: bool = True) -> Path:
@@ -35,9 +35,8 @@ def check_target(path: str | Path, endings: Sequence[str] = (), *, overwrite: bo
     target = Path(path)
     ending = target.suffix.lower()
     if endings and ending not in endings:
-        wanted = f"expected one of {', '.join(endings)}"
-        given = f"unknown ending {ending!r}{near_miss(ending, endings)}" if ending else "no ending"
-        raise OutputError(f"{target}: {given}" + ("" if wanted in given else f"; {wanted}"))
+        given = f"unknown ending {ending!r}" if ending else "no ending"
+        raise OutputError(f"{target}: {given}; expected one of {', '.join(endings)}")
     try:
         if target.is_dir():
             raise OutputError(f"{target}: is a folder; expected the name of a file to write")

@@ -1,0 +1,113 @@
+"""Error fields as CSV: a header with units in the names, one row a point."""
+
+import csv
+import io
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from warpspace.field.evaluate import ErrorField
+from warpspace.machine.parameters import LINEAR_AXES
+from warpspace.outputs.exports.drawing import Drawing
+from warpspace.outputs.files import write_atomically
+from warpspace.units import Array
+
+COLUMNS = (
+    *("x_mm", "y_mm", "z_mm", "error_x_um", "error_y_um", "error_z_um", "norm_um"),
+    *("orientation_x_urad", "orientation_y_urad", "orientation_z_urad"),
+)
+_NUMBER = "%.9g"
+
+
+def write_csv(drawing: Drawing, path: str | Path, *, overwrite: bool = True) -> None:
+    """Write the field of a scene over its grid.
+
+    Parameters
+    ----------
+    drawing : Drawing
+    path : str or Path
+    overwrite : bool, optional
+        Whether an existing file may be replaced.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+
+    Notes
+    -----
+    Behind the numbers every row says what it belongs to (scene, loop, reference, convention,
+    program), so that tables of several scenes can be put under each other.
+    """
+    grid = drawing.picture.grid
+    axes = {
+        name: np.broadcast_to(value, grid.shape).reshape(-1)
+        for name, value in grid.coordinates.items()
+    }
+    reference = drawing.scene.reference
+    held = "absolute" if reference is None else " ".join(f"{k}={v:g}" for k, v in reference.items())
+    remarks = {
+        "scene": drawing.scene.name,
+        "loop": str(drawing.picture.view.loop),
+        "reference": held,
+        "component_errors": str(drawing.scene.model.component_errors),
+        "model": "first order",
+        "program": drawing.provenance["program"],
+    }
+    write_field_csv(path, axes, drawing.picture.field, remarks=remarks, overwrite=overwrite)
+
+
+def write_field_csv(
+    path: str | Path,
+    axes: Mapping[str, Array],
+    field: ErrorField,
+    *,
+    remarks: Mapping[str, str] | None = None,
+    overwrite: bool = True,
+) -> None:
+    """Write axis positions, nominal points, errors and orientation, one row a point.
+
+    Parameters
+    ----------
+    path : str or Path
+    axes : mapping of str to ndarray, [n], mm or degrees
+    field : ErrorField
+        Of n points, whatever their shape.
+    remarks : mapping of str to str, optional
+        Columns that say the same in every row.
+    overwrite : bool, optional
+        Whether an existing file may be replaced.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    table = np.column_stack(
+        [
+            *axes.values(),
+            field.nominal_mm.reshape(-1, 3),
+            field.error_um.reshape(-1, 3),
+            field.norm_um.reshape(-1),
+            field.orientation_urad.reshape(-1, 3),
+        ]
+    )
+    names = [f"{name}_{'mm' if name in LINEAR_AXES else 'deg'}" for name in axes]
+    remarks = remarks or {}
+    row = ",".join([_NUMBER] * table.shape[1])
+    tail = "".join("," + _quoted(text) for text in remarks.values()) + "\n"
+    with (
+        write_atomically(path, overwrite=overwrite) as temporary,
+        temporary.open("w", encoding="utf-8", newline="") as file,
+    ):
+        file.write(",".join([*names, *COLUMNS, *remarks]) + "\n")
+        file.writelines(row % tuple(values) + tail for values in table.tolist())
+
+
+def _quoted(text: str) -> str:
+    """Spell a text as one CSV field; no spreadsheet takes it for a formula."""
+    line = io.StringIO()
+    safe = f"'{text}" if text[:1] in ("=", "+", "-", "@") else text
+    csv.writer(line, lineterminator="").writerow([safe])
+    return line.getvalue()
