@@ -1,8 +1,37 @@
-"""Command `view`."""
+"""Command `view`: the app in the browser."""
 
 import click
 
+from warpspace.cli.options import scene_argument
+
 
 @click.command()
-def view() -> None:
-    """Placeholder while the command is being written."""
+@scene_argument(default="dvf5000_first")
+@click.option(
+    "--host",
+    default="127.0.0.1",
+    show_default=True,
+    help="Address to serve on. Anything but this machine's own is open to the network, without a"
+    " password.",
+)
+@click.option("--port", type=int, help="Port to serve on.  [the next free one from 8080]")
+@click.option("--no-browser", is_flag=True, help="Only print the address of the page.")
+def view(scene: str, host: str, port: int | None, *, no_browser: bool) -> None:
+    """Open SCENE in the browser, with a live slider per error parameter.
+
+    SCENE is dvf5000_first where it is left out.
+    """
+    from warpspace.app.viewer import run_viewer
+    from warpspace.scene.library import load_scene, scene_names
+
+    shown = load_scene(scene)
+    bundled = {name: shown if name == scene else load_scene(name) for name in scene_names()}
+    run_viewer(
+        shown,
+        {loaded.title: loaded for loaded in bundled.values()},
+        host=host,
+        port=port,
+        browser=not no_browser,
+        say=click.echo,
+        warn=lambda text: click.secho(text, err=True, fg="yellow"),
+    )

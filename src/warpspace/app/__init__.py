@@ -1,0 +1,1 @@
+"""The browser app: one private session per tab, drawn with viser."""

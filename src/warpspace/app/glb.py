@@ -1,0 +1,127 @@
+"""A binary glTF file with one unlit mesh in vertex colours, written by hand.
+
+viser has no mesh with colours per vertex that arrive as given; `KHR_materials_unlit` with float
+colours does. Only what that needs is written: positions, colours, indices.
+"""
+
+import json
+import struct
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpspace.app.tonemap import Floats
+from warpspace.units import Array
+
+_FLOAT, _UINT16, _UINT32 = 5126, 5123, 5125
+_VERTEX_BUFFER, _INDEX_BUFFER = 34962, 34963
+_TRIANGLES = 4
+_SMALL = 65535
+_ALIGN = 4
+
+
+def _padded(data: bytes, fill: bytes) -> bytes:
+    """Fill a chunk up to a multiple of four bytes."""
+    return data + fill * (-len(data) % _ALIGN)
+
+
+@lru_cache(maxsize=8)
+def _header(vertices: int, indices: int, low: tuple[float, ...], high: tuple[float, ...]) -> bytes:
+    """Spell the JSON chunk for a number of vertices and indices."""
+    small = vertices <= _SMALL
+    floats = 12 * vertices
+    index_bytes = (2 if small else 4) * indices
+    document = {
+        "asset": {"version": "2.0"},
+        "extensionsUsed": ["KHR_materials_unlit"],
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0, "name": "surface"}],
+        "meshes": [
+            {
+                "primitives": [
+                    {
+                        "attributes": {"POSITION": 0, "COLOR_0": 1},
+                        "indices": 2,
+                        "material": 0,
+                        "mode": _TRIANGLES,
+                    }
+                ]
+            }
+        ],
+        "materials": [
+            {
+                "doubleSided": True,
+                "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 1]},
+                "extensions": {"KHR_materials_unlit": {}},
+            }
+        ],
+        "accessors": [
+            {
+                "bufferView": 0,
+                "componentType": _FLOAT,
+                "count": vertices,
+                "type": "VEC3",
+                "min": low,
+                "max": high,
+            },
+            {"bufferView": 1, "componentType": _FLOAT, "count": vertices, "type": "VEC3"},
+            {
+                "bufferView": 2,
+                "componentType": _UINT16 if small else _UINT32,
+                "count": indices,
+                "type": "SCALAR",
+            },
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": 0, "byteLength": floats, "target": _VERTEX_BUFFER},
+            {"buffer": 0, "byteOffset": floats, "byteLength": floats, "target": _VERTEX_BUFFER},
+            {
+                "buffer": 0,
+                "byteOffset": 2 * floats,
+                "byteLength": index_bytes,
+                "target": _INDEX_BUFFER,
+            },
+        ],
+        "buffers": [{"byteLength": 2 * floats + index_bytes}],
+    }
+    return _padded(json.dumps(document, separators=(",", ":")).encode(), b" ")
+
+
+def build_glb(vertices: Array, triangles: NDArray[np.integer], colours: Floats) -> bytes:
+    """Write one unlit mesh.
+
+    Parameters
+    ----------
+    vertices : ndarray, [M, 3]
+    triangles : ndarray of int, [T, 3]
+        Vertex numbers.
+    colours : ndarray of float32, [M, 3]
+        Linear; any value.
+
+    Returns
+    -------
+    bytes
+        A complete GLB file, vertices and colours as 32-bit floats.
+    """
+    points = np.ascontiguousarray(vertices, dtype="<f4")
+    low, high = points.min(axis=0), points.max(axis=0)
+    indices = triangles.astype("<u2" if len(points) <= _SMALL else "<u4").tobytes()
+    text = _header(
+        len(points),
+        triangles.size,
+        tuple(float(value) for value in low),
+        tuple(float(value) for value in high),
+    )
+    body = _padded(points.tobytes() + colours.astype("<f4").tobytes() + indices, b"\0")
+    length = 12 + 8 + len(text) + 8 + len(body)
+    return b"".join(
+        (
+            struct.pack("<4sII", b"glTF", 2, length),
+            struct.pack("<I4s", len(text), b"JSON"),
+            text,
+            struct.pack("<I4s", len(body), b"BIN\0"),
+            body,
+        )
+    )

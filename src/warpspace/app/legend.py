@@ -1,0 +1,154 @@
+"""Colour bar, numbers and headings as HTML: pure text, every foreign word escaped."""
+
+import html
+
+from warpspace.app.live import Frame
+from warpspace.geometry.colour import ColourScale, colour_table
+from warpspace.geometry.deform import round_down
+from warpspace.units import MM_PER_UM
+
+BAR_HEIGHT = 220
+_BAR_MM = 100.0
+_PX_PER_MM = 0.9
+_STOPS = 32
+
+
+def spell_factor(factor: float) -> str:
+    """Spell a display factor: ``×1000``, at most four digits, never 1e+06."""
+    return f"×{float(f'{factor:.4g}'):,.10g}".replace(",", "\u202f")
+
+
+def _number(value: float) -> str:
+    """Spell a value of a scale with a proper minus sign."""
+    return f"{value:g}".replace("-", "−")
+
+
+def gradient(scale: ColourScale) -> str:
+    """Spell the colours of a scale from the bottom up as a CSS gradient."""
+    table = colour_table(diverging=scale.diverging)
+    last = len(table) - 1
+    stops = [table[round(i * last / _STOPS)] for i in range(_STOPS + 1)]
+    spelt = ",".join(f"rgb({r},{g},{b})" for r, g, b in stops)
+    return f"linear-gradient(to top,{spelt})"
+
+
+def colour_bar(frame: Frame) -> str:
+    """Draw the colour bar with ticks, unit, and marks at mean, P95 and max."""
+    scale, found = frame.scale, frame.statistics
+    frame_of_bar = (
+        f'<div style="position:relative;height:{BAR_HEIGHT}px;margin:10px 0 10px 62px">'
+        f'<div style="position:absolute;left:0;top:0;bottom:0;width:22px;'
+        f'outline:1px solid rgba(128,128,128,.5);background:{gradient(scale)}"></div>'
+    )
+    parts = [frame_of_bar]
+    for tick in scale.ticks:
+        at = float(scale.fraction(tick)) * BAR_HEIGHT  # pyright: ignore[reportArgumentType]
+        parts.append(
+            f'<div style="position:absolute;left:22px;bottom:{at:.1f}px;width:5px;'
+            f'border-top:1px solid currentColor"></div>'
+            f'<div style="position:absolute;left:31px;bottom:{at - 7:.1f}px;line-height:14px;'
+            f'font-size:12px">{_number(tick)}</div>'
+        )
+    if not scale.diverging:
+        parts += _marks(scale, (found.mean_um, found.p95_um, found.max_um))
+    parts.append("</div>")
+    label = html.escape(scale.label).replace("E_", "E<sub>") + (
+        "</sub>" if "_" in scale.label else ""
+    )
+    heading = (
+        f'<div style="margin-left:40px;font-weight:600">{label} [{html.escape(scale.unit)}]</div>'
+    )
+    return heading + "".join(parts)
+
+
+def _marks(scale: ColourScale, values: tuple[float, float, float]) -> list[str]:
+    """Draw mean, P95 and max left of the bar, moved apart where they would overlap."""
+    placed: list[str] = []
+    lowest = -100.0
+    for name, value in zip(("mean", "P95", "max"), values, strict=True):
+        at = float(scale.fraction(value)) * BAR_HEIGHT  # pyright: ignore[reportArgumentType]
+        text = max(at, lowest + 12.0)
+        lowest = text
+        placed.append(
+            f'<div style="position:absolute;left:-58px;width:42px;text-align:right;'
+            f'bottom:{text - 7:.1f}px;line-height:14px;font-size:11px">{name}</div>'
+            f'<div style="position:absolute;left:-12px;bottom:{at - 5:.1f}px;border:5px solid '
+            f'transparent;border-left:8px solid currentColor;border-right:0"></div>'
+        )
+    return placed
+
+
+def numbers(frame: Frame) -> str:
+    """Spell the statistics of the field as a table."""
+    found = frame.statistics
+    x, y, z = (_number(round(value, 1)) for value in found.max_at_mm)
+    rows = [
+        ("max", f"{found.max_um:.2f} µm", True),
+        ("P95", f"{found.p95_um:.2f} µm", False),
+        ("mean", f"{found.mean_um:.2f} µm", True),
+        ("RMS", f"{found.rms_um:.2f} µm", False),
+        ("max at", f"({x}, {y}, {z}) mm", False),
+    ]
+    cells = "".join(
+        f'<tr><td style="opacity:.7;padding:1px 0">{name}</td>'
+        f'<td data-value="{name}" style="text-align:right;font-variant-numeric:tabular-nums;'
+        f'font-weight:{600 if strong else 400}">{value}</td></tr>'
+        for name, value, strong in rows
+    )
+    return f'<table style="width:100%;border-collapse:collapse;font-size:14px">{cells}</table>'
+
+
+def scale_bars(frame: Frame) -> str:
+    """Draw the two lengths side by side: geometry in mm, displacement in µm."""
+    factor = frame.exaggeration
+    error = round_down(_BAR_MM / (factor * MM_PER_UM))
+    width = error * MM_PER_UM * factor * _PX_PER_MM
+    unit = f"{_number(error)} µm" if error < 1e4 else f"{_number(error * MM_PER_UM)} mm"
+
+    def bar(pixels: float, text: str) -> str:
+        return (
+            f'<div style="font-size:12px;margin-top:6px">{text}</div>'
+            f'<div style="width:{pixels:.1f}px;height:5px;border:2px solid currentColor;'
+            f'border-top:0"></div>'
+        )
+
+    return bar(_BAR_MM * _PX_PER_MM, f"{_BAR_MM:g} mm geometry") + bar(
+        width, f"{unit} error (drawn {spell_factor(factor)})"
+    )
+
+
+def summary(frame: Frame) -> str:
+    """Put colour bar, numbers and scale bars into one block."""
+    loop = frame.state.loop.value
+    what = f"|E| of the {frame.field.norm_um.size:,} grid nodes, {loop} loop".replace(",", "\u202f")
+    return (
+        '<div style="padding:6px 16px 14px;line-height:1.45">'
+        f"{colour_bar(frame)}"
+        f'<div style="font-size:12px;opacity:.7;margin-top:12px">{what}</div>'
+        f"{numbers(frame)}"
+        f'<div style="margin-top:10px">{scale_bars(frame)}</div>'
+        "</div>"
+    )
+
+
+def heading(frame: Frame) -> str:
+    """Spell machine, error set and display factor."""
+    state = frame.state
+    factor = frame.exaggeration
+    how = "true scale" if factor == 1.0 else f"displacement drawn {spell_factor(factor)}"
+    auto = " (auto)" if state.exaggeration is None else ""
+    edited = len(state.changed_keys)
+    note = f" · {edited} error{'s' if edited > 1 else ''} changed" if edited else ""
+    nodes = "×".join(str(count) for count in frame.grid.shape)
+    size = " × ".join(f"{edge:.0f}" for edge in frame.grid.extent_mm)
+    machine = f"{state.scene.machine.title}, chain {state.scene.machine.chain}"
+    return (
+        '<div style="padding:2px 14px 10px;line-height:1.4">'
+        f'<div style="font-size:17px;font-weight:650">{html.escape(state.scene.title)}'
+        f'<span style="font-weight:400;opacity:.7">{note}</span></div>'
+        f'<div style="font-size:12.5px;opacity:.75">'
+        f"{html.escape(machine)} · {size} mm · {nodes} nodes</div>"
+        f'<div style="font-size:14px;margin-top:3px"><b data-value="factor">{how}</b>{auto}'
+        '<span style="opacity:.75"> · dashed: nominal box</span></div>'
+        "</div>"
+    )

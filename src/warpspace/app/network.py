@@ -1,0 +1,108 @@
+"""Which address and port the app can serve on, checked before the server starts."""
+
+import errno
+import ipaddress
+import os
+import socket
+
+from warpspace.exceptions import OptionError
+
+DEFAULT_HOST = "127.0.0.1"
+DEFAULT_PORT = 8080
+PORTS_TRIED = 100
+MAX_PORT = 65535
+
+
+def resolve_host(host: str) -> str:
+    """Turn a host name into an address of this machine.
+
+    Parameters
+    ----------
+    host : str
+        Name or address to serve on.
+
+    Returns
+    -------
+    str
+        The address.
+
+    Raises
+    ------
+    OptionError
+        If it cannot be resolved.
+    """
+    try:
+        found = socket.getaddrinfo(host or " ", None, type=socket.SOCK_STREAM)
+    except (OSError, UnicodeError, ValueError):
+        raise OptionError(
+            f"--host {host!r} cannot be resolved; expected an address of this machine,"
+            " for instance 127.0.0.1 (this machine only) or 0.0.0.0 (all networks)"
+        ) from None
+    return str(found[0][4][0])
+
+
+def is_local(address: str) -> bool:
+    """Tell whether an address can be reached from this machine only."""
+    return ipaddress.ip_address(address.partition("%")[0]).is_loopback
+
+
+def _bind_error(address: str, port: int) -> OSError | None:
+    """Try to take a port; give what went wrong."""
+    family = socket.AF_INET6 if ":" in address else socket.AF_INET
+    with socket.socket(family, socket.SOCK_STREAM) as probe:
+        if os.name == "posix":
+            # as the server does: a port in TIME_WAIT is free
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((address, port))
+        except (OSError, OverflowError) as error:
+            return error if isinstance(error, OSError) else OSError(errno.EINVAL, str(error))
+    return None
+
+
+def free_port(address: str, port: int | None) -> int:
+    """Choose the port to serve on.
+
+    Parameters
+    ----------
+    address : str
+    port : int or None
+        The port asked for; None takes the first free one from 8080.
+
+    Returns
+    -------
+    int
+
+    Raises
+    ------
+    OptionError
+        If the port asked for, or the address, cannot be used.
+    """
+    if port is not None and not 1 <= port <= MAX_PORT:
+        raise OptionError(f"--port {port}: expected 1 to {MAX_PORT}")
+    first = DEFAULT_PORT if port is None else port
+    last = first + PORTS_TRIED if port is None else first + 1
+    for candidate in range(first, last):
+        error = _bind_error(address, candidate)
+        if error is None:
+            return candidate
+        if error.errno == errno.EADDRNOTAVAIL:
+            raise OptionError(f"--host {address}: not an address of this machine")
+        if error.errno == errno.EACCES:
+            raise OptionError(
+                f"--port {candidate} needs administrator rights; expected one above 1023"
+            )
+        if error.errno != errno.EADDRINUSE:
+            raise OptionError(f"--port {candidate} on {address}: {error.strerror or error}")
+    if port is None:
+        raise OptionError(f"ports {first} to {last - 1} are all in use; free one of them")
+    raise OptionError(
+        f"--port {port} is in use by another program; leave --port out to take the next free one"
+    )
+
+
+def page_url(address: str, port: int) -> str:
+    """Spell the address to open in a browser."""
+    wildcard = {"0.0.0.0": "127.0.0.1", "::": "[::1]"}.get(address)  # noqa: S104
+    host = wildcard or (f"[{address}]" if ":" in address else address)
+    return f"http://{host}:{port}"

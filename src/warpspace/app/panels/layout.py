@@ -1,0 +1,81 @@
+"""Where the panels stand: errors on the left, colour bar and view on the right, heading on top."""
+
+from collections.abc import Callable, Mapping
+
+from viser import GuiApi
+
+from warpspace.app.panels import Desk, Panel
+from warpspace.app.panels.errors import ErrorsPanel
+from warpspace.app.panels.summary import heading_panel, summary_panel
+from warpspace.app.panels.view import ViewPanel
+from warpspace.app.state import AppState
+from warpspace.scene.model import Scene
+
+LEFT_WIDTH = 330
+RIGHT_WIDTH = 300
+STYLE = """<style>
+/* labels above their controls, on a line of their own */
+.mantine-Flex-root:has(> .mantine-Box-root > .mantine-Text-root > label),
+div:has(> div > p > label) { flex-wrap: wrap; }
+div:has(> p > label) { width: 100% !important; padding-bottom: 2px; }
+div:has(> p > label) + div { width: 100%; }
+p:has(> label) { color: inherit !important; letter-spacing: 0 !important; }
+</style>"""
+
+
+def side_widths() -> tuple[int, int]:
+    """Give the widths of the docked panels, CSS pixels."""
+    return LEFT_WIDTH, RIGHT_WIDTH
+
+
+def apply_theme(gui: GuiApi, *, dark: bool) -> None:
+    """Set the colours of the page."""
+    gui.configure_theme(
+        dark_mode=dark, show_logo=False, show_share_button=False, brand_color=(38, 70, 112)
+    )
+
+
+def lay_out_panels(
+    desk: Desk, state: AppState, scenes: Mapping[str, Scene], fit_view: Callable[[], None]
+) -> list[Panel]:
+    """Build the page of one tab.
+
+    Parameters
+    ----------
+    desk : Desk
+    state : AppState
+    scenes : mapping of str to Scene
+    fit_view : callable
+        Puts the camera back.
+
+    Returns
+    -------
+    list of Panel
+        In the order they are read.
+    """
+    gui = desk.gui
+    apply_theme(gui, dark=state.shown.dark)
+    gui.set_panel_label("Errors")
+    gui.main_panel.dock_left()
+    gui.main_panel.set_width(LEFT_WIDTH)
+    gui.add_html(STYLE)
+    errors = ErrorsPanel(desk, state)
+
+    results = gui.add_panel()
+    with results.add_tab("Result"):
+        summary = summary_panel(desk)
+    results.dock_right()
+    results.set_width(RIGHT_WIDTH)
+
+    settings = gui.add_panel()
+    with settings.add_tab("View"):
+        view = ViewPanel(desk, state, scenes)
+        button = gui.add_button("Fit view", hint="Camera to the operator's side.", order=60.0)
+        button.on_click(lambda _: fit_view())
+    settings.dock_below(results)
+
+    top = gui.add_panel()
+    with top.add_tab("warpspace"):
+        heading = heading_panel(desk)
+    top.float(x=12, y=12, width=520)
+    return [errors, view, summary, heading]

@@ -1,0 +1,226 @@
+"""The view panel: scene, exaggeration, component, loop, density, rotary positions, switches."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from warpspace.app.live import Frame
+from warpspace.app.panels import Desk
+from warpspace.app.state import EXAGGERATION, NODES, TRUE_SCALE, AppState
+from warpspace.app.widgets import Bound, dom_id
+from warpspace.kinematics.model import Loop
+from warpspace.scene.model import Scene
+
+COMPONENT_NAMES = {"norm": "|E| length", "x": "E_x", "y": "E_y", "z": "E_z"}
+LOOP_NAMES = {
+    Loop.TOOL.value: "tool point",
+    Loop.WORKPIECE.value: "workpiece point",
+    Loop.RELATIVE.value: "tool relative to workpiece",
+}
+SWITCHES = {
+    "traces": ("Rotary traces", "Circles and arcs of the table: nominal light, actual dark."),
+    "ghost": ("Nominal box", "The undeformed working volume, dashed."),
+    "grid_lines": ("Grid lines", "Lines of the grid on the bent box."),
+    "axes": ("Axes", "Coordinates of the machine in mm."),
+    "dark": ("Dark mode", "Light lines on a dark ground; the colours of the map stay."),
+}
+
+
+class _Names:
+    """Words shown for the values of a dropdown, both ways."""
+
+    def __init__(self, shown: Mapping[str, str]) -> None:
+        self._shown = dict(shown)
+        self._value = {text: value for value, text in shown.items()}
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        return tuple(self._value)
+
+    def text(self, value: str) -> str:
+        return self._shown.get(value, value)
+
+    def value(self, text: str) -> str:
+        return self._value.get(text, text)
+
+
+class ViewPanel:
+    """How the field is looked at.
+
+    Parameters
+    ----------
+    desk : Desk
+    state : AppState
+    scenes : mapping of str to Scene
+        Scenes to choose from, by the title shown.
+    """
+
+    def __init__(self, desk: Desk, state: AppState, scenes: Mapping[str, Scene]) -> None:
+        self._desk, self._scenes = desk, scenes
+        gui, changed = desk.gui, desk.changed
+        self._titles = {id(scene): title for title, scene in scenes.items()}
+        self._scene: Bound[str] = Bound(
+            gui.add_dropdown(
+                "Scene",
+                tuple(scenes),
+                initial_value=self._titles[id(state.scene)],
+                hint="Machine and error set. Changes made to the errors are lost.",
+            ),
+            changed,
+        )
+        self._add_exaggeration(state)
+        self._components = _Names(COMPONENT_NAMES)
+        self._component: Bound[str] = Bound(
+            gui.add_dropdown(
+                "Colour",
+                self._components.options,
+                initial_value=self._components.text(state.component),
+                hint="What the colours mean: the length of the error or one signed component.",
+            ),
+            changed,
+        )
+        self._loops = _Names(LOOP_NAMES)
+        self._loop: Bound[str] = Bound(
+            gui.add_dropdown(
+                "Error of the",
+                self._loops.options,
+                initial_value=self._loops.text(state.loop),
+                hint="Structural loop: whose error bends the box.",
+            ),
+            changed,
+        )
+        self._nodes: Bound[float] = Bound(
+            gui.add_slider(
+                "Grid density [nodes per axis]",
+                min=NODES.low,
+                max=NODES.high,
+                step=NODES.step,
+                initial_value=float(state.nodes),
+                hint="Nodes along X, Y and Z at which the error is computed.",
+            ),
+            changed,
+        )
+        self._add_positions(state)
+        self._switches: dict[str, Bound[bool]] = {
+            name: Bound(
+                gui.add_checkbox(text, initial_value=getattr(state.shown, name), hint=hint), changed
+            )
+            for name, (text, hint) in SWITCHES.items()
+        }
+
+    def _add_exaggeration(self, state: AppState) -> None:
+        """Add factor, logarithmic slider and the two buttons."""
+        gui, desk = self._desk.gui, self._desk
+        start = state.exaggeration or TRUE_SCALE
+        self._factor: Bound[float] = Bound(
+            gui.add_number(
+                "Displacement drawn ×",
+                initial_value=float(start),
+                min=EXAGGERATION.low,
+                max=EXAGGERATION.high,
+                step=1.0,
+                hint="Display factor of the errors, 1 to 1 000 000.",
+            ),
+            desk.changed,
+        )
+        top = math.log10(EXAGGERATION.high)
+        self._log: Bound[float] = Bound(
+            gui.add_slider(
+                "Exaggeration, logarithmic",
+                min=0.0,
+                max=top,
+                step=0.01,
+                initial_value=math.log10(start),
+                marks=((0.0, "×1"), (2.0, "×100"), (4.0, "×10 000"), (top, "×10⁶")),
+                hint="Display factor of the errors, each mark 100 times the one before.",
+            ),
+            desk.changed,
+        )
+        # its own number box would show the logarithm
+        gui.add_html(
+            f"<style>[id='{dom_id(self._log.handle)}'] ~ .mantine-NumberInput-root"
+            "{display:none}</style>"
+        )
+        buttons = gui.add_button_group(
+            "Factor",
+            ("Auto", "True scale"),
+            hint="Auto: a round factor that makes the largest error a tenth of the box.",
+        )
+        factors = {"Auto": None, "True scale": TRUE_SCALE}
+
+        def choose(name: str) -> None:
+            desk.post(lambda s: s.with_exaggeration(factors[name]))
+
+        buttons.on_click(lambda event: choose(event.target.value))
+
+    def _add_positions(self, state: AppState) -> None:
+        """Add a folder with a slider per rotary axis of the scene's machine."""
+        gui = self._desk.gui
+        self._built_for = state.scene
+        self._folder: Any = gui.add_folder(
+            "Rotary positions", visible=bool(state.positions), order=50.0
+        )
+        self._positions: dict[str, Bound[float]] = {}
+        with self._folder:
+            for axis, value in state.positions.items():
+                span = state.position_spans[axis]
+                slider = gui.add_slider(
+                    f"{axis} [°]",
+                    min=span.low,
+                    max=span.high,
+                    step=span.step,
+                    initial_value=value,
+                    hint=f"Where the {axis} axis stands while the working volume is traversed.",
+                )
+                self._positions[axis] = Bound(slider, self._desk.changed)
+
+    def read(self, state: AppState) -> AppState:
+        """Take over what a browser has chosen."""
+        title = self._scene.poll()
+        if title is not None and title in self._scenes:
+            state = state.with_scene(self._scenes[title])
+        factor, log = self._factor.poll(), self._log.poll()
+        if factor is not None:
+            state = state.with_exaggeration(factor)
+        elif log is not None:
+            state = state.with_exaggeration(_from_log(log))
+        component, loop, nodes = self._component.poll(), self._loop.poll(), self._nodes.poll()
+        if component is not None:
+            state = state.with_component(self._components.value(component))
+        if loop is not None:
+            state = state.with_loop(self._loops.value(loop))
+        if nodes is not None:
+            state = state.with_nodes(nodes)
+        for axis, bound in self._positions.items():
+            position = bound.poll()
+            if position is not None:
+                state = state.with_position(axis, position)
+        for name, bound in self._switches.items():
+            on = bound.poll()
+            if on is not None:
+                state = state.with_shown(**{name: on})
+        return state
+
+    def show(self, frame: Frame) -> None:
+        """Make the widgets show the state."""
+        state = frame.state
+        if state.scene is not self._built_for:
+            self._folder.remove()
+            self._add_positions(state)
+        self._scene.show(self._titles[id(state.scene)])
+        self._factor.show(float(f"{frame.exaggeration:.4g}"))
+        self._log.show(round(math.log10(frame.exaggeration), 2))
+        self._component.show(self._components.text(state.component))
+        self._loop.show(self._loops.text(state.loop))
+        self._nodes.show(float(state.nodes))
+        for axis, bound in self._positions.items():
+            bound.show(state.positions[axis])
+        for name, bound in self._switches.items():
+            bound.show(getattr(state.shown, name))
+
+
+def _from_log(log: float) -> float:
+    """Turn a slider position into a factor of at most three digits; NaN stays NaN."""
+    if math.isnan(log):
+        return math.nan
+    return float(f"{10.0 ** min(max(log, -1.0), 300.0):.3g}")

@@ -1,0 +1,100 @@
+"""Ranges and steps of the controls, and how a wild number is brought into them."""
+
+import math
+from dataclasses import dataclass
+
+from warpspace.machine.parameters import parameter
+from warpspace.machine.tolerances import Tolerance
+from warpspace.scene.model import Scene
+
+LEAST_TRANSLATION_UM = 20.0
+LEAST_ROTATION_URAD = 50.0
+FINE_STEP = 0.1
+_FINE_BELOW = 500.0
+_FINE_ABOVE = 5.0
+_ROUND = (1.0, 2.0, 5.0, 10.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """Range of a control.
+
+    Attributes
+    ----------
+    low, high : float
+        Ends, in the unit of the control.
+    step : float
+        Distance between two positions of a slider.
+    """
+
+    low: float
+    high: float
+    step: float
+
+    def clamp(self, value: float, fallback: float) -> float:
+        """Bring a number that may be anything into the range; what is no number falls back."""
+        if math.isnan(value):
+            return fallback
+        return min(max(value, self.low), self.high)
+
+
+def round_up(value: float) -> float:
+    """Give the smallest 1, 2 or 5 × 10ⁿ that is not below a positive value."""
+    decade = 10.0 ** math.floor(math.log10(value))
+    return next(step * decade for step in _ROUND if step * decade >= value * (1.0 - 1e-9))
+
+
+def _step(high: float) -> float:
+    """Step of a slider that ends at a round number."""
+    if _FINE_ABOVE <= high <= _FINE_BELOW:
+        return FINE_STEP
+    return 10.0 ** (math.ceil(math.log10(high)) - 3)
+
+
+def amplitude_span(key: str, value: float, tolerance: Tolerance | None) -> Span:
+    """Choose the slider range of a parameter.
+
+    Parameters
+    ----------
+    key : str
+        Parameter key.
+    value : float, µm or µrad
+        Value it starts with.
+    tolerance : Tolerance or None
+        Range it may fall in.
+
+    Returns
+    -------
+    Span
+        Symmetric about zero with round ends; holds the tolerance and twice the value.
+    """
+    least = LEAST_ROTATION_URAD if parameter(key).is_rotation else LEAST_TRANSLATION_UM
+    if tolerance is not None:
+        least = abs(tolerance.centre) + tolerance.half_width or least
+    high = round_up(max(least, 2.0 * abs(value)))
+    return Span(-high, high, _step(high))
+
+
+def amplitude_spans(scene: Scene) -> dict[str, Span]:
+    """Choose the slider ranges of all parameters of a scene, by key."""
+    return {
+        key: amplitude_span(key, scene.errors.amplitude(key), scene.tolerances.get(key))
+        for key in scene.parameter_keys
+    }
+
+
+def position_spans(scene: Scene) -> dict[str, Span]:
+    """Give the ranges of the rotary axes of a scene, degrees, by axis.
+
+    They are the travels, widened where the scene itself stands beyond.
+    """
+    at = scene.workspace.positions
+    return {
+        axis.name: Span(
+            min(axis.travel[0], at.get(axis.name, axis.travel[0])),
+            max(axis.travel[1], at.get(axis.name, axis.travel[1])),
+            1.0,
+        )
+        for axis in scene.machine.axes.values()
+        if not axis.is_linear
+    }

@@ -1,0 +1,85 @@
+"""Colours that arrive on screen as they were meant.
+
+viser's client tone-maps what it draws (three.js, ACES filmic). For unlit materials the curve can be
+inverted: vertices get the colour that the tone map turns into the wanted one. Some components come
+out below 0 or above 1, so they travel as floats.
+"""
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpspace.geometry.colour import LEVELS, ColourScale, colour_table
+from warpspace.units import Array
+
+Floats = NDArray[np.float32]
+Rgb = tuple[int, int, int]
+
+# three.js, tonemapping_pars_fragment: sRGB to the ACES working space, and back.
+_IN = np.array(
+    [[0.59719, 0.35458, 0.04823], [0.07600, 0.90834, 0.01566], [0.02840, 0.13383, 0.83777]]
+)
+_OUT = np.array(
+    [[1.60475, -0.53108, -0.07367], [-0.10208, 1.10813, -0.00605], [-0.00327, -0.07276, 1.07602]]
+)
+_EXPOSURE = 1.0 / 0.6
+_A, _B = 0.0245786, 0.000090537
+_C, _D, _E = 0.983729, 0.4329510, 0.238081
+
+
+def srgb_to_linear(srgb: Array) -> Array:
+    """Undo the sRGB transfer curve, [..., 3] of 0 … 1."""
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+
+
+def linear_to_srgb(linear: Array) -> Array:
+    """Apply the sRGB transfer curve, [..., 3] of 0 … 1."""
+    positive = np.maximum(linear, 0.0)
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * positive ** (1 / 2.4) - 0.055)
+
+
+def tone_map(linear: Array) -> Array:
+    """Do what the client does, [..., 3] linear; the result is cut to 0 … 1."""
+    v = (linear * _EXPOSURE) @ _IN.T
+    v = (v * (v + _A) - _B) / (v * (_C * v + _D) + _E)
+    return np.clip(v @ _OUT.T, 0.0, 1.0)
+
+
+def inverse_tone_map(srgb: NDArray[np.uint8]) -> Floats:
+    """Find the linear colours that the client turns into given ones.
+
+    Parameters
+    ----------
+    srgb : ndarray of uint8, [..., 3]
+        Wanted colours on screen.
+
+    Returns
+    -------
+    ndarray of float32, [..., 3]
+        Linear; some components are negative or above 1.
+    """
+    wanted = srgb_to_linear(srgb.astype(float) / 255.0) @ np.linalg.inv(_OUT).T
+    # wanted = (v² + A·v − B) / (C·v² + D·v + E), solved for the positive v
+    a, b, c = 1.0 - _C * wanted, _A - _D * wanted, -(_B + _E * wanted)
+    v = (-b + np.sqrt(b * b - 4.0 * a * c)) / (2.0 * a)
+    return ((v / _EXPOSURE) @ np.linalg.inv(_IN).T).astype(np.float32)
+
+
+@cache
+def _table(*, diverging: bool) -> Floats:
+    """Colours of a scale made ready for the client, [256, 3]."""
+    return inverse_tone_map(colour_table(diverging=diverging))
+
+
+def vertex_colours(scale: ColourScale, values: Array) -> Floats:
+    """Map values to vertex colours that arrive on screen as the scale's colours, [..., 3]."""
+    index = np.rint(scale.fraction(values) * (LEVELS - 1)).astype(np.intp)
+    return _table(diverging=scale.diverging)[index]
+
+
+def line_colour(rgb: Rgb) -> Rgb:
+    """Give the bytes for a line that is to arrive as a colour; near exact below 230."""
+    linear = inverse_tone_map(np.array(rgb, dtype=np.uint8))
+    r, g, b = (int(value) for value in np.rint(np.clip(linear, 0.0, 1.0) * 255.0))
+    return r, g, b

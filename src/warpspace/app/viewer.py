@@ -1,0 +1,193 @@
+"""The server of the app: starts it, gives each browser tab a session, ends it cleanly."""
+
+import contextlib
+import io
+import logging
+import threading
+import webbrowser
+from collections.abc import Callable, Mapping
+from types import TracebackType
+from typing import Self
+
+import viser
+
+from warpspace.app.live import LiveModel
+from warpspace.app.network import free_port, is_local, page_url, resolve_host
+from warpspace.app.session import Session
+from warpspace.app.state import start_state
+from warpspace.exceptions import OptionError
+from warpspace.scene.model import Scene
+
+logger = logging.getLogger(__name__)
+Say = Callable[[str], None]
+NO_AUTHENTICATION = (
+    "warning: {host} can be reached from other machines, and the app asks nobody for a password;"
+    " whoever reaches it can use it"
+)
+
+
+class Viewer:
+    """A running app.
+
+    Parameters
+    ----------
+    scene : Scene
+        Shown first.
+    scenes : mapping of str to Scene
+        Scenes to choose from, by the title shown.
+    host : str, optional
+    port : int or None, optional
+        None takes the next free one from 8080.
+
+    Raises
+    ------
+    OptionError
+        If host or port cannot be used.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        scenes: Mapping[str, Scene] | None = None,
+        *,
+        host: str = "127.0.0.1",
+        port: int | None = None,
+    ) -> None:
+        self.address = resolve_host(host)
+        self.port = free_port(self.address, port)
+        self._scene = scene
+        self._scenes = _with(scene, scenes or {})
+        self._live = LiveModel()
+        self._sessions: dict[int, Session] = {}
+        self._lock = threading.Lock()
+        self._server = _serve(self.address, self.port)
+        self._server.on_client_connect(self._connect)
+        self._server.on_client_disconnect(self._disconnect)
+        # the first tab need not wait for it
+        threading.Thread(
+            target=self._live.frame, args=(start_state(scene),), name="warpspace-warm", daemon=True
+        ).start()
+
+    @property
+    def url(self) -> str:
+        """Address to open in a browser."""
+        return page_url(self.address, self.port)
+
+    @property
+    def is_local(self) -> bool:
+        """Whether only this machine can reach it."""
+        return is_local(self.address)
+
+    @property
+    def sessions(self) -> tuple[Session, ...]:
+        """Sessions of the tabs that are open."""
+        with self._lock:
+            return tuple(self._sessions.values())
+
+    def _connect(self, client: viser.ClientHandle) -> None:
+        """Give a new tab its session."""
+        session = Session(client, self._live, self._scenes, start_state(self._scene))
+        with self._lock:
+            self._sessions[client.client_id] = session
+        session.start()
+        if client.client_id not in self._server.get_clients():
+            self._disconnect(client)
+
+    def _disconnect(self, client: viser.ClientHandle) -> None:
+        """End the session of a tab that is gone."""
+        with self._lock:
+            session = self._sessions.pop(client.client_id, None)
+        if session is not None:
+            session.stop()
+
+    def stop(self) -> None:
+        """End all sessions and the server."""
+        for session in self.sessions:
+            session.stop()
+        self._server.stop()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.stop()
+
+
+def _with(scene: Scene, scenes: Mapping[str, Scene]) -> dict[str, Scene]:
+    """Add the scene shown first to those to choose from, under a title of its own."""
+    if any(known is scene for known in scenes.values()):
+        return dict(scenes)
+    title = scene.title or scene.name
+    if title in scenes:
+        title = f"{title} ({scene.name})"
+    return {title: scene, **{name: known for name, known in scenes.items() if name != title}}
+
+
+def _serve(address: str, port: int) -> viser.ViserServer:
+    """Start viser's server without its banner and without its public tunnel."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        server = viser.ViserServer(host=address, port=port, verbose=False)
+    if server.get_port() != port:
+        server.stop()
+        raise OptionError(f"--port {port} has just been taken by another program; try again")
+    # any tab could ask for a tunnel through a public relay
+    server.request_share_url = lambda *_args, **_kwargs: None
+    server.gui.configure_theme(show_logo=False, show_share_button=False)
+    return server
+
+
+def open_browser(url: str) -> bool:
+    """Open a page in a graphical browser.
+
+    Returns
+    -------
+    bool
+        False where there is none.
+    """
+    try:
+        browser = webbrowser.get()
+    except webbrowser.Error:
+        return False
+    if type(browser) is webbrowser.GenericBrowser:  # one that takes over the terminal
+        return False
+    return browser.open(url)
+
+
+def run_viewer(
+    scene: Scene,
+    scenes: Mapping[str, Scene],
+    *,
+    host: str,
+    port: int | None,
+    browser: bool,
+    say: Say,
+    warn: Say,
+) -> None:
+    """Serve the app until it is interrupted.
+
+    Parameters
+    ----------
+    scene : Scene
+    scenes : mapping of str to Scene
+    host : str
+    port : int or None
+    browser : bool
+        Whether to open the page.
+    say, warn : callable
+        Print a line for the user.
+    """
+    with Viewer(scene, scenes, host=host, port=port) as viewer:
+        try:
+            say(f"{scene.title} is shown at {viewer.url} (Ctrl-C ends it)")
+            if not viewer.is_local:
+                warn(NO_AUTHENTICATION.format(host=host))
+            if browser and not open_browser(viewer.url):
+                say(f"no browser could be opened; open {viewer.url} yourself")
+            threading.Event().wait()
+        except KeyboardInterrupt:
+            say("\nended")
