@@ -3,7 +3,7 @@
 import os
 import tempfile
 from collections.abc import Generator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from warpspace.exceptions import OutputError
@@ -38,6 +38,8 @@ def check_target(path: str | Path, endings: Sequence[str] = (), *, overwrite: bo
         given = f"unknown ending {ending!r}" if ending else "no ending"
         raise OutputError(f"{target}: {given}; expected one of {', '.join(endings)}")
     try:
+        with suppress(FileNotFoundError, NotADirectoryError):
+            target.lstat()  # unlike exists(), says why a name is impossible
         if target.is_dir():
             raise OutputError(f"{target}: is a folder; expected the name of a file to write")
         if not target.parent.is_dir():
