@@ -1,0 +1,78 @@
+"""Levers taken apart: the motions and offsets between an error and the functional point."""
+
+from collections.abc import Mapping
+from itertools import pairwise
+
+import numpy as np
+
+from warpspace.kinematics.chain import branch_frames, branch_pose
+from warpspace.kinematics.model import ComponentErrors, Loop, Model, complete_coordinates
+from warpspace.machine.parameters import parameter
+from warpspace.units import Array
+
+Part = tuple[str, tuple[float, float, float]]
+"""Name and vector in R, mm."""
+
+
+def lever_parts(model: Model, loop: Loop, key: str, at: Mapping[str, float]) -> tuple[Part, ...]:
+    """Take a lever apart into the motions and offsets it is made of.
+
+    Parameters
+    ----------
+    model : Model
+    loop : Loop
+    key : str
+    at : mapping of str to float, mm or degrees
+
+    Returns
+    -------
+    tuple of (str, tuple of float, (3,)), mm
+        Name and vector in R: "Z motion", "X offset", "S", "t", "w", "point"; they add up to the
+        lever. Empty for a workpiece-side parameter in the relative loop.
+    """
+    row = parameter(key)
+    on_tool = row.axis in model.machine.chain.tool
+    if loop is Loop.RELATIVE and not on_tool:
+        return ()
+    side = "tool" if on_tool else "workpiece"
+    coordinates = complete_coordinates(model.machine, at)
+    before = row.is_constant or model.component_errors is ComponentErrors.BEFORE_MOTION
+    stops: list[tuple[str, Array]] = []
+    started = False
+    for frames in branch_frames(model, side, coordinates):
+        name = frames.axis.name
+        if started:
+            stops.append((f"{name} offset", frames.before[:3, 3]))
+        if name == row.axis:
+            started = True
+            stops.append(("", (frames.before if before else frames.after)[:3, 3]))
+            if not before:
+                continue
+        if started:
+            stops.append((f"{name} motion", frames.after[:3, 3]))
+    stops += _end_stops(model, side, coordinates, stops[-1][1])
+    pairs = pairwise(stops)
+    vectors = [(name, vector(end - start)) for (_, start), (name, end) in pairs]
+    return tuple((name, vector) for name, vector in vectors if any(vector))
+
+
+def _end_stops(
+    model: Model, side: str, coordinates: Mapping[str, Array], last: Array
+) -> list[tuple[str, Array]]:
+    """Positions in R of the fixed frames behind the last axis and of the functional point."""
+    pose = branch_pose(model, side, coordinates)
+    names = ("S", "t") if side == "tool" else ("w",)
+    stops: list[tuple[str, Array]] = []
+    place = last
+    for name, offset in zip(names, model.machine.end_offsets_mm(side), strict=True):
+        place = place + pose[:3, :3] @ np.asarray(offset)
+        stops.append((name, place))
+    point = model.tool_point_mm if side == "tool" else model.workpiece_point_mm
+    stops.append(("point", place + pose[:3, :3] @ np.asarray(point)))
+    return stops
+
+
+def vector(values: Array) -> tuple[float, float, float]:
+    """Give the three floats of an array, negative zero made positive."""
+    x, y, z = (float(value) + 0.0 for value in values)
+    return x, y, z
