@@ -1,0 +1,51 @@
+"""Solo and mute: which parameters take part while one listens to a few of them."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+
+
+@dataclass(frozen=True, slots=True)
+class Emphasis:
+    """Parameters that are silenced, and those heard alone.
+
+    Attributes
+    ----------
+    muted : frozenset of str
+        Keys that do not take part.
+    soloed : frozenset of str
+        Where there are any, only these take part; a muted one among them stays silent.
+    """
+
+    muted: frozenset[str] = frozenset()
+    soloed: frozenset[str] = frozenset()
+
+    def __bool__(self) -> bool:
+        """Whether anything is silenced."""
+        return bool(self.muted or self.soloed)
+
+    def heard(self, key: str) -> bool:
+        """Tell whether a parameter takes part."""
+        return key not in self.muted and (not self.soloed or key in self.soloed)
+
+    def effective(self, amplitudes: Mapping[str, float]) -> Mapping[str, float]:
+        """Give the amplitudes that count, µm or µrad: zero for what is not heard."""
+        if not self:
+            return amplitudes
+        return {key: value if self.heard(key) else 0.0 for key, value in amplitudes.items()}
+
+    def with_muted(self, key: str, muted: bool) -> "Emphasis":
+        """Silence one parameter, or let it be heard again."""
+        return replace(self, muted=_with(self.muted, key, muted))
+
+    def with_soloed(self, key: str, soloed: bool) -> "Emphasis":
+        """Add one parameter to those heard alone, or take it away."""
+        return replace(self, soloed=_with(self.soloed, key, soloed))
+
+    def within(self, keys: Collection[str]) -> "Emphasis":
+        """Keep what concerns the parameters of a machine."""
+        return Emphasis(self.muted & frozenset(keys), self.soloed & frozenset(keys))
+
+
+def _with(keys: frozenset[str], key: str, on: bool) -> frozenset[str]:
+    """Give a set with or without a key."""
+    return keys | {key} if on else keys - {key}
