@@ -88,9 +88,16 @@ def write_export(drawing: "Drawing", target: "Path", *, overwrite: bool) -> None
 
             write_csv(drawing, target, overwrite=overwrite)
         case _:
-            from warpspace.app.offline import build_offline_html
+            from warpspace.app.offline import build_offline_html, offline_frame
             from warpspace.outputs.files import write_atomically
 
-            page = build_offline_html(drawing)
+            frame = offline_frame(
+                drawing.scene,
+                exaggeration=drawing.exaggeration,
+                nodes=max(drawing.picture.grid.shape),
+                loop=drawing.picture.view.loop,
+                component=drawing.component,
+            )
+            page = build_offline_html(frame, drawing.provenance)
             with write_atomically(target, overwrite=overwrite) as temporary:
                 temporary.write_text(page, encoding="utf-8")

@@ -1,0 +1,181 @@
+"""One file with the interactive scene that needs no network: for a mail, a share, an archive.
+
+The scene is exported by a throwaway server that nobody connects to; the page around it (heading,
+colour bar, statistics, factor, parameters) is ours, since the export has no widgets.
+"""
+
+import contextlib
+import io
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import viser
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from warpspace import __version__
+from warpspace.app import legend
+from warpspace.app.camera import fit_camera
+from warpspace.app.layers import SCENE_PER_MM
+from warpspace.app.layers.axes import AxesLayer
+from warpspace.app.layers.box import BoxLayer
+from warpspace.app.layers.traces import TracesLayer
+from warpspace.app.live import Frame, LiveModel
+from warpspace.app.state import start_state
+from warpspace.geometry.colour import build_scale
+from warpspace.kinematics.model import ComponentErrors, Loop
+from warpspace.machine.parameters import parameter
+from warpspace.scene.model import Scene
+
+POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' blob: data:;"
+    " style-src 'unsafe-inline'; img-src data: blob:; font-src data: blob:;"
+    " connect-src data: blob:; worker-src blob: data:; frame-src 'self'"
+)
+"""What the browser may load: what is in the file, and nothing else."""
+ASPECT = 1.5
+MARGIN = 1.3
+"""Room around the box, for the axes beside it."""
+COMPONENT_ERRORS = {
+    ComponentErrors.AFTER_MOTION: "component errors ride on the moving body",
+    ComponentErrors.BEFORE_MOTION: "component errors in fixed directions",
+}
+
+
+def offline_frame(
+    scene: Scene,
+    *,
+    exaggeration: float,
+    nodes: int,
+    loop: Loop = Loop.TOOL,
+    component: str = "norm",
+    largest: float | None = None,
+) -> Frame:
+    """Evaluate a scene for a page.
+
+    Parameters
+    ----------
+    scene : Scene
+    exaggeration : float
+        Display factor.
+    nodes : int
+        Grid nodes per axis.
+    loop : Loop, optional
+    component : str, optional
+        What is coloured: norm, x, y or z.
+    largest : float, optional
+        Largest magnitude of the colour scale, µm, where it is shared with other pages.
+
+    Returns
+    -------
+    Frame
+    """
+    state = replace(
+        start_state(scene), exaggeration=exaggeration, nodes=nodes, loop=loop, component=component
+    )
+    frame = LiveModel().frame(state)
+    return frame if largest is None else replace(frame, scale=build_scale(largest, component))
+
+
+def build_scene_html(frame: Frame, aspect: float = ASPECT) -> str:
+    """Export the 3-D scene of a frame as a page of its own, without a word around it.
+
+    Parameters
+    ----------
+    frame : Frame
+    aspect : float, optional
+        Width over height of the room it will fill.
+
+    Returns
+    -------
+    str
+        HTML that requests nothing.
+    """
+    with contextlib.redirect_stdout(io.StringIO()):  # the server says hello and goodbye
+        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        try:
+            for layer in (BoxLayer, TracesLayer, AxesLayer):
+                layer(server.scene, frame)
+            _place_camera(server, frame, aspect)
+            return server.scene.as_html(dark_mode=frame.state.shown.dark)
+        finally:
+            server.stop()
+
+
+def _place_camera(server: viser.ViserServer, frame: Frame, aspect: float) -> None:
+    """Let the page open with the whole box in view, from the operator's side."""
+    drawn = np.concatenate([frame.grid.nominal_mm, frame.drawn_mm])
+    pose = fit_camera(drawn, aspect, margin=MARGIN)
+    camera = server.initial_camera
+    camera.up = (0.0, 0.0, 1.0)
+    camera.fov = pose.fov_rad
+    camera.position = pose.position * SCENE_PER_MM
+    camera.look_at = pose.look_at * SCENE_PER_MM
+
+
+def build_offline_html(frame: Frame, provenance: Mapping[str, Any] | None = None) -> str:
+    """Build the page: the interactive scene with its colour bar, numbers and factor.
+
+    Parameters
+    ----------
+    frame : Frame
+    provenance : mapping, optional
+        Program, scene and settings, stored in the page as JSON.
+
+    Returns
+    -------
+    str
+        HTML that requests nothing and carries everything.
+    """
+    # a page in an attribute: only these two characters would end or change it
+    inner = build_scene_html(frame).replace("&", "&amp;").replace('"', "&quot;")
+    stored = json.dumps(provenance or {}, ensure_ascii=False, allow_nan=False)
+    templates = Environment(
+        loader=PackageLoader("warpspace.app"), autoescape=True, undefined=StrictUndefined
+    )
+    return templates.get_template("offline.html.j2").render(
+        title=frame.state.scene.title,
+        program=f"warpspace {__version__}",
+        policy=POLICY,
+        heading=Markup(legend.heading(frame)),  # noqa: S704 - escaped where it is built
+        summary=Markup(legend.summary(frame)),  # noqa: S704
+        scene=Markup(inner),  # noqa: S704
+        parameters=parameter_rows(frame),
+        remarks=remarks(frame),
+        provenance=Markup(stored.replace("<", "\\u003c")),  # noqa: S704
+    )
+
+
+def parameter_rows(frame: Frame) -> list[dict[str, str]]:
+    """Spell the errors that are not zero: key, plain name, value with unit."""
+    return [
+        {
+            "key": key,
+            "name": parameter(key).name,
+            "value": f"{value:+g} {parameter(key).unit}".replace("-", "−"),
+        }
+        for key, value in frame.state.amplitudes.items()
+        if value != 0.0
+    ]
+
+
+def remarks(frame: Frame) -> list[str]:
+    """Spell how the scene is looked at."""
+    scene = frame.state.scene
+    reference = (
+        "absolute errors"
+        if scene.reference is None
+        else "held still at " + ", ".join(f"{k} {v:g}" for k, v in scene.reference.items())
+    )
+    return [
+        f"{frame.state.loop.value} loop",
+        reference,
+        COMPONENT_ERRORS[scene.model.component_errors],
+        "first-order model",
+        "error = actual − nominal",
+        "drag to turn, wheel to zoom",
+        f"warpspace {__version__}",
+    ]
