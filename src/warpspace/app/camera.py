@@ -29,6 +29,7 @@ def fit_camera(
     direction: tuple[float, float, float] = OPERATOR,
     fov_deg: float = FOV_DEG,
     margin: float = MARGIN,
+    top: float = 0.0,
 ) -> CameraPose:
     """Place a camera so that points fill the picture.
 
@@ -43,6 +44,8 @@ def fit_camera(
         Vertical field of view, degrees.
     margin : float, optional
         Room around the points, 1 for none.
+    top : float, optional
+        Part of the height at the top that is kept free, below a half.
 
     Returns
     -------
@@ -53,17 +56,17 @@ def fit_camera(
     right = np.cross((0.0, 0.0, 1.0), back)
     right = right / np.linalg.norm(right)
     up = np.cross(back, right)
-    tan_y = np.tan(np.deg2rad(fov_deg) / 2.0) / margin
-    tan_x = tan_y * max(aspect, 0.1)
+    half = float(np.tan(np.deg2rad(fov_deg) / 2.0))
+    side, below, above = half * max(aspect, 0.1) / margin, half / margin, half / margin
+    above -= 2.0 * top * half
     target = (flat.min(axis=0) + flat.max(axis=0)) / 2.0
     distance = 1.0
     for _ in range(_ROUNDS):
-        along = (flat - target) @ np.stack([right, up, back], axis=1)
-        x, y, towards = along.T
-        distance = float(
-            max((np.abs(x) / tan_x + towards).max(), (np.abs(y) / tan_y + towards).max())
-        )
+        x, y, towards = ((flat - target) @ np.stack([right, up, back], axis=1)).T
+        least = np.maximum.reduce([np.abs(x) / side, -y / below, y / above]) + towards
+        distance = float(least.max())
         seen_x, seen_y = x / (distance - towards), y / (distance - towards)
-        shift_x, shift_y = (seen_x.min() + seen_x.max()) / 2, (seen_y.min() + seen_y.max()) / 2
+        shift_x = (seen_x.min() + seen_x.max()) / 2.0
+        shift_y = (seen_y.min() + seen_y.max()) / 2.0 + (below - above) / 2.0
         target = target + distance * (shift_x * right + shift_y * up)
     return CameraPose(target + distance * back, target, float(np.deg2rad(fov_deg)))

@@ -2,12 +2,13 @@
 
 import html
 
+from warpspace.app.layers import palette
 from warpspace.app.live import Frame
 from warpspace.geometry.colour import ColourScale, colour_table
 from warpspace.geometry.deform import round_down
 from warpspace.units import MM_PER_UM
 
-BAR_HEIGHT = 220
+BAR_HEIGHT = 190
 _BAR_MM = 100.0
 _PX_PER_MM = 0.9
 _STOPS = 32
@@ -36,7 +37,7 @@ def colour_bar(frame: Frame) -> str:
     """Draw the colour bar with ticks, unit, and marks at mean, P95 and max."""
     scale, found = frame.scale, frame.statistics
     frame_of_bar = (
-        f'<div style="position:relative;height:{BAR_HEIGHT}px;margin:10px 0 10px 62px">'
+        f'<div style="position:relative;height:{BAR_HEIGHT}px;margin:10px 0 8px 58px;width:62px">'
         f'<div style="position:absolute;left:0;top:0;bottom:0;width:22px;'
         f'outline:1px solid rgba(128,128,128,.5);background:{gradient(scale)}"></div>'
     )
@@ -56,7 +57,7 @@ def colour_bar(frame: Frame) -> str:
         "</sub>" if "_" in scale.label else ""
     )
     heading = (
-        f'<div style="margin-left:40px;font-weight:600">{label} [{html.escape(scale.unit)}]</div>'
+        f'<div style="margin-left:44px;font-weight:600">{label} [{html.escape(scale.unit)}]</div>'
     )
     return heading + "".join(parts)
 
@@ -81,13 +82,11 @@ def _marks(scale: ColourScale, values: tuple[float, float, float]) -> list[str]:
 def numbers(frame: Frame) -> str:
     """Spell the statistics of the field as a table."""
     found = frame.statistics
-    x, y, z = (_number(round(value, 1)) for value in found.max_at_mm)
     rows = [
-        ("max", f"{found.max_um:.2f} µm", True),
-        ("P95", f"{found.p95_um:.2f} µm", False),
         ("mean", f"{found.mean_um:.2f} µm", True),
         ("RMS", f"{found.rms_um:.2f} µm", False),
-        ("max at", f"({x}, {y}, {z}) mm", False),
+        ("P95", f"{found.p95_um:.2f} µm", False),
+        ("max", f"{found.max_um:.2f} µm", True),
     ]
     cells = "".join(
         f'<tr><td style="opacity:.7;padding:1px 0">{name}</td>'
@@ -96,6 +95,33 @@ def numbers(frame: Frame) -> str:
         for name, value, strong in rows
     )
     return f'<table style="width:100%;border-collapse:collapse;font-size:14px">{cells}</table>'
+
+
+def worst_place(frame: Frame) -> str:
+    """Spell where the largest error is."""
+    x, y, z = (_number(round(value, 1)) for value in frame.statistics.max_at_mm)
+    return (
+        '<div style="font-size:13px;margin-top:2px"><span style="opacity:.7">max at </span>'
+        f'<span data-value="max at">X {x}, Y {y}, Z {z} mm</span></div>'
+    )
+
+
+def key_to_lines(frame: Frame) -> str:
+    """Explain the lines that are drawn."""
+    colours, shown = palette(frame), frame.state.shown
+    rows = [("solid", colours.edge, "bent working volume")]
+    if shown.ghost:
+        rows.append(("dashed", colours.ghost, "nominal working volume"))
+    if shown.traces and frame.traces:
+        rows += [
+            ("solid", colours.trace_actual, "rotary traces, actual (paler: at other tilts)"),
+            ("solid", colours.trace_nominal, "rotary traces, nominal, where apart"),
+        ]
+    return "".join(
+        '<div style="display:flex;align-items:center;gap:8px;font-size:12px">'
+        f'<span style="flex:0 0 26px;border-top:2px {style} rgb{rgb}"></span>{text}</div>'
+        for style, rgb, text in rows
+    )
 
 
 def scale_bars(frame: Frame) -> str:
@@ -107,27 +133,31 @@ def scale_bars(frame: Frame) -> str:
 
     def bar(pixels: float, text: str) -> str:
         return (
-            f'<div style="font-size:12px;margin-top:6px">{text}</div>'
+            f'<div><div style="font-size:12px;margin-top:6px">{text}</div>'
             f'<div style="width:{pixels:.1f}px;height:5px;border:2px solid currentColor;'
-            f'border-top:0"></div>'
+            f'border-top:0"></div></div>'
         )
 
     return bar(_BAR_MM * _PX_PER_MM, f"{_BAR_MM:g} mm geometry") + bar(
-        width, f"{unit} error (drawn {spell_factor(factor)})"
+        width, f"{unit} error, {spell_factor(factor)}"
     )
 
 
 def summary(frame: Frame) -> str:
-    """Put colour bar, numbers and scale bars into one block."""
-    loop = frame.state.loop.value
-    what = f"|E| of the {frame.field.norm_um.size:,} grid nodes, {loop} loop".replace(",", "\u202f")
+    """Put colour bar, numbers, scale bars and key into one block."""
+    nodes = f"{frame.field.norm_um.size:,}".replace(",", "\u202f")
     return (
-        '<div style="padding:6px 16px 14px;line-height:1.45">'
-        f"{colour_bar(frame)}"
-        f'<div style="font-size:12px;opacity:.7;margin-top:12px">{what}</div>'
-        f"{numbers(frame)}"
-        f'<div style="margin-top:10px">{scale_bars(frame)}</div>'
-        "</div>"
+        '<div style="padding:2px 14px 10px;line-height:1.4">'
+        '<div style="display:flex;gap:14px">'
+        f'<div style="flex:0 0 124px">{colour_bar(frame)}</div>'
+        '<div style="flex:1"><div style="font-weight:600">|E| over the grid</div>'
+        '<div style="font-size:12px;opacity:.7;margin-bottom:6px">'
+        f"{nodes} nodes, {frame.state.loop.value} loop</div>"
+        f"{numbers(frame)}</div></div>"
+        f"{worst_place(frame)}"
+        '<div style="display:flex;gap:18px;align-items:end;margin:2px 0 8px">'
+        f"{scale_bars(frame)}</div>"
+        f"{key_to_lines(frame)}</div>"
     )
 
 
@@ -149,6 +179,5 @@ def heading(frame: Frame) -> str:
         f'<div style="font-size:12.5px;opacity:.75">'
         f"{html.escape(machine)} · {size} mm · {nodes} nodes</div>"
         f'<div style="font-size:14px;margin-top:3px"><b data-value="factor">{how}</b>{auto}'
-        '<span style="opacity:.75"> · dashed: nominal box</span></div>'
-        "</div>"
+        "</div></div>"
     )

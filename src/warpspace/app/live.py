@@ -26,6 +26,8 @@ from warpspace.scene.pipeline import grid_basis
 from warpspace.units import Array
 
 KEPT_BYTES = 400_000_000
+TRACE_SAMPLES = 73
+"""Points along a trace: every five degrees of a turn."""
 T = TypeVar("T")
 
 
@@ -213,7 +215,7 @@ def _build(state: AppState) -> Response:
     scene = state.scene
     grid = build_grid(scene.model, scene.workspace.moved(state.positions), state.nodes)
     positions = {**scene.workspace.positions, **state.positions}
-    groups = build_traces(scene.model, scene.trace_points_mm, positions)
+    groups = build_traces(scene.model, scene.trace_points_mm, positions, TRACE_SAMPLES)
     keys = scene.parameter_keys
     trace_bases = tuple(
         build_basis(

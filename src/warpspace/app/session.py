@@ -11,20 +11,20 @@ import threading
 from collections import deque
 from collections.abc import Mapping
 
+import numpy as np
 from viser import ClientHandle
 from viser import _messages as messages
 
 from warpspace.app.camera import fit_camera
 from warpspace.app.layers import SCENE_PER_MM, Layer
-from warpspace.app.layers.axes import AxesLayer
+from warpspace.app.layers.axes import AxesLayer, axes_room_mm
 from warpspace.app.layers.box import BoxLayer
 from warpspace.app.layers.traces import TracesLayer
 from warpspace.app.live import Frame, LiveModel
 from warpspace.app.panels import Desk, Panel, Update
-from warpspace.app.panels.layout import apply_theme, lay_out_panels, side_widths
+from warpspace.app.panels.layout import HEADING_HEIGHT, apply_theme, lay_out_panels, side_widths
 from warpspace.app.state import AppState
 from warpspace.exceptions import WarpspaceError
-from warpspace.geometry.deform import bounds_mm
 from warpspace.scene.model import Scene
 
 logger = logging.getLogger(__name__)
@@ -166,8 +166,9 @@ class Session:
         camera = self._client.camera
         taken = sum(side_widths()) if self._shown is None else 0  # not docked yet
         width = max(camera.image_width - taken, LEAST_WIDTH)
-        points = bounds_mm(frame.grid.nominal_mm, frame.drawn_mm)
-        pose = fit_camera(points, width / camera.image_height)
+        points = np.concatenate([axes_room_mm(frame), frame.drawn_mm.reshape(-1, 3)])
+        height = max(camera.image_height, LEAST_WIDTH)
+        pose = fit_camera(points, width / height, top=min(HEADING_HEIGHT / height, 0.3))
         camera.up_direction = (0.0, 0.0, 1.0)
         camera.fov = pose.fov_rad
         camera.position = pose.position * SCENE_PER_MM

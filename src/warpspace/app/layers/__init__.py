@@ -27,6 +27,7 @@ class Palette:
     ghost: Rgb
     trace_nominal: Rgb
     trace_actual: Rgb
+    trace_elsewhere: Rgb
     axis: Rgb
 
 
@@ -34,8 +35,9 @@ LIGHT = Palette(
     edge=(24, 32, 46),
     grid=(24, 32, 46),
     ghost=(140, 150, 165),
-    trace_nominal=(178, 186, 198),
+    trace_nominal=(196, 202, 211),
     trace_actual=(45, 55, 72),
+    trace_elsewhere=(150, 158, 171),
     axis=(110, 120, 135),
 )
 DARK = Palette(
@@ -44,6 +46,7 @@ DARK = Palette(
     ghost=(130, 138, 150),
     trace_nominal=(90, 98, 110),
     trace_actual=(205, 212, 222),
+    trace_elsewhere=(118, 126, 138),
     axis=(150, 158, 170),
 )
 

@@ -15,6 +15,7 @@ from warpspace.units import Array
 AWAY = 0.13
 """Distance of the axes from the nominal box, as a part of the longest edge: the bend has room."""
 TICK = 0.022
+LABEL_ROOM = 0.05
 MAX_TICKS = 6
 
 
@@ -37,6 +38,14 @@ def axis_frames(low: Array, high: Array, away: float) -> list[tuple[Array, Array
         (np.array([high[0] + away, 0.0, low[2]]), np.array([1.0, 0.0, 0.0])),
         (np.array([low[0] - away, low[1], 0.0]), np.array([-1.0, 0.0, 0.0])),
     ]
+
+
+def axes_room_mm(frame: Frame) -> Array:
+    """Give points around the nominal box that leave room for axes and their numbers, [8, 3], mm."""
+    low, high = bounds_mm(frame.grid.nominal_mm)
+    away = (AWAY + LABEL_ROOM) * frame.grid.longest_edge_mm
+    x, y, z = (low[0] - away, high[0] + away), (low[1] - away, high[1]), (low[2], high[2])
+    return np.stack(np.meshgrid(x, y, z), axis=-1).reshape(-1, 3)
 
 
 class AxesLayer:

@@ -1,10 +1,48 @@
-"""Traces of the rotary axes: nominal light, actual strong, with the exaggeration of the box."""
+"""Traces of the rotary axes: nominal light, actual strong, with the exaggeration of the box.
+
+Traces that belong to the positions the axes stand at are dark, those at other tilts paler. Where
+actual and nominal coincide on screen only the actual one is drawn.
+"""
 
 import numpy as np
+from numpy.typing import NDArray
 from viser import SceneApi
 
 from warpspace.app.layers import SCENE_PER_MM, colour_bytes, palette, polyline_pieces
-from warpspace.app.live import Frame
+from warpspace.app.live import Frame, TraceLines
+from warpspace.app.tonemap import line_vertex_colours
+from warpspace.geometry.traces import TraceGroup
+
+APART = 0.002
+"""Distance from which nominal and actual are both drawn, as a part of the longest edge."""
+_NOTHING = np.zeros((1, 2, 3), np.float32)
+
+
+def apart(lines: TraceLines, distance_mm: float) -> NDArray[np.float32]:
+    """Give the pieces of the nominal traces that the actual ones do not cover, [S, 2, 3], mm."""
+    far = np.linalg.norm(lines.actual_mm - lines.nominal_mm, axis=-1) > distance_mm
+    kept = (far[..., :-1] | far[..., 1:]).reshape(-1)
+    return polyline_pieces([lines.nominal_mm])[kept]
+
+
+def is_here(group: TraceGroup, positions: dict[str, float]) -> NDArray[np.bool_]:
+    """Tell which traces belong to the positions the rotary axes stand at, [T]."""
+    return np.array(
+        [all(positions.get(name) == at for name, at in trace.at.items()) for trace in group.traces]
+    )
+
+
+def trace_colours(frame: Frame) -> NDArray[np.uint8]:
+    """Colour the pieces of all actual traces, [S, 2, 3]."""
+    colours = palette(frame)
+    found: list[NDArray[np.uint8]] = []
+    for lines in frame.traces:
+        here = is_here(lines.group, dict(frame.state.positions))
+        rgb = np.where(here[:, None], colours.trace_actual, colours.trace_elsewhere)
+        pieces = lines.actual_mm.shape[1] - 1
+        found.append(np.repeat(rgb.astype(np.uint8), pieces, axis=0))
+    flat = np.concatenate(found)
+    return line_vertex_colours(np.stack([flat, flat], axis=1))
 
 
 class TracesLayer:
@@ -18,11 +56,10 @@ class TracesLayer:
 
     def __init__(self, scene: SceneApi, frame: Frame) -> None:
         colours = palette(frame)
-        self._group = None
-        empty = np.zeros((1, 2, 3), np.float32)
+        self._drawn_for: tuple[object, ...] | None = None
         self._nominal = scene.add_line_segments(
             "/traces/nominal",
-            empty,
+            _NOTHING,
             colour_bytes(colours.trace_nominal),
             thickness=1.5,
             thickness_units="screen",
@@ -30,9 +67,9 @@ class TracesLayer:
         )
         self._actual = scene.add_line_segments(
             "/traces/actual",
-            empty,
-            colour_bytes(colours.trace_actual),
-            thickness=2.0,
+            _NOTHING,
+            np.zeros((1, 2, 3), np.uint8),
+            thickness=1.6,
             thickness_units="screen",
             scale=SCENE_PER_MM,
         )
@@ -42,13 +79,16 @@ class TracesLayer:
         """Move the traces."""
         visible = frame.state.shown.traces and bool(frame.traces)
         self._nominal.visible = self._actual.visible = visible
-        colours = palette(frame)
-        self._nominal.colors = colour_bytes(colours.trace_nominal)
-        self._actual.colors = colour_bytes(colours.trace_actual)
         if not visible:
             return
-        group = frame.traces[0].group
-        if group is not self._group:
-            self._group = group
-            self._nominal.points = polyline_pieces([lines.nominal_mm for lines in frame.traces])
+        distance = APART * frame.grid.longest_edge_mm
+        nominal = np.concatenate([apart(lines, distance) for lines in frame.traces])
+        self._nominal.points = nominal if len(nominal) else _NOTHING
         self._actual.points = polyline_pieces([lines.actual_mm for lines in frame.traces])
+        drawn_for = (frame.traces[0].group, frame.state.shown.dark)
+        if self._drawn_for is None or any(
+            new is not old for new, old in zip(drawn_for, self._drawn_for, strict=True)
+        ):
+            self._drawn_for = drawn_for
+            self._nominal.colors = colour_bytes(palette(frame).trace_nominal)
+            self._actual.colors = trace_colours(frame)

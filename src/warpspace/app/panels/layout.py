@@ -12,7 +12,9 @@ from warpspace.app.state import AppState
 from warpspace.scene.model import Scene
 
 LEFT_WIDTH = 330
-RIGHT_WIDTH = 300
+RIGHT_WIDTH = 310
+HEADING_HEIGHT = 130
+"""Room kept free for the heading, CSS pixels."""
 STYLE = """<style>
 /* labels above their controls, on a line of their own */
 .mantine-Flex-root:has(> .mantine-Box-root > .mantine-Text-root > label),
@@ -20,6 +22,8 @@ div:has(> div > p > label) { flex-wrap: wrap; }
 div:has(> p > label) { width: 100% !important; padding-bottom: 2px; }
 div:has(> p > label) + div { width: 100%; }
 p:has(> label) { color: inherit !important; letter-spacing: 0 !important; }
+.mantine-Slider-root:has(.mantine-Slider-markLabel) { margin-bottom: 4px; }
+.mantine-ScrollArea-scrollbar[data-orientation="horizontal"] { display: none; }
 </style>"""
 
 
@@ -70,7 +74,7 @@ def lay_out_panels(
     settings = gui.add_panel()
     with settings.add_tab("View"):
         view = ViewPanel(desk, state, scenes)
-        button = gui.add_button("Fit view", hint="Camera to the operator's side.", order=60.0)
+        button = gui.add_button("Fit view", hint="Camera to the operator's side.")
         button.on_click(lambda _: fit_view())
     settings.dock_below(results)
 

@@ -82,7 +82,7 @@ class ViewPanel:
         self._loops = _Names(LOOP_NAMES)
         self._loop: Bound[str] = Bound(
             gui.add_dropdown(
-                "Error of the",
+                "Structural loop",
                 self._loops.options,
                 initial_value=self._loops.text(state.loop),
                 hint="Structural loop: whose error bends the box.",
@@ -100,6 +100,7 @@ class ViewPanel:
             ),
             changed,
         )
+        self._folder: Any = None
         self._add_positions(state)
         self._switches: dict[str, Bound[bool]] = {
             name: Bound(
@@ -157,8 +158,9 @@ class ViewPanel:
         """Add a folder with a slider per rotary axis of the scene's machine."""
         gui = self._desk.gui
         self._built_for = state.scene
-        self._folder: Any = gui.add_folder(
-            "Rotary positions", visible=bool(state.positions), order=50.0
+        order = self._folder.order if self._folder is not None else None
+        self._folder = gui.add_folder(
+            "Rotary positions", visible=bool(state.positions), order=order
         )
         self._positions: dict[str, Bound[float]] = {}
         with self._folder:
@@ -205,8 +207,9 @@ class ViewPanel:
         """Make the widgets show the state."""
         state = frame.state
         if state.scene is not self._built_for:
-            self._folder.remove()
+            before = self._folder
             self._add_positions(state)
+            before.remove()
         self._scene.show(self._titles[id(state.scene)])
         self._factor.show(float(f"{frame.exaggeration:.4g}"))
         self._log.show(round(math.log10(frame.exaggeration), 2))
