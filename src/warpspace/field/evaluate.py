@@ -180,7 +180,9 @@ def build_basis(
     reference = _reference_point(model, view, coordinates)
     if reference is not None:
         held, held_point = reference
-        position = position - _shaped_jacobian(model, errors, keys, held, view, held_point)[0]
+        fixed = _shaped_jacobian(model, errors, keys, held, view, held_point)[0]
+        batch = (1,) * (position.ndim - fixed.ndim) + fixed.shape[1:]
+        position = position - fixed.reshape(len(keys), *batch)
     rotation = _result_rotation(model, view, coordinates)
     if rotation is not None:
         position = transforms.rotate(rotation, position)

@@ -1,0 +1,79 @@
+"""Files are written whole or not at all."""
+
+import stat
+from pathlib import Path
+
+import pytest
+
+from warpspace.exceptions import OutputError
+from warpspace.outputs.files import write_atomically
+
+
+def test_new_file_appears_only_when_all_went_well(tmp_path: Path) -> None:
+    target = tmp_path / "out.csv"
+    with write_atomically(target) as temporary:
+        temporary.write_text("whole", encoding="utf-8")
+        assert not target.exists()
+        assert temporary.suffix == ".csv"
+    assert target.read_text(encoding="utf-8") == "whole"
+    assert list(tmp_path.iterdir()) == [target]
+    assert not stat.S_IMODE(target.stat().st_mode) & 0o111
+
+
+@pytest.mark.parametrize("kind", [ValueError, KeyboardInterrupt])
+def test_failure_leaves_the_old_file_and_nothing_beside_it(
+    tmp_path: Path, kind: type[BaseException]
+) -> None:
+    target = tmp_path / "out.csv"
+    target.write_text("old", encoding="utf-8")
+    with pytest.raises(kind):
+        write_half(target, kind())
+    assert target.read_text(encoding="utf-8") == "old"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_error_of_the_system_names_the_target(tmp_path: Path) -> None:
+    target = tmp_path / "out.csv"
+    with pytest.raises(OutputError, match=r"out\.csv: cannot be written: No space"):
+        write_full(target)
+    assert list(tmp_path.iterdir()) == []
+
+
+def write_half(target: Path, failure: BaseException) -> None:
+    """Fail in the middle of writing."""
+    with write_atomically(target) as temporary:
+        temporary.write_text("half", encoding="utf-8")
+        raise failure
+
+
+def write_full(target: Path) -> None:
+    """Run out of space while writing."""
+    with write_atomically(target):
+        raise OSError(28, "No space left on device")
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"), [("", "is a folder"), ("nowhere/out.csv", "does not exist")]
+)
+def test_impossible_target_is_refused_before_any_work(
+    tmp_path: Path, name: str, reason: str
+) -> None:
+    with pytest.raises(OutputError, match=reason), write_atomically(tmp_path / name):
+        pytest.fail("the work was begun")
+
+
+def test_device_is_refused_and_stays_a_device() -> None:
+    with pytest.raises(OutputError, match="no regular file"), write_atomically("/dev/null"):
+        pytest.fail("the work was begun")
+    assert Path("/dev/null").is_char_device()
+
+
+def test_link_stays_a_link_to_the_new_file(tmp_path: Path) -> None:
+    folder = tmp_path / "elsewhere"
+    folder.mkdir()
+    link = tmp_path / "out.csv"
+    link.symlink_to(folder / "file.csv")
+    with write_atomically(link) as temporary:
+        temporary.write_text("new", encoding="utf-8")
+    assert link.is_symlink()
+    assert (folder / "file.csv").read_text(encoding="utf-8") == "new"
