@@ -1,0 +1,202 @@
+"""Schematic bodies of a machine: read from its folder, placed and bent like its errors say."""
+
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpspace.exceptions import OptionError
+from warpspace.field.evaluate import View
+from warpspace.kinematics import transforms
+from warpspace.kinematics.bodies import BASE, BodyMotion, body_motions
+from warpspace.kinematics.model import Coordinates, Loop, Model, complete_coordinates
+from warpspace.machine.description import Machine
+from warpspace.machine.errors import ErrorSet
+from warpspace.machine.parameters import parameter
+from warpspace.units import Array
+
+BODY_FILE = "bodies.npz"
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """One body of a machine, in the frame it rides on.
+
+    Attributes
+    ----------
+    name : str
+        Frame and what it is, for instance ``X_saddle``.
+    colour : tuple of int, (3,)
+        sRGB; greys, since colour means error.
+    vertices_mm : ndarray, [V, 3], mm
+    triangles : ndarray, [T, 3]
+        Counter-clockwise seen from outside.
+    edges_mm : ndarray, [E, 2, 3], mm
+        Ends of the edges worth drawing.
+    """
+
+    name: str
+    colour: tuple[int, int, int]
+    vertices_mm: Array
+    triangles: NDArray[np.int32]
+    edges_mm: Array
+
+    @property
+    def frame(self) -> str:
+        """Frame it rides on: R, an axis, S, t or w."""
+        return self.name.split("_")[0]
+
+
+def load_bodies(machine: Machine) -> tuple[Body, ...]:
+    """Read the bodies of a machine.
+
+    Parameters
+    ----------
+    machine : Machine
+
+    Returns
+    -------
+    tuple of Body
+        Empty where its folder has none. Bodies of frames that the machine does not have are left
+        out.
+
+    Raises
+    ------
+    OptionError
+        If the file cannot be read.
+    """
+    if not machine.body_dir:
+        return ()
+    frames = {BASE, "S", "t", "w", *machine.axes}
+    return tuple(b for b in _read(Path(machine.body_dir) / BODY_FILE) if b.frame in frames)
+
+
+@lru_cache(maxsize=8)
+def _read(path: Path) -> tuple[Body, ...]:
+    """Read a file of bodies; kept, since every session draws the same."""
+    if not path.is_file():
+        return ()
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            held = {name: np.asarray(file[name]) for name in file.files}
+        split = {
+            name: np.split(held[name], held[f"{ends}_ends"][:-1])
+            for name, ends in (("vertices", "vertex"), ("triangles", "triangle"), ("edges", "edge"))
+        }
+        return tuple(
+            Body(
+                str(name),
+                (int(colour[0]), int(colour[1]), int(colour[2])),
+                split["vertices"][at].astype(float),
+                split["triangles"][at].astype(np.int32),
+                split["edges"][at].astype(float),
+            )
+            for at, (name, colour) in enumerate(zip(held["names"], held["colours"], strict=True))
+        )
+    except (OSError, KeyError, ValueError, IndexError, EOFError, zipfile.BadZipFile) as error:
+        raise OptionError(f"{path}: no file of machine bodies ({error})") from None
+
+
+def error_values_of(
+    errors: ErrorSet, amplitudes: Mapping[str, float], coordinates: Coordinates
+) -> dict[str, float]:
+    """Evaluate error curves at one position, with amplitudes of their own.
+
+    Parameters
+    ----------
+    errors : ErrorSet
+        Gives the curve of each parameter along its axis.
+    amplitudes : mapping of str to float, µm or µrad
+    coordinates : mapping of str to ndarray, [], mm or degrees
+
+    Returns
+    -------
+    dict of str to float, µm or µrad
+    """
+    found: dict[str, float] = {}
+    for key, amplitude in amplitudes.items():
+        axis = parameter(key).axis
+        if amplitude == 0.0 or axis not in coordinates:
+            continue
+        function = errors.functions.get(key)
+        shape = 1.0 if function is None else float(function.shape(coordinates[axis]))
+        found[key] = amplitude * shape
+    return found
+
+
+def view_motions(
+    model: Model,
+    errors: ErrorSet,
+    amplitudes: Mapping[str, float],
+    positions: Mapping[str, float],
+    view: View | None = None,
+) -> dict[str, BodyMotion]:
+    """Find how the bodies move as a view sees it, so that they agree with its deformed grid.
+
+    Parameters
+    ----------
+    model : Model
+    errors : ErrorSet
+    amplitudes : mapping of str to float, µm or µrad
+    positions : mapping of str to float, mm or degrees
+    view : View, optional
+
+    Returns
+    -------
+    dict of str to BodyMotion
+        By frame. In the relative loop everything is seen from the workpiece, which hence stands
+        nominally; where a reference point is held still, all bodies are shifted with it. The tool
+        point of the tool and relative loops, and the point of the workpiece nominally in contact in
+        the workpiece loop, then lie in the deformed grid exactly.
+    """
+    view = view or View()
+    coordinates = complete_coordinates(model.machine, positions)
+    values = error_values_of(errors, amplitudes, coordinates)
+    motions = body_motions(model, values, coordinates)
+    turn, shift = np.zeros(3), np.zeros(3)
+    if view.loop is Loop.RELATIVE:
+        turn, shift = motions["w"].rotation_rad, motions["w"].displacement_mm
+    if view.reference is not None:
+        held = complete_coordinates(model.machine, {**positions, **view.reference})
+        there = body_motions(model, error_values_of(errors, amplitudes, held), held)
+        shift = shift + _held_displacement(model, there, view.loop)
+    return {
+        name: BodyMotion(m.nominal, m.rotation_rad - turn, m.displacement_mm - shift)
+        for name, m in motions.items()
+    }
+
+
+def _held_displacement(model: Model, motions: Mapping[str, BodyMotion], loop: Loop) -> Array:
+    """Position error of the loop at the reference point, [3], mm."""
+    point = transforms.apply(motions["t"].nominal, model.tool_point_mm)
+
+    def moved(frame: str) -> Array:
+        motion = motions[frame]
+        return motion.displacement_mm + np.cross(motion.rotation_rad, point)
+
+    if loop is Loop.WORKPIECE:
+        return moved("w")
+    return moved("t") - (moved("w") if loop is Loop.RELATIVE else 0.0)
+
+
+def place_points(motion: BodyMotion, points_mm: Array, exaggeration: float) -> Array:
+    """Give where points of a body are drawn in R.
+
+    Parameters
+    ----------
+    motion : BodyMotion
+    points_mm : ndarray, [..., 3], mm
+        In the frame of the body.
+    exaggeration : float
+        Display factor of the small motion; 0 for the nominal place.
+
+    Returns
+    -------
+    ndarray, [..., 3], mm
+    """
+    pose = motion.drawn(exaggeration)
+    return points_mm @ pose[:3, :3].T + pose[:3, 3]
