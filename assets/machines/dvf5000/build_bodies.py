@@ -1,10 +1,10 @@
 """Build the schematic bodies of the DVF5000: `bodies.glb` and `bodies.npz` beside this file.
 
 Run `python assets/machines/dvf5000/build_bodies.py` after changing a size here or an offset in
-`machine.toml`. Sizes are our own reading of a machine of this kind, no drawing of the maker; what they
-must agree with is `machine.toml`: the tool ends in the tool point, the table's top is z = 0 of the
-workpiece frame, and nothing meets over the travels but tool and table, which the travel of Z itself
-allows.
+`machine.toml`. Sizes are our own reading of a machine of this kind, no drawing of the maker; what
+they must agree with is `machine.toml`: the tool ends in the tool point, the table's top is z = 0 of
+the workpiece frame, and nothing meets over the travels but tool and table, which the travel of Z
+itself allows.
 
 A node is named after the frame it rides on (R, X, Y, Z, S, t, B, C) and what it is: `X_saddle`. All
 vertices are mm in that frame. `bodies.glb` (mm, z upwards) is for programs that read meshes;
@@ -68,8 +68,8 @@ def cone(lower: float, upper: float, ends: tuple[float, float]) -> Mesh:
     return trimesh.creation.revolve(outline, sections=SIDES)
 
 
-# All sizes in R, mm, with every axis at zero: the tool point is then at (0, 0, 429), the spindle nose
-# at z = 579, the table's top at z = 0 and the B axis along y at z = 50.
+# All sizes in R, mm, with every axis at zero: the tool point is then at (0, 0, 429), the spindle
+# nose at z = 579, the table's top at z = 0 and the B axis along y at z = 50.
 
 
 def bed() -> list[Mesh]:
@@ -151,8 +151,8 @@ def table_marks() -> list[Points]:
     lines: list[Points] = []
     for number in range(8):
         turn = trimesh.transformations.rotation_matrix(number * np.pi / 4, [0, 0, 1])[:3, :3]
-        for side in (-7.0, 7.0):
-            lines.append(np.array([(45.0, side, above), (249.0, side, above)]) @ turn.T)
+        slot = [np.array([(45.0, y, above), (249.0, y, above)]) for y in (-7.0, 7.0)]
+        lines += [line @ turn.T for line in slot]
     lines.append(np.array([(249.0, -7.0, above), (205.0, 0.0, above)]))
     lines.append(np.array([(205.0, 0.0, above), (249.0, 7.0, above)]))
     return lines
@@ -173,7 +173,7 @@ BODIES: dict[str, tuple[Callable[[], list[Mesh]], tuple[int, int, int]]] = {
 
 
 def crease_edges(mesh: Mesh) -> Points:
-    """Ends of the edges at which a mesh bends sharply, [E, 2, 3]."""
+    """Find the edges at which a mesh bends sharply, ends [E, 2, 3]."""
     sharp = mesh.face_adjacency_angles > CREASE_RAD
     return mesh.vertices[mesh.face_adjacency_edges[sharp]]
 

@@ -1,7 +1,7 @@
 """Planar slices through the working volume: grids of their own, evaluated where they lie.
 
-A slice at any position is a grid of n × 1 × m nodes with one axis standing still, so that its errors
-come from the model and not from interpolation between the nodes of the volume.
+A slice at any position is a grid of n × 1 × m nodes with one axis standing still, so that its
+errors come from the model and not from interpolation between the nodes of the volume.
 """
 
 from collections.abc import Mapping
