@@ -154,7 +154,7 @@ class LiveModel:
 
     def response(self, state: AppState) -> Response:
         """Give grid and responses of a state, kept from an earlier one where possible."""
-        key = (_Same(state.scene), state.nodes, tuple(state.positions.items()), state.loop)
+        key = (Same(state.scene), state.nodes, tuple(state.positions.items()), state.loop)
         return self._kept.get(key, lambda: _build(state), lambda response: response.size)
 
     def frame(self, state: AppState) -> Frame:
@@ -170,7 +170,7 @@ class LiveModel:
         """
         response = self.response(state)
         grid = response.grid
-        amplitudes = np.fromiter(state.amplitudes.values(), float, len(state.amplitudes))
+        amplitudes = np.fromiter(state.heard.values(), float, len(state.amplitudes))
         field = response.basis.evaluate(amplitudes)
         found = statistics(field)
         factor = state.exaggeration or auto_exaggeration(found.max_um, grid.longest_edge_mm)
@@ -197,17 +197,17 @@ class LiveModel:
         )
 
 
-class _Same:
-    """A scene as part of a key, compared by identity (and held, so that its id stays its own)."""
+class Same:
+    """An object as part of a key, compared by identity (and held, so that its id stays its own)."""
 
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
+    def __init__(self, thing: object) -> None:
+        self.thing = thing
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Same) and other.scene is self.scene
+        return isinstance(other, Same) and other.scene is self.scene
 
     def __hash__(self) -> int:
-        return id(self.scene)
+        return id(self.thing)
 
 
 def _build(state: AppState) -> Response:

@@ -9,11 +9,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from warpspace.app.emphasis import Emphasis
 from warpspace.app.ranges import Span, amplitude_spans, position_spans
+from warpspace.app.specification import Specification
 from warpspace.geometry.colour import COMPONENTS
 from warpspace.geometry.deform import MAX_EXAGGERATION
 from warpspace.kinematics.model import Loop
+from warpspace.machine.errors import ErrorSet
 from warpspace.machine.parameters import parameter
+from warpspace.machine.tolerances import ToleranceSet
 from warpspace.scene.model import Scene
 
 NODES = Span(3.0, 31.0, 2.0)
@@ -58,6 +62,14 @@ class AppState:
     nodes : int
         Grid nodes per axis.
     shown : Shown
+    emphasis : Emphasis
+        Parameters that are silenced or heard alone.
+    tolerances : ToleranceSet
+        What machines are sampled from: the scene's, as far as they have not been moved.
+    specification : Specification
+        What the tolerances are held against.
+    loaded : Scene or None
+        The scene as it was opened, where curves of `scene` have been edited since.
     notes : tuple of str
         What the latest change had to clamp.
     """
@@ -73,7 +85,21 @@ class AppState:
     loop: Loop = Loop.TOOL
     nodes: int = START_NODES
     shown: Shown = field(default_factory=Shown)
+    emphasis: Emphasis = field(default_factory=Emphasis)
+    tolerances: ToleranceSet = field(default_factory=ToleranceSet)
+    specification: Specification = field(default_factory=Specification)
+    loaded: Scene | None = None
     notes: tuple[str, ...] = ()
+
+    @property
+    def origin(self) -> Scene:
+        """The scene as it was opened: where reset goes, and what it is known by."""
+        return self.loaded or self.scene
+
+    @property
+    def heard(self) -> Mapping[str, float]:
+        """Amplitudes that count, µm or µrad: those silenced by solo and mute are zero."""
+        return self.emphasis.effective(self.amplitudes)
 
     def with_amplitude(self, key: str, value: float) -> "AppState":
         """Set the amplitude of one parameter, µm or µrad, within its slider's range."""
@@ -123,7 +149,7 @@ class AppState:
         return replace(self, shown=replace(self.shown, **changes))
 
     def with_scene(self, scene: Scene) -> "AppState":
-        """Show another scene; how it is looked at stays."""
+        """Show another scene; component, density and switches stay."""
         fresh = start_state(scene)
         return replace(
             fresh,
@@ -132,12 +158,22 @@ class AppState:
             nodes=self.nodes,
             shown=self.shown,
             exaggeration=fresh.exaggeration,
+            specification=self.specification,
         )
 
     def reset(self, axis: str | None = None) -> "AppState":
-        """Give the errors of one axis, or of all, the scene's values again."""
+        """Give the errors of one axis, or of all, the scene's values and curves again."""
         chosen = {k: v for k, v in self.start.items() if axis is None or parameter(k).axis == axis}
-        return replace(self, amplitudes={**self.amplitudes, **chosen})
+        own, present = self.origin.errors.functions, self.scene.errors.functions
+        curves = {key: function for key, function in present.items() if key not in chosen}
+        curves |= {key: function for key, function in own.items() if key in chosen}
+        scene = self.scene
+        if curves != scene.errors.functions:
+            scene = replace(scene, errors=ErrorSet(curves))
+        if scene == self.origin:
+            scene = self.origin
+        loaded = None if scene is self.origin else self.loaded
+        return replace(self, amplitudes={**self.amplitudes, **chosen}, scene=scene, loaded=loaded)
 
     def zeroed(self, axis: str | None = None) -> "AppState":
         """Set the errors of one axis, or of all, to zero."""
@@ -188,6 +224,13 @@ def start_state(scene: Scene, **changes: Any) -> AppState:
     ranges = position_spans(scene)
     positions = {axis: at.get(axis, 0.0) for axis in ranges}
     state = AppState(
-        scene, start, positions, start, amplitude_spans(scene), ranges, scene.exaggeration
+        scene,
+        start,
+        positions,
+        start,
+        amplitude_spans(scene),
+        ranges,
+        scene.exaggeration,
+        tolerances=scene.tolerances,
     )
     return replace(state, **changes)

@@ -47,6 +47,7 @@ class ErrorsPanel:
         )
         updates = {"Reset": AppState.reset, "All zero": AppState.zeroed}
         buttons.on_click(lambda event: desk.post(updates[event.target.value]))
+        self._home: Any = desk.gui.add_folder(None)
         self._build(state)
 
     def _build(self, state: AppState) -> None:
@@ -59,7 +60,9 @@ class ErrorsPanel:
         for axis, members in groupby(rows, key=lambda row: row.axis):
             own = list(members)
             used = any(state.amplitudes[row.key] for row in own)
-            folder = gui.add_folder(f"{axis} axis · {len(own)} errors", expand_by_default=used)
+            title = f"{axis} axis · {len(own)} errors"
+            with self._home:
+                folder = gui.add_folder(title, expand_by_default=used)
             self._parts.append(folder)
             with folder:
                 for row in own:

@@ -11,16 +11,22 @@ from warpspace.app.panels.view import ViewPanel
 from warpspace.app.state import AppState
 from warpspace.scene.model import Scene
 
+BRAND = (38, 70, 112)
+BRAND_ON_DARK = (122, 162, 214)
 LEFT_WIDTH = 330
 RIGHT_WIDTH = 310
 HEADING_HEIGHT = 130
 """Room kept free for the heading, CSS pixels."""
 STYLE = """<style>
-/* labels above their controls, on a line of their own */
-.mantine-Flex-root:has(> .mantine-Box-root > .mantine-Text-root > label),
-div:has(> div > p > label) { flex-wrap: wrap; }
+/* labels above their controls, on a line of their own; check boxes stay beside theirs */
+div:has(> div > p > label):not(:has(> div input[type="checkbox"])) { flex-wrap: wrap; }
 div:has(> p > label) { width: 100% !important; padding-bottom: 2px; }
 div:has(> p > label) + div { width: 100%; }
+div:has(> div > p > label):has(> div input[type="checkbox"]) { flex-direction: row-reverse;
+  justify-content: flex-end; }
+div:has(> p > label):has(+ div input[type="checkbox"]) { width: auto !important; padding: 0; }
+div:has(> p > label) + div:has(input[type="checkbox"]) { width: auto; flex-grow: 0 !important;
+  padding-right: 8px; }
 p:has(> label) { color: inherit !important; letter-spacing: 0 !important; }
 .mantine-Slider-root:has(.mantine-Slider-markLabel) { margin-bottom: 4px; }
 .mantine-ScrollArea-scrollbar[data-orientation="horizontal"] { display: none; }
@@ -35,7 +41,10 @@ def side_widths() -> tuple[int, int]:
 def apply_theme(gui: GuiApi, *, dark: bool) -> None:
     """Set the colours of the page."""
     gui.configure_theme(
-        dark_mode=dark, show_logo=False, show_share_button=False, brand_color=(38, 70, 112)
+        dark_mode=dark,
+        show_logo=False,
+        show_share_button=False,
+        brand_color=BRAND_ON_DARK if dark else BRAND,
     )
 
 
@@ -74,7 +83,7 @@ def lay_out_panels(
     settings = gui.add_panel()
     with settings.add_tab("View"):
         view = ViewPanel(desk, state, scenes)
-        button = gui.add_button("Fit view", hint="Camera to the operator's side.")
+        button = gui.add_button("Fit view", color="gray", hint="Camera to the operator's side.")
         button.on_click(lambda _: fit_view())
     settings.dock_below(results)
 

@@ -100,7 +100,7 @@ class ViewPanel:
             ),
             changed,
         )
-        self._folder: Any = None
+        self._home: Any = gui.add_folder(None)
         self._add_positions(state)
         self._switches: dict[str, Bound[bool]] = {
             name: Bound(
@@ -158,10 +158,8 @@ class ViewPanel:
         """Add a folder with a slider per rotary axis of the scene's machine."""
         gui = self._desk.gui
         self._built_for = state.scene
-        order = self._folder.order if self._folder is not None else None
-        self._folder = gui.add_folder(
-            "Rotary positions", visible=bool(state.positions), order=order
-        )
+        with self._home:
+            self._folder: Any = gui.add_folder("Rotary positions", visible=bool(state.positions))
         self._positions: dict[str, Bound[float]] = {}
         with self._folder:
             for axis, value in state.positions.items():
@@ -207,9 +205,8 @@ class ViewPanel:
         """Make the widgets show the state."""
         state = frame.state
         if state.scene is not self._built_for:
-            before = self._folder
+            self._folder.remove()
             self._add_positions(state)
-            before.remove()
         self._scene.show(self._titles[id(state.scene)])
         self._factor.show(float(f"{frame.exaggeration:.4g}"))
         self._log.show(round(math.log10(frame.exaggeration), 2))
