@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from warpspace.kinematics.model import Coordinates, Loop, Model, batch_shape
 from warpspace.machine.errors import ErrorSet
 from warpspace.machine.parameters import parameter
 from warpspace.units import Array
+
+MAX_RESPONSES = 3_000_000
+"""Responses (parameters × points) that are held at a time where no basis is asked for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,7 +269,26 @@ def evaluate_first_order(
     view: View | None = None,
     point_mm: Array | None = None,
 ) -> ErrorField:
-    """Evaluate the field with the first-order model; see `evaluate_exact` for the parameters."""
+    """Evaluate the field with the first-order model; see `evaluate_exact` for the parameters.
+
+    The basis of a large batch is built for a few parameters at a time, so that memory stays small.
+    """
     keys = tuple(key for key in errors if parameter(key).axis in model.machine.axes)
-    basis = build_basis(model, errors, keys, coordinates, view, point_mm)
-    return basis.evaluate(amplitudes_of(errors, keys))
+    size = int(np.prod(batch_shape(coordinates))) if point_mm is None else point_mm.size // 3
+    together = max(1, MAX_RESPONSES // max(size, 1))
+    fields = (
+        build_basis(model, errors, part, coordinates, view, point_mm).evaluate(
+            amplitudes_of(errors, part)
+        )
+        for part in (keys[at : at + together] for at in range(0, max(len(keys), 1), together))
+    )
+    return reduce(_sum, fields)
+
+
+def _sum(one: ErrorField, other: ErrorField) -> ErrorField:
+    """Add the errors of two fields over the same points."""
+    return ErrorField(
+        one.nominal_mm,
+        one.error_um + other.error_um,
+        one.orientation_urad + other.orientation_urad,
+    )

@@ -113,6 +113,17 @@ def test_errors_of_axes_the_machine_does_not_have_are_left_out() -> None:
         assert solve(model, ERRORS, coordinates).error_um == pytest.approx([3.0, 0.0, 0.0])
 
 
+@pytest.mark.parametrize("most", [1, 64, 128, 10_000])
+def test_large_batch_is_evaluated_in_parts_with_the_same_result(
+    most: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = evaluate_first_order(MODEL, ERRORS, GRID.coordinates)
+    monkeypatch.setattr("warpspace.field.evaluate.MAX_RESPONSES", most)
+    parts = evaluate_first_order(MODEL, ERRORS, GRID.coordinates)
+    np.testing.assert_allclose(parts.error_um, whole.error_um, atol=1e-10)
+    np.testing.assert_allclose(parts.orientation_urad, whole.orientation_urad, atol=1e-10)
+
+
 @pytest.mark.parametrize("solve", SOLVERS)
 def test_no_errors_and_no_points_are_fields_too(solve) -> None:
     assert not solve(MODEL, ErrorSet(), GRID.coordinates).error_um.any()
