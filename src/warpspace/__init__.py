@@ -14,6 +14,14 @@ if TYPE_CHECKING:
     from warpspace.scene.library import load_scene, scene_names
     from warpspace.scene.model import Scene
     from warpspace.scene.pipeline import evaluate
+    from warpspace.scene.verbs import (
+        ballbar,
+        contributions,
+        gains,
+        measured,
+        montecarlo,
+        thesis,
+    )
 
 _HOME = {
     "ErrorField": "warpspace.field.evaluate",
@@ -21,6 +29,12 @@ _HOME = {
     "SceneError": "warpspace.exceptions",
     "WarpspaceError": "warpspace.exceptions",
     "evaluate": "warpspace.scene.pipeline",
+    "ballbar": "warpspace.scene.verbs",
+    "contributions": "warpspace.scene.verbs",
+    "gains": "warpspace.scene.verbs",
+    "measured": "warpspace.scene.verbs",
+    "montecarlo": "warpspace.scene.verbs",
+    "thesis": "warpspace.scene.verbs",
     "load_scene": "warpspace.scene.library",
     "scene_names": "warpspace.scene.library",
 }
@@ -31,9 +45,15 @@ __all__ = [
     "SceneError",
     "WarpspaceError",
     "__version__",
+    "ballbar",
+    "contributions",
     "evaluate",
+    "gains",
     "load_scene",
+    "measured",
+    "montecarlo",
     "scene_names",
+    "thesis",
 ]
 
 

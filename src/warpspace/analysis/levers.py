@@ -73,6 +73,6 @@ def _end_stops(
 
 
 def vector(values: Array) -> tuple[float, float, float]:
-    """Give the three floats of an array, negative zero made positive."""
-    x, y, z = (float(value) + 0.0 for value in values)
+    """Give the three floats of an array, free of rounding errors and negative zeros."""
+    x, y, z = (round(float(value), 9) + 0.0 for value in values)
     return x, y, z

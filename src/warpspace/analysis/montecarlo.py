@@ -224,7 +224,8 @@ def sample_chunks(job: Job, plan: Plan) -> Iterator[Array]:
 def _job(model: Model, draws: Draws, workspace: Workspace, view: View, plan: Plan) -> Job:
     """Build what a chunk of machines goes through."""
     cylinder = choose_cylinder(model, plan.cylinder) if view.loop is Loop.WORKPIECE else None
-    if plan.over is Over.SAMPLED:
+    over = Over(plan.over)
+    if over is Over.SAMPLED:
 
         def one_point_each(rng: np.random.Generator, count: int) -> Array:
             amplitudes = draws.draw(rng, count)
@@ -233,11 +234,11 @@ def _job(model: Model, draws: Draws, workspace: Workspace, view: View, plan: Pla
             return np.sqrt(sum((np.einsum("nk,kn->n", amplitudes, gain) ** 2) for gain in gains))
 
         return one_point_each
-    find = extreme_places if plan.over is Over.MAX else spread_places
+    find = extreme_places if over is Over.MAX else spread_places
     places = find(model, view.loop, workspace, cylinder, plan.nodes)
     gains = node_gains(model, draws.keys, view, places)
 
     def all_points_each(rng: np.random.Generator, count: int) -> Array:
-        return reduce_nodes(draws.draw(rng, count), gains, plan.over)
+        return reduce_nodes(draws.draw(rng, count), gains, over)
 
     return all_points_each

@@ -6,10 +6,16 @@ import sys
 import click
 
 from warpspace import __version__
+from warpspace.cli.ballbar import ballbar
 from warpspace.cli.check import check, scenes
+from warpspace.cli.contributions import contributions
 from warpspace.cli.export import export
 from warpspace.cli.field import field
+from warpspace.cli.gains import gains
+from warpspace.cli.measured import measured
+from warpspace.cli.montecarlo import montecarlo
 from warpspace.cli.snapshot import snapshot
+from warpspace.cli.thesis import thesis
 from warpspace.cli.view import view
 from warpspace.exceptions import WarpspaceError
 
@@ -36,7 +42,20 @@ def cli() -> None:
     """
 
 
-for command in (view, snapshot, field, export, check, scenes):
+for command in (
+    view,
+    snapshot,
+    field,
+    export,
+    check,
+    scenes,
+    gains,
+    montecarlo,
+    contributions,
+    ballbar,
+    measured,
+    thesis,
+):
     cli.add_command(command)
 
 

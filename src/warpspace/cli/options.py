@@ -58,7 +58,7 @@ at_option = click.option(
 )
 
 
-def parse_point(text: str, axes: Collection[str]) -> dict[str, float]:
+def parse_point(text: str, axes: Collection[str], option: str = "--at") -> dict[str, float]:
     """Read axis positions as a user types them.
 
     Parameters
@@ -67,6 +67,8 @@ def parse_point(text: str, axes: Collection[str]) -> dict[str, float]:
         For instance ``X=0,Y=-225,B=30``.
     axes : collection of str
         Letters of the axes there are.
+    option : str, optional
+        What it was given with, for messages.
 
     Returns
     -------
@@ -87,14 +89,16 @@ def parse_point(text: str, axes: Collection[str]) -> dict[str, float]:
         except ValueError:
             value = math.nan
         if not equals or not math.isfinite(value) or len(name) != 1:
-            raise OptionError(f"--at {text!r}: {part.strip()!r} cannot be read; {expected}")
+            raise OptionError(f"{option} {text!r}: {part.strip()!r} cannot be read; {expected}")
         if name not in axes:
             known = ", ".join(axes)
-            raise OptionError(f"--at {text!r}: unknown axis {name}; expected one of {known}")
+            raise OptionError(f"{option} {text!r}: unknown axis {name}; expected one of {known}")
         if name in found:
-            raise OptionError(f"--at {text!r}: axis {name} is given twice")
+            raise OptionError(f"{option} {text!r}: axis {name} is given twice")
         if abs(value) > 1e5:
-            raise OptionError(f"--at {text!r}: {value:g}; expected at most ±100000 mm or degrees")
+            raise OptionError(
+                f"{option} {text!r}: {value:g}; expected at most ±100000 mm or degrees"
+            )
         found[name] = value
     return found
 

@@ -178,7 +178,8 @@ def _means(
 def _shapes(case: ThesisCase) -> Iterator[Hypothesis]:
     question = (
         "Which plane is out of square (figures 5-10 and 5-12)? (shear of the best affine fit to the"
-        " predicted map: XY, XZ, YZ)"
+        " predicted map: XY, XZ, YZ; it differs from the squareness put in because angular errors"
+        " along the travel shear the volume too, which a ball bar cannot tell apart)"
     )
     for name, machine in zip(MACHINES, judged(case), strict=True):
         shears = ", ".join(f"{value:+.1f}" for value in machine.shear_urad.values())

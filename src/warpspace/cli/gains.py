@@ -1,0 +1,216 @@
+"""Command `gains`: how much of each error arrives at the functional point, and the lever behind."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import click
+
+from warpspace.cli.options import (
+    at_option,
+    json_option,
+    loop_option,
+    parse_point,
+    print_json,
+    scene_argument,
+)
+from warpspace.exceptions import OptionError
+
+if TYPE_CHECKING:
+    from warpspace.analysis.gains import Gain
+    from warpspace.scene.model import Scene
+
+
+@click.command()
+@scene_argument()
+@loop_option
+@at_option
+@click.option(
+    "--max",
+    "over_travel",
+    is_flag=True,
+    help="The largest absolute gains over the machine's travel instead of those at a point.",
+)
+@click.option(
+    "--step",
+    "step_deg",
+    type=float,
+    help="With --max: step of rotary axes in degrees (ends of linear axes are exact).  [1; 5 for"
+    " three rotary axes]",
+)
+@click.option(
+    "--share",
+    type=float,
+    default=0.8,
+    show_default=True,
+    help="Key errors: the largest that together make up this share of the sum of squares.",
+)
+@click.option("--csv", "csv_path", type=click.Path(), help="Write the table to this CSV file.")
+@click.option("--plot", type=click.Path(), help="Draw the chart: .png, .svg or .pdf.")
+@json_option
+def gains(
+    scene: str,
+    loop: str,
+    points: tuple[str, ...],
+    step_deg: float | None,
+    share: float,
+    csv_path: str | None,
+    plot: str | None,
+    *,
+    over_travel: bool,
+    as_json: bool,
+) -> None:
+    """Rank the error parameters of SCENE's machine by their gain.
+
+    A gain is the displacement of the functional point per unit of an error: µm per µm or µm per
+    µrad, signed at a point (--at, by default the middle of the scene's ranges). The lever from the
+    origin of the frame an error sits in to the point explains it: 1 m gives 1 µm per µrad.
+    """
+    from warpspace.outputs.charts.paper import CHART_ENDINGS
+    from warpspace.outputs.files import check_target
+    from warpspace.scene import verbs
+    from warpspace.scene.library import load_scene
+
+    if len(points) > 1 or (points and over_travel):
+        raise OptionError("--at: expected one point, and none with --max")
+    if step_deg is not None and not over_travel:
+        raise OptionError("--step belongs to --max")
+    for path, endings in ((plot, CHART_ENDINGS), (csv_path, (".csv",))):
+        if path is not None:
+            check_target(path, endings)
+    loaded = load_scene(scene)
+    found = verbs.gains(
+        loaded,
+        at=parse_point(points[0], loaded.machine.axes) if points else None,
+        loop=loop,
+        over_travel=over_travel,
+        step_deg=step_deg,
+        share=share,
+    )
+    where = _where(found, loop, over_travel=over_travel)
+    if csv_path is not None:
+        _write_csv(csv_path, loaded, found)
+    if plot is not None:
+        _plot(plot, loaded, found, where, share, signed=not over_travel)
+    if as_json:
+        print_json({"gains": [_json_row(gain) for gain in found]})
+        return
+    click.echo(f"{loaded.machine.title} · {where}")
+    _print_table(loaded, found, over_travel=over_travel)
+    keys = sum(gain.is_key for gain in found)
+    click.echo(
+        f"  * key errors: the largest {keys} make up {share:.0%} of the sum of squares, one µm and"
+        " one µrad counted alike"
+    )
+
+
+def thesis_keys(scene: "Scene") -> tuple[str, ...]:
+    """Give the key errors of the thesis (table 4-7) for its machine, none for any other."""
+    from warpspace.analysis.thesis.rows import printed_tables
+
+    if scene.machine.name != "dvf5000":
+        return ()
+    return tuple(key for key, row in printed_tables()["table_4_7"].items() if isinstance(row, list))
+
+
+def _where(found: "Sequence[Gain]", loop: str, *, over_travel: bool) -> str:
+    """Say which loop and point the gains belong to."""
+    if over_travel:
+        return f"{loop} loop · largest absolute gains over the travel"
+    at = ", ".join(f"{name} {value:g}" for name, value in found[0].at.items())
+    return f"{loop} loop · gains at {at}"
+
+
+def _json_row(gain: "Gain") -> dict[str, object]:
+    """Spell one gain as the JSON output has it."""
+    return {
+        "key": gain.key,
+        "symbol": gain.parameter.symbol,
+        "unit": gain.unit,
+        "x": gain.x,
+        "y": gain.y,
+        "z": gain.z,
+        "norm": gain.norm,
+    }
+
+
+def _explain(gain: "Gain") -> str:
+    """Read a gain off its lever: the coordinate of the lever that is the largest component."""
+    if not gain.parameter.is_rotation:
+        return ""
+    largest = max(abs(gain.x), abs(gain.y), abs(gain.z))
+    for index, length in enumerate(gain.lever_mm):
+        if largest > 0.0 and abs(abs(length) * 1e-3 - largest) < 1e-9:
+            parts = [
+                f"{vector[index]:+g} {name}"
+                for name, vector in gain.lever_parts_mm
+                if abs(vector[index]) > 1e-6
+            ]
+            total = f"{'xyz'[index]}: {length:+g} mm"
+            return f"{total} = {' '.join(parts)}" if len(parts) > 1 else total
+    return ""
+
+
+def _print_table(scene: "Scene", found: "Sequence[Gain]", *, over_travel: bool) -> None:
+    """Print the ranked table."""
+    from warpspace.machine.parameters import ROTARY_AXES
+
+    last = "lever of |E| at" if over_travel else "largest component read off the lever"
+    marked = thesis_keys(scene)
+    beside = " thesis" if marked else ""
+    click.echo(
+        f"    {'key':<5} {'symbol':<6} {'name':<27} {'|E|':>6} {'x':>7} {'y':>7} {'z':>7}"
+        f" {'unit':<8}{beside}  {'lever x, y, z [mm]':<24}  {last}"
+    )
+    for gain in found:
+        row = gain.parameter
+        thesis = f" {'key' if gain.key in marked else '':<6}" if marked else ""
+        lever = ", ".join(f"{value:.6g}" for value in gain.lever_mm)
+        lever = lever if row.is_rotation else ""
+        at = [f"{name} {value:g}" for name, value in gain.at.items() if name in ROTARY_AXES]
+        if row.axis not in ROTARY_AXES:
+            at = [f"{name} {value:g}" for name, value in gain.at.items() if name not in ROTARY_AXES]
+        place = ", ".join(at) if row.is_rotation else ""
+        click.echo(
+            f"  {'*' if gain.is_key else ' '} {gain.key:<5} {row.symbol:<6} {row.name:<27}"
+            f" {gain.norm:6.3f} {gain.x:7.3f} {gain.y:7.3f} {gain.z:7.3f} {gain.unit:<8}"
+            f"{thesis}  {lever:<24}  {place if over_travel else _explain(gain)}".rstrip()
+        )
+
+
+def _write_csv(path: str, scene: "Scene", found: "Sequence[Gain]") -> None:
+    """Write one row a parameter, lever and axis positions included."""
+    import csv
+
+    from warpspace.outputs.files import write_atomically
+
+    marked = thesis_keys(scene)
+    axes = [f"{name}_{'mm' if name in 'XYZ' else 'deg'}" for name in found[0].at]
+    lever = ("lever_x_mm", "lever_y_mm", "lever_z_mm")
+    head = ("key", "symbol", "name", "unit", "x", "y", "z", "norm", *lever, "key_error")
+    with (
+        write_atomically(path) as temporary,
+        temporary.open("w", newline="", encoding="utf-8") as file,
+    ):
+        writer = csv.writer(file)
+        writer.writerow((*head, "thesis_key_error", *axes))
+        for gain in found:
+            numbers = (gain.x, gain.y, gain.z, gain.norm, *gain.lever_mm)
+            writer.writerow(
+                (
+                    *(gain.key, gain.parameter.symbol, gain.parameter.name, gain.unit),
+                    *(f"{number:.9g}" for number in numbers),
+                    int(gain.is_key),
+                    int(gain.key in marked),
+                    *(f"{number:.9g}" for number in gain.at.values()),
+                )
+            )
+
+
+def _plot(
+    path: str, scene: "Scene", found: "Sequence[Gain]", where: str, share: float, *, signed: bool
+) -> None:
+    """Draw the chart."""
+    from warpspace.outputs.charts import gains_chart, write_chart
+
+    title = f"Error gains · {scene.machine.title}"
+    write_chart(gains_chart(found, title, where, share, signed=signed), path)

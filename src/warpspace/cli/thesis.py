@@ -1,0 +1,81 @@
+"""Command `thesis`: every printed number beside ours."""
+
+from typing import TYPE_CHECKING
+
+import click
+
+from warpspace.cli.options import json_option, print_json
+
+if TYPE_CHECKING:
+    from warpspace.analysis.thesis import Row
+
+
+@click.command()
+@click.option("--markdown", type=click.Path(), help="Write the comparison to this .md file.")
+@json_option
+def thesis(markdown: str | None, *, as_json: bool) -> None:
+    """Recompute every number of the thesis's tables 4-1 to 4-8 and 5-3 to 5-5.
+
+    A number agrees where it lies within half of the last printed digit. Rows that do not agree say
+    why; what was tried is listed below them. Nothing is tuned to agree.
+    """
+    from warpspace.analysis.thesis import thesis_hypotheses
+    from warpspace.outputs.files import check_target
+    from warpspace.outputs.thesis_page import thesis_markdown
+    from warpspace.scene import verbs
+
+    if markdown is not None:
+        check_target(markdown, (".md",))
+    rows = verbs.thesis()
+    if markdown is not None:
+        from warpspace.outputs.files import write_atomically
+
+        text = thesis_markdown(rows, thesis_hypotheses(verbs.thesis_case()))
+        with write_atomically(markdown) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    if as_json:
+        print_json({"rows": [_json_row(row) for row in rows]})
+        return
+    _print(rows)
+    if markdown is None:
+        click.echo("What was tried where the thesis is open:")
+        question = ""
+        for tried in thesis_hypotheses(verbs.thesis_case()):
+            if tried.question != question:
+                click.echo(f"  {tried.question}")
+                question = tried.question
+            click.echo(f"    {'>' if tried.used else ' '} {tried.reading}: {tried.result}")
+        click.echo("  > is what the model uses")
+
+
+def _json_row(row: "Row") -> dict[str, object]:
+    """Spell a row as the JSON output has it; a note only where there is one."""
+    found: dict[str, object] = {
+        "source": row.source,
+        "key": row.key,
+        "printed": row.printed,
+        "computed": row.computed,
+        "agrees": row.agrees,
+    }
+    return {**found, "note": row.note} if row.note else found
+
+
+def _print(rows: "tuple[Row, ...]") -> None:
+    """Print all rows, then those that do not agree with their reasons."""
+    from warpspace.outputs.thesis_page import spell
+
+    source = ""
+    for row in rows:
+        if row.source != source:
+            source = row.source
+            same = [other.agrees for other in rows if other.source == source]
+            click.echo(f"{source}: {sum(same)} of {len(same)} agree")
+        mark = " " if row.agrees else "≠"
+        printed, computed = spell(row, row.printed), spell(row, row.computed, more=1)
+        click.echo(f"  {mark} {row.key:<48} {printed:>12}  {computed:>12} {row.unit}")
+    different = [row for row in rows if not row.agrees]
+    click.echo(f"\n{len(rows) - len(different)} of {len(rows)} agree. The others:")
+    for row in different:
+        printed, computed = spell(row, row.printed), spell(row, row.computed, more=1)
+        click.echo(f"  {row.source}: {row.key}: printed {printed}, ours {computed} {row.unit}")
+        click.echo(f"      {row.note}")

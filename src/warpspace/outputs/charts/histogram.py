@@ -1,0 +1,143 @@
+"""Histogram of sampled machines like figures 4-8 and 4-9 of the thesis."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from warpspace.analysis.distribution import Probability
+from warpspace.analysis.montecarlo import MonteCarlo
+from warpspace.outputs.charts.paper import KEY_COLOUR, SMALL, TEXT, quiet, sheet, style
+from warpspace.outputs.style import LIGHT
+
+WIDTH_IN, HEIGHT_IN = 9.0, 5.4
+BEYOND = "#e3c3c6"
+_PAPER: Any = {"facecolor": LIGHT.paper, "edgecolor": "none", "pad": 1.5}
+
+
+def montecarlo_chart(
+    result: MonteCarlo, title: str, subtitle: str, printed_um: float | None = None
+) -> Figure:
+    """Draw the distribution of |E| with its mean, mode, P95 and specification.
+
+    Parameters
+    ----------
+    result : MonteCarlo
+    title, subtitle : str
+    printed_um : float, optional
+        Value printed in the thesis, µm, drawn beside ours.
+
+    Returns
+    -------
+    Figure
+    """
+    with style():
+        figure, top = sheet(WIDTH_IN, HEIGHT_IN, title, subtitle, top_in=1.5)
+        axes = figure.add_axes((0.085, 0.115, 0.885, top - 0.115))
+        edges, counts = result.histogram.edges_um, result.histogram.counts
+        percent = 100.0 * counts / result.plan.samples
+        spec = result.plan.spec_um
+        for low, high, value in zip(edges[:-1], edges[1:], percent, strict=True):
+            beyond = spec is not None and low >= spec
+            axes.bar(
+                low,
+                value,
+                high - low,
+                align="edge",
+                color=BEYOND if beyond else "#a9c4de",
+                edgecolor=LIGHT.paper,
+                linewidth=0.5,
+            )
+        quiet(axes, "y")
+        axes.set_xlabel("volumetric error |E|, µm")
+        axes.set_ylabel(f"machines per {edges[1] - edges[0]:g} µm, %")
+        last = float(edges[1:][np.cumsum(counts) >= 0.9995 * result.plan.samples][0])
+        axes.set_xlim(0.0, max(last, 1.05 * (spec or 0.0), 1.05 * (printed_um or 0.0)))
+        axes.set_ylim(0.0, 1.06 * float(percent.max()))
+        marks = [
+            ("mode", result.mode_um, LIGHT.ink, "-"),
+            ("mean", result.mean_um, KEY_COLOUR, "-"),
+            ("P95", result.p95_um, LIGHT.muted, "-"),
+        ]
+        if printed_um is not None:
+            marks.append(("thesis", printed_um, LIGHT.series[4], "--"))
+        if spec is not None:
+            marks.append(("spec", spec, LIGHT.accent, "-"))
+        _mark(axes, marks)
+        if result.probability is not None:
+            _tell(axes, result.probability)
+        return figure
+
+
+def _mark(axes: Axes, marks: Sequence[tuple[str, float, str, str]]) -> None:
+    """Draw vertical lines; labels start at their line, on as many rows above as they need."""
+    low, high = axes.get_xlim()
+    span = high - low
+    taken: list[list[tuple[float, float]]] = [[], [], [], []]
+    for name, value, colour, dash in sorted(marks, key=lambda mark: mark[1]):
+        text = f"{name} {value:.1f} µm"
+        width = 0.0115 * span * len(text) + 0.01 * span
+        leftwards = (name == "mode" and value - width >= low) or value + width > high
+        start = value - width if leftwards else value
+        row = next(
+            (
+                index
+                for index, boxes in enumerate(taken)
+                if all(start >= right or start + width <= left for left, right in boxes)
+            ),
+            len(taken) - 1,
+        )
+        taken[row].append((start, start + width))
+        height = 1.02 + 0.058 * row
+        axes.plot(
+            [value, value],
+            [0.0, height + 0.04],
+            color=colour,
+            linestyle=dash,
+            linewidth=1.4,
+            transform=axes.get_xaxis_transform(),
+            clip_on=False,
+            zorder=4,
+        )
+        axes.text(
+            value + (-0.006 if leftwards else 0.006) * span,
+            height,
+            text,
+            color=colour,
+            size=TEXT,
+            weight="bold",
+            ha="right" if leftwards else "left",
+            va="bottom",
+            transform=axes.get_xaxis_transform(),
+            zorder=5,
+            bbox={**_PAPER, "pad": 0.4},
+        )
+
+
+def _tell(axes: Axes, probability: Probability) -> None:
+    """Say how likely the specification is kept."""
+    axes.text(
+        0.985,
+        0.95,
+        f"{100.0 * probability.probability:.2f} % of the machines\nstay within"
+        f" {probability.spec_um:g} µm",
+        transform=axes.transAxes,
+        ha="right",
+        va="top",
+        size=TEXT + 2.0,
+        weight="bold",
+        bbox=_PAPER,
+    )
+    axes.text(
+        0.985,
+        0.83,
+        f"95 % interval {100.0 * probability.low:.2f} … {100.0 * probability.high:.2f} %",
+        transform=axes.transAxes,
+        ha="right",
+        va="top",
+        size=SMALL,
+        color=LIGHT.muted,
+        bbox=_PAPER,
+    )
