@@ -6,7 +6,7 @@ and since the machines stay the same, the result moves smoothly with the toleran
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -192,12 +192,6 @@ def estimate(ensemble: Ensemble, tolerances: ToleranceSet, spec_um: float) -> Ch
         stream.display_histogram(),
         probability,
     )
-
-
-def with_half_width(tolerances: ToleranceSet, key: str, half_width: float) -> ToleranceSet:
-    """Give a tolerance set with one half width changed, µm or µrad; the centre stays."""
-    present = tolerances.get(key) or Tolerance(0.0, 0.0)
-    return replace(tolerances, own={**tolerances.own, key: Tolerance(present.centre, half_width)})
 
 
 def tolerance_shares(

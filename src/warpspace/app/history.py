@@ -9,7 +9,7 @@ from typing import Any, Generic, TypeVar, cast
 
 S = TypeVar("S")
 
-STEPS = 200
+STEPS = 100
 """Steps that can be undone; the oldest are forgotten."""
 SAME_STEP_S = 0.8
 """Changes of one thing that follow each other faster than this are one step."""

@@ -21,7 +21,6 @@ from warpspace.geometry import surfaces
 from warpspace.geometry.colour import ColourScale, build_scale, component_values
 from warpspace.geometry.deform import auto_exaggeration, deform
 from warpspace.geometry.traces import TraceGroup, build_traces
-from warpspace.scene.model import Scene
 from warpspace.scene.pipeline import grid_basis
 from warpspace.units import Array
 
@@ -204,7 +203,7 @@ class Same:
         self.thing = thing
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Same) and other.scene is self.scene
+        return isinstance(other, Same) and other.thing is self.thing
 
     def __hash__(self) -> int:
         return id(self.thing)

@@ -8,28 +8,37 @@ a slider is always what is shown, however fast it was moved.
 import json
 import logging
 import threading
+import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
 
-import numpy as np
 from viser import ClientHandle
 from viser import _messages as messages
 
-from warpspace.app.camera import fit_camera
-from warpspace.app.layers import SCENE_PER_MM, Layer
-from warpspace.app.layers.axes import AxesLayer, axes_room_mm
+from warpspace.app.board import Board
+from warpspace.app.eye import Eye
+from warpspace.app.layers import Layer
+from warpspace.app.layers.axes import AxesLayer
 from warpspace.app.layers.box import BoxLayer
 from warpspace.app.layers.traces import TracesLayer
 from warpspace.app.live import Frame, LiveModel
-from warpspace.app.panels import Desk, Panel, Update
-from warpspace.app.panels.layout import HEADING_HEIGHT, apply_theme, lay_out_panels, side_widths
+from warpspace.app.panels import Desk, Panel, Settling, Update
+from warpspace.app.panels.layout import apply_theme, lay_out_panels
 from warpspace.app.state import AppState
+from warpspace.app.tabs import CameraMemory, Left, ask_script, new_token, rename_script
 from warpspace.exceptions import WarpspaceError
 from warpspace.scene.model import Scene
 
 logger = logging.getLogger(__name__)
 NOTE_SECONDS = 8.0
-LEAST_WIDTH = 200
+TOKEN_WAIT_S = 0.25
+"""How long the first picture waits for a tab that may have been here before."""
+SETTLE_S = 0.06
+"""Pause in the changes after which charts follow."""
+LONGEST_SETTLE_S = 0.25
+"""Charts lag no longer than this behind while a slider is being dragged."""
 
 
 class Session:
@@ -42,15 +51,31 @@ class Session:
         Shared by all sessions.
     scenes : mapping of str to Scene
         Scenes to choose from, by the title shown.
-    state : AppState
-        What is shown first.
+    board : Board
+        What is shown: the tab's own, or that of a shared review.
+    claim : callable, optional
+        Takes the session and the token its page has handed over; gives what the tab left behind
+        when its connection was dropped.
     """
 
     def __init__(
-        self, client: ClientHandle, live: LiveModel, scenes: Mapping[str, Scene], state: AppState
+        self,
+        client: ClientHandle,
+        live: LiveModel,
+        scenes: Mapping[str, Scene],
+        board: Board,
+        claim: "Callable[[Session, str], Left | None] | None" = None,
     ) -> None:
         self._client, self._live, self._scenes = client, live, scenes
-        self._state = state
+        self.board = board
+        self.token = new_token()
+        self._claim = claim
+        self._token: Any = None
+        self._told = threading.Event()
+        self._eye = Eye(client)
+        self._camera: CameraMemory | None = None
+        self._actions: deque[Callable[[], None]] = deque()
+        self._unsettled_since: float | None = None
         self._shown: Frame | None = None
         self._posted: deque[Update] = deque()
         self._wake = threading.Event()
@@ -64,7 +89,7 @@ class Session:
     @property
     def state(self) -> AppState:
         """What is shown, or about to be."""
-        return self._state
+        return self.board.state
 
     def start(self) -> None:
         """Build page and drawing, then follow the widgets."""
@@ -74,6 +99,8 @@ class Session:
         """End the worker; nothing is sent any more."""
         self._stopped.set()
         self._wake.set()
+        self._told.set()
+        self.board.unsubscribe(self.changed)
 
     def changed(self) -> None:
         """Take note that a widget has changed; returns at once."""
@@ -84,60 +111,119 @@ class Session:
         self._posted.append(update)
         self._wake.set()
 
-    def _run(self) -> None:
-        """Wait, take everything in, show once; until stopped."""
-        self._guarded(self._build)
-        while True:
-            self._wake.wait()
-            self._wake.clear()
-            if self._stopped.is_set():
-                return
-            self._guarded(self._step)
+    def act(self, action: Callable[[], None]) -> None:
+        """Queue something to be done beside the state, guarded; returns at once."""
+        self._actions.append(action)
+        self._wake.set()
 
-    def _guarded(self, step: Update | object) -> None:
+    def _run(self) -> None:
+        """Wait, take everything in, show once; let charts follow when it settles; until stopped."""
+        self.board.subscribe(self.changed)
+        try:
+            self._guarded(self._ask)
+            self._guarded(self._build)
+            while not self._stopped.is_set():
+                self._turn()
+        finally:
+            self.board.unsubscribe(self.changed)
+
+    def _turn(self) -> None:
+        """Wait for one change, or for a pause in them, and follow."""
+        woken = self._wake.wait(None if self._unsettled_since is None else SETTLE_S)
+        self._wake.clear()
+        if woken and not self._stopped.is_set():
+            self._guarded(self._step)
+        since = self._unsettled_since
+        if since is not None and (not woken or time.monotonic() - since > LONGEST_SETTLE_S):
+            self._unsettled_since = None
+            self._guarded(self._settle)
+
+    def _guarded(self, step: Callable[[], object]) -> None:
         """Run a step; what it raises is logged and shown to this user, and the session goes on."""
         try:
-            step()  # type: ignore[operator]
+            step()
         except Exception as error:
             if self._stopped.is_set():
                 return
             logger.exception("session %d", self._client.client_id)
             known = isinstance(error, WarpspaceError)
             text = str(error) if known else f"{type(error).__name__}: {error}"
-            self._notify("That did not work", text, "red")
+            self.notify("That did not work", text, "red")
+
+    def _ask(self) -> None:
+        """Ask the page which tab it is."""
+        self._token = self._client.gui.add_text("", "", visible=False)
+        self._token.on_update(lambda _: (self._told.set(), self._wake.set()))
+        self._run_script(ask_script(self._token._impl.uuid, self.token))  # noqa: SLF001
+        self._client.flush()
+
+    def _adopt(self) -> None:
+        """Take over what the tab has left behind, if it was here before."""
+        token, self._token = self._token, None
+        left = self._claim(self, token.value) if self._claim is not None else None
+        token.remove()
+        if left is not None:
+            self.board.unsubscribe(self.changed)
+            self.board, self._camera = left.board, left.camera
+            self.board.subscribe(self.changed)
+
+    def renamed(self, token: str) -> None:
+        """Give page and session another token, since two tabs came with one."""
+        self.token = token
+        self._run_script(rename_script(token))
+
+    def left(self) -> Left:
+        """Give what is worth keeping of the tab."""
+        return Left(self.board, self._eye.remember())
 
     def _build(self) -> None:
         """Draw the first frame, then lay out the panels."""
-        frame = self._live.frame(self._state)
+        self._live.frame(self.state)
+        if self._told.wait(TOKEN_WAIT_S):
+            self._adopt()
+        frame = self._live.frame(self.state)
         scene = self._client.scene
         with self._client.atomic():
             self._set_title(frame)
-            self._place_camera(frame)
+            self._restore_camera(frame)
             self._layers = [
                 BoxLayer(scene, frame),
                 TracesLayer(scene, frame),
                 AxesLayer(scene, frame),
             ]
-            desk = Desk(self._client.gui, self.changed, self.post)
-            self._panels = lay_out_panels(desk, self._state, self._scenes, self.fit_view)
+            desk = Desk(
+                self._client.gui, self.changed, self.post, self.act, lambda: self.board, self.notify
+            )
+            self._panels = lay_out_panels(desk, frame.state, self._scenes, self.fit_view)
             for panel in self._panels:
                 panel.show(frame)
         self._client.flush()
         self._shown = frame
+        self._unsettled_since = time.monotonic()
 
     def _step(self) -> None:
         """Take in what has changed and show the outcome."""
-        state = self._state.without_notes()
+        if self._token is not None and self._told.is_set():
+            self._adopt()
+            if self._camera is not None and self._shown is not None:
+                self._restore_camera(self._shown)
+        notes = self.board.apply(self._take_in, by=self.changed)
+        while self._actions:
+            self._actions.popleft()()
+        state = self.board.state
+        if not notes and self._shown is not None and state is self._shown.state:
+            return
+        self._show(self._live.frame(state), notes)
+
+    def _take_in(self, state: AppState) -> AppState:
+        """Apply what widgets and buttons have changed to a state."""
         for panel in self._panels:
             state = panel.read(state)
         while self._posted:
             state = self._posted.popleft()(state)
-        if state == self._state and self._shown is not None:
-            return
-        self._state = state
-        self._show(self._live.frame(state))
+        return state
 
-    def _show(self, frame: Frame) -> None:
+    def _show(self, frame: Frame, notes: tuple[str, ...]) -> None:
         """Make page and drawing show a frame, all at once."""
         before = self._shown
         with self._client.atomic():
@@ -145,44 +231,55 @@ class Session:
                 layer.show(frame)
             for panel in self._panels:
                 panel.show(frame)
-            if before is not None and before.state.scene is not frame.state.scene:
+            if before is not None and before.state.origin is not frame.state.origin:
                 self._set_title(frame)
-                self._place_camera(frame)
+                self._eye.fit(frame, docked=True)
             if before is not None and before.state.shown.dark != frame.state.shown.dark:
                 apply_theme(self._client.gui, dark=frame.state.shown.dark)
         self._client.flush()
         self._shown = frame
-        if frame.state.notes:
-            self._notify("Clamped", "\n".join(frame.state.notes), "yellow")
+        if self._unsettled_since is None:
+            self._unsettled_since = time.monotonic()
+        if notes:
+            self.notify("Clamped", "\n".join(notes), "yellow")
+
+    def _settle(self) -> None:
+        """Let the charts follow."""
+        frame = self._shown
+        if frame is None:
+            return
+        for panel in self._panels:
+            if isinstance(panel, Settling):
+                self._guarded(partial(panel.settle, frame))
+        self._client.flush()
 
     def fit_view(self) -> None:
         """Put the camera back to the operator's side."""
         if self._shown is not None:
-            self._place_camera(self._shown)
+            self._eye.fit(self._shown, docked=True)
             self._client.flush()
 
-    def _place_camera(self, frame: Frame) -> None:
-        """Fill the room between the panels with the box, its traces and axes."""
-        camera = self._client.camera
-        taken = sum(side_widths()) if self._shown is None else 0  # not docked yet
-        width = max(camera.image_width - taken, LEAST_WIDTH)
-        points = np.concatenate([axes_room_mm(frame), frame.drawn_mm.reshape(-1, 3)])
-        height = max(camera.image_height, LEAST_WIDTH)
-        pose = fit_camera(points, width / height, top=min(HEADING_HEIGHT / height, 0.3))
-        camera.up_direction = (0.0, 0.0, 1.0)
-        camera.fov = pose.fov_rad
-        camera.position = pose.position * SCENE_PER_MM
-        camera.look_at = pose.look_at * SCENE_PER_MM
+    def _restore_camera(self, frame: Frame) -> None:
+        """Put the camera where the tab left it, else where all of the box is seen."""
+        memory, self._camera = self._camera, None
+        if memory is not None:
+            self._eye.restore(memory)
+        else:
+            self._eye.fit(frame, docked=self._shown is not None)
 
     def _set_title(self, frame: Frame) -> None:
         """Name the browser tab after the scene."""
         title = json.dumps(f"{frame.state.scene.title} · warpspace").replace("<", "\\u003c")
+        self._run_script(f"document.title = {title};")
+
+    def _run_script(self, source: str) -> None:
+        """Run JavaScript of our own in the page; no word of a user's may be in it unescaped."""
         # viser has a message for it and no method
         self._client._websock_connection.queue_message(  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
-            messages.RunJavascriptMessage(source=f"document.title = {title};")
+            messages.RunJavascriptMessage(source=source)
         )
 
-    def _notify(self, title: str, text: str, colour: str) -> None:
+    def notify(self, title: str, text: str, colour: str) -> None:
         """Show a message in this tab."""
         self._client.add_notification(
             title,

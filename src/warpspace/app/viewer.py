@@ -1,6 +1,7 @@
 """The server of the app: starts it, gives each browser tab a session, ends it cleanly."""
 
 import contextlib
+import importlib
 import io
 import logging
 import threading
@@ -11,10 +12,12 @@ from typing import Self
 
 import viser
 
+from warpspace.app.board import Board
 from warpspace.app.live import LiveModel
 from warpspace.app.network import free_port, is_local, page_url, resolve_host
 from warpspace.app.session import Session
 from warpspace.app.state import start_state
+from warpspace.app.tabs import Keeper, Left, is_token, new_token
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 
@@ -38,6 +41,8 @@ class Viewer:
     host : str, optional
     port : int or None, optional
         None takes the next free one from 8080.
+    shared : bool, optional
+        Whether all tabs see and steer one state; by default each has its own.
 
     Raises
     ------
@@ -52,6 +57,7 @@ class Viewer:
         *,
         host: str = "127.0.0.1",
         port: int | None = None,
+        shared: bool = False,
     ) -> None:
         self.address = resolve_host(host)
         self.port = free_port(self.address, port)
@@ -60,13 +66,13 @@ class Viewer:
         self._live = LiveModel()
         self._sessions: dict[int, Session] = {}
         self._lock = threading.Lock()
+        self._keeper = Keeper()
+        self._shared = Board(start_state(scene)) if shared else None
         self._server = _serve(self.address, self.port)
         self._server.on_client_connect(self._connect)
         self._server.on_client_disconnect(self._disconnect)
         # the first tab need not wait for it
-        threading.Thread(
-            target=self._live.frame, args=(start_state(scene),), name="warpspace-warm", daemon=True
-        ).start()
+        threading.Thread(target=self._warm, name="warpspace-warm", daemon=True).start()
 
     @property
     def url(self) -> str:
@@ -84,19 +90,44 @@ class Viewer:
         with self._lock:
             return tuple(self._sessions.values())
 
+    def _warm(self) -> None:
+        """Do before the first tab what it would have to wait for."""
+        self._live.frame(start_state(self._scene))
+        importlib.import_module("warpspace.app.chance")
+
     def _connect(self, client: viser.ClientHandle) -> None:
         """Give a new tab its session."""
-        session = Session(client, self._live, self._scenes, start_state(self._scene))
+        board = self._shared or Board(start_state(self._scene))
+        session = Session(client, self._live, self._scenes, board, self._claim)
         with self._lock:
             self._sessions[client.client_id] = session
         session.start()
         if client.client_id not in self._server.get_clients():
             self._disconnect(client)
 
+    def _claim(self, session: Session, token: str) -> Left | None:
+        """Find what the tab whose page hands over a token has left behind."""
+        if not is_token(token):
+            return None
+        with self._lock:
+            twins = [s for s in self._sessions.values() if s is not session and s.token == token]
+            left = self._keeper.take(token)
+            if not twins:
+                session.token = token
+        if twins:
+            # a duplicated tab, or one whose old connection is not yet known to be dead
+            left = Left(twins[0].board.copy(), None)
+            session.renamed(new_token())
+        if left is not None and self._shared is not None:
+            return Left(self._shared, left.camera)
+        return left
+
     def _disconnect(self, client: viser.ClientHandle) -> None:
-        """End the session of a tab that is gone."""
+        """End the session of a tab that is gone, and keep what it leaves for a while."""
         with self._lock:
             session = self._sessions.pop(client.client_id, None)
+            if session is not None:
+                self._keeper.keep(session.token, session.left())
         if session is not None:
             session.stop()
 
@@ -164,6 +195,7 @@ def run_viewer(
     *,
     host: str,
     port: int | None,
+    shared: bool = False,
     browser: bool,
     say: Say,
     warn: Say,
@@ -176,12 +208,14 @@ def run_viewer(
     scenes : mapping of str to Scene
     host : str
     port : int or None
+    shared : bool, optional
+        Whether all tabs see and steer one state.
     browser : bool
         Whether to open the page.
     say, warn : callable
         Print a line for the user.
     """
-    with Viewer(scene, scenes, host=host, port=port) as viewer:
+    with Viewer(scene, scenes, host=host, port=port, shared=shared) as viewer:
         try:
             say(f"{scene.title} is shown at {viewer.url} (Ctrl-C ends it)")
             if not viewer.is_local:

@@ -6,14 +6,15 @@ A panel binds widgets to the state: `read` takes what a browser has set and retu
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from viser import GuiApi
 
+from warpspace.app.board import Board, Update
 from warpspace.app.live import Frame
 from warpspace.app.state import AppState
 
-Update = Callable[[AppState], AppState]
+__all__ = ["Desk", "Panel", "Settling", "Update"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,11 +29,21 @@ class Desk:
         To be called from widget callbacks: something is to be read.
     post : callable
         To be called from button callbacks with a pure update of the state.
+    act : callable
+        To be called from callbacks with something to be done beside the state (undo, a modal):
+        it is done by the session's worker, and what it raises is shown and logged.
+    board : callable
+        Gives the board with state and history.
+    notify : callable
+        Shows a message in this tab: title, text, colour. For the worker.
     """
 
     gui: GuiApi
     changed: Callable[[], None]
     post: Callable[[Update], None]
+    act: Callable[[Callable[[], None]], None]
+    board: Callable[[], Board]
+    notify: Callable[[str, str, str], None]
 
 
 class Panel(Protocol):
@@ -44,4 +55,13 @@ class Panel(Protocol):
 
     def show(self, frame: Frame) -> None:
         """Make the widgets show a frame."""
+        ...
+
+
+@runtime_checkable
+class Settling(Protocol):
+    """A panel with something slow that follows when changes pause."""
+
+    def settle(self, frame: Frame) -> None:
+        """Bring charts up to date; some tens of milliseconds at most."""
         ...

@@ -55,7 +55,7 @@ class ErrorsPanel:
         gui = self._desk.gui
         for part in self._parts:
             part.remove()
-        self._scene, self._bound, self._parts = state.scene, {}, []
+        self._scene, self._bound, self._parts = state.origin, {}, []
         rows = sorted(map(parameter, state.amplitudes), key=_by_axis)
         for axis, members in groupby(rows, key=lambda row: row.axis):
             own = list(members)
@@ -97,7 +97,7 @@ class ErrorsPanel:
     def show(self, frame: Frame) -> None:
         """Put the sliders where the state has them."""
         state = frame.state
-        if state.scene is not self._scene:
+        if state.origin is not self._scene:
             self._build(state)
         for key, bound in self._bound.items():
             bound.show(state.amplitudes[key])

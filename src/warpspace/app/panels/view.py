@@ -63,7 +63,7 @@ class ViewPanel:
             gui.add_dropdown(
                 "Scene",
                 tuple(scenes),
-                initial_value=self._titles[id(state.scene)],
+                initial_value=self._titles.get(id(state.origin), state.origin.title),
                 hint="Machine and error set. Changes made to the errors are lost.",
             ),
             changed,
@@ -157,7 +157,7 @@ class ViewPanel:
     def _add_positions(self, state: AppState) -> None:
         """Add a folder with a slider per rotary axis of the scene's machine."""
         gui = self._desk.gui
-        self._built_for = state.scene
+        self._built_for = state.origin
         with self._home:
             self._folder: Any = gui.add_folder("Rotary positions", visible=bool(state.positions))
         self._positions: dict[str, Bound[float]] = {}
@@ -204,10 +204,10 @@ class ViewPanel:
     def show(self, frame: Frame) -> None:
         """Make the widgets show the state."""
         state = frame.state
-        if state.scene is not self._built_for:
+        if state.origin is not self._built_for:
             self._folder.remove()
             self._add_positions(state)
-        self._scene.show(self._titles[id(state.scene)])
+        self._scene.show(self._titles.get(id(state.origin), state.origin.title))
         self._factor.show(float(f"{frame.exaggeration:.4g}"))
         self._log.show(round(math.log10(frame.exaggeration), 2))
         self._component.show(self._components.text(state.component))

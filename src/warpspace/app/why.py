@@ -1,0 +1,197 @@
+"""Why a point is where it is: which point a click means, and what its error is made of."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from warpspace.analysis.explain import Explanation, explain
+from warpspace.app.edits import axis_span
+from warpspace.app.live import Frame
+from warpspace.app.state import AppState
+from warpspace.geometry.deform import deform
+from warpspace.geometry.pick import pick_point, pick_surface
+from warpspace.kinematics import transforms
+from warpspace.kinematics.chain import branch_pose, nominal_point
+from warpspace.kinematics.model import Loop
+from warpspace.machine.description import Vector
+from warpspace.machine.errors import Constant, ErrorSet
+from warpspace.machine.parameters import LINEAR_AXES
+from warpspace.units import Array
+
+TOLERANCE_RAD = 0.0032
+"""How far a click may pass a trace: about seven pixels of the usual view."""
+BETWEEN = 5
+"""Places looked at between two samples of a trace: one degree apart."""
+REACH_MM = 1e7
+"""Rays from farther away than this come from no camera."""
+
+
+@dataclass(frozen=True, slots=True)
+class Picked:
+    """A point somebody asks about; it stays where the axes stand while errors change.
+
+    Attributes
+    ----------
+    at : mapping of str to float, mm or degrees
+        Axis positions: those of the linear axes for a point of the surface (the rotary ones stand
+        where the state has them), those of all axes for a point of a trace.
+    loop : Loop or None
+        Loop of a trace; None for a point of the surface, which follows the loop of the view.
+    point_mm : tuple of float, (3,), mm, or None
+        The traced point in the workpiece (or tool) frame; None for the surface.
+    """
+
+    at: Mapping[str, float]
+    loop: Loop | None = None
+    point_mm: Vector | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """A picked point explained, as it is drawn.
+
+    Attributes
+    ----------
+    at : mapping of str to float, mm or degrees
+        Positions of all axes.
+    loop : Loop
+    explanation : Explanation
+    drawn_mm : ndarray, [3], mm
+        Where the displaced point is drawn.
+    """
+
+    at: Mapping[str, float]
+    loop: Loop
+    explanation: Explanation
+    drawn_mm: Array
+
+
+def pick(frame: Frame, origin_mm: Array, direction: Array) -> Picked | None:
+    """Find the point of a drawn trace or surface that a click means.
+
+    Parameters
+    ----------
+    frame : Frame
+    origin_mm, direction : ndarray, [3]
+        The ray from the eye; anything, since it comes from a browser.
+
+    Returns
+    -------
+    Picked or None
+        None where it meets nothing. A trace in front of the surface comes before it.
+    """
+    ray = np.concatenate([np.ravel(origin_mm), np.ravel(direction)]).astype(float)
+    if ray.shape != (6,) or not np.isfinite(ray).all() or np.abs(ray).max() > REACH_MM:
+        return None
+    length = float(np.linalg.norm(ray[3:]))
+    if length == 0.0:
+        return None
+    origin, unit = ray[:3], ray[3:] / length
+    surface = _on_surface(frame, origin, unit)
+    trace = _on_trace(frame, origin, unit) if frame.state.shown.traces else None
+    if trace is not None and (surface is None or trace[1] <= surface[1]):
+        return trace[0]
+    return None if surface is None else surface[0]
+
+
+def _on_surface(frame: Frame, origin: Array, unit: Array) -> tuple[Picked, float] | None:
+    """Intersect the drawn surface; give the point and its distance, mm."""
+    surface = frame.topology.surface
+    points = frame.drawn_mm.reshape(-1, 3)
+    hit = pick_surface(origin, unit, points[surface.nodes], surface.triangles)
+    if hit is None:
+        return None
+    nodes = surface.nodes[hit.vertices]
+    return _between_nodes(frame, nodes, hit.weights), hit.distance
+
+
+def _between_nodes(frame: Frame, nodes: Array, weights: Array) -> Picked:
+    """Interpolate the axis positions of flat grid nodes."""
+    shape = frame.grid.shape
+    at = {
+        name: float(np.broadcast_to(values, shape).reshape(-1)[nodes] @ weights)
+        for name, values in frame.grid.coordinates.items()
+        if name in LINEAR_AXES
+    }
+    return Picked(at)
+
+
+def _on_trace(frame: Frame, origin: Array, unit: Array) -> tuple[Picked, float] | None:
+    """Find the nearest of the drawn traces; give the point and its distance, mm."""
+    best: tuple[Picked, float] | None = None
+    for lines in frame.traces:
+        shape = lines.actual_mm.shape[:2]
+        dense = _denser(lines.actual_mm)
+        found = pick_point(origin, unit, dense.reshape(-1, 3), TOLERANCE_RAD)
+        if found is None or (best is not None and best[1] <= found[1]):
+            continue
+        number, sample = divmod(found[0], dense.shape[1])
+        trace = lines.group.traces[number]
+        at = {
+            name: float(_denser(np.broadcast_to(values, shape)[..., None])[number, sample, 0])
+            for name, values in lines.group.coordinates.items()
+        }
+        best = Picked(at, lines.group.loop, trace.point_mm), found[1]
+    return best
+
+
+def _denser(samples: Array) -> Array:
+    """Put `BETWEEN` steps between two samples, [T, n, d] → [T, (n−1)·BETWEEN + 1, d]."""
+    count = samples.shape[1]
+    place = np.linspace(0.0, count - 1.0, (count - 1) * BETWEEN + 1)
+    first = np.minimum(place.astype(int), count - 2)
+    part = (place - first)[:, None]
+    return samples[:, first] * (1.0 - part) + samples[:, first + 1] * part
+
+
+def heard_errors(state: AppState) -> ErrorSet:
+    """Give the error set with the amplitudes that count in a state."""
+    functions = state.scene.errors.functions
+    return ErrorSet(
+        {
+            key: (functions.get(key) or Constant(axis_span(state, key))).with_amplitude(value)
+            for key, value in state.heard.items()
+            if value != 0.0
+        }
+    )
+
+
+def answer(state: AppState, picked: Picked, exaggeration: float) -> Answer:
+    """Explain the error of a picked point.
+
+    Parameters
+    ----------
+    state : AppState
+    picked : Picked
+    exaggeration : float
+        Display factor in force.
+
+    Returns
+    -------
+    Answer
+    """
+    model = state.scene.model
+    stands = {**state.scene.workspace.positions, **state.positions, **picked.at}
+    at = {name: stands.get(name, 0.0) for name in model.machine.axes}
+    coordinates = {name: np.asarray(value) for name, value in at.items()}
+    loop = picked.loop or state.loop
+    if picked.point_mm is None:
+        point = nominal_point(model, Loop.TOOL, coordinates)
+    else:
+        side = "workpiece" if loop is Loop.WORKPIECE else "tool"
+        pose = branch_pose(model, side, coordinates)
+        point = transforms.apply(pose, np.asarray(picked.point_mm))
+    found = explain(model, heard_errors(state), coordinates, state.scene.view(loop), point)
+    return Answer(at, loop, found, deform(found.nominal_mm, found.error_um, exaggeration))
+
+
+def with_picked(state: AppState, picked: Picked | None) -> AppState:
+    """Ask about a point, or about none; the chosen contribution stays while there is a point."""
+    return replace(state, picked=picked, lever=state.lever if picked else "")
+
+
+def with_lever(state: AppState, key: str) -> AppState:
+    """Choose the contribution whose axis and lever are drawn; the same one again ends it."""
+    known = key in state.amplitudes
+    return replace(state, lever="" if not known or key == state.lever else key)
