@@ -7,8 +7,9 @@ from operator import index as whole_number
 import numpy as np
 
 from warpspace.exceptions import OptionError
-from warpspace.kinematics.chain import nominal_point
-from warpspace.kinematics.model import Loop, Model
+from warpspace.kinematics import transforms
+from warpspace.kinematics.chain import branch_pose, nominal_point
+from warpspace.kinematics.model import Coordinates, Loop, Model
 from warpspace.machine.parameters import LINEAR_AXES
 from warpspace.units import Array
 
@@ -49,12 +50,17 @@ class Grid:
     shape : tuple of int, (3,)
         Nodes along x, y and z of the volume.
     nominal_mm : ndarray, [nx, ny, nz, 3], mm
-        Nominal tool point in R at each node.
+        Where each node is drawn: the nominal tool point as the workpiece sees it, in R while the
+        linear axes that carry the workpiece stand in the middle of their ranges.
+    point_mm : ndarray, [nx, ny, nz, 3], mm
+        Nominal tool point in R at each node, where its error is evaluated. The same as
+        `nominal_mm` on a machine whose linear axes all carry the tool.
     """
 
     coordinates: dict[str, Array]
     shape: tuple[int, int, int]
     nominal_mm: Array
+    point_mm: Array
 
     @property
     def extent_mm(self) -> Array:
@@ -135,5 +141,19 @@ def build_grid(
         along[index] = counts[index]
         coordinates[name] = np.linspace(low, high, counts[index]).reshape(along)
     full = (shape[0], shape[1], shape[2])
-    nominal = nominal_point(model, Loop.TOOL, coordinates)
-    return Grid(coordinates, full, np.broadcast_to(nominal, (*full, 3)).copy())
+    point = np.broadcast_to(nominal_point(model, Loop.TOOL, coordinates), (*full, 3)).copy()
+    return Grid(
+        coordinates, full, _seen_from_workpiece(model, coordinates, positions, point), point
+    )
+
+
+def _seen_from_workpiece(
+    model: Model, coordinates: Coordinates, middle: Mapping[str, float], point_mm: Array
+) -> Array:
+    """Move points with the linear axes of the workpiece back to the middle of their ranges."""
+    carrying = [axis.name for axis in model.machine.branch("workpiece") if axis.is_linear]
+    if not carrying:
+        return point_mm
+    home = {**coordinates, **{name: np.asarray(middle.get(name, 0.0)) for name in carrying}}
+    there = transforms.inverse(branch_pose(model, "workpiece", coordinates))
+    return transforms.apply(branch_pose(model, "workpiece", home) @ there, point_mm)

@@ -1,7 +1,7 @@
 """The whole flow in one screenful: scene → coordinates → basis or exact chain → field → numbers."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -92,7 +92,8 @@ def evaluate(
         _check_magnitude(scene, given)
         return solve(scene.model, scene.errors, given, view)
     nodes = build_grid(scene.model, scene.workspace, DEFAULT_NODES if grid is None else grid)
-    return solve(scene.model, scene.errors, nodes.coordinates, view, nodes.nominal_mm)
+    field = solve(scene.model, scene.errors, nodes.coordinates, view, nodes.point_mm)
+    return replace(field, nominal_mm=nodes.nominal_mm)
 
 
 def _check_magnitude(scene: Scene, coordinates: Coordinates) -> None:
@@ -136,14 +137,15 @@ def grid_basis(scene: Scene, grid: Grid, view: View | None = None) -> ErrorBasis
     -------
     ErrorBasis
     """
-    return build_basis(
+    basis = build_basis(
         scene.model,
         scene.errors,
         scene.parameter_keys,
         grid.coordinates,
         view or scene.view(),
-        grid.nominal_mm,
+        grid.point_mm,
     )
+    return replace(basis, nominal_mm=grid.nominal_mm)
 
 
 def evaluate_picture(
@@ -164,9 +166,7 @@ def evaluate_picture(
     """
     view = choose_view(scene, loop)
     nodes = build_grid(scene.model, scene.workspace, grid)
-    field = evaluate_first_order(
-        scene.model, scene.errors, nodes.coordinates, view, nodes.nominal_mm
-    )
+    field = evaluate(scene, grid=grid, loop=loop)
     return ScenePicture(scene, nodes, field, statistics(field), view)
 
 

@@ -43,6 +43,25 @@ def test_machine_of_rotary_axes_only_has_one_node() -> None:
     assert grid.longest_edge_mm == 0.0
 
 
+@pytest.mark.parametrize("chain", ["wXYFZt", "wYFXZt", "wXYZFt", "wCXFYZt", "wXCFYZt", "wFXYZt"])
+def test_volume_keeps_its_shape_whichever_side_its_axes_are_on(chain: str) -> None:
+    model = Model(build_machine(chain, direction=dict.fromkeys(chain[1 : chain.index("F")], -1)))
+    grid = build_grid(model, VOLUME.moved({"C": 0.0}), 3)
+    assert grid.extent_mm.tolist() == [20.0, 30.0, 100.0]
+    along_x = grid.nominal_mm[2, 0, 0] - grid.nominal_mm[0, 0, 0]
+    assert along_x.tolist() == [20.0, 0.0, 0.0]
+    tool_side = [axis for axis in "XYZ" if axis in model.machine.chain.tool]
+    moved = np.ptp(grid.point_mm.reshape(-1, 3), axis=0)
+    assert [axis for axis, length in zip("XYZ", moved, strict=True) if length] == tool_side
+
+
+def test_volume_on_a_turned_table_turns_with_it() -> None:
+    model = Model(build_machine("wXCFYZt"))
+    grid = build_grid(model, VOLUME, 2)
+    edge = grid.nominal_mm[1, 0, 0] - grid.nominal_mm[0, 0, 0]
+    np.testing.assert_allclose(edge, [0.0, -20.0, 0.0], atol=1e-12)
+
+
 def test_positions_are_the_middles_and_moving_leaves_the_original_alone() -> None:
     assert VOLUME.positions == {"X": 0.0, "Y": 15.0, "Z": 0.0, "C": 90.0}
     moved = VOLUME.moved({"C": 0.0})

@@ -26,6 +26,16 @@ def test_points_and_grid_agree_where_they_meet() -> None:
     np.testing.assert_allclose(grid.nominal_mm[2, 2, 2], corner.nominal_mm, atol=1e-10)
 
 
+@pytest.mark.parametrize("exact", [False, True])
+def test_error_of_a_moving_workpiece_is_evaluated_where_the_tool_is(exact: bool) -> None:
+    text = '[machine]\nchain = "wXFYZt"\n[errors]\nECX = 10\nEAY = { ramp = 5 }\n'
+    scene = parse_scene(text, "table")
+    field = evaluate(scene, grid=3, loop="relative", exact=exact)
+    assert np.ptp(field.nominal_mm.reshape(-1, 3), axis=0).tolist() == [500.0, 500.0, 500.0]
+    node = evaluate(scene, at={"X": -250, "Y": 250, "Z": 0}, loop="relative", exact=exact)
+    np.testing.assert_allclose(field.error_um[0, 2, 1], node.error_um, atol=1e-10)
+
+
 def test_batch_of_points_keeps_its_shape() -> None:
     field = evaluate(FIRST, at={"X": np.zeros((4, 1)), "Y": np.zeros(5)})
     assert field.error_um.shape == (4, 5, 3)
