@@ -1,0 +1,1 @@
+"""One module a figure; `warpspace.outputs.figures.catalogue` lists them."""

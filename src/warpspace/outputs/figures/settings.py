@@ -1,0 +1,125 @@
+"""What a figure is asked for."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from warpspace.exceptions import OptionError
+from warpspace.geometry.colour import COMPONENTS
+from warpspace.geometry.deform import MAX_EXAGGERATION, auto_exaggeration
+from warpspace.outputs.projection import VIEWS
+from warpspace.outputs.style import DARK, LIGHT, Theme
+from warpspace.scene.pipeline import ScenePicture
+
+SMALLEST_SIZE = (400, 300)
+LARGEST_SIDE = 12_000
+LARGEST_AREA = 64_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class FigureSettings:
+    """Options of a figure.
+
+    Attributes
+    ----------
+    component : str
+        "norm", "x", "y" or "z".
+    exaggeration : float or None
+        Display factor of displacements; None takes the scene's, or chooses a round one.
+    view : str
+        "iso", "front", "right" or "top".
+    size : tuple of int, (2,), px
+        Width and height; vector formats take 100 px for an inch.
+    dark : bool
+        Light ink on a dark ground.
+    loop : str
+        "tool", "workpiece" or "relative".
+    grid : int
+        Nodes per axis of the working volume.
+
+    Raises
+    ------
+    OptionError
+        If a value cannot be drawn with.
+    """
+
+    component: str = "norm"
+    exaggeration: float | None = None
+    view: str = "iso"
+    size: tuple[int, int] = (1600, 1200)
+    dark: bool = False
+    loop: str = "tool"
+    grid: int = 21
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        if self.component not in COMPONENTS:
+            expected = ", ".join(COMPONENTS)
+            raise OptionError(f"component {self.component!r}; expected one of {expected}")
+        if self.view not in VIEWS:
+            raise OptionError(f"view {self.view!r}; expected one of {', '.join(VIEWS)}")
+        if self.exaggeration is not None and not 0.0 < self.exaggeration <= MAX_EXAGGERATION:
+            raise OptionError(
+                f"exaggeration {self.exaggeration:g}; expected a number above 0, at most"
+                f" {MAX_EXAGGERATION:g}, or auto"
+            )
+        check_size(self.size)
+
+    @property
+    def theme(self) -> Theme:
+        """Colours of paper and ink."""
+        return DARK if self.dark else LIGHT
+
+
+def check_size(size: tuple[int, int]) -> None:
+    """Refuse sizes that cannot be drawn.
+
+    Raises
+    ------
+    OptionError
+        With the limits.
+    """
+    width, height = size
+    small = width < SMALLEST_SIZE[0] or height < SMALLEST_SIZE[1]
+    if small or max(size) > LARGEST_SIDE or width * height > LARGEST_AREA:
+        raise OptionError(
+            f"size {width}x{height}; expected {SMALLEST_SIZE[0]}x{SMALLEST_SIZE[1]} to"
+            f" {LARGEST_SIDE} px a side and {LARGEST_AREA // 1_000_000} million px in all,"
+            " for instance 1600x1200"
+        )
+
+
+def choose_exaggeration(settings: FigureSettings, *pictures: ScenePicture) -> float:
+    """Choose the display factor that pictures share.
+
+    Parameters
+    ----------
+    settings : FigureSettings
+    *pictures : ScenePicture
+
+    Returns
+    -------
+    float
+        The one asked for, else the first scene's, else a round one for the largest displacement.
+    """
+    if settings.exaggeration is not None:
+        return settings.exaggeration
+    given = pictures[0].scene.exaggeration
+    if given is not None:
+        return given
+    largest = max(picture.statistics.max_um for picture in pictures)
+    return auto_exaggeration(largest, max(picture.grid.longest_edge_mm for picture in pictures))
+
+
+def spell_settings(settings: FigureSettings, exaggeration: float, **more: Any) -> str:
+    """Spell the settings for metadata, ``key=value`` with commas between."""
+    values = {
+        "component": settings.component,
+        "view": settings.view,
+        "loop": settings.loop,
+        "grid": settings.grid,
+        "exaggeration": f"{exaggeration:.10g}",
+        "size": f"{settings.size[0]}x{settings.size[1]}",
+        "theme": settings.theme.name,
+        **more,
+    }
+    return ", ".join(f"{key}={value}" for key, value in values.items())

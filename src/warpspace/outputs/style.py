@@ -1,0 +1,135 @@
+"""The one look of all figures: colours of the paper and the ink, sizes of text and lines.
+
+Colour on a body means error and comes from `warpspace.geometry.colour`; everything here is quiet.
+Sizes are pixels of a 1600 × 1200 figure; a figure of another size multiplies them by its factor.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+REFERENCE_SIZE: Final = (1600, 1200)
+FONT: Final = "DejaVu Sans"
+SMALLEST_FACTOR: Final = 0.5
+"""Text never gets smaller than this share of its size in a 1600 × 1200 figure."""
+
+
+@dataclass(frozen=True, slots=True)
+class Theme:
+    """Colours of a figure.
+
+    Attributes
+    ----------
+    name : str
+    paper, ink, muted, faint : str
+        Background, main text, secondary text, hair lines.
+    accent : str
+        Displacements: arrows, their labels and the error scale bar.
+    ghost : str
+        The nominal volume.
+    grid, isoline : str
+        Lines on the coloured surface.
+    band : str
+        Tolerance bands.
+    series : tuple of str
+        Curves and bars.
+    body, body_dark, body_light : str
+        Machine bodies.
+    """
+
+    name: str
+    paper: str
+    ink: str
+    muted: str
+    faint: str
+    accent: str
+    ghost: str
+    grid: str
+    isoline: str
+    band: str
+    series: tuple[str, ...]
+    body: str
+    body_dark: str
+    body_light: str
+
+
+LIGHT = Theme(
+    name="light",
+    paper="#ffffff",
+    ink="#17202b",
+    muted="#55637a",
+    faint="#d5dae1",
+    accent="#c8283c",
+    ghost="#8b95a5",
+    grid="#0f1722",
+    isoline="#ffffff",
+    band="#dfe6ee",
+    series=("#1f6fb2", "#c8283c", "#2f8f5b", "#8a5fb0", "#c77f1a", "#4c5b6b"),
+    body="#b9bdc4",
+    body_dark="#3a4350",
+    body_light="#d3d6db",
+)
+DARK = Theme(
+    name="dark",
+    paper="#12161c",
+    ink="#eef1f5",
+    muted="#a3afbf",
+    faint="#38424f",
+    accent="#ff6b78",
+    ghost="#98a4b5",
+    grid="#0b0f15",
+    isoline="#ffffff",
+    band="#263140",
+    series=("#62b0ee", "#ff6b78", "#63c590", "#bb95dd", "#e8ab55", "#a9b5c3"),
+    body="#848b95",
+    body_dark="#3f4854",
+    body_light="#a5abb4",
+)
+THEMES = {theme.name: theme for theme in (LIGHT, DARK)}
+
+
+@dataclass(frozen=True, slots=True)
+class Sizes:
+    """Sizes of text and lines, px of a 1600 × 1200 figure."""
+
+    title: float = 34.0
+    subtitle: float = 17.0
+    heading: float = 18.0
+    text: float = 16.0
+    small: float = 14.0
+    margin: float = 52.0
+    panel: float = 258.0
+    hair: float = 0.9
+    thin: float = 1.2
+    line: float = 1.9
+    bold: float = 2.6
+
+
+SIZES: Final = Sizes()
+
+SAVE_RC: Any = {
+    "font.family": "sans-serif",
+    "font.sans-serif": [FONT],
+    "svg.hashsalt": "warpspace",
+    "svg.fonttype": "path",
+    "pdf.fonttype": 42,
+    "pdf.compression": 6,
+    "path.simplify": False,
+    "agg.path.chunksize": 0,
+}
+"""Settings of matplotlib under which figures are drawn and saved: the same bytes every time."""
+
+
+def factor(width: int, height: int) -> float:
+    """Choose the factor on text and lines for a figure of another size.
+
+    Parameters
+    ----------
+    width, height : int, px
+
+    Returns
+    -------
+    float
+        1 for 1600 × 1200; larger figures grow in proportion, smaller ones shrink less than that.
+    """
+    ratio = min(width / REFERENCE_SIZE[0], height / REFERENCE_SIZE[1])
+    return ratio if ratio >= 1.0 else max(ratio**0.85, SMALLEST_FACTOR)

@@ -1,0 +1,46 @@
+"""Numbers and text as figures spell them."""
+
+import math
+from collections.abc import Sequence
+
+MINUS = "\N{MINUS SIGN}"
+TIMES = "\N{MULTIPLICATION SIGN}"
+
+
+def spell(value: float, digits: int = 3) -> str:
+    """Spell a number with a few significant digits, never in powers of ten where that is avoidable.
+
+    Parameters
+    ----------
+    value : float
+    digits : int, optional
+        Significant digits of a fraction; whole digits are all kept.
+
+    Returns
+    -------
+    str
+        With a true minus sign, for instance ``−43.7``, ``1230`` or ``0.00412``.
+    """
+    if value == 0.0 or not math.isfinite(value):
+        return "0" if value == 0.0 else str(value)
+    size = math.floor(math.log10(abs(value)))
+    if size >= 7 or size < -5:
+        text = f"{value:.{digits - 1}e}"
+    else:
+        text = f"{value:.{max(0, digits - 1 - size)}f}"
+    return text.replace("-", MINUS)
+
+
+def spell_short(value: float) -> str:
+    """Spell a number without trailing zeros, with a true minus sign."""
+    return f"{value:.6g}".replace("-", MINUS)
+
+
+def spell_point(point: Sequence[float]) -> str:
+    """Spell a point in whole millimetres (tenths where they matter)."""
+    return "(" + ", ".join(f"{value + 0.0:.4g}".replace("-", MINUS) for value in point) + ")"
+
+
+def spell_factor(value: float) -> str:
+    """Spell an exaggeration, for instance ``×1000``."""
+    return f"{TIMES}{value:.6g}" if value < 1e6 else f"{TIMES}{value:,.0f}".replace(",", " ")

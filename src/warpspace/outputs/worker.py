@@ -1,0 +1,159 @@
+"""Figures drawn in a process of their own: a crash of the renderer loses that figure only."""
+
+import subprocess
+import sys
+import threading
+from collections.abc import Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context
+
+from warpspace.exceptions import RenderError
+from warpspace.outputs.figures.settings import FigureSettings
+from warpspace.scene.model import Scene
+
+PICTURES_PER_PROCESS = 100
+"""A process is replaced after so many figures."""
+TIMEOUT_S = 300.0
+PROBE_TIMEOUT_S = 60.0
+PACKAGES = "libegl1 libgl1-mesa-dri"
+_PROBE = """
+import os, sys
+if sys.platform == "linux":
+    os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+import vtkmodules.vtkRenderingOpenGL2
+from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
+window = vtkRenderWindow()
+window.SetOffScreenRendering(True)
+window.AddRenderer(vtkRenderer())
+window.Render()
+sys.exit(0 if window.SupportsOpenGL() else 3)
+"""
+
+
+def probe_renderer() -> str:
+    """Try to draw off screen in a process of its own, since a system without OpenGL may end it.
+
+    Returns
+    -------
+    str
+        Empty where it works, else what is wrong and which packages to install.
+    """
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", _PROBE],
+            capture_output=True,
+            timeout=PROBE_TIMEOUT_S,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return f"VTK hangs when it draws off screen. {_advice()}"
+    if done.returncode == 0:
+        return ""
+    lines = done.stderr.decode(errors="replace").strip().splitlines()
+    return f"VTK cannot draw off screen here. {_advice()}" + (f" ({lines[-1]})" if lines else "")
+
+
+def _advice() -> str:
+    """Say what to install."""
+    if sys.platform == "linux":
+        return f"Install the Debian packages {PACKAGES} (apt-get install {PACKAGES})."
+    return "Check the OpenGL driver."
+
+
+def _draw(name: str, scenes: Sequence[Scene], settings: FigureSettings, form: str) -> bytes:
+    """Draw one figure; runs in the process of the renderer."""
+    from warpspace.outputs.save import render_figure
+
+    return render_figure(name, scenes, settings, form)
+
+
+class FigureWorker:
+    """One renderer in a process of its own; requests from any thread queue up.
+
+    Parameters
+    ----------
+    timeout_s : float, optional
+        How long one figure may take.
+    """
+
+    def __init__(self, timeout_s: float = TIMEOUT_S) -> None:
+        self._timeout_s = timeout_s
+        self._lock = threading.Lock()
+        self._pool: ProcessPoolExecutor | None = None
+
+    def render(
+        self,
+        name: str,
+        scenes: Sequence[Scene],
+        settings: FigureSettings | None = None,
+        form: str = "png",
+    ) -> bytes:
+        """Draw a figure and wait for it.
+
+        Parameters
+        ----------
+        name : str
+            Name of the figure, see `warpspace.outputs.figures.catalogue`.
+        scenes : sequence of Scene
+        settings : FigureSettings, optional
+        form : str, optional
+            "png", "svg" or "pdf".
+
+        Returns
+        -------
+        bytes
+            The file's content.
+
+        Raises
+        ------
+        RenderError
+            If the renderer crashed or took too long; the next figure gets a new one.
+        WarpspaceError
+            Whatever drawing it in this process would have raised.
+        """
+        try:
+            future = self._submit(name, tuple(scenes), settings or FigureSettings(), form)
+            return future.result(self._timeout_s)
+        except BrokenProcessPool:
+            self.close(wait=False)
+            problem = probe_renderer()
+            raise RenderError(
+                f"figure {name!r} could not be drawn: "
+                + (problem or "the renderer crashed; other figures are not affected")
+            ) from None
+        except TimeoutError:
+            self.close(wait=False)
+            raise RenderError(
+                f"figure {name!r} was given up after {self._timeout_s:g} s; try a smaller one"
+            ) from None
+
+    def _submit(
+        self, name: str, scenes: Sequence[Scene], settings: FigureSettings, form: str
+    ) -> "Future[bytes]":
+        """Hand a request to the process; start one where there is none."""
+        with self._lock:
+            if self._pool is None:
+                self._pool = ProcessPoolExecutor(
+                    1, get_context("spawn"), max_tasks_per_child=PICTURES_PER_PROCESS
+                )
+            return self._pool.submit(_draw, name, scenes, settings, form)
+
+    def close(self, *, wait: bool = True) -> None:
+        """End the process; the next request starts a new one."""
+        with self._lock:
+            pool, self._pool = self._pool, None
+        if pool is None:
+            return
+        if not wait:
+            for process in list((pool._processes or {}).values()):  # noqa: SLF001 - no public way
+                process.kill()
+        pool.shutdown(wait=wait, cancel_futures=True)
+
+    def __enter__(self) -> "FigureWorker":
+        """Use the worker in a with statement."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End the process."""
+        self.close()

@@ -1,0 +1,143 @@
+"""Reading a figure back: from pixels to numbers, with a ruler and the colour bar."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from warpspace.geometry.colour import ColourScale, colour_table
+from warpspace.geometry.faces import crease_lines
+from warpspace.geometry.surfaces import Surface, triangulate
+from warpspace.outputs.figures.content import DrawnMap
+from warpspace.outputs.figures.map3d import map_faces
+from warpspace.outputs.render import Raster
+from warpspace.scene.pipeline import ScenePicture
+from warpspace.units import MM_PER_UM, Array
+
+SLOPE_TOLERANCE = 0.005
+DEPTH_TOLERANCE_MM = 1.0
+LEAST_FACING = 0.25
+"""Cosine between the viewer and the surface below which it is seen too much from the side."""
+EDGE_PX = 3.0
+"""Nodes nearer to an edge than this, px of the raster, are not read: two faces meet there."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What was read at the nodes that can be seen.
+
+    Attributes
+    ----------
+    read, known : ndarray, [n]
+        Values by colour and by the model.
+    depth_mm : ndarray, [n]
+        How far the drawn surface lies behind (+) or before the expected node.
+    """
+
+    read: Array
+    known: Array
+    depth_mm: Array
+
+    @property
+    def slope(self) -> float:
+        """Slope of what was read over what is known, through the centre of the points."""
+        known = self.known - self.known.mean()
+        return float((known @ (self.read - self.read.mean())) / (known @ known))
+
+    def agrees(self) -> bool:
+        """Whether colours and shape are those of the model."""
+        offset = abs(float((self.read - self.known).mean())) / float(np.ptp(self.known))
+        return (
+            abs(self.slope - 1.0) <= SLOPE_TOLERANCE
+            and offset <= SLOPE_TOLERANCE
+            and float(np.abs(self.depth_mm).max()) <= DEPTH_TOLERANCE_MM
+        )
+
+
+def invert_colours(rgb: Array, scale: ColourScale, diverging: bool | None = None) -> Array:
+    """Find the values of colours, by the nearest point on the polyline of the colour map."""
+    table = colour_table(diverging=scale.diverging if diverging is None else diverging).astype(
+        float
+    )
+    start, step = table[:-1], np.diff(table, axis=0)
+    length = np.maximum((step**2).sum(axis=-1), 1e-9)
+    along = np.clip(((rgb[:, None] - start) * step).sum(axis=-1) / length, 0.0, 1.0)
+    distance = ((start + along[..., None] * step - rgb[:, None]) ** 2).sum(axis=-1)
+    nearest = distance.argmin(axis=1)
+    share = (nearest + along[np.arange(len(rgb)), nearest]) / (len(table) - 1)
+    return scale.low + share * (scale.high - scale.low)
+
+
+def read_map(
+    drawn: DrawnMap,
+    truth: ScenePicture,
+    known: Array,
+    exaggeration: float,
+    view: str = "iso",
+    *,
+    diverging: bool | None = None,
+) -> Reading:
+    """Read a drawn map at the nodes that the model says are visible.
+
+    Parameters
+    ----------
+    drawn : DrawnMap
+        From the figure: only pixels, depth, projection and colour bar are used.
+    truth : ScenePicture
+        The model's numbers.
+    known : ndarray, [nx, ny, nz]
+        What the colour should show.
+    exaggeration : float
+        What the figure says.
+    view : str
+    diverging : bool, optional
+        Read with this kind of colour map instead of the figure's.
+    """
+    assert drawn.raster is not None
+    raster, projection = drawn.raster, drawn.projection
+    shape = known.shape
+    expected = (truth.grid.nominal_mm + exaggeration * MM_PER_UM * truth.field.error_um).reshape(
+        -1, 3
+    )
+    faces = map_faces(shape, view)
+    surface = triangulate(faces)
+    facing = np.zeros(len(expected), dtype=bool)
+    facing[surface.nodes] = _normals(expected, surface) @ projection.towards > LEAST_FACING
+    facing[np.concatenate(crease_lines(faces, shape))] = False
+    nodes = np.flatnonzero(facing)
+    spots, depth = projection.project(expected[nodes]), projection.depth_mm(expected[nodes])
+    # hidden behind another part of the body: judged by the drawn depth, loosely
+    seen = (raster.depth_at(spots) >= depth - 25.0) & _inside(raster, spots, projection.px_per_mm)
+    nodes, spots, depth = nodes[seen], spots[seen], depth[seen]
+    left, _, _, top = raster.rect
+    column = np.floor((spots[:, 0] - left) * raster.sampling).astype(int)
+    row = np.floor((top - spots[:, 1]) * raster.sampling).astype(int)
+    rgb = raster.rgba[row, column, :3].astype(float)
+    return Reading(
+        invert_colours(rgb, drawn.scale, diverging),
+        known.reshape(-1)[nodes],
+        raster.depth_at(spots) - depth,
+    )
+
+
+def _normals(points: Array, surface: Surface) -> Array:
+    """Unit normals at the vertices of a surface, [M, 3]."""
+    a, b, c = (points[surface.nodes[surface.triangles[:, k]]] for k in range(3))
+    flat = np.cross(b - a, c - a)
+    total = np.zeros((len(surface.nodes), 3))
+    for corner in range(3):
+        np.add.at(total, surface.triangles[:, corner], flat)
+    return total / np.linalg.norm(total, axis=-1, keepdims=True)
+
+
+def _inside(raster: Raster, spots: Array, px_per_mm: float) -> np.ndarray:
+    """Keep points whose surroundings are one smooth piece of surface."""
+    reach = EDGE_PX / raster.sampling
+    around = [
+        raster.depth_at(spots + np.array([dx, dy]))
+        for dx in (-reach, 0.0, reach)
+        for dy in (-reach, 0.0, reach)
+    ]
+    stacked = np.stack(around)
+    drawn = np.isfinite(stacked).all(axis=0)
+    steep = np.ptp(np.where(drawn, stacked, 0.0), axis=0)
+    return drawn & (steep < 4.0 * 2.0 * reach / px_per_mm)

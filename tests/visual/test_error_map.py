@@ -1,0 +1,134 @@
+"""Semantic tests of the error map: what is read off the picture is what the model says."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from visual.reading import Reading, read_map
+from warpspace import load_scene
+from warpspace.geometry.colour import component_values
+from warpspace.outputs.figures.catalogue import draw_figure
+from warpspace.outputs.figures.settings import FigureSettings
+from warpspace.scene.pipeline import ScenePicture, evaluate_picture
+
+pytestmark = [pytest.mark.render, pytest.mark.usefixtures("renderer")]
+SCENES = ("dvf5000_first", "dvf5000_second", "teach_squareness", "teach_pitching_axis")
+
+
+@pytest.fixture(scope="module")
+def truth() -> ScenePicture:
+    return evaluate_picture(load_scene("dvf5000_first"))
+
+
+def read(
+    picture: ScenePicture, settings: FigureSettings, *, exaggeration: float | None = None, **options
+) -> Reading:
+    scene = options.pop("drawn_scene", picture.scene)
+    drawn = draw_figure("error-map", [scene], settings).maps[0]
+    known = component_values(picture.field.error_um, settings.component)
+    factor = drawn.exaggeration if exaggeration is None else exaggeration
+    return read_map(drawn, picture, known, factor, settings.view, **options)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_colours_and_shape_are_the_models(name: str) -> None:
+    picture = evaluate_picture(load_scene(name))
+    reading = read(picture, FigureSettings())
+    assert len(reading.known) > 300
+    assert reading.slope == pytest.approx(1.0, abs=0.005)
+    assert np.abs(reading.depth_mm).max() < 1.0
+    assert reading.agrees()
+
+
+@pytest.mark.parametrize("view", ["iso", "front", "right", "top"])
+@pytest.mark.parametrize("component", ["norm", "x", "y", "z"])
+def test_every_view_and_component(truth: ScenePicture, view: str, component: str) -> None:
+    reading = read(truth, FigureSettings(component=component, view=view))
+    assert len(reading.known) > 60
+    if (view, component) == ("top", "x"):
+        # the face is nearly one colour: 26 of 256 levels are too few for a slope of half a percent
+        assert np.abs(reading.read - reading.known).max() < 1.2 * 30.0 / 255.0
+        assert np.abs(reading.depth_mm).max() < 1.0
+    else:
+        assert reading.agrees(), (reading.slope, np.abs(reading.depth_mm).max())
+
+
+@pytest.mark.parametrize("size", [(400, 300), (1000, 1600), (3200, 2400)])
+def test_every_size(truth: ScenePicture, size: tuple[int, int]) -> None:
+    reading = read(truth, FigureSettings(size=size))
+    assert abs(reading.slope - 1.0) < 0.01 if size[0] < 800 else reading.agrees()
+
+
+def scaled(scene, factor: float):
+    functions = {key: f.scaled(factor) for key, f in scene.errors.functions.items()}
+    return replace(scene, errors=replace(scene.errors, functions=functions))
+
+
+# Each of these draws something wrong on purpose; the test above must notice.
+
+
+@pytest.mark.parametrize("factor", [1.02, 0.98])
+def test_an_error_change_of_two_percent_is_noticed(truth: ScenePicture, factor: float) -> None:
+    reading = read(
+        truth,
+        FigureSettings(exaggeration=1000.0),
+        drawn_scene=scaled(truth.scene, factor),
+    )
+    assert reading.slope == pytest.approx(factor, abs=0.006)
+    assert not reading.agrees()
+
+
+@pytest.mark.parametrize("factor", [1.03, 0.97])
+def test_an_exaggeration_change_of_three_percent_is_noticed(
+    truth: ScenePicture, factor: float
+) -> None:
+    reading = read(truth, FigureSettings(exaggeration=1000.0 * factor), exaggeration=1000.0)
+    assert np.abs(reading.depth_mm).max() > 1.0
+    assert not reading.agrees()
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_flipped_axis_is_noticed(truth: ScenePicture, axis: int) -> None:
+    flipped = replace(
+        truth, field=replace(truth.field, error_um=np.flip(truth.field.error_um, axis=axis))
+    )
+    assert not read(flipped, FigureSettings()).agrees()
+
+
+def test_a_sign_change_of_an_axis_is_noticed(truth: ScenePicture) -> None:
+    mirrored = truth.field.error_um * np.array([1.0, -1.0, 1.0])
+    wrong = replace(truth, field=replace(truth.field, error_um=mirrored))
+    assert not read(wrong, FigureSettings()).agrees()
+
+
+@pytest.mark.parametrize("component", ["norm", "y"])
+def test_a_wrong_colour_map_is_noticed(truth: ScenePicture, component: str) -> None:
+    settings = FigureSettings(component=component)
+    assert not read(truth, settings, diverging=component == "norm").agrees()
+
+
+def test_a_wrong_scale_is_noticed(truth: ScenePicture) -> None:
+    drawn = draw_figure("error-map", [truth.scene], FigureSettings()).maps[0]
+    wrong = replace(drawn, scale=replace(drawn.scale, high=drawn.scale.high * 1.02))
+    reading = read_map(wrong, truth, truth.field.norm_um, drawn.exaggeration)
+    assert not reading.agrees()
+
+
+def test_the_png_holds_the_very_pixels(truth: ScenePicture) -> None:
+    """Where nothing is drawn over the body, the file has the renderer's colours."""
+    import io
+
+    from PIL import Image
+
+    from warpspace.outputs.save import figure_bytes
+
+    drawing = draw_figure("error-map", [truth.scene], FigureSettings())
+    drawn = drawing.maps[0]
+    pixels = np.asarray(Image.open(io.BytesIO(figure_bytes(drawing, "png"))))
+    left, bottom, right, top = (int(value) for value in drawn.raster.rect)
+    height = pixels.shape[0]
+    shown = pixels[height - top : height - bottom, left:right]
+    body = drawn.raster.reduced()
+    same = (shown == body[..., :3]).all(axis=-1) & (body[..., 3] == 255)
+    assert same.sum() > 0.55 * (body[..., 3] == 255).sum()
