@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from warpspace.app.emphasis import Emphasis
+from warpspace.app.look import Look, MachineLook, RotaryLook
 from warpspace.app.ranges import Span, amplitude_spans, position_spans
 from warpspace.app.specification import Specification
 from warpspace.geometry.colour import COMPONENTS
@@ -70,6 +71,12 @@ class AppState:
         What the tolerances are held against.
     loaded : Scene or None
         The scene as it was opened, where curves of `scene` have been edited since.
+    look : Look
+        What is shown of the field.
+    machine : MachineLook
+        The schematic machine.
+    rotary : RotaryLook
+        What is traced.
     notes : tuple of str
         What the latest change had to clamp.
     """
@@ -89,6 +96,9 @@ class AppState:
     tolerances: ToleranceSet = field(default_factory=ToleranceSet)
     specification: Specification = field(default_factory=Specification)
     loaded: Scene | None = None
+    look: Look = field(default_factory=Look)
+    machine: MachineLook = field(default_factory=MachineLook)
+    rotary: RotaryLook = field(default_factory=RotaryLook)
     notes: tuple[str, ...] = ()
 
     @property
@@ -149,16 +159,18 @@ class AppState:
         return replace(self, shown=replace(self.shown, **changes))
 
     def with_scene(self, scene: Scene) -> "AppState":
-        """Show another scene; component, density and switches stay."""
+        """Show another scene, in its own loop; component, density and switches stay."""
         fresh = start_state(scene)
         return replace(
             fresh,
             component=self.component,
-            loop=self.loop,
             nodes=self.nodes,
             shown=self.shown,
             exaggeration=fresh.exaggeration,
             specification=self.specification,
+            look=self.look,
+            machine=self.machine,
+            rotary=replace(self.rotary, off=frozenset()),
         )
 
     def reset(self, axis: str | None = None) -> "AppState":
@@ -231,6 +243,17 @@ def start_state(scene: Scene, **changes: Any) -> AppState:
         amplitude_spans(scene),
         ranges,
         scene.exaggeration,
+        loop=start_loop(scene),
         tolerances=scene.tolerances,
     )
     return replace(state, **changes)
+
+
+def start_loop(scene: Scene) -> Loop:
+    """Choose the loop a scene is first shown through.
+
+    The tool loop; the relative one where only axes that carry the workpiece have errors, since the
+    tool point then has none.
+    """
+    axes = {parameter(key).axis for key in scene.parameter_keys if scene.errors.amplitude(key)}
+    return Loop.RELATIVE if axes and axes.isdisjoint(scene.machine.chain.tool) else Loop.TOOL

@@ -74,6 +74,7 @@ def build_traces(
     points_mm: Sequence[Vector],
     positions: Mapping[str, float],
     samples: int = SAMPLES,
+    held: Mapping[str, Sequence[float]] | None = None,
 ) -> tuple[TraceGroup, ...]:
     """Lay the traces of points over every rotary axis of a machine.
 
@@ -87,6 +88,9 @@ def build_traces(
         the one before it: here, and 30° to either side within the travel.
     samples : int, optional
         Points along each trace.
+    held : mapping of str to sequence of float, degrees, optional
+        Positions at which a rotary axis is held while its neighbour turns, instead of those above;
+        so also the first axis can be turned at several positions of the one after it.
 
     Returns
     -------
@@ -102,7 +106,7 @@ def build_traces(
             trace
             for point in points_mm
             for axis in rotary
-            for trace in _traces_of(model, axis, rotary, point, positions)
+            for trace in _traces_of(model, axis, rotary, point, positions, held or {})
         ]
         groups.append(_group(model, side, loop, found, positions, samples))
     return tuple(groups)
@@ -114,12 +118,16 @@ def _traces_of(
     rotary: Sequence[str],
     point: Vector,
     positions: Mapping[str, float],
+    chosen: Mapping[str, Sequence[float]],
 ) -> list[Trace]:
     """Traces of one point over one axis: several where an axis before it tilts it."""
     low, high = model.machine.axes[axis].travel
     closed = high - low >= FULL_TURN_DEG
     held = {name: positions.get(name, 0.0) for name in rotary if name != axis}
-    before = rotary[: rotary.index(axis)]
+    before, after = rotary[: rotary.index(axis)], rotary[rotary.index(axis) + 1 :]
+    neighbour = before[-1] if before else (after[0] if after else "")
+    if chosen.get(neighbour):
+        return [Trace(axis, point, {**held, neighbour: at}, closed) for at in chosen[neighbour]]
     if not before:
         return [Trace(axis, point, held, closed)]
     tilting = before[-1]

@@ -1,0 +1,44 @@
+"""Results of slow functions, kept up to a number of bytes for all sessions together."""
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from typing import Generic, TypeVar
+
+T = TypeVar("T")
+
+
+class Kept(Generic[T]):
+    """The latest results of slow functions, up to a number of bytes, for all sessions together."""
+
+    def __init__(self, limit_bytes: int) -> None:
+        self._limit = limit_bytes
+        self._items: OrderedDict[Hashable, tuple[T, int]] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def get(self, key: Hashable, build: Callable[[], T], size: Callable[[T], int]) -> T:
+        """Give what belongs to a key, built when it is not there."""
+        with self._lock:
+            found = self._items.get(key)
+            if found is not None:
+                self._items.move_to_end(key)
+                return found[0]
+        value = build()
+        with self._lock:
+            self._items[key] = (value, size(value))
+            while len(self._items) > 1 and sum(n for _, n in self._items.values()) > self._limit:
+                self._items.popitem(last=False)
+        return value
+
+
+class Same:
+    """An object as part of a key, compared by identity (and held, so that its id stays its own)."""
+
+    def __init__(self, thing: object) -> None:
+        self.thing = thing
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Same) and other.thing is self.thing
+
+    def __hash__(self) -> int:
+        return id(self.thing)
