@@ -1,0 +1,111 @@
+"""Colours, files and camera that reach the browser."""
+
+import json
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from warpspace.app import legend
+from warpspace.app.camera import fit_camera
+from warpspace.app.glb import build_glb
+from warpspace.app.layers.axes import tick_values
+from warpspace.app.live import LiveModel
+from warpspace.app.state import start_state
+from warpspace.app.tonemap import (
+    inverse_tone_map,
+    line_colour,
+    linear_to_srgb,
+    srgb_to_linear,
+    tone_map,
+)
+from warpspace.geometry.colour import colour_table
+from warpspace.scene.library import load_scene, parse_scene
+
+
+@pytest.mark.parametrize("diverging", [False, True])
+def test_tone_map_turns_the_sent_colours_into_the_wanted_ones(diverging: bool) -> None:
+    wanted = colour_table(diverging=diverging)
+    arrived = linear_to_srgb(tone_map(inverse_tone_map(wanted).astype(float))) * 255.0
+    assert np.abs(arrived - wanted).max() < 0.6
+
+
+@given(st.tuples(*[st.integers(min_value=0, max_value=225)] * 3))
+def test_grey_and_dark_line_colours_arrive(rgb: tuple[int, int, int]) -> None:
+    grey = (max(rgb), max(rgb), max(rgb))
+    sent = srgb_to_linear(np.array(line_colour(grey)) / 255.0)
+    arrived = linear_to_srgb(tone_map(sent)) * 255.0
+    assert np.abs(arrived - np.array(grey)).max() < 4.0
+
+
+def test_glb_holds_what_was_given() -> None:
+    points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.5]])
+    colours = np.array([[0.0, 0.1, -0.2], [2.5, 0.0, 0.0], [0.0, 1.0, 0.0]], np.float32)
+    data = build_glb(points, np.array([[0, 1, 2]]), colours)
+    magic, version, length = struct.unpack_from("<4sII", data)
+    assert (magic, version, length) == (b"glTF", 2, len(data))
+    json_length = struct.unpack_from("<I", data, 12)[0]
+    document = json.loads(data[20 : 20 + json_length])
+    body = data[28 + json_length :]
+    assert len(body) % 4 == 0
+    np.testing.assert_array_equal(np.frombuffer(body, "<f4", 9).reshape(3, 3), points)
+    np.testing.assert_array_equal(np.frombuffer(body, "<f4", 9, 36).reshape(3, 3), colours)
+    assert list(np.frombuffer(body, "<u2", 3, 72)) == [0, 1, 2]
+    assert document["accessors"][0]["max"] == [1.0, 2.0, 0.5]
+    assert "KHR_materials_unlit" in document["extensionsUsed"]
+
+
+@given(
+    st.floats(min_value=0.3, max_value=4.0),
+    st.floats(min_value=0.0, max_value=0.3),
+    st.lists(st.tuples(*[st.floats(min_value=-500, max_value=500)] * 3), min_size=2, max_size=12),
+)
+def test_camera_sees_every_point_below_the_heading(
+    aspect: float, top: float, points: list[tuple[float, float, float]]
+) -> None:
+    spread = np.array([*points, (600.0, 0.0, 0.0), (-600.0, 0.0, 0.0)])
+    pose = fit_camera(spread, aspect, top=top)
+    back = pose.position - pose.look_at
+    back = back / np.linalg.norm(back)
+    right = np.cross((0, 0, 1), back)
+    right /= np.linalg.norm(right)
+    up = np.cross(back, right)
+    seen = spread - pose.position
+    depth = -(seen @ back)
+    half = np.tan(pose.fov_rad / 2)
+    assert (depth > 0).all()
+    x, y = seen @ right / depth / (half * aspect), seen @ up / depth / half
+    assert np.abs(x).max() <= 1.02
+    assert y.min() >= -1.02
+    assert y.max() <= 1.02 - 2 * top
+
+
+def test_ticks_are_round_and_inside() -> None:
+    assert tick_values(-275.0, 275.0) == [-200.0, -100.0, 0.0, 100.0, 200.0]
+    assert tick_values(5.0, 5.0) == [5.0]
+
+
+def test_legend_escapes_what_a_scene_file_says() -> None:
+    text = 'title = "<script>alert(1)</script>"\nmachine = "dvf5000"\n'
+    workspace = "[workspace]\nX = [0, 10]\nY = [0, 10]\nZ = [-20, -10]\nB = 0\nC = 0\n"
+    scene = parse_scene(text + workspace, "evil")
+    frame = LiveModel().frame(start_state(scene, nodes=3))
+    assert "<script>" not in legend.heading(frame)
+    assert "&lt;script&gt;" in legend.heading(frame)
+
+
+def test_legend_says_factor_units_numbers_and_place() -> None:
+    live = LiveModel()
+    frame = live.frame(start_state(load_scene("dvf5000_first")))
+    assert "displacement drawn ×1\u202f000" in legend.heading(frame)
+    summary = legend.summary(frame)
+    assert f"{frame.statistics.mean_um:.2f} µm" in summary
+    assert "X 275, Y −225, Z −51 mm" in summary
+    assert "|E| [µm]" in summary
+    assert "100 mm geometry" in summary
+    assert "100 µm error" in summary
+    true = live.frame(frame.state.with_exaggeration(1.0))
+    assert "true scale" in legend.heading(true)
+    assert "(auto)" not in legend.heading(true)

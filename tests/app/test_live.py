@@ -1,0 +1,125 @@
+"""From a state to a frame: the numbers of the model, and nothing computed twice."""
+
+import numpy as np
+import pytest
+
+from warpspace.app.layers.box import dashes, ghost_dashes
+from warpspace.app.layers.traces import apart, is_here, trace_colours
+from warpspace.app.live import Frame, Kept, LiveModel
+from warpspace.app.state import start_state
+from warpspace.field.evaluate import evaluate_first_order
+from warpspace.kinematics.model import Loop
+from warpspace.machine.errors import ErrorSet
+from warpspace.scene.library import load_scene
+from warpspace.scene.pipeline import evaluate
+
+SCENE = load_scene("dvf5000_first")
+STATE = start_state(SCENE)
+
+
+@pytest.fixture(scope="module")
+def live() -> LiveModel:
+    return LiveModel()
+
+
+@pytest.fixture(scope="module")
+def frame(live: LiveModel) -> Frame:
+    return live.frame(STATE)
+
+
+def test_field_is_that_of_the_scene(frame: Frame) -> None:
+    np.testing.assert_allclose(frame.field.error_um, evaluate(SCENE, grid=21).error_um, atol=1e-9)
+
+
+def test_moved_slider_gives_the_field_of_the_changed_set(live: LiveModel) -> None:
+    state = STATE.with_amplitude("EXX", 7.0).with_amplitude("EAY", 10.0).with_nodes(5)
+    changed: ErrorSet = SCENE.errors
+    for key, value in (("EXX", 7.0), ("EAY", 10.0)):
+        changed = changed.with_amplitude(key, value, (0.0, 1.0))
+    frame = live.frame(state)
+    wanted = evaluate_first_order(SCENE.model, changed, frame.grid.coordinates)
+    np.testing.assert_allclose(frame.field.error_um, wanted.error_um, atol=1e-9)
+
+
+def test_exaggeration_auto_number_and_true_scale(live: LiveModel, frame: Frame) -> None:
+    assert frame.exaggeration == 1000.0
+    for factor in (1.0, 250.0):
+        drawn = live.frame(STATE.with_exaggeration(factor))
+        shift = drawn.drawn_mm - drawn.grid.nominal_mm
+        np.testing.assert_allclose(shift, factor * 1e-3 * frame.field.error_um, atol=1e-9)
+
+
+def test_component_chooses_values_and_scale(live: LiveModel) -> None:
+    frame = live.frame(STATE.with_component("y"))
+    np.testing.assert_array_equal(frame.values, frame.field.error_um[..., 1])
+    assert frame.scale.diverging
+    assert frame.scale.high >= np.abs(frame.values).max()
+
+
+def test_response_is_kept_until_grid_place_or_loop_change(live: LiveModel) -> None:
+    kept = live.response(STATE)
+    assert live.response(STATE.with_amplitude("EXX", 3.0)) is kept
+    assert live.response(STATE.with_component("x")) is kept
+    for other in (
+        STATE.with_nodes(5),
+        STATE.with_position("B", -20.0),
+        STATE.with_loop("relative"),
+    ):
+        assert live.response(other) is not kept
+
+
+def test_rotary_positions_matter_in_the_relative_loop(live: LiveModel) -> None:
+    tilted = start_state(load_scene("teach_tilted_c")).with_nodes(3)
+    assert tilted.loop is Loop.RELATIVE
+    here = live.frame(tilted).field.error_um
+    there = live.frame(tilted.with_position("B", -90.0)).field.error_um
+    assert np.abs(here - there).max() > 1.0
+
+
+def test_scene_without_errors_is_drawn_where_it_is_nominal(live: LiveModel) -> None:
+    frame = live.frame(start_state(load_scene("dvf5000_nominal"), nodes=5))
+    assert frame.statistics.max_um == 0.0
+    np.testing.assert_array_equal(frame.drawn_mm, frame.grid.nominal_mm)
+
+
+def test_traces_are_displaced_by_the_workpiece_loop(live: LiveModel) -> None:
+    frame = live.frame(start_state(load_scene("teach_tilted_c"), nodes=3))
+    lines = frame.traces[0]
+    shift = np.linalg.norm(lines.actual_mm - lines.nominal_mm, axis=-1)
+    assert shift.max() > 1.0
+    assert len(apart(lines, 0.5)) > 100
+    assert len(apart(lines, 1e9)) == 0
+
+
+def test_traces_at_the_present_positions_are_dark(live: LiveModel) -> None:
+    frame = live.frame(STATE)
+    here = is_here(frame.traces[0].group, dict(STATE.positions))
+    assert here.any()
+    assert not here.all()
+    colours = trace_colours(frame)
+    assert colours.shape[1:] == (2, 3)
+    assert len(np.unique(colours.reshape(-1, 3), axis=0)) == 2
+
+
+def test_dashes_begin_and_end_at_the_corners(frame: Frame) -> None:
+    found = dashes(np.array([[[0.0, 0.0, 0.0], [100.0, 0.0, 0.0]]]), 12.0, 8.0)
+    assert found[0, 0, 0] == 0.0
+    assert found[-1, 1, 0] == pytest.approx(100.0)
+    assert (np.diff(found[..., 0].reshape(-1)) > 0.0).all()
+    drawn = ghost_dashes(frame).reshape(-1, 3)
+    nominal = frame.grid.nominal_mm.reshape(-1, 3)
+    np.testing.assert_allclose(drawn.min(axis=0), nominal.min(axis=0), atol=1e-3)
+    np.testing.assert_allclose(drawn.max(axis=0), nominal.max(axis=0), atol=1e-3)
+
+
+def test_kept_results_are_dropped_oldest_first() -> None:
+    kept: Kept[str] = Kept(10)
+    built: list[str] = []
+
+    def build(name: str) -> str:
+        built.append(name)
+        return name
+
+    for name in "abacb":
+        kept.get(name, lambda name=name: build(name), lambda _: 5)
+    assert built == ["a", "b", "c", "b"]
