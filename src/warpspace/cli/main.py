@@ -14,6 +14,7 @@ from warpspace.cli.field import field
 from warpspace.cli.gains import gains
 from warpspace.cli.measured import measured
 from warpspace.cli.montecarlo import montecarlo
+from warpspace.cli.report import report
 from warpspace.cli.snapshot import snapshot
 from warpspace.cli.thesis import thesis
 from warpspace.cli.view import view
@@ -47,6 +48,7 @@ for command in (
     snapshot,
     field,
     export,
+    report,
     check,
     scenes,
     gains,

@@ -1,0 +1,150 @@
+"""The figures of a report, drawn by name; one that cannot be drawn leaves a note in its place."""
+
+import io
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from warpspace.analysis.gains import DEFAULT_SHARE
+from warpspace.exceptions import WarpspaceError
+from warpspace.outputs.report.blocks import Block, Picture, Text
+from warpspace.outputs.report.review import Review, Reviewed
+from warpspace.outputs.report.wording import factor_words
+from warpspace.scene.model import Scene
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from warpspace.outputs.worker import FigureWorker
+
+MAPS: Mapping[str, str] = MappingProxyType(
+    {
+        "slices": "Three slices through the working volume.",
+        "orientation-map": "Orientation error of the tool axis.",
+        "error-curves": "Errors along each axis, with their tolerance bands.",
+        "traces": "Traces of the rotary table, nominal and actual.",
+        "machine": "The machine with its bent bodies.",
+    }
+)
+"""Figures of one scene that follow its error map, where the catalogue has them."""
+MOST_GAINS = 20
+Draw = Callable[..., bytes]
+
+
+class Painter:
+    """Draws the figures of one report.
+
+    Parameters
+    ----------
+    worker : FigureWorker
+        Draws maps in a process of its own.
+    review : Review
+    form : str
+        "svg" or "pdf".
+    """
+
+    def __init__(self, worker: "FigureWorker", review: Review, form: str) -> None:
+        self._worker, self._review, self._form = worker, review, form
+
+    def first(self) -> Block:
+        """Draw the figure of the page read first; failing to draw it ends the report.
+
+        Raises
+        ------
+        RenderError
+            If nothing can be drawn on this system.
+        """
+        scenes = [reviewed.scene for reviewed in self._review.scenes]
+        if len(scenes) == 2 and self._has("comparison"):
+            caption = f"A, B and their difference; {factor_words(self._review.exaggeration)}."
+            return self._map("comparison", scenes, caption)
+        return self._map("error-map", scenes[:1], self._map_caption(scenes[0]))
+
+    def evidence(self, reviewed: Reviewed) -> list[Block]:
+        """Draw the maps of one scene: its error map and whatever else the catalogue has."""
+        scene = reviewed.scene
+        wanted = [(name, caption) for name, caption in MAPS.items() if self._has(name)]
+        found: list[Block] = []
+        if len(self._review.scenes) == 2:
+            wanted.insert(0, ("error-map", self._map_caption(scene)))
+        for name, caption in wanted:
+            try:
+                found.append(self._map(name, [scene], caption))
+            except WarpspaceError as error:
+                found.append(Text(f"{caption} {error}", "note"))
+        return found
+
+    def gains(self, reviewed: Reviewed, prefix: str) -> Block | None:
+        """Bars of the gains; none where the loop has no axis."""
+        from warpspace.outputs.charts.gains import gains_chart
+
+        if not reviewed.gains:
+            return None
+        shown = reviewed.gains[:MOST_GAINS]
+        figure = gains_chart(
+            shown, f"{prefix}Error gains", self._loop_words(reviewed), DEFAULT_SHARE
+        )
+        return self._chart("gains", figure, f"{prefix}gains of the {len(shown)} largest errors.")
+
+    def chance(self, reviewed: Reviewed, prefix: str) -> list[Block]:
+        """Histogram of sampled machines and bars of what their variance comes from."""
+        from warpspace.outputs.charts.gains import contributions_chart
+        from warpspace.outputs.charts.histogram import montecarlo_chart
+
+        chance = reviewed.chance
+        if chance is None:
+            return []
+        machines = f"{chance.sampled.plan.samples:,} machines".replace(",", " ")
+        figure = montecarlo_chart(
+            chance.sampled, f"{prefix}{reviewed.scene.title}", f"{machines}, one random point each"
+        )
+        shares = replace(chance.shares, rows=chance.shares.rows[:MOST_GAINS])
+        bars = contributions_chart(
+            shares, f"{prefix}Which tolerances matter", self._loop_words(reviewed)
+        )
+        return [
+            self._chart("montecarlo", figure, f"{prefix}volumetric error of sampled machines."),
+            self._chart("variance", bars, f"{prefix}shares of the variance."),
+        ]
+
+    def _loop_words(self, reviewed: Reviewed) -> str:
+        """Say what a chart is about."""
+        return f"{reviewed.scene.machine.title}, {self._review.settings.loop} loop"
+
+    def _map_caption(self, scene: Scene) -> str:
+        """Caption of an error map."""
+        return f"Error map of {scene.title}; {factor_words(self._review.exaggeration)}."
+
+    @staticmethod
+    def _has(name: str) -> bool:
+        """Tell whether the catalogue has a figure."""
+        from warpspace.outputs.figures.catalogue import FIGURES
+
+        return name in FIGURES
+
+    def _map(self, name: str, scenes: Sequence[Scene], caption: str) -> Picture:
+        """Draw a figure of the catalogue."""
+        from warpspace.outputs.figures.settings import FigureSettings
+
+        settings = FigureSettings(
+            exaggeration=self._review.exaggeration,
+            loop=self._review.settings.loop,
+            grid=self._review.settings.grid,
+        )
+        data = self._worker.render(name, scenes, settings, self._form)
+        return Picture(name, caption, data, self._form)
+
+    def _chart(self, name: str, figure: "Figure", caption: str) -> Picture:
+        """Spell a chart as a file."""
+        from warpspace.outputs.charts.paper import style
+
+        metadata = (
+            {"Date": None, "Creator": None}
+            if self._form == "svg"
+            else {"CreationDate": None, "Creator": None, "Producer": None}
+        )
+        buffer = io.BytesIO()
+        with style():
+            figure.savefig(buffer, format=self._form, metadata=metadata)  # pyright: ignore[reportArgumentType]
+        return Picture(name, caption, buffer.getvalue(), self._form)

@@ -1,0 +1,254 @@
+"""The numbers of a design review: everything is evaluated here, nothing is worded."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from warpspace.analysis.contributions import Contributions, variance_contributions
+from warpspace.analysis.draws import Distribution, build_draws, loop_keys
+from warpspace.analysis.explain import Explanation, explain
+from warpspace.analysis.gains import Gain, gains_max
+from warpspace.analysis.montecarlo import MonteCarlo, Plan, montecarlo
+from warpspace.analysis.nodes import Over
+from warpspace.analysis.statistics import Statistics, statistics
+from warpspace.exceptions import OptionError, WarpspaceError
+from warpspace.field.evaluate import ErrorField
+from warpspace.kinematics.model import Loop
+from warpspace.outputs.exports.drawing import (
+    Drawing,
+    Exaggeration,
+    choose_exaggeration,
+    draw_scene,
+)
+from warpspace.scene.model import Scene
+from warpspace.scene.pipeline import linearisation_error_um
+from warpspace.units import Array
+
+WORST_SAMPLES = 20_000
+"""Machines of which the worst point is looked for; one random point is taken of many more."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReportSettings:
+    """Choices of a report.
+
+    Attributes
+    ----------
+    loop : str
+        "tool", "workpiece" or "relative".
+    grid : int
+        Nodes per axis of the working volume.
+    exaggeration : float, "auto" or None
+        Display factor; None takes the first scene's.
+    spec_um : float or None
+        Specification of the volumetric error, µm.
+    samples, seed : int
+        Of the Monte Carlo.
+    distribution : str
+        "uniform" or "normal".
+    """
+
+    loop: str = "tool"
+    grid: int = 21
+    exaggeration: Exaggeration = None
+    spec_um: float | None = None
+    samples: int = 100_000
+    seed: int = 0
+    distribution: str = "uniform"
+
+
+@dataclass(frozen=True, slots=True)
+class Chance:
+    """What the tolerances of a scene promise.
+
+    Attributes
+    ----------
+    sampled : MonteCarlo
+        One random point of every machine.
+    worst : MonteCarlo
+        The worst point of every machine.
+    shares : Contributions
+        Which tolerances matter.
+    """
+
+    sampled: MonteCarlo
+    worst: MonteCarlo
+    shares: Contributions
+
+
+@dataclass(frozen=True, slots=True)
+class Reviewed:
+    """One scene, reviewed.
+
+    Attributes
+    ----------
+    drawing : Drawing
+        Evaluated scene with the display factor all scenes of the report share.
+    worst_at : dict of str to float, mm or degrees
+        Axis positions of the worst node.
+    explanation : Explanation
+        Why it is the worst.
+    gains : tuple of Gain
+        Largest over the working volume (rotary axes: over their travel), largest first.
+    chance : Chance or None
+        None without tolerances for every parameter of the loop; `why_no_chance` says which lack.
+    linearisation_um : float, µm
+        Largest difference between the exact chain and the first order.
+    """
+
+    drawing: Drawing
+    worst_at: dict[str, float]
+    explanation: Explanation
+    gains: tuple[Gain, ...]
+    chance: Chance | None
+    why_no_chance: str
+    linearisation_um: float
+
+    @property
+    def scene(self) -> Scene:
+        """The scene."""
+        return self.drawing.scene
+
+    @property
+    def statistics(self) -> Statistics:
+        """Statistics of its field."""
+        return self.drawing.picture.statistics
+
+
+@dataclass(frozen=True, slots=True)
+class Review:
+    """One scene or two, with their difference where they share a working volume.
+
+    Attributes
+    ----------
+    settings : ReportSettings
+    scenes : tuple of Reviewed
+    exaggeration : float
+    largest_um : float, µm
+        Largest error of all scenes: the end of the colour scale they share.
+    difference : Statistics or None
+        Of second minus first, as vectors, node by node.
+    """
+
+    settings: ReportSettings
+    scenes: tuple[Reviewed, ...]
+    exaggeration: float
+    largest_um: float
+    difference: Statistics | None
+
+
+def build_review(scenes: tuple[Scene, ...], settings: ReportSettings) -> Review:
+    """Evaluate everything a report tells.
+
+    Parameters
+    ----------
+    scenes : tuple of Scene
+        One or two.
+    settings : ReportSettings
+
+    Returns
+    -------
+    Review
+
+    Raises
+    ------
+    OptionError
+        If there are none or more than two scenes, or a setting is out of range.
+    """
+    if not 1 <= len(scenes) <= 2:
+        raise OptionError(f"a report is about one scene or two; given {len(scenes)}")
+    Plan(settings.samples, settings.seed, spec_um=settings.spec_um).check()
+    drawings = [draw_scene(scene, grid=settings.grid, loop=settings.loop) for scene in scenes]
+    worst = max(drawings, key=lambda drawing: drawing.picture.statistics.max_um)
+    given = scenes[0].exaggeration if settings.exaggeration is None else settings.exaggeration
+    factor = choose_exaggeration(worst.picture, "auto" if given is None else given)
+    reviewed = tuple(
+        _review_scene(Drawing(drawing.picture, factor), settings) for drawing in drawings
+    )
+    return Review(
+        settings, reviewed, factor, worst.picture.statistics.max_um, _difference(drawings)
+    )
+
+
+def _review_scene(drawing: Drawing, settings: ReportSettings) -> Reviewed:
+    """Evaluate all that is told of one scene."""
+    scene, picture = drawing.scene, drawing.picture
+    index = np.unravel_index(int(np.argmax(picture.field.norm_um)), picture.grid.shape)
+    at = {
+        name: np.broadcast_to(values, picture.grid.shape)[index]
+        for name, values in picture.grid.coordinates.items()
+    }
+    explanation = explain(
+        scene.model, scene.errors, at, picture.view, picture.grid.nominal_mm[index]
+    )
+    chance, why = _chance(scene, settings)
+    return Reviewed(
+        drawing,
+        {name: float(value) for name, value in at.items()},
+        explanation,
+        _gains(scene, picture.view.loop),
+        chance,
+        why,
+        linearisation_error_um(scene, 5),
+    )
+
+
+def _gains(scene: Scene, loop: Loop) -> tuple[Gain, ...]:
+    """Largest gains over the working volume; none where the loop has no axis."""
+    axes = scene.machine.axes
+    ranges = {
+        name: span if axes[name].is_linear else axes[name].travel
+        for name, span in scene.workspace.ranges.items()
+    }
+    try:
+        return gains_max(scene.model, loop, scene.parameter_keys, ranges)
+    except OptionError:
+        return ()
+
+
+def _chance(scene: Scene, settings: ReportSettings) -> tuple[Chance | None, str]:
+    """Sample machines from the tolerances of a scene; why not, where that is impossible."""
+    if not scene.tolerances:
+        return None, "The scene has no tolerances."
+    view = scene.view(Loop(settings.loop))
+    try:
+        keys = loop_keys(scene.model, view.loop, scene.parameter_keys)
+        draws = build_draws(
+            scene.tolerances, keys, Distribution(settings.distribution), source=scene.name
+        )
+
+        def run(over: Over, samples: int) -> MonteCarlo:
+            plan = Plan(samples, settings.seed, over, spec_um=settings.spec_um)
+            return montecarlo(scene.model, draws, scene.workspace, view, plan)
+
+        return (
+            Chance(
+                run(Over.SAMPLED, settings.samples),
+                run(Over.MAX, min(settings.samples, WORST_SAMPLES)),
+                variance_contributions(scene.model, draws, scene.workspace, view),
+            ),
+            "",
+        )
+    except WarpspaceError as error:
+        return None, str(error)
+
+
+def _difference(drawings: list[Drawing]) -> Statistics | None:
+    """Statistics of second minus first where the nodes are the same."""
+    if len(drawings) != 2:
+        return None
+    first, second = (drawing.picture.field for drawing in drawings)
+    if not _same_nodes(first.nominal_mm, second.nominal_mm):
+        return None
+    return statistics(
+        ErrorField(
+            first.nominal_mm,
+            second.error_um - first.error_um,
+            second.orientation_urad - first.orientation_urad,
+        )
+    )
+
+
+def _same_nodes(first_mm: Array, second_mm: Array) -> bool:
+    """Tell whether two grids have the same nominal nodes."""
+    return first_mm.shape == second_mm.shape and bool(np.allclose(first_mm, second_mm, atol=1e-6))

@@ -1,0 +1,215 @@
+"""Sentences and numbers of a report, in the words a reader needs."""
+
+from collections.abc import Mapping, Sequence
+
+from warpspace.analysis.explain import Contribution
+from warpspace.kinematics.model import Loop
+from warpspace.machine.errors import ErrorFunction, Harmonics, Poly, Ramp, Table
+from warpspace.machine.parameters import parameter
+from warpspace.outputs.report.review import Chance, Review, Reviewed
+from warpspace.outputs.words import MINUS, TIMES, spell, spell_factor, spell_short
+from warpspace.scene.model import Scene
+from warpspace.units import MICROMETRE
+
+SUBJECTS = {
+    "tool": "the tool point",
+    "workpiece": "the workpiece point",
+    "relative": "the tool, relative to the workpiece,",
+}
+_NAMED = 3
+_LEAST_SHARE = 0.05
+
+
+def signed(value: float, digits: int = 3) -> str:
+    """Spell a computed number with its sign."""
+    return _signed(spell(value, digits))
+
+
+def given(value: float) -> str:
+    """Spell a number that somebody has chosen, with its sign and without trailing zeros."""
+    return _signed(spell_short(value))
+
+
+def _signed(text: str) -> str:
+    """Put a plus before what has no sign."""
+    return text if text == "0" or text.startswith(MINUS) else f"+{text}"
+
+
+def microns(value: float) -> str:
+    """Spell a length in µm."""
+    return f"{spell(value)} {MICROMETRE}"
+
+
+def limit(value: float) -> str:
+    """Spell a specification in µm."""
+    return f"{spell_short(value)} {MICROMETRE}"
+
+
+def percent(share: float, digits: int = 1) -> str:
+    """Spell a share in per cent."""
+    return f"{100.0 * share:.{digits}f} %".replace("-", MINUS)
+
+
+def place(at: Mapping[str, float]) -> str:
+    """Spell axis positions, for instance ``X 275, Y −225, Z −480 mm, B 0°``."""
+    linear = [
+        f"{name} {value:.6g}".replace("-", MINUS) for name, value in at.items() if name in "XYZ"
+    ]
+    rotary = [
+        f"{name} {value:.6g}°".replace("-", MINUS)
+        for name, value in at.items()
+        if name not in "XYZ"
+    ]
+    return ", ".join([", ".join(linear) + " mm" if linear else "", *rotary]).strip(", ")
+
+
+def worst_place(reviewed: Reviewed) -> str:
+    """Spell the axis positions of the worst point, those that matter in the loop."""
+    tool = reviewed.drawing.picture.view.loop is Loop.TOOL
+    axes = reviewed.scene.machine.chain.tool if tool else reviewed.worst_at
+    return place({name: value for name, value in reviewed.worst_at.items() if name in axes})
+
+
+def volume(reviewed: Reviewed) -> str:
+    """Spell the size of the working volume."""
+    extent = reviewed.drawing.picture.grid.extent_mm
+    return f" {TIMES} ".join(f"{edge:.6g}" for edge in extent) + " mm"
+
+
+def named(key: str) -> str:
+    """Spell a parameter: key and plain name."""
+    return f"{key} ({parameter(key).name})"
+
+
+def listed(words: Sequence[str]) -> str:
+    """Join words with commas and a last "and"."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def leading(reviewed: Reviewed) -> list[tuple[Contribution, float]]:
+    """Find the parameters that matter most at the worst point, with their share of its error."""
+    parts = sorted(reviewed.explanation.contributions, key=lambda part: -part.along_um)
+    total = sum(part.along_um for part in parts)
+    if not total > 0.0:
+        return []
+    shares = [(part, part.along_um / total) for part in parts]
+    return [(part, share) for part, share in shares if share >= _LEAST_SHARE][:_NAMED]
+
+
+def verdict(review: Review) -> str:
+    """Say in a few sentences what a reader must know."""
+    if len(review.scenes) == 1:
+        return " ".join(_one(review, review.scenes[0]))
+    return " ".join(_two(review))
+
+
+def _one(review: Review, reviewed: Reviewed) -> list[str]:
+    """Sentences about one scene."""
+    found, subject = reviewed.statistics, SUBJECTS[review.settings.loop]
+    where = f"in the working volume of {volume(reviewed)}"
+    if found.max_um == 0.0:
+        sentences = [f"The error set is zero: {subject} is where it should be {where}."]
+    else:
+        sentences = [
+            (
+                f"On average {subject} is {microns(found.mean_um)} away from where it should be,"
+                f" and at most {microns(found.max_um)}, {where}."
+            ),
+            _cause(reviewed),
+        ]
+        if review.settings.spec_um is not None:
+            kept = found.max_um <= review.settings.spec_um
+            sentences.append(
+                f"The specification of {limit(review.settings.spec_um)} is"
+                f" {'kept everywhere' if kept else 'not kept'}."
+            )
+    if reviewed.chance is not None:
+        sentences.append(chance_sentence(reviewed.chance))
+    return sentences
+
+
+def _cause(reviewed: Reviewed) -> str:
+    """Say where the worst point is and what makes it so."""
+    first = f"The worst point is {worst_place(reviewed)}"
+    causes = [f"{named(part.key)} makes {percent(share, 0)}" for part, share in leading(reviewed)]
+    return f"{first}: {listed(causes)} of the error there." if causes else f"{first}."
+
+
+def _two(review: Review) -> list[str]:
+    """Sentences about two scenes."""
+    first, second = review.scenes
+    a, b = first.statistics, second.statistics
+    if a.mean_um > 0.0:
+        change = (b.mean_um - a.mean_um) / a.mean_um
+        word = "less" if change < 0.0 else "more"
+        how = f": {percent(abs(change), 0)} {word} than A's {microns(a.mean_um)}"
+        how = how if abs(change) >= 0.005 else f", the same as A's {microns(a.mean_um)}"
+    else:
+        how = "; A has none"
+    sentences = [
+        (
+            f"B ({second.scene.title}) has a mean error of {microns(b.mean_um)}{how}"
+            f" ({first.scene.title})."
+        ),
+        f"The largest error is {microns(b.max_um)} in B and {microns(a.max_um)} in A.",
+    ]
+    for letter, reviewed in (("A", first), ("B", second)):
+        causes = [f"{named(part.key)} {percent(share, 0)}" for part, share in leading(reviewed)]
+        if causes:
+            at = worst_place(reviewed)
+            sentences.append(f"In {letter} the worst point is {at}, caused by {listed(causes)}.")
+    spec = review.settings.spec_um
+    if spec is not None:
+        keeps = [
+            f"{letter} {'keeps' if stats.max_um <= spec else 'does not keep'}"
+            for letter, stats in (("A", a), ("B", b))
+        ]
+        sentences.append(f"Of a specification of {limit(spec)}, {listed(keeps)} every point.")
+    return sentences
+
+
+def chance_sentence(chance: Chance) -> str:
+    """Say what the tolerances promise."""
+    within = chance.worst.probability
+    if within is None:
+        return (
+            f"Of machines that its tolerances allow, 95 % stay below"
+            f" {microns(chance.worst.p95_um)} at their worst point, and"
+            f" {microns(chance.sampled.mean_um)} is the mean error."
+        )
+    return (
+        f"Of machines that its tolerances allow, {percent(within.probability)} keep the"
+        f" specification of {limit(within.spec_um)} in the whole working volume (95 % interval"
+        f" {percent(within.low)} to {percent(within.high)})."
+    )
+
+
+def spell_function(function: ErrorFunction | None, unit: str) -> str:
+    """Describe the curve of an error along its axis."""
+    if function is None:
+        return ""
+    low, high = (spell_short(end) for end in function.span)
+    match function:
+        case Ramp():
+            return f"ramp, 0 at {low} to the value at {high}"
+        case Poly():
+            return f"polynomial of degree {len(function.coefficients) - 1}"
+        case Harmonics():
+            terms = ", ".join(f"{spell(a)} {unit} × {n:g}" for n, a, _ in function.terms[:3])
+            return f"harmonics: {terms}" + (" …" if len(function.terms) > 3 else "")
+        case Table():
+            return f"table of {len(function.points)} points"
+        case _:
+            return "constant"
+
+
+def reference_words(scene: Scene) -> str:
+    """Say what errors are referred to."""
+    if scene.reference is None:
+        return "Absolute: errors include the part that is the same everywhere."
+    return f"Relative to {place(scene.reference)}, which is held still."
+
+
+def factor_words(factor: float) -> str:
+    """Say how displacements are drawn."""
+    return f"displacement drawn {spell_factor(factor)}"
