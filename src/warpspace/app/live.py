@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpspace.analysis.statistics import Statistics, statistics
+from warpspace.app.compare import Compared, compare_frames
 from warpspace.app.facets import Topology, topology
 from warpspace.app.kept import Kept, Same
 from warpspace.app.look import default_held
@@ -50,6 +51,10 @@ class Frame:
     traces : tuple of TraceLines
     slices : tuple of SliceMap
         Drawn in place of the surface where slices are chosen.
+    subject : AppState or None
+        What is drawn, where that is another state than the one steered; else None.
+    compared : Compared or None
+        The comparison it belongs to.
     """
 
     state: AppState
@@ -63,6 +68,8 @@ class Frame:
     topology: Topology
     traces: "tuple[TraceLines, ...]"
     slices: tuple[SliceMap, ...] = ()
+    subject: AppState | None = None
+    compared: Compared | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +125,14 @@ class LiveModel:
         Returns
         -------
         Frame
+            Where two states are compared, of the one that is drawn.
         """
+        if state.comparison.b is not None:
+            return compare_frames(self._single, state)
+        return self._single(state)
+
+    def _single(self, state: AppState) -> Frame:
+        """Evaluate a state without what it is compared with."""
         response = self.response(state)
         grid = response.grid
         amplitudes = np.fromiter(state.heard.values(), float, len(state.amplitudes))

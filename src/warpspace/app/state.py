@@ -9,8 +9,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from warpspace.app.comparison import Comparison
 from warpspace.app.emphasis import Emphasis
 from warpspace.app.look import Look, MachineLook, RotaryLook
+from warpspace.app.picked import Picked
 from warpspace.app.ranges import Span, amplitude_spans, position_spans
 from warpspace.app.specification import Specification
 from warpspace.geometry.colour import COMPONENTS
@@ -77,6 +79,12 @@ class AppState:
         The schematic machine.
     rotary : RotaryLook
         What is traced.
+    picked : Picked or None
+        The point whose error is explained.
+    lever : str
+        Key of the contribution whose axis and lever are drawn; empty for none.
+    comparison : Comparison
+        What is compared.
     notes : tuple of str
         What the latest change had to clamp.
     """
@@ -99,6 +107,9 @@ class AppState:
     look: Look = field(default_factory=Look)
     machine: MachineLook = field(default_factory=MachineLook)
     rotary: RotaryLook = field(default_factory=RotaryLook)
+    picked: Picked | None = None
+    lever: str = ""
+    comparison: Comparison = field(default_factory=Comparison)
     notes: tuple[str, ...] = ()
 
     @property

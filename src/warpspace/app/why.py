@@ -8,13 +8,13 @@ import numpy as np
 from warpspace.analysis.explain import Explanation, explain
 from warpspace.app.edits import axis_span
 from warpspace.app.live import Frame
+from warpspace.app.picked import Picked
 from warpspace.app.state import AppState
 from warpspace.geometry.deform import deform
 from warpspace.geometry.pick import pick_point, pick_surface
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, nominal_point
 from warpspace.kinematics.model import Loop
-from warpspace.machine.description import Vector
 from warpspace.machine.errors import Constant, ErrorSet
 from warpspace.machine.parameters import LINEAR_AXES
 from warpspace.units import Array
@@ -28,26 +28,6 @@ REACH_MM = 1e7
 
 
 @dataclass(frozen=True, slots=True)
-class Picked:
-    """A point somebody asks about; it stays where the axes stand while errors change.
-
-    Attributes
-    ----------
-    at : mapping of str to float, mm or degrees
-        Axis positions: those of the linear axes for a point of the surface (the rotary ones stand
-        where the state has them), those of all axes for a point of a trace.
-    loop : Loop or None
-        Loop of a trace; None for a point of the surface, which follows the loop of the view.
-    point_mm : tuple of float, (3,), mm, or None
-        The traced point in the workpiece (or tool) frame; None for the surface.
-    """
-
-    at: Mapping[str, float]
-    loop: Loop | None = None
-    point_mm: Vector | None = None
-
-
-@dataclass(frozen=True, slots=True)
 class Answer:
     """A picked point explained, as it is drawn.
 
@@ -57,6 +37,8 @@ class Answer:
         Positions of all axes.
     loop : Loop
     explanation : Explanation
+    shift_mm : ndarray, [3], mm
+        From R to where things are drawn, on machines whose linear axes carry the workpiece.
     drawn_mm : ndarray, [3], mm
         Where the displaced point is drawn.
     """
@@ -64,6 +46,7 @@ class Answer:
     at: Mapping[str, float]
     loop: Loop
     explanation: Explanation
+    shift_mm: Array
     drawn_mm: Array
 
 
@@ -183,7 +166,22 @@ def answer(state: AppState, picked: Picked, exaggeration: float) -> Answer:
         pose = branch_pose(model, side, coordinates)
         point = transforms.apply(pose, np.asarray(picked.point_mm))
     found = explain(model, heard_errors(state), coordinates, state.scene.view(loop), point)
-    return Answer(at, loop, found, deform(found.nominal_mm, found.error_um, exaggeration))
+    shift = np.zeros(3) if picked.point_mm is not None else _shift_mm(state, at, point)
+    drawn = deform(found.nominal_mm + shift, found.error_um, exaggeration)
+    return Answer(at, loop, found, shift, drawn)
+
+
+def _shift_mm(state: AppState, at: Mapping[str, float], point: Array) -> Array:
+    """Tell how far from its place in R a node is drawn (see `Grid.nominal_mm`), [3], mm."""
+    model, middle = state.scene.model, state.scene.workspace.positions
+    carrying = [axis.name for axis in model.machine.branch("workpiece") if axis.is_linear]
+    if not carrying:
+        return np.zeros(3)
+    here = {name: np.asarray(value) for name, value in at.items()}
+    home = {**here, **{name: np.asarray(middle.get(name, 0.0)) for name in carrying}}
+    there = transforms.inverse(branch_pose(model, "workpiece", here))
+    moved = branch_pose(model, "workpiece", home) @ there
+    return transforms.apply(moved, point) - point
 
 
 def with_picked(state: AppState, picked: Picked | None) -> AppState:
