@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from warpspace.app.ranges import Span, amplitude_span, round_up
+from warpspace.app.specification import Specification
 from warpspace.app.state import AppState
 from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet
 from warpspace.machine.parameters import parameter
@@ -112,3 +113,8 @@ def with_soloed(state: AppState, key: str, soloed: bool) -> AppState:
 def all_heard(state: AppState) -> AppState:
     """End all solo and mute."""
     return replace(state, emphasis=type(state.emphasis)())
+
+
+def with_specification(state: AppState, specification: Specification) -> AppState:
+    """Hold the tolerances against another specification."""
+    return replace(state, specification=specification)

@@ -25,6 +25,7 @@ from warpspace.app.layers.box import BoxLayer
 from warpspace.app.layers.traces import TracesLayer
 from warpspace.app.live import Frame, LiveModel
 from warpspace.app.panels import Desk, Panel, Settling, Update
+from warpspace.app.panels.commands import hint_script
 from warpspace.app.panels.layout import apply_theme, lay_out_panels
 from warpspace.app.state import AppState
 from warpspace.app.tabs import CameraMemory, Left, ask_script, new_token, rename_script
@@ -198,6 +199,8 @@ class Session:
             for panel in self._panels:
                 panel.show(frame)
         self._client.flush()
+        self._run_script(hint_script())
+        self._client.flush()
         self._shown = frame
         self._unsettled_since = time.monotonic()
 
@@ -253,10 +256,10 @@ class Session:
                 self._guarded(partial(panel.settle, frame))
         self._client.flush()
 
-    def fit_view(self) -> None:
-        """Put the camera back to the operator's side."""
+    def fit_view(self, view: str | None = None, lens: bool | None = None) -> None:
+        """Put the camera to a named view (the last one by default), or change its lens."""
         if self._shown is not None:
-            self._eye.fit(self._shown, docked=True)
+            self._eye.choose(self._shown, view, lens)
             self._client.flush()
 
     def _restore_camera(self, frame: Frame) -> None:

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 from warpspace.app.ranges import Span
 
-LIMIT_UM = Span(0.1, 1000.0, 0.1)
+LIMIT_UM = Span(1.0, 300.0, 0.5)
 START_UM = 50.0
 SAMPLED, MAX = "sampled", "max"
 """One random point of each machine (as in the thesis), or its worst point."""

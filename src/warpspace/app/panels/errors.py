@@ -1,10 +1,16 @@
-"""The errors panel: a slider with number box per parameter, in a folder per axis."""
+"""The errors panel: a slider with number box per parameter, in a folder per axis.
 
+The search box narrows it down to the parameters that are meant; the folders then stand open.
+"""
+
+from collections.abc import Callable
 from itertools import groupby
 from typing import Any
 
 from warpspace.app.live import Frame
 from warpspace.app.panels import Desk
+from warpspace.app.ranges import Span
+from warpspace.app.search import find_parameters
 from warpspace.app.state import AppState
 from warpspace.app.widgets import Bound
 from warpspace.machine.parameters import Parameter, parameter
@@ -33,10 +39,23 @@ class ErrorsPanel:
     ----------
     desk : Desk
     state : AppState
+    touched : callable, optional
+        Called, by the session's worker, with the key of a slider that was moved.
     """
 
-    def __init__(self, desk: Desk, state: AppState) -> None:
-        self._desk = desk
+    def __init__(
+        self, desk: Desk, state: AppState, touched: Callable[[str], None] | None = None
+    ) -> None:
+        self._desk, self._touched = desk, touched
+        self._found: tuple[str, ...] = ()
+        self._search: Bound[str] = Bound(
+            desk.gui.add_text(
+                "Find an error",
+                "",
+                hint="Key, symbol, plain name or axis: EAX, squareness, roll x, γ.",
+            ),
+            desk.changed,
+        )
         self._scene: Scene | None = None
         self._bound: dict[str, Bound[float]] = {}
         self._parts: list[Any] = []
@@ -48,19 +67,24 @@ class ErrorsPanel:
         updates = {"Reset": AppState.reset, "All zero": AppState.zeroed}
         buttons.on_click(lambda event: desk.post(updates[event.target.value]))
         self._home: Any = desk.gui.add_folder(None)
-        self._build(state)
+        self._build(state, tuple(state.amplitudes))
 
-    def _build(self, state: AppState) -> None:
-        """Lay out the folders of a scene's axes."""
+    def _build(self, state: AppState, keys: tuple[str, ...]) -> None:
+        """Lay out the folders of a scene's axes with the parameters that were asked for."""
         gui = self._desk.gui
         for part in self._parts:
             part.remove()
         self._scene, self._bound, self._parts = state.origin, {}, []
-        rows = sorted(map(parameter, state.amplitudes), key=_by_axis)
+        self._found = keys
+        narrowed = len(keys) < len(state.amplitudes)
+        if not keys:
+            with self._home:
+                self._parts.append(gui.add_markdown("No error goes by this name."))
+        rows = sorted(map(parameter, keys), key=_by_axis)
         for axis, members in groupby(rows, key=lambda row: row.axis):
             own = list(members)
-            used = any(state.amplitudes[row.key] for row in own)
-            title = f"{axis} axis · {len(own)} errors"
+            used = narrowed or any(state.amplitudes[row.key] for row in own)
+            title = f"{axis} axis · {len(own)} error{'s' if len(own) > 1 else ''}"
             with self._home:
                 folder = gui.add_folder(title, expand_by_default=used)
             self._parts.append(folder)
@@ -77,12 +101,12 @@ class ErrorsPanel:
         """Add the slider of one parameter."""
         span = state.spans[row.key]
         return self._desk.gui.add_slider(
-            row.label,
+            _label(state, row),
             min=span.low,
             max=span.high,
             step=span.step,
             initial_value=state.amplitudes[row.key],
-            marks=((span.low, f"{span.low:g}"), (0.0, "0"), (span.high, f"{span.high:g}")),
+            marks=_marks(span),
             hint=_hint(state, row),
         )
 
@@ -92,15 +116,47 @@ class ErrorsPanel:
             value = bound.poll()
             if value is not None:
                 state = state.with_amplitude(key, value)
+                if self._touched is not None:
+                    self._touched(key)
+        query = self._search.poll()
+        if query is not None:
+            found = find_parameters(query, tuple(state.amplitudes))
+            if found != self._found:
+                # after the state has been dealt with, since widgets come and go
+                self._desk.act(lambda: self._build(self._desk.board().state, found))
         return state
 
     def show(self, frame: Frame) -> None:
         """Put the sliders where the state has them."""
         state = frame.state
         if state.origin is not self._scene:
-            self._build(state)
+            self._search.show("")
+            self._build(state, tuple(state.amplitudes))
         for key, bound in self._bound.items():
+            _refresh(bound.handle, state, parameter(key))
             bound.show(state.amplitudes[key])
+
+
+def _label(state: AppState, row: Parameter) -> str:
+    """Label a slider, with what solo and mute do to it."""
+    if row.key in state.emphasis.soloed and state.emphasis.heard(row.key):
+        return f"{row.label} · solo"
+    return row.label if state.emphasis.heard(row.key) else f"{row.label} · silent"
+
+
+def _marks(span: Span) -> tuple[tuple[float, str], ...]:
+    """Mark both ends and zero."""
+    return ((span.low, f"{span.low:g}"), (0.0, "0"), (span.high, f"{span.high:g}"))
+
+
+def _refresh(slider: Any, state: AppState, row: Parameter) -> None:
+    """Follow changes of label and range; what is the same already is not sent."""
+    label, span = _label(state, row), state.spans[row.key]
+    if slider.label != label:
+        slider.label = label
+    if (slider.min, slider.max) != (span.low, span.high):
+        slider.min, slider.max, slider.step = span.low, span.high, span.step
+        slider.marks = _marks(span)
 
 
 def _by_axis(row: Parameter) -> int:

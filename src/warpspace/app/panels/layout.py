@@ -5,7 +5,11 @@ from collections.abc import Callable, Mapping
 from viser import GuiApi
 
 from warpspace.app.panels import Desk, Panel
+from warpspace.app.panels.chance import ChancePanel
+from warpspace.app.panels.commands import CommandsPanel
 from warpspace.app.panels.errors import ErrorsPanel
+from warpspace.app.panels.gains import GainsPanel
+from warpspace.app.panels.shape import ShapePanel
 from warpspace.app.panels.summary import heading_panel, summary_panel
 from warpspace.app.panels.view import ViewPanel
 from warpspace.app.state import AppState
@@ -72,7 +76,12 @@ def lay_out_panels(
     gui.main_panel.dock_left()
     gui.main_panel.set_width(LEFT_WIDTH)
     gui.add_html(STYLE)
-    errors = ErrorsPanel(desk, state)
+    commands = CommandsPanel(desk, fit_view)
+    shape_panel = gui.add_panel()
+    with shape_panel.add_tab("One error"):
+        shape = ShapePanel(desk, state)
+    shape_panel.dock_below(gui.main_panel)
+    errors = ErrorsPanel(desk, state, shape.choose)
 
     results = gui.add_panel()
     with results.add_tab("Result"):
@@ -85,10 +94,14 @@ def lay_out_panels(
         view = ViewPanel(desk, state, scenes)
         button = gui.add_button("Fit view", color="gray", hint="Camera to the operator's side.")
         button.on_click(lambda _: fit_view())
+    with settings.add_tab("Gains"):
+        gains = GainsPanel(desk)
+    with settings.add_tab("Chance"):
+        chance = ChancePanel(desk, state)
     settings.dock_below(results)
 
     top = gui.add_panel()
     with top.add_tab("warpspace"):
         heading = heading_panel(desk)
     top.float(x=12, y=12, width=520)
-    return [errors, view, summary, heading]
+    return [errors, shape, view, gains, chance, commands, summary, heading]

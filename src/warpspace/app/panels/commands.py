@@ -1,0 +1,249 @@
+"""What can be done by key, palette and button: undo, reset, view, help; and the first hint."""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from warpspace.app import edits
+from warpspace.app.live import Frame
+from warpspace.app.panels import Desk, Update
+from warpspace.app.state import TRUE_SCALE, AppState
+from warpspace.machine.parameters import PARAMETERS
+
+HINT_SECONDS = 12
+HINT = "Drag a slider on the left: the box bends at once.   Ctrl+Z undoes   ·   H shows all keys"
+WORDS = {
+    "amplitudes": "errors",
+    "positions": "rotary position",
+    "exaggeration": "exaggeration",
+    "component": "colour",
+    "loop": "loop",
+    "nodes": "grid density",
+    "emphasis": "solo and mute",
+    "tolerances": "tolerance",
+    "specification": "specification",
+    "scene": "scene",
+    "loaded": "scene",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """One entry of the palette.
+
+    Attributes
+    ----------
+    label, description : str
+    key : str or None
+        Hotkey.
+    modifier : str or None
+        What is held with it, in viser's words.
+    run : callable
+        Called by the session's worker.
+    """
+
+    label: str
+    description: str
+    key: str | None
+    modifier: str | None
+    run: Callable[[], None]
+
+    @property
+    def keys(self) -> str:
+        """Spell the keys for people; empty where there are none."""
+        if self.key is None:
+            return ""
+        held = {"cmd/ctrl": "Ctrl", "shift": "Shift", "alt": "Alt"}
+        parts = [held[part] for part in (self.modifier or "").split("+") if part]
+        return " + ".join((*parts, self.key.capitalize() if len(self.key) > 1 else self.key))
+
+
+class CommandsPanel:
+    """Undo and redo buttons, the palette with its keys, help, and the first-use hint.
+
+    Parameters
+    ----------
+    desk : Desk
+    fit_view : callable
+        Puts the camera back.
+    """
+
+    def __init__(self, desk: Desk, fit_view: Callable[[], None]) -> None:
+        self._desk = desk
+        self._help: Any = None
+        buttons = desk.gui.add_button_group(
+            "History",
+            ("Undo", "Redo", "Help"),
+            hint="Undo takes the latest change back (Ctrl+Z), Redo does it again (Ctrl+Shift+Z),"
+            " Help lists all keys (H).",
+        )
+        actions = {"Undo": self._undo, "Redo": self._redo, "Help": self._toggle_help}
+        buttons.on_click(lambda event: desk.act(actions[event.target.value]))
+        self.commands = self._commands(fit_view)
+        for command in self.commands:
+            handle = desk.gui.add_command(
+                command.label,
+                description=command.description,
+                hotkey=command.key,  # pyright: ignore[reportArgumentType]
+                modifier=command.modifier,  # pyright: ignore[reportArgumentType]
+            )
+            handle.on_trigger(lambda _, run=command.run: desk.act(run))
+
+    def _commands(self, fit_view: Callable[[], None]) -> tuple[Command, ...]:
+        """List what there is."""
+
+        def does(update: Update) -> Callable[[], None]:
+            return lambda: self._desk.post(update)
+
+        def coloured(component: str) -> Callable[[], None]:
+            return does(lambda state: state.with_component(component))
+
+        return (
+            Command("Undo", "Take the latest change back", "Z", "cmd/ctrl", self._undo),
+            Command("Redo", "Do it again", "Z", "cmd/ctrl+shift", self._redo),
+            Command("Fit view", "Camera to the operator's side", "F", None, fit_view),
+            Command("Reset errors", "Values of the scene", "R", None, does(AppState.reset)),
+            Command("All errors zero", "The nominal machine", "0", None, does(AppState.zeroed)),
+            Command("Hear all errors", "End solo and mute", "E", None, does(edits.all_heard)),
+            Command(
+                "Exaggeration auto",
+                "A round factor that shows the error",
+                "A",
+                None,
+                does(lambda state: state.with_exaggeration(None)),
+            ),
+            Command(
+                "True scale",
+                "Displacement drawn ×1",
+                "T",
+                None,
+                does(lambda state: state.with_exaggeration(TRUE_SCALE)),
+            ),
+            Command("Colour: |E|", "Length of the error", "1", None, coloured("norm")),
+            Command("Colour: E_x", "Error in x", "2", None, coloured("x")),
+            Command("Colour: E_y", "Error in y", "3", None, coloured("y")),
+            Command("Colour: E_z", "Error in z", "4", None, coloured("z")),
+            Command("Grid lines", "Show or hide", "G", None, does(_toggled("grid_lines"))),
+            Command("Nominal box", "Show or hide", "B", None, does(_toggled("ghost"))),
+            Command("Rotary traces", "Show or hide", "C", None, does(_toggled("traces"))),
+            Command("Dark mode", "Dark or light page", "D", None, does(_toggled("dark"))),
+            Command("Help", "All keys", "H", None, self._toggle_help),
+        )
+
+    def _undo(self) -> None:
+        """Take the latest change back and say what it was."""
+        self._say("Undone", self._desk.board().undo())
+
+    def _redo(self) -> None:
+        """Do again what was undone and say what it is."""
+        self._say("Done again", self._desk.board().redo())
+
+    def _say(self, done: str, what: str) -> None:
+        """Tell the user what was changed, or that there is nothing."""
+        if what:
+            self._desk.notify(f"{done}: {spell_change(what)}", "", "gray")
+        else:
+            self._desk.notify(f"Nothing to be {done.lower()}", "", "gray")
+
+    def _toggle_help(self) -> None:
+        """Open the list of keys, or close it."""
+        opened, self._help = self._help, None
+        if opened is not None:
+            opened.close()
+            return
+        gui = self._desk.gui
+        self._help = gui.add_modal("Keys and help")
+        with self._help:
+            gui.add_markdown(help_text(self.commands))
+            close = gui.add_button("Close", hint="Close this window; H does the same.")
+            close.on_click(lambda _: self._desk.act(self._toggle_help))
+
+    def read(self, state: AppState) -> AppState:
+        """Nothing to take over."""
+        return state
+
+    def show(self, frame: Frame) -> None:
+        """Nothing to show."""
+
+
+def _toggled(name: str) -> Update:
+    """Give the update that turns a switch of what is drawn."""
+    return lambda state: state.with_shown(**{name: not getattr(state.shown, name)})
+
+
+def spell_change(what: str) -> str:
+    """Say in words what `describe_change` has found.
+
+    Parameters
+    ----------
+    what : str
+        For instance "amplitudes.EAX".
+    """
+    words: list[str] = []
+    for path in what.split(", "):
+        parts = path.split(".")
+        name = next((part for part in reversed(parts) if part in PARAMETERS), "")
+        place = WORDS.get(parts[0], parts[-1].replace("_", " "))
+        word = PARAMETERS[name].name if name and parts[0] != "scene" else place
+        if parts[0] == "positions" and len(parts) > 1:
+            word = f"position of {parts[1]}"
+        elif parts[0] == "shown":
+            word = parts[-1].replace("_", " ")
+        words.append(f"tolerance of {word}" if parts[0] == "tolerances" and name else word)
+    unique = list(dict.fromkeys(words))
+    if "scene" in unique:
+        errors = [parts for parts in unique if parts in {row.name for row in PARAMETERS.values()}]
+        unique = errors if len(errors) == 1 else ["scene"]
+    return unique[0] if len(unique) == 1 else f"{unique[0]} and {len(unique) - 1} more"
+
+
+def help_text(commands: tuple[Command, ...]) -> str:
+    """Write the help: what the mouse does, and all keys."""
+    rows = "\n".join(
+        f"| **{command.keys}** | {command.label.replace('|', chr(92) + '|')} "
+        f"| {command.description} |"
+        for command in commands
+        if command.keys
+    )
+    return (
+        "Drag to turn the view, drag with the right button to move it, wheel to zoom. Every"
+        " control explains itself when the mouse rests on it.\n\n"
+        "| key | does | |\n|---|---|---|\n"
+        "| **Ctrl + K** | Command palette | All of this by name |\n"
+        "| **← →** | Slider with focus | One step |\n"
+        f"{rows}\n\n"
+        "Keys act when no text box has the focus. After a dropped connection the tab finds its"
+        " state again for ten minutes."
+    )
+
+
+def hint_script(text: str = HINT, seconds: float = HINT_SECONDS) -> str:
+    """Write the script of the hint a browser shows on its first visit, and only then.
+
+    Returns
+    -------
+    str
+        JavaScript: a line at the bottom of the page that takes no clicks and leaves by itself,
+        at the latest with the first thing done.
+    """
+    style = (
+        "position:fixed;left:50%;bottom:28px;transform:translateX(-50%);z-index:50;"
+        "padding:9px 18px;border-radius:8px;background:rgba(24,32,46,.9);color:#fff;"
+        "font:14px/1.4 system-ui,sans-serif;pointer-events:none;transition:opacity .8s;"
+        "white-space:pre;max-width:90vw"
+    )
+    return f"""(() => {{
+  const key = "warpspace-visited";
+  try {{ if (localStorage.getItem(key)) return; localStorage.setItem(key, "1"); }} catch {{}}
+  const hint = document.createElement("div");
+  hint.id = "warpspace-hint";
+  hint.setAttribute("role", "status");
+  hint.style.cssText = {json.dumps(style)};
+  hint.textContent = {json.dumps(text)};
+  document.body.append(hint);
+  const leave = () => {{ hint.style.opacity = 0; setTimeout(() => hint.remove(), 900); }};
+  setTimeout(leave, {1000 * seconds:g});
+  for (const what of ["pointerdown", "keydown"])
+    addEventListener(what, leave, {{ once: true, capture: true }});
+}})();"""
