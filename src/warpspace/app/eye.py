@@ -3,12 +3,14 @@
 import numpy as np
 from viser import ClientHandle
 
-from warpspace.app.camera import fit_camera
+from warpspace.app.cameras import TELEPHOTO_DEG, VIEWS, Stand, change_lens, clipping, view_pose
 from warpspace.app.layers import SCENE_PER_MM
 from warpspace.app.layers.axes import axes_room_mm
 from warpspace.app.live import Frame
+from warpspace.app.machine import machine_room_mm
 from warpspace.app.panels.layout import HEADING_HEIGHT, side_widths
 from warpspace.app.tabs import CameraMemory
+from warpspace.units import Array
 
 LEAST_SIZE = 200
 """CSS pixels of a picture that is taken to be one."""
@@ -24,6 +26,54 @@ class Eye:
 
     def __init__(self, client: ClientHandle) -> None:
         self._camera = client.camera
+        self._stand = Stand()
+
+    @property
+    def stand(self) -> Stand:
+        """Named view and lens that were chosen last."""
+        return self._stand
+
+    def choose(self, frame: Frame, view: str | None = None, lens: bool | None = None) -> None:
+        """Take a named view, or another lens from where the camera stands.
+
+        Parameters
+        ----------
+        frame : Frame
+        view : str or None
+            A key of `warpspace.app.cameras.VIEWS`; None stays, or with no lens goes back to it.
+        lens : bool or None
+            Whether to be orthographic; None stays.
+        """
+        if view is not None and view not in VIEWS:
+            return
+        stand = self._stand
+        orthographic = stand.orthographic if lens is None else lens
+        self._stand = Stand(view or stand.view, orthographic)
+        if view is not None or lens is None:
+            self.fit(frame, docked=True)
+        elif orthographic != stand.orthographic:
+            self._change_lens(frame)
+
+    def _change_lens(self, frame: Frame) -> None:
+        """Go to the other field of view; what is looked at keeps its size."""
+        camera, fov = self._camera, float(np.deg2rad(self._stand.fov_deg))
+        position = change_lens(camera.position, camera.look_at, camera.fov, fov)
+        self._clip(position, self._room_mm(frame))
+        camera.fov = fov
+        camera.position = position
+
+    def _clip(self, position: Array, points_mm: Array) -> None:
+        """Set the clipping planes for a position in scene units."""
+        near, far = clipping(
+            position, points_mm * SCENE_PER_MM, orthographic=self._stand.orthographic
+        )
+        self._camera.near, self._camera.far = near, far
+
+    def _room_mm(self, frame: Frame) -> Array:
+        """Give points around all that is to be seen, mm."""
+        if frame.state.machine.shown:
+            return np.concatenate([machine_room_mm(frame), frame.drawn_mm.reshape(-1, 3)])
+        return np.concatenate([axes_room_mm(frame), frame.drawn_mm.reshape(-1, 3)])
 
     def fit(self, frame: Frame, *, docked: bool) -> None:
         """Fill the room between the panels with the box, its traces and axes.
@@ -38,8 +88,9 @@ class Eye:
         taken = 0 if docked else sum(side_widths())
         width = max(camera.image_width - taken, LEAST_SIZE)
         height = max(camera.image_height, LEAST_SIZE)
-        points = np.concatenate([axes_room_mm(frame), frame.drawn_mm.reshape(-1, 3)])
-        pose = fit_camera(points, width / height, top=min(HEADING_HEIGHT / height, 0.3))
+        points = self._room_mm(frame)
+        pose = view_pose(points, width / height, self._stand, min(HEADING_HEIGHT / height, 0.3))
+        self._clip(pose.position * SCENE_PER_MM, points)
         camera.up_direction = (0.0, 0.0, 1.0)
         camera.fov = pose.fov_rad
         camera.position = pose.position * SCENE_PER_MM
@@ -59,6 +110,9 @@ class Eye:
         """Put it where it stood."""
         camera = self._camera
         camera.up_direction = memory.up
+        telephoto = memory.fov_rad < np.deg2rad(2.0 * TELEPHOTO_DEG)
+        self._stand = Stand(self._stand.view, telephoto)
+        self._clip(np.array(memory.position), np.array([memory.look_at]) / SCENE_PER_MM)
         camera.fov = memory.fov_rad
         camera.position = memory.position
         camera.look_at = memory.look_at

@@ -5,10 +5,13 @@ errors come from the model and not from interpolation between the nodes of the v
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.field.grid import DEFAULT_NODES, Grid, Workspace, build_grid
-from warpspace.kinematics.model import Model
+from warpspace.kinematics import transforms
+from warpspace.kinematics.chain import branch_pose
+from warpspace.kinematics.model import Model, complete_coordinates
 from warpspace.machine.parameters import LINEAR_AXES
 
 PLANES: Mapping[str, str] = {"X": "YZ", "Y": "XZ", "Z": "XY"}
@@ -77,4 +80,18 @@ def build_slice(
     low, high = ranges[axis]
     if not low <= position_mm <= high:
         raise OptionError(f"slice at {axis} = {position_mm:g} mm; expected {low:g} to {high:g} mm")
-    return build_grid(model, workspace.moved({axis: position_mm}), nodes)
+    grid = build_grid(model, workspace.moved({axis: position_mm}), nodes)
+    if axis not in {found.name for found in model.machine.branch("workpiece")}:
+        return grid
+    # the slice is drawn where the whole volume is: with the table in the middle of its range
+    here, home = (
+        branch_pose(model, "workpiece", complete_coordinates(model.machine, positions))
+        for positions in (
+            workspace.moved({axis: position_mm}).positions,
+            workspace.positions,
+        )
+    )
+    return replace(
+        grid,
+        nominal_mm=transforms.apply(home @ transforms.inverse(here), grid.nominal_mm),
+    )

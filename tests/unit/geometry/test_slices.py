@@ -4,8 +4,11 @@ import pytest
 import warpspace
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.field.evaluate import evaluate_first_order
+from warpspace.field.grid import Workspace, build_grid
 from warpspace.geometry.faces import outer_faces
 from warpspace.geometry.slices import PLANES, build_slice, slice_ranges
+from warpspace.kinematics.model import Model
+from warpspace.machine.description import build_machine
 from warpspace.scene.pipeline import grid_basis
 
 
@@ -52,3 +55,16 @@ def test_slice_outside_the_volume_is_refused(scene):
         build_slice(scene.model, scene.workspace, "X", float("nan"))
     with pytest.raises(UnknownNameError):
         build_slice(scene.model, scene.workspace, "B", 0.0)
+
+
+@pytest.mark.parametrize("chain", ["wXYFZt", "wYFXZt", "wCXFZYt"])
+def test_slice_of_a_moving_table_lies_in_the_volume(chain):
+    model = Model(build_machine(chain))
+    workspace = Workspace({"X": (-100.0, 200.0), "Y": (-50.0, 60.0), "Z": (10.0, 90.0)})
+    whole = build_grid(model, workspace, 5)
+    for axis, at in (("X", 3), ("Y", 1), ("Z", 0)):
+        index = "XYZ".index(axis)
+        position = float(np.ravel(whole.coordinates[axis])[at])
+        part = build_slice(model, workspace, axis, position, 5)
+        expected = np.take(whole.nominal_mm, [at], axis=index)
+        assert part.nominal_mm == pytest.approx(expected, abs=1e-9)

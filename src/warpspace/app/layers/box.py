@@ -5,31 +5,31 @@ from numpy.typing import NDArray
 from viser import SceneApi
 
 from warpspace.app.glb import build_glb
-from warpspace.app.layers import SCENE_PER_MM, colour_bytes, palette, pieces
+from warpspace.app.layers import SCENE_PER_MM, colour_bytes, palette
 from warpspace.app.live import Frame
-from warpspace.app.tonemap import vertex_colours
+from warpspace.app.mapmesh import (
+    edge_colours,
+    edge_pieces,
+    grid_colours,
+    grid_pieces,
+    isoline_pieces,
+    map_mesh,
+)
+from warpspace.app.tonemap import Rgb, vertex_colours
 from warpspace.geometry.surfaces import box_edges
 from warpspace.units import Array
 
 SURFACE = "/box/surface"
-LIFT = 0.0012
-"""How far lines are lifted off the surface, as a part of the longest edge."""
 DASH, GAP = 0.022, 0.014
 """Dash and gap of the nominal box, as parts of the longest edge."""
+LIGHT_ISOLINE: Rgb = (226, 230, 236)
+DARK_ISOLINE: Rgb = (60, 68, 80)
 
 
 def surface_glb(frame: Frame) -> bytes:
-    """Write the coloured surface of a frame, vertices in mm."""
-    surface = frame.topology.surface
-    values = frame.values.reshape(-1)[surface.nodes]
-    vertices = frame.drawn_mm.reshape(-1, 3)[surface.nodes]
-    return build_glb(vertices, surface.triangles, vertex_colours(frame.scale, values))
-
-
-def lifted_mm(frame: Frame, times: float = 1.0) -> Array:
-    """Give the displaced nodes a little outside the surface, [N, 3], mm."""
-    lift = LIFT * frame.grid.longest_edge_mm * times
-    return frame.drawn_mm.reshape(-1, 3) + lift * frame.topology.outwards
+    """Write the coloured map of a frame, vertices in mm."""
+    mesh = map_mesh(frame)
+    return build_glb(mesh.vertices_mm, mesh.triangles, vertex_colours(frame.scale, mesh.values))
 
 
 def dashes(points: Array, dash: float, gap: float) -> NDArray[np.float32]:
@@ -87,7 +87,7 @@ class BoxLayer:
         )
         self._grid = scene.add_line_segments(
             "/box/grid",
-            pieces(lifted_mm(frame), frame.topology.grid_segments),
+            grid_pieces(frame),
             colour_bytes(colours.grid),
             thickness=0.7,
             thickness_units="screen",
@@ -95,11 +95,20 @@ class BoxLayer:
         )
         self._edges = scene.add_line_segments(
             "/box/edges",
-            pieces(lifted_mm(frame, 1.5), frame.topology.edge_segments),
+            edge_pieces(frame),
             colour_bytes(colours.edge),
             thickness=1.8,
             thickness_units="screen",
             scale=SCENE_PER_MM,
+        )
+        self._isolines = scene.add_line_segments(
+            "/box/isolines",
+            np.zeros((1, 2, 3), np.float32),
+            colour_bytes(isoline_colour(frame)),
+            thickness=1.4,
+            thickness_units="screen",
+            scale=SCENE_PER_MM,
+            visible=False,
         )
         self._ghost = scene.add_line_segments(
             "/ghost",
@@ -110,21 +119,33 @@ class BoxLayer:
             scale=SCENE_PER_MM,
         )
 
+        self.show(frame)
+
     def show(self, frame: Frame) -> None:
         """Move vertices, colours and lines."""
-        colours, shown = palette(frame), frame.state.shown
-        self._surface.glb_data = surface_glb(frame)
-        self._grid.visible = shown.grid_lines
-        if shown.grid_lines:
-            self._grid.points = pieces(lifted_mm(frame), frame.topology.grid_segments)
-        self._edges.points = pieces(lifted_mm(frame, 1.5), frame.topology.edge_segments)
+        colours, shown, look = palette(frame), frame.state.shown, frame.state.look
+        lines_only = look.surface == "grid"
+        self._surface.visible = not lines_only
+        if not lines_only:
+            self._surface.glb_data = surface_glb(frame)
+        self._grid.visible = shown.grid_lines or lines_only
+        if self._grid.visible:
+            self._grid.points = grid_pieces(frame)
+            self._grid.thickness = 1.4 if lines_only else 0.7
+            self._grid.colors = grid_colours(frame) if lines_only else colour_bytes(colours.grid)
+        self._edges.points = edge_pieces(frame)
+        self._edges.colors = edge_colours(frame) if lines_only else colour_bytes(colours.edge)
+        self._isolines.visible = look.isolines and not lines_only
+        if self._isolines.visible:
+            self._isolines.points = isoline_pieces(frame)
+            self._isolines.colors = colour_bytes(isoline_colour(frame))
         self._ghost.visible = shown.ghost
         if frame.grid.nominal_mm is not self._nominal:
             self._nominal = frame.grid.nominal_mm
             self._ghost.points = ghost_dashes(frame)
-        for handle, rgb in (
-            (self._grid, colours.grid),
-            (self._edges, colours.edge),
-            (self._ghost, colours.ghost),
-        ):
-            handle.colors = colour_bytes(rgb)
+        self._ghost.colors = colour_bytes(colours.ghost)
+
+
+def isoline_colour(frame: Frame) -> Rgb:
+    """Choose a line that is seen on every colour of the scale."""
+    return DARK_ISOLINE if frame.scale.diverging else LIGHT_ISOLINE

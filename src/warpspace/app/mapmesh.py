@@ -1,0 +1,153 @@
+"""The coloured map of a frame as triangles and pieces of line: whole, cut open, or in slices."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpspace.app.facets import Topology, topology
+from warpspace.app.live import Frame
+from warpspace.app.tonemap import vertex_colours
+from warpspace.geometry.isolines import isoline_levels, isoline_segments
+from warpspace.units import Array
+
+LIFT = 0.0012
+"""How far grid lines are lifted off the surface, as a part of the longest edge."""
+EDGE_LIFT, ISOLINE_LIFT = 1.5, 1.25
+"""Edges and isolines, in multiples of that."""
+Pieces = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True)
+class MapMesh:
+    """What is drawn of a map, mm in R.
+
+    Attributes
+    ----------
+    vertices_mm : ndarray, [M, 3], mm
+    triangles : ndarray, [T, 3]
+    values : ndarray, [M]
+        What is coloured, in the unit of the frame's scale.
+    """
+
+    vertices_mm: Array
+    triangles: NDArray[np.intp]
+    values: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One grid of a map: the volume, or a slice."""
+
+    drawn_mm: Array
+    values: Array
+    drawn_of: Topology
+    lifts: tuple[float, ...]
+
+    def lifted(self, times: float) -> list[Array]:
+        """Give the nodes off the surface, on each side that is seen, [N, 3] each, mm."""
+        flat = self.drawn_mm.reshape(-1, 3)
+        return [flat + lift * times * self.drawn_of.outwards for lift in self.lifts]
+
+
+def map_parts(frame: Frame) -> list[Part]:
+    """List the grids that a map consists of; a slice is seen from both sides."""
+    lift = LIFT * frame.grid.longest_edge_mm
+    if not frame.slices:
+        return [Part(frame.drawn_mm, frame.values, frame.topology, (lift,))]
+    return [
+        Part(part.drawn_mm, part.values, topology(part.grid.shape), (lift, -lift))
+        for part in frame.slices
+    ]
+
+
+def map_mesh(frame: Frame) -> MapMesh:
+    """Collect the triangles of a map.
+
+    Parameters
+    ----------
+    frame : Frame
+
+    Returns
+    -------
+    MapMesh
+    """
+    vertices: list[Array] = []
+    triangles: list[NDArray[np.intp]] = []
+    values: list[Array] = []
+    count = 0
+    for part in map_parts(frame):
+        surface = part.drawn_of.surface
+        vertices.append(part.drawn_mm.reshape(-1, 3)[surface.nodes])
+        values.append(part.values.reshape(-1)[surface.nodes])
+        triangles.append(surface.triangles + count)
+        count += len(surface.nodes)
+    return MapMesh(np.concatenate(vertices), np.concatenate(triangles), np.concatenate(values))
+
+
+def grid_pieces(frame: Frame) -> Pieces:
+    """Collect the grid lines on a map, [S, 2, 3], mm."""
+    return _joined(
+        [
+            nodes[part.drawn_of.grid_segments]
+            for part in map_parts(frame)
+            for nodes in part.lifted(1.0)
+        ]
+    )
+
+
+def grid_colours(frame: Frame) -> NDArray[np.uint8]:
+    """Colour the ends of the grid lines by their values, [S, 2, 3]."""
+    return _coloured(
+        frame,
+        [
+            part.values.reshape(-1)[part.drawn_of.grid_segments]
+            for part in map_parts(frame)
+            for _ in part.lifts
+        ],
+    )
+
+
+def edge_colours(frame: Frame) -> NDArray[np.uint8]:
+    """Colour the ends of the edges by their values, [S, 2, 3]."""
+    return _coloured(
+        frame,
+        [part.values.reshape(-1)[part.drawn_of.edge_segments] for part in map_parts(frame)],
+    )
+
+
+def _coloured(frame: Frame, values: list[Array]) -> NDArray[np.uint8]:
+    """Turn values at the ends of pieces of line into bytes of line colours, [S, 2, 3]."""
+    linear = vertex_colours(frame.scale, np.concatenate(values))
+    return np.rint(np.clip(linear, 0.0, 1.0) * 255.0).astype(np.uint8)
+
+
+def edge_pieces(frame: Frame) -> Pieces:
+    """Collect the edges of a map, [S, 2, 3], mm."""
+    return _joined(
+        [
+            nodes[part.drawn_of.edge_segments]
+            for part in map_parts(frame)
+            for nodes in part.lifted(EDGE_LIFT)[:1]
+        ]
+    )
+
+
+def isoline_pieces(frame: Frame) -> Pieces:
+    """Collect the lines of equal value on a map, at the ticks of its scale, [S, 2, 3], mm."""
+    levels = isoline_levels(frame.scale)
+    found: list[Array] = []
+    for part in map_parts(frame):
+        nodes, values = part.drawn_mm.reshape(-1, 3), part.values.reshape(-1)
+        faces, normals = part.drawn_of.faces, part.drawn_of.normals
+        found += [
+            isoline_segments(faces, nodes, values, levels, ISOLINE_LIFT * lift * normals)
+            for lift in part.lifts
+        ]
+    return _joined(found)
+
+
+def _joined(parts: list[Array]) -> Pieces:
+    """Put pieces of line together; one without length where there are none (viser wants some)."""
+    kept = [part for part in parts if len(part)]
+    return np.concatenate(kept).astype(np.float32) if kept else np.zeros((1, 2, 3), np.float32)
