@@ -181,6 +181,15 @@ class Machine:
         return default_keys(self.chain.axes)
 
     @property
+    def reference_keys(self) -> tuple[str, ...]:
+        """Keys of the rotations of the reference axis, which the frame R absorbs by definition.
+
+        The reference axis is the first of X Y Z that the machine has.
+        """
+        linear = [axis for axis in LINEAR_AXES if axis in self.axes]
+        return tuple(f"E{letter}0{axis}" for axis in linear[:1] for letter in "ABC")
+
+    @property
     def allowed_keys(self) -> tuple[str, ...]:
         """Keys of all parameters that may be given, every constant of every axis included."""
         return tuple(key for key, row in PARAMETERS.items() if row.axis in self.axes)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from warpspace.exceptions import SceneError
+from warpspace.exceptions import SceneError, near_miss
 from warpspace.field.grid import Workspace
 from warpspace.kinematics.model import ComponentErrors, Model
 from warpspace.machine import errors as functions
@@ -79,6 +79,7 @@ def build_scene(
     points = problems.validate("points_mm", "points_mm", raw.get("points_mm", {}))
     view = problems.validate("view", "view", raw.get("view", {}))
     workspace = _workspace(problems.table("workspace", raw.get("workspace")), machine, problems)
+    _reference_axis(raw, machine, convention, problems)
     errors = _errors(raw.get("errors"), machine, workspace, folder, problems)
     tolerances = _tolerances(raw.get("tolerances"), machine, problems)
     reference = _reference(view, workspace, problems)
@@ -133,6 +134,23 @@ def _known_parameters(raw: object, section: str, machine: Machine, problems: Pro
         else:
             known[key] = value
     return known
+
+
+def _reference_axis(raw: Raw, machine: Machine, convention: Any, problems: Problems) -> None:
+    """Refuse rotations of the reference axis, nearly always a slip, unless the file frees it."""
+    if convention is None or convention.reference_axis == "free":
+        return
+    usual = [key for key in machine.parameter_keys if key[2] == "0"]
+    for section in ("errors", "tolerances"):
+        table = raw.get(section)
+        for key in table if isinstance(table, dict) else ():
+            if key in machine.reference_keys:
+                problems.add(
+                    f"{section}.{key}",
+                    f"is zero by definition of the frame, {key[3]} being the reference axis"
+                    f'{near_miss(key, usual)} ([convention] reference_axis = "free" allows it)',
+                    table[key],
+                )
 
 
 def _errors(

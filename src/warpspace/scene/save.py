@@ -45,9 +45,10 @@ def scene_to_toml(scene: Scene) -> str:
     parts = [tomli_w.dumps(head, multiline_strings="\r" not in scene.description)]
     if not bundled:
         parts += _machine_sections(scene.machine)
-    parts.append(
-        _section("convention", {"component_errors": str(scene.model.component_errors.value)})
-    )
+    convention = {"component_errors": str(scene.model.component_errors.value)}
+    if {*scene.machine.reference_keys} & {*scene.errors, *scene.tolerances.own}:
+        convention["reference_axis"] = "free"
+    parts.append(_section("convention", convention))
     ranges = {
         axis: low if low == high else [low, high]
         for axis, (low, high) in scene.workspace.ranges.items()

@@ -164,9 +164,10 @@ class MachineSection(Section):
 
 
 class ConventionSection(Section):
-    """Where component errors sit."""
+    """Where component errors sit, and whether the reference axis itself may be out of direction."""
 
     component_errors: Literal["after_motion", "before_motion"] = "after_motion"
+    reference_axis: Literal["fixed", "free"] = "fixed"
 
 
 class PointsSection(Section):

@@ -10,6 +10,7 @@ from warpspace.kinematics.model import ComponentErrors
 from warpspace.machine.errors import Constant, Harmonics, Poly, Ramp, Table
 from warpspace.machine.tolerances import Tolerance
 from warpspace.scene.library import parse_scene
+from warpspace.scene.save import scene_to_toml
 
 DVF = 'machine = "dvf5000"\n'
 
@@ -75,9 +76,16 @@ def test_own_machine_takes_offsets_travels_and_directions() -> None:
 
 
 def test_constant_beyond_the_default_ones_becomes_a_parameter_of_the_scene() -> None:
-    scene = parse_scene(DVF + "[errors]\nEC0X = 5\n[tolerances]\nEY0X = 3\n", "x")
+    free = '[convention]\nreference_axis = "free"\n[errors]\nEC0X = 5\n[tolerances]\nEY0X = 3\n'
+    scene = parse_scene(DVF + free, "x")
     assert len(scene.parameter_keys) == 43
     assert {"EC0X", "EY0X"} < set(scene.parameter_keys)
+    assert parse_scene(scene_to_toml(scene), "x") == scene
+
+
+def test_rotation_of_the_reference_axis_is_taken_for_a_slip() -> None:
+    with pytest.raises(SceneError, match=r"EC0X = 5: .* did you mean 'EC0Y'.*reference_axis"):
+        parse_scene(DVF + "[errors]\nEC0X = 5\nEX0X = 1\n", "x")
 
 
 def test_tolerances_are_a_half_width_or_a_range() -> None:
