@@ -142,14 +142,13 @@ def _reference_axis(raw: Raw, machine: Machine, convention: Any, problems: Probl
         return
     usual = [key for key in machine.parameter_keys if key[2] == "0"]
     for section in ("errors", "tolerances"):
-        table = raw.get(section)
-        for key in table if isinstance(table, dict) else ():
+        for key, value in Problems().table(section, raw.get(section)).items():
             if key in machine.reference_keys:
                 problems.add(
                     f"{section}.{key}",
                     f"is zero by definition of the frame, {key[3]} being the reference axis"
                     f'{near_miss(key, usual)} ([convention] reference_axis = "free" allows it)',
-                    table[key],
+                    value,
                 )
 
 
