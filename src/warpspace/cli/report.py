@@ -83,7 +83,7 @@ def report(
         loaded,
         target,
         settings,
-        embed=_embed,
+        embed=embed_view,
         files=[scene_path(scene) for scene in scenes],
         overwrite=force,
     )
@@ -91,7 +91,9 @@ def report(
     click.echo(f"{output}: design review of {titles}, {target.stat().st_size / 1e6:.2f} MB")
 
 
-def _embed(scene: "Scene", *, exaggeration: float, nodes: int, loop: str, largest: float) -> str:
+def embed_view(
+    scene: "Scene", *, exaggeration: float, nodes: int, loop: str, largest: float
+) -> str:
     """Build the page with the interactive scene; outputs know nothing of the app."""
     from warpspace.app.offline import build_offline_html, offline_frame
     from warpspace.kinematics.model import Loop

@@ -56,17 +56,22 @@ class Painter:
             If nothing can be drawn on this system.
         """
         scenes = [reviewed.scene for reviewed in self._review.scenes]
-        if len(scenes) == 2 and self._has("comparison"):
+        if self._compares:
             caption = f"A, B and their difference; {factor_words(self._review.exaggeration)}."
             return self._map("comparison", scenes, caption)
         return self._map("error-map", scenes[:1], self._map_caption(scenes[0]))
+
+    @property
+    def _compares(self) -> bool:
+        """Whether two scenes are drawn beside each other on the page read first."""
+        return len(self._review.scenes) == 2 and self._has("comparison")
 
     def evidence(self, reviewed: Reviewed) -> list[Block]:
         """Draw the maps of one scene: its error map and whatever else the catalogue has."""
         scene = reviewed.scene
         wanted = [(name, caption) for name, caption in MAPS.items() if self._has(name)]
         found: list[Block] = []
-        if len(self._review.scenes) == 2:
+        if reviewed is not self._review.scenes[0] or self._compares:
             wanted.insert(0, ("error-map", self._map_caption(scene)))
         for name, caption in wanted:
             try:
@@ -85,7 +90,7 @@ class Painter:
         figure = gains_chart(
             shown, f"{prefix}Error gains", self._loop_words(reviewed), DEFAULT_SHARE
         )
-        return self._chart("gains", figure, f"{prefix}gains of the {len(shown)} largest errors.")
+        return self._chart("gains", figure, f"{prefix}Gains of the {len(shown)} largest errors.")
 
     def chance(self, reviewed: Reviewed, prefix: str) -> list[Block]:
         """Histogram of sampled machines and bars of what their variance comes from."""
@@ -104,8 +109,8 @@ class Painter:
             shares, f"{prefix}Which tolerances matter", self._loop_words(reviewed)
         )
         return [
-            self._chart("montecarlo", figure, f"{prefix}volumetric error of sampled machines."),
-            self._chart("variance", bars, f"{prefix}shares of the variance."),
+            self._chart("montecarlo", figure, f"{prefix}Volumetric error of sampled machines."),
+            self._chart("variance", bars, f"{prefix}Shares of the variance."),
         ]
 
     def _loop_words(self, reviewed: Reviewed) -> str:
@@ -114,7 +119,8 @@ class Painter:
 
     def _map_caption(self, scene: Scene) -> str:
         """Caption of an error map."""
-        return f"Error map of {scene.title}; {factor_words(self._review.exaggeration)}."
+        own = "; colour scale of its own" if len(self._review.scenes) == 2 else ""
+        return f"Error map of {scene.title}; {factor_words(self._review.exaggeration)}{own}."
 
     @staticmethod
     def _has(name: str) -> bool:

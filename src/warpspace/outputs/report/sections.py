@@ -56,9 +56,9 @@ def _cards(review: Review) -> list[Card]:
     if len(review.scenes) == 2:
         a, b = (reviewed.statistics for reviewed in review.scenes)
         found = [
-            Card("mean, A → B", f"{spell(a.mean_um)} → {spell(b.mean_um)} {MICROMETRE}"),
-            Card("P95, A → B", f"{spell(a.p95_um)} → {spell(b.p95_um)} {MICROMETRE}"),
-            Card("max, A → B", f"{spell(a.max_um)} → {spell(b.max_um)} {MICROMETRE}"),
+            Card(f"mean, A → B, {MICROMETRE}", f"{spell(a.mean_um)} → {spell(b.mean_um)}"),
+            Card(f"P95, A → B, {MICROMETRE}", f"{spell(a.p95_um)} → {spell(b.p95_um)}"),
+            Card(f"max, A → B, {MICROMETRE}", f"{spell(a.max_um)} → {spell(b.max_um)}"),
         ]
         if review.difference is not None:
             largest = microns(review.difference.max_um)

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from warpspace.analysis.explain import Contribution
 from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import ErrorFunction, Harmonics, Poly, Ramp, Table
-from warpspace.machine.parameters import parameter
+from warpspace.machine.parameters import LINEAR_AXES, parameter
 from warpspace.outputs.report.review import Chance, Review, Reviewed
 from warpspace.outputs.words import MINUS, TIMES, spell, spell_factor, spell_short
 from warpspace.scene.model import Scene
@@ -16,6 +16,8 @@ SUBJECTS = {
     "workpiece": "the workpiece point",
     "relative": "the tool, relative to the workpiece,",
 }
+NBSP = "\N{NO-BREAK SPACE}"
+"""Keeps a number and its unit on one line."""
 _NAMED = 3
 _LEAST_SHARE = 0.05
 
@@ -37,30 +39,25 @@ def _signed(text: str) -> str:
 
 def microns(value: float) -> str:
     """Spell a length in µm."""
-    return f"{spell(value)} {MICROMETRE}"
+    return f"{spell(value)}{NBSP}{MICROMETRE}"
 
 
 def limit(value: float) -> str:
     """Spell a specification in µm."""
-    return f"{spell_short(value)} {MICROMETRE}"
+    return f"{spell_short(value)}{NBSP}{MICROMETRE}"
 
 
 def percent(share: float, digits: int = 1) -> str:
     """Spell a share in per cent."""
-    return f"{100.0 * share:.{digits}f} %".replace("-", MINUS)
+    return f"{100.0 * share:.{digits}f}{NBSP}%".replace("-", MINUS)
 
 
 def place(at: Mapping[str, float]) -> str:
     """Spell axis positions, for instance ``X 275, Y −225, Z −480 mm, B 0°``."""
-    linear = [
-        f"{name} {value:.6g}".replace("-", MINUS) for name, value in at.items() if name in "XYZ"
-    ]
-    rotary = [
-        f"{name} {value:.6g}°".replace("-", MINUS)
-        for name, value in at.items()
-        if name not in "XYZ"
-    ]
-    return ", ".join([", ".join(linear) + " mm" if linear else "", *rotary]).strip(", ")
+    spelt = {name: f"{name}{NBSP}{value:.6g}".replace("-", MINUS) for name, value in at.items()}
+    linear = [text for name, text in spelt.items() if name in LINEAR_AXES]
+    rotary = [f"{text}°" for name, text in spelt.items() if name not in LINEAR_AXES]
+    return ", ".join([", ".join(linear) + f"{NBSP}mm" if linear else "", *rotary]).strip(", ")
 
 
 def worst_place(reviewed: Reviewed) -> str:
@@ -158,14 +155,31 @@ def _two(review: Review) -> list[str]:
         if causes:
             at = worst_place(reviewed)
             sentences.append(f"In {letter} the worst point is {at}, caused by {listed(causes)}.")
-    spec = review.settings.spec_um
-    if spec is not None:
-        keeps = [
-            f"{letter} {'keeps' if stats.max_um <= spec else 'does not keep'}"
-            for letter, stats in (("A", a), ("B", b))
-        ]
-        sentences.append(f"Of a specification of {limit(spec)}, {listed(keeps)} every point.")
+    if review.settings.spec_um is not None:
+        sentences.append(_kept(review, review.settings.spec_um))
     return sentences
+
+
+def _kept(review: Review, spec_um: float) -> str:
+    """Say which of two scenes keeps the specification, and how likely others like them do."""
+    first, second = review.scenes
+    keeps = [scene.statistics.max_um <= spec_um for scene in review.scenes]
+    what = f"the specification of {limit(spec_um)}"
+    if all(keeps):
+        sentence = f"Both keep {what} everywhere."
+    elif not any(keeps):
+        sentence = f"Neither keeps {what} everywhere."
+    else:
+        sentence = f"{'A' if keeps[0] else 'B'} keeps {what} everywhere, the other does not."
+    if first.chance is None or second.chance is None:
+        return sentence
+    a, b = first.chance.worst.probability, second.chance.worst.probability
+    if a is None or b is None:
+        return sentence
+    return (
+        f"{sentence} Of machines that their tolerances allow, {percent(a.probability)} (A) and"
+        f" {percent(b.probability)} (B) would keep it."
+    )
 
 
 def chance_sentence(chance: Chance) -> str:

@@ -1,0 +1,314 @@
+"""The design review: what it says, that it needs nothing else, and that it prints."""
+
+import os
+import re
+import resource
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from warpspace import evaluate, load_scene
+from warpspace.exceptions import OptionError, RenderError
+from warpspace.outputs.report import ReportSettings, build_report, write_report
+from warpspace.outputs.report.blocks import Cards, Embedded, Table, Text
+from warpspace.outputs.report.page import render_html
+from warpspace.outputs.report.paper import render_pdf
+from warpspace.outputs.report.review import build_review
+from warpspace.outputs.report.wording import verdict
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+
+    from warpspace.outputs.report.blocks import Report
+    from warpspace.scene.model import Scene
+
+FAST = ReportSettings(grid=5, samples=2000, spec_um=50.0)
+EVIL = "</script><script>window.hacked=1</script><img src=x onerror='window.hacked=2'>&\"'#*_$[]"
+
+
+def warpspace(*arguments: str, limit_bytes: int | None = None) -> subprocess.CompletedProcess[str]:
+    """Run the command as a user does, with the size of files limited where asked."""
+
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit_bytes, limit_bytes))
+
+    return subprocess.run(
+        [sys.executable, "-m", "warpspace", *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=240,
+        preexec_fn=limit if limit_bytes is not None else None,
+        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
+    )
+
+
+def plain(text: str) -> str:
+    """Text with ordinary blanks."""
+    return text.replace("\N{NO-BREAK SPACE}", " ")
+
+
+def said(*scenes: "Scene", **changes) -> str:
+    """The verdict on scenes."""
+    return plain(verdict(build_review(scenes, replace(FAST, **changes))))
+
+
+def test_verdict_names_mean_max_place_and_cause() -> None:
+    text = said(load_scene("dvf5000_first"), grid=11)
+    assert "31.7 µm away from where it should be, and at most 51.7 µm" in text
+    assert "The worst point is X 275, Y −225, Z −480 mm" in text
+    assert "EA0Z (squareness of Z to Y) makes 95 %" in text
+    assert "specification of 50 µm is not kept" in text
+    assert re.search(r"[\d.]+ % keep the specification of 50 µm", text)
+
+
+def test_verdict_on_a_perfect_machine() -> None:
+    text = said(load_scene("dvf5000_nominal"))
+    assert "The error set is zero" in text
+    assert "nan" not in text
+
+
+def test_verdict_on_two() -> None:
+    text = said(load_scene("dvf5000_first"), load_scene("dvf5000_second"), grid=11)
+    assert "14.6 µm: 54 % less than A's 31.7 µm" in text
+    assert "B keeps the specification of 50 µm everywhere, the other does not" in text
+
+
+def test_contributions_add_up_to_the_worst_error() -> None:
+    scene = load_scene("dvf5000_first")
+    reviewed = build_review((scene,), FAST).scenes[0]
+    explanation = reviewed.explanation
+    total = sum(part.error_um for part in explanation.contributions) + explanation.remainder_um
+    np.testing.assert_allclose(total, explanation.error_um, atol=1e-9)
+    exact = evaluate(scene, at=reviewed.worst_at, exact=True)
+    np.testing.assert_allclose(explanation.error_um, exact.error_um, atol=1e-9)
+
+
+def test_difference_of_two_scenes_is_taken_as_vectors() -> None:
+    first, second = load_scene("dvf5000_first"), load_scene("dvf5000_second")
+    review = build_review((first, second), FAST)
+    apart = evaluate(second, grid=5).error_um - evaluate(first, grid=5).error_um
+    assert review.difference is not None
+    assert review.difference.max_um == pytest.approx(np.linalg.norm(apart, axis=-1).max())
+
+
+def test_more_than_two_scenes_and_none() -> None:
+    scene = load_scene("dvf5000_nominal")
+    for scenes in ((), (scene,) * 3):
+        with pytest.raises(OptionError, match="one scene or two"):
+            build_review(scenes, FAST)
+
+
+@pytest.fixture(scope="module")
+def both(renderer: str) -> "Report":
+    """The report of two scenes with figures for a page, and a stand-in for the interactive view."""
+    scenes = [load_scene("dvf5000_first"), load_scene("dvf5000_second")]
+    return build_report(scenes, FAST, embed=lambda scene, **_: f"<p>{scene.title}</p>")
+
+
+@pytest.mark.render
+def test_every_part_is_there(both: "Report") -> None:
+    headings = [section.heading for section in both.sections]
+    assert headings == [
+        "",
+        "Where the error is",
+        "Why the worst point is the worst",
+        "What differs",
+        "Errors and tolerances",
+        "How errors arrive at the point",
+        "What the tolerances promise",
+        "Conventions",
+        "Provenance",
+    ]
+    first = both.sections[0].blocks
+    assert isinstance(first[0], Text)
+    assert isinstance(first[1], Cards)
+    tables = [b for s in both.sections for b in s.blocks if isinstance(b, Table)]
+    for table in tables:
+        assert all(len(row) == len(table.columns) for row in table.rows)
+        assert not table.marks or len(table.marks) == len(table.rows)
+    assert sum(isinstance(b, Embedded) for b in both.sections[1].blocks) == 2
+    names = {picture.name for picture in both.pictures}
+    assert {"error-map", "gains", "montecarlo", "variance"} <= names
+
+
+@pytest.mark.render
+def test_out_of_tolerance_errors_are_marked(both: "Report") -> None:
+    table = next(b for b in both.sections[4].blocks if isinstance(b, Table))
+    marked = {row[0] for row, mark in zip(table.rows, table.marks, strict=True) if mark == "bad"}
+    assert marked == {"EAY", "EAZ", "EA0Z"}
+
+
+@pytest.mark.render
+def test_page_points_nowhere_and_escapes(renderer: str) -> None:
+    scene = replace(load_scene("dvf5000_first"), title=EVIL, name="<b>")
+    page = render_html(build_report([scene], FAST))
+    assert "<script>window" not in page
+    assert "<img src=x" not in page
+    outer = re.sub(r'(src|srcdoc)="[^"]*"', "", page)
+    assert not re.search(r"https?://|<link|@import|url\(", outer)
+
+
+@pytest.mark.render
+def test_pdf_repeats_and_says_everything(renderer: str, tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
+    scene = replace(load_scene("dvf5000_first"), title=EVIL)
+    first, second = (render_pdf(build_report([scene], FAST, form="pdf")) for _ in range(2))
+    assert first == second
+    assert first.startswith(b"%PDF-")
+    if shutil.which("pdftotext") is None:
+        return
+    (tmp_path / "a.pdf").write_bytes(first)
+    text = subprocess.run(
+        ["pdftotext", "-layout", str(tmp_path / "a.pdf"), "-"],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    pages = text.split("\f")[:-1]
+    assert len(pages) >= 4
+    for number, page in enumerate(pages, start=1):
+        assert re.search(rf"\b{number}\s*/\s*{len(pages)}\b", page)
+    assert "2023-11-14" in text
+    assert "#*_$[]" in text, "markup of the typesetter in a title is text"
+    flat = re.sub(r"\s+", " ", text)
+    for words in ("Why the worst point is the worst", "exact chain", "SHA-256", 'machine = "dvf'):
+        assert words in flat
+
+
+@pytest.mark.render
+def test_two_scenes_within_time_and_size(renderer: str, tmp_path: Path) -> None:
+    import time
+
+    for ending, most in (("html", 8_000_000), ("pdf", 8_000_000)):
+        target = tmp_path / f"a.{ending}"
+        start = time.perf_counter()
+        run = warpspace("report", "dvf5000_first", "dvf5000_second", "-o", str(target))
+        assert run.returncode == 0, run.stderr
+        assert time.perf_counter() - start <= 30.0
+        assert target.stat().st_size <= most
+
+
+@pytest.mark.render
+@pytest.mark.parametrize("loop", ["workpiece", "relative"])
+def test_other_loops_and_scenes_without_tolerances(loop: str, renderer: str, tmp_path) -> None:
+    path = tmp_path / "bare.toml"
+    path.write_text('title = "bare"\nmachine = "dvf5000"\n[errors]\nEXC = 4.0\n')
+    report = build_report([load_scene(path)], replace(FAST, loop=loop))
+    notes = [b.text for s in report.sections for b in s.blocks if isinstance(b, Text)]
+    assert any("no tolerances" in note for note in notes)
+
+
+@pytest.mark.render
+def test_a_machine_without_axes_in_the_loop(renderer: str, tmp_path: Path) -> None:
+    path = tmp_path / "three.toml"
+    path.write_text(
+        'title = "three axes"\n[machine]\nchain = "wFXYZt"\n[errors]\nEB0Z = 5.0\n'
+        "[tolerances]\ndefault = { translation = 1, rotation = 2, squareness = 3 }\n"
+    )
+    scene = load_scene(path)
+    write_report([scene], tmp_path / "a.html", replace(FAST, loop="workpiece"))
+    write_report([scene], tmp_path / "a.pdf", FAST)
+
+
+def test_without_a_renderer_nothing_is_written(tmp_path: Path, monkeypatch) -> None:
+    def crash(*_: object, **__: object) -> bytes:
+        raise RenderError("VTK cannot draw off screen here. Install libegl1 libgl1-mesa-dri.")
+
+    monkeypatch.setattr("warpspace.outputs.worker.FigureWorker.render", crash)
+    with pytest.raises(RenderError, match="libegl1"):
+        write_report([load_scene("dvf5000_first")], tmp_path / "a.html", FAST)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("-o", "a.docx"), "expected one of .html, .pdf"),
+        (("-o", "no/such/a.pdf"), "does not exist"),
+        (("-o", "there.html"), "exists already"),
+        (("-o", "a.html", "--spec-um", "-1"), "specification"),
+        (("-o", "a.html", "--samples", "0"), "samples"),
+        (("-o", "a.html", "--grid", "1"), "grid"),
+        (("-o", "a.html", "--exaggeration", "0"), "exaggeration"),
+        (("dvf5000_first", "dvf5000_first", "-o", "a.html"), "expected one, or two"),
+    ],
+)
+def test_bad_input_gives_one_message(arguments, words, tmp_path, monkeypatch) -> None:
+    (tmp_path / "there.html").write_text("mine")
+    monkeypatch.chdir(tmp_path)
+    run = warpspace("report", "dvf5000_first", *arguments)
+    assert run.returncode == 2
+    assert words in run.stderr
+    assert "Traceback" not in run.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["there.html"]
+
+
+@pytest.mark.render
+@pytest.mark.parametrize("ending", ["html", "pdf"])
+def test_full_disk_gives_one_message(ending: str, renderer: str, tmp_path: Path) -> None:
+    target = tmp_path / f"a.{ending}"
+    run = warpspace("report", "dvf5000_first", "-o", str(target), limit_bytes=150_000)
+    assert run.returncode == 2
+    assert "Traceback" not in run.stderr
+    assert len(run.stderr.strip().splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.browser
+@pytest.mark.render
+def test_page_opens_without_network_and_draws(browser: "Browser", renderer, tmp_path) -> None:
+    from warpspace.cli.report import embed_view
+
+    path = tmp_path / "report.html"
+    scene = replace(load_scene("dvf5000_first"), title=EVIL)
+    write_report([scene], path, FAST, embed=embed_view)
+    context = browser.new_context(viewport={"width": 1200, "height": 900}, offline=True)
+    page = context.new_page()
+    requests: list[str] = []
+    problems: list[str] = []
+    page.on("request", lambda request: requests.append(request.url))
+    page.on("pageerror", lambda error: problems.append(str(error)))
+    page.on("console", lambda entry: problems.append(entry.text) if entry.type == "error" else None)
+    page.goto(path.as_uri())
+    page.locator("iframe").scroll_into_view_if_needed()
+    canvas = page.frame_locator("iframe").frame_locator("iframe").locator("canvas").first
+    canvas.wait_for(state="visible", timeout=60_000)
+    drawn = 0
+    for _ in range(60):
+        page.wait_for_timeout(500)
+        drawn = coloured_pixels(canvas.screenshot())
+        if drawn > 5_000:
+            break
+    assert drawn > 5_000, "the interactive view is not drawn"
+    pictures = page.evaluate("Array.from(document.images, image => image.naturalWidth)")
+    assert pictures
+    assert min(pictures) > 0
+    assert page.evaluate("window.hacked") is None
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    assert problems == []
+    assert [url for url in requests if not url.startswith(("blob:", "data:", "about:"))] == [
+        path.as_uri()
+    ]
+    context.close()
+
+
+def coloured_pixels(png: bytes) -> int:
+    """Count pixels whose colour is one of the colour map's, within three levels."""
+    from io import BytesIO
+
+    from PIL import Image
+
+    from warpspace.geometry.colour import colour_table
+
+    shown = np.asarray(Image.open(BytesIO(png)).convert("RGB")).reshape(-1, 3).astype(np.int16)
+    key, counts = np.unique(shown, axis=0, return_counts=True)
+    table = colour_table().astype(np.int16)
+    near = np.abs(key[:, None] - table[None]).max(axis=-1).min(axis=-1) <= 3
+    return int(counts[near].sum())
