@@ -10,8 +10,10 @@ from warpspace.app.edits import axis_span
 from warpspace.app.live import Frame
 from warpspace.app.picked import Picked
 from warpspace.app.state import AppState
+from warpspace.field.grid import Grid
 from warpspace.geometry.deform import deform
 from warpspace.geometry.pick import pick_point, pick_surface
+from warpspace.geometry.surfaces import Index, outer_surface
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, nominal_point
 from warpspace.kinematics.model import Loop
@@ -79,25 +81,29 @@ def pick(frame: Frame, origin_mm: Array, direction: Array) -> Picked | None:
 
 
 def _on_surface(frame: Frame, origin: Array, unit: Array) -> tuple[Picked, float] | None:
-    """Intersect the drawn surface; give the point and its distance, mm."""
-    surface = frame.topology.surface
-    points = frame.drawn_mm.reshape(-1, 3)
-    hit = pick_surface(origin, unit, points[surface.nodes], surface.triangles)
-    if hit is None:
-        return None
-    nodes = surface.nodes[hit.vertices]
-    return _between_nodes(frame, nodes, hit.weights), hit.distance
+    """Intersect the drawn surface, or the slices; give the point and its distance, mm."""
+    drawn = [(frame.grid, frame.drawn_mm, frame.topology.surface)]
+    if frame.slices:
+        drawn = [(cut.grid, cut.drawn_mm, outer_surface(cut.grid.shape)) for cut in frame.slices]
+    best: tuple[Picked, float] | None = None
+    for grid, drawn_mm, surface in drawn:
+        points = drawn_mm.reshape(-1, 3)[surface.nodes]
+        hit = pick_surface(origin, unit, points, surface.triangles)
+        if hit is not None and (best is None or hit.distance < best[1]):
+            nodes = surface.nodes[hit.vertices]
+            best = _between_nodes(grid, nodes, hit.weights), hit.distance
+    return best
 
 
-def _between_nodes(frame: Frame, nodes: Array, weights: Array) -> Picked:
+def _between_nodes(grid: Grid, nodes: Index, weights: Array) -> Picked:
     """Interpolate the axis positions of flat grid nodes."""
-    shape = frame.grid.shape
-    at = {
-        name: float(np.broadcast_to(values, shape).reshape(-1)[nodes] @ weights)
-        for name, values in frame.grid.coordinates.items()
-        if name in LINEAR_AXES
-    }
-    return Picked(at)
+    return Picked(
+        {
+            name: float(np.broadcast_to(values, grid.shape).reshape(-1)[nodes] @ weights)
+            for name, values in grid.coordinates.items()
+            if name in LINEAR_AXES
+        }
+    )
 
 
 def _on_trace(frame: Frame, origin: Array, unit: Array) -> tuple[Picked, float] | None:
