@@ -38,7 +38,7 @@ def spell_chance(chance: "Chance", shares: Mapping[str, float]) -> str:
         f"{_percent(found.probability)} %</b> of the machines stay within "
         f"<b>{found.spec_um:g} µm</b> {where}</div>"
         f'<div style="opacity:.7" data-value="interval">95 % confidence: {low} … {high} %, '
-        f"{chance.samples:,} machines</div>".replace(",", "\u202f", 1)
+        f"{chance.samples:_} machines</div>".replace("_", "\u202f")
         + _histogram(chance)
         + _numbers(chance)
         + _shares(shares)

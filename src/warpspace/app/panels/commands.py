@@ -13,6 +13,7 @@ from warpspace.machine.parameters import PARAMETERS
 
 HINT_SECONDS = 12
 HINT = "Drag a slider on the left: the box bends at once.   Ctrl+Z undoes   ·   H shows all keys"
+# W A S D Q E belong to viser's camera.
 WORDS = {
     "amplitudes": "errors",
     "positions": "rotary position",
@@ -25,6 +26,9 @@ WORDS = {
     "specification": "specification",
     "scene": "scene",
     "loaded": "scene",
+    "dark": "dark mode",
+    "ghost": "nominal box",
+    "grid_lines": "grid lines",
 }
 
 
@@ -105,11 +109,11 @@ class CommandsPanel:
             Command("Fit view", "Camera to the operator's side", "F", None, fit_view),
             Command("Reset errors", "Values of the scene", "R", None, does(AppState.reset)),
             Command("All errors zero", "The nominal machine", "0", None, does(AppState.zeroed)),
-            Command("Hear all errors", "End solo and mute", "E", None, does(edits.all_heard)),
+            Command("Hear all errors", "End solo and mute", "L", None, does(edits.all_heard)),
             Command(
                 "Exaggeration auto",
                 "A round factor that shows the error",
-                "A",
+                "X",
                 None,
                 does(lambda state: state.with_exaggeration(None)),
             ),
@@ -127,7 +131,7 @@ class CommandsPanel:
             Command("Grid lines", "Show or hide", "G", None, does(_toggled("grid_lines"))),
             Command("Nominal box", "Show or hide", "B", None, does(_toggled("ghost"))),
             Command("Rotary traces", "Show or hide", "C", None, does(_toggled("traces"))),
-            Command("Dark mode", "Dark or light page", "D", None, does(_toggled("dark"))),
+            Command("Dark mode", "Dark or light page", "M", None, does(_toggled("dark"))),
             Command("Help", "All keys", "H", None, self._toggle_help),
         )
 
@@ -189,7 +193,7 @@ def spell_change(what: str) -> str:
         if parts[0] == "positions" and len(parts) > 1:
             word = f"position of {parts[1]}"
         elif parts[0] == "shown":
-            word = parts[-1].replace("_", " ")
+            word = WORDS.get(parts[-1], parts[-1].replace("_", " "))
         words.append(f"tolerance of {word}" if parts[0] == "tolerances" and name else word)
     unique = list(dict.fromkeys(words))
     if "scene" in unique:
@@ -211,6 +215,7 @@ def help_text(commands: tuple[Command, ...]) -> str:
         " control explains itself when the mouse rests on it.\n\n"
         "| key | does | |\n|---|---|---|\n"
         "| **Ctrl + K** | Command palette | All of this by name |\n"
+        "| **W A S D Q E** | Camera | Fly through the scene |\n"
         "| **← →** | Slider with focus | One step |\n"
         f"{rows}\n\n"
         "Keys act when no text box has the focus. After a dropped connection the tab finds its"

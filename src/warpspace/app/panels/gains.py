@@ -148,7 +148,7 @@ def spell_ranking(ranking: Ranking) -> str:
         for bar, value in zip(bars, values, strict=True)
     )
     foot = (
-        '<div style="opacity:.65;margin-top:6px">blue: how far the point moves. Right: gain, and'
+        '<div style="opacity:.65;margin-top:6px">Bar: how far the point moves. Right: gain, and'
         " what the present error adds to |E| here.</div></div>"
     )
     return head + rows + foot
@@ -167,6 +167,7 @@ def _row(bar: Bar, share: float, by_effect: bool) -> str:
         f'<span style="font-variant-numeric:tabular-nums;white-space:nowrap">{first}</span></div>'
         '<div style="display:flex;align-items:center;gap:8px"><div style="flex:1">'
         f'<div style="height:5px;border-radius:2px;background:#4a7ab5;width:{100 * share:.1f}%">'
-        '</div></div><span style="opacity:.6;font-size:11px;white-space:nowrap">'
+        '</div></div><span style="opacity:.6;'
+        'font-size:11px;white-space:nowrap;width:74px;text-align:right">'
         f"{second}</span></div></div>"
     )

@@ -31,6 +31,8 @@ div:has(> div > p > label):has(> div input[type="checkbox"]) { flex-direction: r
 div:has(> p > label):has(+ div input[type="checkbox"]) { width: auto !important; padding: 0; }
 div:has(> p > label) + div:has(input[type="checkbox"]) { width: auto; flex-grow: 0 !important;
   padding-right: 8px; }
+/* messages stand below the heading, not on it */
+.mantine-Notifications-root[data-position^="top"] { top: auto; bottom: 16px; left: 346px; }
 p:has(> label) { color: inherit !important; letter-spacing: 0 !important; }
 .mantine-Slider-root:has(.mantine-Slider-markLabel) { margin-bottom: 4px; }
 .mantine-ScrollArea-scrollbar[data-orientation="horizontal"] { display: none; }

@@ -52,6 +52,31 @@ class ShapePanel:
             ),
             desk.changed,
         )
+        self._chart: Any = gui.add_uplot(
+            _chart_data(None, (0.0, 1.0)),
+            (
+                uplot.Series(label="q"),
+                uplot.Series(label="error", stroke=CURVE_COLOUR, width=2),
+                uplot.Series(label="zero", stroke=ZERO_COLOUR, width=1),
+            ),
+            scales={"x": uplot.Scale(time=False)},
+            legend=uplot.Legend(show=False),
+            height=150,
+            padding=(8, 14, 0, 0),
+        )
+        self._kind: Bound[str] = Bound(
+            gui.add_dropdown(
+                "Curve along the axis",
+                tuple(KINDS),
+                hint="Constant, ramp from the lower end, polynomial, harmonics or table.",
+            ),
+            desk.changed,
+        )
+        self._rows: Bound[str] = Bound(
+            gui.add_text("Numbers", "0", multiline=True, hint=_rows_hint("constant")),
+            desk.changed,
+        )
+        self._problem: Any = gui.add_html("")
         self._solo: Bound[bool] = Bound(
             gui.add_checkbox(
                 "Solo", initial_value=False, hint="Hear this error alone, or with others on solo."
@@ -67,31 +92,6 @@ class ShapePanel:
         hear = gui.add_button("Hear all errors", color="gray", hint="End all solo and mute.")
         hear.on_click(lambda _: desk.post(edits.all_heard))
         self._hear = hear
-        self._kind: Bound[str] = Bound(
-            gui.add_dropdown(
-                "Curve along the axis",
-                tuple(KINDS),
-                hint="Constant, ramp from the lower end, polynomial, harmonics or table.",
-            ),
-            desk.changed,
-        )
-        self._rows: Bound[str] = Bound(
-            gui.add_text("Numbers", "0", multiline=True, hint=_rows_hint("constant")),
-            desk.changed,
-        )
-        self._problem: Any = gui.add_html("")
-        self._chart: Any = gui.add_uplot(
-            _chart_data(None, (0.0, 1.0)),
-            (
-                uplot.Series(label="q"),
-                uplot.Series(label="error", stroke=CURVE_COLOUR, width=2),
-                uplot.Series(label="zero", stroke=ZERO_COLOUR, width=1),
-            ),
-            scales={"x": uplot.Scale(time=False)},
-            legend=uplot.Legend(show=False),
-            height=150,
-            padding=(8, 14, 0, 0),
-        )
         self._show(state)
 
     def choose(self, key: str) -> None:

@@ -1,0 +1,110 @@
+"""What the panels say: histogram and probability, ranked bars, commands, help, the first hint."""
+
+import re
+
+import numpy as np
+import pytest
+
+from warpspace import load_scene
+from warpspace.analysis.distribution import Histogram, Probability
+from warpspace.analysis.montecarlo import Over
+from warpspace.app.chance import Chance
+from warpspace.app.live import LiveModel
+from warpspace.app.odds import spell_chance, spell_refusal
+from warpspace.app.panels.commands import Command, help_text, hint_script, spell_change
+from warpspace.app.panels.gains import rank_frame, spell_ranking
+from warpspace.app.state import start_state
+
+LIVE = LiveModel()
+FRAME = LIVE.frame(start_state(load_scene("dvf5000_first")))
+
+
+def chance(probability, low, high, counts=(5, 10, 5)):
+    return Chance(
+        Over.SAMPLED,
+        20_000,
+        41.0,
+        74.0,
+        129.0,
+        Histogram(np.arange(len(counts) + 1) * 20.0, np.array(counts)),
+        Probability(50.0, probability, low, high),
+    )
+
+
+def test_the_probability_is_said_with_its_interval():
+    text = spell_chance(chance(0.7131, 0.707, 0.7193), {"EAX": 0.25, "EAY": 0.75})
+    assert "71.3 %" in text
+    assert "70.7 … 71.9 %" in text
+    assert "20\u202f000 machines" in text
+    assert text.index("EAY") < text.index("EAX")
+
+
+@pytest.mark.parametrize(
+    ("share", "said"), [(0.0, "0.0 %"), (1.0, "100.0 %"), (0.99999, "99.9 %"), (1e-5, "0.1 %")]
+)
+def test_only_what_is_certain_reads_as_certain(share, said):
+    assert f">{said}<" in spell_chance(chance(share, share, share), {})
+
+
+def test_bars_change_colour_at_the_limit():
+    text = spell_chance(chance(0.7, 0.6, 0.8, counts=(5, 10, 5, 2)), {})
+    within, beyond = re.findall(r'<path d="(M[^"]*z)" fill="#', text)
+    assert within.count("M") == 3
+    assert beyond.count("M") == 1
+
+
+def test_no_error_at_all_can_be_drawn():
+    assert "100.0 %" in spell_chance(chance(1.0, 0.99, 1.0, counts=(20_000,)), {"EAX": 0.0})
+
+
+def test_refusals_are_escaped():
+    assert "<script>" not in spell_refusal("<script>alert(1)</script>")
+
+
+def test_gain_bars_rank_the_worst_point():
+    ranking = rank_frame(FRAME)
+    assert ranking.error_um == pytest.approx(FRAME.statistics.max_um)
+    text = spell_ranking(ranking)
+    keys = re.findall(r'data-bar="(\w+)"', text)
+    assert keys == [bar.key for bar in ranking.bars[:10]]
+    assert f"{FRAME.statistics.max_um:.2f} µm" in text
+
+
+def test_gain_bars_rank_by_what_the_errors_do():
+    ranking = rank_frame(FRAME, middle=True, by_effect=True)
+    moved = [bar.moved_um for bar in ranking.bars]
+    assert moved == sorted(moved, reverse=True)
+    assert sum(bar.along_um for bar in ranking.bars) == pytest.approx(ranking.error_um)
+
+
+@pytest.mark.parametrize(
+    ("what", "said"),
+    [
+        ("amplitudes.EAX", "roll of X"),
+        ("amplitudes.EAX, amplitudes.EBX", "roll of X and 1 more"),
+        ("positions.B", "position of B"),
+        ("shown.dark", "dark mode"),
+        ("tolerances.own.EAX", "tolerance of roll of X"),
+        ("specification.limit_um", "specification"),
+        ("emphasis.muted", "solo and mute"),
+        ("scene.errors.functions.EXX, amplitudes.EXX, loaded", "positioning of X"),
+        ("something_new", "something new"),
+    ],
+)
+def test_changes_are_said_in_words(what, said):
+    assert spell_change(what) == said
+
+
+def test_help_lists_the_keys():
+    command = Command("Redo", "Do it again", "Z", "cmd/ctrl+shift", lambda: None)
+    assert command.keys == "Ctrl + Shift + Z"
+    text = help_text((command, Command("Palette only", "", None, None, lambda: None)))
+    assert "Ctrl + Shift + Z" in text
+    assert "Palette only" not in text
+
+
+def test_the_hint_takes_no_clicks_and_leaves():
+    script = hint_script('a"b</script>', 3.0)
+    assert "pointer-events:none" in script
+    assert "3000" in script
+    assert '"a\\"b</script>"' in script
