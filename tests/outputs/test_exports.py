@@ -25,8 +25,10 @@ from warpspace.outputs.exports import (
     write_glb,
     write_vts,
 )
+from warpspace.outputs.exports.bodies import drawn_bodies
 from warpspace.outputs.exports.glb import build_glb
 from warpspace.outputs.files import check_target
+from warpspace.scene.bodies import load_bodies
 
 SCENES = ("dvf5000_first", "teach_wobbling_table", "dvf5000_nominal")
 
@@ -90,6 +92,18 @@ def test_glb_surface_faces_outwards_and_names_its_nodes() -> None:
     assert {"deformed_surface", "deformed_grid", "deformed_edges", "ghost", "traces"} <= names
     assert f"warpspace dvf5000_first ×{drawing.exaggeration:g}" in names
     assert sum(name.startswith("trace actual") for name in names) == len(drawing.traces)
+    assert {body.name for body in load_bodies(drawing.scene.machine)} <= names
+
+
+def test_glb_tool_stands_in_the_deformed_grid() -> None:
+    """The tool body is bent by the same factor as the grid it works in."""
+    drawing = draw_scene(load_scene("dvf5000_first"), grid=3)
+    (tool,) = [
+        b for b in drawn_bodies(drawing.scene, drawing.picture.view, 1e3) if b[0].frame == "t"
+    ]
+    moved = (tool[1] - tool[2])[np.argmin(tool[2][:, 2])]
+    middle = drawing.picture.field.error_um[1, 1, 1]
+    close(moved, middle)
 
 
 def test_glb_colours_are_linear_and_unlit() -> None:

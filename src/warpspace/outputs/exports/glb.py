@@ -12,7 +12,7 @@ from warpspace.geometry.surfaces import (
     outer_surface,
     segments,
 )
-from warpspace.outputs.exports.bodies import BODY_COLOUR, drawn_bodies
+from warpspace.outputs.exports.bodies import drawn_bodies
 from warpspace.outputs.exports.drawing import Drawing, DrawnTrace
 from warpspace.outputs.exports.gltf import GltfBuilder, srgb_to_linear, to_gltf
 from warpspace.outputs.files import write_atomically
@@ -20,6 +20,7 @@ from warpspace.units import MM_PER_UM, Array
 
 INK, GHOST, NOMINAL = (30, 36, 48), (140, 147, 160), (150, 158, 172)
 TRACE = (200, 60, 70)
+BODY_OPACITY = 0.3
 _ATTRIBUTES = {
     "_ERROR_UM": "position error x, y, z in the machine frame (Z up), µm",
     "_ORIENTATION_URAD": "orientation error of the tool axis in the machine frame (Z up), µrad",
@@ -176,13 +177,16 @@ def _traces(builder: GltfBuilder, traces: tuple[DrawnTrace, ...], exaggeration: 
 
 def _bodies(builder: GltfBuilder, drawing: Drawing) -> list[int]:
     """Add the bodies of the machine where there are any, bent by the same factor."""
-    bodies = drawn_bodies(drawing.scene, drawing.exaggeration)
-    if not bodies:
-        return []
-    material = builder.add_material("body", BODY_COLOUR, opacity=0.35)
     children: list[int] = []
-    for body in bodies:
-        position = {"POSITION": to_gltf(body.vertices_mm)}
-        mesh = builder.add_mesh(body.name, position, body.triangles, material)
+    view = drawing.picture.view
+    for body, drawn_mm, nominal_mm in drawn_bodies(drawing.scene, view, drawing.exaggeration):
+        material = builder.add_material(f"body {body.name}", body.colour, opacity=BODY_OPACITY)
+        mesh = builder.add_mesh(
+            body.name,
+            {"POSITION": to_gltf(drawn_mm)},
+            body.triangles,
+            material,
+            targets={"nominal": to_gltf(nominal_mm - drawn_mm)},
+        )
         children.append(builder.add_node(body.name, mesh=mesh))
-    return [builder.add_node("bodies", children=children)]
+    return [builder.add_node("bodies", children=children)] if children else []
