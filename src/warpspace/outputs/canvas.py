@@ -83,6 +83,7 @@ class Canvas:
             Text and size to draw it with.
         """
         text = clean(text)
+        room *= 0.98  # what is drawn may be a little wider than what was measured
         width = self.text_size(text, size, weight)[0]
         if width <= room:
             return text, size

@@ -1,6 +1,6 @@
 """Orthographic projection: from machine coordinates to pixels and back."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -59,9 +59,9 @@ class Projection:
         """Distance behind the plane through the centre, [...], mm; larger is farther away."""
         return -((points_mm - self.centre_mm) @ self.towards)
 
-    def direction_px(self, vector: Array) -> Array:
-        """Project a vector, [..., 2], px per mm."""
-        return self.px_per_mm * np.stack([vector @ self.right, vector @ self.up], -1)
+    def moved(self, shift_px: Array) -> "Projection":
+        """Give the same projection elsewhere in the figure."""
+        return replace(self, centre_px=self.centre_px + shift_px)
 
 
 def view_axes(view: str) -> tuple[Array, Array, Array]:

@@ -200,8 +200,9 @@ def _draw(
             _add_lights(renderer, projection)
         camera = renderer.GetActiveCamera()
         camera.ParallelProjectionOn()
-        camera.SetFocalPoint(*focus)
-        camera.SetPosition(*(focus + (1.0 - near) * projection.towards))
+        eye = focus + (1.0 - near) * projection.towards
+        camera.SetPosition(*eye)
+        camera.SetFocalPoint(*(eye - projection.towards))
         camera.SetViewUp(*projection.up)
         camera.SetParallelScale(size[1] / step / 2.0 / projection.px_per_mm)
         camera.SetClippingRange(1.0, 1.0 + far - near)

@@ -13,9 +13,8 @@ from PIL.PngImagePlugin import PngInfo
 from warpspace.outputs.figures.catalogue import draw_figure
 from warpspace.outputs.figures.content import Drawing
 from warpspace.outputs.figures.settings import FigureSettings
-from warpspace.outputs.files import write_atomically
-from warpspace.outputs.style import SAVE_RC
-from warpspace.outputs.targets import check_target, figure_format
+from warpspace.outputs.files import check_target, write_atomically
+from warpspace.outputs.style import FIGURE_ENDINGS, SAVE_RC
 from warpspace.scene.model import Scene
 
 
@@ -122,9 +121,8 @@ def write_figure(
     Path
         The file.
     """
-    form = figure_format(path)
-    check_target(path, force=force)
+    form = check_target(path, FIGURE_ENDINGS, overwrite=force).suffix.lower().lstrip(".")
     content = render_figure(name, scenes, settings or FigureSettings(), form)
-    with write_atomically(path) as temporary:
+    with write_atomically(path, overwrite=force) as temporary:
         temporary.write_bytes(content)
     return Path(path)

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 REFERENCE_SIZE: Final = (1600, 1200)
 FONT: Final = "DejaVu Sans"
+FIGURE_ENDINGS: Final = (".png", ".svg", ".pdf")
 SMALLEST_FACTOR: Final = 0.5
 """Text never gets smaller than this share of its size in a 1600 × 1200 figure."""
 

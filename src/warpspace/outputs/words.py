@@ -37,8 +37,9 @@ def spell_short(value: float) -> str:
 
 
 def spell_point(point: Sequence[float]) -> str:
-    """Spell a point in whole millimetres (tenths where they matter)."""
-    return "(" + ", ".join(f"{value + 0.0:.4g}".replace("-", MINUS) for value in point) + ")"
+    """Spell a point in whole millimetres, tenths below ten."""
+    parts = [f"{v:.0f}" if abs(v) >= 10.0 else f"{round(v, 1) + 0.0:g}" for v in point]
+    return "(" + ", ".join(part.replace("-", MINUS) for part in parts) + ")"
 
 
 def spell_factor(value: float) -> str:

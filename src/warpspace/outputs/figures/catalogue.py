@@ -13,6 +13,15 @@ Builder = Callable[..., Drawing]
 _HOMES = MappingProxyType(
     {
         "error-map": ("warpspace.outputs.figures.error_map", "draw_error_map"),
+        "slices": ("warpspace.outputs.figures.slices", "draw_slices"),
+        "orientation-map": ("warpspace.outputs.figures.orientation", "draw_orientation"),
+        "machine": ("warpspace.outputs.figures.machine", "draw_machine"),
+        "traces": ("warpspace.outputs.figures.traces", "draw_traces"),
+        "error-curves": ("warpspace.outputs.figures.curves", "draw_curves"),
+        "gains": ("warpspace.outputs.figures.charts", "draw_gains"),
+        "montecarlo": ("warpspace.outputs.figures.charts", "draw_montecarlo"),
+        "ballbar": ("warpspace.outputs.figures.charts", "draw_ballbar"),
+        "comparison": ("warpspace.outputs.figures.comparison", "draw_comparison"),
     }
 )
 FIGURES = tuple(_HOMES)

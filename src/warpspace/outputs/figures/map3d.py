@@ -1,6 +1,6 @@
 """A bent volume drawn into a box of a figure: surface, lines, ghost, arrows, axes."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -30,6 +30,7 @@ INSETS = (112.0, 92.0, 84.0, 46.0)
 """Room for axes and labels around the body: left, bottom, right, top."""
 SMALL_INSETS = (70.0, 74.0, 40.0, 40.0)
 GHOST_DASHES = (11.0, 7.0)
+Annotate = Callable[[Canvas, MapContent, Projection, Raster | None, Occupancy, Rect | None], None]
 
 
 def map_faces(shape: Shape, view: str) -> list[Index]:
@@ -45,7 +46,8 @@ def draw_map(
     *,
     labels: bool = True,
     projection: Projection | None = None,
-    arrows: bool = True,
+    annotate: Annotate | None = draw_corners,
+    ghost: bool = True,
 ) -> DrawnMap:
     """Draw a bent volume.
 
@@ -60,8 +62,10 @@ def draw_map(
         Whether corner displacements are labelled and axes titled; small maps do without.
     projection : Projection, optional
         Instead of the one that fills the box.
-    arrows : bool, optional
-        Whether corner displacements are drawn.
+    annotate : callable, optional
+        Draws what stands out of the surface; corner displacements by default.
+    ghost : bool, optional
+        Whether the nominal volume is drawn.
 
     Returns
     -------
@@ -83,11 +87,12 @@ def draw_map(
         taken.add_mask(raster.rgba[..., 3] > 0, raster.rect)
     _draw_surface_lines(canvas, content, faces, projection, raster, taken)
     _draw_lone_line(canvas, content, faces, projection)
-    _draw_ghost(canvas, content, projection, raster, taken)
+    if ghost:
+        _draw_ghost(canvas, content, projection, raster, taken)
     draw_axes(canvas, content.nominal_mm, nodes, projection, taken, titles=labels)
     taken.add_rects(canvas.rects[start:])
-    if arrows:
-        draw_corners(canvas, content, projection, raster, taken, rect if labels else None)
+    if annotate is not None:
+        annotate(canvas, content, projection, raster, taken, rect if labels else None)
     return DrawnMap(
         projection, content.scale, content.values, content.drawn_mm, content.exaggeration,
         raster, tuple(canvas.rects[start:]),
@@ -95,9 +100,31 @@ def draw_map(
 
 
 def fit_map(
-    canvas: Canvas, contents: Sequence[MapContent], rect: Rect, view: str, *, labels: bool = True
+    canvas: Canvas,
+    contents: Sequence[MapContent],
+    rect: Rect,
+    view: str,
+    *,
+    labels: bool = True,
+    beside_mm: Array | None = None,
 ) -> Projection:
-    """Choose the projection in which several maps, drawn alike, fill a box."""
+    """Choose the projection in which several maps, drawn alike, fill a box.
+
+    Parameters
+    ----------
+    canvas : Canvas
+    contents : sequence of MapContent
+    rect : tuple of float, (4,), px
+    view : str
+    labels : bool, optional
+        Whether to leave room for labels.
+    beside_mm : ndarray, [n, 3], mm, optional
+        Further points to be seen.
+
+    Returns
+    -------
+    Projection
+    """
     insets = [canvas.px(inset) for inset in (INSETS if labels else SMALL_INSETS)]
     width, height = rect[2] - rect[0], rect[3] - rect[1]
     insets = [
@@ -105,6 +132,7 @@ def fit_map(
     ]
     inner = (rect[0] + insets[0], rect[1] + insets[1], rect[2] - insets[2], rect[3] - insets[3])
     points = [part.reshape(-1, 3) for c in contents for part in (c.nominal_mm, c.drawn_mm)]
+    points += [] if beside_mm is None else [beside_mm]
     return fit_projection(view, np.concatenate(points), inner)
 
 

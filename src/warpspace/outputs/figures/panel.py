@@ -22,7 +22,7 @@ def draw_panel(
     heading: str,
     marks: Sequence[tuple[str, float]],
     rows: Sequence[Row],
-    bars: tuple[float, float] | None,
+    bars: tuple[float, float | None] | None,
 ) -> None:
     """Draw colour bar, statistics and scale bars from top to bottom.
 
@@ -37,8 +37,9 @@ def draw_panel(
         Values marked beside the bar.
     rows : sequence of (str, str)
         Statistics, first one bold.
-    bars : tuple of (float, float) or None
-        Pixels per mm and exaggeration of the map the scale bars belong to.
+    bars : tuple of (float, float or None) or None
+        Pixels per mm and exaggeration of the map the scale bars belong to; no bar for
+        displacements where that is None.
     """
     left, bottom, right, top = rect
     y = bottom
@@ -126,7 +127,9 @@ def _draw_marks(
         )
 
 
-def draw_scale_bars(canvas: Canvas, rect: Rect, px_per_mm: float, exaggeration: float) -> float:
+def draw_scale_bars(
+    canvas: Canvas, rect: Rect, px_per_mm: float, exaggeration: float | None
+) -> float:
     """Draw one bar for lengths and one for displacements, both as seen in the picture plane.
 
     Parameters
@@ -134,7 +137,9 @@ def draw_scale_bars(canvas: Canvas, rect: Rect, px_per_mm: float, exaggeration: 
     canvas : Canvas
     rect : tuple of float, (4,), px
         They stand at its bottom.
-    px_per_mm, exaggeration : float
+    px_per_mm : float
+    exaggeration : float or None
+        None draws no bar for displacements.
 
     Returns
     -------
@@ -144,14 +149,15 @@ def draw_scale_bars(canvas: Canvas, rect: Rect, px_per_mm: float, exaggeration: 
     left, y, right, _ = rect
     room = min(right - left, canvas.px(190.0))
     theme = canvas.theme
-    px_per_um = px_per_mm * MM_PER_UM * exaggeration
     y += canvas.px(6.0)
-    length = round_down(room / px_per_um)
-    _draw_bar(canvas, left, y, length * px_per_um, theme.accent)
-    name = f"{spell_short(length)} µm displacement ({spell_factor(exaggeration)})"
-    text, size = canvas.fit(name, right - left, SIZES.small)
-    canvas.text(left, y + canvas.px(13.0), text, size=size, colour=theme.accent)
-    y += canvas.px(52.0)
+    if exaggeration is not None:
+        px_per_um = px_per_mm * MM_PER_UM * exaggeration
+        length = round_down(room / px_per_um)
+        _draw_bar(canvas, left, y, length * px_per_um, theme.accent)
+        name = f"{spell_short(length)} µm displacement ({spell_factor(exaggeration)})"
+        text, size = canvas.fit(name, right - left, SIZES.small)
+        canvas.text(left, y + canvas.px(13.0), text, size=size, colour=theme.accent)
+        y += canvas.px(52.0)
     length = round_down(room / px_per_mm)
     _draw_bar(canvas, left, y, length * px_per_mm, theme.ink)
     text, size = canvas.fit(f"{spell_short(length)} mm geometry", right - left, SIZES.small)

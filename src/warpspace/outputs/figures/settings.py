@@ -1,13 +1,14 @@
 """What a figure is asked for."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from warpspace.exceptions import OptionError
 from warpspace.geometry.colour import COMPONENTS
 from warpspace.geometry.deform import MAX_EXAGGERATION, auto_exaggeration
 from warpspace.outputs.projection import VIEWS
 from warpspace.outputs.style import DARK, LIGHT, Theme
+from warpspace.scene.model import Scene
 from warpspace.scene.pipeline import ScenePicture
 
 SMALLEST_SIZE = (400, 300)
@@ -23,8 +24,8 @@ class FigureSettings:
     ----------
     component : str
         "norm", "x", "y" or "z".
-    exaggeration : float or None
-        Display factor of displacements; None takes the scene's, or chooses a round one.
+    exaggeration : float, "auto" or None
+        Display factor of displacements; "auto" chooses a round one, None takes the scene's.
     view : str
         "iso", "front", "right" or "top".
     size : tuple of int, (2,), px
@@ -43,7 +44,7 @@ class FigureSettings:
     """
 
     component: str = "norm"
-    exaggeration: float | None = None
+    exaggeration: float | Literal["auto"] | None = None
     view: str = "iso"
     size: tuple[int, int] = (1600, 1200)
     dark: bool = False
@@ -57,9 +58,10 @@ class FigureSettings:
             raise OptionError(f"component {self.component!r}; expected one of {expected}")
         if self.view not in VIEWS:
             raise OptionError(f"view {self.view!r}; expected one of {', '.join(VIEWS)}")
-        if self.exaggeration is not None and not 0.0 < self.exaggeration <= MAX_EXAGGERATION:
+        given = self.exaggeration
+        if given is not None and given != "auto" and not 0.0 < given <= MAX_EXAGGERATION:
             raise OptionError(
-                f"exaggeration {self.exaggeration:g}; expected a number above 0, at most"
+                f"exaggeration {given:g}; expected a number above 0, at most"
                 f" {MAX_EXAGGERATION:g}, or auto"
             )
         check_size(self.size)
@@ -88,6 +90,13 @@ def check_size(size: tuple[int, int]) -> None:
         )
 
 
+def given_exaggeration(settings: FigureSettings, scene: Scene) -> float | None:
+    """Give the display factor asked for, else the scene's; None where one is to be chosen."""
+    if settings.exaggeration == "auto":
+        return None
+    return scene.exaggeration if settings.exaggeration is None else settings.exaggeration
+
+
 def choose_exaggeration(settings: FigureSettings, *pictures: ScenePicture) -> float:
     """Choose the display factor that pictures share.
 
@@ -101,9 +110,7 @@ def choose_exaggeration(settings: FigureSettings, *pictures: ScenePicture) -> fl
     float
         The one asked for, else the first scene's, else a round one for the largest displacement.
     """
-    if settings.exaggeration is not None:
-        return settings.exaggeration
-    given = pictures[0].scene.exaggeration
+    given = given_exaggeration(settings, pictures[0].scene)
     if given is not None:
         return given
     largest = max(picture.statistics.max_um for picture in pictures)

@@ -1,6 +1,6 @@
 """What every figure carries around its content: heading, facts, legend, provenance."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +9,12 @@ from warpspace import __version__
 from warpspace.kinematics.model import ComponentErrors, Loop
 from warpspace.machine.parameters import parameter
 from warpspace.outputs.canvas import Canvas
+from warpspace.outputs.figures.legend import (
+    LegendEntry,
+    draw_legend,
+    grid_symbol,
+    isoline_symbol,
+)
 from warpspace.outputs.figures.settings import FigureSettings, spell_settings
 from warpspace.outputs.projection import Rect
 from warpspace.outputs.style import SIZES
@@ -25,22 +31,6 @@ CONVENTION_WORDS = {
     ComponentErrors.AFTER_MOTION: "component errors after the motion",
     ComponentErrors.BEFORE_MOTION: "component errors before the motion",
 }
-Symbol = Callable[[Canvas, float, float, float], None]
-
-
-@dataclass(frozen=True, slots=True)
-class LegendEntry:
-    """One entry of the legend at the bottom.
-
-    Attributes
-    ----------
-    symbol : callable
-        Draws it, given the canvas, its left end, the height of its middle and its width, px.
-    text : str
-    """
-
-    symbol: Symbol
-    text: str
 
 
 def new_canvas(settings: FigureSettings, *, exact: bool) -> Canvas:
@@ -178,7 +168,7 @@ def draw_footer(
         canvas.text(margin, y, shown[0], size=shown[1], colour=theme.muted)
     if legend:
         y += canvas.px(36.0)
-        _draw_legend(canvas, legend, margin, y, room)
+        draw_legend(canvas, legend, margin, y, room)
     return y + canvas.px(30.0)
 
 
@@ -194,24 +184,6 @@ def _as_many(canvas: Canvas, head: str, items: Sequence[str], room: float) -> tu
     return canvas.fit(head + items[0], room, SIZES.small)
 
 
-def _draw_legend(
-    canvas: Canvas, legend: Sequence[LegendEntry], x: float, y: float, room: float
-) -> None:
-    """Draw the entries of a legend in a row; those that do not fit are left out."""
-    swatch, gap = canvas.px(36.0), canvas.px(10.0)
-    end = x + room
-    for entry in legend:
-        width = swatch + gap + canvas.text_size(entry.text, SIZES.small)[0]
-        if x + width > end:
-            return
-        entry.symbol(canvas, x, y, swatch)
-        canvas.text(
-            x + swatch + gap, y, entry.text, size=SIZES.small, colour=canvas.theme.muted,
-            va="center_baseline",
-        )  # fmt: skip
-        x += width + canvas.px(34.0)
-
-
 def map_legend(isolines: str, *, surface: str = "deformed grid") -> list[LegendEntry]:
     """Build the legend of a map; `isolines` is empty where there are none."""
     entries = [
@@ -221,28 +193,15 @@ def map_legend(isolines: str, *, surface: str = "deformed grid") -> list[LegendE
             ),
             "nominal volume",
         ),
-        LegendEntry(_grid_symbol, surface),
+        LegendEntry(grid_symbol, surface),
         LegendEntry(
             lambda c, x, y, w: c.arrow(np.array([x, y]), np.array([x + w, y])),
             "displacement of corners, |E|",
         ),
     ]
     if isolines:
-        entries.append(LegendEntry(_isoline_symbol, isolines))
+        entries.append(LegendEntry(isoline_symbol, isolines))
     return entries
-
-
-def _grid_symbol(canvas: Canvas, x: float, y: float, width: float) -> None:
-    """Show an edge of the deformed grid."""
-    colour = canvas.theme.ink
-    canvas.line([(x, y), (x + width, y)], width=SIZES.line, colour=colour)
-
-
-def _isoline_symbol(canvas: Canvas, x: float, y: float, width: float) -> None:
-    """Show a white line on a coloured ground."""
-    height = canvas.px(14.0)
-    canvas.rectangle(x, y - height / 2, width, height, facecolor="#2f6b8e", edgecolor="none")
-    canvas.line([(x, y), (x + width, y)], width=SIZES.line, colour=canvas.theme.isoline, zorder=3.5)
 
 
 def metadata(
@@ -277,3 +236,64 @@ def panel_rect(canvas: Canvas, top: float, bottom: float) -> Rect:
     margin = canvas.px(SIZES.margin) * min(1.0, canvas.width / canvas.px(1000.0))
     right = canvas.width - margin
     return (right - panel_width(canvas), bottom, right, top - canvas.px(18.0))
+
+
+@dataclass(frozen=True, slots=True)
+class Sheet:
+    """A figure with heading and footer, waiting for its content.
+
+    Attributes
+    ----------
+    canvas : Canvas
+    title : str
+    content, panel : tuple of float, (4,), px
+        Room for the content and for the column beside it.
+    """
+
+    canvas: Canvas
+    title: str
+    content: Rect
+    panel: Rect
+
+
+def start_sheet(
+    settings: FigureSettings,
+    title: str,
+    facts: Sequence[str],
+    scenes: Sequence[Scene],
+    legend: Sequence[LegendEntry],
+    *,
+    exact: bool,
+    panel: bool = True,
+    notes: Sequence[str] = (),
+) -> Sheet:
+    """Start a figure and draw what surrounds its content.
+
+    Parameters
+    ----------
+    settings : FigureSettings
+    title : str
+    facts : sequence of str
+        For the lines below the title.
+    scenes : sequence of Scene
+    legend : sequence of LegendEntry
+    exact : bool
+        Whether the figure becomes pixels of its own size.
+    panel : bool, optional
+        Whether there is a column beside the content.
+    notes : sequence of str, optional
+        For the last line.
+
+    Returns
+    -------
+    Sheet
+    """
+    canvas = new_canvas(settings, exact=exact)
+    top = draw_heading(canvas, title, facts)
+    bottom = draw_footer(canvas, scenes, legend, notes)
+    return Sheet(
+        canvas,
+        title,
+        content_rect(canvas, top, bottom, panel=panel),
+        panel_rect(canvas, top, bottom),
+    )

@@ -1,0 +1,105 @@
+"""Two scenes and their difference: one scale, one exaggeration, one projection."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from warpspace.analysis.statistics import Statistics, statistics
+from warpspace.geometry.colour import build_scale, component_values
+from warpspace.outputs.canvas import Canvas
+from warpspace.outputs.figures.content import Drawing, DrawnMap, MapContent
+from warpspace.outputs.figures.error_map import VIEW_WORDS, isoline_words, quantity_words
+from warpspace.outputs.figures.map3d import draw_map, fit_map
+from warpspace.outputs.figures.panel import draw_colour_bar, draw_scale_bars
+from warpspace.outputs.figures.settings import FigureSettings, choose_exaggeration
+from warpspace.outputs.figures.sheet import map_legend, metadata, scene_facts, start_sheet
+from warpspace.outputs.projection import Rect
+from warpspace.outputs.style import SIZES
+from warpspace.outputs.words import spell
+from warpspace.scene.difference import difference_field
+from warpspace.scene.model import Scene
+from warpspace.scene.pipeline import evaluate_picture
+
+
+def draw_comparison(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
+    """Draw two scenes and their difference side by side.
+
+    Parameters
+    ----------
+    scenes : sequence of Scene, (2,)
+    settings : FigureSettings
+    exact : bool
+        Whether the figure becomes pixels of its own size.
+
+    Returns
+    -------
+    Drawing
+    """
+    pictures = [evaluate_picture(scene, grid=settings.grid, loop=settings.loop) for scene in scenes]
+    fields = [*(picture.field for picture in pictures), difference_field(*pictures)]
+    exaggeration = choose_exaggeration(settings, *pictures)
+    values = [component_values(field.error_um, settings.component) for field in fields]
+    scale = build_scale(max(float(abs(part).max()) for part in values), settings.component)
+    contents = [
+        MapContent(field.nominal_mm, field.error_um, part, scale, exaggeration)
+        for field, part in zip(fields, values, strict=True)
+    ]
+    title = f"Comparison: {scenes[0].title}  –  {scenes[1].title}"
+    facts = [*scene_facts(pictures[0], exaggeration), VIEW_WORDS[settings.view]]
+    legend = map_legend(isoline_words(scale))
+    sheet = start_sheet(settings, title, facts, scenes, legend, exact=exact, panel=False)
+    canvas = sheet.canvas
+    left, bottom, right, top = sheet.content
+    middle = ((left + right) / 2.0, (bottom + top) / 2.0)
+    head = canvas.px(30.0)
+    cells = [
+        (left, middle[1], middle[0], top),
+        (middle[0], middle[1], right, top),
+        (left, bottom, middle[0], middle[1]),
+    ]
+    rooms = [(c[0], c[1], c[2], c[3] - head) for c in cells]
+    shared = fit_map(canvas, contents, rooms[0], settings.view)
+    names = [f"A  {scenes[0].title}", f"B  {scenes[1].title}", "B − A  difference"]
+    maps: list[DrawnMap] = []
+    for name, content, cell, room in zip(names, contents, cells, rooms, strict=True):
+        shift = np.array([room[0] - rooms[0][0], room[1] - rooms[0][1]])
+        projection = shared.moved(shift)
+        maps.append(draw_map(canvas, content, room, settings.view, projection=projection))
+        text, size = canvas.fit(name, cell[2] - cell[0] - 2.0 * head, SIZES.heading, "bold")
+        canvas.text(
+            cell[0] + head, cell[3] - canvas.px(4.0), text, size=size, weight="bold", va="top"
+        )
+    found = [statistics(field) for field in fields]
+    corner = (middle[0] + canvas.px(60.0), bottom, right, middle[1] - canvas.px(6.0))
+    _draw_corner(canvas, corner, maps[0], found, quantity_words(settings.component))
+    about = metadata(title, scenes, settings, exaggeration, "comparison")
+    return Drawing(canvas.figure, title, about, tuple(maps), tuple(canvas.rects))
+
+
+def _draw_corner(
+    canvas: Canvas, rect: Rect, drawn: DrawnMap, found: Sequence[Statistics], heading: str
+) -> None:
+    """Draw the shared colour bar, a table of statistics and the scale bars."""
+    left, bottom, right, top = rect
+    text, size = canvas.fit(f"{heading}, all three maps", right - left, SIZES.heading, "bold")
+    canvas.text(left, top, text, size=size, weight="bold", va="top")
+    bar = (left + canvas.px(4.0), bottom + canvas.px(20.0), left + canvas.px(34.0))
+    draw_colour_bar(canvas, (bar[0], bar[1], bar[2], top - canvas.px(44.0)), drawn.scale)
+    start = left + canvas.px(130.0)
+    columns = [start + (right - start) * share for share in (0.5, 0.74, 0.99)]
+    y = top - canvas.px(62.0)
+    for x, name in zip(columns, ("A", "B", "B − A"), strict=True):
+        canvas.text(x, y, name, weight="bold", ha="right")
+    rows = (
+        ("max |E|", [part.max_um for part in found]),
+        ("mean |E|", [part.mean_um for part in found]),
+        ("P95", [part.p95_um for part in found]),
+        ("RMS", [part.rms_um for part in found]),
+    )
+    for name, numbers in rows:
+        y -= canvas.px(28.0)
+        canvas.text(start, y, f"{name}  [µm]", colour=canvas.theme.muted)
+        for x, number in zip(columns, numbers, strict=True):
+            canvas.text(x, y, spell(number), ha="right")
+    box = (start, bottom + canvas.px(10.0), right, y)
+    draw_scale_bars(canvas, box, drawn.projection.px_per_mm, drawn.exaggeration)

@@ -1,0 +1,293 @@
+"""Figures with the machine: its bent bodies around the bent volume, and the traces of its table."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from warpspace.geometry.colour import build_scale, component_values
+from warpspace.geometry.deform import deform
+from warpspace.geometry.faces import crease_lines, face_lines, outer_faces
+from warpspace.geometry.surfaces import box_edges, line_spacing, triangulate
+from warpspace.kinematics.bodies import BASE
+from warpspace.outputs.canvas import Canvas
+from warpspace.outputs.figures.content import Drawing, DrawnMap
+from warpspace.outputs.figures.error_map import quantity_words, statistics_rows, value_marks
+from warpspace.outputs.figures.map3d import GHOST_DASHES
+from warpspace.outputs.figures.panel import draw_panel
+from warpspace.outputs.figures.settings import FigureSettings, choose_exaggeration
+from warpspace.outputs.figures.sheet import LegendEntry, metadata, scene_facts, start_sheet
+from warpspace.outputs.lines import split_visible
+from warpspace.outputs.projection import Projection, Rect, fit_projection
+from warpspace.outputs.render import Body, Raster, render_bodies
+from warpspace.outputs.style import SIZES, Theme
+from warpspace.scene import bodies as shapes
+from warpspace.scene.model import Scene
+from warpspace.scene.pipeline import ScenePicture, evaluate_picture
+from warpspace.units import Array
+
+VOLUME_ALPHA, BEHIND_ALPHA = 0.72, 0.22
+"""Opacity of the coloured volume before bodies, and behind them."""
+DARKER = 0.62
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedBody:
+    """A machine body as it is drawn.
+
+    Attributes
+    ----------
+    name : str
+        For a label, for instance ``X saddle``.
+    frame : str
+    body : Body
+        Bent.
+    edges_mm, nominal_edges_mm : ndarray, [E, 2, 3], mm
+        Edges, bent and nominal.
+    """
+
+    name: str
+    frame: str
+    body: Body
+    edges_mm: Array
+    nominal_edges_mm: Array
+
+
+def place_bodies(
+    picture: ScenePicture, exaggeration: float, theme: Theme, only: str = ""
+) -> list[PlacedBody]:
+    """Bend the bodies of a scene's machine like its errors say, axes at their place in the scene.
+
+    Parameters
+    ----------
+    picture : ScenePicture
+    exaggeration : float
+    theme : Theme
+    only : str, optional
+        Frames to take; all by default.
+
+    Returns
+    -------
+    list of PlacedBody
+        Empty where the machine has none.
+    """
+    scene = picture.scene
+    amplitudes = {key: scene.errors.amplitude(key) for key in scene.errors}
+    positions = {**dict.fromkeys(scene.machine.axes, 0.0), **scene.workspace.positions}
+    positions = {name: positions[name] for name in scene.machine.axes}
+    motions = shapes.view_motions(scene.model, scene.errors, amplitudes, positions, picture.view)
+    found: list[PlacedBody] = []
+    for shape in shapes.load_bodies(scene.machine):
+        if only and shape.frame not in only:
+            continue
+        motion = motions[shape.frame]
+        shade = 1.0 if theme.name == "light" else DARKER
+        red, green, blue = (shade * channel / 255.0 for channel in shape.colour)
+        body = Body(
+            shapes.place_points(motion, shape.vertices_mm, exaggeration),
+            shape.triangles.astype(np.intp),
+            colour=(red, green, blue),
+            shaded=True,
+        )
+        edges = shapes.place_points(motion, shape.edges_mm, exaggeration)
+        nominal = shapes.place_points(motion, shape.edges_mm, 0.0)
+        frame, _, what = shape.name.partition("_")
+        name = what if frame in ("R", "S", "t") else f"{frame} {what}"
+        found.append(PlacedBody(name.replace("_", " "), frame, body, edges, nominal))
+    return found
+
+
+def draw_machine(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
+    """Draw a machine with its bent bodies and its bent working volume.
+
+    Parameters
+    ----------
+    scenes : sequence of Scene, (1,)
+    settings : FigureSettings
+    exact : bool
+        Whether the figure becomes pixels of its own size.
+
+    Returns
+    -------
+    Drawing
+    """
+    picture = evaluate_picture(scenes[0], grid=settings.grid, loop=settings.loop)
+    exaggeration = choose_exaggeration(settings, picture)
+    values = component_values(picture.field.error_um, settings.component)
+    scale = build_scale(float(abs(values).max()), settings.component)
+    title = f"Machine and working volume: {picture.scene.title}"
+    placed = place_bodies(picture, exaggeration, settings.theme)
+    facts = [
+        *scene_facts(picture, exaggeration),
+        "bodies schematic, bent and tilted like their frames" if placed else "no bodies known",
+    ]
+    sheet = start_sheet(settings, title, facts, scenes, _legend(), exact=exact)
+    canvas = sheet.canvas
+    drawn_mm = deform(picture.grid.nominal_mm, picture.field.error_um, exaggeration)
+    points = [drawn_mm.reshape(-1, 3), picture.grid.nominal_mm.reshape(-1, 3)]
+    points += [part.body.vertices_mm for part in placed]
+    projection = fit_projection(settings.view, np.concatenate(points), _room(canvas, sheet.content))
+    machine = render_bodies([part.body for part in placed], projection) if placed else None
+    if machine is not None:
+        canvas.image(machine.reduced() if canvas.exact else machine.rgba, machine.rect)
+        draw_body_edges(canvas, placed, projection, machine)
+    faces = outer_faces(picture.grid.shape)
+    surface = triangulate(faces)
+    volume: Raster | None = None
+    if len(surface.triangles):
+        nodes = drawn_mm.reshape(-1, 3)[surface.nodes]
+        body = Body(nodes, surface.triangles, values.reshape(-1)[surface.nodes], scale)
+        volume = render_bodies([body], projection)
+        _overlay(canvas, volume, machine)
+    _draw_volume_lines(canvas, picture, drawn_mm, projection, volume, machine)
+    label_bodies(canvas, placed, projection, machine, sheet.content)
+    draw_panel(
+        canvas, sheet.panel, scale, quantity_words(settings.component),
+        value_marks(picture, values, settings.component),
+        statistics_rows(picture, values, settings.component),
+        (projection.px_per_mm, exaggeration),
+    )  # fmt: skip
+    about = metadata(title, scenes, settings, exaggeration, "machine")
+    maps = (DrawnMap(projection, scale, values, drawn_mm, exaggeration, volume),)
+    return Drawing(canvas.figure, title, about, maps, tuple(canvas.rects))
+
+
+def _room(canvas: Canvas, rect: Rect) -> Rect:
+    """Leave room for the labels of bodies at the right."""
+    left, bottom, right, top = rect
+    side = canvas.px(20.0)
+    return (left + side, bottom + side, right - canvas.px(150.0), top - side)
+
+
+def draw_body_edges(
+    canvas: Canvas, placed: Sequence[PlacedBody], projection: Projection, raster: Raster
+) -> None:
+    """Draw the visible edges of bodies, and faintly where they would be nominally."""
+    theme = canvas.theme
+    seen: list[Array] = []
+    for part in placed:
+        for edge in part.edges_mm:
+            seen += split_visible(edge, projection, raster)[0]
+    canvas.lines(seen, width=SIZES.hair, colour=theme.grid, alpha=0.75, zorder=1.4)
+    nominal: list[Array] = []
+    for part in placed:
+        if part.frame != BASE:
+            for edge in part.nominal_edges_mm:
+                nominal += split_visible(edge, projection, raster)[0]
+    canvas.lines(nominal, width=SIZES.hair, colour=theme.ghost, alpha=0.8, zorder=1.3)
+
+
+def _overlay(canvas: Canvas, volume: Raster, machine: Raster | None) -> None:
+    """Lay the coloured volume over the machine, fainter where bodies stand before it."""
+    rgba = volume.rgba.copy()
+    before = np.ones(rgba.shape[:2], dtype=bool)
+    if machine is not None:
+        left, _, _, top = volume.rect
+        step = volume.sampling
+        rows, columns = np.indices(rgba.shape[:2])
+        spots = np.stack([left + (columns + 0.5) / step, top - (rows + 0.5) / step], -1)
+        before = volume.depth_mm <= machine.depth_at(spots)
+    share = np.where(before, VOLUME_ALPHA, BEHIND_ALPHA)
+    rgba[..., 3] = (rgba[..., 3] * share).astype(np.uint8)
+    canvas.image(rgba, volume.rect, zorder=1.6)
+
+
+def _draw_volume_lines(
+    canvas: Canvas,
+    picture: ScenePicture,
+    drawn_mm: Array,
+    projection: Projection,
+    volume: Raster | None,
+    machine: Raster | None,
+) -> None:
+    """Draw the grid of the bent volume and the ghost of the nominal one."""
+    theme, shape = canvas.theme, picture.grid.shape
+    nodes = drawn_mm.reshape(-1, 3)
+    faces = outer_faces(shape)
+    nx, ny, nz = (2 * line_spacing(count) for count in shape)
+    for lines, width, alpha in (
+        (face_lines(faces, shape, (nx, ny, nz)), SIZES.hair, 0.35),
+        (crease_lines(faces, shape) or box_edges(shape), SIZES.line, 0.95),
+    ):
+        for line in lines:
+            for part in split_visible(nodes[line], projection, volume)[0]:
+                canvas.line(part, width=width, colour=theme.grid, alpha=alpha, zorder=2.0)
+    nominal = picture.grid.nominal_mm.reshape(-1, 3)
+    for edge in box_edges(shape):
+        seen, hidden = split_visible(nominal[edge], projection, machine)
+        canvas.lines(
+            seen, width=SIZES.thin, colour=theme.ink, alpha=0.6, dashes=GHOST_DASHES, zorder=2.2
+        )
+        canvas.lines(
+            hidden, width=SIZES.hair, colour=theme.ink, alpha=0.3, dashes=GHOST_DASHES, zorder=2.2
+        )
+
+
+def label_bodies(
+    canvas: Canvas,
+    placed: Sequence[PlacedBody],
+    projection: Projection,
+    raster: Raster | None,
+    frame: Rect,
+) -> None:
+    """Name bodies in a column at the right, with leaders to a spot of each that can be seen."""
+    if raster is None:
+        return
+    wanted: list[tuple[float, str, tuple[float, float]]] = []
+    for part in placed:
+        spot = _visible_spot(part, projection, raster)
+        if spot is not None:
+            wanted.append((spot[1], part.name, spot))
+    wanted.sort()
+    column = frame[2] - canvas.px(120.0)
+    step = canvas.px(30.0)
+    y = -np.inf
+    for spot_y, name, spot in wanted:
+        y = max(spot_y, y + step)
+        canvas.line(
+            [spot, (column - canvas.px(26.0), y), (column - canvas.px(8.0), y)],
+            width=SIZES.hair, colour=canvas.theme.muted, zorder=5.0,
+        )  # fmt: skip
+        canvas.disc(np.array(spot), 2.5, canvas.theme.muted)
+        canvas.text(column, y, name, size=SIZES.small, va="center_baseline")
+
+
+def _visible_spot(
+    part: PlacedBody, projection: Projection, raster: Raster
+) -> tuple[float, float] | None:
+    """Find the point of a body to lead a label to: visible, well inside what is seen of it."""
+    corners = part.body.vertices_mm[part.body.triangles]
+    rng = np.random.default_rng(0)
+    weights = rng.dirichlet([1.0, 1.0, 1.0], size=(24, len(corners)))
+    points = np.einsum("ktc,tcx->ktx", weights, corners).reshape(-1, 3)
+    spots = projection.project(points)
+    seen = projection.depth_mm(points) <= raster.depth_at(spots) + 1.5 / projection.px_per_mm
+    if not seen.any():
+        return None
+    visible = spots[seen]
+    middle = np.median(visible, axis=0)
+    best = visible[np.argmin(np.hypot(*(visible - middle).T))]
+    return float(best[0]), float(best[1])
+
+
+def _legend() -> list[LegendEntry]:
+    """Build the legend."""
+    return [
+        LegendEntry(
+            lambda c, x, y, w: c.line(
+                [(x, y), (x + w, y)], width=SIZES.thin, colour=c.theme.ink, alpha=0.6,
+                dashes=GHOST_DASHES,
+            ),
+            "nominal volume",
+        ),
+        LegendEntry(
+            lambda c, x, y, w: c.line([(x, y), (x + w, y)], width=SIZES.line, colour=c.theme.ink),
+            "deformed volume",
+        ),
+        LegendEntry(
+            lambda c, x, y, w: c.line(
+                [(x, y), (x + w, y)], width=SIZES.thin, colour=c.theme.ghost, alpha=0.6
+            ),
+            "nominal bodies",
+        ),
+    ]  # fmt: skip

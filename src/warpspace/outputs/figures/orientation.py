@@ -1,0 +1,244 @@
+"""The orientation-error map: how far the tool axis leans, over the working volume."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from warpspace.geometry.colour import build_scale, component_values
+from warpspace.geometry.surfaces import Index, corners, triangulate
+from warpspace.kinematics.chain import branch_pose
+from warpspace.kinematics.model import TOOL_AXIS
+from warpspace.outputs.canvas import Canvas
+from warpspace.outputs.figures.content import Drawing, MapContent
+from warpspace.outputs.figures.error_map import VIEW_WORDS, isoline_words
+from warpspace.outputs.figures.map3d import draw_map, fit_map, map_faces
+from warpspace.outputs.figures.panel import draw_panel
+from warpspace.outputs.figures.settings import FigureSettings
+from warpspace.outputs.figures.sheet import (
+    LegendEntry,
+    map_legend,
+    metadata,
+    scene_facts,
+    start_sheet,
+)
+from warpspace.outputs.labels import Occupancy, place_label
+from warpspace.outputs.lines import split_visible
+from warpspace.outputs.projection import Projection, Rect
+from warpspace.outputs.render import Raster
+from warpspace.outputs.style import SIZES
+from warpspace.outputs.words import spell, spell_factor, spell_point
+from warpspace.scene.model import Scene
+from warpspace.scene.pipeline import ScenePicture, evaluate_picture
+from warpspace.units import MICRORADIAN, RAD_PER_URAD, Array
+
+LEAN_RAD = 0.45
+"""Largest lean on screen that the factor aims at."""
+NEEDLE_SHARE = 0.13
+"""Length of a needle, as a share of the longest edge."""
+NEEDLES = 5
+"""Needles along each edge, about."""
+_ROUND = (1.0, 2.0, 5.0, 10.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Needles:
+    """Tool axes to draw at the nodes.
+
+    Attributes
+    ----------
+    axis : ndarray, [N, 3]
+        Nominal tool axis, unit vectors.
+    lean : ndarray, [N, 3]
+        Exaggerated lean of its end, per length of the needle.
+    length_mm : float, mm
+    tilt_urad : ndarray, [N], µrad
+    """
+
+    axis: Array
+    lean: Array
+    length_mm: float
+    tilt_urad: Array
+
+    def ends_mm(self, nodes_mm: Array, at: Index) -> tuple[Array, Array]:
+        """Give nominal and drawn ends of needles, [n, 2, 3] each, mm."""
+        foot = nodes_mm[at]
+        nominal = np.stack([foot, foot + self.length_mm * self.axis[at]], 1)
+        drawn = np.stack([foot, foot + self.length_mm * (self.axis[at] + self.lean[at])], 1)
+        return nominal, drawn
+
+
+def draw_orientation(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
+    """Draw the orientation-error map of a scene.
+
+    Parameters
+    ----------
+    scenes : sequence of Scene, (1,)
+    settings : FigureSettings
+        The exaggeration is that of the lean.
+    exact : bool
+        Whether the figure becomes pixels of its own size.
+
+    Returns
+    -------
+    Drawing
+    """
+    picture = evaluate_picture(scenes[0], grid=settings.grid, loop=settings.loop)
+    orientation = picture.field.orientation_urad
+    values = component_values(orientation, settings.component)
+    scale = build_scale(
+        float(abs(values).max()), settings.component, quantity="tilt", unit=MICRORADIAN
+    )
+    given = settings.exaggeration
+    automatic = lean_factor(float(np.linalg.norm(orientation, axis=-1).max()))
+    factor = automatic if given is None or given == "auto" else given
+    title = f"Orientation error of the tool axis: {picture.scene.title}"
+    facts = [
+        *scene_facts(picture, None),
+        f"lean of the tool axis drawn {spell_factor(factor)}",
+        "volume undeformed",
+        "orthographic",
+        VIEW_WORDS[settings.view],
+    ]
+    legend = _legend(isoline_words(scale))
+    sheet = start_sheet(settings, title, facts, scenes, legend, exact=exact)
+    needles = _needles(picture, factor)
+
+    def annotate(
+        canvas: Canvas,
+        content: MapContent,
+        projection: Projection,
+        raster: Raster | None,
+        taken: Occupancy,
+        frame: Rect | None,
+    ) -> None:
+        _draw_needles(canvas, content, needles, projection, raster, taken, frame, settings.view)
+
+    content = MapContent(picture.grid.nominal_mm, np.zeros_like(orientation), values, scale, 1.0)
+    ends = needles.ends_mm(content.nominal_mm.reshape(-1, 3), _feet(content, settings.view))
+    drawn = draw_map(
+        sheet.canvas,
+        content,
+        sheet.content,
+        settings.view,
+        projection=fit_map(
+            sheet.canvas,
+            [content],
+            sheet.content,
+            settings.view,
+            beside_mm=np.concatenate(ends).reshape(-1, 3),
+        ),
+        annotate=annotate,
+        ghost=False,
+    )
+    heading = "tilt" if settings.component == "norm" else f"rotation about {settings.component}"
+    tilt = np.linalg.norm(orientation, axis=-1)
+    worst = int(np.argmax(tilt))
+    rows = [
+        ("max tilt", f"{spell(float(tilt.max()))} {MICRORADIAN}"),
+        ("mean tilt", f"{spell(float(tilt.mean()))} {MICRORADIAN}"),
+        ("P95", f"{spell(float(np.percentile(tilt, 95.0)))} {MICRORADIAN}"),
+        ("max at", f"{spell_point(picture.grid.nominal_mm.reshape(-1, 3)[worst])} mm"),
+        ("1° of lean shown", f"{spell(math.radians(1.0) / RAD_PER_URAD / factor)} {MICRORADIAN}"),
+    ]
+    marks = [("mean", float(values.mean())), ("max", float(values.max()))]
+    if settings.component != "norm":
+        marks.insert(0, ("min", float(values.min())))
+    draw_panel(
+        sheet.canvas, sheet.panel, scale, f"{heading}  [{MICRORADIAN}]", marks, rows,
+        (drawn.projection.px_per_mm, None),
+    )  # fmt: skip
+    about = metadata(title, scenes, settings, factor, "orientation-map")
+    return Drawing(sheet.canvas.figure, title, about, (drawn,), tuple(sheet.canvas.rects))
+
+
+def lean_factor(largest_urad: float) -> float:
+    """Choose a round factor that makes the largest lean easy to see; 1000 where there is none."""
+    if not largest_urad > 0.0:
+        return 1000.0
+    wanted = max(LEAN_RAD / (largest_urad * RAD_PER_URAD), 1.0)
+    decade = 10.0 ** math.floor(math.log10(wanted))
+    return max(step * decade for step in _ROUND if step * decade <= wanted * (1.0 + 1e-9))
+
+
+def _needles(picture: ScenePicture, factor: float) -> Needles:
+    """Find nominal and leaning tool axes at all nodes."""
+    pose = branch_pose(picture.scene.model, "tool", picture.grid.coordinates)
+    axis = pose[..., :3, :3] @ np.array(TOOL_AXIS)
+    axis = np.broadcast_to(axis, picture.grid.nominal_mm.shape).reshape(-1, 3)
+    turn = picture.field.orientation_urad.reshape(-1, 3)
+    lean = factor * RAD_PER_URAD * np.cross(turn, axis)
+    longest = max(picture.grid.longest_edge_mm, 1.0)
+    return Needles(axis, lean, NEEDLE_SHARE * longest, np.linalg.norm(turn, axis=-1))
+
+
+def _draw_needles(
+    canvas: Canvas,
+    content: MapContent,
+    needles: Needles,
+    projection: Projection,
+    raster: Raster | None,
+    taken: Occupancy,
+    frame: Rect | None,
+    view: str,
+) -> None:
+    """Draw tool axes on the visible surface and label those at the corners."""
+    nodes = content.nominal_mm.reshape(-1, 3)
+    nominal, drawn = needles.ends_mm(nodes, _feet(content, view))
+    theme = canvas.theme
+    for ends, colour, width, dashes in (
+        (nominal, theme.ghost, SIZES.thin, (6.0, 4.0)),
+        (drawn, theme.accent, SIZES.bold, None),
+    ):
+        lines = [part for line in ends for part in split_visible(line, projection, raster)[0]]
+        canvas.lines(lines, width=width, colour=colour, dashes=dashes, zorder=4.0)
+        taken.add_lines(lines)
+    if frame is None:
+        return
+    found = corners(content.shape)
+    for corner, (foot, tip) in zip(found, needles.ends_mm(nodes, found)[1], strict=True):
+        seen = split_visible(np.stack([foot, tip]), projection, raster)[0]
+        if not seen:
+            continue
+        text = f"{spell(float(needles.tilt_urad[corner]))} {MICRORADIAN}"
+        size = canvas.text_size(text, SIZES.text, "bold")
+        spot = projection.project(tip)
+        placed = place_label([(float(spot[0]), float(spot[1]))], size, frame, taken, canvas.factor)
+        if placed is not None:
+            canvas.text(
+                *placed.centre, text, weight="bold", colour=theme.accent, halo=theme.paper,
+                ha="center", va="center_baseline",
+            )  # fmt: skip
+
+
+def _feet(content: MapContent, view: str) -> Index:
+    """Choose nodes of the surface, evenly spread, to stand needles on."""
+    shape = content.shape
+    surface = triangulate(map_faces(shape, view)).nodes
+    surface = surface if len(surface) else np.arange(np.prod(shape))
+    at = np.stack(np.unravel_index(surface, shape), -1)
+    step = [max(1, (count - 1) // (NEEDLES - 1)) for count in shape]
+    chosen = np.ones(len(surface), dtype=bool)
+    for axis in range(3):
+        chosen &= (at[:, axis] % step[axis] == 0) | (at[:, axis] == shape[axis] - 1)
+    return surface[chosen]
+
+
+def _legend(isolines: str) -> list[LegendEntry]:
+    """Build the legend."""
+    entries = [
+        LegendEntry(
+            lambda c, x, y, w: c.line(
+                [(x, y), (x + w, y)], width=SIZES.thin, colour=c.theme.ghost, dashes=(6.0, 4.0)
+            ),
+            "nominal tool axis",
+        ),
+        LegendEntry(
+            lambda c, x, y, w: c.line(
+                [(x, y), (x + w, y)], width=SIZES.bold, colour=c.theme.accent
+            ),
+            "actual tool axis, lean exaggerated",
+        ),
+    ]
+    return entries + map_legend(isolines)[3:]

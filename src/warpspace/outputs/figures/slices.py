@@ -1,0 +1,195 @@
+"""Three slices through the middle of the working volume, laid out like an engineering drawing."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from warpspace.exceptions import OptionError
+from warpspace.field.evaluate import evaluate_first_order
+from warpspace.geometry.colour import ColourScale, build_scale, component_values
+from warpspace.geometry.faces import crease_lines, outer_faces
+from warpspace.geometry.slices import build_slice, slice_ranges
+from warpspace.geometry.surfaces import box_edges, triangulate
+from warpspace.outputs.canvas import Canvas
+from warpspace.outputs.figures.content import Drawing, DrawnMap, MapContent
+from warpspace.outputs.figures.error_map import (
+    isoline_words,
+    quantity_words,
+    statistics_rows,
+    value_marks,
+)
+from warpspace.outputs.figures.map3d import GHOST_DASHES, draw_map, fit_map
+from warpspace.outputs.figures.panel import draw_panel
+from warpspace.outputs.figures.settings import FigureSettings, choose_exaggeration
+from warpspace.outputs.figures.sheet import map_legend, metadata, scene_facts, start_sheet
+from warpspace.outputs.lines import split_visible
+from warpspace.outputs.projection import Rect, fit_projection
+from warpspace.outputs.render import Body, render_bodies
+from warpspace.outputs.style import SIZES
+from warpspace.outputs.words import spell_short
+from warpspace.scene.model import Scene
+from warpspace.scene.pipeline import ScenePicture, evaluate_picture
+from warpspace.units import Array
+
+VIEW_OF = {"Z": "top", "Y": "front", "X": "right"}
+PLANE_OF = {"Z": "XY", "Y": "XZ", "X": "YZ"}
+
+
+@dataclass(frozen=True, slots=True)
+class Slice:
+    """One slice.
+
+    Attributes
+    ----------
+    axis : str
+        Axis that stands still.
+    position_mm : float, mm
+        Where, in coordinates of the axis.
+    content : MapContent
+    """
+
+    axis: str
+    position_mm: float
+    content: MapContent
+
+    @property
+    def name(self) -> str:
+        """Heading of its map."""
+        return (
+            f"{PLANE_OF[self.axis]} plane at axis {self.axis} = {spell_short(self.position_mm)} mm"
+        )
+
+
+def draw_slices(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
+    """Draw three slices through the middle of a scene's working volume.
+
+    Parameters
+    ----------
+    scenes : sequence of Scene, (1,)
+    settings : FigureSettings
+    exact : bool
+        Whether the figure becomes pixels of its own size.
+
+    Returns
+    -------
+    Drawing
+
+    Raises
+    ------
+    OptionError
+        If the working volume does not extend along three axes.
+    """
+    picture = evaluate_picture(scenes[0], grid=settings.grid, loop=settings.loop)
+    exaggeration = choose_exaggeration(settings, picture)
+    values = component_values(picture.field.error_um, settings.component)
+    scale = build_scale(float(abs(values).max()), settings.component)
+    slices = _evaluate_slices(picture, settings, scale, exaggeration)
+    title = f"Slices through the working volume: {picture.scene.title}"
+    legend = map_legend(isoline_words(scale), surface="deformed slice")
+    sheet = start_sheet(
+        settings, title, scene_facts(picture, exaggeration), scenes, legend, exact=exact
+    )
+    canvas = sheet.canvas
+    cells = _cells(canvas, sheet.content, slices)
+    px_per_mm = min(
+        fit_map(canvas, [part.content], cells[part.axis], VIEW_OF[part.axis]).px_per_mm
+        for part in slices
+    )
+    maps: list[DrawnMap] = []
+    for part in slices:
+        cell, view = cells[part.axis], VIEW_OF[part.axis]
+        fitted = fit_map(canvas, [part.content], cell, view)
+        middle = np.array([cell[0] + cell[2], cell[1] + cell[3]]) / 2.0
+        nominal = part.content.nominal_mm.reshape(-1, 3)
+        centre = (nominal.min(axis=0) + nominal.max(axis=0)) / 2.0
+        projection = replace(fitted, px_per_mm=px_per_mm, centre_mm=centre, centre_px=middle)
+        maps.append(draw_map(canvas, part.content, cell, view, projection=projection))
+        canvas.text(
+            middle[0], cell[3] - canvas.px(12.0), part.name, weight="bold", ha="center", va="top"
+        )
+    _draw_key(canvas, picture, slices, cells["key"])
+    draw_panel(
+        canvas, sheet.panel, scale, quantity_words(settings.component),
+        value_marks(picture, values, settings.component),
+        [("whole volume", ""), *statistics_rows(picture, values, settings.component)],
+        (px_per_mm, exaggeration),
+    )  # fmt: skip
+    facts = metadata(title, scenes, settings, exaggeration, "slices")
+    return Drawing(canvas.figure, title, facts, tuple(maps), tuple(canvas.rects))
+
+
+def _evaluate_slices(
+    picture: ScenePicture, settings: FigureSettings, scale: ColourScale, exaggeration: float
+) -> list[Slice]:
+    """Evaluate the slices where they lie."""
+    scene = picture.scene
+    ranges = slice_ranges(scene.model, scene.workspace)
+    if not ranges:
+        raise OptionError(
+            f"figure 'slices': the working volume of {scene.name} does not extend along X, Y and Z;"
+            " draw the error-map"
+        )
+    found: list[Slice] = []
+    for axis in ("Z", "Y", "X"):
+        low, high = ranges[axis]
+        at = (low + high) / 2.0
+        grid = build_slice(scene.model, scene.workspace, axis, at, settings.grid)
+        field = evaluate_first_order(
+            scene.model, scene.errors, grid.coordinates, picture.view, grid.nominal_mm
+        )
+        values = component_values(field.error_um, settings.component)
+        content = MapContent(grid.nominal_mm, field.error_um, values, scale, exaggeration)
+        found.append(Slice(axis, at, content))
+    return found
+
+
+def _cells(canvas: Canvas, rect: Rect, slices: Sequence[Slice]) -> dict[str, Rect]:
+    """Divide the sheet: XY above XZ, YZ to the right of XZ, the key in the corner left."""
+    spans = {part.axis: np.ptp(part.content.nominal_mm.reshape(-1, 3), axis=0) for part in slices}
+    x, y, z = float(spans["Z"][0]), float(spans["Z"][1]), float(spans["Y"][2])
+    left, bottom, right, top = rect
+    # axes and labels take the same room in every cell, the rest follows the lengths
+    fixed = min(canvas.px(230.0), 0.3 * (right - left), 0.3 * (top - bottom))
+    column = left + fixed + (right - left - 2.0 * fixed) * x / (x + y)
+    row = bottom + fixed + (top - bottom - 2.0 * fixed) * z / (z + y)
+    return {
+        "Z": (left, row, column, top),
+        "Y": (left, bottom, column, row),
+        "X": (column, bottom, right, row),
+        "key": (column, row, right, top),
+    }
+
+
+def _draw_key(canvas: Canvas, picture: ScenePicture, slices: Sequence[Slice], rect: Rect) -> None:
+    """Show where the slices lie in the nominal volume."""
+    inset = canvas.px(46.0)
+    room = (rect[0] + inset, rect[1] + inset, rect[2] - inset, rect[3] - inset)
+    nodes = picture.grid.nominal_mm.reshape(-1, 3)
+    projection = fit_projection("iso", nodes, room)
+    bodies: list[Body] = []
+    creases: list[Array] = []
+    for part in slices:
+        faces = outer_faces(part.content.shape)
+        surface = triangulate(faces)
+        points = part.content.nominal_mm.reshape(-1, 3)
+        values = part.content.values.reshape(-1)
+        bodies.append(
+            Body(
+                points[surface.nodes], surface.triangles, values[surface.nodes], part.content.scale
+            )
+        )
+        creases += [points[line] for line in crease_lines(faces, part.content.shape)]
+    raster = render_bodies(bodies, projection)
+    canvas.image(raster.reduced() if canvas.exact else raster.rgba, raster.rect)
+    theme = canvas.theme
+    seen = [line for crease in creases for line in split_visible(crease, projection, raster)[0]]
+    canvas.lines(seen, width=SIZES.thin, colour=theme.grid, zorder=2.0)
+    for edge in box_edges(picture.grid.shape):
+        visible, hidden = split_visible(nodes[edge], projection, raster)
+        canvas.lines(visible, width=SIZES.thin, colour=theme.ghost, dashes=GHOST_DASHES)
+        canvas.lines(hidden, width=SIZES.hair, colour=theme.ghost, alpha=0.5, dashes=GHOST_DASHES)
+    canvas.text(
+        (rect[0] + rect[2]) / 2.0, rect[3] - canvas.px(12.0), "where they lie (not exaggerated)",
+        weight="bold", ha="center", va="top",
+    )  # fmt: skip
