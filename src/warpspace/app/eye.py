@@ -4,16 +4,23 @@ import numpy as np
 from viser import ClientHandle
 
 from warpspace.app.cameras import TELEPHOTO_DEG, VIEWS, Stand, change_lens, clipping, view_pose
+from warpspace.app.kept import Same
 from warpspace.app.layers import SCENE_PER_MM
 from warpspace.app.layers.axes import axes_room_mm
 from warpspace.app.live import Frame
 from warpspace.app.machine import machine_room_mm
 from warpspace.app.panels.layout import HEADING_HEIGHT, side_widths
+from warpspace.app.state import AppState
 from warpspace.app.tabs import CameraMemory
 from warpspace.units import Array
 
 LEAST_SIZE = 200
 """CSS pixels of a picture that is taken to be one."""
+
+
+def focus(state: AppState) -> tuple[Same, bool]:
+    """Tell what the camera is set up for: the scene, and whether its machine is shown."""
+    return Same(state.origin), state.machine.shown
 
 
 class Eye:

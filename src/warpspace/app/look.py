@@ -10,6 +10,7 @@ from typing import Any
 
 from warpspace.app.ranges import Span
 from warpspace.geometry.slices import slice_ranges
+from warpspace.geometry.traces import TILT_STEP_DEG
 from warpspace.machine.description import Vector
 from warpspace.machine.parameters import LINEAR_AXES
 from warpspace.scene.model import Scene
@@ -25,6 +26,7 @@ RANGES = {"auto": "auto", "fixed": "fixed", "shared": "shared"}
 RANGE_TOP = Span(0.001, 1e6, 0.001)
 START_TOP = 50.0
 POINT_MM = Span(-2000.0, 2000.0, 1.0)
+MOST_TYPED = 200
 MOST_HELD = 8
 """Positions that one axis can be held at while another one is turned."""
 
@@ -210,10 +212,11 @@ def parse_positions(text: str, span: Span) -> tuple[tuple[float, ...], str]:
     tuple of (tuple of float, str)
         Positions within the travel in rising order, and what had to be changed (empty for nothing).
     """
-    words = text.replace("−", "-").replace("°", " ").replace(",", " ").replace(";", " ").split()
+    spaced = text[:MOST_TYPED].replace("−", "-").replace("°", " ").replace(",", " ")
+    words = [word for word in spaced.replace(";", " ").split() if word not in {"-", "+", "."}]
     found: set[float] = set()
     wrong: list[str] = []
-    for word in words[:64]:
+    for word in words:
         try:
             value = float(word)
         except ValueError:
@@ -237,8 +240,8 @@ def default_held(
 ) -> dict[str, tuple[float, ...]]:
     """Give the positions that axes are held at, degrees, where the user has chosen none.
 
-    The last axis of a branch stands where it is and a quarter of a turn on; axes that others stand
-    on are left to `warpspace.geometry.traces`.
+    The last axis of a branch stands where it is and a quarter of a turn on; the one before it
+    where it is and 30 degrees to either side.
     """
     found: dict[str, tuple[float, ...]] = {}
     for side in ("workpiece", "tool"):
@@ -248,4 +251,9 @@ def default_held(
             here = positions.get(last.name, 0.0)
             quarter = here + 90.0 if here + 90.0 <= last.travel[1] else here - 90.0
             found[last.name] = (here, quarter) if quarter >= last.travel[0] else (here,)
+            tilting = turning[-2]
+            low, high = tilting.travel
+            middle = positions.get(tilting.name, 0.0)
+            beside = {middle - TILT_STEP_DEG, middle + TILT_STEP_DEG}
+            found[tilting.name] = (*sorted({middle, *(at for at in beside if low <= at <= high)}),)
     return {**found, **dict(rotary.held)}

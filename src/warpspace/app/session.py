@@ -18,10 +18,11 @@ from viser import ClientHandle
 from viser import _messages as messages
 
 from warpspace.app.board import Board
-from warpspace.app.eye import Eye
+from warpspace.app.eye import Eye, focus
 from warpspace.app.layers import Layer
 from warpspace.app.layers.axes import AxesLayer
 from warpspace.app.layers.box import BoxLayer
+from warpspace.app.layers.stage import StageLayer
 from warpspace.app.layers.traces import TracesLayer
 from warpspace.app.live import Frame, LiveModel
 from warpspace.app.panels import Desk, Panel, Settling, Update
@@ -82,6 +83,7 @@ class Session:
         self._wake = threading.Event()
         self._stopped = threading.Event()
         self._layers: list[Layer] = []
+        self._stage: StageLayer | None = None
         self._panels: list[Panel] = []
         self._worker = threading.Thread(
             target=self._run, name=f"warpspace-session-{client.client_id}", daemon=True
@@ -101,6 +103,8 @@ class Session:
         self._stopped.set()
         self._wake.set()
         self._told.set()
+        if self._stage is not None:
+            self._stage.stop()
         self.board.unsubscribe(self.changed)
 
     def changed(self) -> None:
@@ -191,11 +195,15 @@ class Session:
                 BoxLayer(scene, frame),
                 TracesLayer(scene, frame),
                 AxesLayer(scene, frame),
+                stage := StageLayer(self._client, frame, self.act),
             ]
+            self._stage = stage
             desk = Desk(
                 self._client.gui, self.changed, self.post, self.act, lambda: self.board, self.notify
             )
-            self._panels = lay_out_panels(desk, frame.state, self._scenes, self.fit_view)
+            self._panels = lay_out_panels(
+                desk, frame.state, self._scenes, self.fit_view, stage.play
+            )
             for panel in self._panels:
                 panel.show(frame)
         self._client.flush()
@@ -212,7 +220,7 @@ class Session:
                 self._restore_camera(self._shown)
         notes = self.board.apply(self._take_in, by=self.changed)
         while self._actions:
-            self._actions.popleft()()
+            self._guarded(self._actions.popleft())
         state = self.board.state
         if not notes and self._shown is not None and state is self._shown.state:
             return
@@ -220,10 +228,16 @@ class Session:
 
     def _take_in(self, state: AppState) -> AppState:
         """Apply what widgets and buttons have changed to a state."""
-        for panel in self._panels:
-            state = panel.read(state)
+        updates: list[Update] = [panel.read for panel in self._panels]
         while self._posted:
-            state = self._posted.popleft()(state)
+            updates.append(self._posted.popleft())
+        for update in updates:
+            found: list[AppState] = []
+            self._guarded(
+                lambda update=update, state=state, found=found: found.append(update(state))
+            )
+            # what failed has changed nothing, and the others go on
+            state = found[0] if found else state
         return state
 
     def _show(self, frame: Frame, notes: tuple[str, ...]) -> None:
@@ -234,7 +248,7 @@ class Session:
                 layer.show(frame)
             for panel in self._panels:
                 panel.show(frame)
-            if before is not None and before.state.origin is not frame.state.origin:
+            if before is not None and focus(before.state) != focus(frame.state):
                 self._set_title(frame)
                 self._eye.fit(frame, docked=True)
             if before is not None and before.state.shown.dark != frame.state.shown.dark:

@@ -1,6 +1,6 @@
 """Where the panels stand: errors on the left, colour bar and view on the right, heading on top."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 from viser import GuiApi
 
@@ -9,6 +9,9 @@ from warpspace.app.panels.chance import ChancePanel
 from warpspace.app.panels.commands import CommandsPanel
 from warpspace.app.panels.errors import ErrorsPanel
 from warpspace.app.panels.gains import GainsPanel
+from warpspace.app.panels.looks import CameraPanel, Choose, LooksPanel
+from warpspace.app.panels.machine import MachinePanel
+from warpspace.app.panels.rotary import Play, RotaryPanel
 from warpspace.app.panels.shape import ShapePanel
 from warpspace.app.panels.summary import heading_panel, summary_panel
 from warpspace.app.panels.view import ViewPanel
@@ -32,7 +35,8 @@ div:has(> p > label):has(+ div input[type="checkbox"]) { width: auto !important;
 div:has(> p > label) + div:has(input[type="checkbox"]) { width: auto; flex-grow: 0 !important;
   padding-right: 8px; }
 /* messages stand below the heading, not on it */
-.mantine-Notifications-root[data-position^="top"] { top: auto; bottom: 16px; left: 346px; }
+.mantine-Notifications-root[data-position^="top"] {
+  top: auto !important; bottom: 1em !important; }
 p:has(> label) { color: inherit !important; letter-spacing: 0 !important; }
 .mantine-Slider-root:has(.mantine-Slider-markLabel) { margin-bottom: 4px; }
 .mantine-ScrollArea-scrollbar[data-orientation="horizontal"] { display: none; }
@@ -55,7 +59,7 @@ def apply_theme(gui: GuiApi, *, dark: bool) -> None:
 
 
 def lay_out_panels(
-    desk: Desk, state: AppState, scenes: Mapping[str, Scene], fit_view: Callable[[], None]
+    desk: Desk, state: AppState, scenes: Mapping[str, Scene], fit_view: Choose, play: Play
 ) -> list[Panel]:
     """Build the page of one tab.
 
@@ -65,7 +69,9 @@ def lay_out_panels(
     state : AppState
     scenes : mapping of str to Scene
     fit_view : callable
-        Puts the camera back.
+        Puts the camera to a named view, or changes its lens.
+    play : callable
+        Turns the table.
 
     Returns
     -------
@@ -78,7 +84,7 @@ def lay_out_panels(
     gui.main_panel.dock_left()
     gui.main_panel.set_width(LEFT_WIDTH)
     gui.add_html(STYLE)
-    commands = CommandsPanel(desk, fit_view)
+    commands = CommandsPanel(desk, lambda: fit_view(None, None))
     shape_panel = gui.add_panel()
     with shape_panel.add_tab("One error"):
         shape = ShapePanel(desk, state)
@@ -94,8 +100,12 @@ def lay_out_panels(
     settings = gui.add_panel()
     with settings.add_tab("View"):
         view = ViewPanel(desk, state, scenes)
-        button = gui.add_button("Fit view", color="gray", hint="Camera to the operator's side.")
-        button.on_click(lambda _: fit_view())
+        looks = LooksPanel(desk, state)
+        camera = CameraPanel(desk, fit_view)
+    with settings.add_tab("Machine"):
+        machine = MachinePanel(desk, state)
+    with settings.add_tab("Table"):
+        rotary = RotaryPanel(desk, state, play)
     with settings.add_tab("Gains"):
         gains = GainsPanel(desk)
     with settings.add_tab("Chance"):
@@ -106,4 +116,17 @@ def lay_out_panels(
     with top.add_tab("warpspace"):
         heading = heading_panel(desk)
     top.float(x=12, y=12, width=520)
-    return [errors, shape, view, gains, chance, commands, summary, heading]
+    return [
+        errors,
+        shape,
+        view,
+        looks,
+        camera,
+        machine,
+        rotary,
+        gains,
+        chance,
+        commands,
+        summary,
+        heading,
+    ]

@@ -1,0 +1,188 @@
+"""What is written on the map: corner arrows, the worst point, scale bars."""
+
+from typing import Any
+
+import numpy as np
+from viser import SceneApi
+
+from warpspace.app.layers import SCENE_PER_MM, colour_bytes, palette
+from warpspace.app.layers.axes import AWAY
+from warpspace.app.legend import spell_factor
+from warpspace.app.live import Frame
+from warpspace.geometry.annotations import (
+    ScaleBar,
+    corner_arrows,
+    scale_bars,
+    spell_micrometres,
+    worst_point,
+)
+from warpspace.geometry.arrows import build_arrows
+from warpspace.geometry.deform import bounds_mm
+from warpspace.units import MICROMETRE, Array
+
+RADIUS, HEAD, BALL = 0.0032, 0.034, 0.009
+"""Shaft and head of an arrow, and the marker of the worst point, as parts of the longest edge."""
+BAR_AWAY, BAR_BELOW, BAR_GAP, BAR_TICK = 0.10, 0.17, 0.055, 0.012
+"""Where scale bars lie, from the axes and from each other, and their end ticks, likewise."""
+CORNERS = 8
+
+
+def worst_text(frame: Frame) -> str:
+    """Spell the largest value of what is coloured."""
+    value = worst_point(frame.values, frame.grid.nominal_mm, frame.drawn_mm).value
+    if frame.scale.unit == MICROMETRE:
+        return f"max {spell_micrometres(value)}"
+    return f"max {value:.1f} {frame.scale.unit}".replace("-", "−")
+
+
+def bar_lines(frame: Frame, bars: tuple[ScaleBar, ScaleBar]) -> tuple[Array, Array]:
+    """Lay the scale bars in front of the box, below the numbers of the X axis.
+
+    Parameters
+    ----------
+    frame : Frame
+    bars : tuple of ScaleBar, (2,)
+
+    Returns
+    -------
+    lines_mm : ndarray, [6, 2, 3], mm
+        Each bar with a tick at either end.
+    labels_mm : ndarray, [2, 3], mm
+        Right ends, where the lengths are written.
+    """
+    low, _ = bounds_mm(frame.grid.nominal_mm)
+    longest = frame.grid.longest_edge_mm
+    tick = np.array([0.0, 0.0, BAR_TICK * longest])
+    lines: list[Array] = []
+    labels: list[Array] = []
+    for number, bar in enumerate(bars):
+        start = low + longest * np.array([-AWAY, -AWAY - BAR_AWAY, -BAR_BELOW - number * BAR_GAP])
+        end = start + np.array([bar.drawn_mm, 0.0, 0.0])
+        lines += [np.stack([start, end]), *(np.stack([p, p + tick]) for p in (start, end))]
+        labels.append(end + longest * np.array([0.015, 0.0, 0.0]))
+    return np.stack(lines), np.stack(labels)
+
+
+class AnnotationsLayer:
+    """Arrows, marker, bars and their numbers.
+
+    Parameters
+    ----------
+    scene : viser.SceneApi
+    frame : Frame
+    """
+
+    def __init__(self, scene: SceneApi, frame: Frame) -> None:
+        self._scene = scene
+        self._dark = frame.state.shown.dark
+        self._arrows: Any = None
+        self._corner_labels = [
+            self._label(f"/marks/corner{n}", "bottom-center") for n in range(CORNERS)
+        ]
+        self._ball: Any = None
+        self._worst = self._label("/marks/max", "bottom-center")
+        self._bars = scene.add_line_segments(
+            "/marks/bars",
+            np.zeros((1, 2, 3), np.float32),
+            colour_bytes(palette(frame).edge),
+            thickness=2.4,
+            thickness_units="screen",
+            scale=SCENE_PER_MM,
+        )
+        self._bar_labels = [self._label(f"/marks/bar{n}", "center-left") for n in range(2)]
+        self.show(frame)
+
+    def _label(self, name: str, anchor: Any) -> Any:
+        """Add a label without text yet."""
+        return self._scene.add_label(name, "", visible=False, font_screen_scale=0.8, anchor=anchor)
+
+    def show(self, frame: Frame) -> None:
+        """Follow the frame."""
+        if frame.state.shown.dark != self._dark:
+            self._dark = frame.state.shown.dark
+            for handle in (self._arrows, self._ball):
+                if handle is not None:
+                    handle.color = palette(frame).edge
+        self._show_arrows(frame)
+        self._show_worst(frame)
+        self._show_bars(frame)
+
+    def _show_arrows(self, frame: Frame) -> None:
+        """Draw the displacement of the corners."""
+        on = frame.state.look.arrows
+        if self._arrows is not None:
+            self._arrows.visible = on
+        arrows = corner_arrows(
+            frame.grid.shape, frame.grid.nominal_mm, frame.field.error_um, frame.exaggeration
+        )
+        count = len(arrows.norm_um) if on else 0
+        for label in self._corner_labels[count:]:
+            label.visible = False
+        if not on:
+            return
+        longest = frame.grid.longest_edge_mm
+        vertices, triangles = build_arrows(
+            arrows.start_mm, arrows.end_mm, RADIUS * longest, HEAD * longest
+        )
+        if self._arrows is None or len(self._arrows.vertices) != len(vertices):
+            self._arrows = self._scene.add_mesh_simple(
+                "/marks/arrows",
+                vertices.astype(np.float32),
+                triangles.astype(np.uint32),
+                color=palette(frame).edge,
+                scale=SCENE_PER_MM,
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+        else:
+            self._arrows.vertices = vertices.astype(np.float32)
+        for label, text, at in zip(
+            self._corner_labels, arrows.texts, arrows.label_mm, strict=False
+        ):
+            label.text = text
+            label.position = at * SCENE_PER_MM
+            label.visible = True
+
+    def _show_worst(self, frame: Frame) -> None:
+        """Mark the largest value."""
+        on = frame.state.look.worst and bool(np.any(frame.values))
+        self._worst.visible = on
+        if self._ball is not None:
+            self._ball.visible = on
+        if not on:
+            return
+        longest = frame.grid.longest_edge_mm
+        found = worst_point(frame.values, frame.grid.nominal_mm, frame.drawn_mm)
+        if self._ball is None:
+            self._ball = self._scene.add_icosphere(
+                "/marks/ball",
+                BALL * longest * SCENE_PER_MM,
+                color=palette(frame).edge,
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+        self._ball.position = found.drawn_mm * SCENE_PER_MM
+        middle = frame.grid.nominal_mm.reshape(-1, 3).mean(axis=0)
+        outwards = np.sign(found.nominal_mm - middle) * (1.0, 1.0, 0.0)
+        self._worst.text = worst_text(frame)
+        self._worst.position = (found.drawn_mm + 0.03 * longest * outwards) * SCENE_PER_MM
+
+    def _show_bars(self, frame: Frame) -> None:
+        """Draw the two lengths."""
+        on = frame.state.look.bars
+        self._bars.visible = on
+        for label in self._bar_labels:
+            label.visible = on
+        if not on:
+            return
+        bars = scale_bars(frame.grid.longest_edge_mm, frame.exaggeration)
+        lines, labels = bar_lines(frame, bars)
+        self._bars.points = lines.astype(np.float32)
+        self._bars.colors = colour_bytes(palette(frame).edge)
+        texts = (
+            f"{bars[0].text} geometry",
+            f"{bars[1].text} error, drawn {spell_factor(frame.exaggeration)}",
+        )
+        for label, text, at in zip(self._bar_labels, texts, labels, strict=True):
+            label.text = text
+            label.position = at * SCENE_PER_MM

@@ -1,0 +1,109 @@
+"""The machine tab: its bodies, where its axes stand, whether they are bent."""
+
+from dataclasses import replace
+from typing import Any
+
+from warpspace.app.live import Frame
+from warpspace.app.look import linear_positions, linear_spans
+from warpspace.app.panels import Desk
+from warpspace.app.state import AppState
+from warpspace.app.widgets import Bound
+from warpspace.scene.bodies import load_bodies
+from warpspace.scene.model import Scene
+
+SWITCHES = {
+    "shown": (
+        "Machine bodies",
+        "A schematic of the machine around the working volume, in true proportions.",
+    ),
+    "bent": (
+        "Bodies bent by the errors",
+        "Every body takes the errors before it, with the factor of the box. Off: nominal.",
+    ),
+}
+NO_BODIES = "This machine comes without bodies; its tool point is drawn all the same."
+
+
+class MachinePanel:
+    """Switches and a slider per axis.
+
+    Parameters
+    ----------
+    desk : Desk
+    state : AppState
+    """
+
+    def __init__(self, desk: Desk, state: AppState) -> None:
+        self._desk = desk
+        self._switches: dict[str, Bound[bool]] = {
+            name: Bound(
+                desk.gui.add_checkbox(text, initial_value=getattr(state.machine, name), hint=hint),
+                desk.changed,
+            )
+            for name, (text, hint) in SWITCHES.items()
+        }
+        self._note: Any = desk.gui.add_markdown(NO_BODIES, visible=False)
+        self._home: Any = desk.gui.add_folder("Axis positions")
+        self._built_for: Scene | None = None
+        self._sliders: dict[str, Any] = {}
+        self._linear: dict[str, Bound[float]] = {}
+        self._rotary: dict[str, Bound[float]] = {}
+        self._build(state)
+
+    def _build(self, state: AppState) -> None:
+        """Add the sliders of a scene's axes."""
+        for slider in self._sliders.values():
+            slider.remove()
+        self._built_for = state.scene
+        linear = linear_positions(state.scene, state.machine)
+        spans = {**linear_spans(state.scene), **state.position_spans}
+        with self._home:
+            self._sliders = {
+                axis: self._desk.gui.add_slider(
+                    f"Machine {axis} [{'mm' if axis in linear else '°'}]",
+                    min=span.low,
+                    max=span.high,
+                    step=span.step,
+                    initial_value=linear.get(axis, state.positions.get(axis, 0.0)),
+                    hint=f"Where {axis} stands: moves the bodies and the tool point."
+                    + ("" if axis in linear else " The working volume is drawn for it too."),
+                )
+                for axis, span in spans.items()
+            }
+        bound = {axis: Bound[float](s, self._desk.changed) for axis, s in self._sliders.items()}
+        self._linear = {axis: b for axis, b in bound.items() if axis in linear}
+        self._rotary = {axis: b for axis, b in bound.items() if axis not in linear}
+
+    def read(self, state: AppState) -> AppState:
+        """Take over what a browser has moved."""
+        machine, spans = state.machine, linear_spans(state.scene)
+        for name, switch in self._switches.items():
+            on = switch.poll()
+            if on is not None:
+                machine = machine.switched(**{name: on})
+        for axis, bound in self._linear.items():
+            value = bound.poll()
+            if value is not None and axis in spans:
+                machine = machine.with_linear(axis, value, spans[axis])
+        if machine is not state.machine:
+            state = replace(state, machine=machine)
+        for axis, bound in self._rotary.items():
+            value = bound.poll()
+            if value is not None:
+                state = state.with_position(axis, value)
+        return state
+
+    def show(self, frame: Frame) -> None:
+        """Make the widgets show the state."""
+        state = frame.state
+        if self._built_for is None or state.scene.machine is not self._built_for.machine:
+            self._build(state)
+        for name, switch in self._switches.items():
+            switch.show(getattr(state.machine, name))
+        self._note.visible = state.machine.shown and not load_bodies(state.scene.machine)
+        for axis, value in linear_positions(state.scene, state.machine).items():
+            if axis in self._linear:
+                self._linear[axis].show(value)
+        for axis, bound in self._rotary.items():
+            if axis in state.positions:
+                bound.show(state.positions[axis])
