@@ -203,6 +203,7 @@ def _sobol(
 
     if not 2 <= base <= MAX_SOBOL or base & (base - 1):
         raise OptionError(f"sobol: {base}; expected a power of two from 2 to {MAX_SOBOL:,}")
+    seed = plan.seed + 1  # SALib takes 0 for no seed
     wide = [index for index, width in enumerate(draws.half_width) if width > 0.0]
     problem = {
         "num_vars": len(wide),
@@ -210,12 +211,12 @@ def _sobol(
         "bounds": [[0.0, 1.0]] * len(wide),
     }
     unit = np.full((1, len(draws.keys)), 0.5)
-    drawn = sampling.sample(problem, base, calc_second_order=False, seed=plan.seed)
+    drawn = sampling.sample(problem, base, calc_second_order=False, seed=seed)
     unit = np.repeat(unit, len(drawn), axis=0)
     unit[:, wide] = drawn
     gains = _node_gains(model, draws, workspace, view, plan, SOBOL_NODES)
     result = reduce_nodes(draws.from_unit(unit), gains, Over.MEAN)
-    found = analysis.analyze(problem, result, calc_second_order=False, seed=plan.seed)
+    found = analysis.analyze(problem, result, calc_second_order=False, seed=seed)
     columns = zip(found["S1"], found["ST"], found["ST_conf"], strict=True)
     return {
         draws.keys[index]: (float(first), float(total), float(spread))

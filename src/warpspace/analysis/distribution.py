@@ -132,7 +132,7 @@ class Stream:
         return Histogram(edges_um, counts.astype(np.int64))
 
     def display_histogram(self) -> Histogram:
-        """Count the samples in some 40 to 100 bins of a round width that start at zero."""
+        """Count the samples in 32 to 81 bins of a round width that start at zero."""
         width = round_width(self._largest / 80.0)
         bins = max(1, math.floor(self._largest / width) + 1)
         return self.histogram(np.arange(bins + 1, dtype=np.float64) * width)

@@ -225,7 +225,8 @@ def _sweep(
     sides = ("tool", "workpiece") if loop is Loop.RELATIVE else (str(loop),)
     axes = [axis for side in sides for axis in model.machine.branch(side)]
     rotary = [axis.name for axis in axes if not axis.is_linear]
-    step = step_deg or (DEFAULT_STEP_DEG if len(rotary) < 3 else COARSE_STEP_DEG)
+    default = DEFAULT_STEP_DEG if len(rotary) < 3 else COARSE_STEP_DEG
+    step = default if step_deg is None else step_deg
     if not 0.0 < step <= 90.0:
         raise OptionError(f"step: {step:g}°; expected above 0, at most 90")
     turns: dict[str, Array] = {}

@@ -7,7 +7,7 @@ import click
 from warpspace.cli.options import json_option, print_json
 
 if TYPE_CHECKING:
-    from warpspace.analysis.thesis import Row
+    from warpspace.analysis.thesis import Hypothesis, Row
 
 
 @click.command()
@@ -20,32 +20,34 @@ def thesis(markdown: str | None, *, as_json: bool) -> None:
     why; what was tried is listed below them. Nothing is tuned to agree.
     """
     from warpspace.analysis.thesis import thesis_hypotheses
-    from warpspace.outputs.files import check_target
+    from warpspace.outputs.files import check_target, write_atomically
     from warpspace.outputs.thesis_page import thesis_markdown
     from warpspace.scene import verbs
 
     if markdown is not None:
         check_target(markdown, (".md",))
     rows = verbs.thesis()
+    needed = markdown is not None or not as_json
+    tried = thesis_hypotheses(verbs.thesis_case()) if needed else ()
     if markdown is not None:
-        from warpspace.outputs.files import write_atomically
-
-        text = thesis_markdown(rows, thesis_hypotheses(verbs.thesis_case()))
         with write_atomically(markdown) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+            temporary.write_text(thesis_markdown(rows, tried), encoding="utf-8")
     if as_json:
         print_json({"rows": [_json_row(row) for row in rows]})
         return
     _print(rows)
-    if markdown is None:
-        click.echo("What was tried where the thesis is open:")
-        question = ""
-        for tried in thesis_hypotheses(verbs.thesis_case()):
-            if tried.question != question:
-                click.echo(f"  {tried.question}")
-                question = tried.question
-            click.echo(f"    {'>' if tried.used else ' '} {tried.reading}: {tried.result}")
-        click.echo("  > is what the model uses")
+    _print_tried(tried)
+
+
+def _print_tried(tried: "tuple[Hypothesis, ...]") -> None:
+    """Print the readings that were tried, grouped by question."""
+    click.echo("\nWhat was tried where the thesis is open (> is what the model uses):")
+    question = ""
+    for each in tried:
+        if each.question != question:
+            question = each.question
+            click.echo(f"  {question}")
+        click.echo(f"    {'>' if each.used else ' '} {each.reading}: {each.result}")
 
 
 def _json_row(row: "Row") -> dict[str, object]:

@@ -1,0 +1,95 @@
+"""Mean volumetric errors of sampled machines, and the analytical check of E|E|².
+
+Reference values were computed independently of this program.
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+import warpspace
+from warpspace.analysis import montecarlo as engine
+from warpspace.analysis.contributions import expected_square
+from warpspace.analysis.draws import build_draws, loop_keys
+from warpspace.field.evaluate import View
+from warpspace.kinematics.model import Loop
+from warpspace.scene.verbs import scene_draws
+
+MEANS = [
+    ("dvf5000_general", "tool", "uniform", 41.1, 0.5),
+    ("dvf5000_general", "tool", "normal", 23.5, 0.4),
+    ("dvf5000_general", "workpiece", "uniform", 16.2, 0.5),
+    ("dvf5000_proposed", "workpiece", "uniform", 11.2, 0.5),
+    ("dvf5000_proposed", "tool", "uniform", 28.7, 0.5),
+]
+
+
+@pytest.mark.parametrize(("name", "loop", "distribution", "mean", "within"), MEANS)
+def test_mean_of_sampled_machines(name, loop, distribution, mean, within) -> None:
+    result = warpspace.montecarlo(
+        warpspace.load_scene(name), loop=loop, distribution=distribution, samples=100_000
+    )
+    assert result.mean_um == pytest.approx(mean, abs=within)
+
+
+@pytest.mark.parametrize("loop", ["tool", "workpiece", "relative"])
+@pytest.mark.parametrize(("distribution", "clip"), [("uniform", False), ("normal", True)])
+@pytest.mark.parametrize("name", ["dvf5000_general", "dvf5000_proposed"])
+def test_sampled_mean_square_is_the_trace(name, loop, distribution, clip) -> None:
+    scene = warpspace.load_scene(name)
+    result = warpspace.montecarlo(
+        scene, loop=loop, distribution=distribution, clip=clip, samples=200_000, seed=5
+    )
+    draws = scene_draws(scene, Loop(loop), distribution, clip=clip)
+    variance, offset = expected_square(
+        scene.model, draws, scene.workspace, result.view, result.plan
+    )
+    assert result.rms_um == pytest.approx(math.sqrt(variance.sum() + offset), rel=0.005)
+
+
+@pytest.mark.parametrize("over", ["sampled", "max", "mean"])
+@pytest.mark.parametrize("clip", [False, True])
+@pytest.mark.parametrize("distribution", ["uniform", "normal"])
+def test_every_mode_has_the_mean_square_of_the_trace_at_a_single_point(
+    over, distribution, clip
+) -> None:
+    scene = warpspace.load_scene("dvf5000_proposed")
+    point = scene.workspace.moved({"X": 50.0, "Y": -100.0, "Z": -300.0})
+    keys = loop_keys(scene.model, Loop.TOOL, scene.parameter_keys)
+    draws = build_draws(scene.tolerances, keys, distribution, clip=clip)
+    plan = engine.Plan(samples=200_000, over=over, seed=2)
+    result = engine.montecarlo(scene.model, draws, point, View(), plan)
+    variance, offset = expected_square(scene.model, draws, point, View(), plan)
+    assert result.rms_um == pytest.approx(math.sqrt(variance.sum() + offset), rel=0.005)
+
+
+def test_wilson_interval_covers_the_truth_of_a_large_sample() -> None:
+    scene = warpspace.load_scene("dvf5000_general")
+    truth = warpspace.montecarlo(scene, spec_um=50, samples=400_000, seed=99).probability
+    inside = 0
+    for seed in range(20):
+        found = warpspace.montecarlo(scene, spec_um=50, samples=5_000, seed=seed).probability
+        inside += found.low <= truth.probability <= found.high
+    assert inside >= 16
+
+
+def test_max_over_the_corners_is_the_max_over_the_grid() -> None:
+    scene = warpspace.load_scene("dvf5000_general")
+    keys = loop_keys(scene.model, Loop.TOOL, scene.parameter_keys)
+    draws = build_draws(scene.tolerances, keys, "uniform")
+    from warpspace.analysis.nodes import Over, node_gains, reduce_nodes
+    from warpspace.analysis.points import extreme_places, spread_places
+
+    machines = draws.draw(np.random.default_rng(0), 500)
+    found = [
+        reduce_nodes(
+            machines,
+            node_gains(
+                scene.model, keys, View(), find(scene.model, Loop.TOOL, scene.workspace, None, 7)
+            ),
+            Over.MAX,
+        )
+        for find in (extreme_places, spread_places)
+    ]
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-12)
