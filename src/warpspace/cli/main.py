@@ -6,8 +6,10 @@ import sys
 import click
 
 from warpspace import __version__
+from warpspace.cli.animate import animate
 from warpspace.cli.ballbar import ballbar
 from warpspace.cli.check import check, scenes
+from warpspace.cli.compare import compare
 from warpspace.cli.contributions import contributions
 from warpspace.cli.export import export
 from warpspace.cli.field import field
@@ -46,9 +48,11 @@ def cli() -> None:
 for command in (
     view,
     snapshot,
+    compare,
     field,
     export,
     report,
+    animate,
     check,
     scenes,
     gains,

@@ -1,0 +1,142 @@
+"""Animations read back: number of pictures, timing, one camera, honest factors."""
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import imageio_ffmpeg
+import numpy as np
+import pytest
+from PIL import Image
+
+from warpspace import load_scene
+from warpspace.exceptions import OptionError, OutputError
+from warpspace.outputs.animation import write_animation
+from warpspace.outputs.figures.settings import FigureSettings
+from warpspace.outputs.frames import AnimationSettings, draw_frame, one_round, sweep_factor
+
+
+def decoded(path: Path) -> np.ndarray:
+    """Pictures of an MP4 of 480 × 360, [n, 360, 480, 3]."""
+    decoder = [imageio_ffmpeg.get_ffmpeg_exe(), "-loglevel", "error", "-i", str(path)]
+    raw = subprocess.run(
+        [*decoder, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"], capture_output=True, check=True
+    ).stdout
+    return np.frombuffer(raw, np.uint8).reshape(-1, 360, 480, 3)
+
+
+SMALL = AnimationSettings(frames=4, fps=10.0, figure=FigureSettings(size=(480, 361), grid=5))
+
+
+def test_sweep_runs_from_true_scale_to_the_factor_and_back() -> None:
+    factors = [sweep_factor(1000.0, n / 8) for n in range(9)]
+    assert factors[0] == factors[8] == 1.0
+    assert factors[4] == 1000.0
+    assert factors[1:4] == pytest.approx(factors[7:4:-1], rel=0.01)
+    assert all(float(f"{factor:.3g}") == factor for factor in factors)
+
+
+def test_a_turn_covers_the_circle_of_every_point() -> None:
+    turn = one_round(load_scene("dvf5000_first"))
+    assert turn.axis == "C"
+    assert (turn.turn_deg[0], turn.turn_deg[-1]) == (0.0, 360.0)
+    assert len(turn.nominal_mm) == 2
+    np.testing.assert_allclose(turn.nominal_mm[:, 0], turn.nominal_mm[:, -1], atol=1e-9)
+
+
+@pytest.mark.render
+def test_camera_and_scale_stand_still(renderer: str) -> None:
+    scene = load_scene("dvf5000_first")
+    first, middle = (draw_frame(scene, SMALL, number).maps[0] for number in (0, 2))
+    assert first.exaggeration == 1.0
+    assert middle.exaggeration == 1000.0
+    assert first.scale == middle.scale
+    corners = scene.workspace.ranges["X"]
+    point = np.array([corners[0], 0.0, 0.0])
+    np.testing.assert_allclose(first.projection.project(point), middle.projection.project(point))
+
+
+@pytest.mark.render
+@pytest.mark.parametrize("ending", ["gif", "webp", "mp4"])
+def test_files_are_read_back(ending: str, renderer: str, tmp_path: Path) -> None:
+    target = tmp_path / f"a.{ending}"
+    write_animation(load_scene("dvf5000_first"), target, SMALL)
+    if ending == "mp4":
+        pictures = decoded(target)
+        assert len(pictures) == 4
+        apart = np.abs(pictures[2].astype(int) - pictures[0]).mean()
+    else:
+        with Image.open(target) as image:
+            assert image.n_frames == 4
+            assert image.size == (480, 361)
+            assert image.info["loop"] == 0
+            shots = []
+            for number in (0, 2):
+                image.seek(number)
+                shots.append(np.asarray(image.convert("RGB")).astype(int))
+            apart = np.abs(shots[1] - shots[0]).mean()
+    assert apart > 0.5
+
+
+@pytest.mark.render
+def test_rotation_of_a_wobbling_table(renderer: str, tmp_path: Path) -> None:
+    settings = replace(SMALL, motion="rotation", frames=3)
+    write_animation(load_scene("teach_wobbling_table"), tmp_path / "a.webp", settings)
+    with Image.open(tmp_path / "a.webp") as image:
+        assert image.n_frames == 3
+
+
+def test_nothing_to_turn(tmp_path: Path) -> None:
+    path = tmp_path / "three.toml"
+    path.write_text('title = "three"\n[machine]\nchain = "wFXYZt"\n')
+    with pytest.raises(OptionError, match="nothing turns"):
+        one_round(load_scene(path))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"frames": 1}, {"frames": 10_000}, {"fps": 0.0}, {"fps": float("nan")}, {"motion": "spin"}],
+)
+def test_impossible_settings(changes) -> None:
+    with pytest.raises(OptionError):
+        replace(SMALL, **changes)
+
+
+def test_too_many_pixels() -> None:
+    with pytest.raises(OptionError, match="too many"):
+        AnimationSettings(frames=600, figure=FigureSettings(size=(4000, 3000)))
+
+
+def test_mp4_without_its_package_says_what_to_install(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(OutputError, match="imageio-ffmpeg"):
+        write_animation(load_scene("dvf5000_first"), tmp_path / "a.mp4", SMALL)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("-o", "a.avi"), "expected one of .gif"),
+        (("-o", "there.gif"), "exists already"),
+        (("-o", "a.gif", "--frames", "0"), "frames"),
+        (("-o", "a.gif", "--size", "0x0"), "size"),
+        (("-o", "a.gif", "--size", "100000x100000"), "size"),
+        (("-o", "a.gif", "--fps", "1000"), "fps"),
+    ],
+)
+def test_command_refuses_with_one_message(arguments, words, tmp_path, monkeypatch) -> None:
+    (tmp_path / "there.gif").write_text("mine")
+    monkeypatch.chdir(tmp_path)
+    run = subprocess.run(
+        [sys.executable, "-W", "error", "-m", "warpspace", "animate", "dvf5000_first", *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert run.returncode == 2
+    assert words in run.stderr
+    assert "Traceback" not in run.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["there.gif"]
