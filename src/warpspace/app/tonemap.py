@@ -5,7 +5,7 @@ inverted: vertices get the colour that the tone map turns into the wanted one. S
 out below 0 or above 1, so they travel as floats.
 """
 
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,6 +78,7 @@ def vertex_colours(scale: ColourScale, values: Array) -> Floats:
     return _table(diverging=scale.diverging)[index]
 
 
+@lru_cache(maxsize=64)
 def line_colour(rgb: Rgb) -> Rgb:
     """Give the bytes for a line of one colour that is to arrive as that; near exact below 230."""
     linear = np.clip(inverse_tone_map(np.array(rgb, dtype=np.uint8)), 0.0, 1.0)

@@ -15,6 +15,7 @@ import viser
 from warpspace.app.board import Board
 from warpspace.app.live import LiveModel
 from warpspace.app.network import free_port, is_local, page_url, resolve_host
+from warpspace.app.services import Services
 from warpspace.app.session import Session
 from warpspace.app.state import start_state
 from warpspace.app.tabs import Keeper, Left, is_token, new_token
@@ -41,6 +42,8 @@ class Viewer:
     host : str, optional
     port : int or None, optional
         None takes the next free one from 8080.
+    services : Services, optional
+        Draw figures and write exports.
     shared : bool, optional
         Whether all tabs see and steer one state; by default each has its own.
 
@@ -58,7 +61,9 @@ class Viewer:
         host: str = "127.0.0.1",
         port: int | None = None,
         shared: bool = False,
+        services: Services | None = None,
     ) -> None:
+        self._services = services
         self.address = resolve_host(host)
         self.port = free_port(self.address, port)
         self._scene = scene
@@ -98,7 +103,7 @@ class Viewer:
     def _connect(self, client: viser.ClientHandle) -> None:
         """Give a new tab its session."""
         board = self._shared or Board(start_state(self._scene))
-        session = Session(client, self._live, self._scenes, board, self._claim)
+        session = Session(client, self._live, self._scenes, board, self._claim, self._services)
         with self._lock:
             self._sessions[client.client_id] = session
         session.start()
@@ -135,7 +140,8 @@ class Viewer:
         """End all sessions and the server."""
         for session in self.sessions:
             session.stop()
-        self._server.stop()
+        with contextlib.redirect_stdout(io.StringIO()):
+            self._server.stop()
 
     def __enter__(self) -> Self:
         return self
@@ -196,6 +202,7 @@ def run_viewer(
     host: str,
     port: int | None,
     shared: bool = False,
+    services: Services | None = None,
     browser: bool,
     say: Say,
     warn: Say,
@@ -208,6 +215,8 @@ def run_viewer(
     scenes : mapping of str to Scene
     host : str
     port : int or None
+    services : Services, optional
+        Draw figures and write exports.
     shared : bool, optional
         Whether all tabs see and steer one state.
     browser : bool
@@ -215,7 +224,7 @@ def run_viewer(
     say, warn : callable
         Print a line for the user.
     """
-    with Viewer(scene, scenes, host=host, port=port, shared=shared) as viewer:
+    with Viewer(scene, scenes, host=host, port=port, shared=shared, services=services) as viewer:
         try:
             say(f"{scene.title} is shown at {viewer.url} (Ctrl-C ends it)")
             if not viewer.is_local:

@@ -1,5 +1,7 @@
 """Command `view`: the app in the browser."""
 
+import os
+
 import click
 
 from warpspace.cli.options import scene_argument
@@ -15,13 +17,22 @@ from warpspace.cli.options import scene_argument
     " password.",
 )
 @click.option("--port", type=int, help="Port to serve on.  [the next free one from 8080]")
+@click.option(
+    "--shared",
+    is_flag=True,
+    help="One review for all: every tab shows the same state and may change it.",
+)
 @click.option("--no-browser", is_flag=True, help="Only print the address of the page.")
-def view(scene: str, host: str, port: int | None, *, no_browser: bool) -> None:
+def view(scene: str, host: str, port: int | None, *, shared: bool, no_browser: bool) -> None:
     """Open SCENE in the browser, with a live slider per error parameter.
 
     SCENE is dvf5000_first where it is left out.
     """
+    # Before numpy is loaded: a slider move is one short product, and threads of OpenBLAS that spin
+    # for it beside a browser that draws in software make it thirty times slower.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from warpspace.app.viewer import run_viewer
+    from warpspace.cli.services import build_services
     from warpspace.scene.library import load_scene, scene_names
 
     shown = load_scene(scene)
@@ -31,6 +42,8 @@ def view(scene: str, host: str, port: int | None, *, no_browser: bool) -> None:
         {loaded.title: loaded for loaded in bundled.values()},
         host=host,
         port=port,
+        shared=shared,
+        services=build_services(),
         browser=not no_browser,
         say=click.echo,
         warn=lambda text: click.secho(text, err=True, fg="yellow"),

@@ -1,0 +1,291 @@
+"""The app's speed: serving, one slider move on the server, bytes of a move, click to pixels.
+
+Click to pixels is measured in a software-rendered Chromium beside a bare viser page: the app's own
+scene and text messages of two slider moves, recorded once and replayed by one callback. What is
+compared is our part, not the renderer of this machine.
+
+    python benchmarks/bench_app.py [--moves 15] [--json]
+"""
+
+import argparse
+import contextlib
+import copy
+import io
+import json
+import os
+import shutil
+import statistics
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does
+
+import viser
+from playwright.sync_api import Browser, Page, sync_playwright
+from viser.infra import WebsockClientConnection
+from websockets.asyncio.server import ServerConnection
+
+from warpspace.app.live import LiveModel
+from warpspace.app.panels.layout import side_widths
+from warpspace.app.session import Session
+from warpspace.app.state import start_state
+from warpspace.app.viewer import Viewer
+from warpspace.scene.library import load_scene
+
+LIMITS = {
+    "serving_s": 3.0,
+    "model_ms": 5.0,
+    "new_place_ms": 100.0,
+    "bytes_per_move": 200_000.0,
+    "click_to_pixels_ratio": 1.5,
+}
+CHROMIUM = [
+    "--headless=new",
+    "--no-sandbox",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+SETTLED_MS = 500
+MOVE = """async ([uuid, value]) => {
+  const m = window.__viserMutable;
+  const mesh = () => {
+    let found = null;
+    const node = m.nodeRefFromName['/box/surface'];
+    if (node) node.traverse(o => { if (o.isMesh && o.geometry.attributes.color) found = o; });
+    return found && found.geometry.uuid;
+  };
+  const frame = () => new Promise(done => requestAnimationFrame(done));
+  const before = mesh();
+  const start = performance.now();
+  m.sendMessage({type: 'GuiUpdateMessage', uuid, updates: {value}});
+  while (mesh() === before || mesh() === null) {
+    await frame();
+    if (performance.now() - start > 10000) throw new Error('nothing moved');
+  }
+  await frame();
+  const gl = m.canvas.getContext('webgl2');
+  gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+  return performance.now() - start;
+}"""
+WIDGET = """label => [...document.querySelectorAll('label')]
+    .find(l => l.textContent.startsWith(label)).getAttribute('for')"""
+
+
+def median_ms(action: Callable[[int], object], count: int) -> float:
+    """Median processor time of an action, ms: other load on the machine does not count."""
+    times = []
+    for number in range(count):
+        start = time.thread_time()
+        action(number)
+        times.append((time.thread_time() - start) * 1e3)
+    return statistics.median(times)
+
+
+def serving_s() -> float:
+    """Time from the command until the page is served."""
+    command = [Path(sys.executable).with_name("warpspace"), "view", "--no-browser"]
+    start = time.perf_counter()
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as running:
+        line = running.stdout.readline()
+        url = next(word for word in line.split() if word.startswith("http"))
+        with urllib.request.urlopen(url) as page:
+            page.read(100)
+        taken = time.perf_counter() - start
+        running.terminate()
+        running.communicate()
+    return taken
+
+
+def model_part() -> dict[str, float]:
+    """The model alone: a slider move, and a new rotary position."""
+    live, state = LiveModel(), start_state(load_scene("dvf5000_first"))
+    live.frame(state)
+    return {
+        "model_ms": median_ms(lambda n: live.frame(state.with_amplitude("EXX", n / 10)), 50),
+        "new_place_ms": median_ms(lambda n: live.frame(state.with_position("B", -1.0 - n)), 10),
+    }
+
+
+class Recorder:
+    """What the app's sessions send, how long a step takes, and the bytes on the wire."""
+
+    def __init__(self) -> None:
+        self.bytes_sent = 0
+        self.messages: list[Any] = []
+        self.step_ms: list[float] = []
+        self.recording = True
+        send, queue = ServerConnection.send, WebsockClientConnection.queue_message
+        step = Session._step  # noqa: SLF001
+
+        async def count(connection: Any, message: Any, *args: Any, **kwargs: Any) -> None:
+            self.bytes_sent += 0 if isinstance(message, str) else len(message)
+            await send(connection, message, *args, **kwargs)
+
+        def note(connection: Any, message: Any) -> None:
+            if self.recording:
+                self.messages.append(message)
+            queue(connection, message)
+
+        def timed(session: Session) -> None:
+            start = time.thread_time()
+            step(session)
+            self.step_ms.append((time.thread_time() - start) * 1e3)
+
+        ServerConnection.send = count
+        WebsockClientConnection.queue_message = note
+        Session._step = timed  # noqa: SLF001
+
+    @contextlib.contextmanager
+    def into(self) -> Iterator[list[Any]]:
+        """Collect the messages of a while."""
+        self.messages = []
+        yield self.messages
+        self.messages = []
+
+
+def is_picture(message: Any) -> bool:
+    """Whether a message belongs to the 3-D scene or the camera."""
+    return hasattr(message, "owner") or type(message).__name__.startswith("SetCamera")
+
+
+def is_text(message: Any) -> bool:
+    """Whether a message changes a block of HTML."""
+    return "content" in getattr(message, "updates", {})
+
+
+class BarePage:
+    """A viser page with the same nodes and texts, one slider and nothing behind it."""
+
+    def __init__(self, start: list[Any], moves: list[list[Any]]) -> None:
+        with contextlib.redirect_stdout(io.StringIO()):
+            self.server = viser.ViserServer(host="127.0.0.1", port=8580, verbose=False)
+        self.url = f"http://127.0.0.1:{self.server.get_port()}"
+        self.server.on_client_connect(lambda client: self.build(client, start, moves))
+
+    def build(self, client: viser.ClientHandle, start: list[Any], moves: list[list[Any]]) -> None:
+        """Lay out the page and replay the first picture."""
+        gui = client.gui
+        gui.main_panel.dock_left()
+        gui.main_panel.set_width(side_widths()[0])
+        slider = gui.add_slider("EXX", -10.0, 10.0, 0.1, 0.0)
+        panel = gui.add_panel()
+        with panel.add_tab("Result"):
+            texts = {m.uuid: gui.add_html("") for move in moves for m in move if is_text(m)}
+        panel.dock_right()
+        panel.set_width(side_widths()[1])
+
+        def replay(messages: list[Any]) -> None:
+            with client.atomic():
+                for message in messages:
+                    if is_text(message):
+                        texts[message.uuid].content = message.updates["content"]
+                        continue
+                    again = copy.copy(message)
+                    if hasattr(again, "owner"):
+                        again.owner = client.scene._owner_id  # noqa: SLF001
+                    client._websock_connection.queue_message(again)  # noqa: SLF001
+            client.flush()
+
+        replay([message for message in start if is_picture(message)])
+
+        @slider.on_update
+        async def _(_: object) -> None:
+            replay(moves[round(slider.value * 10) % 2])
+
+
+def open_page(browser: Browser, url: str) -> tuple[Page, str]:
+    """Open a page and give the id of its slider."""
+    page = browser.new_page(viewport={"width": 1600, "height": 900})
+    page.goto(f"{url}/?fixedDpr=1")
+    page.wait_for_function(
+        "() => window.__viserMutable?.nodeRefFromName['/box/surface']"
+        " && [...document.querySelectorAll('label')].some(l => l.textContent.startsWith('EXX'))"
+    )
+    page.wait_for_timeout(4000)
+    return page, page.evaluate(WIDGET, "EXX")
+
+
+def values(count: int) -> list[float]:
+    """Positions of the slider, alternating between the two pictures of the bare page."""
+    return [round(0.1 * (number + 1), 1) for number in range(count)]
+
+
+def timed_move(page: Page, slider: str, value: float) -> float:
+    """Click to pixels of one move of a slider, ms."""
+    page.bring_to_front()
+    page.wait_for_timeout(SETTLED_MS)
+    return page.evaluate(MOVE, [slider, value])
+
+
+def browser_part(moves: int) -> dict[str, float]:
+    """Time and bytes of a move in a browser, beside the bare page."""
+    recorder = Recorder()
+    scene = load_scene("dvf5000_first")
+    with sync_playwright() as playwright, Viewer(scene) as viewer:
+        path = shutil.which("chromium") or shutil.which("google-chrome")
+        browser = playwright.chromium.launch(executable_path=path, args=CHROMIUM)
+        with recorder.into() as start:
+            ours, our_slider = open_page(browser, viewer.url)
+        recorded: list[list[Any]] = []
+        for value in (-0.1, -0.2):
+            with recorder.into() as sent:
+                ours.evaluate(MOVE, [our_slider, value])
+                ours.wait_for_timeout(30)
+                recorded.append([m for m in sent if is_picture(m) or is_text(m)])
+        recorder.recording = False
+        bare = BarePage(start, recorded)
+        plain, plain_slider = open_page(browser, bare.url)
+        recorder.step_ms.clear()
+        app_ms: list[float] = []
+        bare_ms: list[float] = []
+        app_bytes = bare_bytes = 0
+        for value in values(moves + 2):  # in turns, so that other load meets both
+            before = recorder.bytes_sent
+            app_ms.append(timed_move(ours, our_slider, value))
+            ours.wait_for_timeout(SETTLED_MS)
+            between = recorder.bytes_sent
+            bare_ms.append(timed_move(plain, plain_slider, value))
+            app_bytes += between - before
+            bare_bytes += recorder.bytes_sent - between
+        browser.close()
+        with contextlib.redirect_stdout(io.StringIO()):
+            bare.server.stop()
+    app, floor = statistics.median(app_ms[2:]), statistics.median(bare_ms[2:])
+    return {
+        "whole_step_ms": statistics.median(recorder.step_ms),
+        "bytes_per_move": app_bytes / (moves + 2),
+        "bare_bytes_per_move": bare_bytes / (moves + 2),
+        "click_to_pixels_ms": app,
+        "bare_click_to_pixels_ms": floor,
+        "click_to_pixels_ratio": app / floor,
+    }
+
+
+def main() -> None:
+    """Measure, print, and fail where a limit is missed."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--moves", type=int, default=15)
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
+    found = {"serving_s": serving_s(), **model_part(), **browser_part(options.moves)}
+    if options.json:
+        print(json.dumps(found))
+    else:
+        for name, value in found.items():
+            limit = f"  (at most {LIMITS[name]:g})" if name in LIMITS else ""
+            print(f"{name:26} {value:12.2f}{limit}")
+    missed = [name for name, limit in LIMITS.items() if found[name] > limit]
+    if missed:
+        sys.exit(f"over the limit: {', '.join(missed)}")
+
+
+if __name__ == "__main__":
+    main()
