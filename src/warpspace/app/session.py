@@ -5,7 +5,6 @@ applies what buttons have posted, evaluates once and mutates handles in place: t
 a slider is always what is shown, however fast it was moved.
 """
 
-import json
 import logging
 import threading
 import time
@@ -15,26 +14,29 @@ from functools import partial
 from typing import Any
 
 from viser import ClientHandle
-from viser import _messages as messages
 
 from warpspace.app.board import Board
 from warpspace.app.eye import Eye, focus
 from warpspace.app.layers import Layer
 from warpspace.app.layers.axes import AxesLayer
 from warpspace.app.layers.box import BoxLayer
+from warpspace.app.layers.other import OtherLayer
 from warpspace.app.layers.stage import StageLayer
 from warpspace.app.layers.traces import TracesLayer
+from warpspace.app.layers.why import WhyLayer
 from warpspace.app.live import Frame, LiveModel
+from warpspace.app.outside import Outside
+from warpspace.app.page import Page
 from warpspace.app.panels import Desk, Panel, Settling, Update
 from warpspace.app.panels.commands import hint_script
 from warpspace.app.panels.layout import apply_theme, lay_out_panels
+from warpspace.app.services import Services
 from warpspace.app.state import AppState
 from warpspace.app.tabs import CameraMemory, Left, ask_script, new_token, rename_script
 from warpspace.exceptions import WarpspaceError
 from warpspace.scene.model import Scene
 
 logger = logging.getLogger(__name__)
-NOTE_SECONDS = 8.0
 TOKEN_WAIT_S = 0.25
 """How long the first picture waits for a tab that may have been here before."""
 SETTLE_S = 0.06
@@ -58,6 +60,8 @@ class Session:
     claim : callable, optional
         Takes the session and the token its page has handed over; gives what the tab left behind
         when its connection was dropped.
+    services : Services, optional
+        Draw figures and write exports.
     """
 
     def __init__(
@@ -67,14 +71,16 @@ class Session:
         scenes: Mapping[str, Scene],
         board: Board,
         claim: "Callable[[Session, str], Left | None] | None" = None,
+        services: Services | None = None,
     ) -> None:
-        self._client, self._live, self._scenes = client, live, scenes
+        self._client, self._live, self._scenes = client, live, dict(scenes)
+        self._services = services or Services()
         self.board = board
         self.token = new_token()
         self._claim = claim
         self._token: Any = None
         self._told = threading.Event()
-        self._eye = Eye(client)
+        self._eye, self._page = Eye(client), Page(client)
         self._camera: CameraMemory | None = None
         self._actions: deque[Callable[[], None]] = deque()
         self._unsettled_since: float | None = None
@@ -153,13 +159,13 @@ class Session:
             logger.exception("session %d", self._client.client_id)
             known = isinstance(error, WarpspaceError)
             text = str(error) if known else f"{type(error).__name__}: {error}"
-            self.notify("That did not work", text, "red")
+            self._page.notify("That did not work", text, "red")
 
     def _ask(self) -> None:
         """Ask the page which tab it is."""
         self._token = self._client.gui.add_text("", "", visible=False)
         self._token.on_update(lambda _: (self._told.set(), self._wake.set()))
-        self._run_script(ask_script(self._token._impl.uuid, self.token))  # noqa: SLF001
+        self._page.run_script(ask_script(self._token._impl.uuid, self.token))  # noqa: SLF001
         self._client.flush()
 
     def _adopt(self) -> None:
@@ -175,7 +181,7 @@ class Session:
     def renamed(self, token: str) -> None:
         """Give page and session another token, since two tabs came with one."""
         self.token = token
-        self._run_script(rename_script(token))
+        self._page.run_script(rename_script(token))
 
     def left(self) -> Left:
         """Give what is worth keeping of the tab."""
@@ -189,25 +195,39 @@ class Session:
         frame = self._live.frame(self.state)
         scene = self._client.scene
         with self._client.atomic():
-            self._set_title(frame)
+            self._page.set_title(frame.state.scene.title)
             self._restore_camera(frame)
             self._layers = [
                 BoxLayer(scene, frame),
                 TracesLayer(scene, frame),
                 AxesLayer(scene, frame),
+                OtherLayer(scene, frame),
+                WhyLayer(scene, frame),
                 stage := StageLayer(self._client, frame, self.act),
             ]
             self._stage = stage
             desk = Desk(
-                self._client.gui, self.changed, self.post, self.act, lambda: self.board, self.notify
+                self._client.gui,
+                self.changed,
+                self.post,
+                self.act,
+                lambda: self.board,
+                self._page.notify,
             )
-            self._panels = lay_out_panels(
-                desk, frame.state, self._scenes, self.fit_view, stage.play
+            outside = Outside(
+                self._client,
+                self._scenes,
+                self._eye.remember,
+                self._look_from,
+                self._page.run_script,
+                self._services,
+                lambda: self._shown,
             )
+            self._panels = lay_out_panels(desk, frame.state, outside, self.fit_view, stage.play)
             for panel in self._panels:
                 panel.show(frame)
         self._client.flush()
-        self._run_script(hint_script())
+        self._page.run_script(hint_script())
         self._client.flush()
         self._shown = frame
         self._unsettled_since = time.monotonic()
@@ -222,6 +242,8 @@ class Session:
         while self._actions:
             self._guarded(self._actions.popleft())
         state = self.board.state
+        if self._camera is not None and self._shown is not None and not self._moves_on(state):
+            self._restore_camera(self._shown)
         if not notes and self._shown is not None and state is self._shown.state:
             return
         self._show(self._live.frame(state), notes)
@@ -249,8 +271,8 @@ class Session:
             for panel in self._panels:
                 panel.show(frame)
             if before is not None and focus(before.state) != focus(frame.state):
-                self._set_title(frame)
-                self._eye.fit(frame, docked=True)
+                self._page.set_title(frame.state.scene.title)
+                self._restore_camera(frame)
             if before is not None and before.state.shown.dark != frame.state.shown.dark:
                 apply_theme(self._client.gui, dark=frame.state.shown.dark)
         self._client.flush()
@@ -258,7 +280,7 @@ class Session:
         if self._unsettled_since is None:
             self._unsettled_since = time.monotonic()
         if notes:
-            self.notify("Clamped", "\n".join(notes), "yellow")
+            self._page.notify("Clamped", "\n".join(notes), "yellow")
 
     def _settle(self) -> None:
         """Let the charts follow."""
@@ -276,6 +298,15 @@ class Session:
             self._eye.choose(self._shown, view, lens)
             self._client.flush()
 
+    def _look_from(self, memory: CameraMemory) -> None:
+        """Put the camera somewhere with what is shown next."""
+        self._camera = memory
+        self._wake.set()
+
+    def _moves_on(self, state: AppState) -> bool:
+        """Tell whether the camera is about to be placed for another scene or loop."""
+        return self._shown is not None and focus(self._shown.state) != focus(state)
+
     def _restore_camera(self, frame: Frame) -> None:
         """Put the camera where the tab left it, else where all of the box is seen."""
         memory, self._camera = self._camera, None
@@ -283,24 +314,3 @@ class Session:
             self._eye.restore(memory)
         else:
             self._eye.fit(frame, docked=self._shown is not None)
-
-    def _set_title(self, frame: Frame) -> None:
-        """Name the browser tab after the scene."""
-        title = json.dumps(f"{frame.state.scene.title} · warpspace").replace("<", "\\u003c")
-        self._run_script(f"document.title = {title};")
-
-    def _run_script(self, source: str) -> None:
-        """Run JavaScript of our own in the page; no word of a user's may be in it unescaped."""
-        # viser has a message for it and no method
-        self._client._websock_connection.queue_message(  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
-            messages.RunJavascriptMessage(source=source)
-        )
-
-    def notify(self, title: str, text: str, colour: str) -> None:
-        """Show a message in this tab."""
-        self._client.add_notification(
-            title,
-            text,
-            auto_close_seconds=NOTE_SECONDS,
-            color=colour,  # type: ignore[arg-type]
-        )

@@ -1,13 +1,15 @@
 """Where the panels stand: errors on the left, colour bar and view on the right, heading on top."""
 
-from collections.abc import Mapping
-
 from viser import GuiApi
 
+from warpspace.app.outside import Outside
 from warpspace.app.panels import Desk, Panel
 from warpspace.app.panels.chance import ChancePanel
 from warpspace.app.panels.commands import CommandsPanel
+from warpspace.app.panels.compare import ComparePanel
+from warpspace.app.panels.conventions import ConventionsPanel
 from warpspace.app.panels.errors import ErrorsPanel
+from warpspace.app.panels.files import FilesPanel
 from warpspace.app.panels.gains import GainsPanel
 from warpspace.app.panels.looks import CameraPanel, Choose, LooksPanel
 from warpspace.app.panels.machine import MachinePanel
@@ -15,8 +17,9 @@ from warpspace.app.panels.rotary import Play, RotaryPanel
 from warpspace.app.panels.shape import ShapePanel
 from warpspace.app.panels.summary import heading_panel, summary_panel
 from warpspace.app.panels.view import ViewPanel
+from warpspace.app.panels.why import WhyPanel
+from warpspace.app.pointing import Pointing
 from warpspace.app.state import AppState
-from warpspace.scene.model import Scene
 
 BRAND = (38, 70, 112)
 BRAND_ON_DARK = (122, 162, 214)
@@ -59,7 +62,7 @@ def apply_theme(gui: GuiApi, *, dark: bool) -> None:
 
 
 def lay_out_panels(
-    desk: Desk, state: AppState, scenes: Mapping[str, Scene], fit_view: Choose, play: Play
+    desk: Desk, state: AppState, outside: Outside, fit_view: Choose, play: Play
 ) -> list[Panel]:
     """Build the page of one tab.
 
@@ -67,7 +70,8 @@ def lay_out_panels(
     ----------
     desk : Desk
     state : AppState
-    scenes : mapping of str to Scene
+    outside : Outside
+        Camera, page and files of the tab.
     fit_view : callable
         Puts the camera to a named view, or changes its lens.
     play : callable
@@ -94,12 +98,18 @@ def lay_out_panels(
     results = gui.add_panel()
     with results.add_tab("Result"):
         summary = summary_panel(desk)
+    with results.add_tab("Why"):
+        why = WhyPanel(desk)
+    with results.add_tab("Compare"):
+        compare = ComparePanel(desk, outside.scenes)
+    with results.add_tab("Files"):
+        files = FilesPanel(desk, outside)
     results.dock_right()
     results.set_width(RIGHT_WIDTH)
 
     settings = gui.add_panel()
     with settings.add_tab("View"):
-        view = ViewPanel(desk, state, scenes)
+        view = ViewPanel(desk, state, outside.scenes)
         looks = LooksPanel(desk, state)
         camera = CameraPanel(desk, fit_view)
     with settings.add_tab("Machine"):
@@ -110,6 +120,9 @@ def lay_out_panels(
         gains = GainsPanel(desk)
     with settings.add_tab("Chance"):
         chance = ChancePanel(desk, state)
+    with settings.add_tab("Conventions"):
+        conventions = ConventionsPanel(desk, state)
+    Pointing(outside, desk, conventions)
     settings.dock_below(results)
 
     top = gui.add_panel()
@@ -127,6 +140,10 @@ def lay_out_panels(
         gains,
         chance,
         commands,
+        why,
+        compare,
+        files,
+        conventions,
         summary,
         heading,
     ]
