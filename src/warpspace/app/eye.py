@@ -6,6 +6,7 @@ from viser import ClientHandle
 from warpspace.app.cameras import TELEPHOTO_DEG, VIEWS, Stand, change_lens, clipping, view_pose
 from warpspace.app.kept import Same
 from warpspace.app.layers import SCENE_PER_MM
+from warpspace.app.layers.annotations import bar_lines
 from warpspace.app.layers.axes import axes_room_mm
 from warpspace.app.live import Frame
 from warpspace.app.machine import machine_room_mm
@@ -78,9 +79,10 @@ class Eye:
 
     def _room_mm(self, frame: Frame) -> Array:
         """Give points around all that is to be seen, mm."""
-        if frame.state.machine.shown:
-            return np.concatenate([machine_room_mm(frame), frame.drawn_mm.reshape(-1, 3)])
-        return np.concatenate([axes_room_mm(frame), frame.drawn_mm.reshape(-1, 3)])
+        shown = frame.state.machine.shown
+        room = machine_room_mm(frame) if shown else axes_room_mm(frame)
+        bars = [bar_lines(frame)[1].reshape(-1, 3)] if frame.state.look.bars else []
+        return np.concatenate([room, frame.drawn_mm.reshape(-1, 3), *bars])
 
     def fit(self, frame: Frame, *, docked: bool) -> None:
         """Fill the room between the panels with the box, its traces and axes.

@@ -6,7 +6,7 @@ from warpspace.app.layers import palette
 from warpspace.app.live import Frame
 from warpspace.geometry.colour import ColourScale, colour_table
 from warpspace.geometry.deform import round_down
-from warpspace.units import MM_PER_UM
+from warpspace.units import MICROMETRE, MM_PER_UM
 
 BAR_HEIGHT = 190
 _BAR_MM = 100.0
@@ -50,10 +50,10 @@ def colour_bar(frame: Frame) -> str:
             f'<div style="position:absolute;left:31px;bottom:{at - 7:.1f}px;line-height:14px;'
             f'font-size:12px">{_number(tick)}</div>'
         )
-    if not scale.diverging:
+    if not scale.diverging and scale.unit == MICROMETRE:
         parts += _marks(scale, (found.mean_um, found.p95_um, found.max_um))
     parts.append("</div>")
-    label = html.escape(scale.label).replace("E_", "E<sub>") + (
+    label = html.escape(scale.label).replace("_", "<sub>", 1) + (
         "</sub>" if "_" in scale.label else ""
     )
     heading = (

@@ -197,6 +197,14 @@ def slice_positions(scene: Scene, look: Look, machine: MachineLook) -> dict[str,
     }
 
 
+def quarters(scene: Scene, axis: str) -> tuple[float, ...]:
+    """List the quarter turns within the travel of a rotary axis, degrees; a full turn once."""
+    low, high = scene.machine.axes[axis].travel
+    high = min(high, low + 359.0)
+    first, last = math.ceil(low / 90.0), math.floor(high / 90.0)
+    return tuple(90.0 * number for number in range(first, last + 1))[:MOST_HELD]
+
+
 def parse_positions(text: str, span: Span) -> tuple[tuple[float, ...], str]:
     """Read a list of positions that a user has typed.
 
@@ -240,17 +248,15 @@ def default_held(
 ) -> dict[str, tuple[float, ...]]:
     """Give the positions that axes are held at, degrees, where the user has chosen none.
 
-    The last axis of a branch stands where it is and a quarter of a turn on; the one before it
-    where it is and 30 degrees to either side.
+    The axis next to the point stands where it is, the one before it where it is and 30 degrees to
+    either side.
     """
     found: dict[str, tuple[float, ...]] = {}
     for side in ("workpiece", "tool"):
         turning = [axis for axis in scene.machine.branch(side) if not axis.is_linear]
         if len(turning) > 1:
             last = turning[-1]
-            here = positions.get(last.name, 0.0)
-            quarter = here + 90.0 if here + 90.0 <= last.travel[1] else here - 90.0
-            found[last.name] = (here, quarter) if quarter >= last.travel[0] else (here,)
+            found[last.name] = (positions.get(last.name, 0.0),)
             tilting = turning[-2]
             low, high = tilting.travel
             middle = positions.get(tilting.name, 0.0)

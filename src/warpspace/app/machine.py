@@ -144,11 +144,10 @@ def tool_point(frame: Frame) -> ToolPoint:
 
 
 def machine_room_mm(frame: Frame) -> Array:
-    """Give the corners of the box around machine and grid, nominal, [8, 3], mm."""
+    """Give the points of the nominal machine and the corners of the grid, [n, 3], mm."""
     motions = machine_motions(frame.state)
     placed = [
         place_points(motions[body.frame], body.vertices_mm, 0.0)
         for body in load_bodies(frame.state.scene.machine)
     ]
-    low, high = bounds_mm(frame.grid.nominal_mm, *placed)
-    return np.stack(np.meshgrid(*np.stack([low, high], 1), indexing="ij"), -1).reshape(-1, 3)
+    return np.concatenate([bounds_mm(frame.grid.nominal_mm), *placed])

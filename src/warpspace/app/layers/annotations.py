@@ -9,6 +9,7 @@ from warpspace.app.layers import SCENE_PER_MM, colour_bytes, palette
 from warpspace.app.layers.axes import AWAY
 from warpspace.app.legend import spell_factor
 from warpspace.app.live import Frame
+from warpspace.app.machine import machine_room_mm
 from warpspace.geometry.annotations import (
     ScaleBar,
     corner_arrows,
@@ -22,8 +23,8 @@ from warpspace.units import MICROMETRE, Array
 
 RADIUS, HEAD, BALL = 0.0032, 0.034, 0.009
 """Shaft and head of an arrow, and the marker of the worst point, as parts of the longest edge."""
-BAR_AWAY, BAR_BELOW, BAR_GAP, BAR_TICK = 0.10, 0.17, 0.055, 0.012
-"""Where scale bars lie, from the axes and from each other, and their end ticks, likewise."""
+BAR_BELOW, BAR_GAP, BAR_TICK = 0.13, 0.055, 0.012
+"""Where scale bars lie below what they belong to and each other, and their end ticks, likewise."""
 CORNERS = 8
 
 
@@ -35,32 +36,44 @@ def worst_text(frame: Frame) -> str:
     return f"max {value:.1f} {frame.scale.unit}".replace("-", "−")
 
 
-def bar_lines(frame: Frame, bars: tuple[ScaleBar, ScaleBar]) -> tuple[Array, Array]:
+def bar_room_mm(frame: Frame) -> tuple[Array, float]:
+    """Give the left front lower corner that scale bars lie below, [3], and the longest edge, mm."""
+    if frame.state.machine.shown:
+        points = machine_room_mm(frame)
+        return points.min(axis=0), float(np.ptp(points, axis=0).max())
+    low, _ = bounds_mm(frame.grid.nominal_mm)
+    longest = frame.grid.longest_edge_mm
+    return low - AWAY * longest * np.array([1.0, 1.0, 0.0]), longest
+
+
+def bar_lines(frame: Frame) -> tuple[tuple[ScaleBar, ScaleBar], Array, Array]:
     """Lay the scale bars in front of the box, below the numbers of the X axis.
 
     Parameters
     ----------
     frame : Frame
-    bars : tuple of ScaleBar, (2,)
 
     Returns
     -------
+    bars : tuple of ScaleBar, (2,)
     lines_mm : ndarray, [6, 2, 3], mm
         Each bar with a tick at either end.
     labels_mm : ndarray, [2, 3], mm
         Right ends, where the lengths are written.
     """
-    low, _ = bounds_mm(frame.grid.nominal_mm)
-    longest = frame.grid.longest_edge_mm
+    low, longest = bar_room_mm(frame)
+    bars = scale_bars(longest, frame.exaggeration)
     tick = np.array([0.0, 0.0, BAR_TICK * longest])
     lines: list[Array] = []
     labels: list[Array] = []
     for number, bar in enumerate(bars):
-        start = low + longest * np.array([-AWAY, -AWAY - BAR_AWAY, -BAR_BELOW - number * BAR_GAP])
+        start = low - longest * np.array(
+            [0.0, number * BAR_GAP, BAR_BELOW + 0.7 * number * BAR_GAP]
+        )
         end = start + np.array([bar.drawn_mm, 0.0, 0.0])
         lines += [np.stack([start, end]), *(np.stack([p, p + tick]) for p in (start, end))]
         labels.append(end + longest * np.array([0.015, 0.0, 0.0]))
-    return np.stack(lines), np.stack(labels)
+    return bars, np.stack(lines), np.stack(labels)
 
 
 class AnnotationsLayer:
@@ -89,12 +102,16 @@ class AnnotationsLayer:
             thickness_units="screen",
             scale=SCENE_PER_MM,
         )
-        self._bar_labels = [self._label(f"/marks/bar{n}", "center-left") for n in range(2)]
+        self._bar_labels = [
+            self._label(f"/marks/bar{n}", "center-left", hidden=False) for n in range(2)
+        ]
         self.show(frame)
 
-    def _label(self, name: str, anchor: Any) -> Any:
-        """Add a label without text yet."""
-        return self._scene.add_label(name, "", visible=False, font_screen_scale=0.8, anchor=anchor)
+    def _label(self, name: str, anchor: Any, *, hidden: bool = True) -> Any:
+        """Add a label without text yet; one that the map may hide, or one always in front."""
+        return self._scene.add_label(
+            name, "", visible=False, font_screen_scale=0.8, anchor=anchor, depth_test=hidden
+        )
 
     def show(self, frame: Frame) -> None:
         """Follow the frame."""
@@ -175,8 +192,7 @@ class AnnotationsLayer:
             label.visible = on
         if not on:
             return
-        bars = scale_bars(frame.grid.longest_edge_mm, frame.exaggeration)
-        lines, labels = bar_lines(frame, bars)
+        bars, lines, labels = bar_lines(frame)
         self._bars.points = lines.astype(np.float32)
         self._bars.colors = colour_bytes(palette(frame).edge)
         texts = (

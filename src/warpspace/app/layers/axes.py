@@ -74,7 +74,8 @@ class AxesLayer:
     def show(self, frame: Frame) -> None:
         """Follow the nominal box and the switch."""
         box = bounds_mm(frame.grid.nominal_mm)
-        visible = frame.state.shown.axes
+        # their numbers would cover the machine
+        visible = frame.state.shown.axes and not frame.state.machine.shown
         if self._box is None or not np.array_equal(box, self._box):
             self._box = box
             self._lay_out(box, frame.grid.longest_edge_mm)

@@ -1,5 +1,7 @@
 """The bent box: coloured surface, grid lines and edges on it, and the nominal box around it."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from viser import SceneApi
@@ -81,6 +83,8 @@ class BoxLayer:
 
     def __init__(self, scene: SceneApi, frame: Frame) -> None:
         colours = palette(frame)
+        self._scene = scene
+        self._coloured: Any = None
         self._nominal: Array | None = frame.grid.nominal_mm
         self._surface = scene.add_glb(
             SURFACE, surface_glb(frame), scale=SCENE_PER_MM, cast_shadow=False, receive_shadow=False
@@ -128,13 +132,7 @@ class BoxLayer:
         self._surface.visible = not lines_only
         if not lines_only:
             self._surface.glb_data = surface_glb(frame)
-        self._grid.visible = shown.grid_lines or lines_only
-        if self._grid.visible:
-            self._grid.points = grid_pieces(frame)
-            self._grid.thickness = 1.4 if lines_only else 0.7
-            self._grid.colors = grid_colours(frame) if lines_only else colour_bytes(colours.grid)
-        self._edges.points = edge_pieces(frame)
-        self._edges.colors = edge_colours(frame) if lines_only else colour_bytes(colours.edge)
+        self._show_lines(frame, lines_only=lines_only)
         self._isolines.visible = look.isolines and not lines_only
         if self._isolines.visible:
             self._isolines.points = isoline_pieces(frame)
@@ -144,6 +142,35 @@ class BoxLayer:
             self._nominal = frame.grid.nominal_mm
             self._ghost.points = ghost_dashes(frame)
         self._ghost.colors = colour_bytes(colours.ghost)
+
+    def _show_lines(self, frame: Frame, *, lines_only: bool) -> None:
+        """Draw grid lines and edges: dark on the map, or alone in the map's colours."""
+        colours = palette(frame)
+        self._edges.visible = not lines_only
+        self._grid.visible = frame.state.shown.grid_lines and not lines_only
+        if self._grid.visible:
+            self._grid.points = grid_pieces(frame)
+            self._grid.colors = colour_bytes(colours.grid)
+        if self._edges.visible:
+            self._edges.points = edge_pieces(frame)
+            self._edges.colors = colour_bytes(colours.edge)
+        if self._coloured is not None:
+            self._coloured.visible = lines_only
+        if lines_only:
+            points = np.concatenate([grid_pieces(frame), edge_pieces(frame)])
+            colors = np.concatenate([grid_colours(frame), edge_colours(frame)])
+            if self._coloured is not None and self._coloured.points.shape == points.shape:
+                self._coloured.points, self._coloured.colors = points, colors
+                return
+            # one colour for all and one a point are two kinds of line to viser
+            self._coloured = self._scene.add_line_segments(
+                "/box/lines",
+                points,
+                colors,
+                thickness=1.8,
+                thickness_units="screen",
+                scale=SCENE_PER_MM,
+            )
 
 
 def isoline_colour(frame: Frame) -> Rgb:

@@ -10,7 +10,7 @@ from warpspace.app.live import Frame
 from warpspace.app.rotation import points_on_traces
 from warpspace.units import Array
 
-SIZE = 0.02
+SIZE = 0.014
 """Diameter of a point, as a part of the longest edge."""
 
 

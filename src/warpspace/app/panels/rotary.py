@@ -6,7 +6,7 @@ from typing import Any
 
 from warpspace.app.circles import circle_rows, circle_table
 from warpspace.app.live import Frame
-from warpspace.app.look import parse_positions
+from warpspace.app.look import parse_positions, quarters
 from warpspace.app.panels import Desk
 from warpspace.app.rotation import played_axis
 from warpspace.app.state import AppState
@@ -111,11 +111,18 @@ class RotaryPanel:
                 for axis in state.position_spans
                 if len(state.position_spans) > 1
             }
+            button = gui.add_button(
+                "Hold at every 90°",
+                color="gray",
+                hint="Turn the first axis with the table at every quarter turn.",
+                visible=len(texts) > 1,
+            )
+        button.on_click(lambda _: self._desk.post(_at_quarters))
         self._points = [Bound(box, changed) for box in boxes]
         self._own_on: Bound[bool] = Bound(own, changed)
         self._own: Bound[Vector] = Bound(point, changed)
         self._held = {axis: Bound(text, changed) for axis, text in texts.items()}
-        self._parts = [*boxes, own, point, *texts.values()]
+        self._parts = [*boxes, own, point, *texts.values(), button]
 
     def read(self, state: AppState) -> AppState:
         """Take over what a browser has chosen."""
@@ -165,6 +172,14 @@ class RotaryPanel:
         if written != self._written:
             self._written = written
             self._table.content = written
+
+
+def _at_quarters(state: AppState) -> AppState:
+    """Hold the axis next to the point at every quarter turn."""
+    axis = played_axis(state)
+    if axis is None:
+        return state
+    return replace(state, rotary=state.rotary.with_held(axis, quarters(state.scene, axis)))
 
 
 def _spell(state: AppState, axis: str) -> str:
