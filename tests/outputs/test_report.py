@@ -183,16 +183,17 @@ def test_pdf_repeats_and_says_everything(renderer: str, tmp_path: Path, monkeypa
 
 
 @pytest.mark.render
-def test_two_scenes_within_time_and_size(renderer: str, tmp_path: Path) -> None:
-    import time
-
-    for ending, most in (("html", 8_000_000), ("pdf", 8_000_000)):
-        target = tmp_path / f"a.{ending}"
-        start = time.perf_counter()
-        run = warpspace("report", "dvf5000_first", "dvf5000_second", "-o", str(target))
-        assert run.returncode == 0, run.stderr
-        assert time.perf_counter() - start <= 30.0
-        assert target.stat().st_size <= most
+@pytest.mark.slow
+@pytest.mark.parametrize("ending", ["html", "pdf"])
+def test_two_scenes_within_time_and_size(ending: str, renderer: str, tmp_path: Path) -> None:
+    """Processor time, since other tests run at the same time; the benchmark has the wall's."""
+    target = tmp_path / f"a.{ending}"
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    run = warpspace("report", "dvf5000_first", "dvf5000_second", "-o", str(target))
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    assert run.returncode == 0, run.stderr
+    assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime <= 30.0
+    assert target.stat().st_size <= 8_000_000
 
 
 @pytest.mark.render

@@ -86,4 +86,9 @@ def _block(block: Block, folder: Path) -> dict[str, Any]:
     number = len(list(folder.iterdir()))
     path = folder / f"figure{number}.{block.form}"
     path.write_bytes(block.data)
-    return {"kind": block.kind, "caption": block.caption, "file": path.name}
+    return {
+        "kind": block.kind,
+        "caption": block.caption,
+        "width": block.width,
+        "file": path.name,
+    }

@@ -1,7 +1,7 @@
 """The figures of a report, drawn by name; one that cannot be drawn leaves a note in its place."""
 
 import io
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -29,7 +29,8 @@ MAPS: Mapping[str, str] = MappingProxyType(
 )
 """Figures of one scene that follow its error map, where the catalogue has them."""
 MOST_GAINS = 20
-Draw = Callable[..., bytes]
+PAPER_SHARE = 0.87
+"""Width of a map among the evidence: two of them then stand on a page."""
 
 
 class Painter:
@@ -69,16 +70,30 @@ class Painter:
     def evidence(self, reviewed: Reviewed) -> list[Block]:
         """Draw the maps of one scene: its error map and whatever else the catalogue has."""
         scene = reviewed.scene
-        wanted = [(name, caption) for name, caption in MAPS.items() if self._has(name)]
+        left_out = self._left_out(reviewed)
+        wanted = [
+            (name, caption)
+            for name, caption in MAPS.items()
+            if name not in left_out and self._has(name)
+        ]
         found: list[Block] = []
         if reviewed is not self._review.scenes[0] or self._compares:
             wanted.insert(0, ("error-map", self._map_caption(scene)))
         for name, caption in wanted:
             try:
-                found.append(self._map(name, [scene], caption))
+                found.append(self._map(name, [scene], caption, PAPER_SHARE))
             except WarpspaceError as error:
                 found.append(Text(f"{caption} {error}", "note"))
         return found
+
+    def _left_out(self, reviewed: Reviewed) -> set[str]:
+        """Name the figures that would tell nothing: no trace displaced, the same machine again."""
+        left_out: set[str] = set()
+        if not any(trace.error_um.any() for trace in reviewed.drawing.traces):
+            left_out.add("traces")
+        if reviewed is not self._review.scenes[0]:
+            left_out.add("machine")
+        return left_out
 
     def gains(self, reviewed: Reviewed, prefix: str) -> Block | None:
         """Bars of the gains; none where the loop has no axis."""
@@ -129,7 +144,7 @@ class Painter:
 
         return name in FIGURES
 
-    def _map(self, name: str, scenes: Sequence[Scene], caption: str) -> Picture:
+    def _map(self, name: str, scenes: Sequence[Scene], caption: str, width: float = 1.0) -> Picture:
         """Draw a figure of the catalogue."""
         from warpspace.outputs.figures.settings import FigureSettings
 
@@ -139,7 +154,7 @@ class Painter:
             grid=self._review.settings.grid,
         )
         data = self._worker.render(name, scenes, settings, self._form)
-        return Picture(name, caption, data, self._form)
+        return Picture(name, caption, data, self._form, width)
 
     def _chart(self, name: str, figure: "Figure", caption: str) -> Picture:
         """Spell a chart as a file."""
