@@ -51,19 +51,23 @@ class ViewPanel:
     ----------
     desk : Desk
     state : AppState
-    scenes : mapping of str to Scene
-        Scenes to choose from, by the title shown.
+    scenes : dict of str to Scene
+        Scenes to choose from, by the title shown; what is opened is added.
     """
 
-    def __init__(self, desk: Desk, state: AppState, scenes: Mapping[str, Scene]) -> None:
+    def __init__(self, desk: Desk, state: AppState, scenes: dict[str, Scene]) -> None:
         self._desk, self._scenes = desk, scenes
         gui, changed = desk.gui, desk.changed
         self._titles = {id(scene): title for title, scene in scenes.items()}
+        if id(state.origin) not in self._titles:
+            title = _title_of(state.origin, scenes)
+            scenes[title] = state.origin
+            self._titles[id(state.origin)] = title
         self._scene: Bound[str] = Bound(
             gui.add_dropdown(
                 "Scene",
                 tuple(scenes),
-                initial_value=self._titles.get(id(state.origin), state.origin.title),
+                initial_value=self._titles[id(state.origin)],
                 hint="Machine and error set. Changes made to the errors are lost.",
             ),
             changed,
@@ -201,13 +205,23 @@ class ViewPanel:
                 state = state.with_shown(**{name: on})
         return state
 
+    def _know(self, scene: Scene) -> None:
+        """Offer a scene that has been opened from a file or a link."""
+        if id(scene) in self._titles:
+            return
+        title = _title_of(scene, self._scenes)
+        self._scenes[title] = scene
+        self._titles[id(scene)] = title
+        self._scene.handle.options = tuple(self._scenes)
+
     def show(self, frame: Frame) -> None:
         """Make the widgets show the state."""
         state = frame.state
         if state.origin is not self._built_for:
             self._folder.remove()
             self._add_positions(state)
-        self._scene.show(self._titles.get(id(state.origin), state.origin.title))
+        self._know(state.origin)
+        self._scene.show(self._titles[id(state.origin)])
         self._factor.show(float(f"{frame.exaggeration:.4g}"))
         self._log.show(round(math.log10(frame.exaggeration), 2))
         self._component.show(self._components.text(state.component))
@@ -217,6 +231,16 @@ class ViewPanel:
             bound.show(state.positions[axis])
         for name, bound in self._switches.items():
             bound.show(getattr(state.shown, name))
+
+
+def _title_of(scene: Scene, known: Mapping[str, Scene]) -> str:
+    """Give a scene that was opened a title nobody else has."""
+    title = scene.title or scene.name
+    number = 2
+    while title in known:
+        title = f"{scene.title or scene.name} ({number})"
+        number += 1
+    return title
 
 
 def _from_log(log: float) -> float:

@@ -1,0 +1,83 @@
+"""Numbers of a comparison side by side, as HTML."""
+
+import html
+
+from warpspace.analysis.statistics import Statistics
+from warpspace.app.compare import Compared
+from warpspace.app.legend import gradient
+from warpspace.app.live import Frame
+
+NOTHING = (
+    '<div style="padding:4px 14px 10px;line-height:1.5;font-size:13px">Choose a scene for B, or pin'
+    " what is shown now and go on changing it: both are drawn with the same colours, factor and"
+    " camera.</div>"
+)
+_NUMBER = 'style="text-align:right;padding:2px 0 2px 6px;font-variant-numeric:tabular-nums"'
+_ROWS = (("mean", "mean_um"), ("RMS", "rms_um"), ("P95", "p95_um"), ("max", "max_um"))
+
+
+def comparison_html(frame: Frame) -> str:
+    """Spell the numbers of a comparison.
+
+    Parameters
+    ----------
+    frame : Frame
+
+    Returns
+    -------
+    str
+        HTML; every title is escaped.
+    """
+    found = frame.compared
+    if found is None:
+        return NOTHING
+    columns = {"A": found.a, "B": found.b, "A − B": found.difference}
+    drawn = {"a": "A", "b": "B", "difference": "A − B"}[found.shown]
+    head = "".join(f"<th {_NUMBER}>{'▸ ' if name == drawn else ''}{name}</th>" for name in columns)
+    rows = "".join(
+        f'<tr><td style="opacity:.7">{label}</td>'
+        + "".join(_cell(name, label, getattr(s, field, None)) for name, s in columns.items())
+        + "</tr>"
+        for label, field in _ROWS
+    )
+    places = "".join(_place(name, stats) for name, stats in columns.items() if stats is not None)
+    refused = f'<div style="font-size:12px">{found.refused}</div>' if found.refused else ""
+    return (
+        f'<div style="padding:2px 14px 10px;line-height:1.45">{_titles(found)}'
+        '<table style="width:100%;border-collapse:collapse;font-size:13px;margin:4px 0">'
+        f'<tr><th style="text-align:left;font-weight:400;opacity:.7">|E| [µm]</th>{head}</tr>{rows}'
+        f"</table>{places}{refused}{bar(frame)}</div>"
+    )
+
+
+def _titles(found: Compared) -> str:
+    """Name the two sides."""
+    return "".join(
+        f'<div style="font-size:12.5px"><b>{name}</b> {html.escape(title)}</div>'
+        for name, title in zip("AB", found.titles, strict=True)
+    )
+
+
+def _cell(column: str, row: str, value: float | None) -> str:
+    """Spell one number."""
+    spelt = "–" if value is None else f"{value:.2f}"
+    return f'<td {_NUMBER} data-compared="{row} {column}">{spelt}</td>'
+
+
+def _place(name: str, found: Statistics) -> str:
+    """Say where the largest is."""
+    x, y, z = (f"{round(value, 1) + 0.0:g}".replace("-", "−") for value in found.max_at_mm)
+    return f'<div style="font-size:11.5px;opacity:.8">max of {name} at X {x}, Y {y}, Z {z} mm</div>'
+
+
+def bar(frame: Frame) -> str:
+    """Draw the colours shared by all maps as a flat bar."""
+    scale = frame.scale
+    ends = "".join(f"<span>{value:g}</span>".replace("-", "−") for value in (scale.low, scale.high))
+    colours = gradient(scale).replace("to top", "to right")
+    return (
+        '<div style="font-size:11.5px;margin-top:8px">shared colours, '
+        f"{html.escape(scale.label)} [{html.escape(scale.unit)}]"
+        f'<div style="height:12px;margin:2px 0;background:{colours}"></div>'
+        f'<div style="display:flex;justify-content:space-between">{ends}</div></div>'
+    )

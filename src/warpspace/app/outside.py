@@ -1,0 +1,40 @@
+"""What lies outside the panels of a tab: its camera, its page, its files."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from viser import ClientHandle
+
+from warpspace.app.live import Frame
+from warpspace.app.services import Services
+from warpspace.app.tabs import CameraMemory
+from warpspace.scene.model import Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Outside:
+    """What some panels need beside the desk.
+
+    Attributes
+    ----------
+    client : viser.ClientHandle
+    scenes : dict of str to Scene
+        Scenes this tab can choose from, by the title shown.
+    camera : callable
+        Gives where the camera stands.
+    look_from : callable
+        Puts the camera somewhere with the next picture.
+    run_script : callable
+        Runs JavaScript of our own in the page.
+    services : Services
+    shown : callable
+        Gives the frame that is drawn; None before the first.
+    """
+
+    client: ClientHandle
+    scenes: dict[str, Scene]
+    camera: Callable[[], CameraMemory]
+    look_from: Callable[[CameraMemory], None]
+    run_script: Callable[[str], None]
+    services: Services
+    shown: Callable[[], Frame | None]

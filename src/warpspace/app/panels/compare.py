@@ -1,0 +1,112 @@
+"""The panel "Compare": two scenes, or now against a snapshot; A, B or their difference."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from warpspace.app.compare import scene_side, with_pin, with_sides
+from warpspace.app.compare_text import NOTHING, comparison_html
+from warpspace.app.comparison import NOW, SHOWN, Side
+from warpspace.app.live import Frame
+from warpspace.app.panels import Desk, Update
+from warpspace.app.state import AppState
+from warpspace.app.widgets import Bound
+from warpspace.scene.model import Scene
+
+NOBODY = "nothing"
+
+
+class ComparePanel:
+    """Who is compared with whom, what is drawn, and the numbers of both.
+
+    Parameters
+    ----------
+    desk : Desk
+    scenes : mapping of str to Scene
+        Scenes to choose from, by the title shown; it may grow.
+    """
+
+    def __init__(self, desk: Desk, scenes: Mapping[str, Scene]) -> None:
+        gui = desk.gui
+        self._scenes = scenes
+        self._options: tuple[str, ...] = tuple(scenes)
+        pin = gui.add_button(
+            "Pin now and compare",
+            color="gray",
+            hint="Take a snapshot of what is shown now; changes are then compared with it.",
+        )
+        pin.on_click(lambda _: desk.post(with_pin))
+        self._a: Bound[str] = Bound(
+            gui.add_dropdown(
+                "A", (NOW, *scenes), initial_value=NOW, hint="One side; now: what is steered."
+            ),
+            desk.changed,
+        )
+        self._b: Bound[str] = Bound(
+            gui.add_dropdown(
+                "B",
+                (NOBODY, NOW, *scenes),
+                initial_value=NOBODY,
+                hint="The other side. Scenes are taken as opened, at the present rotary positions.",
+            ),
+            desk.changed,
+        )
+        self._shown: Any = gui.add_button_group(
+            "Drawn",
+            tuple(SHOWN.values()),
+            visible=False,
+            hint="What is drawn. The difference is taken node by node.",
+        )
+        self._shown.on_click(lambda event: desk.post(_drawn(event.target.value)))
+        self._ghost: Bound[bool] = Bound(
+            gui.add_checkbox(
+                "Wireframe of the other",
+                initial_value=True,
+                hint="Edges of the box that is not drawn, dotted.",
+            ),
+            desk.changed,
+        )
+        self._text: Any = gui.add_html(NOTHING)
+
+    def read(self, state: AppState) -> AppState:
+        """Take over what a browser has chosen."""
+        a, b, ghost = self._a.poll(), self._b.poll(), self._ghost.poll()
+        comparison = state.comparison
+        if a is not None or b is not None:
+            one = self._side(state, a) if a is not None else comparison.a
+            two = self._side(state, b) if b is not None else comparison.b
+            state = with_sides(state, one or Side(), two)
+        if ghost is not None:
+            state = replace(state, comparison=replace(state.comparison, ghost=bool(ghost)))
+        return state
+
+    def _side(self, state: AppState, title: str) -> Side | None:
+        """Find the side of a title that a browser has sent; None for nothing or nonsense."""
+        pinned = state.comparison.pinned
+        if title == NOW:
+            return Side()
+        if pinned is not None and title == pinned.title:
+            return pinned
+        scene = self._scenes.get(title)
+        return None if scene is None else replace(scene_side(scene), title=title)
+
+    def show(self, frame: Frame) -> None:
+        """Make the widgets show the comparison."""
+        comparison = frame.state.comparison
+        pinned = () if comparison.pinned is None else (comparison.pinned.title,)
+        options = (*pinned, *self._scenes)
+        if options != self._options:
+            self._options = options
+            self._a.handle.options = (NOW, *options)
+            self._b.handle.options = (NOBODY, NOW, *options)
+        self._a.show(comparison.a.title)
+        self._b.show(NOBODY if comparison.b is None else comparison.b.title)
+        self._ghost.show(comparison.ghost)
+        self._shown.visible = comparison.b is not None
+        self._text.content = comparison_html(frame)
+
+
+def _drawn(text: str) -> Update:
+    """Give the update that draws what a button says; nonsense changes nothing."""
+    word = next((word for word, shown in SHOWN.items() if shown == text), "")
+    return lambda s: replace(s, comparison=s.comparison.with_shown(word))

@@ -1,0 +1,112 @@
+"""The panel "Conventions": what the map is drawn with, and what each choice changes."""
+
+from dataclasses import replace
+from typing import Any
+
+from warpspace.app.conventions import (
+    Effect,
+    Effects,
+    reference_spans,
+    with_choice,
+    with_own_conventions,
+    with_reference,
+)
+from warpspace.app.conventions_text import switchboard_html
+from warpspace.app.live import Frame
+from warpspace.app.panels import Desk
+from warpspace.app.panels.clicks import Clicks
+from warpspace.app.state import AppState, start_loop
+from warpspace.app.widgets import Bound
+from warpspace.scene.model import Scene
+
+
+class ConventionsPanel:
+    """Rows to choose from, the reference point in numbers or picked in 3-D, and the way back.
+
+    Parameters
+    ----------
+    desk : Desk
+    state : AppState
+    """
+
+    def __init__(self, desk: Desk, state: AppState) -> None:
+        gui = desk.gui
+        self._desk, self._effects = desk, Effects()
+        self._known: dict[str, Effect] = {}
+        self._clicks = Clicks(gui, lambda word: desk.post(lambda s: with_choice(s, word)))
+        self._text: Any = gui.add_html("")
+        self.picking = False
+        self._pick: Any = gui.add_button(
+            "Pick the reference in 3-D",
+            color="gray",
+            hint="The next click on the box chooses the point that is held still.",
+        )
+        self._pick.on_click(lambda _: desk.act(self._toggle_picking))
+        self._home: Any = gui.add_folder(None)
+        self._scene: Scene | None = None
+        self._at: dict[str, Bound[float]] = {}
+        self._build(state)
+        back = gui.add_button(
+            "Conventions of the scene", color="gray", hint="Undo all choices made here."
+        )
+        back.on_click(lambda _: desk.post(_back))
+
+    def _build(self, state: AppState) -> None:
+        """Add a number box per linear axis of the scene's machine."""
+        for bound in self._at.values():
+            bound.handle.remove()
+        self._scene, self._at = state.origin, {}
+        middle = state.scene.workspace.positions
+        with self._home:
+            for axis, span in reference_spans(state.scene).items():
+                box = self._desk.gui.add_number(
+                    f"Reference {axis} [mm]",
+                    initial_value=float((state.scene.reference or middle).get(axis, 0.0)),
+                    min=span.low,
+                    max=span.high,
+                    step=1.0,
+                    hint="Position of the axis at the point that is held still.",
+                )
+                self._at[axis] = Bound(box, self._desk.changed)
+
+    def _toggle_picking(self) -> None:
+        """Wait for a click on the box, or do not any more."""
+        self.wait(picking=not self.picking)
+
+    def wait(self, *, picking: bool) -> None:
+        """Wait for a click on the box that chooses the reference, or end that."""
+        self.picking = picking
+        self._pick.label = "Click a point of the box …" if picking else "Pick the reference in 3-D"
+
+    def read(self, state: AppState) -> AppState:
+        """Take over a reference point that was typed."""
+        typed = {axis: value for axis, b in self._at.items() if (value := b.poll()) is not None}
+        return with_reference(state, typed) if typed else state
+
+    def show(self, frame: Frame) -> None:
+        """Show what is in force; the effects follow when changes pause."""
+        state = frame.state
+        if state.origin is not self._scene:
+            self._known = {}
+            self._build(state)
+        reference = state.scene.reference
+        if reference is not None:
+            for axis, bound in self._at.items():
+                bound.show(float(reference.get(axis, bound.handle.value)))
+        self._write(state)
+
+    def settle(self, frame: Frame) -> None:
+        """Work out what every choice changes."""
+        self._known = self._effects.of(frame.state)
+        self._write(frame.state)
+
+    def _write(self, state: AppState) -> None:
+        """Write the switchboard."""
+        content = switchboard_html(state, self._known, self._clicks.attributes)
+        if content != self._text.content:
+            self._text.content = content
+
+
+def _back(state: AppState) -> AppState:
+    """Go back to all conventions of the scene, its loop included."""
+    return replace(with_own_conventions(state), loop=start_loop(state.origin))

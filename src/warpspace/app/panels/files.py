@@ -1,0 +1,252 @@
+"""The panel "Files": open, save, link; pictures and exports, made beside the session."""
+
+import logging
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from warpspace.app import document, links
+from warpspace.app.jobs import Jobs, Progress
+from warpspace.app.live import Frame
+from warpspace.app.outside import Outside
+from warpspace.app.panels import Desk
+from warpspace.app.services import CancelledError, Request
+from warpspace.app.state import AppState
+from warpspace.app.tabs import CameraMemory
+from warpspace.app.uploads import Uploads, size_script
+from warpspace.app.widgets import dom_id
+from warpspace.exceptions import WarpspaceError
+
+logger = logging.getLogger(__name__)
+FIGURE_S, VIEW_S, PAGE_S, EXPORT_S = 5.0, 1.5, 1.0, 1.0
+RENDER_TIMEOUT_S = 30.0
+LARGEST_VIEW_PX = 4096
+Make = Callable[[threading.Event], bytes]
+
+
+class FilesPanel:
+    """Buttons for files, a progress bar and a way to cancel.
+
+    Parameters
+    ----------
+    desk : Desk
+    outside : Outside
+    """
+
+    def __init__(self, desk: Desk, outside: Outside) -> None:
+        self._desk, self._outside = desk, outside
+        self._frame: Frame | None = None
+        self._jobs = Jobs(self._report, self._failed)
+        self._add_scene_files()
+        self._add_outputs()
+        gui = desk.gui
+        self._status: Any = gui.add_markdown("", visible=False)
+        self._bar: Any = gui.add_progress_bar(0.0, visible=False, animated=True)
+        self._cancel: Any = gui.add_button(
+            "Cancel", color="gray", visible=False, hint="Give up what is being made."
+        )
+        self._cancel.on_click(lambda _: self._jobs.cancel())
+
+    def _add_scene_files(self) -> None:
+        """Add opening, saving and the link."""
+        gui, outside = self._desk.gui, self._outside
+        upload = gui.add_upload_button(
+            "Open a scene …",
+            mime_type=".toml",
+            hint="A scene file (TOML, at most 4 MB). All its problems are listed; undo goes back.",
+        )
+        Uploads(
+            outside.client,
+            lambda name, content: self._desk.act(partial(self._open, name, content)),
+            lambda text: self._desk.notify("Not opened", text, "red"),
+        )
+        refused = gui.add_text("", "", visible=False)
+        refused.on_update(lambda _: self._desk.act(lambda: self._refuse(str(refused.value))))
+        outside.run_script(size_script(upload, refused))
+        self._group(
+            "Keep scene, settings and camera",
+            {"Save scene": self._save, "Link": self._link},
+            "Save: a scene file that opens to this very state. Link: into the page's address, and"
+            " into the clipboard where the browser allows it.",
+        )
+        link = gui.add_text("", "", visible=False)
+        link.on_update(lambda _: self._desk.act(lambda: self._follow(str(link.value))))
+        outside.run_script(links.listen_script(dom_id(link)))
+
+    def _add_outputs(self) -> None:
+        """Add pictures and exports."""
+        services = self._outside.services
+        pictures = {} if services.draw_figure is None else {"Figure": self._figure}
+        self._group(
+            "Picture (PNG)",
+            {**pictures, "View": self._view},
+            "Figure: the error map drawn for a report. View: what is on the screen now.",
+        )
+        exports = {} if services.write_export is None else {"GLB": ".glb", "CSV": ".csv"}
+        self._group(
+            "Export",
+            {"HTML": self._page}
+            | {name: partial(self._export, name, end) for name, end in exports.items()},
+            "HTML: the interactive scene in one file that needs no network. GLB: the bent box for"
+            " 3-D viewers and CAD. CSV: position and error of every node.",
+        )
+
+    def _group(self, label: str, actions: Mapping[str, Callable[[], None]], hint: str) -> None:
+        """Add buttons whose actions the worker does."""
+        group = self._desk.gui.add_button_group(label, tuple(actions), hint=hint)
+
+        @group.on_click
+        def _(event: Any) -> None:
+            name = str(event.target.value)
+            if name in actions:
+                self._desk.act(partial(self._try, name, actions[name]))
+
+    def _try(self, label: str, action: Callable[[], None]) -> None:
+        """Do something and show what it raises, so that what waits behind it goes on."""
+        try:
+            action()
+        except Exception as error:  # noqa: BLE001 - shown and logged
+            self._failed(label, error)
+
+    def _open(self, name: str, content: bytes) -> None:
+        """Open an uploaded scene."""
+
+        def read() -> None:
+            title = document.safe_name(name)
+            text = document.upload_text(content, f"{title}.toml")
+            self._show(*document.open_text(text, title, f"{title}.toml"))
+            self._desk.notify("Opened", f"{title}.toml", "green")
+
+        self._try("Not opened", read)
+
+    def _refuse(self, message: str) -> None:
+        """Say that a file was too large to be sent, from what the page tells."""
+        _, size, name = (*message.split(":", 2), "", "")[:3]
+        megabytes = float(size) if size.isdigit() and len(size) < 16 else 0.0
+        text = document.size_message(f"{document.safe_name(name)}.toml", megabytes)
+        self._desk.notify("Not opened", text, "red")
+
+    def _follow(self, message: str) -> None:
+        """Show what a link describes."""
+        link = message.partition(":")[2]
+        scenes = self._outside.scenes.values()
+        self._try("Link", lambda: self._show(*document.open_link(link, scenes)))
+
+    def _show(self, opened: AppState, camera: CameraMemory | None) -> None:
+        """Show an opened state from its camera; the comparison stays."""
+        if camera is not None:
+            self._outside.look_from(camera)
+        self._desk.post(lambda now: replace(opened, comparison=now.comparison))
+
+    def _save(self) -> None:
+        """Send the state as a scene file."""
+        state = self._desk.board().state
+        text = document.state_to_toml(state, self._outside.camera())
+        self._send(document.safe_name(state.scene.name), ".toml", text.encode())
+
+    def _link(self) -> None:
+        """Put a link into the address bar."""
+        scenes = self._outside.scenes.values()
+        link = document.state_to_link(self._desk.board().state, self._outside.camera(), scenes)
+        self._outside.run_script(links.show_script(link))
+        self._outside.client.flush()
+        self._desk.notify(
+            "Link", "It stands in the address bar, and in the clipboard where allowed.", "green"
+        )
+
+    def _request(self) -> Request:
+        """Give what is to be drawn: the state that is steered, as it is heard."""
+        state = self._desk.board().state
+        factor = state.exaggeration or (self._frame.exaggeration if self._frame else 1.0)
+        scene = replace(document.heard_scene(state), exaggeration=factor)
+        loop, component = state.loop.value, state.component
+        return Request(scene, loop, component, state.nodes, factor, state.shown.dark)
+
+    def _figure(self) -> None:
+        """Draw the figure in a process of its own."""
+        draw, request = self._outside.services.draw_figure, self._request()
+        if draw is not None:
+            self._make("Figure", ".png", FIGURE_S, lambda cancelled: draw(request, cancelled))
+
+    def _view(self) -> None:
+        """Have the browser render the view, and put title, factor and colour bar around it."""
+        from warpspace.app.picture import view_png
+
+        client, frame = self._outside.client, self._frame
+        if frame is None:
+            return
+        width = min(max(client.camera.image_width, 64), LARGEST_VIEW_PX)
+        height = min(max(client.camera.image_height, 64), LARGEST_VIEW_PX)
+
+        def make(_: threading.Event) -> bytes:
+            pixels = client.get_render(
+                height, width, transport_format="png", timeout=RENDER_TIMEOUT_S
+            )
+            return view_png(pixels, frame)
+
+        self._make("View", ".png", VIEW_S, make)
+
+    def _page(self) -> None:
+        """Write the offline page of what is drawn."""
+        from warpspace.app.offline import build_offline_html
+
+        frame = self._frame
+        if frame is not None:
+            toml = {"scene_toml": document.state_to_toml(frame.state)}
+            self._make("Page", ".html", PAGE_S, lambda _: build_offline_html(frame, toml).encode())
+
+    def _export(self, name: str, ending: str) -> None:
+        """Write an export."""
+        write, request = self._outside.services.write_export, self._request()
+        if write is not None:
+            self._make(name, ending, EXPORT_S, lambda _: write(request, ending))
+
+    def _make(self, name: str, ending: str, usual_s: float, make: Make) -> None:
+        """Make a file beside the session and send it."""
+        stem = document.safe_name(self._desk.board().state.scene.name)
+
+        def work(cancelled: threading.Event) -> None:
+            content = make(cancelled)
+            if not cancelled.is_set():
+                self._send(stem, ending, content)
+
+        if not self._jobs.start(name, work, usual_s):
+            self._desk.notify("Busy", "One file at a time; wait for the other or cancel it", "gray")
+
+    def _send(self, stem: str, ending: str, content: bytes) -> None:
+        """Have the browser save a file."""
+        client = self._outside.client
+        client.send_file_download(f"{stem}{ending}", content, save_immediately=True)
+        client.flush()
+
+    def _report(self, progress: Progress | None) -> None:
+        """Show how far the job is; from another thread."""
+        busy = progress is not None
+        if progress is not None:
+            self._status.content = f"{progress.name} is being made …"
+            self._bar.value = progress.percent
+        for handle in (self._status, self._bar, self._cancel):
+            if handle.visible != busy:
+                handle.visible = busy
+        self._outside.client.flush()
+
+    def _failed(self, name: str, error: Exception) -> None:
+        """Show what went wrong, log what nobody foresaw."""
+        if isinstance(error, CancelledError):
+            self._desk.notify("Cancelled", name, "gray")
+            return
+        if not isinstance(error, WarpspaceError):
+            logger.error("%s", name, exc_info=error)
+        known = isinstance(error, WarpspaceError)
+        text = str(error) if known else f"{type(error).__name__}: {error}"
+        self._desk.notify(name if name == "Not opened" else f"{name}: failed", text, "red")
+
+    def read(self, state: AppState) -> AppState:
+        """Nothing to take over."""
+        return state
+
+    def show(self, frame: Frame) -> None:
+        """Remember what is drawn."""
+        self._frame = frame

@@ -1,0 +1,85 @@
+"""A picture of the 3-D view as PNG that says what it shows: title, factor, numbers, colour bar."""
+
+from io import BytesIO
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont, PngImagePlugin
+
+from warpspace import __version__
+from warpspace.app.legend import spell_factor
+from warpspace.app.live import Frame
+
+LIGHT, DARK = ((255, 255, 255), (27, 38, 59)), ((26, 27, 30), (222, 226, 232))
+"""Ground and ink."""
+BAND_PX = 150
+HEAD_PX = 64
+
+
+def view_png(pixels: NDArray[np.uint8], frame: Frame) -> bytes:
+    """Put a rendered view under a heading and beside its colour bar.
+
+    Parameters
+    ----------
+    pixels : ndarray of uint8, [h, w, 3 or 4]
+        With a transparent ground where there are four channels.
+    frame : Frame
+        What it shows.
+
+    Returns
+    -------
+    bytes
+        PNG.
+    """
+    ground, ink = DARK if frame.state.shown.dark else LIGHT
+    view = Image.fromarray(pixels).convert("RGBA")
+    page = Image.new("RGBA", (view.width + BAND_PX, view.height + HEAD_PX), (*ground, 255))
+    page.alpha_composite(view, (0, HEAD_PX))
+    draw = ImageDraw.Draw(page)
+    _heading(draw, frame, ink)
+    _colour_bar(page, draw, frame, ink)
+    facts = PngImagePlugin.PngInfo()
+    facts.add_text("Software", f"warpspace {__version__}")
+    facts.add_itxt("Title", frame.state.scene.title)
+    facts.add_itxt("Description", f"displacement drawn {spell_factor(frame.exaggeration)}")
+    written = BytesIO()
+    page.convert("RGB").save(written, "PNG", pnginfo=facts)
+    return written.getvalue()
+
+
+def _heading(draw: ImageDraw.ImageDraw, frame: Frame, ink: tuple[int, int, int]) -> None:
+    """Write title, factor and numbers."""
+    found = frame.statistics
+    title = frame.state.scene.title
+    if frame.compared is not None:
+        a, b = frame.compared.titles
+        title = {"a": f"A: {a}", "b": f"B: {b}", "difference": f"A − B: {a} − {b}"}[
+            frame.compared.shown
+        ]
+    factor = spell_factor(frame.exaggeration).replace("\u202f", " ")
+    draw.text((16, 10), title[:110], ink, ImageFont.load_default(22))
+    draw.text(
+        (16, 38),
+        f"displacement drawn {factor} · |E| mean {found.mean_um:.2f} µm, max {found.max_um:.2f} µm"
+        f" · {frame.state.loop.value} loop",
+        ink,
+        ImageFont.load_default(15),
+    )
+
+
+def _colour_bar(
+    page: Image.Image, draw: ImageDraw.ImageDraw, frame: Frame, ink: tuple[int, int, int]
+) -> None:
+    """Draw the colour bar with ticks and unit on the right."""
+    scale = frame.scale
+    left, top = page.width - BAND_PX + 20, HEAD_PX + 60
+    height = max(page.height - top - 40, 40)
+    values = np.linspace(scale.high, scale.low, height)
+    strip = np.repeat(scale.colours(values)[:, None, :], 24, axis=1)
+    page.paste(Image.fromarray(strip.astype(np.uint8)), (left, top))
+    font = ImageFont.load_default(15)
+    draw.text((left, top - 34), f"{scale.label} [{scale.unit}]", ink, font)
+    for tick in scale.ticks:
+        at = top + (scale.high - tick) / (scale.high - scale.low) * (height - 1)
+        draw.line([(left + 24, at), (left + 30, at)], ink, 1)
+        draw.text((left + 35, at - 9), f"{tick:g}".replace("-", "−"), ink, font)

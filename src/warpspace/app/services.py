@@ -1,0 +1,54 @@
+"""What the app has others do: drawing figures and writing exports. The command line hands it in."""
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from warpspace.exceptions import WarpspaceError
+from warpspace.scene.model import Scene
+
+
+class CancelledError(WarpspaceError):
+    """Work that somebody has cancelled."""
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What is to be drawn or written.
+
+    Attributes
+    ----------
+    scene : Scene
+        With all changes made in the app.
+    loop, component : str
+    nodes : int
+        Grid nodes per axis.
+    exaggeration : float
+        Display factor in force.
+    dark : bool
+        Light ink on a dark ground.
+    """
+
+    scene: Scene
+    loop: str
+    component: str
+    nodes: int
+    exaggeration: float
+    dark: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Services:
+    """Work the app cannot do itself; None where nobody does it.
+
+    Attributes
+    ----------
+    draw_figure : callable or None
+        Takes a request and an event that cancels; gives a PNG. Raises `CancelledError` when
+        cancelled, another `WarpspaceError` where it cannot be drawn.
+    write_export : callable or None
+        Takes a request and an ending (".glb", ".csv"); gives the file's content.
+    """
+
+    draw_figure: Callable[[Request, threading.Event], bytes] | None = None
+    write_export: Callable[[Request, str], bytes] | None = None

@@ -1,0 +1,94 @@
+"""What the app has the outputs do: figures in a process of their own, exports in memory."""
+
+import tempfile
+import threading
+from concurrent.futures import ThreadPoolExecutor, wait
+from pathlib import Path
+
+from warpspace.app.services import CancelledError, Request, Services
+
+MOST_RENDERERS = 2
+"""Figures drawn at the same time for all tabs together."""
+POLL_S = 0.1
+_renderers = threading.Semaphore(MOST_RENDERERS)
+
+
+def build_services() -> Services:
+    """Give the app its figures and exports."""
+    return Services(draw_figure, write_export)
+
+
+def draw_figure(request: Request, cancelled: threading.Event) -> bytes:
+    """Draw the error map of a request as a PNG.
+
+    Parameters
+    ----------
+    request : Request
+    cancelled : threading.Event
+        Ends the renderer when set.
+
+    Returns
+    -------
+    bytes
+
+    Raises
+    ------
+    CancelledError
+        If it was cancelled.
+    RenderError
+        If it cannot be drawn here.
+    """
+    from warpspace.outputs.figures.settings import FigureSettings
+    from warpspace.outputs.worker import FigureWorker
+
+    settings = FigureSettings(
+        component=request.component,
+        exaggeration=request.exaggeration,
+        dark=request.dark,
+        loop=request.loop,
+        grid=request.nodes,
+    )
+    while not _renderers.acquire(timeout=POLL_S):
+        if cancelled.is_set():
+            raise CancelledError("cancelled while waiting for a renderer")
+    try:
+        with FigureWorker() as worker, ThreadPoolExecutor(1) as caller:
+            drawn = caller.submit(worker.render, "error-map", [request.scene], settings, "png")
+            while not wait([drawn], POLL_S).done:
+                if cancelled.is_set():
+                    worker.close(wait=False)
+                    wait([drawn])
+                    raise CancelledError("the figure was cancelled")
+            return drawn.result()
+    finally:
+        _renderers.release()
+
+
+def write_export(request: Request, ending: str) -> bytes:
+    """Write an export of a request.
+
+    Parameters
+    ----------
+    request : Request
+    ending : str
+        ".glb", ".vts" or ".csv".
+
+    Returns
+    -------
+    bytes
+        The file's content.
+    """
+    from warpspace.cli.export import write_export as write
+    from warpspace.outputs.exports import draw_scene
+
+    drawing = draw_scene(
+        request.scene,
+        exaggeration=request.exaggeration,
+        grid=request.nodes,
+        loop=request.loop,
+        component=request.component,
+    )
+    with tempfile.TemporaryDirectory(prefix="warpspace-") as folder:
+        target = Path(folder) / f"export{ending}"
+        write(drawing, target, overwrite=False)
+        return target.read_bytes()
