@@ -81,9 +81,18 @@ class ErrorBasis:
         )
 
     def _combine(self, amplitudes: Array, response: Array) -> Array:
-        """One matrix-vector product, [..., 3]."""
+        """One matrix-vector product, [..., 3], without the rows of parameters that are zero.
+
+        The product waits for the memory, and most machines have most parameters at zero.
+        """
         flat = response.reshape(len(self.keys), self.nominal_mm.size)
-        return (amplitudes @ flat).reshape(self.nominal_mm.shape)
+        used = np.flatnonzero(amplitudes)
+        if 2 * len(used) > len(self.keys):
+            return (amplitudes @ flat).reshape(self.nominal_mm.shape)
+        total = np.zeros(self.nominal_mm.size)
+        for index in used:
+            total += amplitudes[index] * flat[index]
+        return total.reshape(self.nominal_mm.shape)
 
     def contributions(self, amplitudes: Array, index: tuple[int, ...] = ()) -> Array:
         """Split the position error at one node into the parameters, [K, 3], µm."""

@@ -1,0 +1,143 @@
+"""A tab without a browser: speaks viser's protocol, drags sliders, reads the numbers shown."""
+
+import asyncio
+import contextlib
+import re
+import secrets
+import subprocess
+import sys
+import time
+import urllib.request
+from dataclasses import dataclass, field
+
+import msgspec.msgpack
+import psutil
+import viser
+import websockets
+import zstandard
+
+NUMBERS = re.compile(r'data-value="(mean|RMS|P95|max)"[^>]*>([^<]*)<')
+CAMERA = {
+    "type": "ViewerCameraMessage",
+    "wxyz": (1.0, 0.0, 0.0, 0.0),
+    "position": (30.0, -30.0, 30.0),
+    "fov": 0.4,
+    "near": 0.01,
+    "far": 1000.0,
+    "image_height": 900,
+    "image_width": 1600,
+    "look_at": (0.0, 0.0, 0.0),
+    "up_direction": (0.0, 0.0, 1.0),
+}
+Shown = tuple[tuple[str, str], ...]
+
+
+@dataclass
+class Tab:
+    """One connection to the app.
+
+    Attributes
+    ----------
+    url : str
+        Address of the page.
+    token : str
+        What the page keeps in its `sessionStorage`.
+    """
+
+    url: str
+    token: str = field(default_factory=lambda: secrets.token_hex(16))
+
+    def __post_init__(self) -> None:
+        self.widgets: dict[str, str] = {}
+        self.values: dict[str, float] = {}
+        self.shown: Shown = ()
+        self.seen: list[tuple[float, Shown]] = []
+        self.bytes = 0
+        self.problems: list[str] = []
+        self._reader: asyncio.Task[None] | None = None
+
+    async def open(self) -> None:
+        """Connect and wait for the first numbers."""
+        self._socket = await websockets.connect(
+            self.url.replace("http", "ws", 1),
+            subprotocols=[f"viser-v{viser.__version__}"],
+            max_size=None,
+            compression=None,
+        )
+        self._reader = asyncio.create_task(self._read())
+        await self._send(CAMERA)
+        for _ in range(600):
+            if self.shown and self.widgets:
+                return
+            await asyncio.sleep(0.05)
+        raise TimeoutError("the app has shown nothing for 30 s")
+
+    async def close(self) -> None:
+        """Drop the connection."""
+        if self._reader is not None:
+            self._reader.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await self._reader
+        await self._socket.close()
+
+    async def drag(self, label: str, value: float) -> None:
+        """Set the slider whose label begins with a word."""
+        await self._update(self.widgets[label], value)
+
+    async def _update(self, widget: str, value: object) -> None:
+        await self._send({"type": "GuiUpdateMessage", "uuid": widget, "updates": {"value": value}})
+
+    async def _send(self, message: dict[str, object]) -> None:
+        await self._socket.send(msgspec.msgpack.encode(message))
+
+    async def _read(self) -> None:
+        zstd = zstandard.ZstdDecompressor()
+        with contextlib.suppress(websockets.ConnectionClosed):
+            async for raw in self._socket:
+                self.bytes += len(raw)
+                packed = int.from_bytes(raw[8:16], "little")
+                size = int.from_bytes(raw[:8], "little")
+                text = zstd.decompress(raw[16 : 16 + packed], max_output_size=size)
+                for message in msgspec.msgpack.decode(text)["messages"]:
+                    await self._take(message)
+
+    async def _take(self, message: dict[str, object]) -> None:
+        kind = message["type"]
+        if kind == "GuiSliderMessage":
+            key = message["props"]["label"].split(" ")[0]
+            self.widgets.setdefault(key, message["uuid"])
+            self.values.setdefault(key, message["value"])
+        elif kind == "RunJavascriptMessage" and "warpspace-tab" in message["source"]:
+            widget = re.search(r'uuid: "([^"]+)"', message["source"])
+            await self._update(widget[1], self.token)
+        elif kind == "NotificationShowMessage":
+            self.problems.append(f"{message['props']['title']}: {message['props']['body']}")
+        elif kind in {"GuiHtmlMessage", "GuiUpdateMessage"}:
+            part = message["props"] if kind == "GuiHtmlMessage" else message["updates"]
+            content = part.get("content")
+            if isinstance(content, str) and 'data-value="mean"' in content:
+                self.shown = tuple(NUMBERS.findall(content))
+                self.seen.append((time.perf_counter(), self.shown))
+
+
+@contextlib.contextmanager
+def running_app(*options: str):
+    """Run the app in a process of its own; give its address and process."""
+    port = 8600 + secrets.randbelow(300)
+    url = f"http://127.0.0.1:{port}"
+    command = [sys.executable, "-m", "warpspace", "view", "--no-browser", "--port", str(port)]
+    process = subprocess.Popen([*command, *options], stdout=subprocess.DEVNULL)
+    try:
+        for _ in range(300):
+            with contextlib.suppress(OSError), urllib.request.urlopen(url, timeout=1):
+                break
+            time.sleep(0.1)
+        yield url, psutil.Process(process.pid)
+    finally:
+        process.terminate()
+        process.wait(10)
+
+
+def rss_mb(process: psutil.Process) -> float:
+    """Memory that a process holds, MB."""
+    return process.memory_info().rss / 1e6

@@ -1,0 +1,113 @@
+"""The app for an hour: tabs come, drag, drop out, come back, leave; memory must not grow.
+
+    python benchmarks/soak_app.py [--minutes 60] [--tabs 6]
+
+A fifth of the run is warming up (caches, allocator). Then the line through the memory over time is
+what counts, together with what stays behind of threads and open files.
+"""
+
+import argparse
+import asyncio
+import random
+import sys
+import time
+
+import numpy as np
+from app_client import Tab, rss_mb, running_app
+
+KEYS = ("EXX", "EAX", "EBY", "EAZ", "EC0Y", "EA0Z", "EAC")
+MAX_MB_PER_HOUR = 20.0
+
+
+async def visit(url: str, until: float, rng: random.Random, counts: dict[str, int]) -> None:
+    """Be one visitor after the other."""
+    while time.monotonic() < until:
+        tab = Tab(url)
+        for _ in range(rng.randint(1, 4)):  # connections of one visitor
+            await tab.open()
+            counts["connections"] += 1
+            expected = tab.values
+            for _ in range(rng.randint(10, 60)):
+                key = rng.choice(KEYS)
+                value = round(rng.uniform(-10.0, 10.0), 1)
+                await tab.drag(key, value)
+                expected[key] = value
+                counts["moves"] += 1
+                await asyncio.sleep(0.03)
+            await asyncio.sleep(0.4)
+            await tab.close()
+            again = Tab(url, tab.token)
+            again.values = {}
+            tab = again
+            await asyncio.sleep(rng.uniform(0.0, 0.3))
+            if time.monotonic() > until:
+                return
+
+
+async def check_return(url: str) -> bool:
+    """Tell whether a tab that comes back finds its state."""
+    tab = Tab(url)
+    await tab.open()
+    await tab.drag("EXX", 7.5)
+    await asyncio.sleep(1.0)
+    numbers = tab.shown
+    await tab.close()
+    await asyncio.sleep(0.5)
+    back = Tab(url, tab.token)
+    await back.open()
+    await asyncio.sleep(1.0)
+    found = back.shown == numbers
+    await back.close()
+    return found
+
+
+async def run(url: str, process, options: argparse.Namespace) -> bool:
+    """Soak and print; give whether nothing grew."""
+    seconds = 60.0 * options.minutes
+    until = time.monotonic() + seconds
+    counts = {"connections": 0, "moves": 0}
+    memory: list[tuple[float, float]] = []
+    visitors = [
+        asyncio.create_task(visit(url, until, random.Random(seed), counts))
+        for seed in range(options.tabs)
+    ]
+    start, next_line = time.monotonic(), 0.0
+    while time.monotonic() < until:
+        at = time.monotonic() - start
+        memory.append((at, rss_mb(process)))
+        if at >= next_line:
+            print(
+                f"{at / 60:6.1f} min  {memory[-1][1]:7.1f} MB  {process.num_threads():4d} threads"
+                f"  {process.num_fds():4d} files  {counts['connections']} connections",
+                flush=True,
+            )
+            next_line += max(60.0, seconds / 10.0)
+        await asyncio.sleep(1.0)
+    await asyncio.gather(*visitors)
+    await asyncio.sleep(3.0)
+    found = await check_return(url)
+    await asyncio.sleep(2.0)
+    times, sizes = np.array([m for m in memory if m[0] > seconds / 5.0]).T
+    slope = float(np.polyfit(times / 3600.0, sizes, 1)[0])
+    print(
+        f"{counts['connections']} connections, {counts['moves']} moves in {options.minutes:g} min"
+    )
+    print(f"memory {sizes[0]:.1f} → {sizes[-1]:.1f} MB, {slope:+.1f} MB per hour")
+    print(f"left open: {process.num_threads()} threads, {process.num_fds()} files")
+    print(f"a tab that comes back finds its state: {'yes' if found else 'NO'}")
+    return found and (slope * options.minutes / 60.0 < MAX_MB_PER_HOUR)
+
+
+def main() -> None:
+    """Run from the command line; exit 1 where something grew."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--minutes", type=float, default=60.0)
+    parser.add_argument("--tabs", type=int, default=6, help="visitors at a time")
+    options = parser.parse_args()
+    with running_app() as (url, process):
+        fine = asyncio.run(run(url, process, options))
+    sys.exit(0 if fine else 1)
+
+
+if __name__ == "__main__":
+    main()
