@@ -16,7 +16,7 @@ from warpspace.units import Array
 
 _FLOAT, _UINT16, _UINT32 = 5126, 5123, 5125
 _VERTEX_BUFFER, _INDEX_BUFFER = 34962, 34963
-_TRIANGLES = 4
+_LINES, _TRIANGLES = 1, 4
 _SMALL = 65535
 _ALIGN = 4
 
@@ -27,7 +27,9 @@ def _padded(data: bytes, fill: bytes) -> bytes:
 
 
 @lru_cache(maxsize=8)
-def _header(vertices: int, indices: int, low: tuple[float, ...], high: tuple[float, ...]) -> bytes:
+def _header(
+    vertices: int, indices: int, mode: int, low: tuple[float, ...], high: tuple[float, ...]
+) -> bytes:
     """Spell the JSON chunk for a number of vertices and indices."""
     small = vertices <= _SMALL
     floats = 12 * vertices
@@ -45,7 +47,7 @@ def _header(vertices: int, indices: int, low: tuple[float, ...], high: tuple[flo
                         "attributes": {"POSITION": 0, "COLOR_0": 1},
                         "indices": 2,
                         "material": 0,
-                        "mode": _TRIANGLES,
+                        "mode": mode,
                     }
                 ]
             }
@@ -90,13 +92,13 @@ def _header(vertices: int, indices: int, low: tuple[float, ...], high: tuple[flo
 
 
 def build_glb(vertices: Array, triangles: NDArray[np.integer], colours: Floats) -> bytes:
-    """Write one unlit mesh.
+    """Write one unlit mesh, or lines.
 
     Parameters
     ----------
     vertices : ndarray, [M, 3]
-    triangles : ndarray of int, [T, 3]
-        Vertex numbers.
+    triangles : ndarray of int, [T, 3] or [S, 2]
+        Vertex numbers of triangles, or of the ends of pieces of line (drawn a pixel wide).
     colours : ndarray of float32, [M, 3]
         Linear; any value.
 
@@ -111,6 +113,7 @@ def build_glb(vertices: Array, triangles: NDArray[np.integer], colours: Floats) 
     text = _header(
         len(points),
         triangles.size,
+        _LINES if triangles.shape[-1] == 2 else _TRIANGLES,
         tuple(float(value) for value in low),
         tuple(float(value) for value in high),
     )

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from warpspace.app.facets import Topology, topology
 from warpspace.app.live import Frame
-from warpspace.app.tonemap import vertex_colours
 from warpspace.geometry.isolines import isoline_levels, isoline_segments
 from warpspace.units import Array
 
@@ -25,7 +24,7 @@ class MapMesh:
     Attributes
     ----------
     vertices_mm : ndarray, [M, 3], mm
-    triangles : ndarray, [T, 3]
+    triangles : ndarray, [T, 3] or [S, 2]
     values : ndarray, [M]
         What is coloured, in the unit of the frame's scale.
     """
@@ -96,30 +95,22 @@ def grid_pieces(frame: Frame) -> Pieces:
     )
 
 
-def grid_colours(frame: Frame) -> NDArray[np.uint8]:
-    """Colour the ends of the grid lines by their values, [S, 2, 3]."""
-    return _coloured(
-        frame,
-        [
-            part.values.reshape(-1)[part.drawn_of.grid_segments]
-            for part in map_parts(frame)
-            for _ in part.lifts
-        ],
-    )
-
-
-def edge_colours(frame: Frame) -> NDArray[np.uint8]:
-    """Colour the ends of the edges by their values, [S, 2, 3]."""
-    return _coloured(
-        frame,
-        [part.values.reshape(-1)[part.drawn_of.edge_segments] for part in map_parts(frame)],
-    )
-
-
-def _coloured(frame: Frame, values: list[Array]) -> NDArray[np.uint8]:
-    """Turn values at the ends of pieces of line into bytes of line colours, [S, 2, 3]."""
-    linear = vertex_colours(frame.scale, np.concatenate(values))
-    return np.rint(np.clip(linear, 0.0, 1.0) * 255.0).astype(np.uint8)
+def line_mesh(frame: Frame) -> MapMesh:
+    """Collect grid lines and edges of a map as pieces of line between nodes, [S, 2]."""
+    vertices: list[Array] = []
+    segments: list[NDArray[np.intp]] = []
+    values: list[Array] = []
+    count = 0
+    for part in map_parts(frame):
+        of = part.drawn_of
+        used, numbered = np.unique(
+            np.concatenate([of.grid_segments, of.edge_segments]), return_inverse=True
+        )
+        vertices.append(part.drawn_mm.reshape(-1, 3)[used])
+        values.append(part.values.reshape(-1)[used])
+        segments.append(numbered.reshape(-1, 2) + count)
+        count += len(used)
+    return MapMesh(np.concatenate(vertices), np.concatenate(segments), np.concatenate(values))
 
 
 def edge_pieces(frame: Frame) -> Pieces:

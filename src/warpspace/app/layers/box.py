@@ -1,7 +1,5 @@
 """The bent box: coloured surface, grid lines and edges on it, and the nominal box around it."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 from viser import SceneApi
@@ -10,11 +8,10 @@ from warpspace.app.glb import build_glb
 from warpspace.app.layers import SCENE_PER_MM, colour_bytes, palette
 from warpspace.app.live import Frame
 from warpspace.app.mapmesh import (
-    edge_colours,
     edge_pieces,
-    grid_colours,
     grid_pieces,
     isoline_pieces,
+    line_mesh,
     map_mesh,
 )
 from warpspace.app.tonemap import Rgb, vertex_colours
@@ -29,8 +26,8 @@ DARK_ISOLINE: Rgb = (60, 68, 80)
 
 
 def surface_glb(frame: Frame) -> bytes:
-    """Write the coloured map of a frame, vertices in mm."""
-    mesh = map_mesh(frame)
+    """Write the coloured map of a frame, or its lines alone, vertices in mm."""
+    mesh = line_mesh(frame) if frame.state.look.surface == "grid" else map_mesh(frame)
     return build_glb(mesh.vertices_mm, mesh.triangles, vertex_colours(frame.scale, mesh.values))
 
 
@@ -83,8 +80,6 @@ class BoxLayer:
 
     def __init__(self, scene: SceneApi, frame: Frame) -> None:
         colours = palette(frame)
-        self._scene = scene
-        self._coloured: Any = None
         self._nominal: Array | None = frame.grid.nominal_mm
         self._surface = scene.add_glb(
             SURFACE, surface_glb(frame), scale=SCENE_PER_MM, cast_shadow=False, receive_shadow=False
@@ -129,9 +124,7 @@ class BoxLayer:
         """Move vertices, colours and lines."""
         colours, shown, look = palette(frame), frame.state.shown, frame.state.look
         lines_only = look.surface == "grid"
-        self._surface.visible = not lines_only
-        if not lines_only:
-            self._surface.glb_data = surface_glb(frame)
+        self._surface.glb_data = surface_glb(frame)
         self._show_lines(frame, lines_only=lines_only)
         self._isolines.visible = look.isolines and not lines_only
         if self._isolines.visible:
@@ -144,7 +137,7 @@ class BoxLayer:
         self._ghost.colors = colour_bytes(colours.ghost)
 
     def _show_lines(self, frame: Frame, *, lines_only: bool) -> None:
-        """Draw grid lines and edges: dark on the map, or alone in the map's colours."""
+        """Draw grid lines and edges on the map, unless they are the map."""
         colours = palette(frame)
         self._edges.visible = not lines_only
         self._grid.visible = frame.state.shown.grid_lines and not lines_only
@@ -154,23 +147,6 @@ class BoxLayer:
         if self._edges.visible:
             self._edges.points = edge_pieces(frame)
             self._edges.colors = colour_bytes(colours.edge)
-        if self._coloured is not None:
-            self._coloured.visible = lines_only
-        if lines_only:
-            points = np.concatenate([grid_pieces(frame), edge_pieces(frame)])
-            colors = np.concatenate([grid_colours(frame), edge_colours(frame)])
-            if self._coloured is not None and self._coloured.points.shape == points.shape:
-                self._coloured.points, self._coloured.colors = points, colors
-                return
-            # one colour for all and one a point are two kinds of line to viser
-            self._coloured = self._scene.add_line_segments(
-                "/box/lines",
-                points,
-                colors,
-                thickness=1.8,
-                thickness_units="screen",
-                scale=SCENE_PER_MM,
-            )
 
 
 def isoline_colour(frame: Frame) -> Rgb:
