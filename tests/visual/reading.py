@@ -10,8 +10,7 @@ from warpspace.geometry.surfaces import Surface, triangulate
 from warpspace.outputs.figures.content import DrawnMap
 from warpspace.outputs.figures.map3d import map_faces
 from warpspace.outputs.render import Raster
-from warpspace.scene.pipeline import ScenePicture
-from warpspace.units import MM_PER_UM, Array
+from warpspace.units import Array
 
 SLOPE_TOLERANCE = 0.005
 DEPTH_TOLERANCE_MM = 1.0
@@ -69,9 +68,8 @@ def invert_colours(rgb: Array, scale: ColourScale, diverging: bool | None = None
 
 def read_map(
     drawn: DrawnMap,
-    truth: ScenePicture,
+    expected_mm: Array,
     known: Array,
-    exaggeration: float,
     view: str = "iso",
     *,
     diverging: bool | None = None,
@@ -82,12 +80,10 @@ def read_map(
     ----------
     drawn : DrawnMap
         From the figure: only pixels, depth, projection and colour bar are used.
-    truth : ScenePicture
-        The model's numbers.
+    expected_mm : ndarray, [nx, ny, nz, 3], mm
+        Where the nodes should be drawn.
     known : ndarray, [nx, ny, nz]
         What the colour should show.
-    exaggeration : float
-        What the figure says.
     view : str
     diverging : bool, optional
         Read with this kind of colour map instead of the figure's.
@@ -95,13 +91,13 @@ def read_map(
     assert drawn.raster is not None
     raster, projection = drawn.raster, drawn.projection
     shape = known.shape
-    expected = (truth.grid.nominal_mm + exaggeration * MM_PER_UM * truth.field.error_um).reshape(
-        -1, 3
-    )
+    expected = expected_mm.reshape(-1, 3)
     faces = map_faces(shape, view)
     surface = triangulate(faces)
     facing = np.zeros(len(expected), dtype=bool)
-    facing[surface.nodes] = _normals(expected, surface) @ projection.towards > LEAST_FACING
+    towards = _normals(expected, surface) @ projection.towards
+    # a slice has no outside: it is seen from both
+    facing[surface.nodes] = (np.abs(towards) if min(shape) == 1 else towards) > LEAST_FACING
     facing[np.concatenate(crease_lines(faces, shape))] = False
     nodes = np.flatnonzero(facing)
     spots, depth = projection.project(expected[nodes]), projection.depth_mm(expected[nodes])

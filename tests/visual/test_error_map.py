@@ -11,6 +11,7 @@ from warpspace.geometry.colour import component_values
 from warpspace.outputs.figures.catalogue import draw_figure
 from warpspace.outputs.figures.settings import FigureSettings
 from warpspace.scene.pipeline import ScenePicture, evaluate_picture
+from warpspace.units import MM_PER_UM, Array
 
 pytestmark = [pytest.mark.render, pytest.mark.usefixtures("renderer")]
 SCENES = ("dvf5000_first", "dvf5000_second", "teach_squareness", "teach_pitching_axis")
@@ -21,6 +22,11 @@ def truth() -> ScenePicture:
     return evaluate_picture(load_scene("dvf5000_first"))
 
 
+def expected(picture: ScenePicture, exaggeration: float) -> Array:
+    """Where the nodes should be drawn."""
+    return picture.grid.nominal_mm + exaggeration * MM_PER_UM * picture.field.error_um
+
+
 def read(
     picture: ScenePicture, settings: FigureSettings, *, exaggeration: float | None = None, **options
 ) -> Reading:
@@ -28,7 +34,7 @@ def read(
     drawn = draw_figure("error-map", [scene], settings).maps[0]
     known = component_values(picture.field.error_um, settings.component)
     factor = drawn.exaggeration if exaggeration is None else exaggeration
-    return read_map(drawn, picture, known, factor, settings.view, **options)
+    return read_map(drawn, expected(picture, factor), known, settings.view, **options)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -111,7 +117,7 @@ def test_a_wrong_colour_map_is_noticed(truth: ScenePicture, component: str) -> N
 def test_a_wrong_scale_is_noticed(truth: ScenePicture) -> None:
     drawn = draw_figure("error-map", [truth.scene], FigureSettings()).maps[0]
     wrong = replace(drawn, scale=replace(drawn.scale, high=drawn.scale.high * 1.02))
-    reading = read_map(wrong, truth, truth.field.norm_um, drawn.exaggeration)
+    reading = read_map(wrong, expected(truth, drawn.exaggeration), truth.field.norm_um)
     assert not reading.agrees()
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.exceptions import RenderError
-from warpspace.geometry.colour import ColourScale, colour_table
+from warpspace.geometry.colour import LEVELS, ColourScale, colour_table
 from warpspace.outputs.projection import Projection
 from warpspace.units import Array
 
@@ -256,7 +256,9 @@ def _actor(body: Body) -> Any:
         values = numpy_to_vtk(np.ascontiguousarray(body.values, dtype=float), deep=True)
         mesh.GetPointData().SetScalars(values)
         mapper.SetLookupTable(_lookup(body.scale))
-        mapper.SetScalarRange(body.scale.low, body.scale.high)
+        # VTK lays the first and the last colour half a colour inside the ends of its range
+        half = 0.5 * (body.scale.high - body.scale.low) / (LEVELS - 1)
+        mapper.SetScalarRange(body.scale.low - half, body.scale.high + half)
         mapper.InterpolateScalarsBeforeMappingOn()
     else:
         mapper.ScalarVisibilityOff()
@@ -274,7 +276,6 @@ def _lookup(scale: ColourScale) -> Any:
     table.SetNumberOfTableValues(len(colours))
     levels: Any = numpy_to_vtk(np.ascontiguousarray(opaque), deep=True)
     table.SetTable(levels)
-    table.SetTableRange(scale.low, scale.high)
     return table
 
 

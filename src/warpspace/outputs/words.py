@@ -44,4 +44,6 @@ def spell_point(point: Sequence[float]) -> str:
 
 def spell_factor(value: float) -> str:
     """Spell an exaggeration, for instance ``×1000``."""
+    if value == 1.0:
+        return f"{TIMES}1, true scale"
     return f"{TIMES}{value:.6g}" if value < 1e6 else f"{TIMES}{value:,.0f}".replace(",", " ")

@@ -8,7 +8,7 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 
-from warpspace.exceptions import RenderError
+from warpspace.exceptions import OptionError, RenderError, SceneError, UnknownNameError
 from warpspace.outputs.figures.settings import FigureSettings
 from warpspace.scene.model import Scene
 
@@ -65,7 +65,11 @@ def _draw(name: str, scenes: Sequence[Scene], settings: FigureSettings, form: st
     """Draw one figure; runs in the process of the renderer."""
     from warpspace.outputs.save import render_figure
 
-    return render_figure(name, scenes, settings, form)
+    try:
+        return render_figure(name, scenes, settings, form)
+    except (SceneError, UnknownNameError) as error:
+        # these two do not travel between processes
+        raise OptionError(str(error)) from None
 
 
 class FigureWorker:

@@ -8,7 +8,7 @@ from warpspace.analysis.statistics import Statistics, statistics
 from warpspace.geometry.colour import build_scale, component_values
 from warpspace.outputs.canvas import Canvas
 from warpspace.outputs.figures.content import Drawing, DrawnMap, MapContent
-from warpspace.outputs.figures.error_map import VIEW_WORDS, isoline_words, quantity_words
+from warpspace.outputs.figures.error_map import isoline_words, quantity_words, view_words
 from warpspace.outputs.figures.map3d import draw_map, fit_map
 from warpspace.outputs.figures.panel import draw_colour_bar, draw_scale_bars
 from warpspace.outputs.figures.settings import FigureSettings, choose_exaggeration
@@ -45,8 +45,11 @@ def draw_comparison(scenes: Sequence[Scene], settings: FigureSettings, *, exact:
         for field, part in zip(fields, values, strict=True)
     ]
     title = f"Comparison: {scenes[0].title}  –  {scenes[1].title}"
-    facts = [*scene_facts(pictures[0], exaggeration), VIEW_WORDS[settings.view]]
-    legend = map_legend(isoline_words(scale))
+    facts = [
+        *scene_facts(pictures[0], exaggeration),
+        view_words(settings.view, pictures[0].grid.shape),
+    ]
+    legend = map_legend(isoline_words(scale, values[0]), diverging=scale.diverging)
     sheet = start_sheet(settings, title, facts, scenes, legend, exact=exact, panel=False)
     canvas = sheet.canvas
     left, bottom, right, top = sheet.content

@@ -198,10 +198,9 @@ def _draw_constants(canvas: Canvas, scene: Scene, keys: Sequence[str], box: Rect
     axes.set_ylim(len(keys) - 0.4, -0.6)
     axes.set_xlim(-1.1 * reach, 1.1 * reach)
     axes.set_yticks(range(len(keys)), [f"{key} [{parameter(key).unit}]" for key in keys])
-    canvas.text(
-        box[0], box[3] + canvas.px(7.0), "squareness, orientation and location",
-        size=SIZES.small, colour=theme.muted,
-    )  # fmt: skip
+    title = "squareness, orientation and location"
+    text, size = canvas.fit(title, canvas.width - box[0] - canvas.px(8.0), SIZES.small)
+    canvas.text(box[0], box[3] + canvas.px(7.0), text, size=size, colour=theme.muted)
     for label in axes.get_yticklabels():
         label.set_color(theme.ink)
 

@@ -3,7 +3,9 @@
 from collections.abc import Sequence
 
 from warpspace.geometry.colour import ColourScale, build_scale, component_values
+from warpspace.geometry.faces import MIN_CUT_NODES
 from warpspace.geometry.isolines import isoline_levels
+from warpspace.geometry.surfaces import Shape
 from warpspace.outputs.figures.content import Drawing, MapContent
 from warpspace.outputs.figures.map3d import draw_map
 from warpspace.outputs.figures.panel import Row, draw_panel
@@ -24,7 +26,6 @@ from warpspace.scene.pipeline import ScenePicture, evaluate_picture
 from warpspace.units import Array
 
 VIEW_WORDS = {
-    "iso": "octant towards the viewer cut away",
     "front": "front view, from the operator",
     "right": "view from the right",
     "top": "view from above",
@@ -57,9 +58,11 @@ def draw_picture(picture: ScenePicture, settings: FigureSettings, *, exact: bool
     scale = build_scale(float(abs(values).max()), settings.component)
     title = f"{map_title(settings.component)}: {scene.title}"
     canvas = new_canvas(settings, exact=exact)
-    facts = [*scene_facts(picture, exaggeration), VIEW_WORDS[settings.view]]
+    facts = [*scene_facts(picture, exaggeration), view_words(settings.view, picture.grid.shape)]
     top = draw_heading(canvas, title, facts)
-    bottom = draw_footer(canvas, [scene], map_legend(isoline_words(scale)))
+    bottom = draw_footer(
+        canvas, [scene], map_legend(isoline_words(scale, values), diverging=scale.diverging)
+    )
     drawn = draw_map(
         canvas,
         MapContent(picture.grid.nominal_mm, picture.field.error_um, values, scale, exaggeration),
@@ -89,9 +92,20 @@ def quantity_words(component: str, unit: str = "µm") -> str:
     return f"|E|  [{unit}]" if component == "norm" else f"{component} component of E  [{unit}]"
 
 
-def isoline_words(scale: ColourScale) -> str:
-    """Say how far apart isolines are; empty where there are none."""
+def view_words(view: str, shape: Shape) -> str:
+    """Say where the volume is looked at from, and what of it is cut away."""
+    if view == "iso":
+        return "octant towards the viewer cut away" if min(shape) >= MIN_CUT_NODES else "iso view"
+    return VIEW_WORDS[view]
+
+
+def isoline_words(scale: ColourScale, values: Array | None = None) -> str:
+    """Say how far apart isolines are; empty where there are none among the values."""
     levels = isoline_levels(scale)
+    if values is not None:
+        volume = sum(count > 1 for count in values.shape) > 1
+        low, high = float(values.min()), float(values.max())
+        levels = tuple(level for level in levels if volume and low < level < high)
     if not levels:
         return ""
     step = scale.ticks[1] - scale.ticks[0]
@@ -118,7 +132,7 @@ def statistics_rows(picture: ScenePicture, values: Array, component: str) -> lis
         ("mean |E|", f"{spell(found.mean_um)} µm"),
         ("P95", f"{spell(found.p95_um)} µm"),
         ("RMS", f"{spell(found.rms_um)} µm"),
-        ("max at", f"{spell_point(found.max_at_mm)} mm"),
+        ("max at", f"{spell_point(found.max_at_mm)} mm" if found.max_um > 0.0 else "–"),
     ]
     if component != "norm":
         low, high = spell(float(values.min())), spell(float(values.max()))

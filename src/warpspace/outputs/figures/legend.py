@@ -48,6 +48,13 @@ def grid_symbol(canvas: Canvas, x: float, y: float, width: float) -> None:
     canvas.line([(x, y), (x + width, y)], width=SIZES.line, colour=colour)
 
 
+def dark_isoline_symbol(canvas: Canvas, x: float, y: float, width: float) -> None:
+    """Show a dark line on a light ground."""
+    height = canvas.px(14.0)
+    canvas.rectangle(x, y - height / 2, width, height, facecolor="#d9a98c", edgecolor="none")
+    canvas.line([(x, y), (x + width, y)], width=SIZES.thin, colour=canvas.theme.grid, zorder=3.5)
+
+
 def isoline_symbol(canvas: Canvas, x: float, y: float, width: float) -> None:
     """Show a white line on a coloured ground."""
     height = canvas.px(14.0)

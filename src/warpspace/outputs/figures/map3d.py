@@ -167,7 +167,7 @@ def _draw_surface_lines(
         width = SIZES.line if diverging and level == 0.0 else SIZES.thin
         canvas.lines(lines, width=width, colour=colour, alpha=0.95, zorder=2.5)
     taken.add_lines([line for lines in by_level.values() for line in lines], 0.5)
-    label_isolines(canvas, by_level, colour, theme.paper if diverging else theme.grid, taken)
+    label_isolines(canvas, by_level, colour, theme.isoline if diverging else theme.grid, taken)
 
 
 def _visible(

@@ -12,7 +12,7 @@ from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import TOOL_AXIS
 from warpspace.outputs.canvas import Canvas
 from warpspace.outputs.figures.content import Drawing, MapContent
-from warpspace.outputs.figures.error_map import VIEW_WORDS, isoline_words
+from warpspace.outputs.figures.error_map import isoline_words, view_words
 from warpspace.outputs.figures.map3d import draw_map, fit_map, map_faces
 from warpspace.outputs.figures.panel import draw_panel
 from warpspace.outputs.figures.settings import FigureSettings
@@ -99,9 +99,9 @@ def draw_orientation(scenes: Sequence[Scene], settings: FigureSettings, *, exact
         f"lean of the tool axis drawn {spell_factor(factor)}",
         "volume undeformed",
         "orthographic",
-        VIEW_WORDS[settings.view],
+        view_words(settings.view, picture.grid.shape),
     ]
-    legend = _legend(isoline_words(scale))
+    legend = _legend(isoline_words(scale, values))
     sheet = start_sheet(settings, title, facts, scenes, legend, exact=exact)
     needles = _needles(picture, factor)
 

@@ -11,6 +11,7 @@ from warpspace.machine.parameters import parameter
 from warpspace.outputs.canvas import Canvas
 from warpspace.outputs.figures.legend import (
     LegendEntry,
+    dark_isoline_symbol,
     draw_legend,
     grid_symbol,
     isoline_symbol,
@@ -184,7 +185,9 @@ def _as_many(canvas: Canvas, head: str, items: Sequence[str], room: float) -> tu
     return canvas.fit(head + items[0], room, SIZES.small)
 
 
-def map_legend(isolines: str, *, surface: str = "deformed grid") -> list[LegendEntry]:
+def map_legend(
+    isolines: str, *, surface: str = "deformed grid", diverging: bool = False
+) -> list[LegendEntry]:
     """Build the legend of a map; `isolines` is empty where there are none."""
     entries = [
         LegendEntry(
@@ -200,7 +203,7 @@ def map_legend(isolines: str, *, surface: str = "deformed grid") -> list[LegendE
         ),
     ]
     if isolines:
-        entries.append(LegendEntry(isoline_symbol, isolines))
+        entries.append(LegendEntry(dark_isoline_symbol if diverging else isoline_symbol, isolines))
     return entries
 
 

@@ -86,7 +86,9 @@ def draw_slices(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     scale = build_scale(float(abs(values).max()), settings.component)
     slices = _evaluate_slices(picture, settings, scale, exaggeration)
     title = f"Slices through the working volume: {picture.scene.title}"
-    legend = map_legend(isoline_words(scale), surface="deformed slice")
+    legend = map_legend(
+        isoline_words(scale, values), surface="deformed slice", diverging=scale.diverging
+    )
     sheet = start_sheet(
         settings, title, scene_facts(picture, exaggeration), scenes, legend, exact=exact
     )

@@ -1,0 +1,81 @@
+"""The renderer's own process: a crash loses one figure only."""
+
+import os
+import signal
+import subprocess
+import threading
+import time
+
+import pytest
+
+from warpspace import load_scene
+from warpspace.exceptions import OptionError, RenderError
+from warpspace.outputs import worker as workers
+from warpspace.outputs.figures.settings import FigureSettings
+from warpspace.outputs.worker import FigureWorker, probe_renderer
+from warpspace.scene.library import parse_scene
+
+pytestmark = [pytest.mark.render, pytest.mark.usefixtures("renderer")]
+SMALL = FigureSettings(size=(400, 300), grid=3)
+LARGE = FigureSettings(size=(8000, 6000))
+
+
+def test_a_crash_loses_one_figure_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(workers, "probe_renderer", lambda: "")
+    scene = load_scene("dvf5000_first")
+    with FigureWorker() as worker:
+        first = worker.render("error-map", [scene], SMALL)
+        (process,) = worker._pool._processes.values()
+        threading.Timer(0.3, os.kill, (process.pid, signal.SIGSEGV)).start()
+        with pytest.raises(RenderError, match="renderer crashed; other figures are not affected"):
+            worker.render("error-map", [scene], LARGE)
+        assert worker.render("error-map", [scene], SMALL) == first
+
+
+def test_messages_come_through() -> None:
+    scene = parse_scene('title="x"\n[machine]\nchain="wFXt"\n[workspace]\nX=[0,9]\n', "x")
+    with FigureWorker() as worker:
+        with pytest.raises(OptionError, match="does not extend along X, Y and Z"):
+            worker.render("slices", [scene], SMALL)
+        with pytest.raises(OptionError, match="unknown figure"):
+            worker.render("slizes", [scene], SMALL)
+        with pytest.raises(OptionError, match="tolerance"):
+            worker.render("montecarlo", [scene], SMALL)
+        assert worker.render("error-map", [scene], SMALL).startswith(b"\x89PNG")
+
+
+def test_concurrent_requests_queue() -> None:
+    scene = load_scene("dvf5000_first")
+    found: list[bytes] = []
+    with FigureWorker() as worker:
+        threads = [
+            threading.Thread(
+                target=lambda: found.append(worker.render("error-map", [scene], SMALL))
+            )
+            for _ in range(4)
+        ]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    assert len(found) == 4
+    assert len(set(found)) == 1
+
+
+def test_a_figure_that_takes_too_long_is_given_up() -> None:
+    with FigureWorker(timeout_s=0.05) as worker:
+        started = time.monotonic()
+        with pytest.raises(RenderError, match="given up"):
+            worker.render("error-map", [load_scene("dvf5000_first")], LARGE)
+        assert time.monotonic() - started < 20.0
+
+
+def test_a_system_without_opengl_is_told_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    gone = subprocess.CompletedProcess([], -11, b"", b"libEGL.so.1: cannot open")
+    monkeypatch.setattr(workers.subprocess, "run", lambda *_, **__: gone)
+    assert "apt-get install libegl1 libgl1-mesa-dri" in probe_renderer()
+    assert "libEGL.so.1" in probe_renderer()
+
+
+def test_the_probe_works_here() -> None:
+    assert probe_renderer() == ""
