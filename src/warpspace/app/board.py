@@ -6,7 +6,7 @@ lock: nobody overwrites what somebody else has just done with an older state of 
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TypeAlias
 
 from warpspace.app.history import History
@@ -102,3 +102,26 @@ class Board:
             listeners = [listener for listener in self._listeners if listener != by]
         for listener in listeners:
             listener()
+
+
+def apply_each(
+    state: AppState, updates: Iterable[Update], guarded: Callable[[Callable[[], object]], None]
+) -> AppState:
+    """Apply updates one by one; what one of them raises keeps none of the others back.
+
+    Parameters
+    ----------
+    state : AppState
+    updates : iterable of callable
+    guarded : callable
+        Runs a callable and deals with what it raises.
+
+    Returns
+    -------
+    AppState
+    """
+    for update in updates:
+        found: list[AppState] = []
+        guarded(lambda update=update, state=state, found=found: found.append(update(state)))
+        state = found[0] if found else state
+    return state

@@ -135,7 +135,7 @@ def compare_frames(single: "Callable[[AppState], Frame]", state: AppState) -> "F
     drawn, other = {"a": (a, b), "b": (b, a), "difference": (difference or a, None)}[shown]
     compared = Compared(
         shown,
-        (chosen.a.title, other_side.title),
+        (_title(state, chosen.a), _title(state, other_side)),
         a.statistics,
         b.statistics,
         None if difference is None else difference.statistics,
@@ -145,6 +145,11 @@ def compare_frames(single: "Callable[[AppState], Frame]", state: AppState) -> "F
     if other is not None and other.drawn_mm.shape != drawn.drawn_mm.shape:
         compared = replace(compared, other_mm=None)
     return replace(drawn, state=state, subject=drawn.state, scale=scale, compared=compared)
+
+
+def _title(state: AppState, side: Side) -> str:
+    """Name a side on the page."""
+    return side.title if side.state else f"now, {state.scene.title or state.scene.name}"
 
 
 def _why_not(a: "Frame", b: "Frame") -> str:

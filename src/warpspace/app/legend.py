@@ -172,9 +172,14 @@ def heading(frame: Frame) -> str:
     nodes = "×".join(str(count) for count in frame.grid.shape)
     size = " × ".join(f"{edge:.0f}" for edge in frame.grid.extent_mm)
     machine = f"{state.scene.machine.title}, chain {state.scene.machine.chain}"
+    title = html.escape(state.scene.title)
+    if frame.compared is not None:
+        a, b = (html.escape(side) for side in frame.compared.titles)
+        sides = {"a": f"A: {a}", "b": f"B: {b}", "difference": f"A − B: {a} − {b}"}
+        title = f'<span data-value="compared">{sides[frame.compared.shown]}</span>'
     return (
         '<div style="padding:2px 14px 10px;line-height:1.4">'
-        f'<div style="font-size:17px;font-weight:650">{html.escape(state.scene.title)}'
+        f'<div style="font-size:17px;font-weight:650">{title}'
         f'<span style="font-weight:400;opacity:.7">{note}</span></div>'
         f'<div style="font-size:12.5px;opacity:.75">'
         f"{html.escape(machine)} · {size} mm · {nodes} nodes</div>"

@@ -20,7 +20,7 @@ FORWARD = """(() => {
     tab.dispatchEvent(new PointerEvent(what, { bubbles: true, cancelable: true, button: 0,
       clientX: x + 4, clientY: y + 4, pointerId: 1, isPrimary: true }));
 })();"""
-"""Brings the panel "Why" to the front; viser has no call for it, and its tabs follow the pointer."""
+"""Brings the panel "Why" to the front: viser has no call for it, its tabs follow the pointer."""
 
 
 class Pointing:

@@ -15,7 +15,7 @@ from typing import Any
 
 from viser import ClientHandle
 
-from warpspace.app.board import Board
+from warpspace.app.board import Board, apply_each
 from warpspace.app.eye import Eye, focus
 from warpspace.app.layers import Layer
 from warpspace.app.layers.axes import AxesLayer
@@ -29,7 +29,9 @@ from warpspace.app.outside import Outside
 from warpspace.app.page import Page
 from warpspace.app.panels import Desk, Panel, Settling, Update
 from warpspace.app.panels.commands import hint_script
+from warpspace.app.panels.errors import ErrorsPanel
 from warpspace.app.panels.layout import apply_theme, lay_out_panels
+from warpspace.app.panels.summary import HtmlPanel
 from warpspace.app.services import Services
 from warpspace.app.state import AppState
 from warpspace.app.tabs import CameraMemory, Left, ask_script, new_token, rename_script
@@ -43,6 +45,10 @@ SETTLE_S = 0.06
 """Pause in the changes after which charts follow."""
 LONGEST_SETTLE_S = 0.25
 """Charts lag no longer than this behind while a slider is being dragged."""
+
+BUSY_S = 0.015
+"""Time for a picture beyond which the server is busy: what can wait then follows with the charts."""
+AT_ONCE = (BoxLayer, TracesLayer, HtmlPanel, ErrorsPanel)
 
 
 class Session:
@@ -84,6 +90,8 @@ class Session:
         self._camera: CameraMemory | None = None
         self._actions: deque[Callable[[], None]] = deque()
         self._unsettled_since: float | None = None
+        self._late: list[Layer | Panel] = []
+        self._busy = False
         self._shown: Frame | None = None
         self._posted: deque[Update] = deque()
         self._wake = threading.Event()
@@ -242,8 +250,9 @@ class Session:
         while self._actions:
             self._guarded(self._actions.popleft())
         state = self.board.state
-        if self._camera is not None and self._shown is not None and not self._moves_on(state):
-            self._restore_camera(self._shown)
+        shown = self._shown
+        if self._camera and shown is not None and focus(shown.state) == focus(state):
+            self._restore_camera(shown)
         if not notes and self._shown is not None and state is self._shown.state:
             return
         self._show(self._live.frame(state), notes)
@@ -253,30 +262,27 @@ class Session:
         updates: list[Update] = [panel.read for panel in self._panels]
         while self._posted:
             updates.append(self._posted.popleft())
-        for update in updates:
-            found: list[AppState] = []
-            self._guarded(
-                lambda update=update, state=state, found=found: found.append(update(state))
-            )
-            # what failed has changed nothing, and the others go on
-            state = found[0] if found else state
-        return state
+        return apply_each(state, updates, self._guarded)
 
     def _show(self, frame: Frame, notes: tuple[str, ...]) -> None:
-        """Make page and drawing show a frame, all at once."""
-        before = self._shown
+        """Make page and drawing show a frame; on a busy server map and numbers first."""
+        before, began = self._shown, time.monotonic()
         with self._client.atomic():
-            for layer in self._layers:
-                layer.show(frame)
-            for panel in self._panels:
-                panel.show(frame)
+            everything = (*self._layers, *self._panels)
+            late = [part for part in everything if not isinstance(part, AT_ONCE)]
+            if not self._busy:
+                late = []
+            for part in everything:
+                if part not in late:
+                    part.show(frame)
             if before is not None and focus(before.state) != focus(frame.state):
                 self._page.set_title(frame.state.scene.title)
                 self._restore_camera(frame)
             if before is not None and before.state.shown.dark != frame.state.shown.dark:
                 apply_theme(self._client.gui, dark=frame.state.shown.dark)
         self._client.flush()
-        self._shown = frame
+        self._shown, self._late = frame, late
+        self._busy = time.monotonic() - began > BUSY_S
         if self._unsettled_since is None:
             self._unsettled_since = time.monotonic()
         if notes:
@@ -287,6 +293,10 @@ class Session:
         frame = self._shown
         if frame is None:
             return
+        late, self._late = self._late, []
+        with self._client.atomic():
+            for part in late:
+                self._guarded(partial(part.show, frame))
         for panel in self._panels:
             if isinstance(panel, Settling):
                 self._guarded(partial(panel.settle, frame))
@@ -302,10 +312,6 @@ class Session:
         """Put the camera somewhere with what is shown next."""
         self._camera = memory
         self._wake.set()
-
-    def _moves_on(self, state: AppState) -> bool:
-        """Tell whether the camera is about to be placed for another scene or loop."""
-        return self._shown is not None and focus(self._shown.state) != focus(state)
 
     def _restore_camera(self, frame: Frame) -> None:
         """Put the camera where the tab left it, else where all of the box is seen."""

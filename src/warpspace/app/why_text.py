@@ -59,7 +59,8 @@ def answer_html(answer: Answer, lever: str, attributes: Attributes) -> str:
     found = answer.explanation
     towards = _unit(sum((part.error_um for part in found.contributions), np.zeros(3)))
     largest = max((abs(part.along_um) for part in found.contributions), default=0.0)
-    listed, rest = _split(found.contributions, lever)
+    ranked = sorted(found.contributions, key=lambda part: abs(part.along_um), reverse=True)
+    listed, rest = _split(ranked, lever)
     rows = [_row(part, largest, part.key == lever, attributes) for part in listed]
     if rest:
         error = sum((part.error_um for part in rest), np.zeros(3))
@@ -174,12 +175,10 @@ def _bar(value: float, largest: float) -> str:
     )
 
 
-def _split(
-    parts: tuple[Contribution, ...], lever: str
-) -> tuple[list[Contribution], list[Contribution]]:
+def _split(parts: list[Contribution], lever: str) -> tuple[list[Contribution], list[Contribution]]:
     """Separate the parts listed from those summed up; the chosen one is always listed."""
     if len(parts) <= SHOWN + 1:
-        return list(parts), []
+        return parts, []
     listed = [p for number, p in enumerate(parts) if number < SHOWN or p.key == lever]
     return listed, [p for number, p in enumerate(parts) if number >= SHOWN and p.key != lever]
 

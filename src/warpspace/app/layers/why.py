@@ -21,6 +21,8 @@ RADIUS = 0.011
 AXIS_HALF = 0.32
 """Half the length of the drawn axis, as a part of the longest edge."""
 DASH = 0.02
+LABEL_AT = 0.25
+"""Place of the lever's label between point and frame: it is seen where the frame is not."""
 _NOTHING = np.zeros((1, 2, 3), np.float32)
 
 
@@ -97,7 +99,7 @@ class WhyLayer:
         self._label("axis", f"{part.key} {way} this axis", origin + half)
         self._line("lever", dashes(np.stack([origin, point])[None], DASH * size, 0.6 * DASH * size))
         length = float(np.linalg.norm(part.lever_mm))
-        self._label("lever", f"lever {length:.0f} mm", (origin + point) / 2.0)
+        self._label("lever", f"lever {length:.0f} mm", point + LABEL_AT * (origin - point))
 
     def _line(self, name: str, points: "Array | NDArray[np.float32]") -> None:
         """Show a line, [S, 2, 3], mm."""

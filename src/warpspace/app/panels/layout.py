@@ -99,7 +99,7 @@ def lay_out_panels(
     with results.add_tab("Result"):
         summary = summary_panel(desk)
     with results.add_tab("Why"):
-        why = WhyPanel(desk)
+        why = WhyPanel(desk, outside)
     with results.add_tab("Compare"):
         compare = ComparePanel(desk, outside.scenes)
     with results.add_tab("Files"):

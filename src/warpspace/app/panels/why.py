@@ -2,10 +2,16 @@
 
 from typing import Any
 
+import numpy as np
+
+from warpspace.app.camera import fit_camera
+from warpspace.app.layers import SCENE_PER_MM
 from warpspace.app.live import Frame
+from warpspace.app.outside import Outside
 from warpspace.app.panels import Desk
 from warpspace.app.panels.clicks import Clicks
 from warpspace.app.state import AppState
+from warpspace.app.tabs import CameraMemory
 from warpspace.app.why import answer, with_lever, with_picked
 from warpspace.app.why_text import ASK, REFUSED, answer_html
 
@@ -16,12 +22,21 @@ class WhyPanel:
     Parameters
     ----------
     desk : Desk
+    outside : Outside
     """
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: Desk, outside: Outside) -> None:
         gui = desk.gui
+        self._desk, self._outside = desk, outside
         self._clicks = Clicks(gui, lambda key: desk.post(lambda s: with_lever(s, key)))
         self._text: Any = gui.add_html(ASK)
+        self._far: Any = gui.add_button(
+            "Show the whole lever",
+            color="gray",
+            visible=False,
+            hint="Move the camera back until axis, lever and box are all in view (F goes back).",
+        )
+        self._far.on_click(lambda _: desk.act(self._stand_back))
         self._clear: Any = gui.add_button(
             "Clear",
             color="gray",
@@ -29,6 +44,8 @@ class WhyPanel:
             hint="Forget the point (N does the same).",
         )
         self._clear.on_click(lambda _: desk.post(forget))
+        command = gui.add_command("Forget the point", description="End the question", hotkey="N")
+        command.on_trigger(lambda _: desk.post(forget))
 
     def read(self, state: AppState) -> AppState:
         """Nothing to take over: clicks post what they change."""
@@ -39,6 +56,7 @@ class WhyPanel:
         state = frame.subject or frame.state
         picked = frame.state.picked
         self._clear.visible = picked is not None
+        self._far.visible = picked is not None and bool(frame.state.lever)
         if picked is None:
             self._text.content = ASK
         elif is_difference(frame):
@@ -46,6 +64,26 @@ class WhyPanel:
         else:
             found = answer(state, picked, frame.exaggeration)
             self._text.content = answer_html(found, frame.state.lever, self._clicks.attributes)
+
+    def _stand_back(self) -> None:
+        """Move the camera back until the frame of the chosen contribution is in view."""
+        frame, camera = self._outside.shown(), self._outside.camera()
+        if frame is None or frame.state.picked is None:
+            return
+        found = answer(frame.subject or frame.state, frame.state.picked, frame.exaggeration)
+        parts = found.explanation.contributions
+        origins = [p.origin_mm + found.shift_mm for p in parts if p.key == frame.state.lever]
+        if not origins:
+            return
+        points = np.concatenate([frame.drawn_mm.reshape(-1, 3), np.stack(origins)])
+        size = self._outside.client.camera
+        aspect = max(size.image_width, 200) / max(size.image_height, 200)
+        pose = fit_camera(points, aspect, fov_deg=float(np.rad2deg(camera.fov_rad)), margin=1.2)
+        x, y, z = (float(value) * SCENE_PER_MM for value in pose.position)
+        at = tuple(float(value) * SCENE_PER_MM for value in pose.look_at)
+        self._outside.look_from(
+            CameraMemory((x, y, z), (at[0], at[1], at[2]), (0.0, 0.0, 1.0), camera.fov_rad)
+        )
 
 
 def forget(state: AppState) -> AppState:
