@@ -9,7 +9,7 @@ from warpspace.field.grid import Workspace
 from warpspace.kinematics.model import ComponentErrors, Model
 from warpspace.machine import errors as functions
 from warpspace.machine.description import Machine, build_machine
-from warpspace.machine.parameters import AXES, LINEAR_AXES, PARAMETERS
+from warpspace.machine.parameters import AXES, LINEAR_AXES, PARAMETERS, ErrorKind
 from warpspace.machine.tolerances import TOLERANCE_CLASSES, Tolerance, ToleranceSet
 from warpspace.scene import schema
 from warpspace.scene.files import read_csv_column
@@ -99,7 +99,7 @@ def build_scene(
         exaggeration=None if view.exaggeration == "auto" else float(view.exaggeration),
         reference=reference,
         description=texts.get("description") or "",
-        notes=_notes(machine, workspace),
+        notes=(*_travel_notes(machine, workspace), *_carried_notes(machine, errors)),
     )
 
 
@@ -260,7 +260,7 @@ def _reference(view: Any, workspace: Workspace, problems: Problems) -> dict[str,
     return {**middle, **view.reference}
 
 
-def _notes(machine: Machine, workspace: Workspace) -> tuple[str, ...]:
+def _travel_notes(machine: Machine, workspace: Workspace) -> tuple[str, ...]:
     """Remark on axes that are drawn outside their travel."""
     notes: list[str] = []
     for name in (axis for axis in AXES if axis in machine.axes):
@@ -271,4 +271,24 @@ def _notes(machine: Machine, workspace: Workspace) -> tuple[str, ...]:
                 f"workspace.{name} {low:g} … {high:g} {unit} reaches beyond the travel"
                 f" {first:g} … {last:g} {unit}"
             )
+    return tuple(notes)
+
+
+def _carried_notes(machine: Machine, errors: functions.ErrorSet) -> tuple[str, ...]:
+    """Remark on squareness errors of an axis that carries the axis it is measured against."""
+    notes: list[str] = []
+    for key in errors:
+        row = PARAMETERS[key]
+        if row.kind is not ErrorKind.SQUARENESS or errors.amplitude(key) == 0.0:
+            continue
+        own = LINEAR_AXES.index(row.axis)
+        if row.direction == own:
+            continue
+        other = LINEAR_AXES[3 - row.direction - own]
+        for branch in (machine.chain.tool, machine.chain.workpiece):
+            if {row.axis, other} <= {*branch} and branch.index(other) > branch.index(row.axis):
+                notes.append(
+                    f"errors.{key} turns {other} as well, which rides on {row.axis}: the angle"
+                    f" between them stays, the pair turns as a whole"
+                )
     return tuple(notes)

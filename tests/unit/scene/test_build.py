@@ -117,3 +117,11 @@ def test_unusable_machine_does_not_hide_the_other_problems_nor_invent_any() -> N
 def test_upload_is_called_by_its_name_in_messages() -> None:
     with pytest.raises(SceneError, match=r"^upload: machine: is missing"):
         parse_scene("", "upload")
+
+
+def test_squareness_of_an_axis_that_carries_the_other_is_remarked_on() -> None:
+    text = '[machine]\nchain = "{}"\n[errors]\nEC0Y = 5\n'
+    (note,) = parse_scene(text.format("wFYXZt"), "x").notes
+    assert "EC0Y turns X as well" in note
+    for chain in ("wFXYZt", "wYFXZt", "wXFYZt"):
+        assert parse_scene(text.format(chain), "x").notes == ()
