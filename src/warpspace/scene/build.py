@@ -285,10 +285,11 @@ def _carried_notes(machine: Machine, errors: functions.ErrorSet) -> tuple[str, .
         if row.direction == own:
             continue
         other = LINEAR_AXES[3 - row.direction - own]
-        for branch in (machine.chain.tool, machine.chain.workpiece):
-            if {row.axis, other} <= {*branch} and branch.index(other) > branch.index(row.axis):
-                notes.append(
-                    f"errors.{key} turns {other} as well, which rides on {row.axis}: the angle"
-                    f" between them stays, the pair turns as a whole"
-                )
+        branches = (machine.chain.tool, machine.chain.workpiece)
+        shared = next((branch for branch in branches if {row.axis, other} <= {*branch}), None)
+        if shared and shared.index(other) > shared.index(row.axis):
+            notes.append(
+                f"errors.{key} turns {other} as well, which rides on {row.axis}: the angle"
+                f" between them stays, the pair turns as a whole"
+            )
     return tuple(notes)
