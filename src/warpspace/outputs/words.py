@@ -23,7 +23,7 @@ def spell(value: float, digits: int = 3) -> str:
     """
     if value == 0.0 or not math.isfinite(value):
         return "0" if value == 0.0 else str(value)
-    size = math.floor(math.log10(abs(value)))
+    size = int(f"{value:.{digits - 1}e}".rpartition("e")[2])  # of the rounded number
     if size >= 7 or size < -5:
         text = f"{value:.{digits - 1}e}"
     else:

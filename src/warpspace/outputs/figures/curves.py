@@ -25,6 +25,8 @@ from warpspace.units import MICROMETRE, MICRORADIAN
 SAMPLES = 361
 WIDTHS = (4.4, 2.8, 1.5)
 """Of the three curves of a panel: those drawn later are thinner, so that none hides another."""
+LEAST_ROW = 105.0
+"""Height of a row, px of a 1600 × 1200 figure, below which axes without errors are left out."""
 KINDS = ((LINEAR_AXES, MICROMETRE, "translation"), (ROTARY_AXES, MICRORADIAN, "rotation"))
 
 
@@ -59,6 +61,8 @@ def draw_curves(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     left, bottom, right, top = sheet.content
     constants = _constant_keys(scene)
     split = left + (0.72 if constants else 1.0) * (right - left)
+    if (top - bottom) / len(axes) < canvas.px(LEAST_ROW):
+        axes = [axis for axis in axes if _has_errors(scene, axis)] or axes
     row = (top - bottom) / len(axes)
     column = (split - left) / 2.0
     for number, axis in enumerate(axes):
@@ -75,6 +79,12 @@ def draw_curves(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
         _draw_constants(canvas, scene, constants, box)
     about = metadata(title, scenes, settings, 1.0, "error-curves")
     return Drawing(canvas.figure, title, about, (), tuple(canvas.rects))
+
+
+def _has_errors(scene: Scene, axis: Axis) -> bool:
+    """Tell whether any component error of an axis is not zero."""
+    keys = (f"E{letter}{axis.name}" for letter in AXES)
+    return any(scene.errors.amplitude(key) != 0.0 for key in keys if key in scene.errors)
 
 
 def _axes(canvas: Canvas, box: Rect) -> Any:
@@ -134,10 +144,8 @@ def _draw_curves(
             x, box[3] + canvas.px(7.0), key, size=SIZES.small, colour=colour, weight="bold"
         )
         x = rect[2] + canvas.px(12.0)
-    canvas.text(
-        x, box[3] + canvas.px(7.0), f"{kind} of {axis.name}  [{unit}]", size=SIZES.small,
-        colour=theme.muted,
-    )  # fmt: skip
+    text, size = canvas.fit(f"{kind} of {axis.name}  [{unit}]", box[2] - x, SIZES.small)
+    canvas.text(x, box[3] + canvas.px(7.0), text, size=size, colour=theme.muted)
     canvas.text(
         (box[0] + box[2]) / 2.0, box[1] - canvas.px(38.0), f"{axis.name}  [{axis.unit}]",
         size=SIZES.small, colour=theme.muted, ha="center",
