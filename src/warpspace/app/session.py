@@ -7,10 +7,8 @@ a slider is always what is shown, however fast it was moved.
 
 import logging
 import threading
-import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from functools import partial
 from typing import Any
 
 from viser import ClientHandle
@@ -27,11 +25,10 @@ from warpspace.app.layers.why import WhyLayer
 from warpspace.app.live import Frame, LiveModel
 from warpspace.app.outside import Outside
 from warpspace.app.page import Page
-from warpspace.app.panels import Desk, Panel, Settling, Update
+from warpspace.app.panels import Desk, Update
 from warpspace.app.panels.commands import hint_script
-from warpspace.app.panels.errors import ErrorsPanel
 from warpspace.app.panels.layout import apply_theme, lay_out_panels
-from warpspace.app.panels.summary import HtmlPanel
+from warpspace.app.parts import Parts
 from warpspace.app.services import Services
 from warpspace.app.state import AppState
 from warpspace.app.tabs import CameraMemory, Left, ask_script, new_token, rename_script
@@ -41,14 +38,6 @@ from warpspace.scene.model import Scene
 logger = logging.getLogger(__name__)
 TOKEN_WAIT_S = 0.25
 """How long the first picture waits for a tab that may have been here before."""
-SETTLE_S = 0.06
-"""Pause in the changes after which charts follow."""
-LONGEST_SETTLE_S = 0.25
-"""Charts lag no longer than this behind while a slider is being dragged."""
-
-BUSY_S = 0.015
-"""Time for a picture beyond which the server is busy: what can wait then follows with the charts."""
-AT_ONCE = (BoxLayer, TracesLayer, HtmlPanel, ErrorsPanel)
 
 
 class Session:
@@ -89,16 +78,12 @@ class Session:
         self._eye, self._page = Eye(client), Page(client)
         self._camera: CameraMemory | None = None
         self._actions: deque[Callable[[], None]] = deque()
-        self._unsettled_since: float | None = None
-        self._late: list[Layer | Panel] = []
-        self._busy = False
         self._shown: Frame | None = None
         self._posted: deque[Update] = deque()
         self._wake = threading.Event()
         self._stopped = threading.Event()
-        self._layers: list[Layer] = []
+        self._parts = Parts()
         self._stage: StageLayer | None = None
-        self._panels: list[Panel] = []
         self._worker = threading.Thread(
             target=self._run, name=f"warpspace-session-{client.client_id}", daemon=True
         )
@@ -148,13 +133,11 @@ class Session:
 
     def _turn(self) -> None:
         """Wait for one change, or for a pause in them, and follow."""
-        woken = self._wake.wait(None if self._unsettled_since is None else SETTLE_S)
+        woken = self._wake.wait(self._parts.pause_s)
         self._wake.clear()
         if woken and not self._stopped.is_set():
             self._guarded(self._step)
-        since = self._unsettled_since
-        if since is not None and (not woken or time.monotonic() - since > LONGEST_SETTLE_S):
-            self._unsettled_since = None
+        if self._parts.is_due(paused=not woken):
             self._guarded(self._settle)
 
     def _guarded(self, step: Callable[[], object]) -> None:
@@ -205,7 +188,7 @@ class Session:
         with self._client.atomic():
             self._page.set_title(frame.state.scene.title)
             self._restore_camera(frame)
-            self._layers = [
+            layers: list[Layer] = [
                 BoxLayer(scene, frame),
                 TracesLayer(scene, frame),
                 AxesLayer(scene, frame),
@@ -231,14 +214,15 @@ class Session:
                 self._services,
                 lambda: self._shown,
             )
-            self._panels = lay_out_panels(desk, frame.state, outside, self.fit_view, stage.play)
-            for panel in self._panels:
+            panels = lay_out_panels(desk, frame.state, outside, self.fit_view, stage.play)
+            for panel in panels:
                 panel.show(frame)
+            self._parts = Parts(layers, panels)
         self._client.flush()
         self._page.run_script(hint_script())
         self._client.flush()
         self._shown = frame
-        self._unsettled_since = time.monotonic()
+        self._parts.unsettle()
 
     def _step(self) -> None:
         """Take in what has changed and show the outcome."""
@@ -259,32 +243,23 @@ class Session:
 
     def _take_in(self, state: AppState) -> AppState:
         """Apply what widgets and buttons have changed to a state."""
-        updates: list[Update] = [panel.read for panel in self._panels]
+        updates: list[Update] = [panel.read for panel in self._parts.panels]
         while self._posted:
             updates.append(self._posted.popleft())
         return apply_each(state, updates, self._guarded)
 
     def _show(self, frame: Frame, notes: tuple[str, ...]) -> None:
         """Make page and drawing show a frame; on a busy server map and numbers first."""
-        before, began = self._shown, time.monotonic()
+        before = self._shown
         with self._client.atomic():
-            everything = (*self._layers, *self._panels)
-            late = [part for part in everything if not isinstance(part, AT_ONCE)]
-            if not self._busy:
-                late = []
-            for part in everything:
-                if part not in late:
-                    part.show(frame)
+            self._parts.show(frame)
             if before is not None and focus(before.state) != focus(frame.state):
                 self._page.set_title(frame.state.scene.title)
                 self._restore_camera(frame)
             if before is not None and before.state.shown.dark != frame.state.shown.dark:
                 apply_theme(self._client.gui, dark=frame.state.shown.dark)
         self._client.flush()
-        self._shown, self._late = frame, late
-        self._busy = time.monotonic() - began > BUSY_S
-        if self._unsettled_since is None:
-            self._unsettled_since = time.monotonic()
+        self._shown = frame
         if notes:
             self._page.notify("Clamped", "\n".join(notes), "yellow")
 
@@ -293,13 +268,8 @@ class Session:
         frame = self._shown
         if frame is None:
             return
-        late, self._late = self._late, []
         with self._client.atomic():
-            for part in late:
-                self._guarded(partial(part.show, frame))
-        for panel in self._panels:
-            if isinstance(panel, Settling):
-                self._guarded(partial(panel.settle, frame))
+            self._parts.settle(frame, self._guarded)
         self._client.flush()
 
     def fit_view(self, view: str | None = None, lens: bool | None = None) -> None:

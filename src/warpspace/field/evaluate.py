@@ -40,7 +40,7 @@ class ErrorField:
     @property
     def norm_um(self) -> Array:
         """Length of the position error, [...], µm."""
-        return np.linalg.norm(self.error_um, axis=-1)
+        return np.sqrt(np.einsum("...i,...i->...", self.error_um, self.error_um))
 
 
 @dataclass(frozen=True, slots=True)

@@ -64,8 +64,9 @@ class Grid:
 
     @property
     def extent_mm(self) -> Array:
-        """Edge lengths of the nominal volume in R, [3], mm."""
-        return np.ptp(self.nominal_mm.reshape(-1, 3), axis=0)
+        """Edge lengths of the nominal volume in R, [3], mm: that of its corners, for it is flat."""
+        corners = self.nominal_mm[np.ix_(*((0, n - 1) for n in self.shape))]
+        return np.ptp(corners.reshape(-1, 3), axis=0)
 
     @property
     def longest_edge_mm(self) -> float:

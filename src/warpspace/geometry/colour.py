@@ -113,7 +113,7 @@ def component_values(error: Array, component: str) -> Array:
     if component not in COMPONENTS:
         raise OptionError(f"component {component!r}; expected one of {', '.join(COMPONENTS)}")
     if component == "norm":
-        return np.linalg.norm(error, axis=-1)
+        return np.sqrt(np.einsum("...i,...i->...", error, error))
     return error[..., "xyz".index(component)]
 
 

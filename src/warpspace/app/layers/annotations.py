@@ -129,14 +129,15 @@ class AnnotationsLayer:
         on = frame.state.look.arrows
         if self._arrows is not None:
             self._arrows.visible = on
+        if not on:
+            for label in self._corner_labels:
+                label.visible = False
+            return
         arrows = corner_arrows(
             frame.grid.shape, frame.grid.nominal_mm, frame.field.error_um, frame.exaggeration
         )
-        count = len(arrows.norm_um) if on else 0
-        for label in self._corner_labels[count:]:
+        for label in self._corner_labels[len(arrows.norm_um) :]:
             label.visible = False
-        if not on:
-            return
         longest = frame.grid.longest_edge_mm
         vertices, triangles = build_arrows(
             arrows.start_mm, arrows.end_mm, RADIUS * longest, HEAD * longest

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from itertools import groupby
 from typing import Any
 
+from warpspace.app.kept import Same
 from warpspace.app.live import Frame
 from warpspace.app.panels import Desk
 from warpspace.app.ranges import Span
@@ -48,6 +49,7 @@ class ErrorsPanel:
     ) -> None:
         self._desk, self._touched = desk, touched
         self._found: tuple[str, ...] = ()
+        self._looks: tuple[Same, ...] = ()
         self._search: Bound[str] = Bound(
             desk.gui.add_text(
                 "Find an error",
@@ -132,8 +134,12 @@ class ErrorsPanel:
         if state.origin is not self._scene:
             self._search.show("")
             self._build(state, tuple(state.amplitudes))
+        looks = (Same(state.emphasis), Same(state.spans))
+        if looks != self._looks:
+            self._looks = looks
+            for key, bound in self._bound.items():
+                _refresh(bound.handle, state, parameter(key))
         for key, bound in self._bound.items():
-            _refresh(bound.handle, state, parameter(key))
             bound.show(state.amplitudes[key])
 
 

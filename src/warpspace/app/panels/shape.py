@@ -142,6 +142,9 @@ class ShapePanel:
         return state
 
     def show(self, frame: Frame) -> None:
+        """Nothing that must follow at once."""
+
+    def settle(self, frame: Frame) -> None:
         """Follow the state."""
         self._show(frame.state)
 

@@ -1,0 +1,86 @@
+"""Everything of a tab that follows the frame: layers and panels, on a busy server in two goes."""
+
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+
+from warpspace.app.layers import Layer
+from warpspace.app.layers.box import BoxLayer
+from warpspace.app.layers.traces import TracesLayer
+from warpspace.app.live import Frame
+from warpspace.app.panels import Panel, Settling
+from warpspace.app.panels.errors import ErrorsPanel
+from warpspace.app.panels.summary import HtmlPanel
+
+SETTLE_S = 0.06
+"""Pause in the changes after which charts follow."""
+LONGEST_SETTLE_S = 0.25
+"""Charts lag no longer than this behind while a slider is being dragged."""
+BUSY_SETTLE_S = 1.0
+"""The same on a busy server; after the drag they follow as quickly as ever."""
+BUSY_S = 0.015
+"""Time for a picture beyond which the server counts as busy."""
+AT_ONCE = (BoxLayer, TracesLayer, HtmlPanel, ErrorsPanel)
+"""What is never put off: map, traces, numbers and the sliders themselves."""
+
+
+class Parts:
+    """Layers and panels of one tab.
+
+    Parameters
+    ----------
+    layers : sequence of Layer
+    panels : sequence of Panel
+    """
+
+    def __init__(self, layers: Sequence[Layer] = (), panels: Sequence[Panel] = ()) -> None:
+        self.layers, self.panels = tuple(layers), tuple(panels)
+        self._late: list[Layer | Panel] = []
+        self._busy = False
+        self._since: float | None = None
+
+    @property
+    def pause_s(self) -> float | None:
+        """How long to wait for further changes before charts follow; None where none has to."""
+        return None if self._since is None else SETTLE_S
+
+    def is_due(self, *, paused: bool) -> bool:
+        """Tell whether charts are to follow now."""
+        if self._since is None:
+            return False
+        longest = BUSY_SETTLE_S if self._busy else LONGEST_SETTLE_S
+        return paused or time.monotonic() - self._since > longest
+
+    def show(self, frame: Frame) -> None:
+        """Follow a frame; on a busy server map and numbers first, the others when it settles."""
+        began = time.monotonic()
+        self._late = []
+        for part in (*self.layers, *self.panels):
+            if self._busy and not isinstance(part, AT_ONCE):
+                self._late.append(part)
+            else:
+                part.show(frame)
+        self._busy = time.monotonic() - began > BUSY_S
+        self.unsettle()
+
+    def unsettle(self) -> None:
+        """Have charts follow soon."""
+        if self._since is None:
+            self._since = time.monotonic()
+
+    def settle(self, frame: Frame, guarded: Callable[[Callable[[], object]], None]) -> None:
+        """Bring everything up to date that has been put off.
+
+        Parameters
+        ----------
+        frame : Frame
+        guarded : callable
+            Runs a step and reports what it raises.
+        """
+        self._since = None
+        late, self._late = self._late, []
+        for part in late:
+            guarded(partial(part.show, frame))
+        for panel in self.panels:
+            if isinstance(panel, Settling):
+                guarded(partial(panel.settle, frame))

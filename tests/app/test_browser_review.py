@@ -1,0 +1,367 @@
+"""A design review in a real Chromium: errors, chance, sessions, keys; what is then on screen."""
+
+import json
+import time
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from app.conftest import Tab
+from warpspace.app import edits
+from warpspace.app.live import Frame, LiveModel
+from warpspace.app.state import AppState, start_state
+from warpspace.app.viewer import Viewer
+from warpspace.machine.errors import Constant, Table
+from warpspace.scene.library import load_scene
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+
+pytestmark = pytest.mark.browser
+LIVE = LiveModel()
+START = start_state(load_scene("dvf5000_first"))
+PAUSE = 100
+"""Milliseconds between two widgets: the client's throttle is one for all of them."""
+
+
+def model(state: AppState) -> Frame:
+    return LIVE.frame(state)
+
+
+def drawn(state: AppState) -> np.ndarray:
+    frame = model(state)
+    return frame.drawn_mm.reshape(-1, 3)[frame.topology.surface.nodes]
+
+
+def shows(tab: Tab, state: AppState) -> None:
+    wanted = drawn(state)
+    tab.until(lambda: tab.shows(wanted))
+
+
+def press(tab: Tab, keys: str) -> None:
+    """Press keys with no widget in focus."""
+    tab.page.evaluate("document.activeElement && document.activeElement.blur()")
+    tab.page.keyboard.press(keys)
+
+
+def labels(tab: Tab) -> list[str]:
+    return tab.page.evaluate("[...document.querySelectorAll('label')].map(l => l.textContent)")
+
+
+def written(tab: Tab, label: str) -> Any:
+    """Text box beside a label; viser does not tie them together."""
+    row = tab.page.locator(f"//label[text()='{label}']/ancestor::div[2]")
+    return row.locator("input, textarea").first
+
+
+def keys_of_sliders(tab: Tab) -> set[str]:
+    return {text.split(" ")[0] for text in labels(tab) if " · " in text and "±" not in text}
+
+
+# --- 1. errors -------------------------------------------------------------------------------
+
+
+def test_search_narrows_the_sliders_down(tab: Tab) -> None:
+    search = written(tab, "Find an error")
+    search.fill("squareness")
+    tab.until(lambda: keys_of_sliders(tab) == {"EC0Y", "EA0Z", "EB0Z"})
+    search.fill("roll x")
+    tab.until(lambda: keys_of_sliders(tab) == {"EAX"})
+    tab.send("EAX", "12")
+    shows(tab, START.with_amplitude("EAX", 12.0))
+    search.fill("<script>alert(1)</script>")
+    tab.until(lambda: tab.page.get_by_text("No error goes by this name").is_visible())
+    search.fill("")
+    tab.until(lambda: {"EXX", "EAX", "EC0Y"} <= keys_of_sliders(tab))
+    assert float(tab.box("EAX").input_value()) == 12.0
+
+
+def test_solo_and_mute(tab: Tab) -> None:
+    tab.send("Error", json.dumps("EC0Y · γ_XY · squareness of Y to X [µrad]"))
+    tab.page.wait_for_timeout(PAUSE)
+    tab.page.get_by_label("Mute").check()
+    shows(tab, edits.with_muted(START, "EC0Y", True))
+    tab.until(lambda: any(t.startswith("EC0Y") and t.endswith("silent") for t in labels(tab)))
+    tab.page.get_by_label("Mute").uncheck()
+    tab.page.wait_for_timeout(PAUSE)
+    tab.page.get_by_label("Solo").check()
+    alone = edits.with_soloed(START, "EC0Y", True)
+    shows(tab, alone)
+    assert tab.number("max") == pytest.approx(model(alone).statistics.max_um, abs=0.006)
+    assert float(tab.box("EAX").input_value()) == 5.5
+    tab.page.get_by_role("button", name="Hear all errors").click()
+    shows(tab, START)
+    tab.until(lambda: not any(t.endswith("silent") for t in labels(tab)))
+
+
+def test_the_shape_of_an_error_is_edited_and_its_curve_drawn(tab: Tab) -> None:
+    tab.send("EXX", "5")
+    shows(tab, START.with_amplitude("EXX", 5.0))
+    # the panel follows the slider that was touched
+    tab.until(lambda: tab.page.get_by_label("Error", exact=True).input_value().startswith("EXX"))
+    tab.choose("Curve along the axis", "table")
+    tab.until(lambda: written(tab, "Numbers").input_value().count("\n") == 4)
+    written(tab, "Numbers").fill("-275 0\n0 8\n275 -2")
+    curve = Table((-275.0, 275.0), ((-275.0, 0.0), (0.0, 8.0), (275.0, -2.0)))
+    start = START.with_amplitude("EXX", 5.0)
+    wanted = edits.with_curve(start, "EXX", curve)
+    shows(tab, wanted)
+    assert float(tab.box("EXX").input_value()) == 8.0
+    charts = (
+        "Object.values(window.__viserTestpoints.uplots).map(u => u.chart.data.map(a => [...a]))"
+    )
+    tab.until(lambda: tab.page.evaluate(charts)[0][1][-1] == -2.0)
+    at, value, _ = tab.page.evaluate(charts)[0]
+    np.testing.assert_allclose(value, curve.evaluate(np.array(at)), atol=1e-9)
+    written(tab, "Numbers").fill("-275 0\nbanana 8")
+    tab.until(lambda: "no number" in tab.text("curve problem"))
+    shows(tab, wanted)
+    tab.page.get_by_role("button", name="Reset X").click()
+    shows(tab, START)
+    tab.until(lambda: written(tab, "Numbers").input_value() == "0")
+
+
+def test_undo_and_redo_of_everything(tab: Tab) -> None:
+    for value in np.linspace(0.0, 8.0, 20).round(1):
+        tab.send("EXX", f"{value}")
+        tab.page.wait_for_timeout(10)
+    moved = START.with_amplitude("EXX", 8.0)
+    shows(tab, moved)
+    tab.page.wait_for_timeout(PAUSE)
+    tab.choose("Colour", "E_x")
+    tab.until(lambda: tab.page.get_by_text("E_x", exact=False).count() > 0)
+    tab.page.wait_for_timeout(300)
+    press(tab, "Control+z")
+    tab.until(lambda: tab.page.get_by_text("Undone: colour").count() > 0)
+    shows(tab, moved)
+    tab.page.get_by_role("button", name="Undo").click()
+    # the whole drag is one step
+    shows(tab, START)
+    tab.until(lambda: float(tab.box("EXX").input_value()) == 0.0)
+    press(tab, "Control+Shift+z")
+    shows(tab, moved)
+    tab.page.get_by_role("button", name="Redo").click()
+    tab.until(lambda: "E_x" in tab.page.get_by_label("Colour", exact=True).input_value())
+
+
+# --- 6. statistics and chance ----------------------------------------------------------------
+
+
+def test_tolerances_are_traded_by_hand(tab: Tab) -> None:
+    tab.page.get_by_role("tab", name="Chance").click()
+    tab.page.wait_for_selector("[data-value='chance']")
+    before = float(tab.text("chance").split()[0])
+    assert 60.0 < before < 80.0
+    assert tab.page.locator("[data-value='histogram']").is_visible()
+    tab.page.get_by_text("Tolerances of Z").click()
+    tab.page.wait_for_timeout(PAUSE)
+    start = time.perf_counter()
+    tab.send("EA0Z · squareness of Z to Y ±", "2")
+    tab.until(lambda: float(tab.text("chance").split()[0]) > before + 3.0)
+    assert time.perf_counter() - start < 2.0
+    tab.send("|E| allowed", "20")
+    tab.until(lambda: "20 µm" in tab.page.inner_text("[data-value='chance'] >> xpath=.."))
+    assert float(tab.text("chance").split()[0]) < 30.0
+    tab.send("|E| allowed", "NaN")
+    tab.page.wait_for_timeout(300)
+    assert "20 µm" in tab.page.inner_text("[data-value='chance'] >> xpath=..")
+    tab.choose("Must hold at", "the worst point of each machine")
+    tab.until(lambda: "everywhere" in tab.page.inner_text("[data-value='chance'] >> xpath=.."))
+    tab.page.get_by_role("button", name="Tolerances of the scene").click()
+    tab.until(lambda: float(tab.box("EA0Z · squareness of Z to Y ±").input_value()) == 25.0)
+
+
+def test_a_tolerance_change_is_answered_within_300_ms_on_the_server(
+    viewer: Viewer, tab: Tab
+) -> None:
+    tab.page.get_by_role("tab", name="Chance").click()
+    tab.page.wait_for_selector("[data-value='chance']")
+    (session,) = viewer.sessions
+    panel = next(p for p in session._parts.panels if type(p).__name__ == "ChancePanel")
+    times = []
+    for half_width in (3.0, 9.0, 15.0, 21.0, 5.0):
+        before = panel._picture.content
+        start = time.perf_counter()
+        session.post(lambda state, h=half_width: edits.with_half_width(state, "EA0Z", h))
+        while panel._picture.content == before:
+            time.sleep(0.002)
+        times.append(time.perf_counter() - start)
+        time.sleep(0.2)
+    assert np.median(times) < 0.3
+
+
+def test_gain_chart_follows_the_errors(tab: Tab) -> None:
+    tab.page.get_by_role("tab", name="Gains").click()
+    tab.page.wait_for_selector("[data-bar]")
+    bars = "[...document.querySelectorAll('[data-bar]')].map(b => b.dataset.bar)"
+    assert tab.page.evaluate(bars)[0] in {"EA0Z", "EB0Z"}
+    assert tab.text("gain point") == tab.text("max")
+    tab.send("EAY", "80")
+    shows(tab, START.with_amplitude("EAY", 80.0))
+    tab.until(lambda: tab.text("gain point") == tab.text("max"))
+    tab.choose("Ranked by", "effect of the present errors")
+    tab.until(lambda: tab.page.evaluate(bars)[0] == "EAY")
+
+
+# --- 10. sessions ----------------------------------------------------------------------------
+
+
+def test_a_dropped_connection_finds_its_state_again(tab: Tab, viewer: Viewer) -> None:
+    tab.send("EXX", "7")
+    moved = START.with_amplitude("EXX", 7.0)
+    shows(tab, moved)
+    viewer._server._websock_server.disconnect_all_clients()
+    tab.until(lambda: not viewer.sessions)
+    tab.until(lambda: len(viewer.sessions) == 1)
+    tab.until(lambda: viewer.sessions[0].state == moved)
+    shows(tab, moved)
+    tab.until(lambda: float(tab.box("EXX").input_value()) == 7.0)
+    # its history as well
+    press(tab, "Control+z")
+    shows(tab, START)
+
+
+def test_a_reloaded_page_finds_its_state_again_and_a_new_tab_does_not(
+    tab: Tab, viewer: Viewer
+) -> None:
+    tab.send("EXX", "-6")
+    moved = START.with_amplitude("EXX", -6.0)
+    shows(tab, moved)
+    tab.page.reload()
+    tab.page.wait_for_selector("[data-value='max']", timeout=60_000)
+    shows(tab, moved)
+    other = tab.page.context.new_page()
+    fresh = Tab(other, viewer.url)
+    shows(fresh, START)
+    tokens = {session.token for session in viewer.sessions}
+    assert len(tokens) == 2
+
+
+@pytest.fixture
+def shared_tabs(browser: "Browser") -> Iterator[Callable[[], Tab]]:
+    contexts: list[Any] = []
+    scene = load_scene("dvf5000_first")
+    with Viewer(scene, {scene.title: scene}, shared=True) as viewer:
+
+        def open_one() -> Tab:
+            contexts.append(browser.new_context(viewport={"width": 1300, "height": 800}))
+            return Tab(contexts[-1].new_page(), viewer.url)
+
+        yield open_one
+        for context in contexts:
+            context.close()
+
+
+def test_in_a_shared_review_all_see_and_steer_one_state(shared_tabs: Callable[[], Tab]) -> None:
+    one, two = shared_tabs(), shared_tabs()
+    one.send("EXX", "9")
+    moved = START.with_amplitude("EXX", 9.0)
+    shows(two, moved)
+    two.until(lambda: float(two.box("EXX").input_value()) == 9.0)
+    two.send("EYX", "-4")
+    both = moved.with_amplitude("EYX", -4.0)
+    shows(one, both)
+    press(one, "Control+z")
+    shows(two, moved)
+    assert one.errors == []
+    assert two.errors == []
+
+
+# --- 11. keys, palette, dark mode, help, hint --------------------------------------------------
+
+
+def test_keys_do_the_main_actions(tab: Tab) -> None:
+    shows(tab, START)
+    press(tab, "t")
+    tab.until(lambda: tab.text("factor") == "true scale")
+    press(tab, "x")
+    tab.until(lambda: "1\u202f000" in tab.text("factor"))
+    press(tab, "2")
+    tab.until(lambda: "E_x" in tab.page.get_by_label("Colour", exact=True).input_value())
+    press(tab, "0")
+    tab.until(lambda: tab.number("max") == 0.0)
+    press(tab, "r")
+    press(tab, "1")
+    shows(tab, START)
+    # in a text box they are letters
+    written(tab, "Find an error").press_sequentially("t0")
+    tab.page.wait_for_timeout(300)
+    assert "1\u202f000" in tab.text("factor")
+
+
+def test_dark_mode(tab: Tab) -> None:
+    scheme = "document.documentElement.getAttribute('data-mantine-color-scheme')"
+    assert tab.page.evaluate(scheme) == "light"
+    camera = "[...window.__viserMutable.camera.position.toArray()]"
+    before = tab.page.evaluate(camera)
+    press(tab, "m")
+    tab.until(lambda: tab.page.evaluate(scheme) == "dark")
+    assert tab.page.evaluate(camera) == pytest.approx(before)
+    press(tab, "m")
+    tab.until(lambda: tab.page.evaluate(scheme) == "light")
+
+
+def test_the_palette_and_the_help_list_what_there_is(tab: Tab) -> None:
+    press(tab, "Control+k")
+    tab.page.get_by_placeholder("Search commands").fill("true scale")
+    tab.page.keyboard.press("Enter")
+    tab.until(lambda: tab.text("factor") == "true scale")
+    press(tab, "h")
+    tab.until(lambda: tab.page.get_by_text("Keys and help").is_visible())
+    for words in ("Ctrl + Shift + Z", "Camera to the operator's side", "Command palette"):
+        assert tab.page.get_by_text(words).first.is_visible()
+    tab.page.get_by_role("button", name="Close", exact=True).click()
+    tab.until(lambda: tab.page.get_by_text("Keys and help").count() == 0)
+
+
+def test_every_control_explains_itself(tab: Tab, viewer: Viewer) -> None:
+    (session,) = viewer.sessions
+    handles = session._client.gui._gui_input_handle_from_uuid.values()
+    silent = [
+        handle.label
+        for handle in handles
+        if getattr(handle, "visible", True) and not getattr(handle, "hint", "none needed")
+    ]
+    assert silent == []
+
+
+def test_the_first_hint_leaves_by_itself_and_does_not_come_back(tab: Tab) -> None:
+    hint = tab.page.locator("#warpspace-hint")
+    assert hint.is_visible()
+    assert "Drag a slider" in hint.inner_text()
+    tab.page.mouse.click(800, 850)
+    tab.until(lambda: hint.count() == 0)
+    tab.page.reload()
+    tab.page.wait_for_selector("[data-value='max']", timeout=60_000)
+    tab.page.wait_for_timeout(500)
+    assert hint.count() == 0
+
+
+# --- bad input --------------------------------------------------------------------------------
+
+
+def test_messages_for_removed_and_unknown_widgets_are_ignored(tab: Tab) -> None:
+    gone = tab.widget("EXX")
+    written(tab, "Find an error").fill("roll x")
+    tab.until(lambda: keys_of_sliders(tab) == {"EAX"})
+    for widget in (gone, "no-such-widget", "'; drop"):
+        message = {"type": "GuiUpdateMessage", "uuid": widget, "updates": {"value": 3}}
+        tab.page.evaluate(f"window.__viserMutable.sendMessage({json.dumps(message)})")
+    tab.send("EAX", "9")
+    shows(tab, START.with_amplitude("EAX", 9.0))
+
+
+def test_a_broken_update_takes_nothing_else_with_it(
+    tab: Tab, viewer: Viewer, caplog: pytest.LogCaptureFixture
+) -> None:
+    def broken(state: AppState) -> AppState:
+        raise RuntimeError("a wheel came off")
+
+    (session,) = viewer.sessions
+    session.post(broken)
+    session.post(lambda state: edits.with_curve(state, "EXX", Constant((-275.0, 275.0), 4.0)))
+    tab.until(lambda: tab.page.get_by_text("a wheel came off").count() > 0)
+    shows(tab, START.with_amplitude("EXX", 4.0))
+    assert "a wheel came off" in caplog.text
