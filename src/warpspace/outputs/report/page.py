@@ -1,6 +1,7 @@
 """The report as one HTML file."""
 
-import base64
+import re
+from urllib.parse import quote
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
@@ -13,6 +14,11 @@ POLICY = (
     " connect-src data: blob:; worker-src blob: data:; frame-src 'self'"
 )
 """What the browser may load: what is in the file, and nothing else."""
+
+_PATH = re.compile(r' d="[^"]*"')
+_NUMBER = re.compile(r"-?\d+\.\d{3,}")
+_SAFE = " <>=:/;,'()[]{}!$*+?@&|^`~\"\\"
+"""What the address of an image may hold as it is; the page's own escaping comes on top."""
 
 
 def render_html(report: Report) -> str:
@@ -41,7 +47,16 @@ def render_html(report: Report) -> str:
 
 def _data_uri(picture: Picture) -> str:
     """Spell a figure as the address of an image; inside an image nothing runs."""
-    return "data:image/svg+xml;base64," + base64.b64encode(picture.data).decode()
+    text = re.sub(r"\s+", " ", picture.data.decode())
+    text = _PATH.sub(lambda path: _NUMBER.sub(_rounded, path.group()), text)
+    if "'" not in text:
+        text = text.replace('"', "'")  # need no escape in the page
+    return "data:image/svg+xml," + quote(text, safe=_SAFE)
+
+
+def _rounded(number: re.Match[str]) -> str:
+    """Round a coordinate of a path to a hundredth of a pixel."""
+    return f"{float(number.group()):.2f}".rstrip("0").rstrip(".")
 
 
 def _attribute_page(page: str) -> Markup:
