@@ -130,6 +130,8 @@ class Session:
                 self._turn()
         finally:
             self.board.unsubscribe(self.changed)
+            # what is large is let go at once, not when cycles happen to be looked for
+            self._parts, self._shown = Parts(), None
 
     def _turn(self) -> None:
         """Wait for one change, or for a pause in them, and follow."""
