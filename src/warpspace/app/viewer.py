@@ -5,6 +5,7 @@ import importlib
 import io
 import logging
 import threading
+import warnings
 import webbrowser
 from collections.abc import Callable, Mapping
 from types import TracebackType
@@ -224,6 +225,8 @@ def run_viewer(
     say, warn : callable
         Print a line for the user.
     """
+    # a tab may close while something is on its way to it
+    warnings.filterwarnings("ignore", message="Queued an? .* on a closed connection")
     with Viewer(scene, scenes, host=host, port=port, shared=shared, services=services) as viewer:
         try:
             say(f"{scene.title} is shown at {viewer.url} (Ctrl-C ends it)")
