@@ -1,12 +1,8 @@
 """The design review from scenes to a file: numbers, then sections, then one of two templates."""
 
-import hashlib
-import platform
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
-
-import numpy as np
 
 from warpspace import __version__
 from warpspace.exceptions import OptionError
@@ -14,29 +10,21 @@ from warpspace.outputs.files import check_target, write_atomically
 from warpspace.outputs.report import sections as parts
 from warpspace.outputs.report.blocks import (
     Block,
-    Code,
-    Column,
     Embedded,
-    Items,
     Report,
     Section,
     Text,
-    table,
 )
+from warpspace.outputs.report.chances import chance_blocks
 from warpspace.outputs.report.clock import report_time
+from warpspace.outputs.report.closing import conventions, provenance
 from warpspace.outputs.report.pictures import Painter
 from warpspace.outputs.report.review import ReportSettings, Review, Reviewed, build_review
-from warpspace.outputs.report.wording import factor_words, reference_words, volume
-from warpspace.outputs.words import spell
+from warpspace.outputs.report.wording import volume
 from warpspace.scene.model import Scene
-from warpspace.scene.save import scene_to_toml
 
 ENDINGS = (".html", ".pdf")
 OVERLINE = "Design review · volumetric error"
-CONVENTION_WORDS = {
-    "after_motion": "Component errors ride on the moving body (after the motion).",
-    "before_motion": "Component errors act in fixed directions (before the motion).",
-}
 
 
 class Embed(Protocol):
@@ -144,8 +132,8 @@ def build_report(
             _errors(review),
             _gains(review, painter),
             _chances(review, painter),
-            _conventions(review),
-            _provenance(review, files),
+            conventions(review),
+            provenance(review, files),
         ]
     return Report(_title(review), "", OVERLINE, _facts(review), tuple(found))
 
@@ -253,74 +241,6 @@ def _chances(review: Review, painter: Painter) -> Section:
             blocks.append(Text(f"{letter}: the same tolerances, the same machines.", "note"))
             continue
         shown.append(scene)
-        blocks += parts.chance_blocks(letter, reviewed)
+        blocks += chance_blocks(letter, reviewed)
         blocks += painter.chance(reviewed, f"{letter}: " if letter else "")
     return parts.section("What the tolerances promise", blocks)
-
-
-def _conventions(review: Review) -> Section:
-    """How to read signs, frames and factors."""
-    first = review.scenes[0].scene
-    items = [
-        "Error = actual − nominal. Lengths in mm, errors in µm, small angles in µrad.",
-        (
-            "Right-handed machine frame R with the axis directions of ISO 841; parameters as in"
-            " ISO 230-1 (EAX: rotation about x of the X axis; EC0Y: squareness of Y to X)."
-        ),
-        f"Loop: {review.settings.loop}. "
-        + {
-            "tool": "The tool point, actual minus nominal.",
-            "workpiece": "The workpiece point, actual minus nominal.",
-            "relative": "The tool point minus the workpiece point that nominally coincides.",
-        }[review.settings.loop],
-        *(
-            parts.prefixed(letter, reference_words(reviewed.scene))
-            for letter, reviewed in parts.letters(review)
-        ),
-        CONVENTION_WORDS[str(first.model.component_errors)],
-        f"In all pictures: {factor_words(review.exaggeration)}; the dashed box is nominal.",
-        "First order in the errors; over a 5 × 5 × 5 grid the exact chain (full rotations, all"
-        " products) differs by at most "
-        + ", ".join(
-            f"{spell(max(reviewed.linearisation_um, 0.0), 2)} µm"
-            + (f" in {letter}" if letter else "")
-            for letter, reviewed in parts.letters(review)
-        )
-        + ".",
-        "Sampled machines have one constant value per error and point, drawn independently.",
-    ]
-    return parts.section("Conventions", [Items(tuple(items))])
-
-
-def _provenance(review: Review, files: Sequence[Path]) -> Section:
-    """Tell what the report was made from and with."""
-    settings = review.settings
-    rows = [
-        ("program", f"warpspace {__version__}"),
-        ("made", report_time().strftime("%Y-%m-%d %H:%M UTC")),
-        ("with", f"Python {platform.python_version()}, NumPy {np.__version__}"),
-        ("grid", f"{settings.grid} nodes per axis"),
-        ("loop", settings.loop),
-        ("exaggeration", factor_words(review.exaggeration)),
-        (
-            "sampling",
-            f"{settings.samples} machines, {settings.distribution}, seed {settings.seed}",
-        ),
-    ]
-    texts = [scene_to_toml(reviewed.scene) for reviewed in review.scenes]
-    for (letter, reviewed), text in zip(parts.letters(review), texts, strict=True):
-        digest = hashlib.sha256(text.encode()).hexdigest()
-        rows.append((parts.prefixed(letter, f"scene {reviewed.scene.name}"), f"SHA-256 {digest}"))
-    for path in files:
-        digest = hashlib.sha256(path.read_bytes()).hexdigest()
-        rows.append((f"file {path.name}", f"SHA-256 {digest}"))
-    blocks: list[Block] = [
-        table("Program, settings and input.", [Column("what"), Column("value", width=3.2)], rows)
-    ]
-    for (letter, reviewed), text in zip(parts.letters(review), texts, strict=True):
-        name = parts.prefixed(letter, f"{reviewed.scene.name}.toml")
-        blocks += [
-            Text(f"{name}, complete: saved as a file it is the scene of this report.", "heading"),
-            Code(text),
-        ]
-    return parts.section("Provenance", blocks)

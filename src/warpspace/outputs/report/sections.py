@@ -248,63 +248,6 @@ def gains_table(letter: str, gains: Sequence[Gain]) -> Block:
     return table(prefixed(letter, caption), columns, rows, marks)
 
 
-def chance_blocks(letter: str, reviewed: Reviewed) -> list[Block]:
-    """Monte Carlo and variance shares in numbers."""
-    chance = reviewed.chance
-    if chance is None:
-        return [Text(prefixed(letter, reviewed.why_no_chance), "note")]
-    rows: list[tuple[str, ...]] = []
-    for name, result in (
-        ("at a random point", chance.sampled),
-        ("at the worst point", chance.worst),
-    ):
-        share = result.probability
-        rows.append(
-            (
-                name,
-                f"{result.plan.samples:,}".replace(",", " "),
-                *(spell(value) for value in (result.mean_um, result.mode_um, result.median_um)),
-                spell(result.p95_um),
-                spell(result.max_um),
-                percent(share.probability, 2) if share else "–",
-                f"{percent(share.low, 2)} … {percent(share.high, 2)}" if share else "–",
-            )
-        )
-    spec = chance.sampled.plan.spec_um
-    columns = [
-        Column("|E| of a machine", width=1.7),
-        Column("machines", "right", 1.1),
-        *(Column(name, "right", 0.85) for name in ("mean", "mode", "median", "P95", "max")),
-        Column(f"≤ {limit(spec)}" if spec is not None else "in spec.", "right", 1.1),
-        Column("95 % interval", "right", 1.9),
-    ]
-    caption = prefixed(
-        letter,
-        f"Machines drawn from the tolerances of {reviewed.scene.title}"
-        f" ({chance.sampled.draws.distribution}, seed {chance.sampled.plan.seed}), {MICROMETRE}.",
-    )
-    shares = [
-        (
-            row.key,
-            parameter(row.key).name,
-            f"± {spell_short(row.half_width)} {row.unit}",
-            spell(row.variance_um2),
-            percent(row.share),
-        )
-        for row in chance.shares.rows[:MOST_ROWS]
-        if row.share > 0.0
-    ]
-    share_columns = [
-        Column("key"),
-        Column("error", width=2.2),
-        Column("half width", "right", 1.2),
-        Column(f"variance, {MICROMETRE}²", "right", 1.2),
-        Column("share", "right"),
-    ]
-    which = prefixed(letter, "Which tolerances matter: shares of the variance of E, exact.")
-    return [table(caption, columns, rows), table(which, share_columns, shares)]
-
-
 def section(heading: str, blocks: Sequence[Block | None]) -> Section:
     """Put a section together, leaving out what there is none of."""
     return Section(heading, tuple(block for block in blocks if block is not None))
