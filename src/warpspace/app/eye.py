@@ -65,10 +65,12 @@ class Eye:
     def _change_lens(self, frame: Frame) -> None:
         """Go to the other field of view; what is looked at keeps its size."""
         camera, fov = self._camera, float(np.deg2rad(self._stand.fov_deg))
-        position = change_lens(camera.position, camera.look_at, camera.fov, fov)
+        look_at = camera.look_at.copy()
+        position = change_lens(camera.position, look_at, camera.fov, fov)
         self._clip(position, self._room_mm(frame))
         camera.fov = fov
         camera.position = position
+        camera.look_at = look_at  # the former takes it along
 
     def _clip(self, position: Array, points_mm: Array) -> None:
         """Set the clipping planes for a position in scene units."""
