@@ -73,6 +73,9 @@ def main() -> None:
     for name, seconds, target in rows:
         print(f"{name:<28} {seconds:6.2f} s" + (f"   target {target:g} s" if target else ""))
 
+    start_cpu = time.process_time()
+    draw("png")
+    print(f"{'processor time of a map':<28} {time.process_time() - start_cpu:6.2f} s   busy or not")
     process = psutil.Process()
     memory: list[float] = []
     for _ in range(PICTURES):
