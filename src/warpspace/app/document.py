@@ -22,6 +22,7 @@ from warpspace.exceptions import OptionError
 from warpspace.machine.errors import ErrorSet
 from warpspace.scene.files import MAX_SCENE_BYTES
 from warpspace.scene.library import parse_scene
+from warpspace.scene.machines import load_machine, machine_names
 from warpspace.scene.model import Scene
 from warpspace.scene.save import scene_to_toml
 
@@ -111,11 +112,29 @@ def open_text(text: str, name: str, source: str) -> tuple[AppState, CameraMemory
     SceneError
         With every problem of the text.
     """
-    state = start_state(parse_scene(text, name, source, folder=None))
+    state = start_state(_recognised(parse_scene(text, name, source, folder=None)))
     found = _VIEW.search(text)
     if found is None:
         return state, None
     return with_settings(state, found[1]), camera_of(found[1])
+
+
+def _recognised(scene: Scene) -> Scene:
+    """Give a machine written inline its bodies back where only directions make it another one."""
+    machine = scene.machine
+    for name in machine_names():
+        known = load_machine(name)
+        if known.axes.keys() != machine.axes.keys():
+            continue
+        axes = {
+            key: replace(axis, direction=known.axes[key].direction)
+            for key, axis in machine.axes.items()
+        }
+        same = replace(known, axes=machine.axes)
+        offsets = machine.fixed_mm == known.fixed_mm and machine.chain == known.chain
+        if offsets and axes == known.axes:
+            return replace(scene, model=replace(scene.model, machine=same))
+    return scene
 
 
 def state_to_link(state: AppState, camera: CameraMemory | None, known: Iterable[Scene]) -> str:

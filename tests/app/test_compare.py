@@ -1,0 +1,81 @@
+"""Compare: shared colours and factor, the difference node by node, and why there is none."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from warpspace.app.compare import pinned_side, scene_side, with_pin, with_sides
+from warpspace.app.compare_text import comparison_html
+from warpspace.app.comparison import Side
+from warpspace.app.live import Frame, LiveModel
+from warpspace.app.state import AppState, start_state
+from warpspace.scene.library import load_scene
+
+LIVE = LiveModel()
+FIRST, SECOND = (load_scene(f"dvf5000_{name}") for name in ("first", "second"))
+START = start_state(FIRST, nodes=9)
+
+
+def frame_of(state: AppState, shown: str) -> Frame:
+    return LIVE.frame(replace(state, comparison=state.comparison.with_shown(shown)))
+
+
+def test_a_b_and_difference_share_colours_factor_and_numbers() -> None:
+    state = with_sides(START, Side(), scene_side(SECOND))
+    a, b, difference = (frame_of(state, shown) for shown in ("a", "b", "difference"))
+    alone = [LIVE.frame(start_state(scene, nodes=9)) for scene in (FIRST, SECOND)]
+    np.testing.assert_array_equal(a.field.error_um, alone[0].field.error_um)
+    np.testing.assert_array_equal(b.field.error_um, alone[1].field.error_um)
+    np.testing.assert_allclose(
+        difference.field.error_um, a.field.error_um - b.field.error_um, atol=1e-12
+    )
+    assert a.scale == b.scale == difference.scale
+    assert a.exaggeration == b.exaggeration == difference.exaggeration
+    assert a.compared is not None
+    assert a.compared.a == alone[0].statistics
+    assert a.compared.b == alone[1].statistics
+    assert a.compared.difference == difference.statistics
+    np.testing.assert_array_equal(a.compared.other_mm, b.drawn_mm)
+
+
+def test_now_against_a_snapshot_moves_while_the_snapshot_stays() -> None:
+    state = with_pin(START).with_amplitude("EXX", 8.0)
+    difference = frame_of(state, "difference")
+    alone = LIVE.frame(
+        start_state(load_scene("dvf5000_nominal"), nodes=9).with_amplitude("EXX", 8.0)
+    )
+    np.testing.assert_allclose(difference.field.error_um, alone.field.error_um, atol=1e-9)
+    assert frame_of(with_pin(START), "difference").statistics.max_um == 0.0
+
+
+def test_other_volumes_have_no_difference_but_both_sides() -> None:
+    other = replace(SECOND, workspace=SECOND.workspace.moved({}), name="other")
+    ranges = {**other.workspace.ranges, "X": (-100.0, 100.0)}
+    other = replace(other, workspace=type(other.workspace)(ranges))
+    frame = frame_of(with_sides(START, Side(), scene_side(other)), "difference")
+    assert frame.compared is not None
+    assert frame.compared.refused
+    assert frame.compared.difference is None
+    assert frame.compared.shown == "a"
+
+
+def test_titles_are_escaped() -> None:
+    evil = replace(SECOND, title="<img src=x onerror=alert(1)>")
+    text = comparison_html(LIVE.frame(with_sides(START, Side(), scene_side(evil))))
+    assert "<img" not in text
+    assert "&lt;img" in text
+
+
+def test_a_snapshot_of_a_comparison_holds_no_comparison() -> None:
+    once = with_pin(START)
+    twice = pinned_side(once).state
+    assert twice is not None
+    assert twice.comparison.b is None
+    assert twice.comparison.pinned is None
+
+
+@pytest.mark.parametrize("word", ["", "c", "<script>"])
+def test_unknown_words_draw_nothing_else(word: str) -> None:
+    state = with_pin(START)
+    assert state.comparison.with_shown(word) is state.comparison
