@@ -18,7 +18,7 @@ from warpspace.app.live import LiveModel
 from warpspace.app.network import free_port, is_local, page_url, resolve_host
 from warpspace.app.services import Services
 from warpspace.app.session import Session
-from warpspace.app.state import start_state
+from warpspace.app.state import AppState, start_state
 from warpspace.app.tabs import Keeper, Left, is_token, new_token
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
@@ -40,6 +40,8 @@ class Viewer:
         Shown first.
     scenes : mapping of str to Scene
         Scenes to choose from, by the title shown.
+    start : AppState, optional
+        How the scene is first shown; by default as `start_state` has it.
     host : str, optional
     port : int or None, optional
         None takes the next free one from 8080.
@@ -59,6 +61,7 @@ class Viewer:
         scene: Scene,
         scenes: Mapping[str, Scene] | None = None,
         *,
+        start: AppState | None = None,
         host: str = "127.0.0.1",
         port: int | None = None,
         shared: bool = False,
@@ -67,13 +70,13 @@ class Viewer:
         self._services = services
         self.address = resolve_host(host)
         self.port = free_port(self.address, port)
-        self._scene = scene
+        self._start = start or start_state(scene)
         self._scenes = _with(scene, scenes or {})
         self._live = LiveModel()
         self._sessions: dict[int, Session] = {}
         self._lock = threading.Lock()
         self._keeper = Keeper()
-        self._shared = Board(start_state(scene)) if shared else None
+        self._shared = Board(self._start) if shared else None
         self._server = _serve(self.address, self.port)
         self._server.on_client_connect(self._connect)
         self._server.on_client_disconnect(self._disconnect)
@@ -98,12 +101,12 @@ class Viewer:
 
     def _warm(self) -> None:
         """Do before the first tab what it would have to wait for."""
-        self._live.frame(start_state(self._scene))
+        self._live.frame(self._start)
         importlib.import_module("warpspace.app.chance")
 
     def _connect(self, client: viser.ClientHandle) -> None:
         """Give a new tab its session."""
-        board = self._shared or Board(start_state(self._scene))
+        board = self._shared or Board(self._start)
         session = Session(client, self._live, self._scenes, board, self._claim, self._services)
         with self._lock:
             self._sessions[client.client_id] = session
@@ -200,6 +203,7 @@ def run_viewer(
     scene: Scene,
     scenes: Mapping[str, Scene],
     *,
+    start: AppState | None = None,
     host: str,
     port: int | None,
     shared: bool = False,
@@ -214,6 +218,8 @@ def run_viewer(
     ----------
     scene : Scene
     scenes : mapping of str to Scene
+    start : AppState, optional
+        How the scene is first shown.
     host : str
     port : int or None
     services : Services, optional
@@ -227,7 +233,9 @@ def run_viewer(
     """
     # a tab may close while something is on its way to it
     warnings.filterwarnings("ignore", message="Queued an? .* on a closed connection")
-    with Viewer(scene, scenes, host=host, port=port, shared=shared, services=services) as viewer:
+    with Viewer(
+        scene, scenes, start=start, host=host, port=port, shared=shared, services=services
+    ) as viewer:
         try:
             say(f"{scene.title} is shown at {viewer.url} (Ctrl-C ends it)")
             if not viewer.is_local:

@@ -1,10 +1,14 @@
 """Command `view`: the app in the browser."""
 
 import os
+from typing import TYPE_CHECKING
 
 import click
 
 from warpspace.cli.options import scene_argument
+
+if TYPE_CHECKING:
+    from warpspace.app.state import AppState
 
 
 @click.command()
@@ -26,7 +30,8 @@ from warpspace.cli.options import scene_argument
 def view(scene: str, host: str, port: int | None, *, shared: bool, no_browser: bool) -> None:
     """Open SCENE in the browser, with a live slider per error parameter.
 
-    SCENE is dvf5000_first where it is left out.
+    SCENE is dvf5000_first where it is left out. A field that `warpspace export` wrote as .vts is
+    shown as it was stored: its scene, loop, grid, component and factor.
     """
     # Before numpy is loaded: a slider move is one short product, and threads of OpenBLAS that spin
     # for it beside a browser that draws in software make it thirty times slower.
@@ -35,11 +40,13 @@ def view(scene: str, host: str, port: int | None, *, shared: bool, no_browser: b
     from warpspace.cli.services import build_services
     from warpspace.scene.library import load_scene, scene_names
 
-    shown = load_scene(scene)
+    start = _stored_start(scene) if scene.lower().endswith(".vts") else None
+    shown = start.scene if start else load_scene(scene)
     bundled = {name: shown if name == scene else load_scene(name) for name in scene_names()}
     run_viewer(
         shown,
         {loaded.title: loaded for loaded in bundled.values()},
+        start=start,
         host=host,
         port=port,
         shared=shared,
@@ -47,4 +54,19 @@ def view(scene: str, host: str, port: int | None, *, shared: bool, no_browser: b
         browser=not no_browser,
         say=click.echo,
         warn=lambda text: click.secho(text, err=True, fg="yellow"),
+    )
+
+
+def _stored_start(path: str) -> "AppState":
+    """Read a stored field and show it as it was stored."""
+    from warpspace.app.state import start_state
+    from warpspace.outputs.exports import load_stored_field
+
+    drawing = load_stored_field(path).drawing
+    return (
+        start_state(drawing.scene)
+        .with_loop(drawing.picture.view.loop)
+        .with_nodes(max(drawing.picture.grid.shape))
+        .with_component(drawing.component)
+        .with_exaggeration(drawing.exaggeration)
     )
