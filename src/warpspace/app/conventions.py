@@ -219,5 +219,5 @@ def _response(state: AppState) -> Array:
     grid = build_grid(scene.model, scene.workspace.moved(state.positions), NODES)
     view = View(loop=state.loop, reference=scene.reference)
     keys = tuple(state.amplitudes)
-    basis = build_basis(scene.model, scene.errors, keys, grid.coordinates, view, grid.nominal_mm)
+    basis = build_basis(scene.model, scene.errors, keys, grid.coordinates, view, grid.point_mm)
     return basis.position

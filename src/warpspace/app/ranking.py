@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpspace.field.evaluate import ErrorBasis
+from warpspace.kinematics.chain import nominal_point
 from warpspace.kinematics.firstorder import columns
 from warpspace.kinematics.model import Coordinates, Loop, Model
 from warpspace.machine.parameters import Parameter, parameter
@@ -78,7 +79,9 @@ def rank_gains(
     total = moved.sum(axis=0)
     length = float(np.linalg.norm(total))
     towards = total / length if length > 0.0 else np.zeros(3)
-    found = columns(model, loop, basis.keys, coordinates, basis.nominal_mm[node])
+    found = columns(
+        model, loop, basis.keys, coordinates, nominal_point(model, Loop.TOOL, coordinates)
+    )
     bars = [
         Bar(
             key,

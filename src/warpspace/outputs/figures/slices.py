@@ -138,7 +138,7 @@ def _evaluate_slices(
         at = (low + high) / 2.0
         grid = build_slice(scene.model, scene.workspace, axis, at, settings.grid)
         field = evaluate_first_order(
-            scene.model, scene.errors, grid.coordinates, picture.view, grid.nominal_mm
+            scene.model, scene.errors, grid.coordinates, picture.view, grid.point_mm
         )
         values = component_values(field.error_um, settings.component)
         content = MapContent(grid.nominal_mm, field.error_um, values, scale, exaggeration)

@@ -178,9 +178,7 @@ def _review_scene(drawing: Drawing, settings: ReportSettings) -> Reviewed:
         name: np.broadcast_to(values, picture.grid.shape)[index]
         for name, values in picture.grid.coordinates.items()
     }
-    explanation = explain(
-        scene.model, scene.errors, at, picture.view, picture.grid.nominal_mm[index]
-    )
+    explanation = explain(scene.model, scene.errors, at, picture.view, picture.grid.point_mm[index])
     chance, why = _chance(scene, settings)
     return Reviewed(
         drawing,
