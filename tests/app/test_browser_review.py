@@ -69,6 +69,8 @@ def test_search_narrows_the_sliders_down(tab: Tab) -> None:
     tab.until(lambda: keys_of_sliders(tab) == {"EC0Y", "EA0Z", "EB0Z"})
     search.fill("roll x")
     tab.until(lambda: keys_of_sliders(tab) == {"EAX"})
+    # the only one found is the one whose curve is shown
+    tab.until(lambda: tab.page.get_by_label("Error", exact=True).input_value().startswith("EAX"))
     tab.send("EAX", "12")
     shows(tab, START.with_amplitude("EAX", 12.0))
     search.fill("<script>alert(1)</script>")
@@ -84,6 +86,7 @@ def test_solo_and_mute(tab: Tab) -> None:
     tab.page.get_by_label("Mute").check()
     shows(tab, edits.with_muted(START, "EC0Y", True))
     tab.until(lambda: any(t.startswith("EC0Y") and t.endswith("silent") for t in labels(tab)))
+    assert tab.page.get_by_text("1 silent").is_visible()
     tab.page.get_by_label("Mute").uncheck()
     tab.page.wait_for_timeout(PAUSE)
     tab.page.get_by_label("Solo").check()

@@ -169,6 +169,9 @@ def heading(frame: Frame) -> str:
     auto = " (auto)" if state.exaggeration is None else ""
     edited = len(state.changed_keys)
     note = f" · {edited} error{'s' if edited > 1 else ''} changed" if edited else ""
+    heard = state.heard
+    silent = sum(1 for key, value in state.amplitudes.items() if value != heard[key])
+    note += f" · {silent} silent" if silent else ""
     nodes = "×".join(str(count) for count in frame.grid.shape)
     size = " × ".join(f"{edge:.0f}" for edge in frame.grid.extent_mm)
     machine = f"{state.scene.machine.title}, chain {state.scene.machine.chain}"

@@ -41,7 +41,7 @@ class ErrorsPanel:
     desk : Desk
     state : AppState
     touched : callable, optional
-        Called, by the session's worker, with the key of a slider that was moved.
+        Called, by the session's worker, with the key of a slider that was moved or found alone.
     """
 
     def __init__(
@@ -123,6 +123,8 @@ class ErrorsPanel:
         query = self._search.poll()
         if query is not None:
             found = find_parameters(query, tuple(state.amplitudes))
+            if len(found) == 1 and self._touched is not None:
+                self._touched(found[0])
             if found != self._found:
                 # after the state has been dealt with, since widgets come and go
                 self._desk.act(lambda: self._build(self._desk.board().state, found))

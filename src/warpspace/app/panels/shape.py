@@ -52,6 +52,18 @@ class ShapePanel:
             ),
             desk.changed,
         )
+        self._solo: Bound[bool] = Bound(
+            gui.add_checkbox(
+                "Solo", initial_value=False, hint="Hear this error alone, or with others on solo."
+            ),
+            desk.changed,
+        )
+        self._mute: Bound[bool] = Bound(
+            gui.add_checkbox(
+                "Mute", initial_value=False, hint="Leave this error out; its value is kept."
+            ),
+            desk.changed,
+        )
         self._chart: Any = gui.add_uplot(
             _chart_data(None, (0.0, 1.0)),
             (
@@ -77,18 +89,6 @@ class ShapePanel:
             desk.changed,
         )
         self._problem: Any = gui.add_html("")
-        self._solo: Bound[bool] = Bound(
-            gui.add_checkbox(
-                "Solo", initial_value=False, hint="Hear this error alone, or with others on solo."
-            ),
-            desk.changed,
-        )
-        self._mute: Bound[bool] = Bound(
-            gui.add_checkbox(
-                "Mute", initial_value=False, hint="Leave this error out; its value is kept."
-            ),
-            desk.changed,
-        )
         hear = gui.add_button("Hear all errors", color="gray", hint="End all solo and mute.")
         hear.on_click(lambda _: desk.post(edits.all_heard))
         self._hear = hear
@@ -99,14 +99,14 @@ class ShapePanel:
         if key != self._key and key in self._keys:
             self._key = key
             self._written = self._drawn = None
+            # after the state has been dealt with; the widgets still show the error before
+            self._desk.act(lambda: self._show(self._desk.board().state))
 
     def read(self, state: AppState) -> AppState:
         """Take over what a browser has chosen or written."""
         label = self._which.poll()
         if label is not None:
             self.choose(label.split(" ", 1)[0])
-            # the other widgets still show the error before
-            self._desk.act(lambda: self._show(self._desk.board().state))
         solo, mute = self._solo.poll(), self._mute.poll()
         if solo is not None:
             state = edits.with_soloed(state, self._key, solo)
