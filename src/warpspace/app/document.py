@@ -27,7 +27,8 @@ from warpspace.scene.model import Scene
 from warpspace.scene.save import scene_to_toml
 
 MARK = "# warpspace-view: "
-MAX_LINK = 60_000
+MAX_LINK = 5_500
+"""Characters of a link before it is packed: servers take request lines of 8 kB."""
 MAX_PACKED_TEXT = 1_000_000
 SCENE, PACKED = "scene", "file"
 _VIEW = re.compile(rf"^{re.escape(MARK)}(\S*)\s*$", re.MULTILINE)
@@ -138,7 +139,7 @@ def _recognised(scene: Scene) -> Scene:
 
 
 def state_to_link(state: AppState, camera: CameraMemory | None, known: Iterable[Scene]) -> str:
-    """Spell a state as what stands behind the # of a link.
+    """Spell a state as a link.
 
     Parameters
     ----------
@@ -178,7 +179,7 @@ def open_link(link: str, known: Iterable[Scene]) -> tuple[AppState, CameraMemory
     Parameters
     ----------
     link : str
-        What stands behind its #; anything, since anybody can write one.
+        A query string; anything, since anybody can write one.
     known : iterable of Scene
         Scenes it may name.
 
@@ -192,7 +193,9 @@ def open_link(link: str, known: Iterable[Scene]) -> tuple[AppState, CameraMemory
         If it names no scene, or holds none that can be read.
     """
     if len(link) > MAX_LINK:
-        raise OptionError(f"the link is {len(link):,} characters long; expected {MAX_LINK:,}")
+        raise OptionError(
+            f"the link is {len(link):,} characters long; expected at most {MAX_LINK:,}"
+        )
     try:
         pairs = dict(parse_qsl(link, max_num_fields=MAX_FIELDS))
     except ValueError:

@@ -130,9 +130,8 @@ class FilesPanel:
 
     def _follow(self, message: str) -> None:
         """Show what a link describes."""
-        link = message.partition(":")[2]
-        scenes = self._outside.scenes.values()
-        self._try("Link", lambda: self._show(*document.open_link(link, scenes)))
+        word, scenes = message.partition(":")[2], self._outside.scenes.values()
+        self._try("Link", lambda: self._show(*document.open_link(links.unpack(word), scenes)))
 
     def _show(self, opened: AppState, camera: CameraMemory | None) -> None:
         """Show an opened state from its camera; the comparison stays."""

@@ -1,0 +1,317 @@
+"""Why, compare, conventions and files in a real Chromium: what is done, and what is then shown."""
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.conftest import Tab
+from warpspace.app.compare import scene_side, with_sides
+from warpspace.app.comparison import Side
+from warpspace.app.conventions import Effects, with_choice
+from warpspace.app.document import state_to_toml
+from warpspace.app.live import Frame, LiveModel
+from warpspace.app.state import AppState, start_state
+from warpspace.app.viewer import Viewer
+from warpspace.app.why import Picked, answer
+from warpspace.cli.services import build_services
+from warpspace.scene.library import load_scene
+
+pytestmark = pytest.mark.browser
+LIVE = LiveModel()
+SCENES = [load_scene(name) for name in ("dvf5000_first", "dvf5000_second", "teach_tilted_c")]
+START = start_state(SCENES[0])
+POINTS = """name => {
+  const node = window.__viserMutable.nodeRefFromName[name];
+  if (!node || !node.visible) return null;
+  let found = null;
+  node.traverse(o => {
+    const g = o.geometry && o.geometry.attributes;
+    if (found || !g) return;
+    const a = g.instanceStart ? g.instanceStart.data : g.position;
+    if (a) found = Array.from(a.array);
+  });
+  return found;
+}"""
+PLACE = """name => {
+  const node = window.__viserMutable.nodeRefFromName[name];
+  return node && node.visible ? [node.position.x, node.position.y, node.position.z] : null;
+}"""
+
+
+@pytest.fixture(scope="module")
+def viewer() -> Iterator[Viewer]:
+    """The app with figures and exports, as the command line starts it."""
+    scenes = {scene.title: scene for scene in SCENES}
+    with Viewer(SCENES[0], scenes, services=build_services()) as running:
+        yield running
+
+
+def drawn(frame: Frame) -> np.ndarray:
+    return frame.drawn_mm.reshape(-1, 3)[frame.topology.surface.nodes]
+
+
+def panel(tab: Tab, name: str) -> None:
+    tab.page.get_by_role("tab", name=name, exact=True).click()
+
+
+def shown_state(viewer: Viewer, tab: Tab) -> AppState:
+    """State of the newest session: that of the tab under test."""
+    tab.page.wait_for_timeout(200)
+    return viewer.sessions[-1].state
+
+
+def click_box(tab: Tab) -> None:
+    """Click the front of the box."""
+    tab.page.wait_for_timeout(500)
+    tab.page.mouse.click(760, 480)
+    tab.until(lambda: tab.page.locator("[data-value='why norm']").count() == 1)
+
+
+def numbers(text: str) -> list[float]:
+    return [float(n.replace("−", "-")) for n in re.findall(r"[+−-]?\d+\.?\d*", text)]
+
+
+def upload(tab: Tab, name: str, content: bytes) -> None:
+    tab.page.locator("input[type=file]").set_input_files(
+        {"name": name, "mimeType": "text/plain", "buffer": content}
+    )
+
+
+def test_a_click_on_the_box_says_why(tab: Tab, viewer: Viewer) -> None:
+    click_box(tab)
+    picked = shown_state(viewer, tab).picked
+    assert picked is not None
+    frame = LIVE.frame(START)
+    found = answer(START, picked, frame.exaggeration)
+    assert tab.number("why norm") == pytest.approx(
+        float(np.linalg.norm(found.explanation.error_um)), abs=0.006
+    )
+    place = tab.page.evaluate(PLACE, "/why/marker")
+    np.testing.assert_allclose(np.array(place) * 100.0, found.drawn_mm, atol=0.5)
+    rows = tab.page.locator("[data-contribution]")
+    assert rows.count() == len(found.explanation.contributions)
+    along = [numbers(rows.nth(i).inner_text())[-4:] for i in range(rows.count())]
+    assert [abs(row[0]) for row in along] == sorted((abs(row[0]) for row in along), reverse=True)
+    error = numbers(tab.text("why error"))[:3]
+    rest = np.array([row[1:] for row in along]).sum(axis=0)
+    np.testing.assert_allclose(rest, error, atol=0.06)
+    assert tab.page.get_by_text("2nd-order rest").is_visible()
+
+
+def test_choosing_a_contribution_draws_axis_and_lever_and_follows(tab: Tab, viewer: Viewer) -> None:
+    click_box(tab)
+    tab.page.locator("[data-contribution='EA0Z']").click()
+    tab.until(lambda: tab.page.evaluate(PLACE, "/why/lever") is not None)
+    assert tab.page.evaluate(PLACE, "/why/axis") is not None
+    assert "mm across the axis" in tab.text("lever")
+    before = tab.page.evaluate(PLACE, "/why/marker")
+    tab.send("EXX", "9")
+    state = START.with_amplitude("EXX", 9.0)
+    picked = shown_state(viewer, tab).picked
+    assert picked is not None
+    tab.until(lambda: tab.page.evaluate(PLACE, "/why/marker") != before)
+    found = answer(state, picked, LIVE.frame(state).exaggeration)
+    tab.until(
+        lambda: np.allclose(
+            np.array(tab.page.evaluate(PLACE, "/why/marker")) * 100.0, found.drawn_mm, atol=0.5
+        )
+    )
+    tab.page.get_by_role("button", name="Clear", exact=True).click()
+    tab.until(lambda: tab.page.evaluate(PLACE, "/why/marker") is None)
+    tab.page.get_by_role("button", name="Undo", exact=True).click()
+    tab.until(lambda: tab.page.evaluate(PLACE, "/why/marker") is not None)
+
+
+def test_two_scenes_are_compared_with_one_scale(tab: Tab) -> None:
+    panel(tab, "Compare")
+    tab.choose("B", SCENES[1].title)
+    state = with_sides(START, Side(), scene_side(SCENES[1]))
+    for name, word in (("A", "a"), ("B", "b"), ("A − B", "difference")):
+        frame = LIVE.frame(replace(state, comparison=state.comparison.with_shown(word)))
+        tab.page.get_by_role("button", name=name, exact=True).click()
+        tab.until(lambda frame=frame: tab.shows(drawn(frame)))
+        for column, found in (
+            ("A", frame.compared.a),
+            ("B", frame.compared.b),
+            ("A − B", frame.compared.difference),
+        ):
+            for row, value in (("mean", found.mean_um), ("RMS", found.rms_um)):
+                shown = tab.page.inner_text(f"[data-compared='{row} {column}']")
+                assert float(shown) == pytest.approx(value, abs=0.006)
+    assert "second machine" in tab.text("compared")
+    tab.page.get_by_role("button", name="A", exact=True).click()
+    tab.until(lambda: tab.page.evaluate(PLACE, "/compare/other") is not None)
+    tab.choose("B", "nothing")
+    tab.until(lambda: tab.shows(drawn(LIVE.frame(START))))
+    assert tab.page.evaluate(PLACE, "/compare/other") is None
+
+
+def test_now_is_compared_with_a_pinned_snapshot(tab: Tab) -> None:
+    panel(tab, "Compare")
+    tab.page.get_by_role("button", name="Pin now and compare").click()
+    tab.until(lambda: tab.page.locator("[data-compared='mean A − B']").count() == 1)
+    tab.send("EXX", "10")
+    wanted = f"{LIVE.frame(START.with_amplitude('EXX', 10.0)).statistics.mean_um:.2f}"
+    tab.until(lambda: tab.page.inner_text("[data-compared='mean A']") == wanted)
+    mean = f"{LIVE.frame(START).statistics.mean_um:.2f}"
+    assert tab.page.inner_text("[data-compared='mean B']") == mean
+
+
+def test_a_convention_changes_the_map_and_says_by_how_much(tab: Tab) -> None:
+    panel(tab, "Conventions")
+    effect = Effects().of(START)["component_errors=before_motion"]
+    row = tab.page.locator("[data-choice='component_errors=before_motion']")
+    tab.until(lambda: "…" not in row.inner_text())
+    assert numbers(row.inner_text())[-2:] == pytest.approx(
+        [effect.mean_um, effect.max_um], abs=0.006
+    )
+    row.click()
+    state = with_choice(START, "component_errors=before_motion")
+    tab.until(lambda: tab.shows(drawn(LIVE.frame(state))))
+    tab.page.get_by_role("button", name="Conventions of the scene").click()
+    tab.until(lambda: tab.shows(drawn(LIVE.frame(START))))
+
+
+def test_the_reference_is_picked_on_the_box(tab: Tab, viewer: Viewer) -> None:
+    panel(tab, "Conventions")
+    tab.page.get_by_role("button", name="Pick the reference in 3-D").click()
+    tab.page.wait_for_timeout(400)
+    tab.page.mouse.click(760, 480)
+    tab.until(lambda: shown_state(viewer, tab).scene.reference is not None)
+    state = shown_state(viewer, tab)
+    assert state.picked is None
+    tab.until(lambda: tab.shows(drawn(LIVE.frame(state))))
+    at = Picked(dict(state.scene.reference or {}))
+    assert np.linalg.norm(answer(state, at, 1.0).explanation.error_um) < 1e-6
+
+
+def test_a_saved_scene_opens_to_the_identical_state(
+    tab: Tab, viewer: Viewer, open_tab: Callable[[], Tab], tmp_path: Path
+) -> None:
+    tab.send("EXX", "7.5")
+    tab.page.wait_for_timeout(100)
+    tab.send("B [°]", "-20")
+    tab.page.wait_for_timeout(100)
+    tab.choose("Colour", "E_y")
+    state = shown_state(viewer, tab)
+    assert state.positions["B"] == -20.0
+    panel(tab, "Files")
+    with tab.page.expect_download() as waiting:
+        tab.page.get_by_role("button", name="Save scene", exact=True).click()
+    assert waiting.value.suggested_filename == "dvf5000_first.toml"
+    path = tmp_path / "dvf5000_first.toml"
+    waiting.value.save_as(path)
+    other = open_tab()
+    panel(other, "Files")
+    upload(other, "dvf5000_first.toml", path.read_bytes())
+    other.until(lambda: other.shows(drawn(LIVE.frame(state))))
+    back = shown_state(viewer, other)
+    assert back.amplitudes == state.amplitudes
+    assert back.component == "y"
+    assert load_scene(path).errors.amplitude("EXX") == 7.5
+
+
+def test_a_link_brings_camera_and_settings(tab: Tab, viewer: Viewer) -> None:
+    tab.send("EXX", "4")
+    tab.page.wait_for_timeout(100)
+    tab.page.get_by_role("button", name="True scale").click()
+    tab.page.mouse.move(760, 480)
+    tab.page.mouse.wheel(0, 400)
+    tab.page.wait_for_timeout(600)
+    panel(tab, "Files")
+    tab.page.get_by_role("button", name="Link", exact=True).click()
+    tab.until(lambda: "view=" in tab.page.url)
+    link = tab.page.url
+    camera = viewer.sessions[-1]._eye.remember()
+    second = tab.page.context.browser.new_context(viewport={"width": 1600, "height": 900})
+    other = second.new_page()
+    other.goto(link)
+    other.wait_for_selector("[data-value='max']", timeout=60_000)
+    for _ in range(200):
+        other.wait_for_timeout(100)
+        if "true scale" in other.inner_text("[data-value='factor']"):
+            break
+    other.wait_for_timeout(800)
+    session = viewer.sessions[-1]
+    assert session.state.amplitudes["EXX"] == 4.0
+    assert session.state.exaggeration == 1.0
+    np.testing.assert_allclose(session._eye.remember().position, camera.position, rtol=1e-3)
+    second.close()
+
+
+@pytest.mark.parametrize(("name", "ending"), [("View", "png"), ("HTML", "html"), ("GLB", "glb")])
+def test_pictures_and_exports_are_downloaded(tab: Tab, name: str, ending: str) -> None:
+    panel(tab, "Files")
+    with tab.page.expect_download(timeout=60_000) as waiting:
+        tab.page.get_by_role("button", name=name, exact=True).click()
+    content = Path(waiting.value.path()).read_bytes()
+    begin = {"png": b"\x89PNG", "html": b"<!", "glb": b"glTF"}[ending]
+    assert content.startswith(begin)
+    assert waiting.value.suggested_filename == f"dvf5000_first.{ending}"
+
+
+@pytest.mark.render
+def test_the_figure_is_drawn_and_can_be_cancelled(tab: Tab, renderer: str) -> None:
+    panel(tab, "Files")
+    tab.page.get_by_role("button", name="Figure", exact=True).click()
+    tab.page.get_by_role("button", name="Cancel", exact=True).click()
+    tab.until(lambda: tab.page.get_by_text("Cancelled").count() > 0)
+    tab.until(lambda: tab.page.get_by_role("button", name="Cancel", exact=True).count() == 0)
+    with tab.page.expect_download(timeout=120_000) as waiting:
+        tab.page.get_by_role("button", name="Figure", exact=True).click()
+    assert Path(waiting.value.path()).read_bytes().startswith(b"\x89PNG")
+
+
+def test_bad_uploads_are_refused_in_the_page_and_the_session_goes_on(tab: Tab) -> None:
+    panel(tab, "Files")
+    problems = b'machine = "dvf5001"\nsurprise = 1\n[errors]\nEC0X = "a"\n'
+    upload(tab, "../../evil.toml", problems)
+    tab.until(lambda: tab.page.get_by_text("4 problems").count() > 0)
+    upload(tab, "noise.toml", b"\xff\xfe\x00\x01")
+    tab.until(lambda: tab.page.get_by_text("not UTF-8").count() > 0)
+    upload(tab, "big.toml", b"x" * (5 * 2**20))
+    tab.until(lambda: tab.page.get_by_text("at most 4 MB").count() > 0)
+    tab.send("EXX", "4")
+    tab.until(lambda: tab.shows(drawn(LIVE.frame(START.with_amplitude("EXX", 4.0)))))
+
+
+def test_a_200_mb_upload_announced_by_a_hostile_page_is_not_kept(tab: Tab, viewer: Viewer) -> None:
+    panel(tab, "Files")
+    uuid = tab.page.locator("input[type=file]").get_attribute("id").removeprefix("file_upload_")
+    script = """([uuid, transfer, size, parts]) => {
+      const viewer = window.__viserMutable;
+      viewer.sendMessage({type: 'FileTransferStartUpload', source_component_uuid: uuid,
+        transfer_uuid: transfer, filename: '../../../big.toml', mime_type: 'text/plain',
+        size_bytes: size, part_count: parts});
+      for (let i = 0; i < 12; i++) viewer.sendMessage({type: 'FileTransferPart',
+        source_component_uuid: uuid, transfer_uuid: transfer, part_index: i,
+        content: new Uint8Array(524288)});
+    }"""
+    tab.page.evaluate(script, [uuid, "honest", 200 * 2**20, 400])
+    tab.until(lambda: tab.page.get_by_text("200.0 MB large").count() > 0)
+    tab.page.evaluate(script, [uuid, "liar", 100, 20])
+    tab.until(lambda: tab.page.get_by_text("more has arrived").count() > 0)
+    assert viewer.sessions[-1]._client.gui._current_file_upload_states == {}
+    tab.send("EXX", "4")
+    tab.until(lambda: tab.shows(drawn(LIVE.frame(START.with_amplitude("EXX", 4.0)))))
+
+
+def test_ten_uploads_at_once_and_a_script_in_a_title(tab: Tab, viewer: Viewer) -> None:
+    panel(tab, "Files")
+    evil = "<img src=x onerror='window.hacked=1'><script>window.hacked=2</script>"
+    scene = replace(SCENES[1], title=evil)
+    text = state_to_toml(start_state(scene))
+    for number in range(10):
+        upload(tab, f"scene {number}.toml", text.encode())
+    tab.until(lambda: tab.shows(drawn(LIVE.frame(start_state(SCENES[1])))), 30.0)
+    tab.until(lambda: shown_state(viewer, tab).scene.name == "scene 9", 30.0)
+    panel(tab, "Compare")
+    tab.page.get_by_role("button", name="Pin now and compare").click()
+    tab.page.wait_for_timeout(800)
+    assert tab.page.evaluate("window.hacked") is None
+    assert tab.page.get_by_text("<script>").first.is_visible()
+    tab.page.get_by_role("button", name="Undo", exact=True).click()
