@@ -135,9 +135,14 @@ class FilesPanel:
 
     def _show(self, opened: AppState, camera: CameraMemory | None) -> None:
         """Show an opened state from its camera; the comparison stays."""
-        if camera is not None:
-            self._outside.look_from(camera)
-        self._desk.post(lambda now: replace(opened, comparison=now.comparison))
+
+        def update(now: AppState) -> AppState:
+            if camera is not None:
+                # with this change, not before it: another scene places the camera anew
+                self._outside.look_from(camera)
+            return replace(opened, comparison=now.comparison)
+
+        self._desk.post(update)
 
     def _save(self) -> None:
         """Send the state as a scene file."""
