@@ -1,6 +1,9 @@
 """A picture of the 3-D view as PNG that says what it shows: title, factor, numbers, colour bar."""
 
+from functools import cache
+from importlib.util import find_spec
 from io import BytesIO
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +50,17 @@ def view_png(pixels: NDArray[np.uint8], frame: Frame) -> bytes:
     return written.getvalue()
 
 
+@cache
+def _font(size: int) -> "ImageFont.ImageFont | ImageFont.FreeTypeFont":
+    """Give a font that has µ, × and −: the one that comes with the figures' library, unloaded."""
+    library = find_spec("matplotlib")
+    if library is not None and library.origin is not None:
+        path = Path(library.origin).parent / "mpl-data/fonts/ttf/DejaVuSans.ttf"
+        if path.is_file():
+            return ImageFont.truetype(str(path), size)
+    return ImageFont.load_default(size)
+
+
 def _heading(draw: ImageDraw.ImageDraw, frame: Frame, ink: tuple[int, int, int]) -> None:
     """Write title, factor and numbers."""
     found = frame.statistics
@@ -57,13 +71,13 @@ def _heading(draw: ImageDraw.ImageDraw, frame: Frame, ink: tuple[int, int, int])
             frame.compared.shown
         ]
     factor = spell_factor(frame.exaggeration).replace("\u202f", " ")
-    draw.text((16, 10), title[:110], ink, ImageFont.load_default(22))
+    draw.text((16, 10), title[:110], ink, _font(22))
     draw.text(
         (16, 38),
         f"displacement drawn {factor} · |E| mean {found.mean_um:.2f} µm, max {found.max_um:.2f} µm"
         f" · {frame.state.loop.value} loop",
         ink,
-        ImageFont.load_default(15),
+        _font(15),
     )
 
 
@@ -77,7 +91,7 @@ def _colour_bar(
     values = np.linspace(scale.high, scale.low, height)
     strip = np.repeat(scale.colours(values)[:, None, :], 24, axis=1)
     page.paste(Image.fromarray(strip.astype(np.uint8)), (left, top))
-    font = ImageFont.load_default(15)
+    font = _font(15)
     draw.text((left, top - 34), f"{scale.label} [{scale.unit}]", ink, font)
     for tick in scale.ticks:
         at = top + (scale.high - tick) / (scale.high - scale.low) * (height - 1)

@@ -1,0 +1,24 @@
+"""The picture of the view carries title, factor and the colours of its bar."""
+
+from io import BytesIO
+
+import numpy as np
+from PIL import Image
+
+from warpspace.app.live import LiveModel
+from warpspace.app.picture import BAND_PX, HEAD_PX, view_png
+from warpspace.app.state import start_state
+from warpspace.scene.library import load_scene
+
+
+def test_the_view_is_framed_by_heading_and_colour_bar() -> None:
+    frame = LiveModel().frame(start_state(load_scene("dvf5000_first"), nodes=5))
+    pixels = np.zeros((300, 400, 4), np.uint8)
+    picture = Image.open(BytesIO(view_png(pixels, frame)))
+    assert picture.size == (400 + BAND_PX, 300 + HEAD_PX)
+    assert "1" in picture.info["Description"]
+    column = np.asarray(picture)[:, 400 + 30]
+    ends = frame.scale.colours(np.array([frame.scale.high, frame.scale.low]))
+    for colour in ends:
+        assert (column == colour).all(axis=-1).any()
+    assert (np.asarray(picture)[:HEAD_PX] < 128).any()
