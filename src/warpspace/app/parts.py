@@ -1,5 +1,6 @@
 """Everything of a tab that follows the frame: layers and panels, on a busy server in two goes."""
 
+import threading
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -12,14 +13,18 @@ from warpspace.app.panels import Panel, Settling
 from warpspace.app.panels.errors import ErrorsPanel
 from warpspace.app.panels.summary import HtmlPanel
 
-SETTLE_S = 0.06
-"""Pause in the changes after which charts follow."""
+SETTLE_S = 0.1
+"""Pause in the changes after which charts follow: longer than between two moves of a drag."""
 LONGEST_SETTLE_S = 0.25
 """Charts lag no longer than this behind while a slider is being dragged."""
-BUSY_SETTLE_S = 1.0
-"""The same on a busy server; after the drag they follow as quickly as ever."""
-BUSY_S = 0.015
-"""Time for a picture beyond which the server counts as busy."""
+BUSY_PAUSE_S, BUSY_SETTLE_S = 0.2, 2.0
+"""The same two on a busy server."""
+BUSY_S = 0.01
+"""Wait for other tabs' pictures beyond which the server counts as busy."""
+BUSY_MEMORY_S = 2.0
+"""How long a server that was busy counts as such."""
+TURN = threading.Lock()
+"""Pictures are made one after the other: twenty at once would all be late, and fight for caches."""
 AT_ONCE = (BoxLayer, TracesLayer, HtmlPanel, ErrorsPanel)
 """What is never put off: map, traces, numbers and the sliders themselves."""
 
@@ -37,12 +42,15 @@ class Parts:
         self.layers, self.panels = tuple(layers), tuple(panels)
         self._late: list[Layer | Panel] = []
         self._busy = False
+        self._busy_until = 0.0
         self._since: float | None = None
 
     @property
     def pause_s(self) -> float | None:
         """How long to wait for further changes before charts follow; None where none has to."""
-        return None if self._since is None else SETTLE_S
+        if self._since is None:
+            return None
+        return BUSY_PAUSE_S if self._busy else SETTLE_S
 
     def is_due(self, *, paused: bool) -> bool:
         """Tell whether charts are to follow now."""
@@ -51,16 +59,21 @@ class Parts:
         longest = BUSY_SETTLE_S if self._busy else LONGEST_SETTLE_S
         return paused or time.monotonic() - self._since > longest
 
+    def waited(self, seconds: float) -> None:
+        """Take note of how long the tab has waited for its turn."""
+        now = time.monotonic()
+        if seconds > BUSY_S:
+            self._busy_until = now + BUSY_MEMORY_S
+        self._busy = now < self._busy_until
+
     def show(self, frame: Frame) -> None:
         """Follow a frame; on a busy server map and numbers first, the others when it settles."""
-        began = time.monotonic()
         self._late = []
         for part in (*self.layers, *self.panels):
             if self._busy and not isinstance(part, AT_ONCE):
                 self._late.append(part)
             else:
                 part.show(frame)
-        self._busy = time.monotonic() - began > BUSY_S
         self.unsettle()
 
     def unsettle(self) -> None:

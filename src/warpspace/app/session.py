@@ -7,6 +7,7 @@ a slider is always what is shown, however fast it was moved.
 
 import logging
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -28,7 +29,7 @@ from warpspace.app.page import Page
 from warpspace.app.panels import Desk, Update
 from warpspace.app.panels.commands import hint_script
 from warpspace.app.panels.layout import apply_theme, lay_out_panels
-from warpspace.app.parts import Parts
+from warpspace.app.parts import TURN, Parts
 from warpspace.app.services import Services
 from warpspace.app.state import AppState
 from warpspace.app.tabs import CameraMemory, Left, ask_script, new_token, rename_script
@@ -241,7 +242,12 @@ class Session:
             self._restore_camera(shown)
         if not notes and self._shown is not None and state is self._shown.state:
             return
-        self._show(self._live.frame(state), notes)
+        # what is slow the first time is done before it is this tab's turn
+        self._live.response(state)
+        asked = time.monotonic()
+        with TURN:
+            self._parts.waited(time.monotonic() - asked)
+            self._show(self._live.frame(state), notes)
 
     def _take_in(self, state: AppState) -> AppState:
         """Apply what widgets and buttons have changed to a state."""

@@ -89,9 +89,10 @@ class ErrorBasis:
         used = np.flatnonzero(amplitudes)
         if 2 * len(used) > len(self.keys):
             return (amplitudes @ flat).reshape(self.nominal_mm.shape)
-        total = np.zeros(self.nominal_mm.size)
+        total, part = np.zeros(self.nominal_mm.size), np.empty(self.nominal_mm.size)
         for index in used:
-            total += amplitudes[index] * flat[index]
+            np.multiply(flat[index], amplitudes[index], out=part)
+            total += part
         return total.reshape(self.nominal_mm.shape)
 
     def contributions(self, amplitudes: Array, index: tuple[int, ...] = ()) -> Array:

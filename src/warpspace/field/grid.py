@@ -65,7 +65,8 @@ class Grid:
     @property
     def extent_mm(self) -> Array:
         """Edge lengths of the nominal volume in R, [3], mm: that of its corners, for it is flat."""
-        corners = self.nominal_mm[np.ix_(*((0, n - 1) for n in self.shape))]
+        x, y, z = (max(n - 1, 1) for n in self.shape)
+        corners = self.nominal_mm[::x, ::y, ::z]
         return np.ptp(corners.reshape(-1, 3), axis=0)
 
     @property
