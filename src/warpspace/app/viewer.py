@@ -1,10 +1,12 @@
 """The server of the app: starts it, gives each browser tab a session, ends it cleanly."""
 
 import contextlib
+import gc
 import importlib
 import io
 import logging
 import threading
+import time
 import warnings
 import webbrowser
 from collections.abc import Callable, Mapping
@@ -25,6 +27,8 @@ from warpspace.scene.model import Scene
 
 logger = logging.getLogger(__name__)
 Say = Callable[[str], None]
+TIDY_S = 10.0
+"""Time between two searches for what closed tabs have left in memory."""
 NO_AUTHENTICATION = (
     "warning: {host} can be reached from other machines, and the app asks nobody for a password;"
     " whoever reaches it can use it"
@@ -76,6 +80,7 @@ class Viewer:
         self._sessions: dict[int, Session] = {}
         self._lock = threading.Lock()
         self._keeper = Keeper()
+        self._tidied = 0.0
         self._shared = Board(self._start) if shared else None
         self._server = _serve(self.address, self.port)
         self._server.on_client_connect(self._connect)
@@ -139,6 +144,14 @@ class Viewer:
                 self._keeper.keep(session.token, session.left())
         if session is not None:
             session.stop()
+            self._tidy()
+
+    def _tidy(self) -> None:
+        """Give back the memory of closed tabs, whose handles hold each other; not too often."""
+        now = time.monotonic()
+        if now - self._tidied > TIDY_S:
+            self._tidied = now
+            gc.collect()
 
     def stop(self) -> None:
         """End all sessions and the server."""
