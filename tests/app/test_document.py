@@ -170,8 +170,16 @@ def test_hostile_settings_are_clamped_or_left_out_and_named() -> None:
 
 @pytest.mark.parametrize(
     "numbers",
-    ["", "1,2,3", "nan," * 9 + "1", "0,0,0,0,0,0,0,0,1,0.4", "1e9,0,0,0,0,0,0,0,1,0.4"]
-    + ["5,5,5,0,0,0,0,0,1,9", "5,5,5,0,0,0,0,0,0,0.4", "5,5,5,0,0,0,0,0,1,x"],
+    [
+        "",
+        "1,2,3",
+        "nan," * 9 + "1",
+        "0,0,0,0,0,0,0,0,1,0.4",
+        "1e9,0,0,0,0,0,0,0,1,0.4",
+        "5,5,5,0,0,0,0,0,1,9",
+        "5,5,5,0,0,0,0,0,0,0.4",
+        "5,5,5,0,0,0,0,0,1,x",
+    ],
 )
 def test_cameras_that_see_nothing_are_not_taken(numbers: str) -> None:
     assert camera_of(f"camera={numbers}") is None
