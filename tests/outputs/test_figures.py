@@ -184,3 +184,15 @@ def test_a_poster_is_drawn() -> None:
     inside(drawing, (8000, 6000))
     image = Image.open(io.BytesIO(figure_bytes(drawing, "png")))
     assert image.size == (8000, 6000)
+
+
+@pytest.mark.parametrize("name", ["gains", "montecarlo", "ballbar"])
+def test_charts_stand_on_a_dark_ground_with_light_ink(name: str) -> None:
+    settings = FigureSettings(size=(900, 700), dark=True)
+    scene = load_scene("dvf5000_first")
+    image = Image.open(io.BytesIO(render_figure(name, [scene], settings, "png"))).convert("L")
+    levels = np.asarray(image)
+    assert np.median(levels) < 40
+    assert (levels > 200).mean() > 0.002
+    light = render_figure(name, [scene], FigureSettings(size=(900, 700)), "png")
+    assert np.median(np.asarray(Image.open(io.BytesIO(light)).convert("L"))) > 240

@@ -7,8 +7,7 @@ from matplotlib.lines import Line2D
 
 from warpspace.analysis.ballbar import Ballbar
 from warpspace.analysis.distribution import round_width
-from warpspace.outputs.charts.paper import KEY_COLOUR, SMALL, TEXT, sheet, style
-from warpspace.outputs.style import LIGHT
+from warpspace.outputs.charts.paper import SMALL, TEXT, ground, key_colour, sheet, style
 from warpspace.units import Array
 
 WIDTH_IN, HEIGHT_IN = 9.0, 6.6
@@ -47,11 +46,11 @@ def ballbar_chart(result: Ballbar, title: str, subtitle: str) -> Figure:
         _axes_names(axes, result.plane)
         angle = np.deg2rad(np.append(result.angle_deg, 360.0))
         radial = np.append(result.radial_um, result.radial_um[0])
-        axes.plot(*_polar(angle, NOMINAL + per_um * radial), color=KEY_COLOUR, linewidth=2.0)
+        axes.plot(*_polar(angle, NOMINAL + per_um * radial), color=key_colour(), linewidth=2.0)
         fitted = result.radius_um + _squareness_um(result, angle)
         axes.plot(
             *_polar(angle, NOMINAL + per_um * fitted),
-            color=LIGHT.accent,
+            color=ground().accent,
             linewidth=1.1,
             linestyle=(0, (4, 3)),
         )
@@ -75,7 +74,7 @@ def _rings(axes: Axes, ring_um: float, per_um: float) -> None:
     """Draw the nominal circle and rings of round deviations with their values."""
     angle = np.linspace(0.0, 2.0 * np.pi, 361)
     for step in range(-3, 4):
-        colour = LIGHT.ink if step == 0 else LIGHT.faint
+        colour = ground().ink if step == 0 else ground().faint
         width = 1.1 if step == 0 else 0.8
         radius = NOMINAL + per_um * ring_um * step
         axes.plot(*_polar(angle, radius), color=colour, linewidth=width)
@@ -85,10 +84,10 @@ def _rings(axes: Axes, ring_um: float, per_um: float) -> None:
             y,
             f"{step * ring_um:+g}" if step else "0",
             size=SMALL - 1.0,
-            color=LIGHT.muted,
+            color=ground().muted,
             ha="center",
             va="center",
-            bbox={"facecolor": LIGHT.paper, "edgecolor": "none", "pad": 0.6},
+            bbox={"facecolor": ground().paper, "edgecolor": "none", "pad": 0.6},
         )
 
 
@@ -97,7 +96,7 @@ def _axes_names(axes: Axes, plane: str) -> None:
     reach = NOMINAL + REACH + 0.03
     for name, (x, y) in zip(plane, ((1.0, 0.0), (0.0, 1.0)), strict=True):
         axes.plot(
-            [-reach * x, reach * x], [-reach * y, reach * y], color=LIGHT.faint, linewidth=0.8
+            [-reach * x, reach * x], [-reach * y, reach * y], color=ground().faint, linewidth=0.8
         )
         for sign, mark in ((1.0, "+"), (-1.0, "−")):
             axes.text(
@@ -129,7 +128,7 @@ def _numbers(figure: Figure, result: Ballbar, ring_um: float, per_um: float) -> 
         ),
     )
     for name, value in rows:
-        figure.text(left, y, name, size=TEXT, color=LIGHT.muted)
+        figure.text(left, y, name, size=TEXT, color=ground().muted)
         figure.text(0.975, y, value.replace("-", "−"), size=TEXT, weight="bold", ha="right")
         y -= 0.045
     factor = per_um * result.radius_mm * 1e3
@@ -142,15 +141,15 @@ def _numbers(figure: Figure, result: Ballbar, ring_um: float, per_um: float) -> 
         "the model has no backlash or following error.",
     )
     for text in notes:
-        figure.text(left, y, text, size=SMALL, color=LIGHT.muted)
+        figure.text(left, y, text, size=SMALL, color=ground().muted)
         y -= 0.034
     figure.legend(
         handles=[
-            Line2D([], [], color=KEY_COLOUR, linewidth=2.0, label="radial deviation"),
+            Line2D([], [], color=key_colour(), linewidth=2.0, label="radial deviation"),
             Line2D(
                 [],
                 [],
-                color=LIGHT.accent,
+                color=ground().accent,
                 linewidth=1.1,
                 linestyle=(0, (4, 3)),
                 label="mean radius and squareness alone",

@@ -10,15 +10,15 @@ from warpspace.analysis.contributions import Contributions
 from warpspace.analysis.gains import Gain
 from warpspace.machine.parameters import parameter
 from warpspace.outputs.charts.paper import (
-    BAR_COLOUR,
-    KEY_COLOUR,
     SMALL,
     TEXT,
+    bar_colour,
+    ground,
+    key_colour,
     quiet,
     sheet,
     style,
 )
-from warpspace.outputs.style import LIGHT
 
 WIDTH_IN = 11.0
 ROW_IN = 0.235
@@ -51,7 +51,7 @@ def gains_chart(
             left=2.55 / WIDTH_IN, right=0.98, top=top, bottom=0.62 / height, wspace=0.09
         )
         rows = range(len(gains))
-        colours = [KEY_COLOUR if gain.is_key else BAR_COLOUR for gain in gains]
+        colours = [key_colour() if gain.is_key else bar_colour() for gain in gains]
         columns = (
             ("|E|", [gain.norm for gain in gains]),
             ("x", [gain.x for gain in gains]),
@@ -77,7 +77,7 @@ def _legend(figure: Figure, top: float, text: str) -> None:
     """Say what the two colours mean, above the bars."""
     height = float(figure.get_figheight())
     figure.legend(
-        handles=[Patch(color=KEY_COLOUR, label=text), Patch(color=BAR_COLOUR, label="others")],
+        handles=[Patch(color=key_colour(), label=text), Patch(color=bar_colour(), label="others")],
         loc="lower left",
         bbox_to_anchor=(2.5 / WIDTH_IN, top + 0.16 / height),
         ncols=2,
@@ -94,7 +94,7 @@ def _gain_panel(panel: Axes, name: str, largest: float, *, signed: bool) -> None
     quiet(panel)
     panel.spines["left"].set_visible(False)
     panel.tick_params(axis="y", length=0)
-    panel.axvline(0.0, color=LIGHT.muted, linewidth=0.8)
+    panel.axvline(0.0, color=ground().muted, linewidth=0.8)
     panel.set_xlim(-1.05 * largest if signed else 0.0, 1.05 * largest)
     panel.set_title(name, size=TEXT, weight="bold", loc="left" if name == "|E|" else "center")
     panel.set_xlabel("µm per µm or µrad", size=SMALL)
@@ -131,13 +131,13 @@ def contributions_chart(found: Contributions, title: str, subtitle: str) -> Figu
         )
         places = range(len(rows))
         share = [100.0 * row.share for row in rows]
-        axes[0].barh(places, share, height=0.7, color=KEY_COLOUR, label="exact")
+        axes[0].barh(places, share, height=0.7, color=key_colour(), label="exact")
         sampled = [100.0 * row.sampled_share for row in rows]
         axes[0].plot(
             sampled,
             places,
             "|",
-            color=LIGHT.ink,
+            color=ground().ink,
             markersize=9,
             label="from 20,000 sampled machines",
         )
@@ -160,11 +160,13 @@ def contributions_chart(found: Contributions, title: str, subtitle: str) -> Figu
                 total,
                 xerr=spread,
                 height=0.7,
-                color=BAR_COLOUR,
+                color=bar_colour(),
                 label="total, 95 % interval",
-                error_kw={"elinewidth": 0.9, "ecolor": LIGHT.muted},
+                error_kw={"elinewidth": 0.9, "ecolor": ground().muted},
             )
-            axes[1].plot(first, places, "o", color=LIGHT.ink, markersize=3.2, label="first order")
+            axes[1].plot(
+                first, places, "o", color=ground().ink, markersize=3.2, label="first order"
+            )
             _share_panel(axes[1], "Sobol index of the mean |E| of a machine", "")
             axes[1].set_xlim(left=0.0)
         _name_rows(axes[0], [row.key for row in rows])

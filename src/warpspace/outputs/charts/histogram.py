@@ -9,12 +9,10 @@ from matplotlib.figure import Figure
 
 from warpspace.analysis.distribution import Probability
 from warpspace.analysis.montecarlo import MonteCarlo
-from warpspace.outputs.charts.paper import KEY_COLOUR, SMALL, TEXT, quiet, sheet, style
+from warpspace.outputs.charts.paper import SMALL, TEXT, ground, key_colour, quiet, sheet, style
 from warpspace.outputs.style import LIGHT
 
 WIDTH_IN, HEIGHT_IN = 9.0, 5.4
-BEYOND = "#e3c3c6"
-_PAPER: Any = {"facecolor": LIGHT.paper, "edgecolor": "none", "pad": 1.5}
 
 
 def montecarlo_chart(
@@ -46,8 +44,8 @@ def montecarlo_chart(
                 value,
                 high - low,
                 align="edge",
-                color=BEYOND if beyond else "#a9c4de",
-                edgecolor=LIGHT.paper,
+                color=_bin_colour(beyond=beyond),
+                edgecolor=ground().paper,
                 linewidth=0.5,
             )
         quiet(axes, "y")
@@ -57,14 +55,14 @@ def montecarlo_chart(
         axes.set_xlim(0.0, max(last, 1.05 * (spec or 0.0), 1.05 * (printed_um or 0.0)))
         axes.set_ylim(0.0, 1.06 * float(percent.max()))
         marks = [
-            ("mode", result.mode_um, LIGHT.ink, "-"),
-            ("mean", result.mean_um, KEY_COLOUR, "-"),
-            ("P95", result.p95_um, LIGHT.muted, "-"),
+            ("mode", result.mode_um, ground().ink, "-"),
+            ("mean", result.mean_um, key_colour(), "-"),
+            ("P95", result.p95_um, ground().muted, "-"),
         ]
         if printed_um is not None:
-            marks.append(("thesis", printed_um, LIGHT.series[4], "--"))
+            marks.append(("thesis", printed_um, ground().series[4], "--"))
         if spec is not None:
-            marks.append(("spec", spec, LIGHT.accent, "-"))
+            marks.append(("spec", spec, ground().accent, "-"))
         _mark(axes, marks)
         if result.probability is not None:
             _tell(axes, result.probability)
@@ -112,7 +110,7 @@ def _mark(axes: Axes, marks: Sequence[tuple[str, float, str, str]]) -> None:
             va="bottom",
             transform=axes.get_xaxis_transform(),
             zorder=5,
-            bbox={**_PAPER, "pad": 0.4},
+            bbox=_paper(0.4),
         )
 
 
@@ -128,7 +126,7 @@ def _tell(axes: Axes, probability: Probability) -> None:
         va="top",
         size=TEXT + 2.0,
         weight="bold",
-        bbox=_PAPER,
+        bbox=_paper(),
     )
     axes.text(
         0.985,
@@ -138,6 +136,18 @@ def _tell(axes: Axes, probability: Probability) -> None:
         ha="right",
         va="top",
         size=SMALL,
-        color=LIGHT.muted,
-        bbox=_PAPER,
+        color=ground().muted,
+        bbox=_paper(),
     )
+
+
+def _bin_colour(*, beyond: bool) -> str:
+    """Colour of a bin within or beyond the specification."""
+    if ground() is LIGHT:
+        return "#e3c3c6" if beyond else "#a9c4de"
+    return "#7a4a52" if beyond else "#3f6a92"
+
+
+def _paper(pad: float = 1.5) -> dict[str, Any]:
+    """Give the ground behind a label."""
+    return {"facecolor": ground().paper, "edgecolor": "none", "pad": pad}

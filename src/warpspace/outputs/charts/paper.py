@@ -1,5 +1,8 @@
 """The sheet charts are drawn on, and writing them so that the same chart is the same file."""
 
+from collections.abc import Generator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
@@ -8,37 +11,67 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from warpspace.outputs.files import check_target, write_atomically
-from warpspace.outputs.style import FONT, LIGHT
+from warpspace.outputs.style import FONT, LIGHT, Theme
 
 CHART_ENDINGS = (".png", ".svg", ".pdf")
 DPI = 160.0
 TITLE, SUBTITLE, TEXT, SMALL = 13.0, 9.5, 9.5, 8.5
-KEY_COLOUR, BAR_COLOUR = LIGHT.series[0], "#b4bfcc"
+_THEME: ContextVar[Theme] = ContextVar("theme of the charts", default=LIGHT)
 # Dates and versions would make every run a new file.
 _METADATA: dict[str, dict[str, Any]] = {
     ".png": {"Software": None},
     ".svg": {"Date": None, "Creator": None},
     ".pdf": {"CreationDate": None, "Creator": None, "Producer": None},
 }
-_RC: Any = {
-    "font.family": [FONT],
-    "font.size": TEXT,
-    "svg.hashsalt": "warpspace",
-    "svg.fonttype": "path",
-    "pdf.fonttype": 42,
-    "axes.edgecolor": LIGHT.muted,
-    "axes.labelcolor": LIGHT.ink,
-    "text.color": LIGHT.ink,
-    "xtick.color": LIGHT.muted,
-    "ytick.color": LIGHT.muted,
-    "xtick.labelcolor": LIGHT.ink,
-    "ytick.labelcolor": LIGHT.ink,
-}
+
+
+@contextmanager
+def on_ground(theme: Theme) -> Generator[None]:
+    """Draw the charts inside on the ground of a theme; they are light elsewhere."""
+    token = _THEME.set(theme)
+    try:
+        yield
+    finally:
+        _THEME.reset(token)
+
+
+def ground() -> Theme:
+    """Give the theme that charts are drawn on here."""
+    return _THEME.get()
+
+
+def key_colour() -> str:
+    """Colour of what matters."""
+    return ground().series[0]
+
+
+def bar_colour() -> str:
+    """Colour of the other bars."""
+    return "#b4bfcc" if ground() is LIGHT else "#56616f"
 
 
 def style() -> Any:
     """Give the context that charts are drawn and written in."""
-    return mpl.rc_context(_RC)
+    theme = ground()
+    return mpl.rc_context(
+        {
+            "font.family": [FONT],
+            "font.size": TEXT,
+            "svg.hashsalt": "warpspace",
+            "svg.fonttype": "path",
+            "pdf.fonttype": 42,
+            "axes.facecolor": theme.paper,
+            "axes.edgecolor": theme.muted,
+            "axes.labelcolor": theme.ink,
+            "legend.facecolor": theme.paper,
+            "legend.edgecolor": theme.faint,
+            "text.color": theme.ink,
+            "xtick.color": theme.muted,
+            "ytick.color": theme.muted,
+            "xtick.labelcolor": theme.ink,
+            "ytick.labelcolor": theme.ink,
+        }
+    )
 
 
 def sheet(
@@ -59,10 +92,10 @@ def sheet(
     top : float
         Upper end of the room for axes, share of the height.
     """
-    figure = Figure(figsize=(width, height), dpi=DPI, facecolor=LIGHT.paper)
+    figure = Figure(figsize=(width, height), dpi=DPI, facecolor=ground().paper)
     left = 0.3 / width
     figure.text(left, 1.0 - 0.2 / height, title, size=TITLE, weight="bold", va="top")
-    figure.text(left, 1.0 - 0.5 / height, subtitle, size=SUBTITLE, color=LIGHT.muted, va="top")
+    figure.text(left, 1.0 - 0.5 / height, subtitle, size=SUBTITLE, color=ground().muted, va="top")
     return figure, 1.0 - top_in / height
 
 
@@ -71,7 +104,7 @@ def quiet(axes: Axes, grid: str = "x") -> None:
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
     axes.tick_params(length=3.0, width=0.8)
-    axes.grid(visible=True, axis=grid, color=LIGHT.faint, linewidth=0.7)  # pyright: ignore[reportArgumentType]
+    axes.grid(visible=True, axis=grid, color=ground().faint, linewidth=0.7)  # pyright: ignore[reportArgumentType]
     axes.set_axisbelow(True)
 
 

@@ -6,12 +6,12 @@ from matplotlib.figure import Figure
 
 from warpspace import __version__
 from warpspace.analysis.gains import DEFAULT_SHARE
-from warpspace.exceptions import OptionError
 from warpspace.outputs.charts import ballbar_chart, gains_chart, montecarlo_chart
+from warpspace.outputs.charts.paper import on_ground
 from warpspace.outputs.figures.content import Drawing
 from warpspace.outputs.figures.settings import FigureSettings
 from warpspace.outputs.figures.sheet import LOOP_WORDS, metadata
-from warpspace.outputs.style import FONT, LIGHT
+from warpspace.outputs.style import FONT
 from warpspace.scene import verbs
 from warpspace.scene.model import Scene
 from warpspace.scene.pipeline import choose_view
@@ -26,7 +26,8 @@ def draw_gains(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool
     found = verbs.gains(scene, loop=settings.loop, over_travel=True)
     title = f"Error gains: {scene.machine.title}"
     where = f"{_loop(scene, settings)} · largest absolute gains over the travel"
-    figure = gains_chart(found, title, where, DEFAULT_SHARE)
+    with on_ground(settings.theme):
+        figure = gains_chart(found, title, where, DEFAULT_SHARE)
     return _finish(figure, title, scene, settings, "gains")
 
 
@@ -39,7 +40,9 @@ def draw_montecarlo(scenes: Sequence[Scene], settings: FigureSettings, *, exact:
         f"{_loop(scene, settings)} · {result.plan.samples:,} machines, one random point each ·"
         f" {result.draws.distribution} over the tolerances · seed {result.plan.seed}"
     ).replace(",", " ", 1)
-    return _finish(montecarlo_chart(result, title, what), title, scene, settings, "montecarlo")
+    with on_ground(settings.theme):
+        figure = montecarlo_chart(result, title, what)
+    return _finish(figure, title, scene, settings, "montecarlo")
 
 
 def draw_ballbar(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
@@ -49,7 +52,9 @@ def draw_ballbar(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bo
     middle = ", ".join(f"{name} {value:g}" for name, value in result.centre.items())
     title = f"Circular test: {scene.title}"
     where = f"{PLANE} plane · radius {RADIUS_MM:g} mm · centre {middle}"
-    return _finish(ballbar_chart(result, title, where), title, scene, settings, "ballbar")
+    with on_ground(settings.theme):
+        figure = ballbar_chart(result, title, where)
+    return _finish(figure, title, scene, settings, "ballbar")
 
 
 def _loop(scene: Scene, settings: FigureSettings) -> str:
@@ -61,14 +66,13 @@ def _finish(
     figure: Figure, title: str, scene: Scene, settings: FigureSettings, name: str
 ) -> Drawing:
     """Give a chart the width asked for (its height follows) and say where it comes from."""
-    if settings.dark:
-        raise OptionError(f"figure {name!r}: charts are drawn on light ground only")
     width, height = figure.get_size_inches()
     dpi = settings.size[0] / width
     figure.set_size_inches(round(width * dpi) / dpi, round(height * dpi) / dpi)
     figure.set_dpi(dpi)
     figure.text(
         1.0 - 0.12 / width, 0.08 / height, f"warpspace {__version__} · scene {scene.name}",
-        size=6.5, color=LIGHT.muted, ha="right", va="bottom", family=[FONT], parse_math=False,
+        size=6.5, color=settings.theme.muted, ha="right", va="bottom", family=[FONT],
+        parse_math=False,
     )  # fmt: skip
     return Drawing(figure, title, metadata(title, [scene], settings, 1.0, name))
