@@ -78,10 +78,6 @@ class History(Generic[S]):
         past = self.past if same else (*self.past, Step(self.present, what))[-self.limit :]
         return replace(self, present=state, past=past, future=(), changed_at=at)
 
-    def amend(self, state: S) -> "History[S]":
-        """Replace the present without a step, for what is not worth undoing."""
-        return replace(self, present=state)
-
     def undo(self) -> "History[S]":
         """Go back one step; the same one where there is none."""
         if not self.past:

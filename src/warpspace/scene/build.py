@@ -1,6 +1,6 @@
 """From a raw document to a scene: every section validated, everything cross-checked."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -79,9 +79,10 @@ def build_scene(
     points = problems.validate("points_mm", "points_mm", raw.get("points_mm", {}))
     view = problems.validate("view", "view", raw.get("view", {}))
     workspace = _workspace(problems.table("workspace", raw.get("workspace")), machine, problems)
-    _reference_axis(raw, machine, convention, problems)
-    errors = _errors(raw.get("errors"), machine, workspace, folder, problems)
-    tolerances = _tolerances(raw.get("tolerances"), machine, problems)
+    fixed = getattr(convention, "reference_axis", "free") == "fixed"
+    refused = machine.reference_keys if fixed else ()
+    errors = _errors(raw.get("errors"), machine, refused, workspace, folder, problems)
+    tolerances = _tolerances(raw.get("tolerances"), machine, refused, problems)
     reference = _reference(view, workspace, problems)
     if problems.lines:
         raise SceneError(source, problems.lines)
@@ -120,8 +121,13 @@ def _workspace(raw: Raw, machine: Machine, problems: Problems) -> Workspace:
     return Workspace(ranges)
 
 
-def _known_parameters(raw: object, section: str, machine: Machine, problems: Problems) -> Raw:
-    """Give the entries of a table whose keys are parameters of the machine."""
+def _known_parameters(
+    raw: object, section: str, machine: Machine, refused: Sequence[str], problems: Problems
+) -> Raw:
+    """Give the entries of a table whose keys are parameters of the machine.
+
+    Refused are the rotations of the reference axis, nearly always a slip, unless the file frees it.
+    """
     known: dict[str, object] = {}
     for key, value in problems.table(section, raw).items():
         if section == "tolerances" and key == "default":
@@ -133,31 +139,28 @@ def _known_parameters(raw: object, section: str, machine: Machine, problems: Pro
             problems.add(f"{section}.{key}", f"the machine {machine.chain} has no axis {axis}")
         else:
             known[key] = value
+        if key in refused:
+            usual = [name for name in machine.parameter_keys if PARAMETERS[name].is_constant]
+            problems.add(
+                f"{section}.{key}",
+                f"is zero by definition of the frame, {key[3]} being the reference axis"
+                f'{near_miss(key, usual)} ([convention] reference_axis = "free" allows it)',
+                value,
+            )
     return known
 
 
-def _reference_axis(raw: Raw, machine: Machine, convention: Any, problems: Problems) -> None:
-    """Refuse rotations of the reference axis, nearly always a slip, unless the file frees it."""
-    if convention is None or convention.reference_axis == "free":
-        return
-    usual = [key for key in machine.parameter_keys if key[2] == "0"]
-    for section in ("errors", "tolerances"):
-        for key, value in Problems().table(section, raw.get(section)).items():
-            if key in machine.reference_keys:
-                problems.add(
-                    f"{section}.{key}",
-                    f"is zero by definition of the frame, {key[3]} being the reference axis"
-                    f'{near_miss(key, usual)} ([convention] reference_axis = "free" allows it)',
-                    value,
-                )
-
-
 def _errors(
-    raw: object, machine: Machine, workspace: Workspace, folder: Path | None, problems: Problems
+    raw: object,
+    machine: Machine,
+    refused: Sequence[str],
+    workspace: Workspace,
+    folder: Path | None,
+    problems: Problems,
 ) -> functions.ErrorSet:
     """Read the error functions, each over the range of its axis."""
     found: dict[str, functions.ErrorFunction] = {}
-    for key, value in _known_parameters(raw, "errors", machine, problems).items():
+    for key, value in _known_parameters(raw, "errors", machine, refused, problems).items():
         where = f"errors.{key}"
         spec = problems.validate("error", where, value)
         if spec is None:
@@ -227,7 +230,9 @@ def _csv_table(
     return functions.Table(span, tuple(points))
 
 
-def _tolerances(raw: object, machine: Machine, problems: Problems) -> ToleranceSet:
+def _tolerances(
+    raw: object, machine: Machine, refused: Sequence[str], problems: Problems
+) -> ToleranceSet:
     """Read the tolerance set."""
     table = problems.table("tolerances", raw)
     default: dict[str, float] = {}
@@ -237,7 +242,7 @@ def _tolerances(raw: object, machine: Machine, problems: Problems) -> ToleranceS
             values = {name: getattr(section, name) for name in TOLERANCE_CLASSES}
             default = {name: value for name, value in values.items() if value is not None}
     own: dict[str, Tolerance] = {}
-    for key, value in _known_parameters(table, "tolerances", machine, problems).items():
+    for key, value in _known_parameters(table, "tolerances", machine, refused, problems).items():
         valid = problems.validate("tolerance", f"tolerances.{key}", value)
         if valid is not None:
             narrow = isinstance(valid, float | int)
