@@ -136,7 +136,7 @@ class LiveModel:
         response = self.response(state)
         grid = response.grid
         amplitudes = np.fromiter(state.heard.values(), float, len(state.amplitudes))
-        field = response.basis.evaluate(amplitudes)
+        field = response.basis.evaluate(amplitudes, orientation=state.look.tilts)
         found = statistics(field)
         factor = state.exaggeration or auto_exaggeration(found.max_um, grid.longest_edge_mm)
         values = shown_values(state, field)
@@ -154,7 +154,11 @@ class LiveModel:
                 TraceLines(
                     group,
                     group.nominal_mm,
-                    deform(basis.nominal_mm, basis.evaluate(amplitudes).error_um, factor),
+                    deform(
+                        basis.nominal_mm,
+                        basis.evaluate(amplitudes, orientation=False).error_um,
+                        factor,
+                    ),
                 )
                 for group, basis in zip(response.groups, response.trace_bases, strict=True)
             ),

@@ -65,6 +65,11 @@ class Look:
     slices_mm: Mapping[str, float] = field(default_factory=dict[str, float])
     follow: bool = False
 
+    @property
+    def tilts(self) -> bool:
+        """Whether the orientation error of the tool axis is coloured, not the position error."""
+        return self.quantity == "orientation"
+
     def with_choice(self, **names: str) -> "Look":
         """Choose surface, quantity or range_mode; unknown names change nothing."""
         allowed: Mapping[str, Iterable[str]] = {

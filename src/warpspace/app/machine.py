@@ -10,7 +10,7 @@ from warpspace.app.look import linear_positions
 from warpspace.app.mapping import shown_values
 from warpspace.app.state import AppState
 from warpspace.field.evaluate import build_basis
-from warpspace.geometry.deform import bounds_mm, deform
+from warpspace.geometry.deform import deform
 from warpspace.kinematics import transforms
 from warpspace.kinematics.bodies import BodyMotion
 from warpspace.kinematics.model import complete_coordinates
@@ -150,4 +150,4 @@ def machine_room_mm(frame: Frame) -> Array:
         place_points(motions[body.frame], body.vertices_mm, 0.0)
         for body in load_bodies(frame.state.scene.machine)
     ]
-    return np.concatenate([bounds_mm(frame.grid.nominal_mm), *placed])
+    return np.concatenate([frame.grid.bounds_mm, *placed])

@@ -15,11 +15,13 @@ SYMBOLS = {"position": ("E", MICROMETRE), "orientation": ("φ", MICRORADIAN)}
 
 def shown_error(state: AppState, field: ErrorField) -> Array:
     """Give the vectors that are coloured, [..., 3], µm or µrad."""
-    return field.orientation_urad if state.look.quantity == "orientation" else field.error_um
+    return field.orientation_urad if state.look.tilts else field.error_um
 
 
 def shown_values(state: AppState, field: ErrorField) -> Array:
     """Give the values that are coloured, [...], µm or µrad."""
+    if state.component == "norm" and not state.look.tilts:
+        return field.norm_um
     return component_values(shown_error(state, field), state.component)
 
 

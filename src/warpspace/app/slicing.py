@@ -63,7 +63,7 @@ class SliceSource:
         found: list[SliceMap] = []
         for axis, at in slice_positions(state.scene, state.look, state.machine).items():
             grid, basis = self._basis(state, axis, at)
-            field = basis.evaluate(amplitudes)
+            field = basis.evaluate(amplitudes, orientation=state.look.tilts)
             drawn = deform(field.nominal_mm, field.error_um, exaggeration)
             found.append(SliceMap(axis, at, grid, shown_values(state, field), drawn))
         return tuple(found)

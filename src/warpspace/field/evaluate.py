@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import reduce
+from functools import cached_property, reduce
 
 import numpy as np
 
@@ -18,7 +18,7 @@ MAX_RESPONSES = 3_000_000
 """Responses (parameters × points) that are held at a time where no basis is asked for."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ErrorField:
     """Errors over a batch of points.
 
@@ -30,14 +30,15 @@ class ErrorField:
         Position error, actual − nominal.
     orientation_urad : ndarray, [..., 3], µrad
         Orientation error of the tool axis: the small rotation vector that turns it, right-hand
-        rule. It has no part about the tool axis itself; its norm is the tilt.
+        rule. It has no part about the tool axis itself; its norm is the tilt. Not a number where it
+        was not asked for.
     """
 
     nominal_mm: Array
     error_um: Array
     orientation_urad: Array
 
-    @property
+    @cached_property
     def norm_um(self) -> Array:
         """Length of the position error, [...], µm."""
         return np.sqrt(np.einsum("...i,...i->...", self.error_um, self.error_um))
@@ -63,12 +64,14 @@ class ErrorBasis:
     position: Array
     orientation: Array
 
-    def evaluate(self, amplitudes: Array) -> ErrorField:
+    def evaluate(self, amplitudes: Array, *, orientation: bool = True) -> ErrorField:
         """Add up the response to a vector of amplitudes.
 
         Parameters
         ----------
         amplitudes : ndarray, [K], µm or µrad
+        orientation : bool, optional
+            Whether the orientation error is wanted too, at twice the work.
 
         Returns
         -------
@@ -77,7 +80,9 @@ class ErrorBasis:
         return ErrorField(
             self.nominal_mm,
             self._combine(amplitudes, self.position),
-            self._combine(amplitudes, self.orientation),
+            self._combine(amplitudes, self.orientation)
+            if orientation
+            else np.broadcast_to(np.nan, self.nominal_mm.shape),
         )
 
     def _combine(self, amplitudes: Array, response: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from operator import index as whole_number
 
 import numpy as np
@@ -39,7 +40,7 @@ class Workspace:
         return Workspace({**self.ranges, **moved})
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Grid:
     """Nodes of the working volume.
 
@@ -62,14 +63,19 @@ class Grid:
     nominal_mm: Array
     point_mm: Array
 
-    @property
-    def extent_mm(self) -> Array:
-        """Edge lengths of the nominal volume in R, [3], mm: that of its corners, for it is flat."""
+    @cached_property
+    def bounds_mm(self) -> Array:
+        """Lower and upper corner of the nominal volume in R, [2, 3], mm; its faces are flat."""
         x, y, z = (max(n - 1, 1) for n in self.shape)
-        corners = self.nominal_mm[::x, ::y, ::z]
-        return np.ptp(corners.reshape(-1, 3), axis=0)
+        corners = self.nominal_mm[::x, ::y, ::z].reshape(-1, 3)
+        return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
-    @property
+    @cached_property
+    def extent_mm(self) -> Array:
+        """Edge lengths of the nominal volume in R, [3], mm."""
+        return self.bounds_mm[1] - self.bounds_mm[0]
+
+    @cached_property
     def longest_edge_mm(self) -> float:
         """Longest edge of the nominal volume, mm."""
         return float(self.extent_mm.max())

@@ -6,6 +6,7 @@ with a node scale of `SCENE_PER_MM`: one scene unit is 100 mm, since viser clips
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -16,6 +17,8 @@ from warpspace.app.tonemap import Rgb, line_colour
 from warpspace.units import Array
 
 SCENE_PER_MM = 0.01
+NOTHING = np.zeros((1, 2, 3), np.float32)
+"""A piece of line without length, for handles that have nothing to show: viser wants some."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,9 +59,12 @@ def palette(frame: Frame) -> Palette:
     return DARK if frame.state.shown.dark else LIGHT
 
 
+@lru_cache(maxsize=64)
 def colour_bytes(rgb: Rgb) -> NDArray[np.uint8]:
-    """Give the bytes of a line colour as viser's handles take them, [3]."""
-    return np.array(line_colour(rgb), dtype=np.uint8)
+    """Give the bytes of a line colour as viser's handles take them, [3], always the same array."""
+    found = np.array(line_colour(rgb), dtype=np.uint8)
+    found.flags.writeable = False
+    return found
 
 
 def pieces(points: Array, segments: NDArray[np.intp]) -> NDArray[np.float32]:

@@ -5,8 +5,10 @@ from typing import Any
 import numpy as np
 from viser import SceneApi
 
-from warpspace.app.layers import SCENE_PER_MM, colour_bytes, palette
+from warpspace.app.kept import Same
+from warpspace.app.layers import NOTHING, SCENE_PER_MM, colour_bytes, palette
 from warpspace.app.layers.axes import AWAY
+from warpspace.app.layers.drawn import Drawn
 from warpspace.app.legend import spell_factor
 from warpspace.app.live import Frame
 from warpspace.app.machine import machine_room_mm
@@ -18,7 +20,6 @@ from warpspace.geometry.annotations import (
     worst_point,
 )
 from warpspace.geometry.arrows import build_arrows
-from warpspace.geometry.deform import bounds_mm
 from warpspace.units import MICROMETRE, Array
 
 RADIUS, HEAD, BALL = 0.0032, 0.034, 0.009
@@ -30,10 +31,16 @@ CORNERS = 8
 
 def worst_text(frame: Frame) -> str:
     """Spell the largest value of what is coloured."""
-    value = worst_point(frame.values, frame.grid.nominal_mm, frame.drawn_mm).value
-    if frame.scale.unit == MICROMETRE:
+    return _spell_value(
+        worst_point(frame.values, frame.grid.nominal_mm, frame.drawn_mm).value, frame.scale.unit
+    )
+
+
+def _spell_value(value: float, unit: str) -> str:
+    """Spell a largest value with its unit."""
+    if unit == MICROMETRE:
         return f"max {spell_micrometres(value)}"
-    return f"max {value:.1f} {frame.scale.unit}".replace("-", "−")
+    return f"max {value:.1f} {unit}".replace("-", "−")
 
 
 def bar_room_mm(frame: Frame) -> tuple[Array, float]:
@@ -41,9 +48,8 @@ def bar_room_mm(frame: Frame) -> tuple[Array, float]:
     if frame.state.machine.shown:
         points = machine_room_mm(frame)
         return points.min(axis=0), float(np.ptp(points, axis=0).max())
-    low, _ = bounds_mm(frame.grid.nominal_mm)
     longest = frame.grid.longest_edge_mm
-    return low - AWAY * longest * np.array([1.0, 1.0, 0.0]), longest
+    return frame.grid.bounds_mm[0] - AWAY * longest * np.array([1.0, 1.0, 0.0]), longest
 
 
 def bar_lines(frame: Frame) -> tuple[tuple[ScaleBar, ScaleBar], Array, Array]:
@@ -87,119 +93,127 @@ class AnnotationsLayer:
 
     def __init__(self, scene: SceneApi, frame: Frame) -> None:
         self._scene = scene
-        self._dark = frame.state.shown.dark
-        self._arrows: Any = None
+        self._arrows: Drawn | None = None
         self._corner_labels = [
             self._label(f"/marks/corner{n}", "bottom-center") for n in range(CORNERS)
         ]
-        self._ball: Any = None
+        self._ball: Drawn | None = None
         self._worst = self._label("/marks/max", "bottom-center")
-        self._bars = scene.add_line_segments(
-            "/marks/bars",
-            np.zeros((1, 2, 3), np.float32),
-            colour_bytes(palette(frame).edge),
-            thickness=2.4,
-            thickness_units="screen",
-            scale=SCENE_PER_MM,
+        self._bars = Drawn(
+            scene.add_line_segments(
+                "/marks/bars",
+                NOTHING,
+                colour_bytes(palette(frame).edge),
+                thickness=2.4,
+                thickness_units="screen",
+                scale=SCENE_PER_MM,
+            )
         )
         self._bar_labels = [
             self._label(f"/marks/bar{n}", "center-left", hidden=False) for n in range(2)
         ]
+        self._bars_for: tuple[object, ...] = ()
         self.show(frame)
 
-    def _label(self, name: str, anchor: Any, *, hidden: bool = True) -> Any:
+    def _label(self, name: str, anchor: Any, *, hidden: bool = True) -> Drawn:
         """Add a label without text yet; one that the map may hide, or one always in front."""
-        return self._scene.add_label(
-            name, "", visible=False, font_screen_scale=0.8, anchor=anchor, depth_test=hidden
+        return Drawn(
+            self._scene.add_label(
+                name, "", visible=False, font_screen_scale=0.8, anchor=anchor, depth_test=hidden
+            )
         )
 
     def show(self, frame: Frame) -> None:
         """Follow the frame."""
-        if frame.state.shown.dark != self._dark:
-            self._dark = frame.state.shown.dark
-            for handle in (self._arrows, self._ball):
-                if handle is not None:
-                    handle.color = palette(frame).edge
         self._show_arrows(frame)
         self._show_worst(frame)
         self._show_bars(frame)
 
     def _show_arrows(self, frame: Frame) -> None:
         """Draw the displacement of the corners."""
-        on = frame.state.look.arrows
-        if self._arrows is not None:
-            self._arrows.visible = on
-        if not on:
-            for label in self._corner_labels:
-                label.visible = False
+        if not frame.state.look.arrows:
+            for part in (*self._corner_labels, *([self._arrows] if self._arrows else ())):
+                part.put(visible=False)
             return
         arrows = corner_arrows(
             frame.grid.shape, frame.grid.nominal_mm, frame.field.error_um, frame.exaggeration
         )
         for label in self._corner_labels[len(arrows.norm_um) :]:
-            label.visible = False
+            label.put(visible=False)
         longest = frame.grid.longest_edge_mm
         vertices, triangles = build_arrows(
             arrows.start_mm, arrows.end_mm, RADIUS * longest, HEAD * longest
         )
-        if self._arrows is None or len(self._arrows.vertices) != len(vertices):
-            self._arrows = self._scene.add_mesh_simple(
-                "/marks/arrows",
-                vertices.astype(np.float32),
-                triangles.astype(np.uint32),
-                color=palette(frame).edge,
-                scale=SCENE_PER_MM,
-                cast_shadow=False,
-                receive_shadow=False,
+        if self._arrows is None or len(self._arrows.handle.vertices) != len(vertices):
+            self._arrows = Drawn(
+                self._scene.add_mesh_simple(
+                    "/marks/arrows",
+                    vertices.astype(np.float32),
+                    triangles.astype(np.uint32),
+                    color=palette(frame).edge,
+                    scale=SCENE_PER_MM,
+                    cast_shadow=False,
+                    receive_shadow=False,
+                )
             )
-        else:
-            self._arrows.vertices = vertices.astype(np.float32)
+        self._arrows.put(
+            vertices=vertices.astype(np.float32), color=palette(frame).edge, visible=True
+        )
         for label, text, at in zip(
             self._corner_labels, arrows.texts, arrows.label_mm, strict=False
         ):
-            label.text = text
-            label.position = at * SCENE_PER_MM
-            label.visible = True
+            label.put(text=text, position=at * SCENE_PER_MM, visible=True)
 
     def _show_worst(self, frame: Frame) -> None:
         """Mark the largest value."""
-        on = frame.state.look.worst and bool(np.any(frame.values))
-        self._worst.visible = on
+        found = worst_point(frame.values, frame.grid.nominal_mm, frame.drawn_mm)
+        on = frame.state.look.worst and found.value != 0.0
+        self._worst.put(visible=on)
         if self._ball is not None:
-            self._ball.visible = on
+            self._ball.put(visible=on)
         if not on:
             return
         longest = frame.grid.longest_edge_mm
-        found = worst_point(frame.values, frame.grid.nominal_mm, frame.drawn_mm)
         if self._ball is None:
-            self._ball = self._scene.add_icosphere(
-                "/marks/ball",
-                BALL * longest * SCENE_PER_MM,
-                color=palette(frame).edge,
-                cast_shadow=False,
-                receive_shadow=False,
+            self._ball = Drawn(
+                self._scene.add_icosphere(
+                    "/marks/ball",
+                    BALL * longest * SCENE_PER_MM,
+                    color=palette(frame).edge,
+                    cast_shadow=False,
+                    receive_shadow=False,
+                )
             )
-        self._ball.position = found.drawn_mm * SCENE_PER_MM
-        middle = frame.grid.nominal_mm.reshape(-1, 3).mean(axis=0)
-        outwards = np.sign(found.nominal_mm - middle) * (1.0, 1.0, 0.0)
-        self._worst.text = worst_text(frame)
-        self._worst.position = (found.drawn_mm + 0.03 * longest * outwards) * SCENE_PER_MM
+        self._ball.put(position=found.drawn_mm * SCENE_PER_MM, color=palette(frame).edge)
+        middle = frame.grid.bounds_mm.mean(axis=0)
+        outwards = np.sign(np.round(found.nominal_mm - middle, 9)) * (1.0, 1.0, 0.0)
+        self._worst.put(
+            text=_spell_value(found.value, frame.scale.unit),
+            position=(found.drawn_mm + 0.03 * longest * outwards) * SCENE_PER_MM,
+        )
 
     def _show_bars(self, frame: Frame) -> None:
-        """Draw the two lengths."""
-        on = frame.state.look.bars
-        self._bars.visible = on
+        """Draw the two lengths, where they have changed."""
+        state = frame.state
+        on = state.look.bars
+        self._bars.put(visible=on)
         for label in self._bar_labels:
-            label.visible = on
-        if not on:
+            label.put(visible=on)
+        bars_for = (
+            Same(frame.grid),
+            frame.exaggeration,
+            state.shown.dark,
+            Same(state.machine),
+            Same(state.positions),
+        )
+        if not on or bars_for == self._bars_for:
             return
+        self._bars_for = bars_for
         bars, lines, labels = bar_lines(frame)
-        self._bars.points = lines.astype(np.float32)
-        self._bars.colors = colour_bytes(palette(frame).edge)
+        self._bars.put(points=lines.astype(np.float32), colors=colour_bytes(palette(frame).edge))
         texts = (
             f"{bars[0].text} geometry",
             f"{bars[1].text} error, drawn {spell_factor(frame.exaggeration)}",
         )
         for label, text, at in zip(self._bar_labels, texts, labels, strict=True):
-            label.text = text
-            label.position = at * SCENE_PER_MM
+            label.put(text=text, position=at * SCENE_PER_MM)

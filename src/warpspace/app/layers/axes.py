@@ -1,15 +1,13 @@
 """Axes of the machine frame in mm beside the nominal box."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 from viser import SceneApi
 
-from warpspace.app.layers import SCENE_PER_MM, colour_bytes, palette
+from warpspace.app.layers import NOTHING, SCENE_PER_MM, colour_bytes, palette
+from warpspace.app.layers.drawn import Drawn
 from warpspace.app.live import Frame
 from warpspace.geometry.colour import nice_step
-from warpspace.geometry.deform import bounds_mm
 from warpspace.units import Array
 
 AWAY = 0.13
@@ -42,7 +40,7 @@ def axis_frames(low: Array, high: Array, away: float) -> list[tuple[Array, Array
 
 def axes_room_mm(frame: Frame) -> Array:
     """Give points around the nominal box that leave room for axes and their numbers, [8, 3], mm."""
-    low, high = bounds_mm(frame.grid.nominal_mm)
+    low, high = frame.grid.bounds_mm
     away = (AWAY + LABEL_ROOM) * frame.grid.longest_edge_mm
     x, y, z = (low[0] - away, high[0] + away), (low[1] - away, high[1]), (low[2], high[2])
     return np.stack(np.meshgrid(x, y, z), axis=-1).reshape(-1, 3)
@@ -59,35 +57,37 @@ class AxesLayer:
 
     def __init__(self, scene: SceneApi, frame: Frame) -> None:
         self._scene = scene
-        self._labels: list[Any] = []
+        self._labels: list[Drawn] = []
         self._box: Array | None = None
-        self._lines = scene.add_line_segments(
-            "/axes/lines",
-            np.zeros((1, 2, 3), np.float32),
-            colour_bytes(palette(frame).axis),
-            thickness=1.2,
-            thickness_units="screen",
-            scale=SCENE_PER_MM,
+        self._lines = Drawn(
+            scene.add_line_segments(
+                "/axes/lines",
+                NOTHING,
+                colour_bytes(palette(frame).axis),
+                thickness=1.2,
+                thickness_units="screen",
+                scale=SCENE_PER_MM,
+            )
         )
         self.show(frame)
 
     def show(self, frame: Frame) -> None:
         """Follow the nominal box and the switch."""
-        box = bounds_mm(frame.grid.nominal_mm)
+        box = frame.grid.bounds_mm
         # their numbers would cover the machine
         visible = frame.state.shown.axes and not frame.state.machine.shown
-        if self._box is None or not np.array_equal(box, self._box):
+        if box is not self._box:
+            if self._box is None or not np.array_equal(box, self._box):
+                self._lay_out(box, frame.grid.longest_edge_mm)
             self._box = box
-            self._lay_out(box, frame.grid.longest_edge_mm)
-        self._lines.visible = visible
-        self._lines.colors = colour_bytes(palette(frame).axis)
+        self._lines.put(visible=visible, colors=colour_bytes(palette(frame).axis))
         for label in self._labels:
-            label.visible = visible
+            label.put(visible=visible)
 
     def _lay_out(self, box: Array, longest: float) -> None:
         """Build lines and labels for a nominal box, [2, 3]."""
         for label in self._labels:
-            label.remove()
+            label.handle.remove()
         self._labels = []
         low, high = box
         lines: list[NDArray[np.float64]] = []
@@ -100,16 +100,18 @@ class AxesLayer:
                 self._label(f"{value:g}".replace("-", "−"), at + 2.4 * TICK * longest * out, 0.8)
             middle = foot + (low[index] + high[index]) / 2.0 * along
             self._label(f"{'XYZ'[index]} [mm]", middle + 6.0 * TICK * longest * out, 1.0)
-        self._lines.points = np.stack(lines).astype(np.float32)
+        self._lines.put(points=np.stack(lines).astype(np.float32))
 
     def _label(self, text: str, at: Array, size: float) -> None:
         """Add one label at a point in mm."""
         self._labels.append(
-            self._scene.add_label(
-                f"/axes/label{len(self._labels)}",
-                text,
-                position=at * SCENE_PER_MM,
-                font_screen_scale=size,
-                anchor="center-center",
+            Drawn(
+                self._scene.add_label(
+                    f"/axes/label{len(self._labels)}",
+                    text,
+                    position=at * SCENE_PER_MM,
+                    font_screen_scale=size,
+                    anchor="center-center",
+                )
             )
         )

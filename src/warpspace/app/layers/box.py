@@ -5,7 +5,8 @@ from numpy.typing import NDArray
 from viser import SceneApi
 
 from warpspace.app.glb import build_glb
-from warpspace.app.layers import SCENE_PER_MM, colour_bytes, palette
+from warpspace.app.layers import NOTHING, SCENE_PER_MM, colour_bytes, palette
+from warpspace.app.layers.drawn import Drawn
 from warpspace.app.live import Frame
 from warpspace.app.mapmesh import (
     edge_pieces,
@@ -79,74 +80,63 @@ class BoxLayer:
     """
 
     def __init__(self, scene: SceneApi, frame: Frame) -> None:
-        colours = palette(frame)
-        self._nominal: Array | None = frame.grid.nominal_mm
-        self._surface = scene.add_glb(
-            SURFACE, surface_glb(frame), scale=SCENE_PER_MM, cast_shadow=False, receive_shadow=False
+        self._nominal: Array | None = None
+        self._surface = Drawn(
+            scene.add_glb(
+                SURFACE,
+                surface_glb(frame),
+                scale=SCENE_PER_MM,
+                cast_shadow=False,
+                receive_shadow=False,
+            )
         )
-        self._grid = scene.add_line_segments(
-            "/box/grid",
-            grid_pieces(frame),
-            colour_bytes(colours.grid),
-            thickness=0.7,
-            thickness_units="screen",
-            scale=SCENE_PER_MM,
+        self._grid, self._edges, self._isolines, self._ghost = (
+            Drawn(
+                scene.add_line_segments(
+                    name,
+                    NOTHING,
+                    colour_bytes(palette(frame).edge),
+                    thickness=thickness,
+                    thickness_units="screen",
+                    scale=SCENE_PER_MM,
+                    visible=False,
+                )
+            )
+            for name, thickness in (
+                ("/box/grid", 0.7),
+                ("/box/edges", 1.8),
+                ("/box/isolines", 1.4),
+                ("/ghost", 1.5),
+            )
         )
-        self._edges = scene.add_line_segments(
-            "/box/edges",
-            edge_pieces(frame),
-            colour_bytes(colours.edge),
-            thickness=1.8,
-            thickness_units="screen",
-            scale=SCENE_PER_MM,
-        )
-        self._isolines = scene.add_line_segments(
-            "/box/isolines",
-            np.zeros((1, 2, 3), np.float32),
-            colour_bytes(isoline_colour(frame)),
-            thickness=1.4,
-            thickness_units="screen",
-            scale=SCENE_PER_MM,
-            visible=False,
-        )
-        self._ghost = scene.add_line_segments(
-            "/ghost",
-            ghost_dashes(frame),
-            colour_bytes(colours.ghost),
-            thickness=1.5,
-            thickness_units="screen",
-            scale=SCENE_PER_MM,
-        )
-
         self.show(frame)
 
     def show(self, frame: Frame) -> None:
         """Move vertices, colours and lines."""
         colours, shown, look = palette(frame), frame.state.shown, frame.state.look
         lines_only = look.surface == "grid"
-        self._surface.glb_data = surface_glb(frame)
-        self._show_lines(frame, lines_only=lines_only)
-        self._isolines.visible = look.isolines and not lines_only
-        if self._isolines.visible:
-            self._isolines.points = isoline_pieces(frame)
-            self._isolines.colors = colour_bytes(isoline_colour(frame))
-        self._ghost.visible = shown.ghost
+        self._surface.put(glb_data=surface_glb(frame))
+        if lines_only or not shown.grid_lines:
+            self._grid.put(visible=False)
+        else:
+            self._grid.put(
+                points=grid_pieces(frame), colors=colour_bytes(colours.grid), visible=True
+            )
+        if lines_only:
+            self._edges.put(visible=False)
+        else:
+            self._edges.put(
+                points=edge_pieces(frame), colors=colour_bytes(colours.edge), visible=True
+            )
+        if look.isolines and not lines_only:
+            self._isolines.put(
+                points=isoline_pieces(frame), colors=colour_bytes(isoline_colour(frame))
+            )
+        self._isolines.put(visible=look.isolines and not lines_only)
         if frame.grid.nominal_mm is not self._nominal:
             self._nominal = frame.grid.nominal_mm
-            self._ghost.points = ghost_dashes(frame)
-        self._ghost.colors = colour_bytes(colours.ghost)
-
-    def _show_lines(self, frame: Frame, *, lines_only: bool) -> None:
-        """Draw grid lines and edges on the map, unless they are the map."""
-        colours = palette(frame)
-        self._edges.visible = not lines_only
-        self._grid.visible = frame.state.shown.grid_lines and not lines_only
-        if self._grid.visible:
-            self._grid.points = grid_pieces(frame)
-            self._grid.colors = colour_bytes(colours.grid)
-        if self._edges.visible:
-            self._edges.points = edge_pieces(frame)
-            self._edges.colors = colour_bytes(colours.edge)
+            self._ghost.put(points=ghost_dashes(frame))
+        self._ghost.put(colors=colour_bytes(colours.ghost), visible=shown.ghost)
 
 
 def isoline_colour(frame: Frame) -> Rgb:

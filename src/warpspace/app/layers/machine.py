@@ -7,6 +7,7 @@ import numpy as np
 from viser import SceneApi
 
 from warpspace.app.layers import SCENE_PER_MM, colour_bytes, palette
+from warpspace.app.layers.drawn import Drawn
 from warpspace.app.live import Frame
 from warpspace.app.machine import DrawnBody, drawn_bodies, tool_point
 from warpspace.app.tonemap import Rgb
@@ -29,10 +30,12 @@ class MachineLayer:
 
     def __init__(self, scene: SceneApi, frame: Frame) -> None:
         self._scene = scene
-        self._bodies: dict[str, tuple[Any, Any]] = {}
-        self._ball: Any = None
-        self._label = scene.add_label(
-            "/machine/label", "", visible=False, font_screen_scale=0.8, anchor="center-left"
+        self._bodies: dict[str, tuple[Drawn, Drawn]] = {}
+        self._ball: Drawn | None = None
+        self._label = Drawn(
+            scene.add_label(
+                "/machine/label", "", visible=False, font_screen_scale=0.8, anchor="center-left"
+            )
         )
         self._turned: Mapping[str, float] = {}
         self._frame = frame
@@ -52,16 +55,17 @@ class MachineLayer:
         """Place everything."""
         frame, look = self._frame, self._frame.state.machine
         for mesh, lines in self._bodies.values():
-            mesh.visible = lines.visible = look.shown
-        self._label.visible = look.shown
+            mesh.put(visible=look.shown)
+            lines.put(visible=look.shown)
+        self._label.put(visible=look.shown)
         if self._ball is not None:
-            self._ball.visible = look.shown
+            self._ball.put(visible=look.shown)
         if not look.shown:
             return
         placed = drawn_bodies(frame, self._turned)
         for name in set(self._bodies) - {part.body.name for part in placed}:
-            for handle in self._bodies.pop(name):
-                handle.remove()
+            for part in self._bodies.pop(name):
+                part.handle.remove()
         edge = colour_bytes(DARK_EDGE if frame.state.shown.dark else EDGE)
         for part in placed:
             self._draw_body(part, edge)
@@ -73,12 +77,12 @@ class MachineLayer:
         vertices = part.vertices_mm.astype(np.float32)
         edges = part.edges_mm.astype(np.float32)
         known = self._bodies.get(name)
-        if known is not None and known[0].vertices.shape == vertices.shape:
+        if known is not None and known[0].handle.vertices.shape == vertices.shape:
             mesh, lines = known
-            if not np.array_equal(mesh.vertices, vertices):
-                mesh.vertices = vertices
-                lines.points = edges
-            lines.colors = edge
+            if not np.array_equal(mesh.handle.vertices, vertices):
+                mesh.put(vertices=vertices)
+                lines.put(points=edges)
+            lines.put(colors=edge)
             return
         mesh = self._scene.add_mesh_simple(
             f"/machine/{name}",
@@ -98,21 +102,25 @@ class MachineLayer:
             thickness_units="screen",
             scale=SCENE_PER_MM,
         )
-        self._bodies[name] = (mesh, lines)
+        self._bodies[name] = (Drawn(mesh), Drawn(lines))
 
     def _draw_tool_point(self, frame: Frame) -> None:
         """Mark the tool point where the deformed grid has it."""
         found = tool_point(frame)
         longest = frame.grid.longest_edge_mm
         if self._ball is None:
-            self._ball = self._scene.add_icosphere(
-                "/machine/tool_point",
-                BALL * longest * SCENE_PER_MM,
-                color=palette(frame).edge,
-                cast_shadow=False,
-                receive_shadow=False,
+            self._ball = Drawn(
+                self._scene.add_icosphere(
+                    "/machine/tool_point",
+                    BALL * longest * SCENE_PER_MM,
+                    color=palette(frame).edge,
+                    cast_shadow=False,
+                    receive_shadow=False,
+                )
             )
-        self._ball.position = found.drawn_mm * SCENE_PER_MM
+        self._ball.put(position=found.drawn_mm * SCENE_PER_MM)
         length = float(np.linalg.norm(found.error_um))
-        self._label.text = f"tool point, |E| {spell_micrometres(length)}"
-        self._label.position = (found.drawn_mm + 0.03 * longest * np.eye(3)[0]) * SCENE_PER_MM
+        self._label.put(
+            text=f"tool point, |E| {spell_micrometres(length)}",
+            position=(found.drawn_mm + 0.03 * longest * np.eye(3)[0]) * SCENE_PER_MM,
+        )

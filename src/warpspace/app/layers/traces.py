@@ -8,14 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 from viser import SceneApi
 
-from warpspace.app.layers import SCENE_PER_MM, colour_bytes, palette, polyline_pieces
+from warpspace.app.kept import Same
+from warpspace.app.layers import NOTHING, SCENE_PER_MM, colour_bytes, palette, polyline_pieces
+from warpspace.app.layers.drawn import Drawn
 from warpspace.app.live import Frame, TraceLines
 from warpspace.app.tonemap import line_vertex_colours
 from warpspace.geometry.traces import TraceGroup
 
 APART = 0.002
 """Distance from which nominal and actual are both drawn, as a part of the longest edge."""
-_NOTHING = np.zeros((1, 2, 3), np.float32)
 
 
 def apart(lines: TraceLines, distance_mm: float) -> NDArray[np.float32]:
@@ -55,40 +56,37 @@ class TracesLayer:
     """
 
     def __init__(self, scene: SceneApi, frame: Frame) -> None:
-        colours = palette(frame)
-        self._drawn_for: tuple[object, ...] | None = None
-        self._nominal = scene.add_line_segments(
-            "/traces/nominal",
-            _NOTHING,
-            colour_bytes(colours.trace_nominal),
-            thickness=1.5,
-            thickness_units="screen",
-            scale=SCENE_PER_MM,
-        )
-        self._actual = scene.add_line_segments(
-            "/traces/actual",
-            _NOTHING,
-            np.zeros((1, 2, 3), np.uint8),
-            thickness=1.6,
-            thickness_units="screen",
-            scale=SCENE_PER_MM,
+        self._drawn_for: tuple[object, ...] = ()
+        self._nominal, self._actual = (
+            Drawn(
+                scene.add_line_segments(
+                    name,
+                    NOTHING,
+                    colour_bytes(palette(frame).trace_nominal),
+                    thickness=thickness,
+                    thickness_units="screen",
+                    scale=SCENE_PER_MM,
+                )
+            )
+            for name, thickness in (("/traces/nominal", 1.5), ("/traces/actual", 1.6))
         )
         self.show(frame)
 
     def show(self, frame: Frame) -> None:
         """Move the traces."""
         visible = frame.state.shown.traces and bool(frame.traces)
-        self._nominal.visible = self._actual.visible = visible
+        self._nominal.put(visible=visible)
+        self._actual.put(visible=visible)
         if not visible:
             return
         distance = APART * frame.grid.longest_edge_mm
         nominal = np.concatenate([apart(lines, distance) for lines in frame.traces])
-        self._nominal.points = nominal if len(nominal) else _NOTHING
-        self._actual.points = polyline_pieces([lines.actual_mm for lines in frame.traces])
-        drawn_for = (frame.traces[0].group, frame.state.shown.dark)
-        if self._drawn_for is None or any(
-            new is not old for new, old in zip(drawn_for, self._drawn_for, strict=True)
-        ):
+        self._nominal.put(
+            points=nominal if len(nominal) else NOTHING,
+            colors=colour_bytes(palette(frame).trace_nominal),
+        )
+        self._actual.put(points=polyline_pieces([lines.actual_mm for lines in frame.traces]))
+        drawn_for = (Same(frame.traces[0].group), frame.state.shown.dark)
+        if drawn_for != self._drawn_for:
             self._drawn_for = drawn_for
-            self._nominal.colors = colour_bytes(palette(frame).trace_nominal)
-            self._actual.colors = trace_colours(frame)
+            self._actual.put(colors=trace_colours(frame))

@@ -1,14 +1,13 @@
 """The point that was asked about, its displacement, axis and lever of the chosen contribution."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 from viser import SceneApi
 
 from warpspace.analysis.explain import Contribution
-from warpspace.app.layers import SCENE_PER_MM, colour_bytes
+from warpspace.app.layers import NOTHING, SCENE_PER_MM, colour_bytes
 from warpspace.app.layers.box import dashes
+from warpspace.app.layers.drawn import Drawn
 from warpspace.app.live import Frame
 from warpspace.app.why import Answer, answer
 from warpspace.machine.parameters import parameter
@@ -23,7 +22,6 @@ AXIS_HALF = 0.32
 DASH = 0.02
 LABEL_AT = 0.25
 """Place of the lever's label between point and frame: it is seen where the frame is not."""
-_NOTHING = np.zeros((1, 2, 3), np.float32)
 
 
 class WhyLayer:
@@ -36,29 +34,35 @@ class WhyLayer:
     """
 
     def __init__(self, scene: SceneApi, frame: Frame) -> None:
-        self._marker: Any = scene.add_icosphere(
-            "/why/marker",
-            radius=1.0,
-            color=ACCENT,
-            subdivisions=2,
-            cast_shadow=False,
-            receive_shadow=False,
-            visible=False,
-        )
-        self._lines: dict[str, Any] = {
-            name: scene.add_line_segments(
-                f"/why/{name}",
-                _NOTHING,
-                colour_bytes(ACCENT),
-                thickness=thickness,
-                thickness_units="screen",
-                scale=SCENE_PER_MM,
+        self._marker = Drawn(
+            scene.add_icosphere(
+                "/why/marker",
+                radius=1.0,
+                color=ACCENT,
+                subdivisions=2,
+                cast_shadow=False,
+                receive_shadow=False,
                 visible=False,
+            )
+        )
+        self._lines = {
+            name: Drawn(
+                scene.add_line_segments(
+                    f"/why/{name}",
+                    NOTHING,
+                    colour_bytes(ACCENT),
+                    thickness=thickness,
+                    thickness_units="screen",
+                    scale=SCENE_PER_MM,
+                    visible=False,
+                )
             )
             for name, thickness in (("vector", 3.0), ("axis", 3.5), ("lever", 2.0))
         }
-        self._labels: dict[str, Any] = {
-            name: scene.add_label(f"/why/label-{name}", "", visible=False, anchor="bottom-center")
+        self._labels = {
+            name: Drawn(
+                scene.add_label(f"/why/label-{name}", "", visible=False, anchor="bottom-center")
+            )
             for name in ("point", "axis", "lever")
         }
         self.show(frame)
@@ -72,9 +76,11 @@ class WhyLayer:
             return
         found = answer(frame.subject or frame.state, picked, frame.exaggeration)
         size = frame.grid.longest_edge_mm
-        self._marker.position = found.drawn_mm * SCENE_PER_MM
-        self._marker.scale = RADIUS * size * SCENE_PER_MM
-        self._marker.visible = True
+        self._marker.put(
+            position=found.drawn_mm * SCENE_PER_MM,
+            scale=RADIUS * size * SCENE_PER_MM,
+            visible=True,
+        )
         nominal = found.explanation.nominal_mm + found.shift_mm
         self._line("vector", np.stack([nominal, found.drawn_mm])[None])
         length = float(np.linalg.norm(found.explanation.error_um))
@@ -103,19 +109,15 @@ class WhyLayer:
 
     def _line(self, name: str, points: "Array | NDArray[np.float32]") -> None:
         """Show a line, [S, 2, 3], mm."""
-        handle = self._lines[name]
-        handle.points = points.astype(np.float32) if len(points) else _NOTHING
-        handle.visible = True
+        self._lines[name].put(
+            points=points.astype(np.float32) if len(points) else NOTHING, visible=True
+        )
 
     def _label(self, name: str, text: str, at: Array) -> None:
         """Show a label at a point, mm."""
-        handle = self._labels[name]
-        handle.text = text
-        handle.position = at * SCENE_PER_MM
-        handle.visible = True
+        self._labels[name].put(text=text, position=at * SCENE_PER_MM, visible=True)
 
-    def _hide(self, *handles: Any) -> None:
+    def _hide(self, *parts: Drawn) -> None:
         """Hide what is shown."""
-        for handle in handles:
-            if handle.visible:
-                handle.visible = False
+        for part in parts:
+            part.put(visible=False)
