@@ -74,7 +74,7 @@ def bar(frame: Frame) -> str:
     """Draw the colours shared by all maps as a flat bar."""
     scale = frame.scale
     ends = "".join(f"<span>{value:g}</span>".replace("-", "−") for value in (scale.low, scale.high))
-    colours = gradient(scale).replace("to top", "to right")
+    colours = gradient(diverging=scale.diverging).replace("to top", "to right")
     return (
         '<div style="font-size:11.5px;margin-top:8px">shared colours, '
         f"{html.escape(scale.label)} [{html.escape(scale.unit)}]"

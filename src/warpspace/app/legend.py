@@ -1,6 +1,7 @@
 """Colour bar, numbers and headings as HTML: pure text, every foreign word escaped."""
 
 import html
+from functools import cache, lru_cache
 
 from warpspace.app.layers import palette
 from warpspace.app.live import Frame
@@ -24,9 +25,10 @@ def _number(value: float) -> str:
     return f"{value:g}".replace("-", "−")
 
 
-def gradient(scale: ColourScale) -> str:
+@cache
+def gradient(*, diverging: bool) -> str:
     """Spell the colours of a scale from the bottom up as a CSS gradient."""
-    table = colour_table(diverging=scale.diverging)
+    table = colour_table(diverging=diverging)
     last = len(table) - 1
     stops = [table[round(i * last / _STOPS)] for i in range(_STOPS + 1)]
     spelt = ",".join(f"rgb({r},{g},{b})" for r, g, b in stops)
@@ -36,30 +38,45 @@ def gradient(scale: ColourScale) -> str:
 def colour_bar(frame: Frame) -> str:
     """Draw the colour bar with ticks, unit, and marks at mean, P95 and max."""
     scale, found = frame.scale, frame.statistics
-    frame_of_bar = (
-        f'<div style="position:relative;height:{BAR_HEIGHT}px;margin:10px 0 8px 58px;width:62px">'
-        f'<div style="position:absolute;left:0;top:0;bottom:0;width:22px;'
-        f'outline:1px solid rgba(128,128,128,.5);background:{gradient(scale)}"></div>'
-    )
-    parts = [frame_of_bar]
+    heading, bar = _empty_bar(scale)
+    marks: list[str] = []
+    if not scale.diverging and scale.unit == MICROMETRE:
+        marks = _marks(scale, (found.mean_um, found.p95_um, found.max_um))
+    return heading + bar + "".join(marks) + "</div>"
+
+
+@lru_cache(maxsize=32)
+def _empty_bar(scale: ColourScale) -> tuple[str, str]:
+    """Draw heading and bar of a scale with its ticks, without marks; the bar is still open."""
+    parts = [
+        (
+            f'<div style="position:relative;height:{BAR_HEIGHT}px;margin:10px 0 8px 58px;width:62px">'
+            f'<div style="position:absolute;left:0;top:0;bottom:0;width:22px;'
+            f"outline:1px solid rgba(128,128,128,.5);"
+            f'background:{gradient(diverging=scale.diverging)}"></div>'
+        )
+    ]
     for tick in scale.ticks:
-        at = float(scale.fraction(tick)) * BAR_HEIGHT  # pyright: ignore[reportArgumentType]
+        at = _height(scale, tick)
         parts.append(
             f'<div style="position:absolute;left:22px;bottom:{at:.1f}px;width:5px;'
             f'border-top:1px solid currentColor"></div>'
             f'<div style="position:absolute;left:31px;bottom:{at - 7:.1f}px;line-height:14px;'
             f'font-size:12px">{_number(tick)}</div>'
         )
-    if not scale.diverging and scale.unit == MICROMETRE:
-        parts += _marks(scale, (found.mean_um, found.p95_um, found.max_um))
-    parts.append("</div>")
     label = html.escape(scale.label).replace("_", "<sub>", 1) + (
         "</sub>" if "_" in scale.label else ""
     )
     heading = (
         f'<div style="margin-left:44px;font-weight:600">{label} [{html.escape(scale.unit)}]</div>'
     )
-    return heading + "".join(parts)
+    return heading, "".join(parts)
+
+
+def _height(scale: ColourScale, value: float) -> float:
+    """Place a value on the bar, pixels above its foot."""
+    part = (value - scale.low) / (scale.high - scale.low)
+    return min(max(part, 0.0), 1.0) * BAR_HEIGHT
 
 
 def _marks(scale: ColourScale, values: tuple[float, float, float]) -> list[str]:
@@ -67,7 +84,7 @@ def _marks(scale: ColourScale, values: tuple[float, float, float]) -> list[str]:
     placed: list[str] = []
     lowest = -100.0
     for name, value in zip(("mean", "P95", "max"), values, strict=True):
-        at = float(scale.fraction(value)) * BAR_HEIGHT  # pyright: ignore[reportArgumentType]
+        at = _height(scale, value)
         text = max(at, lowest + 12.0)
         lowest = text
         placed.append(

@@ -8,10 +8,10 @@ from viser import SceneApi
 from warpspace.app.kept import Same
 from warpspace.app.layers import NOTHING, SCENE_PER_MM, colour_bytes, palette
 from warpspace.app.layers.axes import AWAY
-from warpspace.app.layers.drawn import Drawn
 from warpspace.app.legend import spell_factor
 from warpspace.app.live import Frame
 from warpspace.app.machine import machine_room_mm
+from warpspace.app.widgets import Told
 from warpspace.geometry.annotations import (
     ScaleBar,
     corner_arrows,
@@ -93,13 +93,13 @@ class AnnotationsLayer:
 
     def __init__(self, scene: SceneApi, frame: Frame) -> None:
         self._scene = scene
-        self._arrows: Drawn | None = None
+        self._arrows: Told | None = None
         self._corner_labels = [
             self._label(f"/marks/corner{n}", "bottom-center") for n in range(CORNERS)
         ]
-        self._ball: Drawn | None = None
+        self._ball: Told | None = None
         self._worst = self._label("/marks/max", "bottom-center")
-        self._bars = Drawn(
+        self._bars = Told(
             scene.add_line_segments(
                 "/marks/bars",
                 NOTHING,
@@ -115,9 +115,9 @@ class AnnotationsLayer:
         self._bars_for: tuple[object, ...] = ()
         self.show(frame)
 
-    def _label(self, name: str, anchor: Any, *, hidden: bool = True) -> Drawn:
+    def _label(self, name: str, anchor: Any, *, hidden: bool = True) -> Told:
         """Add a label without text yet; one that the map may hide, or one always in front."""
-        return Drawn(
+        return Told(
             self._scene.add_label(
                 name, "", visible=False, font_screen_scale=0.8, anchor=anchor, depth_test=hidden
             )
@@ -145,7 +145,7 @@ class AnnotationsLayer:
             arrows.start_mm, arrows.end_mm, RADIUS * longest, HEAD * longest
         )
         if self._arrows is None or len(self._arrows.handle.vertices) != len(vertices):
-            self._arrows = Drawn(
+            self._arrows = Told(
                 self._scene.add_mesh_simple(
                     "/marks/arrows",
                     vertices.astype(np.float32),
@@ -175,7 +175,7 @@ class AnnotationsLayer:
             return
         longest = frame.grid.longest_edge_mm
         if self._ball is None:
-            self._ball = Drawn(
+            self._ball = Told(
                 self._scene.add_icosphere(
                     "/marks/ball",
                     BALL * longest * SCENE_PER_MM,

@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 from viser import SceneApi
 
 from warpspace.app.layers import NOTHING, SCENE_PER_MM, colour_bytes, palette
-from warpspace.app.layers.drawn import Drawn
 from warpspace.app.live import Frame
+from warpspace.app.widgets import Told
 from warpspace.geometry.colour import nice_step
 from warpspace.units import Array
 
@@ -57,9 +57,9 @@ class AxesLayer:
 
     def __init__(self, scene: SceneApi, frame: Frame) -> None:
         self._scene = scene
-        self._labels: list[Drawn] = []
+        self._labels: list[Told] = []
         self._box: Array | None = None
-        self._lines = Drawn(
+        self._lines = Told(
             scene.add_line_segments(
                 "/axes/lines",
                 NOTHING,
@@ -105,7 +105,7 @@ class AxesLayer:
     def _label(self, text: str, at: Array, size: float) -> None:
         """Add one label at a point in mm."""
         self._labels.append(
-            Drawn(
+            Told(
                 self._scene.add_label(
                     f"/axes/label{len(self._labels)}",
                     text,

@@ -6,7 +6,6 @@ from viser import SceneApi
 
 from warpspace.app.glb import build_glb
 from warpspace.app.layers import NOTHING, SCENE_PER_MM, colour_bytes, palette
-from warpspace.app.layers.drawn import Drawn
 from warpspace.app.live import Frame
 from warpspace.app.mapmesh import (
     edge_pieces,
@@ -16,6 +15,7 @@ from warpspace.app.mapmesh import (
     map_mesh,
 )
 from warpspace.app.tonemap import Rgb, vertex_colours
+from warpspace.app.widgets import Told
 from warpspace.geometry.surfaces import box_edges
 from warpspace.units import Array
 
@@ -81,7 +81,7 @@ class BoxLayer:
 
     def __init__(self, scene: SceneApi, frame: Frame) -> None:
         self._nominal: Array | None = None
-        self._surface = Drawn(
+        self._surface = Told(
             scene.add_glb(
                 SURFACE,
                 surface_glb(frame),
@@ -91,7 +91,7 @@ class BoxLayer:
             )
         )
         self._grid, self._edges, self._isolines, self._ghost = (
-            Drawn(
+            Told(
                 scene.add_line_segments(
                     name,
                     NOTHING,

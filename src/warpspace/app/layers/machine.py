@@ -7,10 +7,10 @@ import numpy as np
 from viser import SceneApi
 
 from warpspace.app.layers import SCENE_PER_MM, colour_bytes, palette
-from warpspace.app.layers.drawn import Drawn
 from warpspace.app.live import Frame
 from warpspace.app.machine import DrawnBody, drawn_bodies, tool_point
 from warpspace.app.tonemap import Rgb
+from warpspace.app.widgets import Told
 from warpspace.geometry.annotations import spell_micrometres
 
 EDGE: Rgb = (70, 78, 90)
@@ -30,9 +30,9 @@ class MachineLayer:
 
     def __init__(self, scene: SceneApi, frame: Frame) -> None:
         self._scene = scene
-        self._bodies: dict[str, tuple[Drawn, Drawn]] = {}
-        self._ball: Drawn | None = None
-        self._label = Drawn(
+        self._bodies: dict[str, tuple[Told, Told]] = {}
+        self._ball: Told | None = None
+        self._label = Told(
             scene.add_label(
                 "/machine/label", "", visible=False, font_screen_scale=0.8, anchor="center-left"
             )
@@ -102,14 +102,14 @@ class MachineLayer:
             thickness_units="screen",
             scale=SCENE_PER_MM,
         )
-        self._bodies[name] = (Drawn(mesh), Drawn(lines))
+        self._bodies[name] = (Told(mesh), Told(lines))
 
     def _draw_tool_point(self, frame: Frame) -> None:
         """Mark the tool point where the deformed grid has it."""
         found = tool_point(frame)
         longest = frame.grid.longest_edge_mm
         if self._ball is None:
-            self._ball = Drawn(
+            self._ball = Told(
                 self._scene.add_icosphere(
                     "/machine/tool_point",
                     BALL * longest * SCENE_PER_MM,

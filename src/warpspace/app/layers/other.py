@@ -3,8 +3,8 @@
 from viser import SceneApi
 
 from warpspace.app.layers import NOTHING, SCENE_PER_MM, colour_bytes, palette, pieces
-from warpspace.app.layers.drawn import Drawn
 from warpspace.app.live import Frame
+from warpspace.app.widgets import Told
 
 
 class OtherLayer:
@@ -17,7 +17,7 @@ class OtherLayer:
     """
 
     def __init__(self, scene: SceneApi, frame: Frame) -> None:
-        self._edges = Drawn(
+        self._edges = Told(
             scene.add_line_segments(
                 "/compare/other",
                 NOTHING,

@@ -10,9 +10,9 @@ from viser import SceneApi
 
 from warpspace.app.kept import Same
 from warpspace.app.layers import NOTHING, SCENE_PER_MM, colour_bytes, palette, polyline_pieces
-from warpspace.app.layers.drawn import Drawn
 from warpspace.app.live import Frame, TraceLines
 from warpspace.app.tonemap import line_vertex_colours
+from warpspace.app.widgets import Told
 from warpspace.geometry.traces import TraceGroup
 
 APART = 0.002
@@ -58,7 +58,7 @@ class TracesLayer:
     def __init__(self, scene: SceneApi, frame: Frame) -> None:
         self._drawn_for: tuple[object, ...] = ()
         self._nominal, self._actual = (
-            Drawn(
+            Told(
                 scene.add_line_segments(
                     name,
                     NOTHING,

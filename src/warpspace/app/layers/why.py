@@ -7,9 +7,9 @@ from viser import SceneApi
 from warpspace.analysis.explain import Contribution
 from warpspace.app.layers import NOTHING, SCENE_PER_MM, colour_bytes
 from warpspace.app.layers.box import dashes
-from warpspace.app.layers.drawn import Drawn
 from warpspace.app.live import Frame
 from warpspace.app.why import Answer, answer
+from warpspace.app.widgets import Told
 from warpspace.machine.parameters import parameter
 from warpspace.units import Array
 
@@ -34,7 +34,7 @@ class WhyLayer:
     """
 
     def __init__(self, scene: SceneApi, frame: Frame) -> None:
-        self._marker = Drawn(
+        self._marker = Told(
             scene.add_icosphere(
                 "/why/marker",
                 radius=1.0,
@@ -46,7 +46,7 @@ class WhyLayer:
             )
         )
         self._lines = {
-            name: Drawn(
+            name: Told(
                 scene.add_line_segments(
                     f"/why/{name}",
                     NOTHING,
@@ -60,7 +60,7 @@ class WhyLayer:
             for name, thickness in (("vector", 3.0), ("axis", 3.5), ("lever", 2.0))
         }
         self._labels = {
-            name: Drawn(
+            name: Told(
                 scene.add_label(f"/why/label-{name}", "", visible=False, anchor="bottom-center")
             )
             for name in ("point", "axis", "lever")
@@ -117,7 +117,7 @@ class WhyLayer:
         """Show a label at a point, mm."""
         self._labels[name].put(text=text, position=at * SCENE_PER_MM, visible=True)
 
-    def _hide(self, *parts: Drawn) -> None:
+    def _hide(self, *parts: Told) -> None:
         """Hide what is shown."""
         for part in parts:
             part.put(visible=False)

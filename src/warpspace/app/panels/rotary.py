@@ -153,7 +153,9 @@ class RotaryPanel:
             or state.scene.machine is not self._scene.machine
         ):
             self._build(state)
-        self._button.visible = played_axis(state) is not None
+        visible = played_axis(state) is not None
+        if self._button.visible != visible:
+            self._button.visible = visible
         for number, bound in enumerate(self._points):
             bound.show(number not in state.rotary.off)
         self._own_on.show(state.rotary.own_mm is not None)

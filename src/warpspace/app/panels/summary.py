@@ -6,6 +6,7 @@ from warpspace.app import legend
 from warpspace.app.live import Frame
 from warpspace.app.panels import Desk
 from warpspace.app.state import AppState
+from warpspace.app.widgets import Told
 
 
 class HtmlPanel:
@@ -20,7 +21,7 @@ class HtmlPanel:
 
     def __init__(self, desk: Desk, render: Any) -> None:
         self._render = render
-        self._handle = desk.gui.add_html("")
+        self._handle = Told(desk.gui.add_html(""))
 
     def read(self, state: AppState) -> AppState:
         """Nothing to take over."""
@@ -28,7 +29,7 @@ class HtmlPanel:
 
     def show(self, frame: Frame) -> None:
         """Write the frame's text."""
-        self._handle.content = self._render(frame)
+        self._handle.put(content=self._render(frame))
 
 
 def summary_panel(desk: Desk) -> HtmlPanel:
