@@ -4,10 +4,13 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpspace.geometry import surfaces
 from warpspace.geometry.faces import crease_lines, cut_faces, face_axis, face_lines, outer_faces
 from warpspace.units import Array
+
+Floats = NDArray[np.float32]
 
 CUT_CORNER = (1, 0, 1)
 """The octant that is cut away: the one nearest to the operator, right in front and above."""
@@ -24,6 +27,8 @@ class Topology:
         Flat node indices of the ends of each piece of line.
     outwards : ndarray, [N, 3]
         Per node, the sum of the outward directions of the faces it lies on.
+    grid_outwards, edge_outwards : ndarray of float32, [S, 2, 3]
+        The same at the ends of the pieces of line.
     faces : tuple of ndarray, [a, b]
         Rectangular patches of nodes that the surface consists of.
     normals : ndarray, [F, 3]
@@ -34,6 +39,8 @@ class Topology:
     grid_segments: surfaces.Index
     edge_segments: surfaces.Index
     outwards: Array
+    grid_outwards: Floats
+    edge_outwards: Floats
     faces: tuple[surfaces.Index, ...]
     normals: Array
 
@@ -62,11 +69,14 @@ def topology(shape: surfaces.Shape, *, cut: bool = False) -> Topology:
                 outwards[np.unique(np.concatenate([f.ravel() for f in on])), axis] += sign
     every = tuple(map(surfaces.line_spacing, shape))
     lines = face_lines(faces, shape, (every[0], every[1], every[2]))
+    grid, edges = surfaces.segments(lines), surfaces.segments(crease_lines(faces, shape))
     return Topology(
         surfaces.triangulate(faces),
-        surfaces.segments(lines),
-        surfaces.segments(crease_lines(faces, shape)),
+        grid,
+        edges,
         outwards,
+        outwards[grid].astype(np.float32),
+        outwards[edges].astype(np.float32),
         tuple(faces),
         normals,
     )

@@ -11,6 +11,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from warpspace.app.kept import Same
 from warpspace.app.tonemap import Floats
 from warpspace.units import Array
 
@@ -19,6 +20,7 @@ _VERTEX_BUFFER, _INDEX_BUFFER = 34962, 34963
 _LINES, _TRIANGLES = 1, 4
 _SMALL = 65535
 _ALIGN = 4
+_CUT = "bounds"
 
 
 def _padded(data: bytes, fill: bytes) -> bytes:
@@ -26,11 +28,9 @@ def _padded(data: bytes, fill: bytes) -> bytes:
     return data + fill * (-len(data) % _ALIGN)
 
 
-@lru_cache(maxsize=8)
-def _header(
-    vertices: int, indices: int, mode: int, low: tuple[float, ...], high: tuple[float, ...]
-) -> bytes:
-    """Spell the JSON chunk for a number of vertices and indices."""
+@lru_cache(maxsize=32)
+def _header(vertices: int, indices: int, mode: int) -> tuple[str, str, str]:
+    """Spell the JSON chunk for a number of vertices and indices, cut where the bounds belong."""
     small = vertices <= _SMALL
     floats = 12 * vertices
     index_bytes = (2 if small else 4) * indices
@@ -65,8 +65,8 @@ def _header(
                 "componentType": _FLOAT,
                 "count": vertices,
                 "type": "VEC3",
-                "min": low,
-                "max": high,
+                "min": _CUT,
+                "max": _CUT,
             },
             {"bufferView": 1, "componentType": _FLOAT, "count": vertices, "type": "VEC3"},
             {
@@ -88,7 +88,14 @@ def _header(
         ],
         "buffers": [{"byteLength": 2 * floats + index_bytes}],
     }
-    return _padded(json.dumps(document, separators=(",", ":")).encode(), b" ")
+    before, between, after = json.dumps(document, separators=(",", ":")).split(f'"{_CUT}"')
+    return before, between, after
+
+
+@lru_cache(maxsize=8)
+def _indices(triangles: Same, kind: str) -> bytes:
+    """Write vertex numbers; those of one array once."""
+    return triangles.thing.astype(kind).tobytes()
 
 
 def build_glb(vertices: Array, triangles: NDArray[np.integer], colours: Floats) -> bytes:
@@ -108,15 +115,12 @@ def build_glb(vertices: Array, triangles: NDArray[np.integer], colours: Floats) 
         A complete GLB file, vertices and colours as 32-bit floats.
     """
     points = np.ascontiguousarray(vertices, dtype="<f4")
-    low, high = points.min(axis=0), points.max(axis=0)
-    indices = triangles.astype("<u2" if len(points) <= _SMALL else "<u4").tobytes()
-    text = _header(
-        len(points),
-        triangles.size,
-        _LINES if triangles.shape[-1] == 2 else _TRIANGLES,
-        tuple(float(value) for value in low),
-        tuple(float(value) for value in high),
+    low, high = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+    indices = _indices(Same(triangles), "<u2" if len(points) <= _SMALL else "<u4")
+    before, between, after = _header(
+        len(points), triangles.size, _LINES if triangles.shape[-1] == 2 else _TRIANGLES
     )
+    text = _padded(f"{before}{low}{between}{high}{after}".encode(), b" ")
     body = _padded(points.tobytes() + colours.astype("<f4").tobytes() + indices, b"\0")
     length = 12 + 8 + len(text) + 8 + len(body)
     return b"".join(

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from warpspace.app.facets import Topology, topology
 from warpspace.app.live import Frame
 from warpspace.geometry.isolines import isoline_levels, isoline_segments
+from warpspace.geometry.surfaces import Index
 from warpspace.units import Array
 
 LIFT = 0.0012
@@ -43,10 +44,10 @@ class Part:
     drawn_of: Topology
     lifts: tuple[float, ...]
 
-    def lifted(self, times: float) -> list[Array]:
-        """Give the nodes off the surface, on each side that is seen, [N, 3] each, mm."""
-        flat = self.drawn_mm.reshape(-1, 3)
-        return [flat + lift * times * self.drawn_of.outwards for lift in self.lifts]
+    def pieces(self, segments: Index, outwards: Pieces, times: float) -> list[Pieces]:
+        """Give pieces of line off the surface, on each side that is seen, [S, 2, 3] each, mm."""
+        ends = self.drawn_mm.reshape(-1, 3)[segments].astype(np.float32)
+        return [ends + (outwards * (lift * times)).astype(np.float32) for lift in self.lifts]
 
 
 def map_parts(frame: Frame) -> list[Part]:
@@ -74,8 +75,16 @@ def map_mesh(frame: Frame) -> MapMesh:
     vertices: list[Array] = []
     triangles: list[NDArray[np.intp]] = []
     values: list[Array] = []
+    parts = map_parts(frame)
+    if len(parts) == 1:
+        surface = parts[0].drawn_of.surface
+        return MapMesh(
+            parts[0].drawn_mm.reshape(-1, 3)[surface.nodes],
+            surface.triangles,
+            parts[0].values.reshape(-1)[surface.nodes],
+        )
     count = 0
-    for part in map_parts(frame):
+    for part in parts:
         surface = part.drawn_of.surface
         vertices.append(part.drawn_mm.reshape(-1, 3)[surface.nodes])
         values.append(part.values.reshape(-1)[surface.nodes])
@@ -88,9 +97,9 @@ def grid_pieces(frame: Frame) -> Pieces:
     """Collect the grid lines on a map, [S, 2, 3], mm."""
     return _joined(
         [
-            nodes[part.drawn_of.grid_segments]
+            pieces
             for part in map_parts(frame)
-            for nodes in part.lifted(1.0)
+            for pieces in part.pieces(part.drawn_of.grid_segments, part.drawn_of.grid_outwards, 1.0)
         ]
     )
 
@@ -117,9 +126,8 @@ def edge_pieces(frame: Frame) -> Pieces:
     """Collect the edges of a map, [S, 2, 3], mm."""
     return _joined(
         [
-            nodes[part.drawn_of.edge_segments]
+            part.pieces(part.drawn_of.edge_segments, part.drawn_of.edge_outwards, EDGE_LIFT)[0]
             for part in map_parts(frame)
-            for nodes in part.lifted(EDGE_LIFT)[:1]
         ]
     )
 
@@ -127,18 +135,22 @@ def edge_pieces(frame: Frame) -> Pieces:
 def isoline_pieces(frame: Frame) -> Pieces:
     """Collect the lines of equal value on a map, at the ticks of its scale, [S, 2, 3], mm."""
     levels = isoline_levels(frame.scale)
-    found: list[Array] = []
+    found: list[Pieces] = []
     for part in map_parts(frame):
         nodes, values = part.drawn_mm.reshape(-1, 3), part.values.reshape(-1)
         faces, normals = part.drawn_of.faces, part.drawn_of.normals
         found += [
-            isoline_segments(faces, nodes, values, levels, ISOLINE_LIFT * lift * normals)
+            isoline_segments(faces, nodes, values, levels, ISOLINE_LIFT * lift * normals).astype(
+                np.float32
+            )
             for lift in part.lifts
         ]
     return _joined(found)
 
 
-def _joined(parts: list[Array]) -> Pieces:
+def _joined(parts: list[Pieces]) -> Pieces:
     """Put pieces of line together; one without length where there are none (viser wants some)."""
     kept = [part for part in parts if len(part)]
-    return np.concatenate(kept).astype(np.float32) if kept else np.zeros((1, 2, 3), np.float32)
+    if not kept:
+        return np.zeros((1, 2, 3), np.float32)
+    return kept[0] if len(kept) == 1 else np.concatenate(kept)
