@@ -1,7 +1,9 @@
 """Colours, files and camera that reach the browser."""
 
 import json
+import re
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -109,3 +111,33 @@ def test_legend_says_factor_units_numbers_and_place() -> None:
     true = live.frame(frame.state.with_exaggeration(1.0))
     assert "true scale" in legend.heading(true)
     assert "(auto)" not in legend.heading(true)
+
+
+def marks(frame) -> dict[str, float]:
+    found = re.findall(r'data-mark="(\w+)" title="([^ ]+) (µm|µrad)"', legend.colour_bar(frame))
+    assert {unit for _, _, unit in found} == {frame.scale.unit}
+    return {name: float(value.replace("−", "-")) for name, value, _ in found}
+
+
+def test_the_bar_marks_what_is_coloured() -> None:
+    live, start = LiveModel(), start_state(load_scene("dvf5000_first"))
+    tilted = replace(start, look=start.look.with_choice(quantity="orientation"))
+    for state in (start, tilted):
+        lengths = live.frame(state)
+        assert marks(lengths) == pytest.approx(
+            {
+                "mean": lengths.values.mean(),
+                "P95": np.percentile(lengths.values, 95),
+                "max": lengths.values.max(),
+            },
+            abs=0.006,
+        )
+        signed = live.frame(state.with_component("y"))
+        assert marks(signed) == pytest.approx(
+            {
+                "min": signed.values.min(),
+                "mean": signed.values.mean(),
+                "max": signed.values.max(),
+            },
+            abs=0.006,
+        )

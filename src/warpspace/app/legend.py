@@ -1,7 +1,10 @@
 """Colour bar, numbers and headings as HTML: pure text, every foreign word escaped."""
 
 import html
+from collections.abc import Mapping
 from functools import cache, lru_cache
+
+import numpy as np
 
 from warpspace.app.layers import palette
 from warpspace.app.live import Frame
@@ -36,13 +39,28 @@ def gradient(*, diverging: bool) -> str:
 
 
 def colour_bar(frame: Frame) -> str:
-    """Draw the colour bar with ticks, unit, and marks at mean, P95 and max."""
-    scale, found = frame.scale, frame.statistics
-    heading, bar = _empty_bar(scale)
-    marks: list[str] = []
-    if not scale.diverging and scale.unit == MICROMETRE:
-        marks = _marks(scale, (found.mean_um, found.p95_um, found.max_um))
-    return heading + bar + "".join(marks) + "</div>"
+    """Draw the colour bar with ticks, unit, and marks at mean, P95 and max of what is coloured."""
+    heading, bar = _empty_bar(frame.scale)
+    return heading + bar + "".join(_marks(frame.scale, _marked(frame))) + "</div>"
+
+
+def _marked(frame: Frame) -> dict[str, float]:
+    """Choose what is marked, by name from the lowest value up, in the unit of the scale."""
+    found, values = frame.statistics, frame.values
+    if frame.scale.diverging:
+        # the length of the error says nothing of a signed component: its own ends do
+        return {
+            "min": float(values.min()),
+            "mean": float(values.mean()),
+            "max": float(values.max()),
+        }
+    if frame.scale.unit == MICROMETRE:
+        return {"mean": found.mean_um, "P95": found.p95_um, "max": found.max_um}
+    return {
+        "mean": float(values.mean()),
+        "P95": float(np.percentile(values, 95.0)),
+        "max": float(values.max()),
+    }
 
 
 @lru_cache(maxsize=32)
@@ -50,7 +68,8 @@ def _empty_bar(scale: ColourScale) -> tuple[str, str]:
     """Draw heading and bar of a scale with its ticks, without marks; the bar is still open."""
     parts = [
         (
-            f'<div style="position:relative;height:{BAR_HEIGHT}px;margin:10px 0 8px 58px;width:62px">'
+            f'<div style="position:relative;height:{BAR_HEIGHT}px;margin:10px 0 8px 58px;'
+            f'width:62px">'
             f'<div style="position:absolute;left:0;top:0;bottom:0;width:22px;'
             f"outline:1px solid rgba(128,128,128,.5);"
             f'background:{gradient(diverging=scale.diverging)}"></div>'
@@ -79,16 +98,17 @@ def _height(scale: ColourScale, value: float) -> float:
     return min(max(part, 0.0), 1.0) * BAR_HEIGHT
 
 
-def _marks(scale: ColourScale, values: tuple[float, float, float]) -> list[str]:
-    """Draw mean, P95 and max left of the bar, moved apart where they would overlap."""
+def _marks(scale: ColourScale, values: Mapping[str, float]) -> list[str]:
+    """Draw names and arrows left of the bar, the names moved apart where they would overlap."""
     placed: list[str] = []
     lowest = -100.0
-    for name, value in zip(("mean", "P95", "max"), values, strict=True):
+    for name, value in values.items():
         at = _height(scale, value)
         text = max(at, lowest + 12.0)
         lowest = text
         placed.append(
-            f'<div style="position:absolute;left:-58px;width:42px;text-align:right;'
+            f'<div data-mark="{name}" title="{_number(round(value, 2))} {scale.unit}"'
+            f' style="position:absolute;left:-58px;width:42px;text-align:right;'
             f'bottom:{text - 7:.1f}px;line-height:14px;font-size:11px">{name}</div>'
             f'<div style="position:absolute;left:-12px;bottom:{at - 5:.1f}px;border:5px solid '
             f'transparent;border-left:8px solid currentColor;border-right:0"></div>'
