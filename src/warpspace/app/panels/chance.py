@@ -108,6 +108,8 @@ class ChancePanel:
         self._limit.show(state.specification.limit_um)
         self._over.show(OVER_NAMES[state.specification.over])
         self._spread.show(SPREAD_NAMES[state.specification.distribution])
+        if self._built_for[:1] != (Same(state.origin),):
+            return  # other sliders are on their way: a page must not hear of these any more
         for key, slider in self._sliders.items():
             slider.show(edits.half_width_of(state, key))
 
