@@ -7,7 +7,8 @@ if TYPE_CHECKING:
     from warpspace.app.state import AppState
 
 SHOWN = {"a": "A", "b": "B", "difference": "A − B"}
-NOW = "now"
+NOW, NOBODY = "now", "nothing"
+"""Names of what is steered, and of no other side."""
 
 
 @dataclass(frozen=True, slots=True)

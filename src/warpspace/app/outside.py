@@ -7,8 +7,8 @@ from viser import ClientHandle
 
 from warpspace.app.live import Frame
 from warpspace.app.services import Services
+from warpspace.app.shelf import Shelf
 from warpspace.app.tabs import CameraMemory
-from warpspace.scene.model import Scene
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,8 +18,8 @@ class Outside:
     Attributes
     ----------
     client : viser.ClientHandle
-    scenes : dict of str to Scene
-        Scenes this tab can choose from, by the title shown.
+    scenes : Shelf
+        Scenes this tab can choose from.
     camera : callable
         Gives where the camera stands.
     look_from : callable
@@ -32,7 +32,7 @@ class Outside:
     """
 
     client: ClientHandle
-    scenes: dict[str, Scene]
+    scenes: Shelf
     camera: Callable[[], CameraMemory]
     look_from: Callable[[CameraMemory], None]
     run_script: Callable[[str], None]

@@ -9,7 +9,7 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 from viser import ClientHandle
@@ -31,10 +31,10 @@ from warpspace.app.panels.commands import hint_script
 from warpspace.app.panels.layout import apply_theme, lay_out_panels
 from warpspace.app.parts import TURN, Parts
 from warpspace.app.services import Services
+from warpspace.app.shelf import Shelf
 from warpspace.app.state import AppState
 from warpspace.app.tabs import CameraMemory, Left, ask_script, new_token, rename_script
 from warpspace.exceptions import WarpspaceError
-from warpspace.scene.model import Scene
 
 logger = logging.getLogger(__name__)
 TOKEN_WAIT_S = 0.25
@@ -49,8 +49,8 @@ class Session:
     client : viser.ClientHandle
     live : LiveModel
         Shared by all sessions.
-    scenes : mapping of str to Scene
-        Scenes to choose from, by the title shown.
+    scenes : Shelf
+        Scenes to choose from.
     board : Board
         What is shown: the tab's own, or that of a shared review.
     claim : callable, optional
@@ -64,12 +64,12 @@ class Session:
         self,
         client: ClientHandle,
         live: LiveModel,
-        scenes: Mapping[str, Scene],
+        scenes: Shelf,
         board: Board,
         claim: "Callable[[Session, str], Left | None] | None" = None,
         services: Services | None = None,
     ) -> None:
-        self._client, self._live, self._scenes = client, live, dict(scenes)
+        self._client, self._live, self._scenes = client, live, scenes
         self._services = services or Services()
         self.board = board
         self.token = new_token()

@@ -20,6 +20,7 @@ from warpspace.app.live import LiveModel
 from warpspace.app.network import free_port, is_local, page_url, resolve_host
 from warpspace.app.services import Services
 from warpspace.app.session import Session
+from warpspace.app.shelf import Shelf
 from warpspace.app.state import AppState, start_state
 from warpspace.app.tabs import Keeper, Left, is_token, new_token
 from warpspace.exceptions import OptionError
@@ -112,7 +113,9 @@ class Viewer:
     def _connect(self, client: viser.ClientHandle) -> None:
         """Give a new tab its session."""
         board = self._shared or Board(self._start)
-        session = Session(client, self._live, self._scenes, board, self._claim, self._services)
+        session = Session(
+            client, self._live, Shelf(self._scenes), board, self._claim, self._services
+        )
         with self._lock:
             self._sessions[client.client_id] = session
         session.start()

@@ -6,14 +6,12 @@ from typing import Any
 
 from warpspace.app.compare import scene_side, with_pin, with_sides
 from warpspace.app.compare_text import NOTHING, comparison_html
-from warpspace.app.comparison import NOW, SHOWN, Side
+from warpspace.app.comparison import NOBODY, NOW, SHOWN, Side
 from warpspace.app.live import Frame
 from warpspace.app.panels import Desk, Update
 from warpspace.app.state import AppState
 from warpspace.app.widgets import Bound
 from warpspace.scene.model import Scene
-
-NOBODY = "nothing"
 
 
 class ComparePanel:
@@ -82,19 +80,22 @@ class ComparePanel:
 
     def _side(self, state: AppState, title: str) -> Side | None:
         """Find the side of a title that a browser has sent; None for nothing or nonsense."""
-        pinned = state.comparison.pinned
         if title == NOW:
             return Side()
-        if pinned is not None and title == pinned.title:
-            return pinned
+        used = (state.comparison.pinned, state.comparison.a, state.comparison.b)
+        for side in used:
+            if side is not None and title == side.title:
+                return side
         scene = self._scenes.get(title)
         return None if scene is None else replace(scene_side(scene), title=title)
 
     def show(self, frame: Frame) -> None:
         """Make the widgets show the comparison."""
         comparison = frame.state.comparison
-        pinned = () if comparison.pinned is None else (comparison.pinned.title,)
-        options = (*pinned, *self._scenes)
+        used = (comparison.pinned, comparison.a, comparison.b)
+        own = (side.title for side in used if side is not None and side.state is not None)
+        # a title twice would end the page's dropdown
+        options = tuple(dict.fromkeys((*own, *self._scenes)))
         if options != self._options:
             self._options = options
             self._a.handle.options = (NOW, *options)

@@ -6,6 +6,7 @@ from typing import Any
 
 from warpspace.app.live import Frame
 from warpspace.app.panels import Desk
+from warpspace.app.shelf import MOST_OPENED, Shelf
 from warpspace.app.state import EXAGGERATION, NODES, TRUE_SCALE, AppState
 from warpspace.app.widgets import Bound, dom_id
 from warpspace.kinematics.model import Loop
@@ -51,23 +52,19 @@ class ViewPanel:
     ----------
     desk : Desk
     state : AppState
-    scenes : dict of str to Scene
-        Scenes to choose from, by the title shown; what is opened is added.
+    scenes : Shelf
+        Scenes to choose from; what is opened is added.
     """
 
-    def __init__(self, desk: Desk, state: AppState, scenes: dict[str, Scene]) -> None:
+    def __init__(self, desk: Desk, state: AppState, scenes: Shelf) -> None:
         self._desk, self._scenes = desk, scenes
         gui, changed = desk.gui, desk.changed
-        self._titles = {id(scene): title for title, scene in scenes.items()}
-        if id(state.origin) not in self._titles:
-            title = _title_of(state.origin, scenes)
-            scenes[title] = state.origin
-            self._titles[id(state.origin)] = title
+        self._known, self._title = state.origin, scenes.add(state.origin)[0]
         self._scene: Bound[str] = Bound(
             gui.add_dropdown(
                 "Scene",
                 tuple(scenes),
-                initial_value=self._titles[id(state.origin)],
+                initial_value=self._title,
                 hint="Machine and error set. Changes made to the errors are lost.",
             ),
             changed,
@@ -207,12 +204,15 @@ class ViewPanel:
 
     def _know(self, scene: Scene) -> None:
         """Offer a scene that has been opened from a file or a link."""
-        if id(scene) in self._titles:
+        if scene is self._known:
             return
-        title = _title_of(scene, self._scenes)
-        self._scenes[title] = scene
-        self._titles[id(scene)] = title
-        self._scene.handle.options = tuple(self._scenes)
+        self._known, (self._title, dropped) = scene, self._scenes.add(scene)
+        options = tuple(self._scenes)
+        if options != tuple(self._scene.handle.options):
+            self._scene.handle.options = options
+        if dropped:
+            text = f"The newest {MOST_OPENED} opened scenes are kept; {dropped} left the list."
+            self._desk.notify("Scenes", text, "gray")
 
     def show(self, frame: Frame) -> None:
         """Make the widgets show the state."""
@@ -221,7 +221,7 @@ class ViewPanel:
             self._folder.remove()
             self._add_positions(state)
         self._know(state.origin)
-        self._scene.show(self._titles[id(state.origin)])
+        self._scene.show(self._title)
         self._factor.show(float(f"{frame.exaggeration:.4g}"))
         self._log.show(round(math.log10(frame.exaggeration), 2))
         self._component.show(self._components.text(state.component))
@@ -231,16 +231,6 @@ class ViewPanel:
             bound.show(state.positions[axis])
         for name, bound in self._switches.items():
             bound.show(getattr(state.shown, name))
-
-
-def _title_of(scene: Scene, known: Mapping[str, Scene]) -> str:
-    """Give a scene that was opened a title nobody else has."""
-    title = scene.title or scene.name
-    number = 2
-    while title in known:
-        title = f"{scene.title or scene.name} ({number})"
-        number += 1
-    return title
 
 
 def _from_log(log: float) -> float:
