@@ -12,11 +12,10 @@ from warpspace.app.document import (
     MAX_PACKED_TEXT,
     open_link,
     open_text,
-    safe_name,
     state_to_link,
     state_to_toml,
-    upload_text,
 )
+from warpspace.app.incoming import safe_name, upload_text
 from warpspace.app.look import Look, MachineLook, RotaryLook
 from warpspace.app.settings import camera_of, settings_line, with_settings
 from warpspace.app.specification import Specification

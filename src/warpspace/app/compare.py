@@ -82,11 +82,17 @@ def side_state(now: AppState, side: Side) -> AppState:
         exaggeration=now.exaggeration,
         look=now.look,
         shown=now.shown,
-        rotary=now.rotary if base.scene is now.scene else RotaryLook(),
+        rotary=now.rotary if _turns_alike(base, now) else RotaryLook(),
         comparison=Comparison(),
         picked=now.picked,
         lever=now.lever,
     )
+
+
+def _turns_alike(one: AppState, other: AppState) -> bool:
+    """Tell whether the same points are traced over the same axes."""
+    points = one.scene.trace_points_mm == other.scene.trace_points_mm
+    return points and one.positions.keys() == other.positions.keys()
 
 
 def scene_side(scene: Scene) -> Side:

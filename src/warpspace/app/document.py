@@ -1,74 +1,46 @@
 """A state as a scene file, and as a link; both read back to the same state.
 
-The file is an ordinary scene; one comment in it holds how it was looked at, which only the app
-reads. A link holds the name of a scene the app knows and what differs from it, or the whole file,
-packed.
+The file is an ordinary scene; comments at its head hold how it was looked at and what it was
+compared with, which only the app reads. A link holds the name of a scene the app knows and what
+differs from it, or the whole file, packed.
 """
 
 import base64
 import binascii
 import re
 import zlib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from urllib.parse import parse_qsl, urlencode
 
 from warpspace import __version__
-from warpspace.app.edits import curve_of
+from warpspace.app.incoming import LONGEST_NAME, safe_name
+from warpspace.app.resulting import scene_of
 from warpspace.app.settings import MAX_FIELDS, camera_of, settings_line, with_settings
+from warpspace.app.sides import PREFIX as COMPARISON
+from warpspace.app.sides import comparison_line, with_comparison
 from warpspace.app.state import AppState, start_state
 from warpspace.app.tabs import CameraMemory
 from warpspace.exceptions import OptionError
-from warpspace.machine.errors import ErrorSet
-from warpspace.scene.files import MAX_SCENE_BYTES
-from warpspace.scene.library import parse_scene
+from warpspace.scene.library import load_scene, parse_scene, scene_names
 from warpspace.scene.machines import load_machine, machine_names
 from warpspace.scene.model import Scene
 from warpspace.scene.save import scene_to_toml
 
 MARK = "# warpspace-view: "
+COMPARED = "# warpspace-compare: "
 MAX_LINK = 5_500
 """Characters of a link before it is packed: servers take request lines of 8 kB."""
+MAX_COMPARED = 400_000
+"""Characters of a comparison in a file."""
 MAX_PACKED_TEXT = 1_000_000
-SCENE, PACKED = "scene", "file"
-_VIEW = re.compile(rf"^{re.escape(MARK)}(\S*)\s*$", re.MULTILINE)
-_UNSAFE = re.compile(r"[^A-Za-z0-9._ -]+")
-LONGEST_NAME = 60
-
-
-def scene_of(state: AppState) -> Scene:
-    """Give the scene that a state amounts to: amplitudes, curves, positions, tolerances, factor.
-
-    Parameters
-    ----------
-    state : AppState
-
-    Returns
-    -------
-    Scene
-        All parameters take part, silenced or not.
-    """
-    scene = state.scene
-    keys = [
-        key for key in state.amplitudes if state.amplitudes[key] or key in scene.errors.functions
-    ]
-    moved = {
-        axis: value
-        for axis, value in state.positions.items()
-        if value != scene.workspace.positions.get(axis)
-    }
-    return replace(
-        scene,
-        errors=ErrorSet({key: curve_of(state, key) for key in keys}),
-        workspace=scene.workspace.moved(moved) if moved else scene.workspace,
-        tolerances=state.tolerances,
-        exaggeration=state.exaggeration,
-    )
-
-
-def heard_scene(state: AppState) -> Scene:
-    """Give the scene as it is drawn: what is silenced by solo and mute is left out."""
-    return scene_of(replace(state, amplitudes=dict(state.heard)))
+SCENE, PACKED, NAME = "scene", "file", "name"
+_HEAD = re.compile(r"(?:[ \t]*(?:#[^\n]*)?\n)*")
+_VIEW, _COMPARISON = (
+    re.compile(rf"^{re.escape(mark)}(\S*)\s*$", re.MULTILINE) for mark in (MARK, COMPARED)
+)
+Find = Callable[[str], Scene | None]
+"""Gives the scene that whoever opens a file or a link also has under a name."""
 
 
 def state_to_toml(state: AppState, camera: CameraMemory | None = None) -> str:
@@ -83,14 +55,25 @@ def state_to_toml(state: AppState, camera: CameraMemory | None = None) -> str:
     -------
     str
         TOML that every reader of scenes takes; `open_text` gives the identical state back.
+
+    Raises
+    ------
+    OptionError
+        If what the state is compared with is too large to be stored beside it.
     """
+    line = comparison_line(state.comparison, lambda side: _write(side, None, _bundled))
+    if len(line) > MAX_COMPARED:
+        raise OptionError("what is compared is too large to be stored with the scene")
+    compared = f"{COMPARED}{line}\n" if line else ""
+    head = f"# Saved by warpspace {__version__}. Below stands how it was looked at.\n"
+    return f"{head}{_with_view(state, camera, compared)}"
+
+
+def _with_view(state: AppState, camera: CameraMemory | None, remarks: str = "") -> str:
+    """Spell a state without its comparison as a scene file."""
     scene = scene_of(state)
     saved = replace(state, scene=scene, loaded=None)
-    head = (
-        f"# Saved by warpspace {__version__}. The line below holds how it was looked at.\n"
-        f"{MARK}{settings_line(saved, camera)}\n\n"
-    )
-    return head + scene_to_toml(scene)
+    return f"{MARK}{settings_line(saved, camera)}\n{remarks}\n{scene_to_toml(scene)}"
 
 
 def open_text(text: str, name: str, source: str) -> tuple[AppState, CameraMemory | None]:
@@ -110,14 +93,40 @@ def open_text(text: str, name: str, source: str) -> tuple[AppState, CameraMemory
 
     Raises
     ------
-    SceneError
-        With every problem of the text.
+    SceneError, OptionError
+        With every problem of the text, or what is wrong with the comparison in it.
     """
+    state, camera = _read_text(text, name, source)
+    found = _COMPARISON.search(_head(text))
+    if found is not None:
+        pairs = _pairs(found[1], MAX_COMPARED, "the comparison")
+        state = with_comparison(state, pairs, lambda link: _read_link(link, _bundled)[0])
+    return state, camera
+
+
+def _read_text(text: str, name: str, source: str) -> tuple[AppState, CameraMemory | None]:
+    """Build a state from a file without looking at a comparison in it."""
     state = start_state(_recognised(parse_scene(text, name, source, folder=None)))
-    found = _VIEW.search(text)
+    found = _VIEW.search(_head(text))
     if found is None:
         return state, None
     return with_settings(state, found[1]), camera_of(found[1])
+
+
+def is_looked_at(text: str) -> bool:
+    """Tell whether a scene file says how it was looked at."""
+    return _VIEW.search(_head(text)) is not None
+
+
+def _head(text: str) -> str:
+    """Give the comments that a file begins with."""
+    found = _HEAD.match(text)
+    return found[0] if found else ""
+
+
+def _bundled(name: str) -> Scene | None:
+    """Give a scene that everybody has."""
+    return load_scene(name) if name in scene_names() else None
 
 
 def _recognised(scene: Scene) -> Scene:
@@ -156,16 +165,33 @@ def state_to_link(state: AppState, camera: CameraMemory | None, known: Iterable[
     Raises
     ------
     OptionError
-        If the scene is too large for a link.
+        If the scene, or what it is compared with, is too large for a link.
     """
-    plain = state.loaded is None and state.tolerances == state.scene.tolerances
-    if plain and any(scene is state.scene for scene in known):
-        return urlencode({SCENE: state.scene.name}) + _behind(settings_line(state, camera))
-    packed = base64.urlsafe_b64encode(zlib.compress(state_to_toml(state, camera).encode(), 9))
-    link = urlencode({PACKED: packed.decode().rstrip("=")})
+    find = _among(known)
+    link = _write(state, camera, find)
+    if not link.startswith(f"{SCENE}="):
+        link = _packed(state.scene.name, state_to_toml(state, camera))
+    else:
+        link += _behind(comparison_line(state.comparison, lambda side: _write(side, None, find)))
     if len(link) > MAX_LINK:
-        raise OptionError("this scene is too large for a link; save it as a file instead")
+        raise OptionError("this is too large for a link; save it as a file instead")
     return link
+
+
+def _write(state: AppState, camera: CameraMemory | None, find: Find) -> str:
+    """Spell a state without its comparison as a link of any length."""
+    plain = state.loaded is None and state.tolerances == state.scene.tolerances
+    if plain and find(state.scene.name) == state.scene:
+        return urlencode({SCENE: state.scene.name}) + _behind(settings_line(state, camera))
+    return _packed(state.scene.name, _with_view(state, camera))
+
+
+def _among(known: Iterable[Scene]) -> Find:
+    """Find scenes among those a server offers; of two with one name the first."""
+    named: dict[str, Scene] = {}
+    for scene in known:
+        named.setdefault(scene.name, scene)
+    return named.get
 
 
 def _behind(line: str) -> str:
@@ -190,25 +216,50 @@ def open_link(link: str, known: Iterable[Scene]) -> tuple[AppState, CameraMemory
     Raises
     ------
     OptionError, SceneError
-        If it names no scene, or holds none that can be read.
+        If it names no scene, or holds none that can be read, or a comparison that cannot.
     """
-    if len(link) > MAX_LINK:
-        raise OptionError(
-            f"the link is {len(link):,} characters long; expected at most {MAX_LINK:,}"
-        )
-    try:
-        pairs = dict(parse_qsl(link, max_num_fields=MAX_FIELDS))
-    except ValueError:
-        raise OptionError("the link has too many parts; it was not made by this program") from None
+    pairs = _pairs(link, MAX_LINK, "the link")
+    find = _among(known)
     if PACKED in pairs:
-        return open_text(_unpack(pairs[PACKED]), "link", "the scene in the link")
-    for scene in known:
-        if scene.name == pairs.get(SCENE):
-            rest = [(name, value) for name, value in pairs.items() if name != SCENE]
-            line = urlencode(rest)
-            return with_settings(start_state(scene), line), camera_of(line)
-    name = pairs.get(SCENE, "")[:LONGEST_NAME]
-    raise OptionError(f"the link names the scene {name!r}, which is not here")
+        return open_text(_unpack(pairs[PACKED]), *_named(pairs))
+    state, camera = _read_link(link, find)
+    return with_comparison(state, pairs, lambda part: _read_link(part, find)[0]), camera
+
+
+def _pairs(line: str, longest: int, what: str) -> dict[str, str]:
+    """Take a query string apart that may be anything."""
+    if len(line) > longest:
+        raise OptionError(f"{what} is {len(line):,} characters long; expected at most {longest:,}")
+    try:
+        return dict(parse_qsl(line, max_num_fields=MAX_FIELDS))
+    except ValueError:
+        raise OptionError(f"{what} has too many parts; it was not made by this program") from None
+
+
+def _read_link(link: str, find: Find) -> tuple[AppState, CameraMemory | None]:
+    """Build the state of a link without looking at a comparison in it."""
+    pairs = _pairs(link, MAX_COMPARED, "the link")
+    if PACKED in pairs:
+        return _read_text(_unpack(pairs[PACKED]), *_named(pairs))
+    name = pairs.get(SCENE, "")
+    scene = find(name)
+    if scene is None:
+        raise OptionError(f"the link names the scene {name[:LONGEST_NAME]!r}, which is not here")
+    line = urlencode(
+        [(k, v) for k, v in pairs.items() if k != SCENE and not k.startswith(COMPARISON)]
+    )
+    return with_settings(start_state(scene), line), camera_of(line)
+
+
+def _packed(name: str, text: str) -> str:
+    """Pack a file into a link."""
+    word = base64.urlsafe_b64encode(zlib.compress(text.encode(), 9)).decode().rstrip("=")
+    return urlencode({NAME: name, PACKED: word})
+
+
+def _named(pairs: Mapping[str, str]) -> tuple[str, str]:
+    """Name the file in a link, for itself and for messages."""
+    return safe_name(pairs.get(NAME, ""), "link"), "the scene in the link"
 
 
 def _unpack(packed: str) -> str:
@@ -222,48 +273,3 @@ def _unpack(packed: str) -> str:
         return text.decode("utf-8")
     except (binascii.Error, zlib.error, ValueError):
         raise OptionError("the scene in the link cannot be read; was the link cut?") from None
-
-
-def safe_name(name: str, fallback: str = "scene") -> str:
-    """Make a file name of what a user or a browser calls something.
-
-    Parameters
-    ----------
-    name : str
-        Anything: folders, ``../``, control characters and reserved letters are dropped.
-    fallback : str, optional
-        Where nothing is left.
-
-    Returns
-    -------
-    str
-        Without an ending.
-    """
-    last = name.replace("\\", "/").rsplit("/", 1)[-1]
-    stem = last.rsplit(".", 1)[0] if "." in last.strip(".") else last
-    clean = _UNSAFE.sub("_", stem).strip(" ._-")[:LONGEST_NAME].strip(" ._-")
-    return clean or fallback
-
-
-def upload_text(content: bytes, source: str) -> str:
-    """Read the bytes of an uploaded file.
-
-    Raises
-    ------
-    OptionError
-        If it is too large or no UTF-8 text.
-    """
-    if len(content) > MAX_SCENE_BYTES:
-        raise OptionError(size_message(source, len(content)))
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise OptionError(
-            f"{source} is not UTF-8 text (byte {error.start}); expected a scene file"
-        ) from None
-
-
-def size_message(source: str, size: float) -> str:
-    """Say that a file is too large."""
-    limit = MAX_SCENE_BYTES / 2**20
-    return f"{source} is {size / 2**20:.1f} MB large; expected a scene file of at most {limit:g} MB"

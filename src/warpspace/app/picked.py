@@ -3,8 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from warpspace.app.spelling import read_point, refuse, spell_numbers
 from warpspace.kinematics.model import Loop
 from warpspace.machine.description import Vector
+
+FARTHEST_MM = 1e5
+"""Farthest point of a workpiece that a link may ask about."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,3 +29,23 @@ class Picked:
     at: Mapping[str, float]
     loop: Loop | None = None
     point_mm: Vector | None = None
+
+
+def spell_trace(picked: Picked) -> str:
+    """Spell which trace a point lies on: loop and traced point; `read_trace` reads it back."""
+    return f"{picked.loop},{spell_numbers(picked.point_mm or ())}"
+
+
+def read_trace(text: str) -> Picked:
+    """Read which trace a point lies on; where the axes stand is still to come.
+
+    Raises
+    ------
+    Unreadable
+        If it means nothing.
+    """
+    loop, _, point = text.partition(",")
+    point_mm = read_point(point)
+    if loop not in [*Loop] or max(map(abs, point_mm)) > FARTHEST_MM:
+        refuse()
+    return Picked({}, Loop(loop), point_mm)

@@ -12,7 +12,17 @@ from urllib.parse import parse_qsl, urlencode
 
 from warpspace.app.emphasis import Emphasis
 from warpspace.app.look import linear_spans, slice_spans
-from warpspace.app.picked import Picked
+from warpspace.app.picked import Picked, read_trace, spell_trace
+from warpspace.app.spelling import (
+    Unreadable,
+    read_number,
+    read_numbers,
+    read_point,
+    read_switch,
+    refuse,
+    spell,
+    spell_numbers,
+)
 from warpspace.app.state import AppState, Shown, start_state
 from warpspace.app.tabs import CameraMemory
 from warpspace.kinematics.model import Loop
@@ -27,11 +37,8 @@ FOV_RAD = (0.01, 2.5)
 LOOK_NAMES = ("surface", "quantity", "range_mode")
 LOOK_SWITCHES = ("isolines", "arrows", "worst", "bars", "follow")
 MACHINE_SWITCHES = ("shown", "bent")
+TRACE = "why.trace"
 Handler = Callable[[AppState, str], AppState]
-
-
-class Unreadable(ValueError):  # noqa: N818 - it is handled here and never shown as such
-    """A value that means nothing."""
 
 
 def settings_line(state: AppState, camera: CameraMemory | None = None) -> str:
@@ -50,7 +57,7 @@ def settings_line(state: AppState, camera: CameraMemory | None = None) -> str:
     pairs = [*_differences(state)]
     if camera is not None:
         numbers = (*camera.position, *camera.look_at, *camera.up, camera.fov_rad)
-        pairs.append((CAMERA, _join(numbers, 6)))
+        pairs.append((CAMERA, ",".join(f"{number:.6g}" for number in numbers)))
     return urlencode(pairs)
 
 
@@ -75,18 +82,26 @@ def _differences(state: AppState) -> Iterator[tuple[str, str]]:
             if value == getattr(before, field.name):
                 continue
             if isinstance(value, dict):
-                yield from ((f"{group}.{field.name}.{k}", repr(v)) for k, v in value.items())
+                yield from (
+                    (f"{group}.{field.name}.{axis}", repr(at))
+                    for axis, at in value.items()
+                    if axis in state.scene.machine.axes
+                )
             else:
-                yield f"{group}.{field.name}", _word(value)
+                yield f"{group}.{field.name}", spell(value)
     if state.rotary.off:
         yield "rotary.off", ",".join(map(str, sorted(state.rotary.off)))
     if state.rotary.own_mm is not None:
-        yield "rotary.own", _join(state.rotary.own_mm)
-    yield from ((f"rotary.held.{axis}", _join(at)) for axis, at in state.rotary.held)
+        yield "rotary.own", spell_numbers(state.rotary.own_mm)
+    for axis, at in state.rotary.held:
+        if axis in state.positions:
+            yield f"rotary.held.{axis}", spell_numbers(at)
     for name in ("muted", "soloed"):
         if keys := getattr(state.emphasis, name):
             yield name, ",".join(sorted(keys))
-    if state.picked is not None and state.picked.point_mm is None:
+    if state.picked is not None:
+        if state.picked.point_mm is not None:
+            yield TRACE, spell_trace(state.picked)
         yield from ((f"why.{axis}", repr(at)) for axis, at in state.picked.at.items())
         if state.lever:
             yield "lever", state.lever
@@ -128,7 +143,7 @@ def camera_of(line: str) -> CameraMemory | None:
     if text is None:
         return None
     try:
-        numbers = _numbers(text, CAMERA_NUMBERS)
+        numbers = read_numbers(text, CAMERA_NUMBERS)
     except Unreadable:
         return None
     position, look_at, up = ((n[0], n[1], n[2]) for n in (numbers[:3], numbers[3:6], numbers[6:9]))
@@ -152,13 +167,13 @@ def _pairs(line: str) -> list[tuple[str, str]]:
 def _handlers(state: AppState) -> dict[str, Handler]:
     """List what can be set in a state, and how."""
     found: dict[str, Handler] = {
-        "exaggeration": lambda s, v: s.with_exaggeration(None if v == "auto" else _number(v)),
+        "exaggeration": lambda s, v: s.with_exaggeration(None if v == "auto" else read_number(v)),
         "component": lambda s, v: s.with_component(v),
-        "loop": lambda s, v: s.with_loop(v) if v in [*Loop] else _refuse(),
-        "nodes": lambda s, v: s.with_nodes(_number(v)),
-        "look.range_top": lambda s, v: _with_top(s, _number(v)),
+        "loop": lambda s, v: s.with_loop(v) if v in [*Loop] else refuse(),
+        "nodes": lambda s, v: s.with_nodes(read_number(v)),
+        "look.range_top": lambda s, v: _with_top(s, read_number(v)),
         "specification.limit_um": lambda s, v: replace(
-            s, specification=s.specification.with_limit(_number(v))
+            s, specification=s.specification.with_limit(read_number(v))
         ),
         "specification.over": lambda s, v: replace(s, specification=s.specification.with_over(v)),
         "specification.distribution": lambda s, v: replace(
@@ -167,19 +182,21 @@ def _handlers(state: AppState) -> dict[str, Handler]:
         "rotary.off": lambda s, v: replace(
             s, rotary=replace(s.rotary, off=frozenset(_indices(s, v)))
         ),
-        "rotary.own": lambda s, v: replace(s, rotary=s.rotary.with_own(_point(v))),
+        "rotary.own": lambda s, v: replace(s, rotary=s.rotary.with_own(read_point(v))),
         "muted": lambda s, v: _with_silenced(s, muted=v),
         "soloed": lambda s, v: _with_silenced(s, soloed=v),
-        "lever": lambda s, v: replace(s, lever=v) if v in s.amplitudes else _refuse(),
+        TRACE: lambda s, v: replace(s, picked=read_trace(v)),
+        "lever": lambda s, v: replace(s, lever=v) if v in s.amplitudes else refuse(),
     }
     for key in state.amplitudes:
-        found[key] = lambda s, v, key=key: s.with_amplitude(key, _number(v))
+        found[key] = lambda s, v, key=key: s.with_amplitude(key, read_number(v))
     for axis in state.positions:
-        found[axis] = lambda s, v, axis=axis: s.with_position(axis, _number(v))
+        found[axis] = lambda s, v, axis=axis: s.with_position(axis, read_number(v))
+        found[f"why.{axis}"] = lambda s, v, axis=axis: _with_turned(s, axis, read_number(v))
         found[f"rotary.held.{axis}"] = lambda s, v, axis=axis: _with_held(s, axis, v)
     for field in fields(Shown):
         found[f"shown.{field.name}"] = lambda s, v, name=field.name: s.with_shown(
-            **{name: _bool(v)}
+            **{name: read_switch(v)}
         )
     for name in LOOK_NAMES:
         found[f"look.{name}"] = lambda s, v, name=name: replace(
@@ -187,22 +204,22 @@ def _handlers(state: AppState) -> dict[str, Handler]:
         )
     for name in LOOK_SWITCHES:
         found[f"look.{name}"] = lambda s, v, name=name: replace(
-            s, look=s.look.switched(**{name: _bool(v)})
+            s, look=s.look.switched(**{name: read_switch(v)})
         )
     for name in MACHINE_SWITCHES:
         found[f"machine.{name}"] = lambda s, v, name=name: replace(
-            s, machine=s.machine.switched(**{name: _bool(v)})
+            s, machine=s.machine.switched(**{name: read_switch(v)})
         )
     for axis, span in slice_spans(state.scene).items():
         found[f"look.slices_mm.{axis}"] = lambda s, v, axis=axis, span=span: replace(
-            s, look=s.look.with_slice(axis, _number(v), span)
+            s, look=s.look.with_slice(axis, read_number(v), span)
         )
     for axis, span in linear_spans(state.scene).items():
         found[f"machine.linear_mm.{axis}"] = lambda s, v, axis=axis, span=span: replace(
-            s, machine=s.machine.with_linear(axis, _number(v), span)
+            s, machine=s.machine.with_linear(axis, read_number(v), span)
         )
         found[f"why.{axis}"] = lambda s, v, axis=axis, span=span: _with_asked(
-            s, axis, span.clamp(_number(v), 0.0)
+            s, axis, span.clamp(read_number(v), 0.0)
         )
     return found
 
@@ -225,67 +242,25 @@ def _with_silenced(state: AppState, *, muted: str = "", soloed: str = "") -> App
 def _with_held(state: AppState, axis: str, text: str) -> AppState:
     """Hold an axis at listed positions within its travel."""
     span = state.position_spans[axis]
-    at = tuple(span.clamp(value, span.low) for value in _numbers(text)[:8])
+    at = tuple(span.clamp(value, span.low) for value in read_numbers(text)[:8])
     return replace(state, rotary=state.rotary.with_held(axis, at))
 
 
 def _with_asked(state: AppState, axis: str, at: float) -> AppState:
-    """Ask about a point of the surface, one axis position at a time, mm."""
-    before = {} if state.picked is None else state.picked.at
-    return replace(state, picked=Picked({**before, axis: at}))
+    """Ask about a point, one axis position at a time, mm or degrees."""
+    picked = state.picked or Picked({})
+    return replace(state, picked=replace(picked, at={**picked.at, axis: at}))
 
 
-def _word(value: object) -> str:
-    """Spell a plain value."""
-    if isinstance(value, bool):
-        return "1" if value else "0"
-    return repr(value) if isinstance(value, float) else str(value)
-
-
-def _join(numbers: tuple[float, ...], digits: int = 15) -> str:
-    """Spell numbers with commas between."""
-    return ",".join(f"{number:.{digits}g}" for number in numbers)
-
-
-def _refuse() -> AppState:
-    """Say that a value means nothing."""
-    raise Unreadable
-
-
-def _bool(text: str) -> bool:
-    """Read a switch."""
-    if text not in ("0", "1"):
-        raise Unreadable
-    return text == "1"
-
-
-def _number(text: str) -> float:
-    """Read a finite number."""
-    try:
-        value = float(text)
-    except ValueError:
-        raise Unreadable from None
-    if not math.isfinite(value):
-        raise Unreadable
-    return value
-
-
-def _numbers(text: str, count: int | None = None) -> tuple[float, ...]:
-    """Read numbers with commas between."""
-    found = tuple(_number(word) for word in text.split(","))
-    if count is not None and len(found) != count:
-        raise Unreadable
-    return found
-
-
-def _point(text: str) -> tuple[float, float, float]:
-    """Read a point."""
-    x, y, z = _numbers(text, 3)
-    return x, y, z
+def _with_turned(state: AppState, axis: str, at: float) -> AppState:
+    """Ask about a point of a trace, one rotary axis at a time, degrees."""
+    if state.picked is None or state.picked.point_mm is None:
+        refuse()
+    return _with_asked(state, axis, state.position_spans[axis].clamp(at, 0.0))
 
 
 def _indices(state: AppState, text: str) -> Iterator[int]:
     """Read numbers of the scene's trace points."""
-    for value in _numbers(text):
+    for value in read_numbers(text):
         if 0 <= value < len(state.scene.trace_points_mm):
             yield int(value)

@@ -6,7 +6,7 @@ from typing import Any
 from viser import ClientHandle
 from viser import _messages as messages
 
-from warpspace.app.document import size_message
+from warpspace.app.incoming import size_message
 from warpspace.app.widgets import dom_id
 from warpspace.scene.files import MAX_SCENE_BYTES
 

@@ -7,17 +7,19 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from warpspace.app import document, links
+from warpspace.app import document, incoming, links
+from warpspace.app.comparison import Comparison
 from warpspace.app.jobs import Jobs, Progress
 from warpspace.app.live import Frame
 from warpspace.app.outside import Outside
 from warpspace.app.panels import Desk
+from warpspace.app.resulting import heard_scene
 from warpspace.app.services import CancelledError, Request
 from warpspace.app.state import AppState
 from warpspace.app.tabs import CameraMemory
 from warpspace.app.uploads import Uploads, size_script
 from warpspace.app.widgets import dom_id
-from warpspace.exceptions import WarpspaceError
+from warpspace.exceptions import OptionError, WarpspaceError
 
 logger = logging.getLogger(__name__)
 FIGURE_S, VIEW_S, PAGE_S, EXPORT_S = 5.0, 1.5, 1.0, 1.0
@@ -114,9 +116,10 @@ class FilesPanel:
         """Open an uploaded scene."""
 
         def read() -> None:
-            title = document.safe_name(name)
-            text = document.upload_text(content, f"{title}.toml")
-            self._show(*document.open_text(text, title, f"{title}.toml"))
+            title = incoming.safe_name(name)
+            text = incoming.upload_text(content, f"{title}.toml")
+            opened, camera = document.open_text(text, title, f"{title}.toml")
+            self._show(opened, camera, whole=document.is_looked_at(text))
             self._desk.notify("Opened", f"{title}.toml", "green")
 
         self._try("Not opened", read)
@@ -125,46 +128,58 @@ class FilesPanel:
         """Say that a file was too large to be sent, from what the page tells."""
         _, size, name = (*message.split(":", 2), "", "")[:3]
         megabytes = float(size) if size.isdigit() and len(size) < 16 else 0.0
-        text = document.size_message(f"{document.safe_name(name)}.toml", megabytes)
+        text = incoming.size_message(f"{incoming.safe_name(name)}.toml", megabytes)
         self._desk.notify("Not opened", text, "red")
 
     def _follow(self, message: str) -> None:
         """Show what a link describes."""
-        word, scenes = message.partition(":")[2], self._outside.scenes.values()
+        word, scenes = message.partition(":")[2], self._outside.scenes.fixed
         self._try("Link", lambda: self._show(*document.open_link(links.unpack(word), scenes)))
 
-    def _show(self, opened: AppState, camera: CameraMemory | None) -> None:
-        """Show an opened state from its camera; the comparison stays."""
+    def _show(self, opened: AppState, camera: CameraMemory | None, *, whole: bool = True) -> None:
+        """Show an opened state from its camera; beside a plain scene the comparison stays."""
 
         def update(now: AppState) -> AppState:
             if camera is not None:
                 # with this change, not before it: another scene places the camera anew
                 self._outside.look_from(camera)
-            return replace(opened, comparison=now.comparison)
+            return opened if whole else replace(opened, comparison=now.comparison)
 
         self._desk.post(update)
 
     def _save(self) -> None:
         """Send the state as a scene file."""
-        state = self._desk.board().state
-        text = document.state_to_toml(state, self._outside.camera())
-        self._send(document.safe_name(state.scene.name), ".toml", text.encode())
+        state, camera = self._desk.board().state, self._outside.camera()
+        text = self._alone_if_large(lambda s: document.state_to_toml(s, camera))
+        self._send(incoming.safe_name(state.scene.name), ".toml", text.encode())
 
     def _link(self) -> None:
         """Put a link into the address bar."""
-        scenes = self._outside.scenes.values()
-        link = document.state_to_link(self._desk.board().state, self._outside.camera(), scenes)
+        scenes, camera = self._outside.scenes.fixed, self._outside.camera()
+        link = self._alone_if_large(lambda s: document.state_to_link(s, camera, scenes))
         self._outside.run_script(links.show_script(link))
         self._outside.client.flush()
         self._desk.notify(
             "Link", "It stands in the address bar, and in the clipboard where allowed.", "green"
         )
 
+    def _alone_if_large(self, write: Callable[[AppState], str]) -> str:
+        """Write the state; without what it is compared with where both are too large."""
+        state = self._desk.board().state
+        try:
+            return write(state)
+        except OptionError as error:
+            if state.comparison == Comparison():
+                raise
+            text = write(replace(state, comparison=Comparison()))
+            self._desk.notify("Without the comparison", str(error), "yellow")
+            return text
+
     def _request(self) -> Request:
         """Give what is to be drawn: the state that is steered, as it is heard."""
         state = self._desk.board().state
         factor = state.exaggeration or (self._frame.exaggeration if self._frame else 1.0)
-        scene = replace(document.heard_scene(state), exaggeration=factor)
+        scene = replace(heard_scene(state), exaggeration=factor)
         loop, component = state.loop.value, state.component
         return Request(scene, loop, component, state.nodes, factor, state.shown.dark)
 
@@ -209,7 +224,7 @@ class FilesPanel:
 
     def _make(self, name: str, ending: str, usual_s: float, make: Make) -> None:
         """Make a file beside the session and send it."""
-        stem = document.safe_name(self._desk.board().state.scene.name)
+        stem = incoming.safe_name(self._desk.board().state.scene.name)
 
         def work(cancelled: threading.Event) -> None:
             content = make(cancelled)

@@ -1,0 +1,54 @@
+"""Files that a browser sends: a name that can be used, and the text in them."""
+
+import re
+
+from warpspace.exceptions import OptionError
+from warpspace.scene.files import MAX_SCENE_BYTES
+
+_UNSAFE = re.compile(r"[^A-Za-z0-9._ -]+")
+LONGEST_NAME = 60
+
+
+def safe_name(name: str, fallback: str = "scene") -> str:
+    """Make a file name of what a user or a browser calls something.
+
+    Parameters
+    ----------
+    name : str
+        Anything: folders, ``../``, control characters and reserved letters are dropped.
+    fallback : str, optional
+        Where nothing is left.
+
+    Returns
+    -------
+    str
+        Without an ending.
+    """
+    last = name.replace("\\", "/").rsplit("/", 1)[-1]
+    stem = last.rsplit(".", 1)[0] if "." in last.strip(".") else last
+    clean = _UNSAFE.sub("_", stem).strip(" ._-")[:LONGEST_NAME].strip(" ._-")
+    return clean or fallback
+
+
+def upload_text(content: bytes, source: str) -> str:
+    """Read the bytes of an uploaded file.
+
+    Raises
+    ------
+    OptionError
+        If it is too large or no UTF-8 text.
+    """
+    if len(content) > MAX_SCENE_BYTES:
+        raise OptionError(size_message(source, len(content)))
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise OptionError(
+            f"{source} is not UTF-8 text (byte {error.start}); expected a scene file"
+        ) from None
+
+
+def size_message(source: str, size: float) -> str:
+    """Say that a file is too large."""
+    limit = MAX_SCENE_BYTES / 2**20
+    return f"{source} is {size / 2**20:.1f} MB large; expected a scene file of at most {limit:g} MB"
