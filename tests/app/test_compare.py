@@ -8,8 +8,13 @@ import pytest
 from warpspace.app.compare import pinned_side, scene_side, with_pin, with_sides
 from warpspace.app.compare_text import comparison_html
 from warpspace.app.comparison import Side
+from warpspace.app.facets import topology
 from warpspace.app.live import Frame, LiveModel
+from warpspace.app.mapmesh import map_mesh
+from warpspace.app.ranges import Span
 from warpspace.app.state import AppState, start_state
+from warpspace.geometry.colour import component_values
+from warpspace.geometry.deform import deform
 from warpspace.scene.library import load_scene
 
 LIVE = LiveModel()
@@ -79,3 +84,45 @@ def test_a_snapshot_of_a_comparison_holds_no_comparison() -> None:
 def test_unknown_words_draw_nothing_else(word: str) -> None:
     state = with_pin(START)
     assert state.comparison.with_shown(word) is state.comparison
+
+
+def test_the_difference_is_cut_into_slices_evaluated_where_they_lie() -> None:
+    look = START.look.with_choice(surface="slices").with_slice("X", 31.0, Span(-275.0, 275.0, 1.0))
+    for component, quantity in (("norm", "position"), ("y", "position"), ("norm", "orientation")):
+        state = replace(
+            START, look=look.with_choice(quantity=quantity), component=component
+        ).with_amplitude("EAX", 9.0)
+        state = with_sides(state, Side(), scene_side(SECOND))
+        a, b, difference = (frame_of(state, shown) for shown in ("a", "b", "difference"))
+        assert [part.axis for part in difference.slices] == [part.axis for part in a.slices]
+        assert difference.slices[0].position_mm == 31.0
+        for one, two, part in zip(a.slices, b.slices, difference.slices, strict=True):
+            np.testing.assert_array_equal(one.grid.nominal_mm, two.grid.nominal_mm)
+            error = one.field.error_um - two.field.error_um
+            np.testing.assert_allclose(part.field.error_um, error, atol=1e-12)
+            drawn = deform(one.grid.nominal_mm, error, difference.exaggeration)
+            np.testing.assert_allclose(part.drawn_mm, drawn, atol=1e-9)
+            coloured = error
+            if quantity == "orientation":
+                coloured = one.field.orientation_urad - two.field.orientation_urad
+            np.testing.assert_allclose(
+                part.values, component_values(coloured, component), atol=1e-12
+            )
+        # what is drawn are the slices, on the shared scale
+        mesh = map_mesh(difference)
+        assert len(mesh.values) == sum(part.values.size for part in difference.slices)
+
+
+def test_slices_of_both_sides_follow_the_tool_point_of_now() -> None:
+    look = START.look.with_choice(surface="slices").switched(follow=True)
+    machine = START.machine.with_linear("Y", 50.0, Span(-225.0, 225.0, 1.0))
+    state = with_sides(replace(START, look=look, machine=machine), Side(), scene_side(SECOND))
+    for shown in ("a", "b", "difference"):
+        at = {part.axis: part.position_mm for part in frame_of(state, shown).slices}
+        assert at["Y"] == 50.0
+
+
+def test_the_difference_is_cut_open() -> None:
+    state = replace(START, look=START.look.with_choice(surface="cut"))
+    difference = frame_of(with_sides(state, Side(), scene_side(SECOND)), "difference")
+    assert difference.topology is topology(difference.grid.shape, cut=True)

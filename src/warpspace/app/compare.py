@@ -14,6 +14,7 @@ from warpspace.analysis.statistics import Statistics, statistics
 from warpspace.app.comparison import Comparison, Side
 from warpspace.app.look import RotaryLook
 from warpspace.app.mapping import shown_values
+from warpspace.app.slicing import SliceMap, draw_slice
 from warpspace.app.state import AppState, start_state
 from warpspace.field.evaluate import ErrorField
 from warpspace.geometry.colour import ColourScale, build_scale
@@ -81,6 +82,7 @@ def side_state(now: AppState, side: Side) -> AppState:
         nodes=now.nodes,
         exaggeration=now.exaggeration,
         look=now.look,
+        machine=now.machine,
         shown=now.shown,
         rotary=now.rotary if _turns_alike(base, now) else RotaryLook(),
         comparison=Comparison(),
@@ -160,20 +162,14 @@ def _title(state: AppState, side: Side) -> str:
 
 def _why_not(a: "Frame", b: "Frame") -> str:
     """Say why there is no difference; empty where there is one."""
-    if a.grid.shape != b.grid.shape or not np.allclose(
-        a.grid.nominal_mm, b.grid.nominal_mm, rtol=0.0, atol=SAME_PLACE_MM
-    ):
+    if not _same_place(a.grid.nominal_mm, b.grid.nominal_mm):
         return "The working volumes are not the same, so there is no difference node by node."
     return ""
 
 
 def _difference(a: "Frame", b: "Frame", factor: float) -> "Frame":
-    """Subtract b from a, node by node and trace by trace."""
-    field = ErrorField(
-        a.field.nominal_mm,
-        a.field.error_um - b.field.error_um,
-        a.field.orientation_urad - b.field.orientation_urad,
-    )
+    """Subtract b from a: node by node, slice by slice and trace by trace."""
+    field = _subtract(a.field, b.field)
     return replace(
         a,
         field=field,
@@ -181,18 +177,40 @@ def _difference(a: "Frame", b: "Frame", factor: float) -> "Frame":
         values=shown_values(a.state, field),
         drawn_mm=deform(field.nominal_mm, field.error_um, factor),
         traces=_trace_differences(a, b),
-        slices=(),
+        slices=_slice_differences(a, b, factor),
     )
+
+
+def _subtract(one: ErrorField, two: ErrorField) -> ErrorField:
+    """Subtract two fields over the same points."""
+    return ErrorField(
+        one.nominal_mm,
+        one.error_um - two.error_um,
+        one.orientation_urad - two.orientation_urad,
+    )
+
+
+def _slice_differences(a: "Frame", b: "Frame", factor: float) -> tuple[SliceMap, ...]:
+    """Subtract what the model says on the slices themselves, where both lie in one place."""
+    return tuple(
+        draw_slice(
+            a.state, one.axis, one.position_mm, one.grid, _subtract(one.field, two.field), factor
+        )
+        for one, two in zip(a.slices, b.slices, strict=False)
+        if _same_place(one.grid.nominal_mm, two.grid.nominal_mm)
+    )
+
+
+def _same_place(one: Array, two: Array) -> bool:
+    """Tell whether nodes nominally coincide."""
+    return one.shape == two.shape and np.allclose(one, two, rtol=0.0, atol=SAME_PLACE_MM)
 
 
 def _trace_differences(a: "Frame", b: "Frame") -> "tuple[TraceLines, ...]":
     """Subtract traces where they are the same ones."""
     found: list[TraceLines] = []
     for one, two in zip(a.traces, b.traces, strict=False):
-        same = one.nominal_mm.shape == two.nominal_mm.shape and np.allclose(
-            one.nominal_mm, two.nominal_mm, rtol=0.0, atol=SAME_PLACE_MM
-        )
-        if same:
+        if _same_place(one.nominal_mm, two.nominal_mm):
             found.append(replace(one, actual_mm=one.nominal_mm + one.actual_mm - two.actual_mm))
     return tuple(found)
 

@@ -6,7 +6,7 @@ from warpspace.app.kept import Kept, Same
 from warpspace.app.look import slice_positions
 from warpspace.app.mapping import shown_values
 from warpspace.app.state import AppState
-from warpspace.field.evaluate import ErrorBasis
+from warpspace.field.evaluate import ErrorBasis, ErrorField
 from warpspace.field.grid import Grid
 from warpspace.geometry.deform import deform
 from warpspace.geometry.slices import build_slice
@@ -27,6 +27,7 @@ class SliceMap:
     position_mm : float, mm
     grid : Grid
         One node along the axis of the slice.
+    field : ErrorField
     values : ndarray, [nx, ny, nz], µm or µrad
         What is coloured.
     drawn_mm : ndarray, [nx, ny, nz, 3], mm
@@ -35,6 +36,7 @@ class SliceMap:
     axis: str
     position_mm: float
     grid: Grid
+    field: ErrorField
     values: Array
     drawn_mm: Array
 
@@ -64,8 +66,7 @@ class SliceSource:
         for axis, at in slice_positions(state.scene, state.look, state.machine).items():
             grid, basis = self._basis(state, axis, at)
             field = basis.evaluate(amplitudes, orientation=state.look.tilts)
-            drawn = deform(field.nominal_mm, field.error_um, exaggeration)
-            found.append(SliceMap(axis, at, grid, shown_values(state, field), drawn))
+            found.append(draw_slice(state, axis, at, grid, field, exaggeration))
         return tuple(found)
 
     def _basis(self, state: AppState, axis: str, at: float) -> tuple[Grid, ErrorBasis]:
@@ -80,6 +81,14 @@ class SliceSource:
             return grid, grid_basis(scene, grid, scene.view(state.loop))
 
         return self._kept.get(key, build, _size)
+
+
+def draw_slice(
+    state: AppState, axis: str, at: float, grid: Grid, field: ErrorField, exaggeration: float
+) -> SliceMap:
+    """Colour and displace the nodes of a slice as a state is looked at."""
+    drawn = deform(field.nominal_mm, field.error_um, exaggeration)
+    return SliceMap(axis, at, grid, field, shown_values(state, field), drawn)
 
 
 def _size(held: tuple[Grid, ErrorBasis]) -> int:
