@@ -1,5 +1,7 @@
 """Conventions: every choice is applied, measured against the scene's own, and undone."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -12,7 +14,10 @@ from warpspace.app.conventions import (
     with_reference,
 )
 from warpspace.app.conventions_text import switchboard_html
+from warpspace.app.document import open_text, state_to_toml
 from warpspace.app.live import LiveModel
+from warpspace.app.panels import conventions as panel_module
+from warpspace.app.panels.conventions import ConventionsPanel
 from warpspace.app.state import start_state
 from warpspace.scene.library import load_scene
 
@@ -66,3 +71,55 @@ def test_the_switchboard_marks_what_is_in_force() -> None:
     text = switchboard_html(state, {}, lambda word, role: f'role="{role}"')
     assert 'data-choice="loop=relative" aria-checked="true"' in text
     assert 'data-choice="loop=tool" aria-checked="false"' in text
+
+
+def test_linear_axes_have_a_direction_like_rotary_ones() -> None:
+    text = switchboard_html(START, {}, lambda word, role: "")
+    table, linear = text.index("Table direction"), text.index("Direction of linear axes")
+    for axis, begin, end in (
+        ("B", table, linear),
+        ("C", table, linear),
+        ("X", linear, len(text)),
+        ("Z", linear, len(text)),
+    ):
+        assert begin < text.index(f'data-choice="direction {axis}=-1"') < end
+    turned = with_choice(START, "direction X=-1")
+    assert turned.scene.machine.axes["X"].direction == -1
+    along_x = LIVE.frame(turned).grid.nominal_mm[:, 0, 0, 0]
+    assert along_x[0] > along_x[-1]
+    assert Effects().of(START)["direction Z=-1"].max_um > 0.0
+    assert with_own_conventions(turned) == START
+
+
+def test_files_keep_the_direction_of_a_linear_axis() -> None:
+    turned = with_choice(START, "direction Y=-1")
+    back, _ = open_text(state_to_toml(turned), "dvf5000_first", "x.toml")
+    assert back.scene.machine.axes["Y"].direction == -1
+    assert back.scene.model == turned.scene.model
+
+
+def test_the_panel_does_nothing_while_a_slider_moves(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is shown on every slider move of every tab."""
+    calls: list[str] = []
+    monkeypatch.setattr(
+        panel_module,
+        "switchboard_html",
+        lambda *_: calls.append("written") or f"text {len(calls)}",
+    )
+    panel = object.__new__(ConventionsPanel)
+    panel._scene, panel._in_force, panel._known, panel._at = START.origin, (), {}, {}
+    panel._effects, panel._text = Effects(), SimpleNamespace(content="")
+    panel._clicks = SimpleNamespace(attributes=None)
+    panel.show(LIVE.frame(START))
+    assert calls == ["written"]
+    moved = START
+    for value in (1.0, 2.0, 3.0):
+        moved = moved.with_amplitude("EXX", value)
+        panel.show(LIVE.frame(moved))
+    assert calls == ["written"]
+    panel.settle(LIVE.frame(moved))
+    assert len(calls) == 2
+    panel.settle(LIVE.frame(moved))
+    assert len(calls) == 2
+    panel.show(LIVE.frame(with_choice(moved, "loop=relative")))
+    assert len(calls) == 3

@@ -135,13 +135,13 @@ def _with_scene(state: AppState, scene: Scene) -> AppState:
 
 def choices(state: AppState) -> list[str]:
     """List what can be chosen, as `with_choice` takes it, in the order shown."""
-    rotary = [axis.name for axis in state.scene.machine.axes.values() if not axis.is_linear]
+    axes = sorted(state.scene.machine.axes.values(), key=lambda axis: (axis.is_linear, axis.name))
     return [
         *(f"component_errors={order}" for order in ComponentErrors),
         *(f"loop={loop}" for loop in Loop),
         "reference=absolute",
         "reference=point",
-        *(f"direction {axis}={sign}" for axis in rotary for sign in (1, -1)),
+        *(f"direction {axis.name}={sign}" for axis in axes for sign in (1, -1)),
     ]
 
 
@@ -177,9 +177,9 @@ class Effects:
             By choice; "all" is the present combination. Over 7 × 7 × 7 nodes, first order, at the
             same axis positions. What the scene itself chooses changes nothing.
         """
-        own = own_state(state)
-        needed = (own.scene, tuple(state.positions.items()), state.scene, state.loop)
+        needed = (state.origin, state.scene, tuple(state.positions.items()), state.loop)
         if self._own is None or not _same(needed, self._for):
+            own = own_state(state)
             self._for = needed
             self._own = _response(own)
             self._bases = {

@@ -4,12 +4,14 @@ from collections.abc import Callable, Mapping
 
 from warpspace.app.conventions import Effect, choices, chosen, own_state
 from warpspace.app.state import AppState
+from warpspace.machine.parameters import LINEAR_AXES
 
 GROUPS = {
     "component_errors": ("Component errors", "where the errors of a motion act"),
     "loop": ("Loop", "whose error is looked at"),
     "reference": ("Reference", "what is held still"),
-    "direction": ("Table direction", "+1 with its name, −1 against"),
+    "rotary": ("Table direction", "+1 with its name, −1 against"),
+    "linear": ("Direction of linear axes", "likewise"),
 }
 WORDS = {
     "component_errors=after_motion": "after motion (moving body)",
@@ -32,6 +34,12 @@ def spell_choice(choice: str) -> str:
     return f"{axis} {'+1' if sign == '1' else '−1'}"
 
 
+def _group(choice: str) -> str:
+    """Give the key of `GROUPS` that a choice belongs to."""
+    what, _, axis = choice.split("=", maxsplit=1)[0].partition(" ")
+    return what if not axis else "linear" if axis in LINEAR_AXES else "rotary"
+
+
 def switchboard_html(state: AppState, effects: Mapping[str, Effect], attributes: Attributes) -> str:
     """Spell the switchboard.
 
@@ -52,7 +60,7 @@ def switchboard_html(state: AppState, effects: Mapping[str, Effect], attributes:
     rows: list[str] = []
     group = ""
     for choice in choices(state):
-        name = choice.split("=")[0].split(" ")[0]
+        name = _group(choice)
         if name != group:
             group = name
             title, meaning = GROUPS[name]

@@ -12,6 +12,7 @@ from warpspace.app.conventions import (
     with_reference,
 )
 from warpspace.app.conventions_text import switchboard_html
+from warpspace.app.kept import Same
 from warpspace.app.live import Frame
 from warpspace.app.panels import Desk
 from warpspace.app.panels.clicks import Clicks
@@ -33,6 +34,7 @@ class ConventionsPanel:
         gui = desk.gui
         self._desk, self._effects = desk, Effects()
         self._known: dict[str, Effect] = {}
+        self._in_force: tuple[object, ...] = ()
         self._clicks = Clicks(gui, lambda word: desk.post(lambda s: with_choice(s, word)))
         self._text: Any = gui.add_html("")
         self.picking = False
@@ -84,21 +86,27 @@ class ConventionsPanel:
         return with_reference(state, typed) if typed else state
 
     def show(self, frame: Frame) -> None:
-        """Show what is in force; the effects follow when changes pause."""
+        """Show what is in force, where that has changed; the effects follow when changes pause."""
         state = frame.state
         if state.origin is not self._scene:
             self._known = {}
             self._build(state)
-        reference = state.scene.reference
-        if reference is not None:
+        scene = state.scene
+        in_force = (Same(state.origin), Same(scene.model), scene.reference, state.loop)
+        if in_force == self._in_force:
+            return
+        self._in_force = in_force
+        if scene.reference is not None:
             for axis, bound in self._at.items():
-                bound.show(float(reference.get(axis, bound.handle.value)))
+                bound.show(float(scene.reference.get(axis, bound.handle.value)))
         self._write(state)
 
     def settle(self, frame: Frame) -> None:
         """Work out what every choice changes."""
-        self._known = self._effects.of(frame.state)
-        self._write(frame.state)
+        known = self._effects.of(frame.state)
+        if known != self._known:
+            self._known = known
+            self._write(frame.state)
 
     def _write(self, state: AppState) -> None:
         """Write the switchboard."""
