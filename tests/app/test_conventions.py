@@ -16,6 +16,7 @@ from warpspace.app.conventions import (
 from warpspace.app.conventions_text import switchboard_html
 from warpspace.app.document import open_text, state_to_toml
 from warpspace.app.live import LiveModel
+from warpspace.app.mapmesh import edge_pieces
 from warpspace.app.panels import conventions as panel_module
 from warpspace.app.panels.conventions import ConventionsPanel
 from warpspace.app.state import start_state
@@ -89,6 +90,13 @@ def test_linear_axes_have_a_direction_like_rotary_ones() -> None:
     assert along_x[0] > along_x[-1]
     assert Effects().of(START)["direction Z=-1"].max_um > 0.0
     assert with_own_conventions(turned) == START
+
+
+def test_lines_stay_on_the_outside_of_a_mirrored_volume() -> None:
+    frame = LIVE.frame(with_choice(START.zeroed(), "direction X=-1"))
+    lines, nodes = edge_pieces(frame).reshape(-1, 3), frame.grid.nominal_mm.reshape(-1, 3)
+    assert (lines.max(axis=0) > nodes.max(axis=0)).all()
+    assert (lines.min(axis=0) < nodes.min(axis=0)).all()
 
 
 def test_files_keep_the_direction_of_a_linear_axis() -> None:

@@ -43,22 +43,39 @@ class Part:
     values: Array
     drawn_of: Topology
     lifts: tuple[float, ...]
+    ways: Array
+    """Direction of each axis of the grid, +1 or −1: an axis may run against its name."""
 
     def pieces(self, segments: Index, outwards: Pieces, times: float) -> list[Pieces]:
         """Give pieces of line off the surface, on each side that is seen, [S, 2, 3] each, mm."""
         ends = self.drawn_mm.reshape(-1, 3)[segments].astype(np.float32)
-        return [ends + (outwards * (lift * times)).astype(np.float32) for lift in self.lifts]
+        return [
+            ends + (outwards * (lift * times * self.ways)).astype(np.float32) for lift in self.lifts
+        ]
 
 
 def map_parts(frame: Frame) -> list[Part]:
     """List the grids that a map consists of; a slice is seen from both sides."""
     lift = LIFT * frame.grid.longest_edge_mm
     if not frame.slices:
-        return [Part(frame.drawn_mm, frame.values, frame.topology, (lift,))]
+        ways = _ways(frame.grid.nominal_mm)
+        return [Part(frame.drawn_mm, frame.values, frame.topology, (lift,), ways)]
     return [
-        Part(part.drawn_mm, part.values, topology(part.grid.shape), (lift, -lift))
+        Part(
+            part.drawn_mm,
+            part.values,
+            topology(part.grid.shape),
+            (lift, -lift),
+            _ways(part.grid.nominal_mm),
+        )
         for part in frame.slices
     ]
+
+
+def _ways(nominal_mm: Array) -> Array:
+    """Tell which way the nodes of a grid run along x, y and z, +1 or −1, [3]."""
+    along = nominal_mm[-1, -1, -1] - nominal_mm[0, 0, 0]
+    return np.where(along < 0.0, -1.0, 1.0)
 
 
 def map_mesh(frame: Frame) -> MapMesh:
@@ -138,7 +155,7 @@ def isoline_pieces(frame: Frame) -> Pieces:
     found: list[Pieces] = []
     for part in map_parts(frame):
         nodes, values = part.drawn_mm.reshape(-1, 3), part.values.reshape(-1)
-        faces, normals = part.drawn_of.faces, part.drawn_of.normals
+        faces, normals = part.drawn_of.faces, part.drawn_of.normals * part.ways
         found += [
             isoline_segments(faces, nodes, values, levels, ISOLINE_LIFT * lift * normals).astype(
                 np.float32
