@@ -115,7 +115,8 @@ def build_glb(vertices: Array, triangles: NDArray[np.integer], colours: Floats) 
         A complete GLB file, vertices and colours as 32-bit floats.
     """
     points = np.ascontiguousarray(vertices, dtype="<f4")
-    low, high = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+    columns = np.ascontiguousarray(points.T)
+    low, high = columns.min(axis=1).tolist(), columns.max(axis=1).tolist()
     indices = _indices(Same(triangles), "<u2" if len(points) <= _SMALL else "<u4")
     before, between, after = _header(
         len(points), triangles.size, _LINES if triangles.shape[-1] == 2 else _TRIANGLES

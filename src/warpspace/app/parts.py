@@ -9,7 +9,7 @@ from warpspace.app.layers import Layer
 from warpspace.app.layers.box import BoxLayer
 from warpspace.app.layers.traces import TracesLayer
 from warpspace.app.live import Frame
-from warpspace.app.panels import Panel, Settling
+from warpspace.app.panels import Choosy, Panel, Settling
 from warpspace.app.panels.errors import ErrorsPanel
 from warpspace.app.panels.summary import HtmlPanel
 
@@ -44,6 +44,10 @@ class Parts:
         self._busy = False
         self._busy_until = 0.0
         self._since: float | None = None
+        self._concerns = {
+            part: part.concerns for part in (*self.layers, *self.panels) if isinstance(part, Choosy)
+        }
+        self._concerned: dict[Layer | Panel, tuple[object, ...]] = {}
 
     @property
     def pause_s(self) -> float | None:
@@ -66,15 +70,32 @@ class Parts:
             self._busy_until = now + BUSY_MEMORY_S
         self._busy = now < self._busy_until
 
-    def show(self, frame: Frame) -> None:
-        """Follow a frame; on a busy server map and numbers first, the others when it settles."""
+    def show(self, frame: Frame, *, anew: bool = False) -> None:
+        """Follow a frame; on a busy server map and numbers first, the others when it settles.
+
+        Parameters
+        ----------
+        frame : Frame
+        anew : bool, optional
+            Also what shows the same as before: a widget may show what was refused.
+        """
         self._late = []
         for part in (*self.layers, *self.panels):
-            if self._busy and not isinstance(part, AT_ONCE):
+            if self._busy and not anew and not isinstance(part, AT_ONCE):
                 self._late.append(part)
             else:
-                part.show(frame)
+                self._show(part, frame, anew=anew)
         self.unsettle()
+
+    def _show(self, part: Layer | Panel, frame: Frame, *, anew: bool = False) -> None:
+        """Have one part follow, unless it shows all that already."""
+        concerns = self._concerns.get(part)
+        if concerns is not None:
+            concerned = concerns(frame)
+            if not anew and self._concerned.get(part) == concerned:
+                return
+            self._concerned[part] = concerned
+        part.show(frame)
 
     def unsettle(self) -> None:
         """Have charts follow soon."""
@@ -93,7 +114,7 @@ class Parts:
         self._since = None
         late, self._late = self._late, []
         for part in late:
-            guarded(partial(part.show, frame))
+            guarded(partial(self._show, part, frame))
         for panel in self.panels:
             if isinstance(panel, Settling):
                 guarded(partial(panel.settle, frame))

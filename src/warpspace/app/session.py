@@ -260,13 +260,12 @@ class Session:
         """Make page and drawing show a frame; on a busy server map and numbers first."""
         before = self._shown
         with self._client.atomic():
-            self._parts.show(frame)
+            self._parts.show(frame, anew=bool(notes))
             if before is not None and focus(before.state) != focus(frame.state):
                 self._page.set_title(frame.state.scene.title)
                 self._restore_camera(frame)
             if before is not None and before.state.shown.dark != frame.state.shown.dark:
                 apply_theme(self._client.gui, dark=frame.state.shown.dark)
-        self._client.flush()
         self._shown = frame
         if notes:
             self._page.notify("Clamped", "\n".join(notes), "yellow")

@@ -26,17 +26,22 @@ class Bound(Generic[T]):
     def __init__(self, handle: Any, changed: Changed) -> None:
         self.handle = handle
         self._seen: T = handle.value
+        self._touched = False
         # each tab has widgets of its own: there are no other clients to send the value on to
         handle._impl.sync_cb = None  # noqa: SLF001 - viser builds a message for nobody otherwise
 
         async def note(event: Any) -> None:  # a plain function would take a thread of a pool
             if event.client is not None:
+                self._touched = True
                 changed()
 
         handle.on_update(note)
 
     def poll(self) -> T | None:
         """Give the value a browser has set since the last poll, else None."""
+        if not self._touched:
+            return None
+        self._touched = False
         value: T = self.handle.value
         if value == self._seen:
             return None

@@ -94,8 +94,11 @@ class ErrorBasis:
         used = np.flatnonzero(amplitudes)
         if 2 * len(used) > len(self.keys):
             return (amplitudes @ flat).reshape(self.nominal_mm.shape)
-        total, part = np.zeros(self.nominal_mm.size), np.empty(self.nominal_mm.size)
-        for index in used:
+        if not len(used):
+            return np.zeros(self.nominal_mm.shape)
+        total = flat[used[0]] * amplitudes[used[0]]
+        part = np.empty_like(total)
+        for index in used[1:]:
             np.multiply(flat[index], amplitudes[index], out=part)
             total += part
         return total.reshape(self.nominal_mm.shape)

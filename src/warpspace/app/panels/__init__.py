@@ -14,7 +14,7 @@ from warpspace.app.board import Board, Update
 from warpspace.app.live import Frame
 from warpspace.app.state import AppState
 
-__all__ = ["Desk", "Panel", "Settling", "Update"]
+__all__ = ["Choosy", "Desk", "Panel", "Settling", "Update"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +55,15 @@ class Panel(Protocol):
 
     def show(self, frame: Frame) -> None:
         """Make the widgets show a frame."""
+        ...
+
+
+@runtime_checkable
+class Choosy(Protocol):
+    """A part of the page that need not follow every frame."""
+
+    def concerns(self, frame: Frame) -> tuple[object, ...]:
+        """Give what it shows of a frame; as long as that is equal it is not asked to show it."""
         ...
 
 

@@ -102,6 +102,11 @@ class ChancePanel:
                 state = edits.with_half_width(state, key, half_width)
         return state
 
+    def concerns(self, frame: Frame) -> tuple[object, ...]:
+        """Give what the widgets show."""
+        state = frame.state
+        return Same(state.specification), Same(state.tolerances), Same(state.origin)
+
     def show(self, frame: Frame) -> None:
         """Put the widgets where the state has them."""
         state = frame.state

@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 from warpspace.app.cameras import VIEWS
+from warpspace.app.kept import Same
 from warpspace.app.live import Frame
 from warpspace.app.look import RANGES, SURFACES, slice_positions, slice_spans
 from warpspace.app.panels import Desk
@@ -187,6 +188,11 @@ class LooksPanel:
             if on is not None:
                 look = look.switched(**{name: on})
         return state if look is state.look else replace(state, look=look)
+
+    def concerns(self, frame: Frame) -> tuple[object, ...]:
+        """Give what the widgets show."""
+        state = frame.state
+        return Same(state.scene), Same(state.look), Same(state.machine), frame.scale.high
 
     def show(self, frame: Frame) -> None:
         """Make the widgets show the state."""

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
+from warpspace.app.kept import Same
 from warpspace.app.live import Frame
 from warpspace.app.look import linear_positions, linear_spans
 from warpspace.app.panels import Desk
@@ -92,6 +93,11 @@ class MachinePanel:
             if value is not None:
                 state = state.with_position(axis, value)
         return state
+
+    def concerns(self, frame: Frame) -> tuple[object, ...]:
+        """Give what the widgets show."""
+        state = frame.state
+        return Same(state.scene), Same(state.machine), Same(state.positions)
 
     def show(self, frame: Frame) -> None:
         """Make the widgets show the state."""

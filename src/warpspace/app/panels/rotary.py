@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 from warpspace.app.circles import circle_rows, circle_table
+from warpspace.app.kept import Same
 from warpspace.app.live import Frame
 from warpspace.app.look import parse_positions, quarters
 from warpspace.app.panels import Desk
@@ -145,6 +146,11 @@ class RotaryPanel:
             return state
         return replace(state, rotary=rotary, notes=notes)
 
+    def concerns(self, frame: Frame) -> tuple[object, ...]:
+        """Give what the widgets show."""
+        state = frame.state
+        return Same(state.scene), Same(state.rotary), Same(state.positions)
+
     def show(self, frame: Frame) -> None:
         """Make the widgets show the state."""
         state = frame.state
@@ -153,9 +159,7 @@ class RotaryPanel:
             or state.scene.machine is not self._scene.machine
         ):
             self._build(state)
-        visible = played_axis(state) is not None
-        if self._button.visible != visible:
-            self._button.visible = visible
+        self._button.visible = played_axis(state) is not None
         for number, bound in enumerate(self._points):
             bound.show(number not in state.rotary.off)
         self._own_on.show(state.rotary.own_mm is not None)

@@ -1,7 +1,5 @@
 """The panel "Why": the error of the point that was clicked, taken apart."""
 
-from typing import Any
-
 import numpy as np
 
 from warpspace.app.camera import fit_camera
@@ -14,6 +12,7 @@ from warpspace.app.state import AppState
 from warpspace.app.tabs import CameraMemory
 from warpspace.app.why import answer, with_lever, with_picked
 from warpspace.app.why_text import ASK, REFUSED, answer_html
+from warpspace.app.widgets import Told
 
 
 class WhyPanel:
@@ -29,21 +28,22 @@ class WhyPanel:
         gui = desk.gui
         self._desk, self._outside = desk, outside
         self._clicks = Clicks(gui, lambda key: desk.post(lambda s: with_lever(s, key)))
-        self._text: Any = gui.add_html(ASK)
-        self._far: Any = gui.add_button(
+        self._text = Told(gui.add_html(ASK))
+        far = gui.add_button(
             "Show the whole lever",
             color="gray",
             visible=False,
             hint="Move the camera back until axis, lever and box are all in view (F goes back).",
         )
-        self._far.on_click(lambda _: desk.act(self._stand_back))
-        self._clear: Any = gui.add_button(
+        far.on_click(lambda _: desk.act(self._stand_back))
+        clear = gui.add_button(
             "Clear",
             color="gray",
             visible=False,
             hint="Forget the point (N does the same).",
         )
-        self._clear.on_click(lambda _: desk.post(forget))
+        clear.on_click(lambda _: desk.post(forget))
+        self._far, self._clear = Told(far), Told(clear)
         command = gui.add_command("Forget the point", description="End the question", hotkey="N")
         command.on_trigger(lambda _: desk.post(forget))
 
@@ -55,15 +55,15 @@ class WhyPanel:
         """Explain the point in the state that is drawn."""
         state = frame.subject or frame.state
         picked = frame.state.picked
-        self._clear.visible = picked is not None
-        self._far.visible = picked is not None and bool(frame.state.lever)
+        self._clear.put(visible=picked is not None)
+        self._far.put(visible=picked is not None and bool(frame.state.lever))
         if picked is None:
-            self._text.content = ASK
+            self._text.put(content=ASK)
         elif is_difference(frame):
-            self._text.content = REFUSED
+            self._text.put(content=REFUSED)
         else:
             found = answer(state, picked, frame.exaggeration)
-            self._text.content = answer_html(found, frame.state.lever, self._clicks.attributes)
+            self._text.put(content=answer_html(found, frame.state.lever, self._clicks.attributes))
 
     def _stand_back(self) -> None:
         """Move the camera back until the frame of the chosen contribution is in view."""
