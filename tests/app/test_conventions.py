@@ -19,6 +19,7 @@ from warpspace.app.live import LiveModel
 from warpspace.app.mapmesh import edge_pieces
 from warpspace.app.panels import conventions as panel_module
 from warpspace.app.panels.conventions import ConventionsPanel
+from warpspace.app.parts import Parts
 from warpspace.app.state import start_state
 from warpspace.scene.library import load_scene
 
@@ -115,19 +116,20 @@ def test_the_panel_does_nothing_while_a_slider_moves(monkeypatch: pytest.MonkeyP
         lambda *_: calls.append("written") or f"text {len(calls)}",
     )
     panel = object.__new__(ConventionsPanel)
-    panel._scene, panel._in_force, panel._known, panel._at = START.origin, (), {}, {}
+    panel._scene, panel._known, panel._at = START.origin, {}, {}
     panel._effects, panel._text = Effects(), SimpleNamespace(content="")
     panel._clicks = SimpleNamespace(attributes=None)
-    panel.show(LIVE.frame(START))
+    parts = Parts((), [panel])
+    parts.show(LIVE.frame(START))
     assert calls == ["written"]
     moved = START
     for value in (1.0, 2.0, 3.0):
         moved = moved.with_amplitude("EXX", value)
-        panel.show(LIVE.frame(moved))
+        parts.show(LIVE.frame(moved))
     assert calls == ["written"]
     panel.settle(LIVE.frame(moved))
     assert len(calls) == 2
     panel.settle(LIVE.frame(moved))
     assert len(calls) == 2
-    panel.show(LIVE.frame(with_choice(moved, "loop=relative")))
+    parts.show(LIVE.frame(with_choice(moved, "loop=relative")))
     assert len(calls) == 3

@@ -7,6 +7,7 @@ from typing import Any
 from warpspace.app.compare import scene_side, with_pin, with_sides
 from warpspace.app.compare_text import NOTHING, comparison_html
 from warpspace.app.comparison import NOBODY, NOW, SHOWN, Side
+from warpspace.app.kept import Same
 from warpspace.app.live import Frame
 from warpspace.app.panels import Desk, Update
 from warpspace.app.state import AppState
@@ -88,6 +89,10 @@ class ComparePanel:
                 return side
         scene = self._scenes.get(title)
         return None if scene is None else replace(scene_side(scene), title=title)
+
+    def concerns(self, frame: Frame) -> tuple[object, ...]:
+        """Give what the widgets show: the comparison, its numbers, the scenes there are."""
+        return Same(frame.state.comparison), Same(frame.compared), *self._scenes
 
     def show(self, frame: Frame) -> None:
         """Make the widgets show the comparison."""

@@ -34,7 +34,6 @@ class ConventionsPanel:
         gui = desk.gui
         self._desk, self._effects = desk, Effects()
         self._known: dict[str, Effect] = {}
-        self._in_force: tuple[object, ...] = ()
         self._clicks = Clicks(gui, lambda word: desk.post(lambda s: with_choice(s, word)))
         self._text: Any = gui.add_html("")
         self.picking = False
@@ -85,20 +84,21 @@ class ConventionsPanel:
         typed = {axis: value for axis, b in self._at.items() if (value := b.poll()) is not None}
         return with_reference(state, typed) if typed else state
 
+    def concerns(self, frame: Frame) -> tuple[object, ...]:
+        """Give what is in force."""
+        state = frame.state
+        return Same(state.origin), Same(state.scene.model), state.scene.reference, state.loop
+
     def show(self, frame: Frame) -> None:
-        """Show what is in force, where that has changed; the effects follow when changes pause."""
+        """Show what is in force; the effects follow when changes pause."""
         state = frame.state
         if state.origin is not self._scene:
             self._known = {}
             self._build(state)
-        scene = state.scene
-        in_force = (Same(state.origin), Same(scene.model), scene.reference, state.loop)
-        if in_force == self._in_force:
-            return
-        self._in_force = in_force
-        if scene.reference is not None:
+        reference = state.scene.reference
+        if reference is not None:
             for axis, bound in self._at.items():
-                bound.show(float(scene.reference.get(axis, bound.handle.value)))
+                bound.show(float(reference.get(axis, bound.handle.value)))
         self._write(state)
 
     def settle(self, frame: Frame) -> None:
