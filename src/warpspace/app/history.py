@@ -111,12 +111,14 @@ def describe_change(old: object, new: object) -> str:
     Parameters
     ----------
     old, new : object
-        Frozen dataclasses of one type; nested ones and mappings are looked into.
+        Frozen dataclasses of one type; nested ones, mappings and sets are looked into.
 
     Returns
     -------
     str
-        Dotted names with commas between, for instance "amplitudes.EAX"; empty where they are equal.
+        Dotted names with commas between, for instance "amplitudes.EAX", or "emphasis.muted.+EAX"
+        for what has come into a set; empty where they are equal. On and off are thus two things,
+        and two steps however fast they follow each other.
     """
     return ", ".join(_differences(old, new))
 
@@ -134,6 +136,9 @@ def _differences(old: object, new: object) -> list[str]:
         before, after = cast("Mapping[str, Any]", old), cast("Mapping[str, Any]", new)
         keys = dict.fromkeys((*before, *after))
         parts = [(str(key), before.get(key), after.get(key)) for key in keys]
+    elif isinstance(old, frozenset) and isinstance(new, frozenset):
+        gone, come = cast("frozenset[Any]", old - new), cast("frozenset[Any]", new - old)
+        return [*sorted(f"-{item}" for item in gone), *sorted(f"+{item}" for item in come)]
     else:
         return [] if _equal(old, new) else [""]
     return [

@@ -22,6 +22,7 @@ WORDS = {
     "loop": "loop",
     "nodes": "grid density",
     "emphasis": "solo and mute",
+    "rotary": "rotary traces",
     "tolerances": "tolerance",
     "specification": "specification",
     "scene": "scene",
@@ -186,7 +187,7 @@ def spell_change(what: str) -> str:
     """
     words: list[str] = []
     for path in what.split(", "):
-        parts = path.split(".")
+        parts = [part.lstrip("+-") for part in path.split(".")]
         name = next((part for part in reversed(parts) if part in PARAMETERS), "")
         place = WORDS.get(parts[0], parts[-1].replace("_", " "))
         word = PARAMETERS[name].name if name and parts[0] != "scene" else place
@@ -194,6 +195,8 @@ def spell_change(what: str) -> str:
             word = f"position of {parts[1]}"
         elif parts[0] == "shown":
             word = WORDS.get(parts[-1], parts[-1].replace("_", " "))
+        elif parts[0] == "emphasis" and name:
+            word = f"{'solo' if parts[1] == 'soloed' else 'mute'} of {word}"
         words.append(f"tolerance of {word}" if parts[0] == "tolerances" and name else word)
     unique = list(dict.fromkeys(words))
     if "scene" in unique:
