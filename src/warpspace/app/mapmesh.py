@@ -48,7 +48,7 @@ class Part:
 
     def pieces(self, segments: Index, outwards: Pieces, times: float) -> list[Pieces]:
         """Give pieces of line off the surface, on each side that is seen, [S, 2, 3] each, mm."""
-        ends = self.drawn_mm.reshape(-1, 3)[segments].astype(np.float32)
+        ends = self.drawn_mm.reshape(-1, 3).take(segments, axis=0).astype(np.float32)
         return [
             ends + (outwards * (lift * times * self.ways)).astype(np.float32) for lift in self.lifts
         ]
@@ -96,9 +96,9 @@ def map_mesh(frame: Frame) -> MapMesh:
     if len(parts) == 1:
         surface = parts[0].drawn_of.surface
         return MapMesh(
-            parts[0].drawn_mm.reshape(-1, 3)[surface.nodes],
+            parts[0].drawn_mm.reshape(-1, 3).take(surface.nodes, axis=0),
             surface.triangles,
-            parts[0].values.reshape(-1)[surface.nodes],
+            parts[0].values.reshape(-1).take(surface.nodes),
         )
     count = 0
     for part in parts:
