@@ -1,6 +1,5 @@
 """Everything of a tab that follows the frame: layers and panels, on a busy server in two goes."""
 
-import threading
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -12,6 +11,7 @@ from warpspace.app.live import Frame
 from warpspace.app.panels import Choosy, Panel, Settling
 from warpspace.app.panels.errors import ErrorsPanel
 from warpspace.app.panels.summary import HtmlPanel
+from warpspace.app.turns import Turns
 
 SETTLE_S = 0.1
 """Pause in the changes after which charts follow: longer than between two moves of a drag."""
@@ -23,7 +23,7 @@ BUSY_S = 0.01
 """Wait for other tabs' pictures beyond which the server counts as busy."""
 BUSY_MEMORY_S = 2.0
 """How long a server that was busy counts as such."""
-TURN = threading.Lock()
+TURN = Turns()
 """Pictures are made one after the other: twenty at once would all be late, and fight for caches."""
 AT_ONCE = (BoxLayer, TracesLayer, HtmlPanel, ErrorsPanel)
 """What is never put off: map, traces, numbers and the sliders themselves."""

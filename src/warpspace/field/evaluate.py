@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, reduce
+from functools import cached_property, lru_cache, reduce
 
 import numpy as np
 
@@ -82,7 +82,7 @@ class ErrorBasis:
             self._combine(amplitudes, self.position),
             self._combine(amplitudes, self.orientation)
             if orientation
-            else np.broadcast_to(np.nan, self.nominal_mm.shape),
+            else _unknown(self.nominal_mm.shape),
         )
 
     def _combine(self, amplitudes: Array, response: Array) -> Array:
@@ -107,6 +107,12 @@ class ErrorBasis:
         """Split the position error at one node into the parameters, [K, 3], µm."""
         chosen = self.position[(slice(None), *index)]
         return amplitudes[:, None] * chosen.reshape(len(self.keys), 3)
+
+
+@lru_cache(maxsize=64)
+def _unknown(shape: tuple[int, ...]) -> Array:
+    """Give an array of a shape that is not a number anywhere, without the memory for it."""
+    return np.broadcast_to(np.nan, shape)
 
 
 @dataclass(frozen=True, slots=True)
