@@ -38,6 +38,8 @@ class Compared:
         What is drawn: "a", "b" or "difference".
     titles : tuple of str, (2,)
         Names of the two sides.
+    sides : tuple of AppState, (2,)
+        What they are, looked at as now.
     a, b : Statistics
     difference : Statistics or None
         None where there is no difference.
@@ -49,11 +51,44 @@ class Compared:
 
     shown: str
     titles: tuple[str, str]
+    sides: tuple[AppState, AppState]
     a: Statistics
     b: Statistics
     difference: Statistics | None
     other_mm: Array | None
     refused: str = ""
+
+    @property
+    def title(self) -> str:
+        """Name of what is drawn."""
+        a, b = self.titles
+        return {"a": f"A: {a}", "b": f"B: {b}", "difference": f"A − B: {a} − {b}"}[self.shown]
+
+
+def drawn_title(frame: "Frame") -> str:
+    """Name what is drawn: the scene, or a side of a comparison, or the difference."""
+    return frame.state.scene.title if frame.compared is None else frame.compared.title
+
+
+def is_difference(frame: "Frame") -> bool:
+    """Tell whether a difference of two states is drawn."""
+    return frame.compared is not None and frame.compared.shown == "difference"
+
+
+def both_words(frame: "Frame", word: Callable[[AppState], str]) -> str:
+    """Say something of what is drawn; of a difference for both sides where they are not alike.
+
+    Parameters
+    ----------
+    frame : Frame
+    word : callable
+        Says it of a state.
+    """
+    found = frame.compared
+    if found is None or not is_difference(frame):
+        return word(frame.subject or frame.state)
+    a, b = (word(side) for side in found.sides)
+    return a if a == b else f"{a} − {b}"
 
 
 def side_state(now: AppState, side: Side) -> AppState:
@@ -144,6 +179,7 @@ def compare_frames(single: "Callable[[AppState], Frame]", state: AppState) -> "F
     compared = Compared(
         shown,
         (_title(state, chosen.a), _title(state, other_side)),
+        (a.state, b.state),
         a.statistics,
         b.statistics,
         None if difference is None else difference.statistics,

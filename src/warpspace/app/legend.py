@@ -6,6 +6,7 @@ from functools import cache, lru_cache
 
 import numpy as np
 
+from warpspace.app.compare import both_words
 from warpspace.app.layers import palette
 from warpspace.app.live import Frame
 from warpspace.geometry.colour import ColourScale, colour_table
@@ -189,7 +190,7 @@ def summary(frame: Frame) -> str:
         f'<div style="flex:0 0 124px">{colour_bar(frame)}</div>'
         '<div style="flex:1"><div style="font-weight:600">|E| over the grid</div>'
         '<div style="font-size:12px;opacity:.7;margin-bottom:6px">'
-        f"{nodes} nodes, {frame.state.loop.value} loop</div>"
+        f"{nodes} nodes, {both_words(frame, lambda state: state.loop.value)} loop</div>"
         f"{numbers(frame)}</div></div>"
         f"{worst_place(frame)}"
         '<div style="display:flex;gap:18px;align-items:end;margin:2px 0 8px">'
@@ -200,10 +201,10 @@ def summary(frame: Frame) -> str:
 
 def heading(frame: Frame) -> str:
     """Spell machine, error set and display factor."""
-    state = frame.state
+    state = frame.subject or frame.state
     factor = frame.exaggeration
     how = "true scale" if factor == 1.0 else f"displacement drawn {spell_factor(factor)}"
-    auto = " (auto)" if state.exaggeration is None else ""
+    auto = " (auto)" if frame.state.exaggeration is None else ""
     edited = len(state.changed_keys)
     note = f" · {edited} error{'s' if edited > 1 else ''} changed" if edited else ""
     heard = state.heard
@@ -214,9 +215,7 @@ def heading(frame: Frame) -> str:
     machine = f"{state.scene.machine.title}, chain {state.scene.machine.chain}"
     title = html.escape(state.scene.title)
     if frame.compared is not None:
-        a, b = (html.escape(side) for side in frame.compared.titles)
-        sides = {"a": f"A: {a}", "b": f"B: {b}", "difference": f"A − B: {a} − {b}"}
-        title = f'<span data-value="compared">{sides[frame.compared.shown]}</span>'
+        title = f'<span data-value="compared">{html.escape(frame.compared.title)}</span>'
     return (
         '<div style="padding:2px 14px 10px;line-height:1.4">'
         f'<div style="font-size:17px;font-weight:650">{title}'

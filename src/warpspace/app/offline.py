@@ -19,14 +19,18 @@ from markupsafe import Markup
 from warpspace import __version__
 from warpspace.app import legend
 from warpspace.app.camera import fit_camera
+from warpspace.app.compare import both_words, drawn_title, is_difference
 from warpspace.app.layers import SCENE_PER_MM
 from warpspace.app.layers.axes import AxesLayer
 from warpspace.app.layers.box import BoxLayer
+from warpspace.app.layers.other import OtherLayer
 from warpspace.app.layers.traces import TracesLayer
 from warpspace.app.live import Frame, LiveModel
-from warpspace.app.state import start_state
+from warpspace.app.state import AppState, start_state
+from warpspace.app.why import heard_errors
 from warpspace.geometry.colour import build_scale
 from warpspace.kinematics.model import ComponentErrors, Loop
+from warpspace.machine.errors import ErrorFunction
 from warpspace.machine.parameters import parameter
 from warpspace.scene.model import Scene
 
@@ -97,7 +101,7 @@ def build_scene_html(frame: Frame, aspect: float = ASPECT) -> str:
     with contextlib.redirect_stdout(io.StringIO()):  # the server says hello and goodbye
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         try:
-            for layer in (BoxLayer, TracesLayer, AxesLayer):
+            for layer in (BoxLayer, TracesLayer, AxesLayer, OtherLayer):
                 layer(server.scene, frame)
             _place_camera(server, frame, aspect)
             return server.scene.as_html(dark_mode=frame.state.shown.dark)
@@ -137,45 +141,62 @@ def build_offline_html(frame: Frame, provenance: Mapping[str, Any] | None = None
         loader=PackageLoader("warpspace.app"), autoescape=True, undefined=StrictUndefined
     )
     return templates.get_template("offline.html.j2").render(
-        title=frame.state.scene.title,
+        title=drawn_title(frame),
         program=f"warpspace {__version__}",
         policy=POLICY,
         heading=Markup(legend.heading(frame)),  # noqa: S704 - escaped where it is built
         summary=Markup(legend.summary(frame)),  # noqa: S704
         scene=Markup(inner),  # noqa: S704
         parameters=parameter_rows(frame),
+        counted="unlike in A and B" if is_difference(frame) else "not zero",
         remarks=remarks(frame),
         provenance=Markup(stored.replace("<", "\\u003c")),  # noqa: S704
     )
 
 
 def parameter_rows(frame: Frame) -> list[dict[str, str]]:
-    """Spell the errors that are not zero: key, plain name, value with unit."""
+    """Spell the errors that are drawn: key, plain name, value with unit.
+
+    Those that are not zero; of a difference those that are unlike on both sides.
+    """
+    drawn = frame.subject or frame.state
+    if frame.compared is None or not is_difference(frame):
+        return [_row(key, f"{value:+g}") for key, value in drawn.heard.items() if value != 0.0]
+    a, b = (heard_errors(side).functions for side in frame.compared.sides)
     return [
-        {
-            "key": key,
-            "name": parameter(key).name,
-            "value": f"{value:+g} {parameter(key).unit}".replace("-", "−"),
-        }
-        for key, value in frame.state.amplitudes.items()
-        if value != 0.0
+        _row(key, f"A {_amplitude(a.get(key))}, B {_amplitude(b.get(key))}")
+        for key in {**a, **b}
+        if a.get(key) != b.get(key)
     ]
 
 
+def _row(key: str, value: str) -> dict[str, str]:
+    """Spell one error."""
+    row = parameter(key)
+    return {"key": key, "name": row.name, "value": f"{value} {row.unit}".replace("-", "−")}
+
+
+def _amplitude(function: ErrorFunction | None) -> str:
+    """Spell the amplitude of an error."""
+    return "0" if function is None else f"{function.amplitude:+g}"
+
+
 def remarks(frame: Frame) -> list[str]:
-    """Spell how the scene is looked at."""
-    scene = frame.state.scene
-    reference = (
-        "absolute errors"
-        if scene.reference is None
-        else "held still at " + ", ".join(f"{k} {v:g}" for k, v in scene.reference.items())
-    )
+    """Spell how the scene is looked at; of a difference for both sides."""
     return [
-        f"{frame.state.loop.value} loop",
-        reference,
-        COMPONENT_ERRORS[scene.model.component_errors],
+        f"{both_words(frame, lambda state: state.loop.value)} loop",
+        both_words(frame, _reference_words),
+        both_words(frame, lambda state: COMPONENT_ERRORS[state.scene.model.component_errors]),
         "first-order model",
         "error = actual − nominal",
         "drag to turn, wheel to zoom",
         f"warpspace {__version__}",
     ]
+
+
+def _reference_words(state: AppState) -> str:
+    """Say what is held still."""
+    held = state.scene.reference
+    if held is None:
+        return "absolute errors"
+    return "held still at " + ", ".join(f"{axis} {at:g}" for axis, at in held.items())

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont, PngImagePlugin
 
 from warpspace import __version__
+from warpspace.app.compare import both_words, drawn_title
 from warpspace.app.legend import spell_factor
 from warpspace.app.live import Frame
 
@@ -43,7 +44,7 @@ def view_png(pixels: NDArray[np.uint8], frame: Frame) -> bytes:
     _colour_bar(page, draw, frame, ink)
     facts = PngImagePlugin.PngInfo()
     facts.add_text("Software", f"warpspace {__version__}")
-    facts.add_itxt("Title", frame.state.scene.title)
+    facts.add_itxt("Title", drawn_title(frame))
     facts.add_itxt("Description", f"displacement drawn {spell_factor(frame.exaggeration)}")
     written = BytesIO()
     page.convert("RGB").save(written, "PNG", pnginfo=facts)
@@ -64,18 +65,13 @@ def _font(size: int) -> "ImageFont.ImageFont | ImageFont.FreeTypeFont":
 def _heading(draw: ImageDraw.ImageDraw, frame: Frame, ink: tuple[int, int, int]) -> None:
     """Write title, factor and numbers."""
     found = frame.statistics
-    title = frame.state.scene.title
-    if frame.compared is not None:
-        a, b = frame.compared.titles
-        title = {"a": f"A: {a}", "b": f"B: {b}", "difference": f"A − B: {a} − {b}"}[
-            frame.compared.shown
-        ]
+    title = drawn_title(frame)
     factor = spell_factor(frame.exaggeration).replace("\u202f", " ")
     draw.text((16, 10), title[:110], ink, _font(22))
     draw.text(
         (16, 38),
         f"displacement drawn {factor} · |E| mean {found.mean_um:.2f} µm, max {found.max_um:.2f} µm"
-        f" · {frame.state.loop.value} loop",
+        f" · {both_words(frame, lambda state: state.loop.value)} loop",
         ink,
         _font(15),
     )

@@ -13,6 +13,20 @@ class CancelledError(WarpspaceError):
 
 
 @dataclass(frozen=True, slots=True)
+class Beside:
+    """The other side of a comparison.
+
+    Attributes
+    ----------
+    scene : Scene
+    loop : str
+    """
+
+    scene: Scene
+    loop: str
+
+
+@dataclass(frozen=True, slots=True)
 class Request:
     """What is to be drawn or written.
 
@@ -27,6 +41,12 @@ class Request:
         Display factor in force.
     dark : bool
         Light ink on a dark ground.
+    largest : float or None
+        Largest magnitude of the colours where other maps share them, µm.
+    minus : Beside or None
+        What is subtracted, where a difference is wanted.
+    pair : tuple of Scene, (2,), or None
+        Both sides of a comparison where they can be drawn on one sheet, with their difference.
     """
 
     scene: Scene
@@ -35,6 +55,9 @@ class Request:
     nodes: int
     exaggeration: float
     dark: bool
+    largest: float | None = None
+    minus: Beside | None = None
+    pair: tuple[Scene, Scene] | None = None
 
 
 @dataclass(frozen=True, slots=True)

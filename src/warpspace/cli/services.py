@@ -3,9 +3,11 @@
 import tempfile
 import threading
 from concurrent.futures import ThreadPoolExecutor, wait
+from dataclasses import replace
 from pathlib import Path
 
 from warpspace.app.services import CancelledError, Request, Services
+from warpspace.exceptions import OptionError
 
 MOST_RENDERERS = 2
 """Figures drawn at the same time for all tabs together."""
@@ -19,7 +21,7 @@ def build_services() -> Services:
 
 
 def draw_figure(request: Request, cancelled: threading.Event) -> bytes:
-    """Draw the error map of a request as a PNG.
+    """Draw the error map of a request as a PNG; of a comparison both sides and the difference.
 
     Parameters
     ----------
@@ -38,7 +40,7 @@ def draw_figure(request: Request, cancelled: threading.Event) -> bytes:
     RenderError
         If it cannot be drawn here.
     """
-    from warpspace.outputs.figures.settings import FigureSettings
+    from warpspace.outputs.figures.settings import A_MINUS_B, FigureSettings
     from warpspace.outputs.worker import FigureWorker
 
     settings = FigureSettings(
@@ -47,13 +49,22 @@ def draw_figure(request: Request, cancelled: threading.Event) -> bytes:
         dark=request.dark,
         loop=request.loop,
         grid=request.nodes,
+        difference=A_MINUS_B,
     )
+    name, scenes = "error-map", [request.scene]
+    if request.pair is not None:
+        name, scenes = "comparison", list(request.pair)
+    elif request.minus is not None:
+        raise OptionError(
+            f"A is seen through the {request.loop} loop, B through the {request.minus.loop} loop; a"
+            " figure of both needs one loop. GLB, CSV and HTML show their difference."
+        )
     while not _renderers.acquire(timeout=POLL_S):
         if cancelled.is_set():
             raise CancelledError("cancelled while waiting for a renderer")
     try:
         with FigureWorker() as worker, ThreadPoolExecutor(1) as caller:
-            drawn = caller.submit(worker.render, "error-map", [request.scene], settings, "png")
+            drawn = caller.submit(worker.render, name, scenes, settings, "png")
             while not wait([drawn], POLL_S).done:
                 if cancelled.is_set():
                     worker.close(wait=False)
@@ -79,15 +90,24 @@ def write_export(request: Request, ending: str) -> bytes:
         The file's content.
     """
     from warpspace.cli.export import write_export as write
-    from warpspace.outputs.exports import draw_scene
+    from warpspace.outputs.exports import draw_scene, subtract_drawings
 
-    drawing = draw_scene(
-        request.scene,
-        exaggeration=request.exaggeration,
-        grid=request.nodes,
-        loop=request.loop,
-        component=request.component,
+    drawing, *subtracted = (
+        replace(
+            draw_scene(
+                part.scene,
+                exaggeration=request.exaggeration,
+                grid=request.nodes,
+                loop=part.loop,
+                component=request.component,
+            ),
+            largest_um=request.largest,
+        )
+        for part in (request, request.minus)
+        if part is not None
     )
+    if subtracted:
+        drawing = subtract_drawings(drawing, subtracted[0])
     with tempfile.TemporaryDirectory(prefix="warpspace-") as folder:
         target = Path(folder) / f"export{ending}"
         write(drawing, target, overwrite=False)

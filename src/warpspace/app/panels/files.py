@@ -1,5 +1,6 @@
 """The panel "Files": open, save, link; pictures and exports, made beside the session."""
 
+import html
 import logging
 import threading
 from collections.abc import Callable, Mapping
@@ -9,12 +10,12 @@ from typing import Any
 
 from warpspace.app import document, incoming, links
 from warpspace.app.comparison import Comparison
+from warpspace.app.exported import build_request, exported_words, file_stem
 from warpspace.app.jobs import Jobs, Progress
 from warpspace.app.live import Frame
 from warpspace.app.outside import Outside
 from warpspace.app.panels import Desk
-from warpspace.app.resulting import heard_scene
-from warpspace.app.services import CancelledError, Request
+from warpspace.app.services import CancelledError
 from warpspace.app.state import AppState
 from warpspace.app.tabs import CameraMemory
 from warpspace.app.uploads import Uploads, size_script
@@ -25,6 +26,10 @@ logger = logging.getLogger(__name__)
 FIGURE_S, VIEW_S, PAGE_S, EXPORT_S = 5.0, 1.5, 1.0, 1.0
 RENDER_TIMEOUT_S = 30.0
 LARGEST_VIEW_PX = 4096
+SHOWS = (
+    '<div data-value="exported" style="padding:2px 14px 8px;font-size:12px;line-height:1.4">'
+    "{}</div>"
+)
 Make = Callable[[threading.Event], bytes]
 
 
@@ -44,6 +49,7 @@ class FilesPanel:
         self._add_scene_files()
         self._add_outputs()
         gui = desk.gui
+        self._shows: Any = gui.add_html("", visible=False)
         self._status: Any = gui.add_markdown("", visible=False)
         self._bar: Any = gui.add_progress_bar(0.0, visible=False, animated=True)
         self._cancel: Any = gui.add_button(
@@ -175,18 +181,11 @@ class FilesPanel:
             self._desk.notify("Without the comparison", str(error), "yellow")
             return text
 
-    def _request(self) -> Request:
-        """Give what is to be drawn: the state that is steered, as it is heard."""
-        state = self._desk.board().state
-        factor = state.exaggeration or (self._frame.exaggeration if self._frame else 1.0)
-        scene = replace(heard_scene(state), exaggeration=factor)
-        loop, component = state.loop.value, state.component
-        return Request(scene, loop, component, state.nodes, factor, state.shown.dark)
-
     def _figure(self) -> None:
         """Draw the figure in a process of its own."""
-        draw, request = self._outside.services.draw_figure, self._request()
-        if draw is not None:
+        draw, frame = self._outside.services.draw_figure, self._frame
+        if draw is not None and frame is not None:
+            request = build_request(frame)
             self._make("Figure", ".png", FIGURE_S, lambda cancelled: draw(request, cancelled))
 
     def _view(self) -> None:
@@ -213,18 +212,19 @@ class FilesPanel:
 
         frame = self._frame
         if frame is not None:
-            toml = {"scene_toml": document.state_to_toml(frame.state)}
+            toml = {"scene_toml": self._alone_if_large(document.state_to_toml)}
             self._make("Page", ".html", PAGE_S, lambda _: build_offline_html(frame, toml).encode())
 
     def _export(self, name: str, ending: str) -> None:
         """Write an export."""
-        write, request = self._outside.services.write_export, self._request()
-        if write is not None:
+        write, frame = self._outside.services.write_export, self._frame
+        if write is not None and frame is not None:
+            request = build_request(frame)
             self._make(name, ending, EXPORT_S, lambda _: write(request, ending))
 
     def _make(self, name: str, ending: str, usual_s: float, make: Make) -> None:
         """Make a file beside the session and send it."""
-        stem = incoming.safe_name(self._desk.board().state.scene.name)
+        stem = "view" if self._frame is None else file_stem(self._frame)
 
         def work(cancelled: threading.Event) -> None:
             content = make(cancelled)
@@ -267,5 +267,14 @@ class FilesPanel:
         return state
 
     def show(self, frame: Frame) -> None:
-        """Remember what is drawn."""
-        self._frame = frame
+        """Remember what is drawn, and say so where it is not what is steered."""
+        before, self._frame = self._frame, frame
+        if frame.compared is not None or (before is not None and before.compared is not None):
+            self._tell(exported_words(frame))
+
+    def _tell(self, words: str) -> None:
+        """Say what pictures and exports show."""
+        content = SHOWS.format(html.escape(words)) if words else ""
+        if content != self._shows.content:
+            self._shows.content = content
+            self._shows.visible = bool(words)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from warpspace.app.camera import fit_camera
+from warpspace.app.compare import is_difference
 from warpspace.app.layers import SCENE_PER_MM
 from warpspace.app.live import Frame
 from warpspace.app.outside import Outside
@@ -89,8 +90,3 @@ class WhyPanel:
 def forget(state: AppState) -> AppState:
     """Ask about no point any more."""
     return with_picked(state, None)
-
-
-def is_difference(frame: Frame) -> bool:
-    """Tell whether a difference of two states is drawn."""
-    return frame.compared is not None and frame.compared.shown == "difference"

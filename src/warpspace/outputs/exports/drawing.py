@@ -57,11 +57,14 @@ class Drawing:
         Display factor of all displacements.
     component : str
         What the colours show: "norm", "x", "y" or "z".
+    largest_um : float or None
+        Largest magnitude of the colour scale where other maps share it, µm.
     """
 
     picture: ScenePicture
     exaggeration: float
     component: str = "norm"
+    largest_um: float | None = None
 
     @property
     def scene(self) -> Scene:
@@ -81,7 +84,8 @@ class Drawing:
     @cached_property
     def scale(self) -> ColourScale:
         """Colour scale of the values."""
-        return build_scale(float(np.abs(self.values_um).max()), self.component)
+        largest = float(np.abs(self.values_um).max())
+        return build_scale(max(largest, self.largest_um or 0.0), self.component)
 
     @cached_property
     def traces(self) -> tuple[DrawnTrace, ...]:
@@ -112,6 +116,21 @@ class Drawing:
             "nodes": list(self.picture.grid.shape),
             "exaggeration": self.exaggeration,
             "component": self.component,
+        }
+
+    @property
+    def remarks(self) -> dict[str, str]:
+        """What a table says of every row: scene, loop, reference, convention, program."""
+        held = self.scene.reference
+        return {
+            "scene": self.scene.name,
+            "loop": str(self.picture.view.loop),
+            "reference": "absolute"
+            if held is None
+            else " ".join(f"{axis}={at:g}" for axis, at in held.items()),
+            "component_errors": str(self.scene.model.component_errors),
+            "model": "first order",
+            "program": f"warpspace {__version__}",
         }
 
     @cached_property

@@ -45,17 +45,7 @@ def write_csv(drawing: Drawing, path: str | Path, *, overwrite: bool = True) -> 
         name: np.broadcast_to(value, grid.shape).reshape(-1)
         for name, value in grid.coordinates.items()
     }
-    reference = drawing.scene.reference
-    held = "absolute" if reference is None else " ".join(f"{k}={v:g}" for k, v in reference.items())
-    remarks = {
-        "scene": drawing.scene.name,
-        "loop": str(drawing.picture.view.loop),
-        "reference": held,
-        "component_errors": str(drawing.scene.model.component_errors),
-        "model": "first order",
-        "program": drawing.provenance["program"],
-    }
-    write_field_csv(path, axes, drawing.picture.field, remarks=remarks, overwrite=overwrite)
+    write_field_csv(path, axes, drawing.picture.field, remarks=drawing.remarks, overwrite=overwrite)
 
 
 def write_field_csv(

@@ -11,7 +11,7 @@ from warpspace.outputs.figures.content import Drawing, DrawnMap, MapContent
 from warpspace.outputs.figures.error_map import isoline_words, quantity_words, view_words
 from warpspace.outputs.figures.map3d import draw_map, fit_map
 from warpspace.outputs.figures.panel import draw_colour_bar, draw_scale_bars
-from warpspace.outputs.figures.settings import FigureSettings, choose_exaggeration
+from warpspace.outputs.figures.settings import B_MINUS_A, FigureSettings, choose_exaggeration
 from warpspace.outputs.figures.sheet import map_legend, metadata, scene_facts, start_sheet
 from warpspace.outputs.projection import Rect
 from warpspace.outputs.style import SIZES
@@ -36,7 +36,8 @@ def draw_comparison(scenes: Sequence[Scene], settings: FigureSettings, *, exact:
     Drawing
     """
     pictures = [evaluate_picture(scene, grid=settings.grid, loop=settings.loop) for scene in scenes]
-    fields = [*(picture.field for picture in pictures), difference_field(*pictures)]
+    ordered = pictures if settings.difference == B_MINUS_A else pictures[::-1]
+    fields = [*(picture.field for picture in pictures), difference_field(*ordered)]
     exaggeration = choose_exaggeration(settings, *pictures)
     values = [component_values(field.error_um, settings.component) for field in fields]
     scale = build_scale(max(float(abs(part).max()) for part in values), settings.component)
@@ -62,7 +63,7 @@ def draw_comparison(scenes: Sequence[Scene], settings: FigureSettings, *, exact:
     ]
     rooms = [(c[0], c[1], c[2], c[3] - head) for c in cells]
     shared = fit_map(canvas, contents, rooms[0], settings.view)
-    names = [f"A  {scenes[0].title}", f"B  {scenes[1].title}", "B − A  difference"]
+    names = [f"A  {scenes[0].title}", f"B  {scenes[1].title}", f"{settings.difference}  difference"]
     maps: list[DrawnMap] = []
     for name, content, cell, room in zip(names, contents, cells, rooms, strict=True):
         shift = np.array([room[0] - rooms[0][0], room[1] - rooms[0][1]])
@@ -74,24 +75,30 @@ def draw_comparison(scenes: Sequence[Scene], settings: FigureSettings, *, exact:
         )
     found = [statistics(field) for field in fields]
     corner = (middle[0] + canvas.px(60.0), bottom, right, middle[1] - canvas.px(6.0))
-    _draw_corner(canvas, corner, maps[0], found, quantity_words(settings.component))
+    _draw_corner(canvas, corner, maps[0], found, settings)
     about = metadata(title, scenes, settings, exaggeration, "comparison")
     return Drawing(canvas.figure, title, about, tuple(maps), tuple(canvas.rects))
 
 
 def _draw_corner(
-    canvas: Canvas, rect: Rect, drawn: DrawnMap, found: Sequence[Statistics], heading: str
+    canvas: Canvas,
+    rect: Rect,
+    drawn: DrawnMap,
+    found: Sequence[Statistics],
+    settings: FigureSettings,
 ) -> None:
     """Draw the shared colour bar, a table of statistics and the scale bars."""
     left, bottom, right, top = rect
-    text, size = canvas.fit(f"{heading}, all three maps", right - left, SIZES.heading, "bold")
+    text, size = canvas.fit(
+        f"{quantity_words(settings.component)}, all three maps", right - left, SIZES.heading, "bold"
+    )
     canvas.text(left, top, text, size=size, weight="bold", va="top")
     bar = (left + canvas.px(4.0), bottom + canvas.px(20.0), left + canvas.px(34.0))
     draw_colour_bar(canvas, (bar[0], bar[1], bar[2], top - canvas.px(44.0)), drawn.scale)
     start = left + canvas.px(130.0)
     columns = [start + (right - start) * share for share in (0.5, 0.74, 0.99)]
     y = top - canvas.px(62.0)
-    for x, name in zip(columns, ("A", "B", "B − A"), strict=True):
+    for x, name in zip(columns, ("A", "B", settings.difference), strict=True):
         canvas.text(x, y, name, weight="bold", ha="right")
     rows = (
         ("max |E|", [part.max_um for part in found]),

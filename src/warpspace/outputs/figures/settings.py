@@ -15,6 +15,8 @@ SMALLEST_SIZE = (400, 300)
 LARGEST_SIDE = 12_000
 LARGEST_AREA = 64_000_000
 
+B_MINUS_A, A_MINUS_B = "B − A", "A − B"
+
 
 @dataclass(frozen=True, slots=True)
 class FigureSettings:
@@ -36,6 +38,8 @@ class FigureSettings:
         "tool", "workpiece" or "relative".
     grid : int
         Nodes per axis of the working volume.
+    difference : str
+        Which way two scenes A and B are subtracted: `B_MINUS_A` or `A_MINUS_B`.
 
     Raises
     ------
@@ -50,6 +54,7 @@ class FigureSettings:
     dark: bool = False
     loop: str = "tool"
     grid: int = 21
+    difference: str = B_MINUS_A
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -64,6 +69,8 @@ class FigureSettings:
                 f"exaggeration {given:g}; expected a number above 0, at most"
                 f" {MAX_EXAGGERATION:g}, or auto"
             )
+        if self.difference not in (B_MINUS_A, A_MINUS_B):
+            raise OptionError(f"difference {self.difference!r}; expected B − A or A − B")
         check_size(self.size)
 
     @property

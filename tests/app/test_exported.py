@@ -1,0 +1,172 @@
+"""Exports while comparing: what is drawn, under its own name, with its own numbers and colours."""
+
+import csv
+import io
+import json
+import struct
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from warpspace.app.compare import scene_side, with_pin, with_sides
+from warpspace.app.comparison import Side
+from warpspace.app.conventions import with_choice
+from warpspace.app.exported import build_request, exported_words, file_stem
+from warpspace.app.live import Frame, LiveModel
+from warpspace.app.offline import build_offline_html
+from warpspace.app.picture import view_png
+from warpspace.app.state import AppState, start_state
+from warpspace.cli.services import draw_figure, write_export
+from warpspace.exceptions import OptionError
+from warpspace.outputs.figures.catalogue import draw_figure as draw
+from warpspace.outputs.figures.settings import A_MINUS_B, FigureSettings
+from warpspace.scene.library import load_scene
+
+LIVE = LiveModel()
+FIRST, SECOND = (load_scene(f"dvf5000_{name}") for name in ("first", "second"))
+START = start_state(FIRST, nodes=5).with_amplitude("EXX", 6.0)
+BOTH = with_sides(START, Side(), scene_side(SECOND))
+WORDS = {
+    "a": f"A: now, {FIRST.title}",
+    "b": f"B: {SECOND.title}",
+    "difference": f"A − B: now, {FIRST.title} − {SECOND.title}",
+}
+
+
+def frame_of(shown: str, state: AppState = BOTH) -> Frame:
+    return LIVE.frame(replace(state, comparison=state.comparison.with_shown(shown)))
+
+
+def read_glb(data: bytes) -> dict:
+    return json.loads(data[20 : 20 + struct.unpack("<I", data[12:16])[0]])
+
+
+@pytest.mark.parametrize("shown", WORDS)
+def test_csv_holds_the_numbers_that_are_drawn(shown: str) -> None:
+    frame = frame_of(shown)
+    text = write_export(build_request(frame), ".csv").decode()
+    rows = list(csv.DictReader(io.StringIO(text)))
+    errors = np.array([[float(row[f"error_{c}_um"]) for c in "xyz"] for row in rows])
+    np.testing.assert_allclose(errors, frame.field.error_um.reshape(-1, 3), atol=1e-6)
+    assert all(title in rows[0]["scene"] for title in WORDS[shown].split(": ", 1)[1].split(" − "))
+    assert rows[0]["loop"] == "tool"
+
+
+@pytest.mark.parametrize("shown", WORDS)
+def test_glb_has_the_title_the_factor_and_the_shared_colours(shown: str) -> None:
+    frame = frame_of(shown)
+    document = read_glb(write_export(build_request(frame), ".glb"))
+    extras = document["asset"]["extras"]
+    assert extras["settings"]["exaggeration"] == frame.exaggeration
+    assert (extras["colours"]["low"], extras["colours"]["high"]) == (
+        frame.scale.low,
+        frame.scale.high,
+    )
+    assert extras["statistics"]["max_um"] == pytest.approx(frame.statistics.max_um)
+    for title in frame.compared.titles if shown == "difference" else [WORDS[shown][3:]]:
+        assert title in extras["title"]
+    if shown == "difference":
+        assert extras["settings"]["difference"] == "A − B"
+        assert extras["a"]["parameters"]["EXX"]["amplitude"] == 6.0
+        assert "parameters" not in extras
+    names = {node.get("name", "") for node in document["nodes"]}
+    assert "deformed_surface" in names
+    assert any(name.startswith("trace actual") for name in names)
+
+
+def test_traces_of_a_difference_are_displaced_by_the_difference() -> None:
+    frame = frame_of("difference", with_sides(START, Side(), Side()))
+    document = read_glb(write_export(build_request(frame), ".glb"))
+    assert document["asset"]["extras"]["statistics"]["max_um"] == 0.0
+    bounds = {
+        node["name"]: document["accessors"][
+            document["meshes"][node["mesh"]]["primitives"][0]["attributes"]["POSITION"]
+        ]
+        for node in document["nodes"]
+        if node.get("name", "").startswith("trace") and "mesh" in node
+    }
+    for name, found in bounds.items():
+        if name.startswith("trace actual"):
+            assert found["max"] == bounds[name.replace("actual", "nominal")]["max"]
+
+
+@pytest.mark.parametrize("shown", WORDS)
+def test_the_offline_page_says_what_it_shows(shown: str) -> None:
+    page = build_offline_html(frame_of(shown))
+    head = page.partition("<main>")[0]
+    assert WORDS[shown] in head
+    rest = page.partition("<aside>")[2]
+    if shown == "difference":
+        assert "unlike in A and B" in rest
+        assert "A +6, B 0 µm" in rest
+    else:
+        assert "not zero" in rest
+        assert ("+6 µm" in rest) == (shown == "a")
+
+
+def test_the_page_of_a_difference_names_what_is_unlike_on_both_sides() -> None:
+    other = with_choice(with_pin(START), "component_errors=before_motion").with_loop("relative")
+    page = build_offline_html(frame_of("difference", other))
+    assert "relative − tool loop" in page
+    assert "component errors in fixed directions − component errors ride" in page
+
+
+def test_pictures_of_the_view_carry_the_title_of_what_is_drawn() -> None:
+    content = view_png(np.zeros((200, 300, 3), np.uint8), frame_of("difference"))
+    assert Image.open(io.BytesIO(content)).info["Title"] == WORDS["difference"]
+
+
+@pytest.mark.render
+def test_the_figure_is_a_sheet_of_both_and_the_difference_as_the_app_takes_it(
+    renderer: str,
+) -> None:
+    request = build_request(frame_of("a"))
+    assert [scene.title for scene in request.pair] == [f"now, {FIRST.title}", SECOND.title]
+    settings = FigureSettings(grid=5, exaggeration=request.exaggeration, difference=A_MINUS_B)
+    drawing = draw("comparison", list(request.pair), settings)
+    difference = frame_of("difference")
+    np.testing.assert_allclose(drawing.maps[2].values, difference.values, atol=1e-6)
+    np.testing.assert_allclose(drawing.maps[2].drawn_mm, difference.drawn_mm, atol=1e-6)
+    assert any("A − B" in text.get_text() for text in drawing.figure.texts) or any(
+        "A − B" in text.get_text() for axes in drawing.figure.axes for text in axes.texts
+    )
+    with pytest.raises(OptionError, match="A − B"):
+        FigureSettings(difference="A + B")
+
+
+def test_two_loops_on_one_sheet_are_refused_in_words() -> None:
+    frame = frame_of("difference", with_pin(START).with_loop("relative"))
+    with pytest.raises(OptionError, match="one loop"):
+        draw_figure(build_request(frame), threading.Event())
+    # the other exports draw each side through its own
+    text = write_export(build_request(frame), ".csv").decode()
+    rows = list(csv.DictReader(io.StringIO(text)))
+    errors = np.array([[float(row[f"error_{c}_um"]) for c in "xyz"] for row in rows])
+    np.testing.assert_allclose(errors, frame.field.error_um.reshape(-1, 3), atol=1e-6)
+    assert rows[0]["loop"] == "relative − tool"
+
+
+@pytest.mark.parametrize(
+    ("shown", "stem"),
+    [("a", "A_now"), ("b", "B_dvf5000_second"), ("difference", "now_minus_dvf5000_second")],
+)
+def test_files_and_the_panel_name_what_is_exported(shown: str, stem: str) -> None:
+    frame = frame_of(shown)
+    assert file_stem(frame) == stem
+    assert exported_words(frame).startswith(f"Pictures and exports show {WORDS[shown]}.")
+    assert exported_words(LIVE.frame(START)) == ""
+    assert file_stem(LIVE.frame(START)) == "dvf5000_first"
+
+
+def test_volumes_that_differ_export_the_side_that_is_drawn() -> None:
+    ranges = {**SECOND.workspace.ranges, "X": (-100.0, 100.0)}
+    other = replace(SECOND, name="other", workspace=type(SECOND.workspace)(ranges))
+    frame = frame_of("difference", with_sides(START, Side(), scene_side(other)))
+    request = build_request(frame)
+    assert request.pair is None
+    assert request.minus is None
+    assert file_stem(frame) == "A_now"
+    assert "sheet" not in exported_words(frame)
