@@ -122,7 +122,8 @@ async def run(url: str, process, options: argparse.Namespace) -> bool:
     print(
         f"latency              median {p50:.1f} ms, p95 {p95:.1f} ms (≤ 50), worst {worst:.0f} ms"
     )
-    print(f"pictures             {pictures}, {10 * cpu * options.seconds / pictures:.2f} ms of a core each")
+    each = 10 * cpu * options.seconds / pictures
+    print(f"pictures             {pictures}, {each:.2f} ms of a core each")
     print(f"bytes per picture    {moved / 1e3:.1f} kB (≤ 200)")
     print(f"stale final values   {stale} (0), all shown after {final:.1f} s")
     print(f"memory               {settled[-1]:.0f} MB, {growth:+.1f} MB after settling (flat)")
