@@ -253,5 +253,6 @@ def hint_script(text: str = HINT, seconds: float = HINT_SECONDS) -> str:
   const leave = () => {{ hint.style.opacity = 0; setTimeout(() => hint.remove(), 900); }};
   setTimeout(leave, {1000 * seconds:g});
   for (const what of ["pointerdown", "keydown"])
-    addEventListener(what, leave, {{ once: true, capture: true }});
+    // what scripts of our own do is not the user's first deed
+    addEventListener(what, event => event.isTrusted && leave(), {{ capture: true }});
 }})();"""
