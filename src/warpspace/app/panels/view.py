@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from warpspace.app.kept import Same
 from warpspace.app.live import Frame
 from warpspace.app.panels import Desk
 from warpspace.app.shelf import MOST_OPENED, Shelf
@@ -12,7 +13,16 @@ from warpspace.app.widgets import Bound, dom_id
 from warpspace.kinematics.model import Loop
 from warpspace.scene.model import Scene
 
-COMPONENT_NAMES = {"norm": "|E| length", "x": "E_x", "y": "E_y", "z": "E_z"}
+COMPONENT_NAMES = {
+    "position": {"norm": "|E| length", "x": "E_x", "y": "E_y", "z": "E_z"},
+    "orientation": {
+        "norm": "|φ| tilt of the tool axis",
+        "x": "φ_x tilt about x",
+        "y": "φ_y tilt about y",
+        "z": "φ_z tilt about z",
+    },
+}
+"""What the components are called, for each quantity that can be coloured."""
 LOOP_NAMES = {
     Loop.TOOL.value: "tool point",
     Loop.WORKPIECE.value: "workpiece point",
@@ -45,6 +55,15 @@ class _Names:
         return self._value.get(text, text)
 
 
+def component_of(text: str) -> str:
+    """Give the component that a name stands for, whatever is coloured meanwhile; else the text."""
+    for names in COMPONENT_NAMES.values():
+        for component, name in names.items():
+            if name == text:
+                return component
+    return text
+
+
 class ViewPanel:
     """How the field is looked at.
 
@@ -70,13 +89,14 @@ class ViewPanel:
             changed,
         )
         self._add_exaggeration(state)
-        self._components = _Names(COMPONENT_NAMES)
+        names = COMPONENT_NAMES[state.look.quantity]
         self._component: Bound[str] = Bound(
             gui.add_dropdown(
                 "Colour",
-                self._components.options,
-                initial_value=self._components.text(state.component),
-                hint="What the colours mean: the length of the error or one signed component.",
+                tuple(names.values()),
+                initial_value=names[state.component],
+                hint="What the colours mean: the length of the error or one signed component;"
+                " of the position or of the tool axis, see Colour shows.",
             ),
             changed,
         )
@@ -187,7 +207,7 @@ class ViewPanel:
             state = state.with_exaggeration(_from_log(log))
         component, loop, nodes = self._component.poll(), self._loop.poll(), self._nodes.poll()
         if component is not None:
-            state = state.with_component(self._components.value(component))
+            state = state.with_component(component_of(component))
         if loop is not None:
             state = state.with_loop(self._loops.value(loop))
         if nodes is not None:
@@ -214,6 +234,16 @@ class ViewPanel:
             text = f"The newest {MOST_OPENED} opened scenes are kept; {dropped} left the list."
             self._desk.notify("Scenes", text, "gray")
 
+    def concerns(self, frame: Frame) -> tuple[object, ...]:
+        """Give what the widgets show."""
+        state = frame.state
+        return (
+            Same(state.origin),
+            frame.exaggeration,
+            (state.component, state.look.quantity, state.loop, state.nodes, state.shown),
+            Same(state.positions),
+        )
+
     def show(self, frame: Frame) -> None:
         """Make the widgets show the state."""
         state = frame.state
@@ -224,13 +254,21 @@ class ViewPanel:
         self._scene.show(self._title)
         self._factor.show(float(f"{frame.exaggeration:.4g}"))
         self._log.show(round(math.log10(frame.exaggeration), 2))
-        self._component.show(self._components.text(state.component))
+        self._show_component(state)
         self._loop.show(self._loops.text(state.loop))
         self._nodes.show(float(state.nodes))
         for axis, bound in self._positions.items():
             bound.show(state.positions[axis])
         for name, bound in self._switches.items():
             bound.show(getattr(state.shown, name))
+
+    def _show_component(self, state: AppState) -> None:
+        """Call the components by the names of what is coloured."""
+        names = COMPONENT_NAMES[state.look.quantity]
+        options, dropdown = tuple(names.values()), self._component.handle
+        if dropdown.options != options:
+            dropdown.options = options
+        self._component.show(names[state.component])
 
 
 def _from_log(log: float) -> float:
