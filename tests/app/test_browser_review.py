@@ -81,22 +81,52 @@ def test_search_narrows_the_sliders_down(tab: Tab) -> None:
 
 
 def test_solo_and_mute(tab: Tab) -> None:
-    tab.send("Error", json.dumps("EC0Y · γ_XY · squareness of Y to X [µrad]"))
-    tab.page.wait_for_timeout(PAUSE)
-    tab.page.get_by_label("Mute").check()
+    solo = tab.page.get_by_role("button", name="Solo EC0Y, squareness of Y to X")
+    mute = tab.page.get_by_role("button", name="Mute EC0Y, squareness of Y to X")
+    mute.click()
     shows(tab, edits.with_muted(START, "EC0Y", True))
-    tab.until(lambda: any(t.startswith("EC0Y") and t.endswith("silent") for t in labels(tab)))
+    tab.until(lambda: mute.get_attribute("aria-pressed") == "true")
     assert tab.page.get_by_text("1 silent").is_visible()
-    tab.page.get_by_label("Mute").uncheck()
-    tab.page.wait_for_timeout(PAUSE)
-    tab.page.get_by_label("Solo").check()
+    assert tab.page.get_by_role("group", name="EC0Y, squareness of Y to X, silent").count() == 1
+    # both at once: no click is lost, none counts twice
+    tab.page.evaluate(
+        "for (const word of ['mute EC0Y', 'solo EC0Y'])"
+        " document.querySelector(`[data-word='${word}']`).click()"
+    )
     alone = edits.with_soloed(START, "EC0Y", True)
     shows(tab, alone)
+    tab.until(lambda: solo.get_attribute("aria-pressed") == "true")
+    assert mute.get_attribute("aria-pressed") == "false"
     assert tab.number("max") == pytest.approx(model(alone).statistics.max_um, abs=0.006)
     assert float(tab.box("EAX").input_value()) == 5.5
-    tab.page.get_by_role("button", name="Hear all errors").click()
+    tab.page.get_by_role("button", name="Hear all").click()
     shows(tab, START)
-    tab.until(lambda: not any(t.endswith("silent") for t in labels(tab)))
+    tab.until(lambda: tab.page.locator(".ws-silent").count() == 0)
+
+
+def test_solo_by_keyboard_keeps_the_focus_and_is_undone(tab: Tab) -> None:
+    word = "solo EAX"
+    tab.page.get_by_role("button", name="Solo EAX, roll of X").focus()
+    alone = edits.with_soloed(START, "EAX", True)
+    focus = "[document.activeElement.dataset.word, document.activeElement.ariaPressed]"
+    for state, pressed in ((alone, "true"), (START, "false"), (alone, "true")):
+        tab.page.keyboard.press("Enter")
+        shows(tab, state)
+        tab.until(lambda pressed=pressed: tab.page.evaluate(focus) == [word, pressed])
+    press(tab, "Control+z")
+    shows(tab, START)
+    tab.until(lambda: tab.page.locator("button[aria-pressed='true']").count() == 0)
+
+
+def test_the_curve_of_a_row_comes_into_view(tab: Tab) -> None:
+    error = tab.page.get_by_label("Error", exact=True)
+    tab.page.get_by_role("button", name="Curve of EC0Y, squareness of Y to X").click()
+    tab.until(lambda: error.input_value().startswith("EC0Y"))
+    assert tab.page.get_by_label("Curve", exact=True).input_value() == "constant"
+    tab.page.get_by_role("button", name="Curve of EAY, pitch of Y").focus()
+    tab.page.keyboard.press("Space")
+    tab.until(lambda: error.input_value().startswith("EAY"))
+    assert error.is_visible()
 
 
 def test_the_shape_of_an_error_is_edited_and_its_curve_drawn(tab: Tab) -> None:
@@ -104,7 +134,7 @@ def test_the_shape_of_an_error_is_edited_and_its_curve_drawn(tab: Tab) -> None:
     shows(tab, START.with_amplitude("EXX", 5.0))
     # the panel follows the slider that was touched
     tab.until(lambda: tab.page.get_by_label("Error", exact=True).input_value().startswith("EXX"))
-    tab.choose("Curve along the axis", "table")
+    tab.choose("Curve", "table")
     tab.until(lambda: written(tab, "Numbers").input_value().count("\n") == 4)
     written(tab, "Numbers").fill("-275 0\n0 8\n275 -2")
     curve = Table((-275.0, 275.0), ((-275.0, 0.0), (0.0, 8.0), (275.0, -2.0)))

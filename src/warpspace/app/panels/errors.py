@@ -1,4 +1,4 @@
-"""The errors panel: a slider with number box per parameter, in a folder per axis.
+"""The errors panel: a slider with number box, solo, mute and curve per parameter, by axis.
 
 The search box narrows it down to the parameters that are meant; the folders then stand open.
 """
@@ -7,9 +7,12 @@ from collections.abc import Callable
 from itertools import groupby
 from typing import Any
 
+from warpspace.app import edits
+from warpspace.app.emphasis_text import CURVE, STYLE, emphasis_buttons, with_switched
 from warpspace.app.kept import Same
 from warpspace.app.live import Frame
 from warpspace.app.panels import Desk
+from warpspace.app.panels.clicks import Clicks
 from warpspace.app.ranges import Span
 from warpspace.app.search import find_parameters
 from warpspace.app.state import AppState
@@ -40,14 +43,20 @@ class ErrorsPanel:
     ----------
     desk : Desk
     state : AppState
-    touched : callable, optional
+    touched : callable
         Called, by the session's worker, with the key of a slider that was moved or found alone.
+    opened : callable
+        Called, by the session's worker, with the key of an error whose curve is asked for.
     """
 
     def __init__(
-        self, desk: Desk, state: AppState, touched: Callable[[str], None] | None = None
+        self,
+        desk: Desk,
+        state: AppState,
+        touched: Callable[[str], None],
+        opened: Callable[[str], None],
     ) -> None:
-        self._desk, self._touched = desk, touched
+        self._desk, self._touched, self._opened = desk, touched, opened
         self._found: tuple[str, ...] = ()
         self._looks: tuple[Same, ...] = ()
         self._search: Bound[str] = Bound(
@@ -60,13 +69,21 @@ class ErrorsPanel:
         )
         self._scene: Scene | None = None
         self._bound: dict[str, Bound[float]] = {}
+        self._buttons: dict[str, Any] = {}
         self._parts: list[Any] = []
+        self._clicks = Clicks(desk.gui, self._clicked)
+        desk.gui.add_html(STYLE)
         buttons = desk.gui.add_button_group(
             "All errors",
-            ("Reset", "All zero"),
-            hint="Reset: the values of the scene. All zero: the nominal machine.",
+            ("Reset", "All zero", "Hear all"),
+            hint="Reset: the values of the scene. All zero: the nominal machine. Hear all: end all"
+            " solo and mute.",
         )
-        updates = {"Reset": AppState.reset, "All zero": AppState.zeroed}
+        updates = {
+            "Reset": AppState.reset,
+            "All zero": AppState.zeroed,
+            "Hear all": edits.all_heard,
+        }
         buttons.on_click(lambda event: desk.post(updates[event.target.value]))
         self._home: Any = desk.gui.add_folder(None)
         self._build(state, tuple(state.amplitudes))
@@ -76,8 +93,8 @@ class ErrorsPanel:
         gui = self._desk.gui
         for part in self._parts:
             part.remove()
-        self._scene, self._bound, self._parts = state.origin, {}, []
-        self._found = keys
+        self._scene, self._bound, self._buttons, self._parts = state.origin, {}, {}, []
+        self._found, self._looks = keys, (Same(state.emphasis), Same(state.spans))
         narrowed = len(keys) < len(state.amplitudes)
         if not keys:
             with self._home:
@@ -92,9 +109,13 @@ class ErrorsPanel:
             self._parts.append(folder)
             with folder:
                 for row in own:
+                    self._buttons[row.key] = gui.add_html(
+                        emphasis_buttons(row, state.emphasis, self._clicks.button)
+                    )
                     self._bound[row.key] = Bound(self._slider(state, row), self._desk.changed)
                 button = gui.add_button(
                     f"Reset {axis}",
+                    color="gray",
                     hint=f"Give all errors of {axis} the values of the scene again.",
                 )
                 button.on_click(lambda _, axis=axis: self._desk.post(lambda s: s.reset(axis)))
@@ -103,7 +124,7 @@ class ErrorsPanel:
         """Add the slider of one parameter."""
         span = state.spans[row.key]
         return self._desk.gui.add_slider(
-            _label(state, row),
+            row.label,
             min=span.low,
             max=span.high,
             step=span.step,
@@ -112,18 +133,25 @@ class ErrorsPanel:
             hint=_hint(state, row),
         )
 
+    def _clicked(self, word: str) -> None:
+        """Take note of a click of solo, mute or curve."""
+        what, _, key = word.partition(" ")
+        if what == CURVE:
+            self._desk.act(lambda: self._opened(key))
+        else:
+            self._desk.post(lambda state: with_switched(state, word))
+
     def read(self, state: AppState) -> AppState:
         """Take over the sliders that a browser has moved."""
         for key, bound in self._bound.items():
             value = bound.poll()
             if value is not None:
                 state = state.with_amplitude(key, value)
-                if self._touched is not None:
-                    self._touched(key)
+                self._touched(key)
         query = self._search.poll()
         if query is not None:
             found = find_parameters(query, tuple(state.amplitudes))
-            if len(found) == 1 and self._touched is not None:
+            if len(found) == 1:
                 self._touched(found[0])
             if found != self._found:
                 # after the state has been dealt with, since widgets come and go
@@ -140,16 +168,13 @@ class ErrorsPanel:
         if looks != self._looks:
             self._looks = looks
             for key, bound in self._bound.items():
-                _refresh(bound.handle, state, parameter(key))
+                _refresh(bound.handle, state.spans[key])
+            for key, handle in self._buttons.items():
+                text = emphasis_buttons(parameter(key), state.emphasis, self._clicks.button)
+                if handle.content != text:
+                    handle.content = text
         for key, bound in self._bound.items():
             bound.show(state.amplitudes[key])
-
-
-def _label(state: AppState, row: Parameter) -> str:
-    """Label a slider, with what solo and mute do to it."""
-    if row.key in state.emphasis.soloed and state.emphasis.heard(row.key):
-        return f"{row.label} · solo"
-    return row.label if state.emphasis.heard(row.key) else f"{row.label} · silent"
 
 
 def _marks(span: Span) -> tuple[tuple[float, str], ...]:
@@ -157,11 +182,8 @@ def _marks(span: Span) -> tuple[tuple[float, str], ...]:
     return ((span.low, f"{span.low:g}"), (0.0, "0"), (span.high, f"{span.high:g}"))
 
 
-def _refresh(slider: Any, state: AppState, row: Parameter) -> None:
-    """Follow changes of label and range; what is the same already is not sent."""
-    label, span = _label(state, row), state.spans[row.key]
-    if slider.label != label:
-        slider.label = label
+def _refresh(slider: Any, span: Span) -> None:
+    """Follow a changed range; what is the same already is not sent."""
     if (slider.min, slider.max) != (span.low, span.high):
         slider.min, slider.max, slider.step = span.low, span.high, span.step
         slider.marks = _marks(span)

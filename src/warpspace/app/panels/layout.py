@@ -5,6 +5,7 @@ from viser import GuiApi
 from warpspace.app.outside import Outside
 from warpspace.app.panels import Desk, Panel
 from warpspace.app.panels.chance import ChancePanel
+from warpspace.app.panels.clicks import SCRIPT
 from warpspace.app.panels.commands import CommandsPanel
 from warpspace.app.panels.compare import ComparePanel
 from warpspace.app.panels.conventions import ConventionsPanel
@@ -23,8 +24,10 @@ from warpspace.app.state import AppState
 
 BRAND = (38, 70, 112)
 BRAND_ON_DARK = (122, 162, 214)
-LEFT_WIDTH = 330
-RIGHT_WIDTH = 310
+LEFT_WIDTH = 350
+RIGHT_WIDTH = 320
+ERRORS_SHARE = 0.68
+"""Share of the left column's height that the sliders have, the curve of one error below them."""
 HEADING_HEIGHT = 130
 """Room kept free for the heading, CSS pixels."""
 STYLE = """<style>
@@ -42,6 +45,11 @@ div:has(> p > label) + div:has(input[type="checkbox"]) { width: auto; flex-grow:
   top: auto !important; bottom: 1em !important; }
 p:has(> label) { color: inherit !important; letter-spacing: 0 !important; }
 .mantine-Slider-root:has(.mantine-Slider-markLabel) { margin-bottom: 4px; }
+/* what is not the main thing to do is outlined */
+.mantine-Button-root[style*="color-gray-filled"] { background: none;
+  color: var(--mantine-color-text); border: 1px solid var(--mantine-color-default-border); }
+/* all tabs of a panel on one line */
+[data-dock-tab] { padding: 0 .52em !important; }
 .mantine-ScrollArea-scrollbar[data-orientation="horizontal"] { display: none; }
 </style>"""
 
@@ -59,6 +67,40 @@ def apply_theme(gui: GuiApi, *, dark: bool) -> None:
         show_share_button=False,
         brand_color=BRAND_ON_DARK if dark else BRAND,
     )
+
+
+def split_script(share: float = ERRORS_SHARE) -> str:
+    """Write the script that divides the left column between sliders and curve.
+
+    The server can only halve a column. The script moves the divider as a hand would, so that it
+    stays a divider which can be moved; one that has been moved already is left alone.
+
+    Parameters
+    ----------
+    share : float, optional
+        Of the height that is to go to the upper panel.
+
+    Returns
+    -------
+    str
+        JavaScript that waits for the panels and gives up after ten seconds.
+    """
+    return f"""(() => {{
+  const divide = tries => {{
+    const divider = document.querySelector(
+      "[data-dock-region=left] [data-dock-divider=column]");
+    if (!divider) return tries && setTimeout(divide, 50, tries - 1);
+    if (divider.previousElementSibling?.style.flexGrow !== "0.5") return;
+    const column = divider.parentElement.getBoundingClientRect();
+    const send = (target, type, clientY) => target.dispatchEvent(new PointerEvent(type, {{
+      bubbles: true, button: 0, pointerId: 7007, clientX: column.left + 1, clientY }}));
+    const from = divider.getBoundingClientRect().top;
+    send(divider, "pointerdown", from);
+    send(window, "pointermove", from + ({share} - 0.5) * column.height);
+    send(window, "pointerup", from + ({share} - 0.5) * column.height);
+  }};
+  divide(200);
+}})();"""
 
 
 def lay_out_panels(
@@ -88,18 +130,27 @@ def lay_out_panels(
     gui.main_panel.dock_left()
     gui.main_panel.set_width(LEFT_WIDTH)
     gui.add_html(STYLE)
+    outside.run_script(SCRIPT)
     commands = CommandsPanel(desk, lambda: fit_view(None, None))
     shape_panel = gui.add_panel()
     with shape_panel.add_tab("One error"):
         shape = ShapePanel(desk, state)
     shape_panel.dock_below(gui.main_panel)
-    errors = ErrorsPanel(desk, state, shape.choose)
+    outside.run_script(split_script())
+
+    def open_curve(key: str) -> None:
+        shape.choose(key)
+        shape_panel.expand()
+
+    errors = ErrorsPanel(desk, state, shape.choose, open_curve)
 
     results = gui.add_panel()
     with results.add_tab("Result"):
         summary = summary_panel(desk)
     with results.add_tab("Why"):
         why = WhyPanel(desk, outside)
+    with results.add_tab("Gains"):
+        gains = GainsPanel(desk)
     with results.add_tab("Compare"):
         compare = ComparePanel(desk, outside.scenes)
     with results.add_tab("Files"):
@@ -116,8 +167,6 @@ def lay_out_panels(
         machine = MachinePanel(desk, state)
     with settings.add_tab("Table"):
         rotary = RotaryPanel(desk, state, play)
-    with settings.add_tab("Gains"):
-        gains = GainsPanel(desk)
     with settings.add_tab("Chance"):
         chance = ChancePanel(desk, state)
     with settings.add_tab("Conventions"):

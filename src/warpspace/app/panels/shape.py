@@ -1,4 +1,4 @@
-"""The panel of one error: solo, mute, and its curve along the travel, edited as rows of numbers."""
+"""The panel of one error: its curve along the travel, edited as rows of numbers."""
 
 import html
 from typing import Any
@@ -18,13 +18,16 @@ from warpspace.app.curves import (
 from warpspace.app.live import Frame
 from warpspace.app.panels import Desk
 from warpspace.app.state import AppState
-from warpspace.app.widgets import Bound
+from warpspace.app.widgets import Bound, dom_id
 from warpspace.exceptions import OptionError
 from warpspace.machine.errors import ErrorFunction
 from warpspace.machine.parameters import Parameter, parameter
 
 CURVE_COLOUR = "#4a7ab5"
 ZERO_COLOUR = "#9aa3af"
+CHART_HEIGHT = 128
+LABEL_WIDTH = 76
+"""Room for the labels, which stand beside their controls here, CSS pixels."""
 
 
 class ShapePanel:
@@ -52,18 +55,6 @@ class ShapePanel:
             ),
             desk.changed,
         )
-        self._solo: Bound[bool] = Bound(
-            gui.add_checkbox(
-                "Solo", initial_value=False, hint="Hear this error alone, or with others on solo."
-            ),
-            desk.changed,
-        )
-        self._mute: Bound[bool] = Bound(
-            gui.add_checkbox(
-                "Mute", initial_value=False, hint="Leave this error out; its value is kept."
-            ),
-            desk.changed,
-        )
         self._chart: Any = gui.add_uplot(
             _chart_data(None, (0.0, 1.0)),
             (
@@ -73,14 +64,15 @@ class ShapePanel:
             ),
             scales={"x": uplot.Scale(time=False)},
             legend=uplot.Legend(show=False),
-            height=150,
+            height=CHART_HEIGHT,
             padding=(8, 14, 0, 0),
         )
         self._kind: Bound[str] = Bound(
             gui.add_dropdown(
-                "Curve along the axis",
+                "Curve",
                 tuple(KINDS),
-                hint="Constant, ramp from the lower end, polynomial, harmonics or table.",
+                hint="Along the axis: constant, ramp from the lower end, polynomial, harmonics or"
+                " table.",
             ),
             desk.changed,
         )
@@ -89,9 +81,7 @@ class ShapePanel:
             desk.changed,
         )
         self._problem: Any = gui.add_html("")
-        hear = gui.add_button("Hear all errors", color="gray", hint="End all solo and mute.")
-        hear.on_click(lambda _: desk.post(edits.all_heard))
-        self._hear = hear
+        gui.add_html(_style(self._which.handle, self._kind.handle, self._rows.handle))
         self._show(state)
 
     def choose(self, key: str) -> None:
@@ -107,11 +97,6 @@ class ShapePanel:
         label = self._which.poll()
         if label is not None:
             self.choose(label.split(" ", 1)[0])
-        solo, mute = self._solo.poll(), self._mute.poll()
-        if solo is not None:
-            state = edits.with_soloed(state, self._key, solo)
-        if mute is not None:
-            state = edits.with_muted(state, self._key, mute)
         kind, rows = self._kind.poll(), self._rows.poll()
         if kind is None and rows is None:
             return state
@@ -158,10 +143,6 @@ class ShapePanel:
             self._key = _first(state)
         row = parameter(self._key)
         self._which.show(row.label)
-        self._solo.show(self._key in state.emphasis.soloed)
-        self._mute.show(self._key in state.emphasis.muted)
-        if self._hear.disabled != (not state.emphasis):
-            self._hear.disabled = not state.emphasis
         function = edits.curve_of(state, self._key)
         if function != self._written:
             self._write(function, row)
@@ -188,9 +169,22 @@ class ShapePanel:
         self._chart.axes = (
             uplot.Axis(label=f"{row.axis} [{unit}]", size=34, labelSize=16, font="11px sans-serif"),
             uplot.Axis(
-                label=f"{row.key} [{row.unit}]", size=44, labelSize=16, font="11px sans-serif"
+                label=f"{row.key} [{row.unit}]",
+                size=44,
+                labelSize=16,
+                font="11px sans-serif",
+                space=18,
             ),
         )
+
+
+def _style(*handles: Any) -> str:
+    """Put labels beside their controls, since there is little height."""
+    labels = ",".join(f"label[for='{dom_id(handle)}']" for handle in handles)
+    return (
+        f"<style>div:has(> div > p > :is({labels})) {{ flex-wrap: nowrap !important; }}"
+        f"div:has(> p > :is({labels})) {{ width: {LABEL_WIDTH}px !important; }}</style>"
+    )
 
 
 def _first(state: AppState) -> str:

@@ -1,0 +1,131 @@
+"""Buttons of one error, and the clicks of HTML that carry their words."""
+
+import re
+from html.parser import HTMLParser
+
+import pytest
+
+from warpspace import load_scene
+from warpspace.app import edits
+from warpspace.app.emphasis import Emphasis
+from warpspace.app.emphasis_text import emphasis_buttons, with_switched
+from warpspace.app.history import History
+from warpspace.app.panels.clicks import LONGEST_WORD, MOST_CLICKS, SCRIPT, read_clicks
+from warpspace.app.panels.layout import split_script
+from warpspace.app.panels.view import COMPONENT_NAMES, component_of
+from warpspace.app.state import start_state
+from warpspace.machine.parameters import parameter
+
+STATE = start_state(load_scene("dvf5000_first"))
+
+
+class _Buttons(HTMLParser):
+    """Collects the attributes of the group and of its buttons."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.group: dict[str, str] = {}
+        self.found: list[dict[str, str]] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = {name: value or "" for name, value in attrs}
+        if tag == "button":
+            self.found.append(given)
+        elif given.get("role") == "group":
+            self.group = given
+
+
+def buttons(emphasis: Emphasis, key: str = "EAX") -> _Buttons:
+    return _Buttons(
+        emphasis_buttons(parameter(key), emphasis, lambda word: f'type="button" data-word="{word}"')
+    )
+
+
+def pressed(emphasis: Emphasis, key: str = "EAX") -> tuple[str, str]:
+    solo, mute, _ = buttons(emphasis, key).found
+    return solo["aria-pressed"], mute["aria-pressed"]
+
+
+def test_the_buttons_say_what_they_do_to_which_error():
+    solo, mute, curve = buttons(Emphasis()).found
+    assert [b["data-word"] for b in (solo, mute, curve)] == ["solo EAX", "mute EAX", "curve EAX"]
+    assert solo["aria-label"] == "Solo EAX, roll of X"
+    assert mute["aria-label"] == "Mute EAX, roll of X"
+    assert curve["aria-label"] == "Curve of EAX, roll of X"
+    assert all(b["title"] and b["type"] == "button" for b in (solo, mute, curve))
+
+
+def test_the_buttons_show_what_is_pressed_and_who_is_silent():
+    assert pressed(Emphasis()) == ("false", "false")
+    assert pressed(Emphasis().with_muted("EAX", True)) == ("false", "true")
+    alone = Emphasis().with_soloed("EAX", True)
+    assert pressed(alone) == ("true", "false")
+    assert pressed(alone, "EBX") == ("false", "false")
+    assert "silent" not in buttons(alone).group["aria-label"]
+    assert buttons(alone, "EBX").group["aria-label"].endswith("silent")
+    assert "ws-silent" in buttons(alone, "EBX").group["class"]
+    assert "ws-silent" not in buttons(alone).group["class"]
+
+
+def test_a_click_switches_and_a_second_one_switches_back():
+    once = with_switched(STATE, "solo EAX")
+    assert once == edits.with_soloed(STATE, "EAX", True)
+    assert with_switched(once, "solo EAX") == STATE
+    muted = with_switched(STATE, "mute EC0Y")
+    assert muted.emphasis.muted == frozenset({"EC0Y"})
+    assert with_switched(muted, "mute EC0Y") == STATE
+
+
+@pytest.mark.parametrize("word", ["", "solo", "solo EXA", "mute <script>", "delete EAX", " EAX"])
+def test_words_that_mean_nothing_change_nothing(word):
+    assert with_switched(STATE, word) is STATE
+
+
+def test_each_switch_is_a_step_however_fast_they_follow_each_other():
+    history = History(STATE)
+    for number, word in enumerate(("mute EAX", "mute EBX", "mute EBX", "solo EBX")):
+        history = history.push(with_switched(history.present, word), 0.01 * number)
+    assert history.undoes == "emphasis.soloed.+EBX"
+    history = history.undo()
+    assert history.present.emphasis == Emphasis(frozenset({"EAX"}))
+    history = history.undo()
+    assert history.present.emphasis == Emphasis(frozenset({"EAX", "EBX"}))
+    assert history.undo().undo().present == STATE
+
+
+def test_clicks_are_read_in_order_with_their_numbers():
+    assert read_clicks("7:solo EAX\n8:mute EBX") == ((7, "solo EAX"), (8, "mute EBX"))
+    assert read_clicks("3:a:b") == ((3, "a:b"),)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "solo EAX", "x:solo EAX", "-1:a", "²:a", "9" * 40 + ":a", "1.5:a", "None"]
+)
+def test_what_is_no_click_is_left_out(text):
+    assert read_clicks(text) == ()
+
+
+def test_a_flood_of_clicks_is_bounded():
+    found = read_clicks("\n".join(f"{i}:a" for i in range(10_000)))
+    assert len(found) == MOST_CLICKS
+    assert len(read_clicks("1:" + "a" * 1_000_000)[0][1]) == LONGEST_WORD
+
+
+def test_scripts_have_balanced_braces():
+    for script in (SCRIPT, split_script()):
+        assert script.count("{") == script.count("}")
+        assert script.count("(") == script.count(")")
+    assert "0.68" in split_script(0.68)
+
+
+def test_components_are_named_after_what_is_coloured():
+    assert "tilt" in COMPONENT_NAMES["orientation"]["norm"]
+    assert not any("E" in name for name in COMPONENT_NAMES["orientation"].values())
+    for names in COMPONENT_NAMES.values():
+        for component, name in names.items():
+            assert component_of(name) == component
+    assert component_of("<script>") == "<script>"
+    spelt = [name for names in COMPONENT_NAMES.values() for name in names.values()]
+    assert len(set(spelt)) == len(spelt)
+    assert not [name for name in spelt if re.search(r"[<>&]", name)]
