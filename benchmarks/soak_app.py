@@ -1,9 +1,10 @@
 """The app for an hour: tabs come, drag, drop out, come back, leave; memory must not grow.
 
-    python benchmarks/soak_app.py [--minutes 60] [--tabs 6]
+    python benchmarks/soak_app.py [--minutes 60] [--tabs 6] [--rate 10]
 
 A fifth of the run is warming up (caches, allocator). Then the line through the memory over time is
-what counts, together with what stays behind of threads and open files.
+what counts, together with what stays behind of threads and open files. CPU is that of the server
+since the line before, in percent of one core.
 """
 
 import argparse
@@ -19,23 +20,28 @@ KEYS = ("EXX", "EAX", "EBY", "EAZ", "EC0Y", "EA0Z", "EAC")
 MAX_MB_PER_HOUR = 20.0
 
 
-async def visit(url: str, until: float, rng: random.Random, counts: dict[str, int]) -> None:
-    """Be one visitor after the other."""
+async def visit(
+    url: str, until: float, rate: float, rng: random.Random, counts: dict[str, int]
+) -> None:
+    """Be one visitor after the other, who moves sliders so many times a second."""
     while time.monotonic() < until:
         tab = Tab(url)
         for _ in range(rng.randint(1, 4)):  # connections of one visitor
             await tab.open()
             counts["connections"] += 1
+            counts["open"] += 1
             expected = tab.values
-            for _ in range(rng.randint(10, 60)):
+            start, moves = time.monotonic(), rng.randint(10, 60)
+            for move in range(1, moves + 1):
                 key = rng.choice(KEYS)
                 value = round(rng.uniform(-10.0, 10.0), 1)
                 await tab.drag(key, value)
                 expected[key] = value
                 counts["moves"] += 1
-                await asyncio.sleep(0.03)
+                await asyncio.sleep(max(0.0, start + move / rate - time.monotonic()))
             await asyncio.sleep(0.4)
             await tab.close()
+            counts["open"] -= 1
             again = Tab(url, tab.token)
             again.values = {}
             tab = again
@@ -65,25 +71,29 @@ async def run(url: str, process, options: argparse.Namespace) -> bool:
     """Soak and print; give whether nothing grew."""
     seconds = 60.0 * options.minutes
     until = time.monotonic() + seconds
-    counts = {"connections": 0, "moves": 0}
+    counts = {"connections": 0, "moves": 0, "open": 0}
     memory: list[tuple[float, float]] = []
     visitors = [
-        asyncio.create_task(visit(url, until, random.Random(seed), counts))
+        asyncio.create_task(visit(url, until, options.rate, random.Random(seed), counts))
         for seed in range(options.tabs)
     ]
     start, next_line = time.monotonic(), 0.0
+    cpu_s = process.cpu_times()
+    process.cpu_percent()  # from here on
     while time.monotonic() < until:
         at = time.monotonic() - start
         memory.append((at, rss_mb(process)))
         if at >= next_line:
             print(
-                f"{at / 60:6.1f} min  {memory[-1][1]:7.1f} MB  {process.num_threads():4d} threads"
-                f"  {process.num_fds():4d} files  {counts['connections']} connections",
+                f"{at / 60:6.1f} min  {memory[-1][1]:7.1f} MB  {process.cpu_percent():4.0f} % CPU"
+                f"  {process.num_threads():4d} threads  {process.num_fds():4d} files"
+                f"  {counts['open']:3d} open of {counts['connections']} connections",
                 flush=True,
             )
             next_line += max(60.0, seconds / 10.0)
         await asyncio.sleep(1.0)
     await asyncio.gather(*visitors)
+    spent_s = sum(process.cpu_times()[:2]) - sum(cpu_s[:2])
     await asyncio.sleep(3.0)
     found = await check_return(url)
     await asyncio.sleep(2.0)
@@ -91,6 +101,10 @@ async def run(url: str, process, options: argparse.Namespace) -> bool:
     slope = float(np.polyfit(times / 3600.0, sizes, 1)[0])
     print(
         f"{counts['connections']} connections, {counts['moves']} moves in {options.minutes:g} min"
+    )
+    print(
+        f"CPU {100.0 * spent_s / seconds:.0f} % of a core,"
+        f" {1000.0 * spent_s / max(counts['moves'], 1):.1f} ms a move, connecting included"
     )
     print(f"memory {sizes[0]:.1f} → {sizes[-1]:.1f} MB, {slope:+.1f} MB per hour")
     print(f"left open: {process.num_threads()} threads, {process.num_fds()} files")
@@ -103,6 +117,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--minutes", type=float, default=60.0)
     parser.add_argument("--tabs", type=int, default=6, help="visitors at a time")
+    parser.add_argument("--rate", type=float, default=10.0, help="moves per second and visitor")
     options = parser.parse_args()
     with running_app() as (url, process):
         fine = asyncio.run(run(url, process, options))
