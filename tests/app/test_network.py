@@ -4,11 +4,16 @@ import errno
 import socket
 import threading
 from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from warpspace.app import network, viewer
+from warpspace.app.board import Board
 from warpspace.app.network import free_port, is_local, page_url, resolve_host
+from warpspace.app.state import start_state
+from warpspace.app.tabs import Left, new_token
 from warpspace.exceptions import OptionError
 from warpspace.scene.library import load_scene
 
@@ -73,6 +78,16 @@ def test_public_tunnel_is_off_and_a_second_app_takes_another_port() -> None:
         assert first._server.request_share_url() is None
 
 
+def test_a_connection_that_is_gone_takes_nothing_from_the_tab_that_comes_back() -> None:
+    scene = load_scene("dvf5000_nominal")
+    token, left = new_token(), Left(Board(start_state(scene)), None)
+    gone: Any = SimpleNamespace(token="")
+    with viewer.Viewer(scene) as running:
+        running._keeper.keep(token, left)
+        assert running._claim(gone, token) is None
+        assert running._keeper.take(token) is left
+
+
 def test_run_warns_of_a_public_address_and_ends_on_ctrl_c(monkeypatch: pytest.MonkeyPatch) -> None:
     class Interrupted(threading.Event):
         def wait(self, timeout: float | None = None) -> bool:
@@ -86,6 +101,7 @@ def test_run_warns_of_a_public_address_and_ends_on_ctrl_c(monkeypatch: pytest.Mo
             return self
 
         def __exit__(self, *_: object) -> None: ...
+        def settle(self) -> None: ...
 
     said: list[str] = []
     warned: list[str] = []

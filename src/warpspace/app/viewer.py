@@ -1,12 +1,10 @@
 """The server of the app: starts it, gives each browser tab a session, ends it cleanly."""
 
 import contextlib
-import gc
 import importlib
 import io
 import logging
 import threading
-import time
 import warnings
 import webbrowser
 from collections.abc import Callable, Mapping
@@ -17,6 +15,7 @@ import viser
 
 from warpspace.app.board import Board
 from warpspace.app.live import LiveModel
+from warpspace.app.memory import Tidier, limit_arenas, settle_memory
 from warpspace.app.network import free_port, is_local, page_url, resolve_host
 from warpspace.app.services import Services
 from warpspace.app.session import Session
@@ -28,8 +27,6 @@ from warpspace.scene.model import Scene
 
 logger = logging.getLogger(__name__)
 Say = Callable[[str], None]
-TIDY_S = 10.0
-"""Time between two searches for what closed tabs have left in memory."""
 NO_AUTHENTICATION = (
     "warning: {host} can be reached from other machines, and the app asks nobody for a password;"
     " whoever reaches it can use it"
@@ -81,13 +78,14 @@ class Viewer:
         self._sessions: dict[int, Session] = {}
         self._lock = threading.Lock()
         self._keeper = Keeper()
-        self._tidied = 0.0
+        self._tidier = Tidier()
         self._shared = Board(self._start) if shared else None
         self._server = _serve(self.address, self.port)
         self._server.on_client_connect(self._connect)
         self._server.on_client_disconnect(self._disconnect)
         # the first tab need not wait for it
-        threading.Thread(target=self._warm, name="warpspace-warm", daemon=True).start()
+        self._warming = threading.Thread(target=self._warm, name="warpspace-warm", daemon=True)
+        self._warming.start()
 
     @property
     def url(self) -> str:
@@ -104,6 +102,12 @@ class Viewer:
         """Sessions of the tabs that are open."""
         with self._lock:
             return tuple(self._sessions.values())
+
+    def settle(self) -> None:
+        """Wait until the app is warm, then have searches for cycles leave out what is there."""
+        self._warming.join()
+        if not self.sessions:
+            settle_memory()
 
     def _warm(self) -> None:
         """Do before the first tab what it would have to wait for."""
@@ -127,6 +131,8 @@ class Viewer:
         if not is_token(token):
             return None
         with self._lock:
+            if session not in self._sessions.values():
+                return None  # its connection is gone already: it must not take what it left
             twins = [s for s in self._sessions.values() if s is not session and s.token == token]
             left = self._keeper.take(token)
             if not twins:
@@ -147,17 +153,11 @@ class Viewer:
                 self._keeper.keep(session.token, session.left())
         if session is not None:
             session.stop()
-            self._tidy()
-
-    def _tidy(self) -> None:
-        """Give back the memory of closed tabs, whose handles hold each other; not too often."""
-        now = time.monotonic()
-        if now - self._tidied > TIDY_S:
-            self._tidied = now
-            gc.collect()
+            self._tidier.soon()
 
     def stop(self) -> None:
         """End all sessions and the server."""
+        self._tidier.stop()
         for session in self.sessions:
             session.stop()
         with contextlib.redirect_stdout(io.StringIO()):
@@ -249,6 +249,8 @@ def run_viewer(
     """
     # a tab may close while something is on its way to it
     warnings.filterwarnings("ignore", message="Queued an? .* on a closed connection")
+    limit_arenas()
+    settle_memory()
     with Viewer(
         scene, scenes, start=start, host=host, port=port, shared=shared, services=services
     ) as viewer:
@@ -258,6 +260,7 @@ def run_viewer(
                 warn(NO_AUTHENTICATION.format(host=host))
             if browser and not open_browser(viewer.url):
                 say(f"no browser could be opened; open {viewer.url} yourself")
+            viewer.settle()
             threading.Event().wait()
         except KeyboardInterrupt:
             say("\nended")
