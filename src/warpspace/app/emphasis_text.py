@@ -28,7 +28,8 @@ STYLE = """<style>
 .ws-error button[aria-pressed="true"][data-word^="mute"] {
   background: var(--mantine-color-text); }
 div:has(> .ws-error) + div p { white-space: nowrap; overflow: hidden; text-overflow: ellipsis;
-  padding-right: 66px; box-sizing: border-box !important; font-size: .83em !important; }
+  padding-right: 65px; box-sizing: border-box !important; font-size: .83em !important;
+  letter-spacing: -.3px !important; }
 div:has(> .ws-error) + div label wbr { display: none; }
 /* what is silent stands back, and can still be moved */
 div:has(> .ws-silent) + div { opacity: .45; }
