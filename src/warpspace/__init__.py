@@ -10,7 +10,7 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from warpspace.exceptions import SceneError, WarpspaceError
-    from warpspace.field.evaluate import ErrorField
+    from warpspace.field.basis import ErrorField
     from warpspace.scene.library import load_scene, scene_names
     from warpspace.scene.model import Scene
     from warpspace.scene.pipeline import evaluate

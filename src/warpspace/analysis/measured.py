@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpspace.analysis.statistics import Statistics, statistics
-from warpspace.field.evaluate import ErrorField, View, evaluate_first_order
+from warpspace.field.basis import ErrorField
+from warpspace.field.evaluate import View, evaluate_first_order
 from warpspace.field.grid import Workspace, build_grid
 from warpspace.kinematics.model import Model
 from warpspace.machine.errors import ErrorSet

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpspace.exceptions import OptionError
-from warpspace.field.evaluate import ErrorField
+from warpspace.field.basis import ErrorField
 
 
 @dataclass(frozen=True, slots=True)

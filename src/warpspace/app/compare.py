@@ -16,7 +16,7 @@ from warpspace.app.look import RotaryLook
 from warpspace.app.mapping import shown_values
 from warpspace.app.slicing import SliceMap, draw_slice
 from warpspace.app.state import AppState, start_state
-from warpspace.field.evaluate import ErrorField
+from warpspace.field.basis import ErrorField
 from warpspace.geometry.colour import ColourScale, build_scale
 from warpspace.geometry.deform import deform
 from warpspace.scene.model import Scene

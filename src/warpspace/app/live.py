@@ -16,7 +16,8 @@ from warpspace.app.look import default_held
 from warpspace.app.mapping import choose_scale, shown_values
 from warpspace.app.slicing import SliceMap, SliceSource
 from warpspace.app.state import AppState
-from warpspace.field.evaluate import ErrorBasis, ErrorField, View, build_basis
+from warpspace.field.basis import ErrorBasis, ErrorField
+from warpspace.field.evaluate import View, build_basis
 from warpspace.field.grid import Grid, build_grid
 from warpspace.geometry.colour import ColourScale
 from warpspace.geometry.deform import auto_exaggeration, deform

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from warpspace.app.state import AppState
-from warpspace.field.evaluate import ErrorBasis, ErrorField
+from warpspace.field.basis import ErrorBasis, ErrorField
 from warpspace.geometry.colour import ColourScale, build_scale, component_values
 from warpspace.units import MICROMETRE, MICRORADIAN, Array
 

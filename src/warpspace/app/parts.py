@@ -44,10 +44,10 @@ class Parts:
         self._busy = False
         self._busy_until = 0.0
         self._since: float | None = None
-        self._concerns = {
+        self._concerns: dict[object, Callable[[Frame], tuple[object, ...]]] = {
             part: part.concerns for part in (*self.layers, *self.panels) if isinstance(part, Choosy)
         }
-        self._concerned: dict[Layer | Panel, tuple[object, ...]] = {}
+        self._concerned: dict[object, tuple[object, ...]] = {}
 
     @property
     def pause_s(self) -> float | None:

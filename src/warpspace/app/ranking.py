@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpspace.field.evaluate import ErrorBasis
+from warpspace.field.basis import ErrorBasis
 from warpspace.kinematics.chain import nominal_point
 from warpspace.kinematics.firstorder import columns
 from warpspace.kinematics.model import Coordinates, Loop, Model

@@ -6,7 +6,7 @@ from warpspace.app.kept import Kept, Same
 from warpspace.app.look import slice_positions
 from warpspace.app.mapping import shown_values
 from warpspace.app.state import AppState
-from warpspace.field.evaluate import ErrorBasis, ErrorField
+from warpspace.field.basis import ErrorBasis, ErrorField
 from warpspace.field.grid import Grid
 from warpspace.geometry.deform import deform
 from warpspace.geometry.slices import build_slice

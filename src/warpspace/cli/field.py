@@ -15,7 +15,7 @@ from warpspace.cli.options import (
 from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
-    from warpspace.field.evaluate import ErrorField
+    from warpspace.field.basis import ErrorField
     from warpspace.scene.model import Scene
     from warpspace.units import Array
 
@@ -92,7 +92,7 @@ def _evaluate(
     """Evaluate at the points given or over the grid; axis positions and field, both flat."""
     import numpy as np
 
-    from warpspace.field.evaluate import ErrorField
+    from warpspace.field.basis import ErrorField
     from warpspace.field.grid import DEFAULT_NODES, build_grid
     from warpspace.kinematics.model import complete_coordinates
     from warpspace.scene.pipeline import evaluate

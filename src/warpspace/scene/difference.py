@@ -3,7 +3,7 @@
 import numpy as np
 
 from warpspace.exceptions import OptionError
-from warpspace.field.evaluate import ErrorField
+from warpspace.field.basis import ErrorField
 from warpspace.scene.pipeline import ScenePicture
 
 SAME_MM = 1e-6

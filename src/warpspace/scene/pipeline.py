@@ -8,9 +8,8 @@ from numpy.typing import ArrayLike
 
 from warpspace.analysis.statistics import Statistics, statistics
 from warpspace.exceptions import OptionError
+from warpspace.field.basis import ErrorBasis, ErrorField
 from warpspace.field.evaluate import (
-    ErrorBasis,
-    ErrorField,
     View,
     build_basis,
     error_values,

@@ -5,7 +5,7 @@ import pytest
 
 from warpspace.analysis.statistics import statistics
 from warpspace.exceptions import OptionError
-from warpspace.field.evaluate import ErrorField
+from warpspace.field.basis import ErrorField
 
 
 def field_of(norms: np.ndarray) -> ErrorField:

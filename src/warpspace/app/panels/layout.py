@@ -83,14 +83,14 @@ def split_script(share: float = ERRORS_SHARE) -> str:
     Returns
     -------
     str
-        JavaScript that waits for the panels and gives up after ten seconds.
+        JavaScript that waits for a column in halves and gives up after ten seconds.
     """
     return f"""(() => {{
   const divide = tries => {{
     const divider = document.querySelector(
       "[data-dock-region=left] [data-dock-divider=column]");
-    if (!divider) return tries && setTimeout(divide, 50, tries - 1);
-    if (divider.previousElementSibling?.style.flexGrow !== "0.5") return;
+    if (divider?.previousElementSibling?.style.flexGrow !== "0.5")
+      return tries && setTimeout(divide, 50, tries - 1);
     const column = divider.parentElement.getBoundingClientRect();
     const send = (target, type, clientY) => target.dispatchEvent(new PointerEvent(type, {{
       bubbles: true, button: 0, pointerId: 7007, clientX: column.left + 1, clientY }}));

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from warpspace.field.evaluate import ErrorField
+from warpspace.field.basis import ErrorField
 from warpspace.machine.parameters import LINEAR_AXES
 from warpspace.outputs.exports.drawing import Drawing
 from warpspace.outputs.files import write_atomically

@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 
 from warpspace.exceptions import SceneError, WarpspaceError
-from warpspace.field.evaluate import ErrorField
+from warpspace.field.basis import ErrorField
 from warpspace.outputs.exports.drawing import Drawing, draw_scene
 from warpspace.outputs.files import write_atomically
 from warpspace.scene.library import parse_scene

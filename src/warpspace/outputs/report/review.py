@@ -12,7 +12,7 @@ from warpspace.analysis.montecarlo import MonteCarlo, Plan, montecarlo
 from warpspace.analysis.nodes import Over
 from warpspace.analysis.statistics import Statistics, statistics
 from warpspace.exceptions import OptionError, WarpspaceError
-from warpspace.field.evaluate import ErrorField
+from warpspace.field.basis import ErrorField
 from warpspace.kinematics.model import Loop
 from warpspace.outputs.exports.drawing import (
     Drawing,
