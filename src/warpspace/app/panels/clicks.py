@@ -27,7 +27,7 @@ SCRIPT = f"""(() => {{
           preventScroll: true }});
     }});
     watch.observe(document.body, {{childList: true, subtree: true}});
-    setTimeout(() => watch.disconnect(), 3000);
+    setTimeout(() => watch.disconnect(), 10000);
   }};
 }})();"""
 """Has to run in the page before anything is clicked."""
