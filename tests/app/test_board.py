@@ -59,6 +59,15 @@ def test_everybody_else_is_told():
     assert told.count("two") == 2
 
 
+def test_a_busy_server_does_not_make_two_steps_of_one_drag():
+    board = Board(STATE)
+    board.apply(moved("EAX", 1.0), at=10.0)
+    board.apply(moved("EAX", 2.0), at=10.3)  # however much later it is applied
+    assert len(board.history.past) == 1
+    board.apply(moved("EAX", 3.0), at=12.0)
+    assert len(board.history.past) == 2
+
+
 def test_what_raises_changes_nothing_and_blocks_nobody():
     board = Board(STATE)
 

@@ -40,7 +40,9 @@ class Board:
         """What is shown, or about to be."""
         return self._history.present
 
-    def apply(self, update: Update, by: Listener | None = None) -> tuple[str, ...]:
+    def apply(
+        self, update: Update, by: Listener | None = None, at: float | None = None
+    ) -> tuple[str, ...]:
         """Apply a pure update to the present state.
 
         Parameters
@@ -48,6 +50,9 @@ class Board:
         update : callable
         by : callable, optional
             The listener of who does it: it is not told.
+        at : float, optional
+            When the user did it on the monotonic clock, s; now by default. A busy server is late,
+            and must not make two steps of one drag.
 
         Returns
         -------
@@ -58,7 +63,9 @@ class Board:
             before = self._history
             state = update(before.present)
             notes = state.notes
-            self._history = before.push(state.without_notes(), time.monotonic())
+            self._history = before.push(
+                state.without_notes(), time.monotonic() if at is None else at
+            )
             changed = self._history is not before
         if changed:
             self._tell(by)

@@ -5,6 +5,8 @@ import json
 from viser import ClientHandle
 from viser import _messages as messages
 
+from warpspace.exceptions import WarpspaceError
+
 NOTE_SECONDS = 8.0
 
 
@@ -39,3 +41,19 @@ class Page:
             auto_close_seconds=NOTE_SECONDS,
             color=colour,  # type: ignore[arg-type]
         )
+
+    def report(self, error: Exception) -> None:
+        """Tell the user of this tab what went wrong."""
+        known = isinstance(error, WarpspaceError)
+        text = str(error) if known else f"{type(error).__name__}: {error}"
+        self.notify("That did not work", text, "red")
+
+
+def is_passing(error: Exception) -> bool:
+    """Tell whether an error is gone when the same is done again.
+
+    viser wakes its sender from our thread, which once in ten thousands of pictures meets the sender
+    itself. What was to be sent is in its buffer all the same; showing the state again sends the
+    rest.
+    """
+    return isinstance(error, RuntimeError) and "mutated during iteration" in str(error)

@@ -94,7 +94,10 @@ class Parts:
             concerned = concerns(frame)
             if not anew and self._concerned.get(part) == concerned:
                 return
+            self._concerned.pop(part, None)
+            part.show(frame)
             self._concerned[part] = concerned
+            return
         part.show(frame)
 
     def unsettle(self) -> None:

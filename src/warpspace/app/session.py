@@ -25,7 +25,7 @@ from warpspace.app.layers.traces import TracesLayer
 from warpspace.app.layers.why import WhyLayer
 from warpspace.app.live import Frame, LiveModel
 from warpspace.app.outside import Outside
-from warpspace.app.page import Page
+from warpspace.app.page import Page, is_passing
 from warpspace.app.panels import Desk, Update
 from warpspace.app.panels.commands import hint_script
 from warpspace.app.panels.layout import apply_theme, lay_out_panels
@@ -34,7 +34,6 @@ from warpspace.app.services import Services
 from warpspace.app.shelf import Shelf
 from warpspace.app.state import AppState
 from warpspace.app.tabs import CameraMemory, Left, ask_script, new_token, rename_script
-from warpspace.exceptions import WarpspaceError
 
 logger = logging.getLogger(__name__)
 TOKEN_WAIT_S = 0.25
@@ -81,7 +80,7 @@ class Session:
         self._actions: deque[Callable[[], None]] = deque()
         self._shown: Frame | None = None
         self._posted: deque[Update] = deque()
-        self._wake = threading.Event()
+        self._wake, self._changed_at = threading.Event(), time.monotonic()
         self._stopped = threading.Event()
         self._parts = Parts()
         self._stage: StageLayer | None = None
@@ -109,12 +108,13 @@ class Session:
 
     def changed(self) -> None:
         """Take note that a widget has changed; returns at once."""
+        self._changed_at = time.monotonic()
         self._wake.set()
 
     def post(self, update: Update) -> None:
         """Queue a pure update of the state; returns at once."""
         self._posted.append(update)
-        self._wake.set()
+        self.changed()
 
     def act(self, action: Callable[[], None]) -> None:
         """Queue something to be done beside the state, guarded; returns at once."""
@@ -150,10 +150,11 @@ class Session:
         except Exception as error:
             if self._stopped.is_set():
                 return
+            if is_passing(error):
+                self._wake.set()
+                return
             logger.exception("session %d", self._client.client_id)
-            known = isinstance(error, WarpspaceError)
-            text = str(error) if known else f"{type(error).__name__}: {error}"
-            self._page.notify("That did not work", text, "red")
+            self._page.report(error)
 
     def _ask(self) -> None:
         """Ask the page which tab it is."""
@@ -233,7 +234,7 @@ class Session:
             self._adopt()
             if self._camera is not None and self._shown is not None:
                 self._restore_camera(self._shown)
-        notes = self.board.apply(self._take_in, by=self.changed)
+        notes = self.board.apply(self._take_in, by=self.changed, at=self._changed_at)
         while self._actions:
             self._guarded(self._actions.popleft())
         state = self.board.state

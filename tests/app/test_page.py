@@ -1,0 +1,17 @@
+"""What a page is told of errors, and which of them pass by themselves."""
+
+from collections import deque
+
+import pytest
+
+from warpspace.app.page import is_passing
+
+
+def test_the_race_inside_viser_passes_and_nothing_else_does() -> None:
+    waiting = deque([1, 2])
+    with pytest.raises(RuntimeError) as caught:
+        for _ in waiting:
+            waiting.append(3)
+    assert is_passing(caught.value)
+    assert not is_passing(RuntimeError("Cannot assign to 'label' on a removed handle"))
+    assert not is_passing(ValueError("mutated during iteration"))
