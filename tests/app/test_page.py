@@ -10,8 +10,7 @@ from warpspace.app.page import is_passing
 def test_the_race_inside_viser_passes_and_nothing_else_does() -> None:
     waiting = deque([1, 2])
     with pytest.raises(RuntimeError) as caught:
-        for _ in waiting:
-            waiting.append(3)
+        waiting.extend(number for number in waiting)
     assert is_passing(caught.value)
     assert not is_passing(RuntimeError("Cannot assign to 'label' on a removed handle"))
     assert not is_passing(ValueError("mutated during iteration"))
