@@ -1,17 +1,31 @@
 """A comparison in a real Chromium: stored in links and files, exported, sliced; and its limits."""
 
+import csv
+import io
 from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
+from urllib.parse import urlencode
 
 import numpy as np
 import pytest
 
 from app.conftest import Tab
-from warpspace.app import links
+from warpspace.app import edits, links
+from warpspace.app.compare import scene_side, with_pin, with_sides
+from warpspace.app.comparison import Side
+from warpspace.app.conventions import Effects, with_choice
+from warpspace.app.document import open_text, state_to_toml
 from warpspace.app.live import Frame, LiveModel
+from warpspace.app.mapmesh import map_mesh
+from warpspace.app.picked import Picked
+from warpspace.app.resulting import scene_of
 from warpspace.app.state import AppState, start_state
 from warpspace.app.viewer import Viewer
 from warpspace.cli.services import build_services
+from warpspace.kinematics.model import Loop
+from warpspace.machine.errors import Table
 from warpspace.scene.library import load_scene
 
 if TYPE_CHECKING:
@@ -21,6 +35,12 @@ pytestmark = pytest.mark.browser
 LIVE = LiveModel()
 SCENES = [load_scene(name) for name in ("dvf5000_first", "dvf5000_second", "teach_tilted_c")]
 START = start_state(SCENES[0])
+LISTEN = """window.said = new Set();
+new MutationObserver(() => document.querySelectorAll('.mantine-Notification-root').forEach(
+  note => window.said.add(note.textContent))).observe(document, {childList: true, subtree: true});
+"""
+"""Keeps what the page says: on a busy machine a message may be gone before it is looked for."""
+WORKSPACE = b"[workspace]\nX = [-275, 275]\nY = [-225, 225]\nZ = [-480, -80]\nB = 0\nC = 0\n"
 
 
 @pytest.fixture(scope="module")
@@ -58,6 +78,7 @@ def follow(viewer: Viewer, browser: "Browser") -> Iterator[Callable[[str], Tab]]
 
     def open_link(link: str) -> Tab:
         context = browser.new_context(viewport={"width": 1600, "height": 900})
+        context.add_init_script(LISTEN)
         address = f"{viewer.url}/?fixedDpr=1&{links.PARAMETER}={links.pack(link)}#"
         opened.append((context, Tab(context.new_page(), address)))
         return opened[-1][1]
@@ -75,3 +96,205 @@ def test_a_link_to_another_scene_with_changed_errors_leaves_no_message(
     tab = follow("scene=dvf5000_second&EXX=4&EC0Y=1")
     tab.until(lambda: state_of(viewer, tab).scene is SCENES[1])
     tab.page.wait_for_timeout(1500)
+
+
+def compare_with_pin(tab: Tab, viewer: Viewer) -> AppState:
+    """Pin, change an error, and draw the difference; give the state it amounts to."""
+    panel(tab, "Compare")
+    tab.page.get_by_role("button", name="Pin now and compare").click()
+    tab.until(lambda: tab.page.locator("[data-compared='mean A − B']").count() == 1)
+    tab.send("EXX", "10")
+    state = with_pin(START).with_amplitude("EXX", 10.0)
+    state = replace(state, comparison=state.comparison.with_shown("difference"))
+    tab.page.wait_for_timeout(100)
+    tab.page.get_by_role("button", name="A − B", exact=True).click()
+    tab.until(lambda: tab.shows(drawn(LIVE.frame(state))))
+    assert state_of(viewer, tab) == state
+    return state
+
+
+def said(tab: Tab) -> list[str]:
+    """All messages the page has shown."""
+    return tab.page.evaluate("[...window.said]")
+
+
+def press_link(tab: Tab) -> str:
+    """Press Link; give what stands in the address bar."""
+    panel(tab, "Files")
+    tab.page.get_by_role("button", name="Link", exact=True).click()
+    tab.until(lambda: f"{links.PARAMETER}=" in tab.page.url)
+    return links.unpack(tab.page.url.partition(f"{links.PARAMETER}=")[2].split("&")[0])
+
+
+def test_a_link_brings_the_comparison_with_its_snapshot(
+    tab: Tab, viewer: Viewer, follow: Callable[[str], Tab]
+) -> None:
+    state = compare_with_pin(tab, viewer)
+    other = follow(press_link(tab))
+    other.until(lambda: other.shows(drawn(LIVE.frame(state))))
+    assert state_of(viewer, other) == state
+    panel(other, "Compare")
+    other.until(lambda: other.page.locator("[data-compared='mean A − B']").count() == 1)
+    snapshot = state.comparison.pinned.title
+    assert other.page.get_by_label("B", exact=True).input_value() == snapshot
+    assert other.page.get_by_label("A", exact=True).input_value() == "now"
+    # and it goes on from there
+    other.page.get_by_role("button", name="B", exact=True).click()
+    other.until(lambda: other.shows(drawn(LIVE.frame(START))))
+
+
+def test_a_saved_scene_brings_the_comparison_of_two_scenes(
+    tab: Tab, viewer: Viewer, open_tab: Callable[[], Tab]
+) -> None:
+    panel(tab, "Compare")
+    tab.choose("B", SCENES[1].title)
+    tab.until(lambda: tab.page.locator("[data-compared='mean A − B']").count() == 1)
+    state = with_sides(START, Side(), scene_side(SCENES[1]))
+    panel(tab, "Files")
+    with tab.page.expect_download() as waiting:
+        tab.page.get_by_role("button", name="Save scene", exact=True).click()
+    content = Path(waiting.value.path()).read_bytes()
+    other = open_tab()
+    panel(other, "Files")
+    upload(other, "dvf5000_first.toml", content)
+    other.until(lambda: state_of(viewer, other).comparison == state.comparison)
+    panel(other, "Compare")
+    other.until(lambda: other.page.get_by_label("B", exact=True).input_value() == SCENES[1].title)
+    other.page.get_by_role("button", name="A − B", exact=True).click()
+    frame = LIVE.frame(replace(state, comparison=state.comparison.with_shown("difference")))
+    other.until(lambda: other.shows(drawn(frame)))
+    # a scene that says nothing of how it is looked at leaves the comparison alone
+    upload(other, "plain.toml", b'title = "Plain"\nmachine = "dvf5000"\n' + WORKSPACE)
+    other.until(lambda: state_of(viewer, other).scene.title == "Plain")
+    assert viewer.sessions[-1].state.comparison.b == state.comparison.b
+    assert other.errors == []
+
+
+def test_a_point_of_a_trace_and_its_lever_come_with_a_link(
+    tab: Tab, viewer: Viewer, follow: Callable[[str], Tab]
+) -> None:
+    at = {"X": 0.0, "Y": 0.0, "Z": -280.0, "B": 0.0, "C": 45.0}
+    asked = replace(
+        START.with_amplitude("EC0B", 9.0),
+        picked=Picked(at, Loop.WORKPIECE, (275.0, 0.0, 0.0)),
+        lever="EC0B",
+    )
+    viewer.sessions[-1].post(lambda _: asked)
+    panel(tab, "Why")
+    tab.until(lambda: tab.page.locator("[data-value='why norm']").count() == 1)
+    norm = tab.text("why norm")
+    other = follow(press_link(tab))
+    panel(other, "Why")
+    other.until(lambda: other.page.locator("[data-value='why norm']").count() == 1)
+    assert other.text("why norm") == norm
+    assert "mm" in other.text("lever")
+    assert state_of(viewer, other) == asked
+
+
+@pytest.mark.parametrize(
+    ("pairs", "message"),
+    [
+        ({"compare.b": "scene=nobody"}, "which is not here"),
+        ({"compare.b": "file=!!!"}, "is cut off"),
+        ({"compare.b": "now", "compare.shown": "<b>"}, "does not say what is drawn"),
+    ],
+)
+def test_a_link_with_a_broken_comparison_says_so_and_changes_nothing(
+    viewer: Viewer, follow: Callable[[str], Tab], pairs: dict[str, str], message: str
+) -> None:
+    tab = follow(f"scene=dvf5000_second&EXX=7&{urlencode(pairs)}")
+    tab.until(lambda: any(message in text for text in said(tab)))
+    assert len([text for text in said(tab) if "Link: failed" in text]) == 1
+    assert state_of(viewer, tab) == START
+
+
+def test_what_is_too_large_for_a_link_is_left_out_and_named(tab: Tab, viewer: Viewer) -> None:
+    rows = np.linspace(-275.0, 275.0, 200)
+    noise = np.random.default_rng(1).normal(size=(3, 200))
+    big = START
+    for key, values in zip(("EXX", "EYX", "EZX"), noise, strict=True):
+        curve = Table((-275.0, 275.0), tuple(zip(rows.tolist(), values.tolist(), strict=True)))
+        big = edits.with_curve(big, key, curve)
+    state = replace(START, comparison=with_pin(big).comparison)
+    viewer.sessions[-1].post(lambda _: state)
+    tab.until(lambda: tab.page.locator("[data-value='compared']").count() == 1)
+    link = press_link(tab)
+    tab.until(lambda: tab.page.get_by_text("Without the comparison").count() == 1)
+    assert tab.page.get_by_text("too large for a link").count() == 1
+    assert "compare" not in link
+    with tab.page.expect_download() as waiting:
+        tab.page.get_by_role("button", name="Save scene", exact=True).click()
+    text = Path(waiting.value.path()).read_text(encoding="utf-8")
+    back = open_text(text, "dvf5000_first", "x")[0].comparison
+    assert back.pinned.title == state.comparison.pinned.title
+    assert back.pinned.state.scene.errors == scene_of(big).errors
+
+
+def test_exports_show_the_difference_that_is_drawn(tab: Tab, viewer: Viewer) -> None:
+    state = compare_with_pin(tab, viewer)
+    frame = LIVE.frame(state)
+    panel(tab, "Files")
+    tab.until(lambda: tab.page.locator("[data-value='exported']").count() == 1)
+    assert tab.text("exported").startswith(f"Pictures and exports show {frame.compared.title}")
+    contents: dict[str, bytes] = {}
+    for name, ending in (("CSV", "csv"), ("HTML", "html"), ("GLB", "glb")):
+        with tab.page.expect_download(timeout=60_000) as waiting:
+            tab.page.get_by_role("button", name=name, exact=True).click()
+        assert waiting.value.suggested_filename == f"now_minus_snapshot.{ending}"
+        contents[ending] = Path(waiting.value.path()).read_bytes()
+        tab.until(lambda: tab.page.get_by_role("button", name="Cancel", exact=True).count() == 0)
+    rows = list(csv.DictReader(io.StringIO(contents["csv"].decode())))
+    largest = max(float(row["norm_um"]) for row in rows)
+    assert largest == pytest.approx(frame.statistics.max_um, abs=1e-6)
+    assert frame.compared.title in contents["html"].decode()
+    assert b"A \xe2\x88\x92 B" in contents["glb"]
+    panel(tab, "Compare")
+    tab.choose("B", "nothing")
+    panel(tab, "Files")
+    tab.until(lambda: tab.page.locator("[data-value='exported']").count() == 0)
+
+
+def test_the_difference_is_drawn_in_slices_and_cut_open(tab: Tab) -> None:
+    panel(tab, "Compare")
+    tab.choose("B", SCENES[1].title)
+    tab.page.wait_for_timeout(100)
+    tab.page.get_by_role("button", name="A − B", exact=True).click()
+    state = with_sides(START, Side(), scene_side(SCENES[1]))
+    state = replace(state, comparison=state.comparison.with_shown("difference"))
+    for shown, word in (("slices", "slices"), ("cut octant", "cut")):
+        tab.choose("Show as", shown)
+        look = state.look.with_choice(surface=word)
+        mesh = map_mesh(LIVE.frame(replace(state, look=look)))
+        tab.until(lambda mesh=mesh: tab.shows(mesh.vertices_mm))
+
+
+def test_a_linear_axis_is_turned_round_in_the_conventions(tab: Tab) -> None:
+    panel(tab, "Conventions")
+    effect = Effects().of(START)["direction X=-1"]
+    row = tab.page.locator("[data-choice='direction X=-1']")
+    tab.until(lambda: "…" not in row.inner_text())
+    assert row.inner_text().split()[-2:] == [f"{effect.mean_um:.2f}", f"{effect.max_um:.2f}"]
+    row.click()
+    tab.until(lambda: tab.shows(drawn(LIVE.frame(with_choice(START, "direction X=-1")))))
+    tab.until(lambda: row.get_attribute("aria-checked") == "true")
+    tab.page.get_by_role("button", name="Conventions of the scene").click()
+    tab.until(lambda: tab.shows(drawn(LIVE.frame(START))))
+
+
+@pytest.mark.slow
+def test_opened_scenes_do_not_pile_up(tab: Tab, viewer: Viewer) -> None:
+    tab.page.evaluate(LISTEN)
+    panel(tab, "Files")
+    for number in range(22):
+        scene = replace(SCENES[1], title=f"Machine {number}", name=f"machine {number}")
+        upload(tab, f"machine {number}.toml", state_to_toml(start_state(scene)).encode())
+        tab.until(lambda n=number: viewer.sessions[-1].state.scene.title == f"Machine {n}")
+    # behind the messages of 22 opened files
+    tab.until(lambda: any("Machine 1 left the list" in text for text in said(tab)), 90.0)
+    panel(tab, "View")
+    tab.page.get_by_label("Scene", exact=True).first.click()
+    tab.page.wait_for_timeout(300)
+    options = tab.page.get_by_role("option").all_inner_texts()
+    named = [text for text in options if text.startswith("Machine ")]
+    assert named == [f"Machine {number}" for number in range(2, 22)]
+    assert SCENES[0].title in options
