@@ -16,6 +16,7 @@ from warpspace.app.live import Frame
 from warpspace.app.outside import Outside
 from warpspace.app.panels import Desk
 from warpspace.app.services import CancelledError
+from warpspace.app.shelf import MOST_OPENED
 from warpspace.app.state import AppState
 from warpspace.app.tabs import CameraMemory
 from warpspace.app.uploads import Uploads, size_script
@@ -144,6 +145,11 @@ class FilesPanel:
 
     def _show(self, opened: AppState, camera: CameraMemory | None, *, whole: bool = True) -> None:
         """Show an opened state from its camera; beside a plain scene the comparison stays."""
+        # here, since not every opened scene is drawn where many follow each other
+        _, dropped = self._outside.scenes.add(opened.origin)
+        if dropped:
+            text = f"The newest {MOST_OPENED} opened scenes are kept; {dropped} left the list."
+            self._desk.notify("Scenes", text, "gray")
 
         def update(now: AppState) -> AppState:
             if camera is not None:
