@@ -8,6 +8,7 @@ from warpspace.app.layers import Layer
 from warpspace.app.layers.box import BoxLayer
 from warpspace.app.layers.traces import TracesLayer
 from warpspace.app.live import Frame
+from warpspace.app.mapmesh import drafted
 from warpspace.app.panels import Choosy, Panel, Settling
 from warpspace.app.panels.errors import ErrorsPanel
 from warpspace.app.panels.summary import HtmlPanel
@@ -17,11 +18,11 @@ SETTLE_S = 0.1
 """Pause in the changes after which charts follow: longer than between two moves of a drag."""
 LONGEST_SETTLE_S = 0.25
 """Charts lag no longer than this behind while a slider is being dragged."""
-BUSY_PAUSE_S, BUSY_SETTLE_S = 0.2, 2.0
-"""The same two on a busy server."""
+BUSY_PAUSE_S, BUSY_SETTLE_S = 0.2, 10.0
+"""The same two on a busy server, which also draws the map of every second node meanwhile."""
 BUSY_S = 0.01
 """Wait for other tabs' pictures beyond which the server counts as busy."""
-BUSY_MEMORY_S = 2.0
+BUSY_MEMORY_S = 5.0
 """How long a server that was busy counts as such."""
 TURN = Turns()
 """Pictures are made one after the other: twenty at once would all be late, and fight for caches."""
@@ -40,12 +41,16 @@ class Parts:
 
     def __init__(self, layers: Sequence[Layer] = (), panels: Sequence[Panel] = ()) -> None:
         self.layers, self.panels = tuple(layers), tuple(panels)
-        self._late: list[Layer | Panel] = []
+        every = (*self.layers, *self.panels)
+        self._at_once = tuple(part for part in every if isinstance(part, AT_ONCE))
+        self._thinned = tuple(part for part in every if isinstance(part, BoxLayer))
+        self._put_off = tuple(p for p in every if p not in self._at_once or p in self._thinned)
+        self._late: tuple[Layer | Panel, ...] = ()
         self._busy = False
         self._busy_until = 0.0
         self._since: float | None = None
         self._concerns: dict[object, Callable[[Frame], tuple[object, ...]]] = {
-            part: part.concerns for part in (*self.layers, *self.panels) if isinstance(part, Choosy)
+            part: part.concerns for part in every if isinstance(part, Choosy)
         }
         self._concerned: dict[object, tuple[object, ...]] = {}
 
@@ -79,11 +84,14 @@ class Parts:
         anew : bool, optional
             Also what shows the same as before: a widget may show what was refused.
         """
-        self._late = []
-        for part in (*self.layers, *self.panels):
-            if self._busy and not anew and not isinstance(part, AT_ONCE):
-                self._late.append(part)
-            else:
+        self._late = ()
+        if self._busy and not anew:
+            draft = drafted(frame)
+            for part in self._at_once:
+                self._show(part, draft if part in self._thinned else frame)
+            self._late = self._put_off
+        else:
+            for part in (*self.layers, *self.panels):
                 self._show(part, frame, anew=anew)
         self.unsettle()
 
@@ -115,7 +123,7 @@ class Parts:
             Runs a step and reports what it raises.
         """
         self._since = None
-        late, self._late = self._late, []
+        late, self._late = self._late, ()
         for part in late:
             guarded(partial(self._show, part, frame))
         for panel in self.panels:

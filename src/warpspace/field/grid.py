@@ -71,6 +71,12 @@ class Grid:
         return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
     @cached_property
+    def ways(self) -> Array:
+        """Which way the nodes run along x, y and z, [3]: +1, or −1 where from upper to lower."""
+        along = self.nominal_mm[-1, -1, -1] - self.nominal_mm[0, 0, 0]
+        return np.where(along < 0.0, -1.0, 1.0)
+
+    @cached_property
     def extent_mm(self) -> Array:
         """Edge lengths of the nominal volume in R, [3], mm."""
         return self.bounds_mm[1] - self.bounds_mm[0]
