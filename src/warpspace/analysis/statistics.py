@@ -6,6 +6,9 @@ import numpy as np
 
 from warpspace.exceptions import OptionError
 from warpspace.field.basis import ErrorField
+from warpspace.units import Array
+
+P95 = 0.95
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +53,20 @@ def statistics(field: ErrorField) -> Statistics:
     x, y, z = (float(value) for value in field.nominal_mm.reshape(-1, 3)[worst])
     return Statistics(
         float(norm.mean()),
-        float(np.sqrt(np.mean(norm**2))),
-        float(np.percentile(norm, 95.0)),
+        float(np.sqrt(norm @ norm / norm.size)),
+        _percentile(norm, P95),
         float(norm[worst]),
         (x, y, z),
     )
+
+
+def _percentile(values: Array, part: float) -> float:
+    """Interpolate between the two values around a percentile, as `numpy.quantile` does.
+
+    That one takes thrice the time for what the app works out with every move of a slider.
+    """
+    place = part * (values.size - 1)
+    below = int(place)
+    above = min(below + 1, values.size - 1)
+    low, high = np.partition(values, (below, above))[[below, above]]
+    return float(low + (place - below) * (high - low))

@@ -31,7 +31,11 @@ class ErrorField:
     @cached_property
     def norm_um(self) -> Array:
         """Length of the position error, [...], µm."""
-        return np.sqrt(np.einsum("...i,...i->...", self.error_um, self.error_um))
+        x, y, z = (self.error_um[..., axis] for axis in range(3))
+        squared = x * x
+        squared += y * y  # in place: a volume of points is larger than what a processor keeps near
+        squared += z * z
+        return np.sqrt(squared)
 
 
 @dataclass(frozen=True, slots=True)

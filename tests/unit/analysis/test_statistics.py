@@ -28,6 +28,12 @@ def test_95th_percentile_leaves_a_twentieth_above() -> None:
     assert statistics(field_of(np.arange(101.0))).p95_um == pytest.approx(95.0)
 
 
+@pytest.mark.parametrize("count", [1, 2, 3, 19, 20, 21, 9261])
+def test_95th_percentile_is_that_of_numpy(count: int) -> None:
+    norms = np.random.default_rng(count).gamma(2.0, 10.0, count)
+    assert statistics(field_of(norms)).p95_um == pytest.approx(np.quantile(norms, 0.95), rel=1e-14)
+
+
 def test_one_point_is_enough_and_none_is_not() -> None:
     assert statistics(field_of(np.array(7.0))).max_um == 7.0
     with pytest.raises(OptionError, match="expected at least one"):

@@ -74,10 +74,12 @@ def pieces(points: Array, segments: NDArray[np.intp]) -> NDArray[np.float32]:
 
 def polyline_pieces(lines: Sequence[Array] | Array) -> NDArray[np.float32]:
     """Cut polylines, [..., n, 3], into pieces, [S, 2, 3]."""
-    cut = [
-        np.stack([line[..., :-1, :], line[..., 1:, :]], axis=-2).reshape(-1, 2, 3) for line in lines
-    ]
-    return np.concatenate(cut).astype(np.float32) if cut else np.zeros((0, 2, 3), np.float32)
+    cut: list[NDArray[np.float32]] = []
+    for line in lines:
+        ends = np.empty((*line.shape[:-2], line.shape[-2] - 1, 2, 3), np.float32)
+        ends[..., 0, :], ends[..., 1, :] = line[..., :-1, :], line[..., 1:, :]
+        cut.append(ends.reshape(-1, 2, 3))
+    return np.concatenate(cut) if cut else np.zeros((0, 2, 3), np.float32)
 
 
 class Layer(Protocol):

@@ -24,6 +24,8 @@ def apart(lines: TraceLines, distance_mm: float) -> NDArray[np.float32]:
     way = lines.actual_mm - lines.nominal_mm
     far = np.einsum("...i,...i->...", way, way) > distance_mm**2
     kept = (far[..., :-1] | far[..., 1:]).reshape(-1)
+    if not kept.any():
+        return np.zeros((0, 2, 3), np.float32)
     return polyline_pieces([lines.nominal_mm])[kept]
 
 
