@@ -18,8 +18,9 @@ SETTLE_S = 0.1
 """Pause in the changes after which charts follow: longer than between two moves of a drag."""
 LONGEST_SETTLE_S = 0.25
 """Charts lag no longer than this behind while a slider is being dragged."""
-BUSY_PAUSE_S, BUSY_SETTLE_S = 0.2, 10.0
-"""The same two on a busy server, which also draws the map of every second node meanwhile."""
+BUSY_PAUSE_S = 0.2
+"""The pause on a busy server. Its charts wait for one however long a drag takes, and the map is
+drawn of every second node meanwhile."""
 BUSY_S = 0.01
 """Wait for other tabs' pictures beyond which the server counts as busy."""
 BUSY_MEMORY_S = 5.0
@@ -65,8 +66,8 @@ class Parts:
         """Tell whether charts are to follow now."""
         if self._since is None:
             return False
-        longest = BUSY_SETTLE_S if self._busy else LONGEST_SETTLE_S
-        return paused or time.monotonic() - self._since > longest
+        lagging = time.monotonic() - self._since > LONGEST_SETTLE_S
+        return paused or (lagging and not self._busy)
 
     def waited(self, seconds: float) -> None:
         """Take note of how long the tab has waited for its turn."""
