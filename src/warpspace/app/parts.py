@@ -1,17 +1,20 @@
-"""Everything of a tab that follows the frame: layers and panels, on a busy server in two goes."""
+"""Everything of a tab that follows the frame: layers and panels, on a busy server by drafts."""
 
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 
+from warpspace.app.drafts import Draft, build_draft, only_moved
 from warpspace.app.layers import Layer
 from warpspace.app.layers.box import BoxLayer
-from warpspace.app.layers.traces import TracesLayer
-from warpspace.app.live import Frame
-from warpspace.app.mapmesh import drafted
+from warpspace.app.live import Frame, LiveModel
+from warpspace.app.painter import PAINTER
 from warpspace.app.panels import Choosy, Panel, Settling
 from warpspace.app.panels.errors import ErrorsPanel
 from warpspace.app.panels.summary import HtmlPanel
+from warpspace.app.state import AppState
 from warpspace.app.turns import Turns
 
 SETTLE_S = 0.1
@@ -19,16 +22,34 @@ SETTLE_S = 0.1
 LONGEST_SETTLE_S = 0.25
 """Charts lag no longer than this behind while a slider is being dragged."""
 BUSY_PAUSE_S = 0.2
-"""The pause on a busy server. Its charts wait for one however long a drag takes, and the map is
-drawn of every second node meanwhile."""
+"""The pause on a busy server. Its charts wait for one however long a drag takes, and drafts are
+shown meanwhile."""
 BUSY_S = 0.01
 """Wait for other tabs' pictures beyond which the server counts as busy."""
-BUSY_MEMORY_S = 5.0
-"""How long a server that was busy counts as such."""
+BUSY_MEMORY_S = 2.0
+"""How long a server that was busy counts as such without another wait."""
+BUSY_PACE = 60.0
+"""Pictures a second, of all tabs, with which a busy server stays busy."""
 TURN = Turns()
 """Pictures are made one after the other: twenty at once would all be late, and fight for caches."""
-AT_ONCE = (BoxLayer, TracesLayer, HtmlPanel, ErrorsPanel)
-"""What is never put off: map, traces, numbers and the sliders themselves."""
+_LATEST: deque[float] = deque(maxlen=32)
+"""When the latest pictures of all tabs were asked for, s."""
+
+
+def pace() -> float:
+    """Give how many pictures a second all tabs together have asked for lately."""
+    now = time.monotonic()
+    _LATEST.append(now)
+    return len(_LATEST) / max(now - _LATEST[0], 1e-3) if len(_LATEST) == _LATEST.maxlen else 0.0
+
+
+def make_draft(live: LiveModel, state: AppState) -> Draft:
+    """Work out the draft of a state, in the other process if that can be had."""
+    draft = PAINTER.paint(state)
+    if draft is None:
+        with TURN:
+            draft = build_draft(live.frame(state))
+    return draft
 
 
 class Parts:
@@ -40,12 +61,15 @@ class Parts:
     panels : sequence of Panel
     """
 
-    def __init__(self, layers: Sequence[Layer] = (), panels: Sequence[Panel] = ()) -> None:
+    def __init__(
+        self,
+        layers: Sequence[Layer] = (),
+        panels: Sequence[Panel] = (),
+        frame: Frame | None = None,
+    ) -> None:
         self.layers, self.panels = tuple(layers), tuple(panels)
+        self._frame, self._state = frame, None if frame is None else frame.state
         every = (*self.layers, *self.panels)
-        self._at_once = tuple(part for part in every if isinstance(part, AT_ONCE))
-        self._thinned = tuple(part for part in every if isinstance(part, BoxLayer))
-        self._put_off = tuple(p for p in every if p not in self._at_once or p in self._thinned)
         self._late: tuple[Layer | Panel, ...] = ()
         self._busy = False
         self._busy_until = 0.0
@@ -69,15 +93,39 @@ class Parts:
         lagging = time.monotonic() - self._since > LONGEST_SETTLE_S
         return paused or (lagging and not self._busy)
 
+    @property
+    def state(self) -> AppState | None:
+        """What is shown, be it as a draft."""
+        return self._state
+
     def waited(self, seconds: float) -> None:
         """Take note of how long the tab has waited for its turn."""
-        now = time.monotonic()
         if seconds > BUSY_S:
-            self._busy_until = now + BUSY_MEMORY_S
-        self._busy = now < self._busy_until
+            self._busy_until = time.monotonic() + BUSY_MEMORY_S
+
+    def takes_draft(self, state: AppState) -> bool:
+        """Tell whether a draft of a state will do for now."""
+        if pace() > BUSY_PACE and self._busy:
+            self._busy_until = time.monotonic() + BUSY_MEMORY_S
+        self._busy = time.monotonic() < self._busy_until
+        return self._busy and self._state is not None and only_moved(self._state, state)
+
+    def show_draft(self, state: AppState, draft: Draft) -> None:
+        """Show a draft; all else follows when it settles."""
+        for part in self.layers:
+            if isinstance(part, BoxLayer):
+                part.move(draft.box)
+        for part in self.panels:
+            if isinstance(part, HtmlPanel):
+                part.write(draft.texts[part.name])
+            elif isinstance(part, ErrorsPanel) and self._frame is not None:
+                part.show(replace(self._frame, state=state))
+        self._state = state
+        self._late = (*self.layers, *self.panels)
+        self.unsettle()
 
     def show(self, frame: Frame, *, anew: bool = False) -> None:
-        """Follow a frame; on a busy server map and numbers first, the others when it settles.
+        """Follow a frame.
 
         Parameters
         ----------
@@ -85,15 +133,9 @@ class Parts:
         anew : bool, optional
             Also what shows the same as before: a widget may show what was refused.
         """
-        self._late = ()
-        if self._busy and not anew:
-            draft = drafted(frame)
-            for part in self._at_once:
-                self._show(part, draft if part in self._thinned else frame)
-            self._late = self._put_off
-        else:
-            for part in (*self.layers, *self.panels):
-                self._show(part, frame, anew=anew)
+        self._frame, self._state, self._late = frame, frame.state, ()
+        for part in (*self.layers, *self.panels):
+            self._show(part, frame, anew=anew)
         self.unsettle()
 
     def _show(self, part: Layer | Panel, frame: Frame, *, anew: bool = False) -> None:
@@ -123,7 +165,7 @@ class Parts:
         guarded : callable
             Runs a step and reports what it raises.
         """
-        self._since = None
+        self._since, self._frame = None, frame
         late, self._late = self._late, ()
         for part in late:
             guarded(partial(self._show, part, frame))

@@ -16,20 +16,14 @@ from viser import ClientHandle
 
 from warpspace.app.board import Board, apply_each
 from warpspace.app.eye import Eye, focus
-from warpspace.app.layers import Layer
-from warpspace.app.layers.axes import AxesLayer
-from warpspace.app.layers.box import BoxLayer
-from warpspace.app.layers.other import OtherLayer
-from warpspace.app.layers.stage import StageLayer
-from warpspace.app.layers.traces import TracesLayer
-from warpspace.app.layers.why import WhyLayer
+from warpspace.app.layers.stage import StageLayer, draw_map
 from warpspace.app.live import Frame, LiveModel
 from warpspace.app.outside import Outside
 from warpspace.app.page import Page, is_passing
 from warpspace.app.panels import Desk, Update
 from warpspace.app.panels.commands import hint_script
 from warpspace.app.panels.layout import apply_theme, lay_out_panels
-from warpspace.app.parts import TURN, Parts
+from warpspace.app.parts import TURN, Parts, make_draft
 from warpspace.app.services import Services
 from warpspace.app.shelf import Shelf
 from warpspace.app.state import AppState
@@ -188,19 +182,11 @@ class Session:
         if self._told.wait(TOKEN_WAIT_S):
             self._adopt()
         frame = self._live.frame(self.state)
-        scene = self._client.scene
         with self._client.atomic():
             self._page.set_title(frame.state.scene.title)
             self._restore_camera(frame)
-            layers: list[Layer] = [
-                BoxLayer(scene, frame),
-                TracesLayer(scene, frame),
-                AxesLayer(scene, frame),
-                OtherLayer(scene, frame),
-                WhyLayer(scene, frame),
-                stage := StageLayer(self._client, frame, self.act),
-            ]
-            self._stage = stage
+            self._stage = stage = StageLayer(self._client, frame, self.act)
+            layers = [*draw_map(self._client.scene, frame), stage]
             desk = Desk(
                 self._client.gui,
                 self.changed,
@@ -221,7 +207,7 @@ class Session:
             panels = lay_out_panels(desk, frame.state, outside, self.fit_view, stage.play)
             for panel in panels:
                 panel.show(frame)
-            self._parts = Parts(layers, panels)
+            self._parts = Parts(layers, panels, frame)
         self._client.flush()
         self._page.run_script(hint_script())
         self._client.flush()
@@ -241,10 +227,13 @@ class Session:
         shown = self._shown
         if self._camera and shown is not None and focus(shown.state) == focus(state):
             self._restore_camera(shown)
-        if not notes and self._shown is not None and state is self._shown.state:
+        if not notes and state is self._parts.state:
             return
         # what is slow the first time is done before it is this tab's turn
         self._live.response(state)
+        if self._parts.takes_draft(state) and not notes:
+            self._show_draft(state)
+            return
         asked = time.monotonic()
         with TURN:
             self._parts.waited(time.monotonic() - asked)
@@ -271,11 +260,21 @@ class Session:
         if notes:
             self._page.notify("Clamped", "\n".join(notes), "yellow")
 
+    def _show_draft(self, state: AppState) -> None:
+        """Show for now what matters most; all else follows when it settles."""
+        draft = make_draft(self._live, state)
+        with self._client.atomic():
+            self._parts.show_draft(state, draft)
+        self._client.flush()
+
     def _settle(self) -> None:
-        """Let the charts follow."""
-        frame = self._shown
-        if frame is None:
+        """Let all follow that has been put off."""
+        if self._parts.state is None:
             return
+        if self._shown is None or self._shown.state is not self._parts.state:
+            with TURN:
+                self._shown = self._live.frame(self._parts.state)
+        frame = self._shown
         with self._client.atomic():
             self._parts.settle(frame, self._guarded)
         self._client.flush()

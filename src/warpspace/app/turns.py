@@ -17,15 +17,18 @@ class Turns:
         self._taken = False
         self._waiting: deque[threading.Lock] = deque()
 
-    def __enter__(self) -> None:
+    def ask(self) -> threading.Lock:
+        """Stand in line; give a lock that can be acquired when it is one's turn."""
+        mine = threading.Lock()
         with self._inner:
-            if not self._taken:
-                self._taken = True
-                return
-            mine = threading.Lock()
-            mine.acquire()
-            self._waiting.append(mine)
-        mine.acquire()  # until whoever has the turn hands it over
+            if self._taken:
+                mine.acquire()
+                self._waiting.append(mine)
+            self._taken = True
+        return mine
+
+    def __enter__(self) -> None:
+        self.ask().acquire()  # until whoever has the turn hands it over
 
     def __exit__(
         self,
@@ -33,6 +36,10 @@ class Turns:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        self.hand_on()
+
+    def hand_on(self) -> None:
+        """End one's turn."""
         with self._inner:
             if self._waiting:
                 self._waiting.popleft().release()

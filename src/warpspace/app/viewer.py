@@ -4,6 +4,7 @@ import contextlib
 import importlib
 import io
 import logging
+import sys
 import threading
 import warnings
 import webbrowser
@@ -17,6 +18,7 @@ from warpspace.app.board import Board
 from warpspace.app.live import LiveModel
 from warpspace.app.memory import Tidier, limit_arenas, settle_memory
 from warpspace.app.network import free_port, is_local, page_url, resolve_host
+from warpspace.app.painter import PAINTER
 from warpspace.app.services import Services
 from warpspace.app.session import Session
 from warpspace.app.shelf import Shelf
@@ -27,6 +29,8 @@ from warpspace.scene.model import Scene
 
 logger = logging.getLogger(__name__)
 Say = Callable[[str], None]
+SWITCH_S = 0.001
+"""How long a thread keeps the interpreter while others wait for it: an answer passes four."""
 NO_AUTHENTICATION = (
     "warning: {host} can be reached from other machines, and the app asks nobody for a password;"
     " whoever reaches it can use it"
@@ -160,6 +164,7 @@ class Viewer:
         self._tidier.stop()
         for session in self.sessions:
             session.stop()
+        PAINTER.close()
         with contextlib.redirect_stdout(io.StringIO()):
             self._server.stop()
 
@@ -247,6 +252,7 @@ def run_viewer(
     say, warn : callable
         Print a line for the user.
     """
+    sys.setswitchinterval(SWITCH_S)
     # a tab may close while something is on its way to it
     warnings.filterwarnings("ignore", message="Queued an? .* on a closed connection")
     limit_arenas()

@@ -4,17 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 from viser import SceneApi
 
-from warpspace.app.glb import build_glb
+from warpspace.app.drafts import BoxPicture, box_picture, surface_glb
 from warpspace.app.layers import NOTHING, SCENE_PER_MM, colour_bytes, palette
 from warpspace.app.live import Frame
-from warpspace.app.mapmesh import (
-    edge_pieces,
-    grid_pieces,
-    isoline_pieces,
-    line_mesh,
-    map_mesh,
-)
-from warpspace.app.tonemap import Rgb, vertex_colours
+from warpspace.app.tonemap import Rgb
 from warpspace.app.widgets import Told
 from warpspace.geometry.surfaces import box_edges
 from warpspace.units import Array
@@ -24,12 +17,6 @@ DASH, GAP = 0.022, 0.014
 """Dash and gap of the nominal box, as parts of the longest edge."""
 LIGHT_ISOLINE: Rgb = (226, 230, 236)
 DARK_ISOLINE: Rgb = (60, 68, 80)
-
-
-def surface_glb(frame: Frame) -> bytes:
-    """Write the coloured map of a frame, or its lines alone, vertices in mm."""
-    mesh = line_mesh(frame) if frame.state.look.surface == "grid" else map_mesh(frame)
-    return build_glb(mesh.vertices_mm, mesh.triangles, vertex_colours(frame.scale, mesh.values))
 
 
 def dashes(points: Array, dash: float, gap: float) -> NDArray[np.float32]:
@@ -113,30 +100,27 @@ class BoxLayer:
 
     def show(self, frame: Frame) -> None:
         """Move vertices, colours and lines."""
-        colours, shown, look = palette(frame), frame.state.shown, frame.state.look
-        lines_only = look.surface == "grid"
-        self._surface.put(glb_data=surface_glb(frame))
-        if lines_only or not shown.grid_lines:
-            self._grid.put(visible=False)
-        else:
-            self._grid.put(
-                points=grid_pieces(frame), colors=colour_bytes(colours.grid), visible=True
-            )
-        if lines_only:
-            self._edges.put(visible=False)
-        else:
-            self._edges.put(
-                points=edge_pieces(frame), colors=colour_bytes(colours.edge), visible=True
-            )
-        if look.isolines and not lines_only:
-            self._isolines.put(
-                points=isoline_pieces(frame), colors=colour_bytes(isoline_colour(frame))
-            )
-        self._isolines.put(visible=look.isolines and not lines_only)
+        colours = palette(frame)
+        self.move(box_picture(frame))
+        self._grid.put(colors=colour_bytes(colours.grid))
+        self._edges.put(colors=colour_bytes(colours.edge))
+        self._isolines.put(colors=colour_bytes(isoline_colour(frame)))
         if frame.grid.nominal_mm is not self._nominal:
             self._nominal = frame.grid.nominal_mm
             self._ghost.put(points=ghost_dashes(frame))
-        self._ghost.put(colors=colour_bytes(colours.ghost), visible=shown.ghost)
+        self._ghost.put(colors=colour_bytes(colours.ghost), visible=frame.state.shown.ghost)
+
+    def move(self, picture: BoxPicture) -> None:
+        """Move the map and the lines on it; their colours stay."""
+        self._surface.put(glb_data=picture.surface)
+        for lines, points in (
+            (self._grid, picture.grid),
+            (self._edges, picture.edges),
+            (self._isolines, picture.isolines),
+        ):
+            if points is not None:
+                lines.put(points=points)
+            lines.put(visible=points is not None)
 
 
 def isoline_colour(frame: Frame) -> Rgb:

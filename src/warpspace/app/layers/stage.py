@@ -2,16 +2,28 @@
 
 from collections.abc import Callable
 
-from viser import ClientHandle
+from viser import ClientHandle, SceneApi
 
+from warpspace.app.layers import Layer
 from warpspace.app.layers.annotations import AnnotationsLayer
+from warpspace.app.layers.axes import AxesLayer
+from warpspace.app.layers.box import BoxLayer
 from warpspace.app.layers.machine import MachineLayer
+from warpspace.app.layers.other import OtherLayer
 from warpspace.app.layers.rotation import RotationLayer
+from warpspace.app.layers.traces import TracesLayer
+from warpspace.app.layers.why import WhyLayer
 from warpspace.app.live import Frame
 from warpspace.app.rotation import played_position
 from warpspace.app.turning import Player
 
 Tell = Callable[[str], None]
+
+
+def draw_map(scene: SceneApi, frame: Frame) -> list[Layer]:
+    """Draw the map and what lies on and around it."""
+    kinds = (BoxLayer, TracesLayer, AxesLayer, OtherLayer, WhyLayer)
+    return [kind(scene, frame) for kind in kinds]
 
 
 class StageLayer:

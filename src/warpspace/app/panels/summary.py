@@ -1,8 +1,6 @@
 """What is always in view: heading with the display factor, colour bar, statistics, scale bars."""
 
-from typing import Any
-
-from warpspace.app import legend
+from warpspace.app.drafts import TEXTS
 from warpspace.app.live import Frame
 from warpspace.app.panels import Desk
 from warpspace.app.state import AppState
@@ -15,12 +13,12 @@ class HtmlPanel:
     Parameters
     ----------
     desk : Desk
-    render : callable
-        Turns a frame into HTML.
+    name : str
+        A key of `TEXTS`.
     """
 
-    def __init__(self, desk: Desk, render: Any) -> None:
-        self._render = render
+    def __init__(self, desk: Desk, name: str) -> None:
+        self.name = name
         self._handle = Told(desk.gui.add_html(""))
 
     def read(self, state: AppState) -> AppState:
@@ -29,14 +27,18 @@ class HtmlPanel:
 
     def show(self, frame: Frame) -> None:
         """Write the frame's text."""
-        self._handle.put(content=self._render(frame))
+        self.write(TEXTS[self.name](frame))
+
+    def write(self, text: str) -> None:
+        """Write HTML."""
+        self._handle.put(content=text)
 
 
 def summary_panel(desk: Desk) -> HtmlPanel:
     """Colour bar, numbers and scale bars."""
-    return HtmlPanel(desk, legend.summary)
+    return HtmlPanel(desk, "summary")
 
 
 def heading_panel(desk: Desk) -> HtmlPanel:
     """Machine, error set and display factor."""
-    return HtmlPanel(desk, legend.heading)
+    return HtmlPanel(desk, "heading")

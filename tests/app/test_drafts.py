@@ -1,0 +1,140 @@
+"""What a busy server shows while a slider moves, and the process that works it out."""
+
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from warpspace import load_scene
+from warpspace.app import parts as parts_module
+from warpspace.app.comparison import Comparison
+from warpspace.app.drafts import box_picture, build_draft, only_moved
+from warpspace.app.live import LiveModel
+from warpspace.app.mapmesh import drafted, grid_pieces, map_mesh
+from warpspace.app.painter import Painter
+from warpspace.app.parts import Parts, make_draft
+from warpspace.app.state import AppState, start_state
+
+STATE = start_state(load_scene("dvf5000_first"))
+LIVE = LiveModel()
+
+
+def looking(**look: object) -> AppState:
+    return replace(STATE, look=replace(STATE.look, **look))
+
+
+@pytest.mark.parametrize("surface", ["surface", "cut", "grid"])
+def test_a_draft_has_every_second_node_and_the_same_lines(surface: str) -> None:
+    frame = LIVE.frame(looking(surface=surface))
+    thin = drafted(frame)
+    vertices = {tuple(v) for v in np.round(map_mesh(frame).vertices_mm, 6)}
+    few = {tuple(v) for v in np.round(map_mesh(thin).vertices_mm, 6)}
+    assert few < vertices
+    assert len(few) < len(vertices) / 3
+    ends = {tuple(p) for p in np.round(grid_pieces(frame).reshape(-1, 3), 3)}
+    assert {tuple(p) for p in np.round(grid_pieces(thin).reshape(-1, 3), 3)} < ends
+    assert thin.statistics is frame.statistics
+    assert thin.scale is frame.scale
+    assert len(box_picture(thin).surface) < len(box_picture(frame).surface) / 2
+
+
+@pytest.mark.parametrize("nodes", [3, 11, 13, 19])
+def test_what_thinning_would_change_is_not_thinned(nodes: int) -> None:
+    frame = LIVE.frame(STATE.with_nodes(nodes))
+    assert drafted(frame) is frame
+
+
+def test_slices_are_not_thinned() -> None:
+    frame = LIVE.frame(looking(surface="slices"))
+    assert drafted(frame) is frame
+
+
+def test_numbers_of_a_draft_are_those_of_all_nodes() -> None:
+    frame = LIVE.frame(STATE.with_amplitude("EAX", 33.0))
+    assert f"{frame.statistics.max_um:.2f} µm" in build_draft(frame).texts["summary"]
+
+
+def test_only_amplitudes_are_drafted() -> None:
+    moved = STATE.with_amplitude("EAX", 3.0)
+    assert only_moved(STATE, moved)
+    assert only_moved(moved, STATE)
+    assert not only_moved(STATE, moved.with_nodes(11))
+    assert not only_moved(STATE, moved.with_shown(ghost=False))
+    compared = replace(STATE, comparison=Comparison(b=Comparison().a))
+    assert not only_moved(compared, compared.with_amplitude("EAX", 3.0))
+
+
+@pytest.fixture
+def painter() -> Iterator[Painter]:
+    made = Painter()
+    yield made
+    made.close()
+
+
+def started(painter: Painter) -> Painter:
+    """Wait until the other process works."""
+    for _ in range(600):
+        if painter.paint(STATE) is not None:
+            return painter
+        time.sleep(0.1)
+    raise AssertionError("the painter did not start within a minute")
+
+
+def test_the_other_process_draws_the_same(painter: Painter) -> None:
+    assert painter.paint(STATE) is None, "it must not keep anybody waiting while it starts"
+    started(painter)
+    for state in (STATE, STATE.with_amplitude("EAX", 12.0), looking(isolines=True, surface="cut")):
+        found, wanted = painter.paint(state), build_draft(LIVE.frame(state))
+        assert found is not None
+        assert found.box.surface == wanted.box.surface
+        assert found.texts == wanted.texts
+        np.testing.assert_array_equal(found.box.grid, wanted.box.grid)
+        assert (found.box.isolines is None) == (not state.look.isolines)
+
+
+def test_without_the_other_process_the_app_goes_on(
+    painter: Painter, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    started(painter)
+    painter._process.terminate()
+    painter._process.join()
+    moved = STATE.with_amplitude("EAX", 5.0)
+    assert painter.paint(moved) is None
+    assert painter.paint(moved) is None
+    assert "goes on without it" in caplog.text
+    monkeypatch.setattr(parts_module, "PAINTER", painter)
+    assert make_draft(LIVE, moved).texts == build_draft(LIVE.frame(moved)).texts
+
+
+class Follower:
+    """A part that takes note of what it is shown."""
+
+    def __init__(self) -> None:
+        self.states: list[AppState] = []
+
+    def show(self, frame: Any) -> None:
+        self.states.append(frame.state)
+
+    def read(self, state: AppState) -> AppState:
+        return state
+
+
+def test_all_that_was_put_off_follows_when_it_settles() -> None:
+    frame, part = LIVE.frame(STATE), Follower()
+    parts = Parts([part], [], frame)
+    moved = STATE.with_amplitude("EAX", 5.0)
+    assert not parts.takes_draft(moved)
+    parts.waited(1.0)
+    assert parts.takes_draft(moved)
+    assert not parts.takes_draft(moved.with_nodes(11))
+    parts.show_draft(moved, build_draft(LIVE.frame(moved)))
+    assert parts.state is moved
+    assert part.states == []
+    assert not parts.is_due(paused=False)
+    assert parts.is_due(paused=True)
+    parts.settle(LIVE.frame(moved), lambda step: step())
+    assert part.states == [moved]
+    assert not parts.is_due(paused=True)
