@@ -124,7 +124,8 @@ def _shares(shares: Mapping[str, float]) -> str:
         f'<span style="width:44px"><b>{key}</b></span>'
         f'<span style="flex:1"><span style="display:block;height:5px;border-radius:2px;'
         f'background:{WITHIN};width:{100.0 * share / longest:.1f}%"></span></span>'
-        f'<span style="width:40px;text-align:right">{100.0 * share:.1f} %</span></div>'
+        '<span style="width:44px;text-align:right;white-space:nowrap">'
+        f"{100.0 * share:.1f} %</span></div>"
         for key, share in ranked
         if share > 0.0 and parameter(key)
     )

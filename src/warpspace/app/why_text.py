@@ -20,9 +20,12 @@ REFUSED = (
 )
 SHOWN = 14
 """Contributions listed one by one; the smaller ones are summed up in one row."""
-BAR_PX = 66
+BAR_PX = 36
 Attributes = Callable[[str], str]
-_CELL = 'style="text-align:right;padding:2px 0 2px 4px;font-variant-numeric:tabular-nums"'
+_CELL = (
+    'style="text-align:right;padding:2px 0 2px 3px;white-space:nowrap;'
+    'font-variant-numeric:tabular-nums"'
+)
 
 
 def number(value: float, digits: int = 2) -> str:
@@ -76,7 +79,7 @@ def answer_html(answer: Answer, lever: str, attributes: Attributes) -> str:
     )
     return (
         f'<div style="padding:2px 12px 10px;line-height:1.4">{_point(answer)}'
-        '<table style="width:100%;border-collapse:collapse;font-size:11.5px;margin-top:6px">'
+        '<table style="width:100%;border-collapse:collapse;font-size:11px;margin-top:6px">'
         f'<tr style="opacity:.65"><th></th><th></th>{head}</tr>{"".join(rows)}{"".join(closing)}'
         "</table>"
         '<div style="font-size:11px;opacity:.65;margin-top:4px">µm; parts along E add up to its'
@@ -87,10 +90,9 @@ def answer_html(answer: Answer, lever: str, attributes: Attributes) -> str:
 def _point(answer: Answer) -> str:
     """Spell where the point is and what its error is."""
     found = answer.explanation
-    where = " · ".join(
-        f"{name} {_plain(value)}{' mm' if name in 'XYZ' else '°'}"
-        for name, value in answer.at.items()
-    )
+    linear = ", ".join(f"{name} {_plain(q)}" for name, q in answer.at.items() if name in "XYZ")
+    rotary = [f"{name} {_plain(q)}°" for name, q in answer.at.items() if name not in "XYZ"]
+    where = " · ".join((*([f"{linear} mm"] if linear else ()), *rotary))
     x, y, z = (number(value) for value in found.error_um)
     tilt = float(np.linalg.norm(found.orientation_urad))
     length = float(np.linalg.norm(found.error_um))
@@ -100,7 +102,7 @@ def _point(answer: Answer) -> str:
         f"{html.escape(answer.loop.value)} loop · tilt of the tool axis {tilt:.1f} µrad</div>"
         '<div style="margin-top:3px"><span style="font-size:17px;font-weight:650">'
         f'|E| <span data-value="why norm">{length:.2f} µm</span></span>'
-        f'<span data-value="why error" style="font-size:13px;margin-left:10px;'
+        '<span data-value="why error" style="font-size:12px;margin-left:8px;white-space:nowrap;'
         f'font-variant-numeric:tabular-nums">{x}, {y}, {z} µm</span></div>'
     )
 

@@ -94,12 +94,16 @@ class AxesLayer:
         for index, (foot, out) in enumerate(axis_frames(low, high, AWAY * longest)):
             along = np.eye(3)[index]
             lines.append(np.stack([foot + low[index] * along, foot + high[index] * along]))
-            for value in tick_values(low[index], high[index]):
+            ticks = tick_values(low[index], high[index])
+            for value in ticks:
                 at = foot + value * along
                 lines.append(np.stack([at, at + TICK * longest * out]))
                 self._label(f"{value:g}".replace("-", "−"), at + 2.4 * TICK * longest * out, 0.8)
-            middle = foot + (low[index] + high[index]) / 2.0 * along
-            self._label(f"{'XYZ'[index]} [mm]", middle + 6.0 * TICK * longest * out, 1.0)
+            # between two numbers; that of X at the end, clear of the scale bars
+            first = len(ticks) - 2 if index == 0 else len(ticks) // 2
+            between = np.mean(ticks[max(first, 0) :][:2])
+            title = foot + between * along + 6.0 * TICK * longest * out
+            self._label(f"{'XYZ'[index]} [mm]", title, 1.0)
         self._lines.put(points=np.stack(lines).astype(np.float32))
 
     def _label(self, text: str, at: Array, size: float) -> None:

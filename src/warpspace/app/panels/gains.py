@@ -168,6 +168,6 @@ def _row(bar: Bar, share: float, by_effect: bool) -> str:
         '<div style="display:flex;align-items:center;gap:8px"><div style="flex:1">'
         f'<div style="height:5px;border-radius:2px;background:#4a7ab5;width:{100 * share:.1f}%">'
         '</div></div><span style="opacity:.6;'
-        'font-size:11px;white-space:nowrap;width:74px;text-align:right">'
+        'font-size:11px;white-space:nowrap;width:82px;text-align:right">'
         f"{second}</span></div></div>"
     )

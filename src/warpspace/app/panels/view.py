@@ -161,7 +161,9 @@ class ViewPanel:
         # its own number box would show the logarithm
         gui.add_html(
             f"<style>[id='{dom_id(self._log.handle)}'] ~ .mantine-NumberInput-root"
-            "{display:none}</style>"
+            "{display:none}"
+            # the last mark is not cut off
+            f"[id='{dom_id(self._log.handle)}']{{margin-right:14px}}</style>"
         )
         buttons = gui.add_button_group(
             "Factor",
