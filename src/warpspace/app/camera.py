@@ -11,6 +11,8 @@ FOV_DEG = 22.0
 OPERATOR = (0.55, -1.0, 0.52)
 """Direction from the box to the camera: from the front (−Y), slightly from the right and above."""
 MARGIN = 1.06
+HEADING_HEIGHT = 130
+"""Room kept free for the heading of the page, CSS pixels."""
 _ROUNDS = 4
 
 
@@ -21,6 +23,11 @@ class CameraPose:
     position: Array
     look_at: Array
     fov_rad: float
+
+
+def heading_share(height: float) -> float:
+    """Give the part of a picture's height, CSS pixels, that the heading takes at the top."""
+    return min(HEADING_HEIGHT / height, 0.3)
 
 
 def fit_camera(

@@ -3,6 +3,7 @@
 import numpy as np
 from viser import ClientHandle
 
+from warpspace.app.camera import heading_share
 from warpspace.app.cameras import TELEPHOTO_DEG, VIEWS, Stand, change_lens, clipping, view_pose
 from warpspace.app.kept import Same
 from warpspace.app.layers import SCENE_PER_MM
@@ -10,7 +11,7 @@ from warpspace.app.layers.annotations import bar_lines
 from warpspace.app.layers.axes import axes_room_mm
 from warpspace.app.live import Frame
 from warpspace.app.machine import machine_room_mm
-from warpspace.app.panels.layout import HEADING_HEIGHT, side_widths
+from warpspace.app.panels.layout import side_widths
 from warpspace.app.state import AppState
 from warpspace.app.tabs import CameraMemory
 from warpspace.units import Array
@@ -100,7 +101,7 @@ class Eye:
         width = max(camera.image_width - taken, LEAST_SIZE)
         height = max(camera.image_height, LEAST_SIZE)
         points = self._room_mm(frame)
-        pose = view_pose(points, width / height, self._stand, min(HEADING_HEIGHT / height, 0.3))
+        pose = view_pose(points, width / height, self._stand, heading_share(height))
         self._clip(pose.position * SCENE_PER_MM, points)
         camera.up_direction = (0.0, 0.0, 1.0)
         camera.fov = pose.fov_rad

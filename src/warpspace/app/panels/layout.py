@@ -28,8 +28,6 @@ LEFT_WIDTH = 350
 RIGHT_WIDTH = 320
 ERRORS_SHARE = 0.68
 """Share of the left column's height that the sliders have, the curve of one error below them."""
-HEADING_HEIGHT = 130
-"""Room kept free for the heading, CSS pixels."""
 STYLE = """<style>
 /* labels above their controls, on a line of their own; check boxes stay beside theirs */
 div:has(> div > p > label):not(:has(> div input[type="checkbox"])) { flex-wrap: wrap; }

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from warpspace.app.camera import fit_camera
+from warpspace.app.camera import fit_camera, heading_share
 from warpspace.app.compare import is_difference
 from warpspace.app.layers import SCENE_PER_MM
 from warpspace.app.live import Frame
@@ -78,8 +78,14 @@ class WhyPanel:
             return
         points = np.concatenate([frame.drawn_mm.reshape(-1, 3), np.stack(origins)])
         size = self._outside.client.camera
-        aspect = max(size.image_width, 200) / max(size.image_height, 200)
-        pose = fit_camera(points, aspect, fov_deg=float(np.rad2deg(camera.fov_rad)), margin=1.2)
+        width, height = max(size.image_width, 200), max(size.image_height, 200)
+        pose = fit_camera(
+            points,
+            width / height,
+            fov_deg=float(np.rad2deg(camera.fov_rad)),
+            margin=1.2,
+            top=heading_share(height),
+        )
         x, y, z = (float(value) * SCENE_PER_MM for value in pose.position)
         at = tuple(float(value) * SCENE_PER_MM for value in pose.look_at)
         self._outside.look_from(
