@@ -40,7 +40,7 @@ bench: $(DEV_STAMP) ## run every benchmark
 	    [ -e "$$script" ] || { echo "no benchmarks/bench_*.py"; exit 1; }; \
 	    echo "== $$script"; $(BIN)/python "$$script" $(ARGS); done
 
-screenshots: system-packages $(DEV_STAMP) ## take the pictures of the README anew
+screenshots: system-packages $(DEV_STAMP) ## take the pictures of README and docs anew
 	$(BIN)/python examples/screenshots.py $(ARGS)
 
 clean: ## remove what the other targets made, .venv included

@@ -1,25 +1,34 @@
-"""Take the app's pictures for the README into ``docs/images``, in a headless Chromium.
+"""Take the app's pictures for README and docs into ``docs/images``, in a headless Chromium.
 
     python examples/screenshots.py [NAME …] [--to docs/images]
 
-`make screenshots` runs it. Each picture is a visit: a scene, what is clicked, and a file name.
+`make screenshots` runs it; it starts the app itself. Each picture is a visit: a scene, the tab that
+is opened, and what is done there. Pictures of a tab show its column beside the box.
 """
 
 import argparse
+import io
 import os
 import shutil
 import sys
 from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from playwright.sync_api import Page, sync_playwright
+from PIL import Image
+from playwright.sync_api import Browser, Page, sync_playwright
 
+from warpspace.app.panels.layout import LEFT_WIDTH, RIGHT_WIDTH
 from warpspace.app.viewer import Viewer
+from warpspace.cli.services import build_services
 from warpspace.scene.library import load_scene
 
-SIZE = {"width": 1600, "height": 900}
+SCENES = ("dvf5000_first", "dvf5000_second", "teach_wobbling_table")
+WHOLE, ONE_TAB = (1600, 900), (1280, 900)
+"""Width and height of the page, CSS pixels."""
 CHROMIUM = [
     "--headless=new",
     "--no-sandbox",
@@ -31,23 +40,66 @@ CHROMIUM = [
 ]
 TO = Path(__file__).resolve().parents[1] / "docs" / "images"
 LOADED = "() => window.__viserMutable?.nodeRefFromName['/box/surface']"
-SETTLED_MS = 3000
+SETTLED_MS, PAUSE_MS, PATIENCE_MS = 2500, 400, 30_000
+COLOURS = 256
 
 
-def choose(page: Page, label: str, option: str) -> None:
-    """Choose an option of a dropdown."""
-    page.get_by_label(label, exact=True).first.click()
-    page.get_by_role("option", name=option, exact=True).first.click()
-    page.wait_for_timeout(500)
+@dataclass(frozen=True)
+class Visit:
+    """What is in a picture.
+
+    Attributes
+    ----------
+    act : callable
+        What is done once the page stands.
+    tab : str
+        Tab that the picture is about; empty for the whole page.
+    scene : str
+    share : float
+        Of its column's height that the panel of the tab is given.
+    """
+
+    act: Callable[[Page], None]
+    tab: str = ""
+    scene: str = "dvf5000_first"
+    share: float = 0.72
 
 
 def as_opened(page: Page) -> None:
     """Leave everything as it is."""
 
 
+def choose(page: Page, label: str, option: str) -> None:
+    """Choose an option of a dropdown."""
+    page.get_by_label(label, exact=True).first.click()
+    page.get_by_role("option", name=option, exact=True).first.click()
+    page.wait_for_timeout(PAUSE_MS)
+
+
+def press(page: Page, name: str) -> None:
+    """Press a button."""
+    page.get_by_role("button", name=name, exact=True).first.click()
+    page.wait_for_timeout(PAUSE_MS)
+
+
+def tick(page: Page, name: str) -> None:
+    """Tick a check box."""
+    page.get_by_role("checkbox", name=name, exact=True).check()
+    page.wait_for_timeout(PAUSE_MS)
+
+
+def write(page: Page, label: str, value: str) -> None:
+    """Write into the number box of the slider whose label begins with a word."""
+    row = page.locator("label", has_text=label).first.get_attribute("for")
+    box = page.locator(f"[id='{row}'] ~ div input")
+    box.fill(value)
+    box.press("Enter")
+    page.wait_for_timeout(PAUSE_MS)
+
+
 def dark(page: Page) -> None:
     """Switch to the dark page."""
-    page.get_by_role("checkbox", name="Dark mode").check()
+    page.keyboard.press("m")
 
 
 def signed(page: Page) -> None:
@@ -55,49 +107,129 @@ def signed(page: Page) -> None:
     choose(page, "Colour", "E_z")
 
 
-VISITS: dict[str, tuple[str, Callable[[Page], None]]] = {
-    "app": ("dvf5000_first", as_opened),
-    "app_dark": ("dvf5000_first", dark),
-    "app_rotary": ("teach_wobbling_table", signed),
+def switched(page: Page) -> None:
+    """Hear two errors, one of them muted."""
+    for word in ("solo EAX", "solo EXX", "mute EXX"):
+        page.locator(f"button[data-word='{word}']").click()
+        page.wait_for_timeout(PAUSE_MS)
+
+
+def curved(page: Page) -> None:
+    """Make the curve of one error a table."""
+    choose(page, "Curve", "table")
+    page.locator("textarea").first.fill("-225 0\n-75 -31\n75 -24\n225 -43.7")
+    page.wait_for_timeout(PAUSE_MS)
+
+
+def asked(page: Page) -> None:
+    """Ask a point why it is off, and one contribution where it comes from."""
+    page.mouse.click(LEFT_WIDTH + 250, 430)
+    page.locator("[data-contribution='EA0Z']").click()
+    press(page, "Show the whole lever")
+
+
+def by_effect(page: Page) -> None:
+    """Rank by what the errors do."""
+    choose(page, "Ranked by", "effect of the present errors")
+
+
+def compared(page: Page) -> None:
+    """Pin, mend one squareness, draw the difference."""
+    press(page, "Pin now and compare")
+    write(page, "EA0Z", "0")
+    press(page, "A − B")
+
+
+def sliced(page: Page) -> None:
+    """Look at slices with isolines."""
+    choose(page, "Show as", "slices")
+    tick(page, "Isolines")
+
+
+def bent(page: Page) -> None:
+    """Draw the machine as its errors bend it."""
+    tick(page, "Machine bodies")
+    tick(page, "Bodies bent by the errors")
+    page.keyboard.press("f")
+
+
+def sampled(page: Page) -> None:
+    """Wait for the sampled machines."""
+    page.wait_for_selector("[data-value='histogram']")
+
+
+VISITS = {
+    "app": Visit(as_opened),
+    "app_dark": Visit(dark),
+    "app_rotary": Visit(signed, scene="teach_wobbling_table"),
+    "tab_errors": Visit(switched, "Errors"),
+    "tab_one_error": Visit(curved, "One error", share=0.45),
+    "tab_result": Visit(as_opened, "Result", share=0.52),
+    "tab_why": Visit(asked, "Why"),
+    "tab_gains": Visit(by_effect, "Gains"),
+    "tab_compare": Visit(compared, "Compare"),
+    "tab_files": Visit(as_opened, "Files", share=0.4),
+    "tab_view": Visit(sliced, "View"),
+    "tab_machine": Visit(bent, "Machine", share=0.6),
+    "tab_table": Visit(as_opened, "Table", "teach_wobbling_table"),
+    "tab_chance": Visit(sampled, "Chance"),
+    "tab_conventions": Visit(as_opened, "Conventions"),
 }
-"""File name to scene and what is done before the picture is taken."""
+"""File name to visit."""
+LEFT_TABS, LOWER_TABS = (
+    ("Errors", "One error"),
+    ("One error", "View", "Machine", "Table", "Chance", "Conventions"),
+)
 
 
-def take(name: str, folder: Path) -> Path:
-    """Take one picture.
+def open_tab(page: Page, visit: Visit) -> None:
+    """Open the tab of a visit and give it room."""
+    if visit.tab != "Errors":
+        page.get_by_role("tab", name=visit.tab, exact=True).first.click()
+    side = "left" if visit.tab in LEFT_TABS else "right"
+    divider = page.locator(f"[data-dock-region={side}] [data-dock-divider=column]").bounding_box()
+    assert divider is not None, side
+    x, y = divider["x"] + 4, divider["y"] + divider["height"] / 2
+    share = 1 - visit.share if visit.tab in LOWER_TABS else visit.share
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x, share * ONE_TAB[1], steps=5)
+    page.mouse.up()
+    page.wait_for_timeout(PAUSE_MS)
 
-    Parameters
-    ----------
-    name : str
-        Key of `VISITS`.
-    folder : Path
 
-    Returns
-    -------
-    Path
-        The file written.
-    """
-    scene_name, act = VISITS[name]
-    path = shutil.which("chromium") or shutil.which("google-chrome")
-    if path is None:
-        sys.exit("no Chromium found (Debian package chromium)")
-    with Viewer(load_scene(scene_name)) as viewer, sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=CHROMIUM)
-        page = browser.new_page(viewport=SIZE)
-        page.goto(f"{viewer.url}/?fixedDpr=1")
-        page.wait_for_function(LOADED, timeout=60_000)
-        page.wait_for_selector("[data-value='max']", timeout=60_000)
-        page.wait_for_timeout(SETTLED_MS)
-        # the client's remark on software rendering, and any first-use hint
-        for button in page.locator(".mantine-Notification-closeButton").all():
-            button.click()
-        act(page)
-        page.mouse.move(SIZE["width"] / 2, SIZE["height"] - 5)
-        page.wait_for_timeout(SETTLED_MS)
-        target = folder / f"{name}.png"
-        page.screenshot(path=target)
-        browser.close()
-    return target
+def take(browser: Browser, viewer: Viewer, visit: Visit) -> Image.Image:
+    """Take one picture."""
+    width, height = ONE_TAB if visit.tab else WHOLE
+    page = browser.new_page(viewport={"width": width, "height": height})
+    page.set_default_timeout(PATIENCE_MS)
+    page.goto(f"{viewer.url}/?fixedDpr=1")
+    page.wait_for_function(LOADED, timeout=60_000)
+    page.wait_for_selector("[data-value='max']", timeout=60_000)
+    page.wait_for_timeout(SETTLED_MS)
+    # the client's remark on software rendering, and any first-use hint
+    for button in page.locator(".mantine-Notification-closeButton").all():
+        button.click()
+    if visit.tab:
+        open_tab(page, visit)
+    visit.act(page)
+    page.evaluate("document.activeElement?.blur()")
+    page.mouse.move(width / 2, height - 5)
+    page.wait_for_timeout(SETTLED_MS)
+    shot = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+    page.context.close()
+    if not visit.tab:
+        return shot
+    if visit.tab in LEFT_TABS:
+        return shot.crop((0, 0, width - RIGHT_WIDTH, height))
+    return shot.crop((LEFT_WIDTH, 0, width, height))
+
+
+def with_few_colours(shot: Image.Image) -> Image.Image:
+    """Make a picture small; its colours stay smooth."""
+    # the median cut would merge the colours of the scale, of which there are few pixels
+    palette = shot.quantize(COLOURS, Image.Quantize.MAXCOVERAGE, kmeans=1)
+    return shot.quantize(COLOURS, palette=palette, dither=Image.Dither.FLOYDSTEINBERG)
 
 
 def main() -> None:
@@ -108,9 +240,26 @@ def main() -> None:
     options = parser.parse_args()
     if unknown := [name for name in options.names if name not in VISITS]:
         parser.error(f"unknown picture {', '.join(unknown)}; expected {', '.join(VISITS)}")
+    path = shutil.which("chromium") or shutil.which("google-chrome")
+    if path is None:
+        sys.exit("no Chromium found (Debian package chromium)")
     options.to.mkdir(parents=True, exist_ok=True)
-    for name in options.names or VISITS:
-        print(take(name, options.to))
+    scenes = {name: load_scene(name) for name in SCENES}
+    shelf = {scene.title: scene for scene in scenes.values()}
+    with ExitStack() as open_apps, sync_playwright() as playwright:
+        viewers: dict[str, Viewer] = {}
+        browser = playwright.chromium.launch(executable_path=path, args=CHROMIUM)
+        for name in options.names or VISITS:
+            visit = VISITS[name]
+            if visit.scene not in viewers:
+                viewer = Viewer(scenes[visit.scene], shelf, services=build_services())
+                viewers[visit.scene] = open_apps.enter_context(viewer)
+            target = options.to / f"{name}.png"
+            shot = take(browser, viewers[visit.scene], visit)
+            few = with_few_colours(shot)
+            few.save(target, optimize=True)
+            print(target)
+        browser.close()
 
 
 if __name__ == "__main__":

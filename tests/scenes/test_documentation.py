@@ -13,6 +13,7 @@ from warpspace.scene.schema import (
 )
 
 ROOT = Path(__file__).resolve().parents[2]
+PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 
 
 def _blocks(page: str, language: str) -> list[str]:
@@ -47,3 +48,31 @@ def test_readme_names_every_command():
     page = (ROOT / "README.md").read_text("utf-8")
     table = page[page.index("| command") : page.index("Shell completion")]
     assert set(re.findall(r"`(\w+)`", re.sub(r"\|[^|]*\|\n", "|\n", table))) == set(cli.commands)
+
+
+def test_every_picture_that_is_linked_exists_and_every_other_picture_is_linked():
+    linked = {
+        (page.parent / target).resolve()
+        for page in PAGES
+        for target in re.findall(r"!\[[^\]]+\]\(([^)]+\.png)\)", page.read_text("utf-8"))
+    }
+    assert linked == set((ROOT / "docs" / "images").glob("*.png"))
+
+
+def test_pictures_are_small():
+    sizes = [path.stat().st_size for path in (ROOT / "docs" / "images").glob("*.png")]
+    assert sum(sizes) < 3.5e6
+
+
+def test_there_is_one_picture_of_every_tab():
+    layout = (ROOT / "src/warpspace/app/panels/layout.py").read_text("utf-8")
+    tabs = re.findall(r'(?:add_tab|set_panel_label)\("([^"]+)"\)', layout)
+    script = (ROOT / "examples/screenshots.py").read_text("utf-8")
+    visits = re.findall(r'"tab_(\w+)": Visit\(\w+, "([^"]+)"', script)
+    # the heading is on every picture
+    assert sorted(tab for _, tab in visits) == sorted(set(tabs) - {"warpspace"})
+    assert len(visits) > 10
+    page = (ROOT / "docs/app.md").read_text("utf-8")
+    for name, tab in visits:
+        assert name == tab.lower().replace(" ", "_")
+        assert f"](images/tab_{name}.png)" in page
