@@ -88,6 +88,11 @@ def test_a_click_on_the_box_says_why(tab: Tab, viewer: Viewer) -> None:
     rest = np.array([row[1:] for row in along]).sum(axis=0)
     np.testing.assert_allclose(rest, error, atol=0.06)
     assert tab.page.get_by_text("2nd-order rest").is_visible()
+    # no column is cut off at the edge of the page
+    assert tab.page.evaluate(
+        "document.querySelector('[data-contribution]').closest('table')"
+        ".getBoundingClientRect().right < innerWidth - 5"
+    )
 
 
 def test_choosing_a_contribution_draws_axis_and_lever_and_follows(tab: Tab, viewer: Viewer) -> None:
