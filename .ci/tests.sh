@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Run every test: in parallel what can be, then the browser tests one after the other.
-# Both parts always run; coverage is that of both.
+# Run every test: the browser tests one after the other, and beside them, with what they leave of
+# the processor, all others. Both parts always run; coverage is that of both.
 set -u
 python=.venv/bin/python
 # The workers are the parallelism; threads below them would only compete.
@@ -8,7 +8,13 @@ export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 LP_NUM_THREADS=1
 
 status=0
 rm -f .coverage .coverage.*
-$python -m pytest -n 2 --dist loadfile -m "not browser" --durations=10 \
+others=$(mktemp)
+trap 'rm -f "$others"' EXIT
+COVERAGE_FILE=.coverage.others nice -n 10 $python -m pytest -n 2 --dist loadfile -m "not browser" \
+    --durations=10 --cov --cov-report= >"$others" 2>&1 &
+COVERAGE_FILE=.coverage.browser $python -m pytest -m browser --durations=10 \
     --cov --cov-report= || status=$?
-$python -m pytest -m browser --cov --cov-append --cov-report=term || status=$?
+wait $! || status=$?
+cat "$others"
+$python -m coverage combine --quiet && $python -m coverage report || status=$?
 exit "$status"
