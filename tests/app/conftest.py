@@ -102,6 +102,20 @@ class Tab:
             f" uuid: {json.dumps(self.widget(label))}, updates: {{value: {value}}}}})"
         )
 
+    def drag(self, label: str, values: list[float]) -> None:
+        """Send the positions of a drag 10 ms apart, however busy the page is with drawing."""
+        self.page.evaluate(
+            """([uuid, values]) => {
+              for (const value of values) {
+                window.__viserMutable.sendMessage(
+                  {type: 'GuiUpdateMessage', uuid, updates: {value}});
+                const until = performance.now() + 10;
+                while (performance.now() < until);
+              }
+            }""",
+            [self.widget(label), values],
+        )
+
     def choose(self, label: str, option: str) -> None:
         """Choose an option of a dropdown."""
         self.page.get_by_label(label, exact=True).first.click()

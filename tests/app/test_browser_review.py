@@ -157,9 +157,7 @@ def test_the_shape_of_an_error_is_edited_and_its_curve_drawn(tab: Tab) -> None:
 
 
 def test_undo_and_redo_of_everything(tab: Tab) -> None:
-    for value in np.linspace(0.0, 8.0, 20).round(1):
-        tab.send("EXX", f"{value}")
-        tab.page.wait_for_timeout(10)
+    tab.drag("EXX", np.linspace(0.4, 8.0, 20).round(1).tolist())
     moved = START.with_amplitude("EXX", 8.0)
     shows(tab, moved)
     tab.page.wait_for_timeout(PAUSE)
