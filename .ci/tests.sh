@@ -8,13 +8,14 @@ export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 LP_NUM_THREADS=1
 
 status=0
 rm -f .coverage .coverage.*
-others=$(mktemp)
-trap 'rm -f "$others"' EXIT
-COVERAGE_FILE=.coverage.others nice -n 10 $python -m pytest -n 2 --dist loadfile -m "not browser" \
-    --durations=10 --cov --cov-report= >"$others" 2>&1 &
+browser=$(mktemp)
+trap 'rm -f "$browser"' EXIT
+# What runs in the background is deaf to Ctrl-C, which the others test.
 COVERAGE_FILE=.coverage.browser $python -m pytest -m browser --durations=10 \
-    --cov --cov-report= || status=$?
+    --cov --cov-report= >"$browser" 2>&1 &
+COVERAGE_FILE=.coverage.others nice -n 10 $python -m pytest -n 2 --dist loadfile -m "not browser" \
+    --durations=10 --cov --cov-report= || status=$?
 wait $! || status=$?
-cat "$others"
+cat "$browser"
 $python -m coverage combine --quiet && $python -m coverage report || status=$?
 exit "$status"
