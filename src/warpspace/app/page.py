@@ -1,6 +1,9 @@
 """What a page is told beside its widgets: scripts of our own, its title, messages."""
 
+import asyncio
 import json
+from collections.abc import Callable
+from typing import Any
 
 from viser import ClientHandle
 from viser import _messages as messages
@@ -20,6 +23,11 @@ class Page:
 
     def __init__(self, client: ClientHandle) -> None:
         self._client = client
+        # viser also sets this event from the thread that sends, for which it is not made: that may
+        # meet the sender itself. What viser then asks of the loop is enough.
+        connection: Any = client._websock_connection  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
+        event = connection.get_message_buffer().message_event
+        event.set = _set_on_loop(event)
 
     def run_script(self, source: str) -> None:
         """Run JavaScript of our own in the page; no word of a user's may be in it unescaped."""
@@ -47,6 +55,20 @@ class Page:
         known = isinstance(error, WarpspaceError)
         text = str(error) if known else f"{type(error).__name__}: {error}"
         self.notify("That did not work", text, "red")
+
+
+def _set_on_loop(event: Any) -> Callable[[], None]:
+    """Give the setter of an event of asyncio that does nothing on other threads."""
+    original: Callable[[], None] = event.set
+
+    def set_event() -> None:
+        try:
+            asyncio.get_running_loop()
+        except RuntimeError:
+            return
+        original()
+
+    return set_event
 
 
 def is_passing(error: Exception) -> bool:
