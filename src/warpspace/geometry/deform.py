@@ -2,8 +2,6 @@
 
 import math
 
-import numpy as np
-
 from warpspace.units import MM_PER_UM, Array
 
 TARGET_FRACTION = 0.1
@@ -60,9 +58,3 @@ def round_down(value: float) -> float:
     """Give the largest 1, 2 or 5 × 10ⁿ that is not above a positive value (scale bars)."""
     decade = 10.0 ** math.floor(math.log10(value))
     return max(step * decade for step in _ROUND if step * decade <= value * (1.0 + 1e-9))
-
-
-def bounds_mm(*points_mm: Array) -> Array:
-    """Give the box around sets of points, [2, 3], mm: lower and upper corner."""
-    flat = np.concatenate([points.reshape(-1, 3) for points in points_mm])
-    return np.stack([flat.min(axis=0), flat.max(axis=0)])

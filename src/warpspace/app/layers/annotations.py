@@ -6,7 +6,8 @@ import numpy as np
 from viser import SceneApi
 
 from warpspace.app.kept import Same
-from warpspace.app.layers import NOTHING, SCENE_PER_MM, colour_bytes, palette
+from warpspace.app.layers import SCENE_PER_MM, colour_bytes, palette
+from warpspace.app.layers.adding import add_ball, add_lines
 from warpspace.app.layers.axes import AWAY
 from warpspace.app.legend import spell_factor
 from warpspace.app.live import Frame
@@ -99,16 +100,7 @@ class AnnotationsLayer:
         ]
         self._ball: Told | None = None
         self._worst = self._label("/marks/max", "bottom-center")
-        self._bars = Told(
-            scene.add_line_segments(
-                "/marks/bars",
-                NOTHING,
-                colour_bytes(palette(frame).edge),
-                thickness=2.4,
-                thickness_units="screen",
-                scale=SCENE_PER_MM,
-            )
-        )
+        self._bars = add_lines(scene, "/marks/bars", palette(frame).edge, 2.4)
         self._bar_labels = [
             self._label(f"/marks/bar{n}", "center-left", hidden=False) for n in range(2)
         ]
@@ -175,15 +167,7 @@ class AnnotationsLayer:
             return
         longest = frame.grid.longest_edge_mm
         if self._ball is None:
-            self._ball = Told(
-                self._scene.add_icosphere(
-                    "/marks/ball",
-                    BALL * longest * SCENE_PER_MM,
-                    color=palette(frame).edge,
-                    cast_shadow=False,
-                    receive_shadow=False,
-                )
-            )
+            self._ball = add_ball(self._scene, "/marks/ball", BALL * longest, palette(frame).edge)
         self._ball.put(position=found.drawn_mm * SCENE_PER_MM, color=palette(frame).edge)
         middle = frame.grid.bounds_mm.mean(axis=0)
         outwards = np.sign(np.round(found.nominal_mm - middle, 9)) * (1.0, 1.0, 0.0)

@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from viser import SceneApi
 
-from warpspace.app.layers import NOTHING, SCENE_PER_MM, colour_bytes, palette
+from warpspace.app.layers import SCENE_PER_MM, colour_bytes, palette
+from warpspace.app.layers.adding import add_lines
 from warpspace.app.live import Frame
 from warpspace.app.widgets import Told
 from warpspace.geometry.colour import nice_step
@@ -59,16 +60,7 @@ class AxesLayer:
         self._scene = scene
         self._labels: list[Told] = []
         self._box: Array | None = None
-        self._lines = Told(
-            scene.add_line_segments(
-                "/axes/lines",
-                NOTHING,
-                colour_bytes(palette(frame).axis),
-                thickness=1.2,
-                thickness_units="screen",
-                scale=SCENE_PER_MM,
-            )
-        )
+        self._lines = add_lines(scene, "/axes/lines", palette(frame).axis, 1.2)
         self.show(frame)
 
     def show(self, frame: Frame) -> None:

@@ -5,7 +5,8 @@ from numpy.typing import NDArray
 from viser import SceneApi
 
 from warpspace.app.drafts import BoxPicture, box_picture, surface_glb
-from warpspace.app.layers import NOTHING, SCENE_PER_MM, colour_bytes, palette
+from warpspace.app.layers import SCENE_PER_MM, colour_bytes, palette
+from warpspace.app.layers.adding import add_lines
 from warpspace.app.live import Frame
 from warpspace.app.tonemap import Rgb
 from warpspace.app.widgets import Told
@@ -78,17 +79,7 @@ class BoxLayer:
             )
         )
         self._grid, self._edges, self._isolines, self._ghost = (
-            Told(
-                scene.add_line_segments(
-                    name,
-                    NOTHING,
-                    colour_bytes(palette(frame).edge),
-                    thickness=thickness,
-                    thickness_units="screen",
-                    scale=SCENE_PER_MM,
-                    visible=False,
-                )
-            )
+            add_lines(scene, name, palette(frame).edge, thickness, visible=False)
             for name, thickness in (
                 ("/box/grid", 0.7),
                 ("/box/edges", 1.8),

@@ -7,6 +7,7 @@ import numpy as np
 from viser import SceneApi
 
 from warpspace.app.layers import SCENE_PER_MM, colour_bytes, palette
+from warpspace.app.layers.adding import add_ball
 from warpspace.app.live import Frame
 from warpspace.app.machine import DrawnBody, drawn_bodies, tool_point
 from warpspace.app.tonemap import Rgb
@@ -109,14 +110,8 @@ class MachineLayer:
         found = tool_point(frame)
         longest = frame.grid.longest_edge_mm
         if self._ball is None:
-            self._ball = Told(
-                self._scene.add_icosphere(
-                    "/machine/tool_point",
-                    BALL * longest * SCENE_PER_MM,
-                    color=palette(frame).edge,
-                    cast_shadow=False,
-                    receive_shadow=False,
-                )
+            self._ball = add_ball(
+                self._scene, "/machine/tool_point", BALL * longest, palette(frame).edge
             )
         self._ball.put(position=found.drawn_mm * SCENE_PER_MM)
         length = float(np.linalg.norm(found.error_um))

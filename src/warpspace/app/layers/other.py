@@ -2,9 +2,9 @@
 
 from viser import SceneApi
 
-from warpspace.app.layers import NOTHING, SCENE_PER_MM, colour_bytes, palette, pieces
+from warpspace.app.layers import colour_bytes, palette, pieces
+from warpspace.app.layers.adding import add_lines
 from warpspace.app.live import Frame
-from warpspace.app.widgets import Told
 
 
 class OtherLayer:
@@ -17,17 +17,7 @@ class OtherLayer:
     """
 
     def __init__(self, scene: SceneApi, frame: Frame) -> None:
-        self._edges = Told(
-            scene.add_line_segments(
-                "/compare/other",
-                NOTHING,
-                colour_bytes(palette(frame).edge),
-                thickness=2.0,
-                thickness_units="screen",
-                scale=SCENE_PER_MM,
-                visible=False,
-            )
-        )
+        self._edges = add_lines(scene, "/compare/other", palette(frame).edge, 2.0, visible=False)
         self.show(frame)
 
     def show(self, frame: Frame) -> None:

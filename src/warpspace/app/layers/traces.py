@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from viser import SceneApi
 
 from warpspace.app.kept import Same
-from warpspace.app.layers import NOTHING, SCENE_PER_MM, colour_bytes, palette, polyline_pieces
+from warpspace.app.layers import NOTHING, colour_bytes, palette, polyline_pieces
+from warpspace.app.layers.adding import add_lines
 from warpspace.app.live import Frame, TraceLines
 from warpspace.app.tonemap import line_vertex_colours
-from warpspace.app.widgets import Told
 from warpspace.geometry.traces import TraceGroup
 
 APART = 0.002
@@ -61,16 +61,7 @@ class TracesLayer:
     def __init__(self, scene: SceneApi, frame: Frame) -> None:
         self._drawn_for: tuple[object, ...] = ()
         self._nominal, self._actual = (
-            Told(
-                scene.add_line_segments(
-                    name,
-                    NOTHING,
-                    colour_bytes(palette(frame).trace_nominal),
-                    thickness=thickness,
-                    thickness_units="screen",
-                    scale=SCENE_PER_MM,
-                )
-            )
+            add_lines(scene, name, palette(frame).trace_nominal, thickness)
             for name, thickness in (("/traces/nominal", 1.5), ("/traces/actual", 1.6))
         )
         self.show(frame)

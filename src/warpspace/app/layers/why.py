@@ -5,7 +5,8 @@ from numpy.typing import NDArray
 from viser import SceneApi
 
 from warpspace.analysis.explain import Contribution
-from warpspace.app.layers import NOTHING, SCENE_PER_MM, colour_bytes
+from warpspace.app.layers import NOTHING, SCENE_PER_MM
+from warpspace.app.layers.adding import add_lines
 from warpspace.app.layers.box import dashes
 from warpspace.app.live import Frame
 from warpspace.app.why import Answer, answer
@@ -46,17 +47,7 @@ class WhyLayer:
             )
         )
         self._lines = {
-            name: Told(
-                scene.add_line_segments(
-                    f"/why/{name}",
-                    NOTHING,
-                    colour_bytes(ACCENT),
-                    thickness=thickness,
-                    thickness_units="screen",
-                    scale=SCENE_PER_MM,
-                    visible=False,
-                )
-            )
+            name: add_lines(scene, f"/why/{name}", ACCENT, thickness, visible=False)
             for name, thickness in (("vector", 3.0), ("axis", 3.5), ("lever", 2.0))
         }
         self._labels = {
