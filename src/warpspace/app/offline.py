@@ -23,6 +23,7 @@ from warpspace.app.compare import both_words, drawn_title, is_difference
 from warpspace.app.layers import SCENE_PER_MM
 from warpspace.app.layers.axes import AxesLayer
 from warpspace.app.layers.box import BoxLayer
+from warpspace.app.layers.lights import light_scene
 from warpspace.app.layers.other import OtherLayer
 from warpspace.app.layers.traces import TracesLayer
 from warpspace.app.live import Frame, LiveModel
@@ -101,6 +102,7 @@ def build_scene_html(frame: Frame, aspect: float = ASPECT) -> str:
     with contextlib.redirect_stdout(io.StringIO()):  # the server says hello and goodbye
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         try:
+            light_scene(server.scene)
             for layer in (BoxLayer, TracesLayer, AxesLayer, OtherLayer):
                 layer(server.scene, frame)
             _place_camera(server, frame, aspect)

@@ -69,15 +69,23 @@ class Parts:
     ) -> None:
         self.layers, self.panels = tuple(layers), tuple(panels)
         self._frame, self._state = frame, None if frame is None else frame.state
-        every = (*self.layers, *self.panels)
         self._late: tuple[Layer | Panel, ...] = ()
         self._busy = False
         self._busy_until = 0.0
         self._since: float | None = None
         self._concerns: dict[object, Callable[[Frame], tuple[object, ...]]] = {
-            part: part.concerns for part in every if isinstance(part, Choosy)
+            part: part.concerns for part in (*layers, *panels) if isinstance(part, Choosy)
         }
         self._concerned: dict[object, tuple[object, ...]] = {}
+
+    def add(self, frame: Frame, layers: Sequence[Layer] = (), panels: Sequence[Panel] = ()) -> None:
+        """Have further parts follow, which show a frame that may be behind by now."""
+        self.layers, self.panels = (*self.layers, *layers), (*self.panels, *panels)
+        added = (*layers, *panels)
+        self._concerns |= {part: part.concerns for part in added if isinstance(part, Choosy)}
+        if frame.state is not self._state:
+            self._late = (*self._late, *added)
+        self.unsettle()
 
     @property
     def pause_s(self) -> float | None:

@@ -10,19 +10,19 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from typing import Any
+from functools import partial
 
 from viser import ClientHandle
 
+from warpspace.app.answers import Answer
 from warpspace.app.board import Board, apply_each
 from warpspace.app.eye import Eye, focus
-from warpspace.app.layers.stage import StageLayer, draw_map
 from warpspace.app.live import Frame, LiveModel
+from warpspace.app.opening import Opening
 from warpspace.app.outside import Outside
 from warpspace.app.page import Page, is_passing
 from warpspace.app.panels import Desk, Update
-from warpspace.app.panels.commands import hint_script
-from warpspace.app.panels.layout import apply_theme, lay_out_panels
+from warpspace.app.panels.layout import Places, apply_theme
 from warpspace.app.parts import TURN, Parts, make_draft
 from warpspace.app.services import Services
 from warpspace.app.shelf import Shelf
@@ -46,6 +46,7 @@ class Session:
         Scenes to choose from.
     board : Board
         What is shown: the tab's own, or that of a shared review.
+    places : Places
     claim : callable, optional
         Takes the session and the token its page has handed over; gives what the tab left behind
         when its connection was dropped.
@@ -59,16 +60,16 @@ class Session:
         live: LiveModel,
         scenes: Shelf,
         board: Board,
+        places: Places,
         claim: "Callable[[Session, str], Left | None] | None" = None,
         services: Services | None = None,
     ) -> None:
         self._client, self._live, self._scenes = client, live, scenes
         self._services = services or Services()
-        self.board = board
+        self.board, self._places = board, places
         self.token = new_token()
         self._claim = claim
-        self._token: Any = None
-        self._told = threading.Event()
+        self._token: Answer | None = None
         self._eye, self._page = Eye(client), Page(client)
         self._camera: CameraMemory | None = None
         self._actions: deque[Callable[[], None]] = deque()
@@ -77,7 +78,7 @@ class Session:
         self._wake, self._changed_at = threading.Event(), time.monotonic()
         self._stopped = threading.Event()
         self._parts = Parts()
-        self._stage: StageLayer | None = None
+        self._opening: Opening | None = None
         self._worker = threading.Thread(
             target=self._run, name=f"warpspace-session-{client.client_id}", daemon=True
         )
@@ -95,9 +96,10 @@ class Session:
         """End the worker; nothing is sent any more."""
         self._stopped.set()
         self._wake.set()
-        self._told.set()
-        if self._stage is not None:
-            self._stage.stop()
+        if self._token is not None:
+            self._token.give_up()
+        if self._opening is not None:
+            self._opening.stop()
         self.board.unsubscribe(self.changed)
 
     def changed(self) -> None:
@@ -126,14 +128,17 @@ class Session:
         finally:
             self.board.unsubscribe(self.changed)
             # what is large is let go at once, not when cycles happen to be looked for
-            self._parts, self._shown = Parts(), None
+            self._parts, self._opening, self._shown = Parts(), None, None
 
     def _turn(self) -> None:
         """Wait for one change, or for a pause in them, and follow."""
-        woken = self._wake.wait(self._parts.pause_s)
+        waits = (self._parts.pause_s, self._opening and self._opening.remaining_s())
+        woken = self._wake.wait(min((wait for wait in waits if wait is not None), default=None))
         self._wake.clear()
         if woken and not self._stopped.is_set():
             self._guarded(self._step)
+        if self._opening is not None and self._opening.is_due and self._shown is not None:
+            self._guarded(partial(self._opening.advance, self._shown))
         if self._parts.is_due(paused=not woken):
             self._guarded(self._settle)
 
@@ -152,15 +157,14 @@ class Session:
 
     def _ask(self) -> None:
         """Ask the page which tab it is."""
-        self._token = self._client.gui.add_text("", "", visible=False)
-        self._token.on_update(lambda _: (self._told.set(), self._wake.set()))
-        self._page.run_script(ask_script(self._token._impl.uuid, self.token))  # noqa: SLF001
+        self._token = Answer(self._client.gui, self._wake.set)
+        self._page.run_script(ask_script(self._token.widget, self.token))
         self._client.flush()
 
-    def _adopt(self) -> None:
+    def _adopt(self, token: Answer) -> None:
         """Take over what the tab has left behind, if it was here before."""
-        token, self._token = self._token, None
-        left = self._claim(self, token.value) if self._claim is not None else None
+        self._token = None
+        left = self._claim(self, token.word) if self._claim is not None else None
         token.remove()
         if left is not None:
             self.board.unsubscribe(self.changed)
@@ -177,47 +181,43 @@ class Session:
         return Left(self.board, self._eye.remember())
 
     def _build(self) -> None:
-        """Draw the first frame, then lay out the panels."""
+        """Show map, sliders and numbers; line up all else."""
         self._live.frame(self.state)
-        if self._told.wait(TOKEN_WAIT_S):
-            self._adopt()
+        if self._token is not None and self._token.wait(TOKEN_WAIT_S):
+            self._adopt(self._token)
         frame = self._live.frame(self.state)
+        desk = Desk(
+            self._client.gui,
+            self.changed,
+            self.post,
+            self.act,
+            lambda: self.board,
+            self._page.notify,
+        )
+        outside = Outside(
+            self._client,
+            self._scenes,
+            self._eye.remember,
+            self._look_from,
+            self._page.run_script,
+            self._services,
+            lambda: self._shown,
+        )
+        self._opening = Opening(desk, outside, self._places, self.fit_view, self._wake.set)
         with self._client.atomic():
+            if frame.state.shown.dark != self._places.dark:
+                apply_theme(self._client.gui, dark=frame.state.shown.dark)
             self._page.set_title(frame.state.scene.title)
             self._restore_camera(frame)
-            self._stage = stage = StageLayer(self._client, frame, self.act)
-            layers = [*draw_map(self._client.scene, frame), stage]
-            desk = Desk(
-                self._client.gui,
-                self.changed,
-                self.post,
-                self.act,
-                lambda: self.board,
-                self._page.notify,
-            )
-            outside = Outside(
-                self._client,
-                self._scenes,
-                self._eye.remember,
-                self._look_from,
-                self._page.run_script,
-                self._services,
-                lambda: self._shown,
-            )
-            panels = lay_out_panels(desk, frame.state, outside, self.fit_view, stage.play)
-            for panel in panels:
-                panel.show(frame)
-            self._parts = Parts(layers, panels, frame)
-        self._client.flush()
-        self._page.run_script(hint_script())
+            self._parts = self._opening.begin(frame)
         self._client.flush()
         self._shown = frame
         self._parts.unsettle()
 
     def _step(self) -> None:
         """Take in what has changed and show the outcome."""
-        if self._token is not None and self._told.is_set():
-            self._adopt()
+        if self._token is not None and self._token.is_there:
+            self._adopt(self._token)
             if self._camera is not None and self._shown is not None:
                 self._restore_camera(self._shown)
         notes = self.board.apply(self._take_in, by=self.changed, at=self._changed_at)

@@ -15,10 +15,12 @@ from typing import Self
 import viser
 
 from warpspace.app.board import Board
+from warpspace.app.layers.lights import light_scene
 from warpspace.app.live import LiveModel
 from warpspace.app.memory import Tidier, limit_arenas, settle_memory
 from warpspace.app.network import free_port, is_local, page_url, resolve_host
 from warpspace.app.painter import PAINTER
+from warpspace.app.panels.layout import lay_out
 from warpspace.app.services import Services
 from warpspace.app.session import Session
 from warpspace.app.shelf import Shelf
@@ -85,6 +87,8 @@ class Viewer:
         self._tidier = Tidier()
         self._shared = Board(self._start) if shared else None
         self._server = _serve(self.address, self.port)
+        light_scene(self._server.scene)
+        self._places = lay_out(self._server.gui, dark=self._start.shown.dark)
         self._server.on_client_connect(self._connect)
         self._server.on_client_disconnect(self._disconnect)
         # the first tab need not wait for it
@@ -122,7 +126,13 @@ class Viewer:
         """Give a new tab its session."""
         board = self._shared or Board(self._start)
         session = Session(
-            client, self._live, Shelf(self._scenes), board, self._claim, self._services
+            client,
+            self._live,
+            Shelf(self._scenes),
+            board,
+            self._places,
+            self._claim,
+            self._services,
         )
         with self._lock:
             self._sessions[client.client_id] = session
@@ -199,7 +209,6 @@ def _serve(address: str, port: int) -> viser.ViserServer:
         raise OptionError(f"--port {port} has just been taken by another program; try again")
     # any tab could ask for a tunnel through a public relay
     server.request_share_url = lambda *_args, **_kwargs: None
-    server.gui.configure_theme(show_logo=False, show_share_button=False)
     return server
 
 

@@ -7,7 +7,6 @@ from viser import ClientHandle, SceneApi
 from warpspace.app.layers import Layer
 from warpspace.app.layers.annotations import AnnotationsLayer
 from warpspace.app.layers.axes import AxesLayer
-from warpspace.app.layers.box import BoxLayer
 from warpspace.app.layers.machine import MachineLayer
 from warpspace.app.layers.other import OtherLayer
 from warpspace.app.layers.rotation import RotationLayer
@@ -20,9 +19,9 @@ from warpspace.app.turning import Player
 Tell = Callable[[str], None]
 
 
-def draw_map(scene: SceneApi, frame: Frame) -> list[Layer]:
-    """Draw the map and what lies on and around it."""
-    kinds = (BoxLayer, TracesLayer, AxesLayer, OtherLayer, WhyLayer)
+def draw_around(scene: SceneApi, frame: Frame) -> list[Layer]:
+    """Draw what lies on and around the map."""
+    kinds = (TracesLayer, AxesLayer, OtherLayer, WhyLayer)
     return [kind(scene, frame) for kind in kinds]
 
 

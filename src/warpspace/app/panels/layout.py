@@ -1,26 +1,13 @@
-"""Where the panels stand: errors on the left, colour bar and view on the right, heading on top."""
+"""Where the panels stand: errors on the left, colour bar and view on the right, heading on top.
 
-from viser import GuiApi
+The places are the server's, the same for every tab, and on their way as soon as a page connects;
+what stands in them belongs to each tab.
+"""
 
-from warpspace.app.outside import Outside
-from warpspace.app.panels import Desk, Panel
-from warpspace.app.panels.chance import ChancePanel
-from warpspace.app.panels.clicks import SCRIPT
-from warpspace.app.panels.commands import CommandsPanel
-from warpspace.app.panels.compare import ComparePanel
-from warpspace.app.panels.conventions import ConventionsPanel
-from warpspace.app.panels.errors import ErrorsPanel
-from warpspace.app.panels.files import FilesPanel
-from warpspace.app.panels.gains import GainsPanel
-from warpspace.app.panels.looks import CameraPanel, Choose, LooksPanel
-from warpspace.app.panels.machine import MachinePanel
-from warpspace.app.panels.rotary import Play, RotaryPanel
-from warpspace.app.panels.shape import ShapePanel
-from warpspace.app.panels.summary import heading_panel, summary_panel
-from warpspace.app.panels.view import ViewPanel
-from warpspace.app.panels.why import WhyPanel
-from warpspace.app.pointing import Pointing
-from warpspace.app.state import AppState
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from viser import GuiApi, GuiTabHandle
 
 BRAND = (38, 70, 112)
 BRAND_ON_DARK = (122, 162, 214)
@@ -101,96 +88,64 @@ def split_script(share: float = ERRORS_SHARE) -> str:
 }})();"""
 
 
-def lay_out_panels(
-    desk: Desk, state: AppState, outside: Outside, fit_view: Choose, play: Play
-) -> list[Panel]:
-    """Build the page of one tab.
+@dataclass(frozen=True, slots=True)
+class Places:
+    """Where a tab puts its panels.
+
+    Attributes
+    ----------
+    tabs : mapping of str to viser.GuiTabHandle
+        By the word on them. What has no tab stands in the main panel.
+    dark : bool
+        Whether a page starts dark.
+    """
+
+    tabs: Mapping[str, GuiTabHandle]
+    dark: bool
+
+
+def lay_out(gui: GuiApi, *, dark: bool) -> Places:
+    """Divide the page, for all tabs of a server.
 
     Parameters
     ----------
-    desk : Desk
-    state : AppState
-    outside : Outside
-        Camera, page and files of the tab.
-    fit_view : callable
-        Puts the camera to a named view, or changes its lens.
-    play : callable
-        Turns the table.
+    gui : viser.GuiApi
+        Of the server.
+    dark : bool
+        Whether pages start dark.
 
     Returns
     -------
-    list of Panel
-        In the order they are read.
+    Places
     """
-    gui = desk.gui
-    apply_theme(gui, dark=state.shown.dark)
+    apply_theme(gui, dark=dark)
     gui.set_panel_label("Errors")
     gui.main_panel.dock_left()
     gui.main_panel.set_width(LEFT_WIDTH)
     gui.add_html(STYLE)
-    outside.run_script(SCRIPT)
-    commands = CommandsPanel(desk, lambda: fit_view(None, None))
-    shape_panel = gui.add_panel()
-    with shape_panel.add_tab("One error"):
-        shape = ShapePanel(desk, state)
-    shape_panel.dock_below(gui.main_panel)
-    outside.run_script(split_script())
-
-    def open_curve(key: str) -> None:
-        shape.choose(key)
-        shape_panel.expand()
-
-    errors = ErrorsPanel(desk, state, shape.choose, open_curve)
 
     results = gui.add_panel()
-    with results.add_tab("Result"):
-        summary = summary_panel(desk)
-    with results.add_tab("Why"):
-        why = WhyPanel(desk, outside)
-    with results.add_tab("Gains"):
-        gains = GainsPanel(desk)
-    with results.add_tab("Compare"):
-        compare = ComparePanel(desk, outside.scenes)
-    with results.add_tab("Files"):
-        files = FilesPanel(desk, outside)
+    tabs = {
+        "Result": results.add_tab("Result"),
+        "Why": results.add_tab("Why"),
+        "Gains": results.add_tab("Gains"),
+        "Compare": results.add_tab("Compare"),
+        "Files": results.add_tab("Files"),
+    }
     results.dock_right()
     results.set_width(RIGHT_WIDTH)
 
     settings = gui.add_panel()
-    with settings.add_tab("View"):
-        view = ViewPanel(desk, state, outside.scenes)
-        looks = LooksPanel(desk, state)
-        camera = CameraPanel(desk, fit_view)
-    with settings.add_tab("Machine"):
-        machine = MachinePanel(desk, state)
-    with settings.add_tab("Table"):
-        rotary = RotaryPanel(desk, state, play)
-    with settings.add_tab("Chance"):
-        chance = ChancePanel(desk, state)
-    with settings.add_tab("Conventions"):
-        conventions = ConventionsPanel(desk, state)
-    Pointing(outside, desk, conventions)
+    tabs |= {
+        "View": settings.add_tab("View"),
+        "Machine": settings.add_tab("Machine"),
+        "Table": settings.add_tab("Table"),
+        "Chance": settings.add_tab("Chance"),
+        "Conventions": settings.add_tab("Conventions"),
+    }
     settings.dock_below(results)
 
     top = gui.add_panel()
-    with top.add_tab("warpspace"):
-        heading = heading_panel(desk)
+    tabs["heading"] = top.add_tab("warpspace")
     top.float(x=12, y=12, width=520)
-    return [
-        errors,
-        shape,
-        view,
-        looks,
-        camera,
-        machine,
-        rotary,
-        gains,
-        chance,
-        commands,
-        why,
-        compare,
-        files,
-        conventions,
-        summary,
-        heading,
-    ]
+    return Places(tabs, dark)

@@ -1,0 +1,140 @@
+"""What stands in the places of a page, built step by step, the most important first."""
+
+from collections.abc import Callable, Sequence
+
+from warpspace.app.outside import Outside
+from warpspace.app.panels import Desk, Panel
+from warpspace.app.panels.chance import ChancePanel
+from warpspace.app.panels.clicks import SCRIPT
+from warpspace.app.panels.commands import CommandsPanel
+from warpspace.app.panels.compare import ComparePanel
+from warpspace.app.panels.conventions import ConventionsPanel
+from warpspace.app.panels.errors import ErrorsPanel
+from warpspace.app.panels.files import FilesPanel
+from warpspace.app.panels.gains import GainsPanel
+from warpspace.app.panels.layout import Places, split_script
+from warpspace.app.panels.looks import CameraPanel, Choose, LooksPanel
+from warpspace.app.panels.machine import MachinePanel
+from warpspace.app.panels.rotary import Play, RotaryPanel
+from warpspace.app.panels.shape import ShapePanel
+from warpspace.app.panels.summary import heading_panel, summary_panel
+from warpspace.app.panels.view import ViewPanel
+from warpspace.app.panels.why import WhyPanel
+from warpspace.app.pointing import Pointing
+from warpspace.app.state import AppState
+
+Build = Callable[[AppState], Sequence[Panel]]
+
+
+class Contents:
+    """The panels of one tab.
+
+    Parameters
+    ----------
+    desk : Desk
+    outside : Outside
+        Camera, page and files of the tab.
+    places : Places
+    fit_view : callable
+        Puts the camera to a named view, or changes its lens.
+    play : callable
+        Turns the table.
+    """
+
+    def __init__(
+        self, desk: Desk, outside: Outside, places: Places, fit_view: Choose, play: Play
+    ) -> None:
+        self._desk, self._outside, self._tabs = desk, outside, places.tabs
+        self._fit_view, self._play = fit_view, play
+        self._shape: ShapePanel | None = None
+        self._expand: Callable[[], None] = lambda: None
+
+    def build_first(self, state: AppState) -> Sequence[Panel]:
+        """Build what a page cannot be without: sliders, numbers, heading."""
+        self._outside.run_script(SCRIPT)
+        commands = CommandsPanel(self._desk, lambda: self._fit_view(None, None))
+        errors = ErrorsPanel(self._desk, state, self._choose, self._open_curve)
+        with self._tabs["Result"]:
+            summary = summary_panel(self._desk)
+        with self._tabs["heading"]:
+            heading = heading_panel(self._desk)
+        return [errors, commands, summary, heading]
+
+    @property
+    def others(self) -> tuple[Build, ...]:
+        """What builds all else, in this order; what is seen at the start comes first."""
+        return (
+            self._build_shape,
+            self._build_view,
+            self._build_looks,
+            self._build_why,
+            self._build_gains,
+            self._build_compare,
+            self._build_files,
+            self._build_machine,
+            self._build_rotary,
+            self._build_chance,
+            self._build_conventions,
+        )
+
+    def _choose(self, key: str) -> None:
+        """Show the curve of an error."""
+        if self._shape is not None:
+            self._shape.choose(key)
+
+    def _open_curve(self, key: str) -> None:
+        """Show the curve of an error, should its panel be minimized."""
+        self._choose(key)
+        self._expand()
+
+    def _build_shape(self, state: AppState) -> Sequence[Panel]:
+        gui = self._desk.gui
+        panel = gui.add_panel()
+        with panel.add_tab("One error"):
+            self._shape = ShapePanel(self._desk, state)
+        panel.dock_below(gui.main_panel)
+        self._outside.run_script(split_script())
+        self._expand = panel.expand
+        return [self._shape]
+
+    def _build_view(self, state: AppState) -> Sequence[Panel]:
+        with self._tabs["View"]:
+            return [ViewPanel(self._desk, state, self._outside.scenes)]
+
+    def _build_looks(self, state: AppState) -> Sequence[Panel]:
+        with self._tabs["View"]:
+            return [LooksPanel(self._desk, state), CameraPanel(self._desk, self._fit_view)]
+
+    def _build_why(self, _: AppState) -> Sequence[Panel]:
+        with self._tabs["Why"]:
+            return [WhyPanel(self._desk, self._outside)]
+
+    def _build_gains(self, _: AppState) -> Sequence[Panel]:
+        with self._tabs["Gains"]:
+            return [GainsPanel(self._desk)]
+
+    def _build_compare(self, _: AppState) -> Sequence[Panel]:
+        with self._tabs["Compare"]:
+            return [ComparePanel(self._desk, self._outside.scenes)]
+
+    def _build_files(self, _: AppState) -> Sequence[Panel]:
+        with self._tabs["Files"]:
+            return [FilesPanel(self._desk, self._outside)]
+
+    def _build_machine(self, state: AppState) -> Sequence[Panel]:
+        with self._tabs["Machine"]:
+            return [MachinePanel(self._desk, state)]
+
+    def _build_rotary(self, state: AppState) -> Sequence[Panel]:
+        with self._tabs["Table"]:
+            return [RotaryPanel(self._desk, state, self._play)]
+
+    def _build_chance(self, state: AppState) -> Sequence[Panel]:
+        with self._tabs["Chance"]:
+            return [ChancePanel(self._desk, state)]
+
+    def _build_conventions(self, state: AppState) -> Sequence[Panel]:
+        with self._tabs["Conventions"]:
+            conventions = ConventionsPanel(self._desk, state)
+        Pointing(self._outside, self._desk, conventions)
+        return [conventions]
