@@ -11,7 +11,6 @@ from collections import deque
 from collections.abc import Callable
 from functools import partial
 
-from warpspace.app.answers import Answer
 from warpspace.app.layers.box import BoxLayer
 from warpspace.app.layers.stage import StageLayer, draw_around
 from warpspace.app.live import Frame
@@ -22,6 +21,7 @@ from warpspace.app.panels.contents import Build, Contents
 from warpspace.app.panels.layout import Places
 from warpspace.app.panels.looks import Choose
 from warpspace.app.parts import Parts
+from warpspace.app.widgets import dom_id
 
 ANSWER_S = 1.0
 """How long a page may take for one step; one that does not answer gets the rest at once."""
@@ -52,7 +52,12 @@ class Opening:
     ) -> None:
         self._desk, self._outside = desk, outside
         self._contents = Contents(desk, outside, places, fit_view, self._play)
-        self._answer = Answer(desk.gui, told)
+        self._answer = desk.gui.add_text("", "", visible=False)
+
+        @self._answer.on_update
+        async def _(_: object) -> None:  # a plain function would take a thread of a pool
+            told()
+
         self._steps: deque[Step] = deque()
         self._asked, self._patient, self._asked_at = 0, True, 0.0
         self._parts = Parts()
@@ -76,7 +81,7 @@ class Opening:
             panel.show(frame)
         self._parts = Parts([box], panels, frame)
         self._steps.append(self._draw_around)
-        self._steps.extend(partial(self._add_panels, build) for build in self._contents.others)
+        self._steps.extend(partial(self._add_panels, build) for build in self._contents.others())
         self._steps.append(self._hint)
         self._ask()
         return self._parts
@@ -99,7 +104,7 @@ class Opening:
     def is_due(self) -> bool:
         """Whether the page has drawn the last step, or does not say."""
         left = self.remaining_s()
-        return left == 0.0 or (left is not None and self._answer.word == str(self._asked))
+        return left == 0.0 or (left is not None and self._answer.value == str(self._asked))
 
     def advance(self, frame: Frame) -> None:
         """Take the next step.
@@ -123,7 +128,7 @@ class Opening:
         """Have the page say when it has drawn what it gets now."""
         self._asked += 1
         self._asked_at = time.monotonic()
-        self._outside.run_script(drawn_script(self._answer.widget, self._asked))
+        self._outside.run_script(drawn_script(dom_id(self._answer), self._asked))
 
     def _draw_around(self, frame: Frame) -> None:
         """Draw what lies on and around the map."""

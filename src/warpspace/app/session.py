@@ -14,7 +14,7 @@ from functools import partial
 
 from viser import ClientHandle
 
-from warpspace.app.answers import Answer
+from warpspace.app.arrivals import Arrival
 from warpspace.app.board import Board, apply_each
 from warpspace.app.eye import Eye, focus
 from warpspace.app.live import Frame, LiveModel
@@ -27,7 +27,7 @@ from warpspace.app.parts import TURN, Parts, make_draft
 from warpspace.app.services import Services
 from warpspace.app.shelf import Shelf
 from warpspace.app.state import AppState
-from warpspace.app.tabs import CameraMemory, Left, ask_script, new_token, rename_script
+from warpspace.app.tabs import CameraMemory, Left, new_token, rename_script
 
 logger = logging.getLogger(__name__)
 TOKEN_WAIT_S = 0.25
@@ -47,6 +47,8 @@ class Session:
     board : Board
         What is shown: the tab's own, or that of a shared review.
     places : Places
+    arrival : Arrival
+        Tells which tab it is.
     claim : callable, optional
         Takes the session and the token its page has handed over; gives what the tab left behind
         when its connection was dropped.
@@ -61,6 +63,7 @@ class Session:
         scenes: Shelf,
         board: Board,
         places: Places,
+        arrival: Arrival,
         claim: "Callable[[Session, str], Left | None] | None" = None,
         services: Services | None = None,
     ) -> None:
@@ -68,8 +71,8 @@ class Session:
         self._services = services or Services()
         self.board, self._places = board, places
         self.token = new_token()
+        self._arrival: Arrival | None = arrival
         self._claim = claim
-        self._token: Answer | None = None
         self._eye, self._page = Eye(client), Page(client)
         self._camera: CameraMemory | None = None
         self._actions: deque[Callable[[], None]] = deque()
@@ -96,8 +99,6 @@ class Session:
         """End the worker; nothing is sent any more."""
         self._stopped.set()
         self._wake.set()
-        if self._token is not None:
-            self._token.give_up()
         if self._opening is not None:
             self._opening.stop()
         self.board.unsubscribe(self.changed)
@@ -121,7 +122,6 @@ class Session:
         """Wait, take everything in, show once; let charts follow when it settles; until stopped."""
         self.board.subscribe(self.changed)
         try:
-            self._guarded(self._ask)
             self._guarded(self._build)
             while not self._stopped.is_set():
                 self._turn()
@@ -155,17 +155,10 @@ class Session:
             logger.exception("session %d", self._client.client_id)
             self._page.report(error)
 
-    def _ask(self) -> None:
-        """Ask the page which tab it is."""
-        self._token = Answer(self._client.gui, self._wake.set)
-        self._page.run_script(ask_script(self._token.widget, self.token))
-        self._client.flush()
-
-    def _adopt(self, token: Answer) -> None:
+    def _adopt(self, arrival: Arrival) -> None:
         """Take over what the tab has left behind, if it was here before."""
-        self._token = None
-        left = self._claim(self, token.word) if self._claim is not None else None
-        token.remove()
+        self._arrival = None
+        left = self._claim(self, arrival.token) if self._claim is not None else None
         if left is not None:
             self.board.unsubscribe(self.changed)
             self.board, self._camera = left.board, left.camera
@@ -182,9 +175,8 @@ class Session:
 
     def _build(self) -> None:
         """Show map, sliders and numbers; line up all else."""
-        self._live.frame(self.state)
-        if self._token is not None and self._token.wait(TOKEN_WAIT_S):
-            self._adopt(self._token)
+        if self._arrival is not None and self._arrival.wait(TOKEN_WAIT_S, self._wake.set):
+            self._adopt(self._arrival)
         frame = self._live.frame(self.state)
         desk = Desk(
             self._client.gui,
@@ -216,8 +208,8 @@ class Session:
 
     def _step(self) -> None:
         """Take in what has changed and show the outcome."""
-        if self._token is not None and self._token.is_there:
-            self._adopt(self._token)
+        if self._arrival is not None and self._arrival.is_there:
+            self._adopt(self._arrival)
             if self._camera is not None and self._shown is not None:
                 self._restore_camera(self._shown)
         notes = self.board.apply(self._take_in, by=self.changed, at=self._changed_at)

@@ -114,27 +114,26 @@ def is_token(text: str) -> bool:
     return _TOKEN.fullmatch(text) is not None
 
 
-def ask_script(widget: str, fresh: str) -> str:
+def ask_script(carrier: str) -> str:
     """Write the script that makes a page hand over its token.
 
     Parameters
     ----------
-    widget : str
-        Identifier of the (invisible) widget that takes the token.
-    fresh : str
-        Token of a page that has none yet.
+    carrier : str
+        What stands for a widget in the message.
 
     Returns
     -------
     str
-        JavaScript. Where the browser forbids `sessionStorage` the page has the fresh token until
-        it is reloaded.
+        JavaScript. A page without a token makes one; where the browser forbids `sessionStorage` it
+        has it until it is reloaded.
     """
     return f"""(() => {{
   const key = {json.dumps(STORAGE_KEY)};
   let token = window.__warpspaceTab;
   try {{ token = sessionStorage.getItem(key) || token; }} catch {{}}
-  token = token || {json.dumps(fresh)};
+  token = token || [...crypto.getRandomValues(new Uint8Array(16))]
+    .map(byte => byte.toString(16).padStart(2, "0")).join("");
   window.__warpspaceTab = token;
   try {{ sessionStorage.setItem(key, token); }} catch {{}}
   let tries = 0;
@@ -142,7 +141,7 @@ def ask_script(widget: str, fresh: str) -> str:
     const viewer = window.__viserMutable;
     if (!viewer) {{ if (tries++ < 200) setTimeout(hand, 25); return; }}
     viewer.sendMessage({{
-      type: "GuiUpdateMessage", uuid: {json.dumps(widget)}, updates: {{ value: token }}
+      type: "GuiUpdateMessage", uuid: {json.dumps(carrier)}, updates: {{ value: token }}
     }});
   }};
   hand();

@@ -14,6 +14,7 @@ from typing import Self
 
 import viser
 
+from warpspace.app.arrivals import Arrivals
 from warpspace.app.board import Board
 from warpspace.app.layers.lights import light_scene
 from warpspace.app.live import LiveModel
@@ -88,6 +89,7 @@ class Viewer:
         self._shared = Board(self._start) if shared else None
         self._server = _serve(self.address, self.port)
         light_scene(self._server.scene)
+        self._arrivals = Arrivals(self._server)
         self._places = lay_out(self._server.gui, dark=self._start.shown.dark)
         self._server.on_client_connect(self._connect)
         self._server.on_client_disconnect(self._disconnect)
@@ -131,6 +133,7 @@ class Viewer:
             Shelf(self._scenes),
             board,
             self._places,
+            self._arrivals.expect(client.client_id),
             self._claim,
             self._services,
         )
@@ -161,6 +164,7 @@ class Viewer:
 
     def _disconnect(self, client: viser.ClientHandle) -> None:
         """End the session of a tab that is gone, and keep what it leaves for a while."""
+        self._arrivals.forget(client.client_id)
         with self._lock:
             session = self._sessions.pop(client.client_id, None)
             if session is not None:

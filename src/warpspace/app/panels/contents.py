@@ -46,6 +46,7 @@ class Contents:
     ) -> None:
         self._desk, self._outside, self._tabs = desk, outside, places.tabs
         self._fit_view, self._play = fit_view, play
+        self._errors: ErrorsPanel | None = None
         self._shape: ShapePanel | None = None
         self._expand: Callable[[], None] = lambda: None
 
@@ -53,17 +54,18 @@ class Contents:
         """Build what a page cannot be without: sliders, numbers, heading."""
         self._outside.run_script(SCRIPT)
         commands = CommandsPanel(self._desk, lambda: self._fit_view(None, None))
-        errors = ErrorsPanel(self._desk, state, self._choose, self._open_curve)
+        self._errors = errors = ErrorsPanel(self._desk, state, self._choose, self._open_curve)
         with self._tabs["Result"]:
             summary = summary_panel(self._desk)
         with self._tabs["heading"]:
             heading = heading_panel(self._desk)
         return [errors, commands, summary, heading]
 
-    @property
     def others(self) -> tuple[Build, ...]:
-        """What builds all else, in this order; what is seen at the start comes first."""
+        """Give what builds all else, in this order; what is seen at the start comes first."""
+        axes = self._errors.missing if self._errors is not None else 0
         return (
+            *(self._build_axis for _ in range(axes)),
             self._build_shape,
             self._build_view,
             self._build_looks,
@@ -86,6 +88,11 @@ class Contents:
         """Show the curve of an error, should its panel be minimized."""
         self._choose(key)
         self._expand()
+
+    def _build_axis(self, state: AppState) -> Sequence[Panel]:
+        if self._errors is not None:
+            self._errors.add_axis(state)
+        return ()
 
     def _build_shape(self, state: AppState) -> Sequence[Panel]:
         gui = self._desk.gui

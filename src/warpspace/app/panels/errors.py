@@ -3,6 +3,7 @@
 The search box narrows it down to the parameters that are meant; the folders then stand open.
 """
 
+from collections import deque
 from collections.abc import Callable
 from itertools import groupby
 from typing import Any
@@ -38,6 +39,8 @@ def _hint(state: AppState, row: Parameter) -> str:
 
 class ErrorsPanel:
     """Sliders of all parameters; rebuilt when another scene is shown.
+
+    At first only those of the first axis are there: `add_axis` adds the others one by one.
 
     Parameters
     ----------
@@ -86,39 +89,57 @@ class ErrorsPanel:
         }
         buttons.on_click(lambda event: desk.post(updates[event.target.value]))
         self._home: Any = desk.gui.add_folder(None)
-        self._build(state, tuple(state.amplitudes))
+        self._missing: deque[tuple[Parameter, ...]] = deque()
+        self._begin(state, tuple(state.amplitudes))
+        self.add_axis(state)
 
     def _build(self, state: AppState, keys: tuple[str, ...]) -> None:
         """Lay out the folders of a scene's axes with the parameters that were asked for."""
-        gui = self._desk.gui
+        self._begin(state, keys)
+        while self._missing:
+            self.add_axis(state)
+
+    def _begin(self, state: AppState, keys: tuple[str, ...]) -> None:
+        """Clear all folders and note which are to be laid out."""
         for part in self._parts:
             part.remove()
         self._scene, self._bound, self._buttons, self._parts = state.origin, {}, {}, []
         self._found, self._looks = keys, (Same(state.emphasis), Same(state.spans))
-        narrowed = len(keys) < len(state.amplitudes)
         if not keys:
             with self._home:
-                self._parts.append(gui.add_markdown("No error goes by this name."))
+                self._parts.append(self._desk.gui.add_markdown("No error goes by this name."))
         rows = sorted(map(parameter, keys), key=_by_axis)
-        for axis, members in groupby(rows, key=lambda row: row.axis):
-            own = list(members)
-            used = narrowed or any(state.amplitudes[row.key] for row in own)
-            title = f"{axis} axis · {len(own)} error{'s' if len(own) > 1 else ''}"
-            with self._home:
-                folder = gui.add_folder(title, expand_by_default=used)
-            self._parts.append(folder)
-            with folder:
-                for row in own:
-                    self._buttons[row.key] = gui.add_html(
-                        emphasis_buttons(row, state.emphasis, self._clicks.button)
-                    )
-                    self._bound[row.key] = Bound(self._slider(state, row), self._desk.changed)
-                button = gui.add_button(
-                    f"Reset {axis}",
-                    color="gray",
-                    hint=f"Give all errors of {axis} the values of the scene again.",
+        self._missing = deque(tuple(own) for _, own in groupby(rows, key=lambda row: row.axis))
+
+    @property
+    def missing(self) -> int:
+        """How many axes have no folder yet."""
+        return len(self._missing)
+
+    def add_axis(self, state: AppState) -> None:
+        """Lay out the folder of the next axis, if one is missing."""
+        if not self._missing:
+            return
+        gui, own = self._desk.gui, self._missing.popleft()
+        axis = own[0].axis
+        narrowed = len(self._found) < len(state.amplitudes)
+        used = narrowed or any(state.amplitudes[row.key] for row in own)
+        title = f"{axis} axis · {len(own)} error{'s' if len(own) > 1 else ''}"
+        with self._home:
+            folder = gui.add_folder(title, expand_by_default=used)
+        self._parts.append(folder)
+        with folder:
+            for row in own:
+                self._buttons[row.key] = gui.add_html(
+                    emphasis_buttons(row, state.emphasis, self._clicks.button)
                 )
-                button.on_click(lambda _, axis=axis: self._desk.post(lambda s: s.reset(axis)))
+                self._bound[row.key] = Bound(self._slider(state, row), self._desk.changed)
+            button = gui.add_button(
+                f"Reset {axis}",
+                color="gray",
+                hint=f"Give all errors of {axis} the values of the scene again.",
+            )
+            button.on_click(lambda _, axis=axis: self._desk.post(lambda s: s.reset(axis)))
 
     def _slider(self, state: AppState, row: Parameter) -> Any:
         """Add the slider of one parameter."""
