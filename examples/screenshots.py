@@ -205,7 +205,7 @@ def take(browser: Browser, viewer: Viewer, visit: Visit) -> Image.Image:
     page.set_default_timeout(PATIENCE_MS)
     page.goto(f"{viewer.url}/?fixedDpr=1")
     page.wait_for_function(LOADED, timeout=60_000)
-    page.wait_for_selector("[data-value='max']", timeout=60_000)
+    page.wait_for_selector("html[data-warpspace=open]", timeout=60_000)
     page.wait_for_timeout(SETTLED_MS)
     # the client's remark on software rendering, and any first-use hint
     for button in page.locator(".mantine-Notification-closeButton").all():

@@ -28,6 +28,11 @@ VERTICES = """() => {
 }"""
 
 
+def wait_until_open(page: "Page") -> None:
+    """Wait until all of a page is there."""
+    page.wait_for_selector("html[data-warpspace=open] [data-value='max']", timeout=60_000)
+
+
 class Tab:
     """A browser tab with the app in it."""
 
@@ -37,7 +42,7 @@ class Tab:
         page.on("pageerror", lambda error: self.errors.append(str(error)))
         page.on("console", self._listen)
         page.goto(f"{url}/?fixedDpr=1")
-        page.wait_for_selector("[data-value='max']", timeout=60_000)
+        wait_until_open(page)
         self.until(lambda: self.vertices() is not None)
 
     def _listen(self, message: Any) -> None:

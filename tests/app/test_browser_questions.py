@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.conftest import Tab
+from app.conftest import Tab, wait_until_open
 from warpspace.app.compare import scene_side, with_sides
 from warpspace.app.comparison import Side
 from warpspace.app.conventions import Effects, with_choice
@@ -223,7 +223,7 @@ def test_a_link_brings_camera_and_settings(tab: Tab, viewer: Viewer) -> None:
     second = tab.page.context.browser.new_context(viewport={"width": 1600, "height": 900})
     other = second.new_page()
     other.goto(link)
-    other.wait_for_selector("[data-value='max']", timeout=60_000)
+    wait_until_open(other)
     for _ in range(200):
         other.wait_for_timeout(100)
         if "true scale" in other.inner_text("[data-value='factor']"):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from app.conftest import Tab
+from app.conftest import Tab, wait_until_open
 from warpspace.app import edits
 from warpspace.app.live import Frame, LiveModel
 from warpspace.app.state import AppState, start_state
@@ -262,7 +262,7 @@ def test_a_reloaded_page_finds_its_state_again_and_a_new_tab_does_not(
     moved = START.with_amplitude("EXX", -6.0)
     shows(tab, moved)
     tab.page.reload()
-    tab.page.wait_for_selector("[data-value='max']", timeout=60_000)
+    wait_until_open(tab.page)
     shows(tab, moved)
     other = tab.page.context.new_page()
     fresh = Tab(other, viewer.url)
@@ -366,7 +366,7 @@ def test_the_first_hint_leaves_by_itself_and_does_not_come_back(tab: Tab) -> Non
     tab.page.mouse.click(800, 850)
     tab.until(lambda: hint.count() == 0)
     tab.page.reload()
-    tab.page.wait_for_selector("[data-value='max']", timeout=60_000)
+    wait_until_open(tab.page)
     tab.page.wait_for_timeout(500)
     assert hint.count() == 0
 

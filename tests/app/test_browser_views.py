@@ -317,6 +317,6 @@ def test_rotation_plays_pauses_and_stops_with_its_session(tab: Tab, viewer: View
     tab.until(lambda: drawn(tab, "/rotation/actual") is None)
     tab.page.get_by_role("button", name="Play rotation").click()
     session = viewer.sessions[-1]
-    tab.until(lambda: session._stage.playing)
+    tab.until(lambda: session._opening._stage.playing)
     tab.page.goto("about:blank")
-    tab.until(lambda: not session._stage.playing)
+    tab.until(lambda: not session._opening._stage.playing)

@@ -1,8 +1,8 @@
 """How the page of a tab comes to be: what matters most first, all else while it is in use.
 
 A page draws what it gets in one go before it answers anybody, and two hundred widgets take it
-nearly a second. The map and the sliders are sent first; every further step when the page has drawn
-the one before, so that a hand at a slider is never kept waiting for long.
+nearly a second. The map and the first sliders are sent first; every further step when the page has
+drawn the one before, so that a hand at a slider is not kept waiting for long.
 """
 
 import json
@@ -82,7 +82,7 @@ class Opening:
         self._parts = Parts([box], panels, frame)
         self._steps.append(self._draw_around)
         self._steps.extend(partial(self._add_panels, build) for build in self._contents.others())
-        self._steps.append(self._hint)
+        self._outside.run_script(stage_script("opening"))
         self._ask()
         return self._parts
 
@@ -116,12 +116,12 @@ class Opening:
         """
         self._patient = self._patient and self.remaining_s() != 0.0
         step = self._steps.popleft()
-        if self._steps:
-            self._ask()
-        else:
-            self._answer.remove()
         with self._outside.client.atomic():
             step(frame)
+            if self._steps:
+                self._ask()
+            else:
+                self._end()
         self._outside.client.flush()
 
     def _ask(self) -> None:
@@ -143,14 +143,27 @@ class Opening:
             panel.show(frame)
         self._parts.add(frame, panels=panels)
 
-    def _hint(self, _: Frame) -> None:
+    def _end(self) -> None:
         """Say how to begin."""
+        self._answer.remove()
         self._outside.run_script(hint_script())
+        self._outside.run_script(stage_script("open"))
 
     def _play(self, on: bool | None, tell: Callable[[str], None]) -> None:
         """Play, pause or take back the rotation."""
         if self._stage is not None:
             self._stage.play(on, tell)
+
+
+def stage_script(word: str) -> str:
+    """Write the script that marks how far a page is, for whoever drives it from outside.
+
+    Parameters
+    ----------
+    word : str
+        "opening", or "open" once everything is there: what `data-warpspace` of the page's root is.
+    """
+    return f"document.documentElement.dataset.warpspace = {json.dumps(word)};"
 
 
 def drawn_script(widget: str, number: int) -> str:

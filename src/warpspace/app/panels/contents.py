@@ -63,21 +63,7 @@ class Contents:
 
     def others(self) -> tuple[Build, ...]:
         """Give what builds all else, in this order; what is seen at the start comes first."""
-        axes = self._errors.missing if self._errors is not None else 0
-        return (
-            *(self._build_axis for _ in range(axes)),
-            self._build_shape,
-            self._build_view,
-            self._build_looks,
-            self._build_why,
-            self._build_gains,
-            self._build_compare,
-            self._build_files,
-            self._build_machine,
-            self._build_rotary,
-            self._build_chance,
-            self._build_conventions,
-        )
+        return (self._build_seen, self._build_behind)
 
     def _choose(self, key: str) -> None:
         """Show the curve of an error."""
@@ -89,59 +75,40 @@ class Contents:
         self._choose(key)
         self._expand()
 
-    def _build_axis(self, state: AppState) -> Sequence[Panel]:
+    def _build_seen(self, state: AppState) -> Sequence[Panel]:
+        """Build what is in front, and the other sliders."""
         if self._errors is not None:
-            self._errors.add_axis(state)
-        return ()
-
-    def _build_shape(self, state: AppState) -> Sequence[Panel]:
+            self._errors.add_axes(state)
         gui = self._desk.gui
-        panel = gui.add_panel()
-        with panel.add_tab("One error"):
+        curve = gui.add_panel()
+        with curve.add_tab("One error"):
             self._shape = ShapePanel(self._desk, state)
-        panel.dock_below(gui.main_panel)
+        curve.dock_below(gui.main_panel)
         self._outside.run_script(split_script())
-        self._expand = panel.expand
-        return [self._shape]
-
-    def _build_view(self, state: AppState) -> Sequence[Panel]:
+        self._expand = curve.expand
         with self._tabs["View"]:
-            return [ViewPanel(self._desk, state, self._outside.scenes)]
+            view = ViewPanel(self._desk, state, self._outside.scenes)
+            looks = LooksPanel(self._desk, state)
+            camera = CameraPanel(self._desk, self._fit_view)
+        return [self._shape, view, looks, camera]
 
-    def _build_looks(self, state: AppState) -> Sequence[Panel]:
-        with self._tabs["View"]:
-            return [LooksPanel(self._desk, state), CameraPanel(self._desk, self._fit_view)]
-
-    def _build_why(self, _: AppState) -> Sequence[Panel]:
+    def _build_behind(self, state: AppState) -> Sequence[Panel]:
+        """Build the tabs behind the numbers and behind the view."""
         with self._tabs["Why"]:
-            return [WhyPanel(self._desk, self._outside)]
-
-    def _build_gains(self, _: AppState) -> Sequence[Panel]:
+            why = WhyPanel(self._desk, self._outside)
         with self._tabs["Gains"]:
-            return [GainsPanel(self._desk)]
-
-    def _build_compare(self, _: AppState) -> Sequence[Panel]:
+            gains = GainsPanel(self._desk)
         with self._tabs["Compare"]:
-            return [ComparePanel(self._desk, self._outside.scenes)]
-
-    def _build_files(self, _: AppState) -> Sequence[Panel]:
+            compare = ComparePanel(self._desk, self._outside.scenes)
         with self._tabs["Files"]:
-            return [FilesPanel(self._desk, self._outside)]
-
-    def _build_machine(self, state: AppState) -> Sequence[Panel]:
+            files = FilesPanel(self._desk, self._outside)
         with self._tabs["Machine"]:
-            return [MachinePanel(self._desk, state)]
-
-    def _build_rotary(self, state: AppState) -> Sequence[Panel]:
+            machine = MachinePanel(self._desk, state)
         with self._tabs["Table"]:
-            return [RotaryPanel(self._desk, state, self._play)]
-
-    def _build_chance(self, state: AppState) -> Sequence[Panel]:
+            rotary = RotaryPanel(self._desk, state, self._play)
         with self._tabs["Chance"]:
-            return [ChancePanel(self._desk, state)]
-
-    def _build_conventions(self, state: AppState) -> Sequence[Panel]:
+            chance = ChancePanel(self._desk, state)
         with self._tabs["Conventions"]:
             conventions = ConventionsPanel(self._desk, state)
         Pointing(self._outside, self._desk, conventions)
-        return [conventions]
+        return [why, gains, compare, files, machine, rotary, chance, conventions]

@@ -40,7 +40,7 @@ def _hint(state: AppState, row: Parameter) -> str:
 class ErrorsPanel:
     """Sliders of all parameters; rebuilt when another scene is shown.
 
-    At first only those of the first axis are there: `add_axis` adds the others one by one.
+    At first only those of the first axis are there; `add_axes` adds the others.
 
     Parameters
     ----------
@@ -91,13 +91,12 @@ class ErrorsPanel:
         self._home: Any = desk.gui.add_folder(None)
         self._missing: deque[tuple[Parameter, ...]] = deque()
         self._begin(state, tuple(state.amplitudes))
-        self.add_axis(state)
+        self._add_axis(state)
 
     def _build(self, state: AppState, keys: tuple[str, ...]) -> None:
         """Lay out the folders of a scene's axes with the parameters that were asked for."""
         self._begin(state, keys)
-        while self._missing:
-            self.add_axis(state)
+        self.add_axes(state)
 
     def _begin(self, state: AppState, keys: tuple[str, ...]) -> None:
         """Clear all folders and note which are to be laid out."""
@@ -111,15 +110,13 @@ class ErrorsPanel:
         rows = sorted(map(parameter, keys), key=_by_axis)
         self._missing = deque(tuple(own) for _, own in groupby(rows, key=lambda row: row.axis))
 
-    @property
-    def missing(self) -> int:
-        """How many axes have no folder yet."""
-        return len(self._missing)
+    def add_axes(self, state: AppState) -> None:
+        """Lay out all folders that are still missing."""
+        while self._missing:
+            self._add_axis(state)
 
-    def add_axis(self, state: AppState) -> None:
-        """Lay out the folder of the next axis, if one is missing."""
-        if not self._missing:
-            return
+    def _add_axis(self, state: AppState) -> None:
+        """Lay out the folder of the next axis."""
         gui, own = self._desk.gui, self._missing.popleft()
         axis = own[0].axis
         narrowed = len(self._found) < len(state.amplitudes)

@@ -1,0 +1,218 @@
+"""A page is built in steps: map and sliders first, the rest as fast as the page draws it."""
+
+import re
+import secrets
+from collections.abc import Callable, Iterator
+from types import SimpleNamespace
+from typing import Any
+
+import msgspec.msgpack
+import pytest
+import viser
+import zstandard
+from viser import _messages as messages
+from websockets.sync.client import connect
+from websockets.sync.connection import Connection
+
+from warpspace.app import opening
+from warpspace.app.arrivals import CARRIER, MOST_HEARD, Arrivals
+from warpspace.app.opening import drawn_script, stage_script
+from warpspace.app.state import start_state
+from warpspace.app.viewer import Viewer
+from warpspace.machine.parameters import PARAMETERS
+from warpspace.scene.library import load_scene
+
+CAMERA = {
+    "type": "ViewerCameraMessage",
+    "wxyz": (1.0, 0.0, 0.0, 0.0),
+    "position": (30.0, -30.0, 30.0),
+    "fov": 0.4,
+    "near": 0.01,
+    "far": 1000.0,
+    "image_height": 900,
+    "image_width": 1600,
+    "look_at": (0.0, 0.0, 0.0),
+    "up_direction": (0.0, 0.0, 1.0),
+}
+KEYS = set(start_state(load_scene("dvf5000_first")).amplitudes)
+OPEN = stage_script("open")
+
+
+class Wire:
+    """A page that shows nothing and remembers what it was sent."""
+
+    def __init__(self, socket: Connection) -> None:
+        self._socket = socket
+        self.kinds: list[str] = []
+        self.labels: list[str] = []
+        self.scripts: list[str] = []
+        self.send({"type": "GuiUpdateMessage", "uuid": CARRIER, "updates": {"value": new_token()}})
+        self.send(CAMERA)
+
+    def send(self, message: dict[str, Any]) -> None:
+        self._socket.send(msgspec.msgpack.encode(message))
+
+    def update(self, uuid: str, value: object) -> None:
+        self.send({"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": value}})
+
+    def read_until(self, fine: Callable[[], bool], seconds: float = 20.0) -> bool:
+        """Read until something holds; tell whether it did before nothing came any more."""
+        while not fine():
+            try:
+                raw = self._socket.recv(timeout=seconds)
+            except TimeoutError:
+                return False
+            assert isinstance(raw, bytes)
+            size, packed = (int.from_bytes(raw[at : at + 8], "little") for at in (0, 8))
+            text = zstandard.ZstdDecompressor().decompress(
+                raw[16 : 16 + packed], max_output_size=size
+            )
+            for message in msgspec.msgpack.decode(text)["messages"]:
+                self._take(message)
+        return True
+
+    def _take(self, message: dict[str, Any]) -> None:
+        self.kinds.append(message["type"])
+        label = message.get("props", {}).get("label") if "props" in message else None
+        if isinstance(label, str):
+            self.labels.append(label)
+        if message["type"] == "RunJavascriptMessage":
+            self.scripts.append(message["source"])
+
+    @property
+    def keys(self) -> set[str]:
+        """Keys of the errors that have a slider."""
+        return {label.split(" ")[0] for label in self.labels} & set(PARAMETERS)
+
+    @property
+    def question(self) -> tuple[str, str]:
+        """The latest question whether all is drawn: widget and number."""
+        found = re.findall(
+            r'requestAnimationFrame|uuid: "([^"]+)", updates: \{ value: "(\d+)" \}',
+            "".join(self.scripts),
+        )
+        return [pair for pair in found if pair[0]][-1]
+
+
+def new_token() -> str:
+    return secrets.token_hex(16)
+
+
+@pytest.fixture(scope="module")
+def viewer() -> Iterator[Viewer]:
+    with Viewer(load_scene("dvf5000_first")) as running:
+        yield running
+
+
+@pytest.fixture
+def wire(viewer: Viewer) -> Iterator[Wire]:
+    with connect(
+        viewer.url.replace("http", "ws", 1),
+        subprotocols=[f"viser-v{viser.__version__}"],  # pyright: ignore[reportArgumentType]
+        max_size=None,
+        compression=None,
+    ) as socket:
+        yield Wire(socket)
+
+
+def test_the_map_and_its_first_sliders_come_before_all_else(
+    wire: Wire, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(opening, "ANSWER_S", 1e6)
+    assert wire.read_until(lambda: any("opening" in script for script in wire.scripts))
+    assert "GlbMessage" in wire.kinds
+    assert wire.keys == {"EXX", "EYX", "EZX", "EAX", "EBX", "ECX"}
+    first = set(wire.labels)
+    assert not wire.read_until(lambda: set(wire.labels) != first, seconds=0.5)
+    # the next step when the page has drawn the first one: what lies on and around the map
+    lines = wire.kinds.count("LineSegmentsMessage")
+    wire.update(*wire.question)
+    assert wire.read_until(lambda: wire.kinds.count("LineSegmentsMessage") > lines)
+    assert set(wire.labels) == first
+    # an answer to a question of before does not count
+    wire.update(wire.question[0], "1")
+    assert not wire.read_until(lambda: set(wire.labels) != first, seconds=0.5)
+    while OPEN not in wire.scripts:
+        asked = len(wire.scripts)
+        wire.update(*wire.question)
+        assert wire.read_until(lambda asked=asked: len(wire.scripts) > asked)
+    assert wire.keys == KEYS
+    assert {"Scene", "Structural loop", "Conventions of the scene"} <= set(wire.labels)
+
+
+def test_a_page_that_does_not_answer_gets_all_of_it(
+    wire: Wire, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(opening, "ANSWER_S", 0.05)
+    assert wire.read_until(lambda: OPEN in wire.scripts)
+    assert wire.keys == KEYS
+
+
+def test_the_scripts_carry_what_the_page_is_to_say() -> None:
+    assert '"some-widget"' in drawn_script("some-widget", 7)
+    assert '"7"' in drawn_script("some-widget", 7)
+    assert "requestAnimationFrame" in drawn_script("some-widget", 7)
+
+
+class Connections:
+    """Stands for viser's connections."""
+
+    def __init__(self) -> None:
+        self.handler: Any = None
+        self.sent: list[Any] = []
+
+    def register_handler(self, _: type, handler: Any) -> None:
+        self.handler = handler
+
+    def queue_message(self, message: Any) -> None:
+        self.sent.append(message)
+
+    def say(self, client: int, uuid: str, value: object) -> None:
+        self.handler(client, messages.GuiUpdateMessage(uuid, {"value": value}))
+
+
+@pytest.fixture
+def connections() -> Connections:
+    return Connections()
+
+
+@pytest.fixture
+def arrivals(connections: Connections) -> Arrivals:
+    return Arrivals(SimpleNamespace(_websock_server=connections))  # pyright: ignore[reportArgumentType]
+
+
+def test_a_token_is_heard_before_and_after_a_page_is_expected(
+    arrivals: Arrivals, connections: Connections
+) -> None:
+    assert CARRIER in connections.sent[0].source
+    connections.say(3, CARRIER, "early")
+    woken: list[int] = []
+    early, late = arrivals.expect(3), arrivals.expect(4)
+    assert early.wait(0.0, lambda: woken.append(3))
+    assert early.token == "early"
+    assert not late.wait(0.0, lambda: woken.append(4))
+    connections.say(4, CARRIER, "late")
+    connections.say(4, CARRIER, "later")  # only the first counts
+    assert late.is_there
+    assert late.token == "late"
+    assert woken == [4]
+
+
+@pytest.mark.parametrize("value", [None, 1, ["a"], {"a": 1}])
+def test_what_is_no_text_is_not_heard(
+    arrivals: Arrivals, connections: Connections, value: object
+) -> None:
+    connections.say(1, CARRIER, value)
+    connections.say(1, "some-widget", "text")
+    assert not arrivals.expect(1).is_there
+
+
+def test_pages_that_never_show_anything_are_forgotten(
+    arrivals: Arrivals, connections: Connections
+) -> None:
+    first = arrivals.expect(0)
+    for client in range(1, MOST_HEARD + 1):
+        connections.say(client, CARRIER, "x")
+    assert arrivals.expect(0) is not first
+    arrivals.forget(5)
+    assert not arrivals.expect(5).is_there
