@@ -149,7 +149,7 @@ def open_tab(viewer: Viewer, browser: "Browser") -> Iterator[Callable[[], Tab]]:
     contexts: list[Any] = []
 
     def open_one() -> Tab:
-        contexts.append(browser.new_context(viewport={"width": 1600, "height": 900}))
+        contexts.append(browser.new_context(viewport={"width": 1280, "height": 720}))
         return Tab(contexts[-1].new_page(), viewer.url)
 
     yield open_one

@@ -77,7 +77,7 @@ def follow(viewer: Viewer, browser: "Browser") -> Iterator[Callable[[str], Tab]]
     opened: list[tuple[BrowserContext, Tab]] = []
 
     def open_link(link: str) -> Tab:
-        context = browser.new_context(viewport={"width": 1600, "height": 900})
+        context = browser.new_context(viewport={"width": 1280, "height": 720})
         context.add_init_script(LISTEN)
         address = f"{viewer.url}/?fixedDpr=1&{links.PARAMETER}={links.pack(link)}#"
         opened.append((context, Tab(context.new_page(), address)))

@@ -220,7 +220,7 @@ def test_a_link_brings_camera_and_settings(tab: Tab, viewer: Viewer) -> None:
     tab.until(lambda: "view=" in tab.page.url)
     link = tab.page.url
     camera = viewer.sessions[-1]._eye.remember()
-    second = tab.page.context.browser.new_context(viewport={"width": 1600, "height": 900})
+    second = tab.page.context.browser.new_context(viewport={"width": 1280, "height": 720})
     other = second.new_page()
     other.goto(link)
     wait_until_open(other)
