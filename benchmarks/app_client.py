@@ -54,10 +54,11 @@ class Tab:
         self.seen: list[tuple[float, Shown]] = []
         self.bytes = 0
         self.problems: list[str] = []
+        self._open = False
         self._reader: asyncio.Task[None] | None = None
 
     async def open(self) -> None:
-        """Connect and wait for the first numbers."""
+        """Connect and wait until all of the page is there."""
         self._socket = await websockets.connect(
             self.url.replace("http", "ws", 1),
             subprotocols=[f"viser-v{viser.__version__}"],
@@ -67,7 +68,7 @@ class Tab:
         self._reader = asyncio.create_task(self._read())
         await self._send(CAMERA)
         for _ in range(600):
-            if self.shown and self.widgets:
+            if self.shown and self._open:
                 return
             await asyncio.sleep(0.05)
         raise TimeoutError("the app has shown nothing for 30 s")
@@ -101,15 +102,22 @@ class Tab:
                 for message in msgspec.msgpack.decode(text)["messages"]:
                     await self._take(message)
 
+    async def _run(self, source: str) -> None:
+        """Do what a script asks a page for: its token, and whether it has drawn everything."""
+        asked = re.search(r'uuid: "([^"]+)", updates: \{ value: (?:token|"(\d+)") \}', source)
+        if asked is not None:
+            await self._update(asked[1], asked[2] or self.token)
+        elif 'dataset.warpspace = "open"' in source:
+            self._open = True
+
     async def _take(self, message: dict[str, object]) -> None:
         kind = message["type"]
         if kind == "GuiSliderMessage":
             key = message["props"]["label"].split(" ")[0]
             self.widgets.setdefault(key, message["uuid"])
             self.values.setdefault(key, message["value"])
-        elif kind == "RunJavascriptMessage" and "warpspace-tab" in message["source"]:
-            widget = re.search(r'uuid: "([^"]+)"', message["source"])
-            await self._update(widget[1], self.token)
+        elif kind == "RunJavascriptMessage":
+            await self._run(message["source"])
         elif kind == "NotificationShowMessage":
             self.problems.append(f"{message['props']['title']}: {message['props']['body']}")
         elif kind in {"GuiHtmlMessage", "GuiUpdateMessage"}:
