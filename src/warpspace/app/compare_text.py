@@ -12,6 +12,8 @@ NOTHING = (
     " what is shown now and go on changing it: both are drawn with the same colours, factor and"
     " camera.</div>"
 )
+MARK = "▸ "
+"""Before the name of what is drawn."""
 _NUMBER = 'style="text-align:right;padding:2px 0 2px 6px;font-variant-numeric:tabular-nums"'
 _ROWS = (("mean", "mean_um"), ("RMS", "rms_um"), ("P95", "p95_um"), ("max", "max_um"))
 
@@ -33,7 +35,7 @@ def comparison_html(frame: Frame) -> str:
         return NOTHING
     columns = {"A": found.a, "B": found.b, "A − B": found.difference}
     drawn = {"a": "A", "b": "B", "difference": "A − B"}[found.shown]
-    head = "".join(f"<th {_NUMBER}>{'▸ ' if name == drawn else ''}{name}</th>" for name in columns)
+    head = "".join(f"<th {_NUMBER}>{MARK if name == drawn else ''}{name}</th>" for name in columns)
     rows = "".join(
         f'<tr><td style="opacity:.7">{label}</td>'
         + "".join(_cell(name, label, getattr(s, field, None)) for name, s in columns.items())

@@ -10,7 +10,7 @@ from warpspace.machine.parameters import parameter
 if TYPE_CHECKING:
     from warpspace.app.chance import Chance
 
-WIDTH, HEIGHT, FOOT = 280.0, 96.0, 18.0
+WIDTH, HEIGHT, FOOT = 280.0, 96.0, 31.0
 WITHIN, BEYOND = "#4a7ab5", "#c9863a"
 SHOWN_SHARES = 6
 
@@ -86,7 +86,8 @@ def _histogram(chance: "Chance") -> str:
         f'<path d="{bars[True]}" fill="{WITHIN}"/><path d="{bars[False]}" fill="{BEYOND}"/>'
         f'<path d="M0 {HEIGHT:g}H{WIDTH:g}" stroke="currentColor" opacity=".5"/>'
         f'<path d="M{at:.1f} -2V{HEIGHT:g}" stroke="currentColor" stroke-dasharray="4 3"/>'
-        f"{ticks}</svg>"
+        f'{ticks}<text x="{WIDTH / 2:g}" y="{HEIGHT + 27:g}" text-anchor="middle" font-size="10" '
+        f'fill="currentColor">|E| [µm]</text></svg>'
     )
 
 
@@ -102,7 +103,7 @@ def _numbers(chance: "Chance") -> str:
     """Spell mean, P95 and the largest."""
     cells = "".join(
         f'<span><span style="opacity:.7">{name}</span> '
-        f'<b data-value="chance {name}">{value:.1f}</b></span>'
+        f'<b data-value="chance {name}">{value:.1f}</b> µm</span>'
         for name, value in (
             ("mean", chance.mean_um),
             ("P95", chance.p95_um),
@@ -111,7 +112,7 @@ def _numbers(chance: "Chance") -> str:
     )
     return (
         '<div style="display:flex;justify-content:space-between;font-variant-numeric:tabular-nums">'
-        f"{cells}<span>µm</span></div>"
+        f"{cells}</div>"
     )
 
 

@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from viser import SceneApi
 
 from warpspace.app.kept import Same
@@ -14,6 +15,7 @@ from warpspace.app.live import Frame
 from warpspace.app.machine import machine_room_mm
 from warpspace.app.widgets import Told
 from warpspace.geometry.annotations import (
+    CornerArrows,
     ScaleBar,
     corner_arrows,
     scale_bars,
@@ -151,10 +153,18 @@ class AnnotationsLayer:
         self._arrows.put(
             vertices=vertices.astype(np.float32), color=palette(frame).edge, visible=True
         )
-        for label, text, at in zip(
-            self._corner_labels, arrows.texts, arrows.label_mm, strict=False
+        marked = self._is_marked(frame, arrows)
+        for label, text, at, hidden in zip(
+            self._corner_labels, arrows.texts, arrows.label_mm, marked, strict=False
         ):
-            label.put(text=text, position=at * SCENE_PER_MM, visible=True)
+            label.put(text=text, position=at * SCENE_PER_MM, visible=not hidden)
+
+    def _is_marked(self, frame: Frame, arrows: CornerArrows) -> NDArray[np.bool_]:
+        """Tell which corners carry the mark of the largest error, which says the same number."""
+        if not frame.state.look.worst or frame.state.component != "norm":
+            return np.zeros(len(arrows.norm_um), dtype=bool)
+        found = worst_point(frame.values, frame.grid.nominal_mm, frame.drawn_mm)
+        return np.all(np.isclose(arrows.start_mm, found.nominal_mm), axis=1)
 
     def _show_worst(self, frame: Frame) -> None:
         """Mark the largest value."""
