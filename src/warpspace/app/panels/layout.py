@@ -30,6 +30,11 @@ div:has(> p > label) + div:has(input[type="checkbox"]) { width: auto; flex-grow:
   top: auto !important; bottom: 1em !important; }
 p:has(> label) { color: inherit !important; letter-spacing: 0 !important; }
 .mantine-Slider-root:has(.mantine-Slider-markLabel) { margin-bottom: 4px; }
+/* errors have signs: a track filled from its left end would make zero look like something */
+[data-dock-region="left"] .mantine-Slider-bar { background: none; }
+[data-dock-region="left"] .mantine-Slider-mark[data-filled] {
+  border-color: var(--track-bg, var(--mantine-color-gray-3));
+  background: var(--mantine-color-body); }
 /* what is not the main thing to do is outlined */
 .mantine-Button-root[style*="color-gray-filled"] { background: none;
   color: var(--mantine-color-text); border: 1px solid var(--mantine-color-default-border); }
