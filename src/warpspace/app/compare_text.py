@@ -6,6 +6,7 @@ from warpspace.analysis.statistics import Statistics
 from warpspace.app.compare import Compared
 from warpspace.app.legend import gradient
 from warpspace.app.live import Frame
+from warpspace.app.where import spell_point
 
 NOTHING = (
     '<div style="padding:4px 14px 10px;line-height:1.5;font-size:13px">Choose a scene for B, or pin'
@@ -68,8 +69,8 @@ def _cell(column: str, row: str, value: float | None) -> str:
 
 def _place(name: str, found: Statistics) -> str:
     """Say where the largest is."""
-    x, y, z = (f"{round(value, 1) + 0.0:g}".replace("-", "−") for value in found.max_at_mm)
-    return f'<div style="font-size:11.5px;opacity:.8">max of {name} at X {x}, Y {y}, Z {z} mm</div>'
+    where = spell_point(found.max_at_mm)
+    return f'<div style="font-size:11.5px;opacity:.8">max of {name} at {where}</div>'
 
 
 def bar(frame: Frame) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from warpspace.app.compare import both_words
 from warpspace.app.layers import palette
 from warpspace.app.live import Frame
+from warpspace.app.where import spell_point
 from warpspace.geometry.colour import ColourScale, colour_table
 from warpspace.geometry.deform import round_down
 from warpspace.units import MICROMETRE, MM_PER_UM
@@ -137,10 +138,9 @@ def numbers(frame: Frame) -> str:
 
 def worst_place(frame: Frame) -> str:
     """Spell where the largest error is."""
-    x, y, z = (_number(round(value, 1)) for value in frame.statistics.max_at_mm)
     return (
         '<div style="font-size:13px;margin-top:2px"><span style="opacity:.7">max at </span>'
-        f'<span data-value="max at">X {x}, Y {y}, Z {z} mm</span></div>'
+        f'<span data-value="max at">{spell_point(frame.statistics.max_at_mm)}</span></div>'
     )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from warpspace.analysis.explain import Contribution
+from warpspace.app.where import plain, spell_point, spell_positions
 from warpspace.app.why import Answer
 from warpspace.machine.parameters import parameter
 from warpspace.units import Array
@@ -90,14 +91,14 @@ def answer_html(answer: Answer, lever: str, attributes: Attributes) -> str:
 def _point(answer: Answer) -> str:
     """Spell where the point is and what its error is."""
     found = answer.explanation
-    linear = ", ".join(f"{name} {_plain(q)}" for name, q in answer.at.items() if name in "XYZ")
-    rotary = [f"{name} {_plain(q)}°" for name, q in answer.at.items() if name not in "XYZ"]
-    where = " · ".join((*([f"{linear} mm"] if linear else ()), *rotary))
     x, y, z = (number(value) for value in found.error_um)
     tilt = float(np.linalg.norm(found.orientation_urad))
     length = float(np.linalg.norm(found.error_um))
     return (
-        f'<div data-value="why at" style="font-size:12px;opacity:.75">{where}</div>'
+        f'<div data-value="why at" style="font-size:12px">'
+        f"{spell_point(found.nominal_mm + answer.shift_mm)}</div>"
+        '<div style="font-size:12px;opacity:.75" data-value="why axes">'
+        f"axes at {spell_positions(answer.at)}</div>"
         '<div style="font-size:12px;opacity:.75">'
         f"{html.escape(answer.loop.value)} loop · tilt of the tool axis {tilt:.1f} µrad</div>"
         '<div style="margin-top:3px"><span style="font-size:17px;font-weight:650">'
@@ -132,7 +133,7 @@ def _lever_row(part: Contribution) -> str:
         how = f"{value} × {arm:.0f} mm across the axis"
     else:
         how = f"{value} along the direction drawn; a translation needs no lever"
-    place = ", ".join(_plain(float(value)) for value in part.origin_mm)
+    place = ", ".join(plain(value) for value in part.origin_mm)
     return (
         '<tr style="background:rgba(194,24,91,.12)"><td colspan="6" data-value="lever"'
         f' style="padding:0 2px 5px;font-size:11.5px">{html.escape(row.name)}: {how}.<br>Frame of'
@@ -189,8 +190,3 @@ def _unit(vector: Array) -> Array:
     """Give the direction of a vector, [3]; zero for none."""
     length = float(np.linalg.norm(vector))
     return vector / length if length > 0.0 else np.zeros(3)
-
-
-def _plain(value: float) -> str:
-    """Spell a position with at most one decimal."""
-    return f"{round(value, 1) + 0.0:g}".replace("-", "−")

@@ -9,6 +9,7 @@ from warpspace.app.live import Frame
 from warpspace.app.panels import Desk
 from warpspace.app.ranking import SHOWN_BARS, Bar, node_coordinates, rank_gains
 from warpspace.app.state import AppState
+from warpspace.app.where import spell_point, spell_positions
 from warpspace.app.widgets import Bound
 from warpspace.field.evaluate import build_basis
 
@@ -26,8 +27,8 @@ class Ranking:
         Largest first.
     by_effect : bool
         Ranked by what the present errors do, not by gain.
-    place : str
-        Where, for people.
+    place, positions : str
+        Where it is drawn and where the axes stand, for people.
     error_um : float, µm
         |E| there.
     """
@@ -35,6 +36,7 @@ class Ranking:
     bars: tuple[Bar, ...]
     by_effect: bool
     place: str
+    positions: str
     error_um: float
 
 
@@ -127,10 +129,9 @@ def rank_frame(frame: Frame, *, middle: bool = False, by_effect: bool = False) -
     bars = rank_gains(scene.model, state.loop, basis, state.heard, (), at)
     if by_effect:
         bars = tuple(sorted(bars, key=lambda bar: -round(bar.moved_um, 9)))
-    place = ", ".join(
-        f"{name} {float(at[name]):.0f}".replace("-", "−") for name in "XYZ" if name in at
+    return Ranking(
+        bars, by_effect, spell_point(grid.nominal_mm[node]), spell_positions(at), float(norm[node])
     )
-    return Ranking(bars, by_effect, place, float(norm[node]))
 
 
 def spell_ranking(ranking: Ranking) -> str:
@@ -140,8 +141,10 @@ def spell_ranking(ranking: Ranking) -> str:
     longest = max(values, default=0.0) or 1.0
     head = (
         '<div style="padding:0 12px 12px;font-size:12px;line-height:1.35">'
-        f'<div style="opacity:.75;margin-bottom:6px">{html.escape(ranking.place)} mm · |E| '
+        f'<div><span data-value="gain at">{html.escape(ranking.place)}</span> · |E| '
         f"<b data-value='gain point'>{ranking.error_um:.2f} µm</b></div>"
+        '<div style="opacity:.75;margin-bottom:6px">axes at '
+        f"{html.escape(ranking.positions)}</div>"
     )
     rows = "".join(
         _row(bar, value / longest, ranking.by_effect)

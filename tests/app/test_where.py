@@ -1,0 +1,34 @@
+"""One point is spelt alike everywhere: as the drawing's axes have it, beside where axes stand."""
+
+import numpy as np
+import pytest
+
+from warpspace.app.legend import worst_place
+from warpspace.app.live import LiveModel
+from warpspace.app.panels.gains import rank_frame
+from warpspace.app.state import start_state
+from warpspace.app.where import plain, spell_point, spell_positions
+from warpspace.scene.library import load_scene
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(0.0, "0"), (-0.04, "0"), (-50.96, "−51"), (2.5, "2.5"), (1e4, "10000")]
+)
+def test_numbers_are_spelt_to_a_tenth_with_a_proper_minus(value: float, text: str) -> None:
+    assert plain(value) == text
+
+
+def test_points_and_positions_carry_their_units() -> None:
+    assert spell_point((275.0, -225.0, -51.0)) == "X 275, Y −225, Z −51 mm"
+    assert spell_positions({"C": 90.0, "X": 1.0, "Z": -480.0}) == "X 1, Z −480 mm · C 90°"
+    assert spell_positions({"B": -30.0}) == "B −30°"
+
+
+def test_result_and_gains_name_the_worst_point_alike() -> None:
+    frame = LiveModel().frame(start_state(load_scene("dvf5000_first")))
+    ranking = rank_frame(frame)
+    assert ranking.place == spell_point(frame.statistics.max_at_mm)
+    assert ranking.place in worst_place(frame)
+    # Z of the drawing counts from the table, that of the axis from its upper end
+    assert ranking.positions.startswith("X 275, Y −225, Z −480 mm")
+    assert np.isclose(frame.statistics.max_at_mm[2], -51.0)
