@@ -7,7 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from warpspace.app.live import Frame
+from warpspace.app.state import AppState
 from warpspace.app.viewer import Viewer
+from warpspace.cli.services import build_services
 from warpspace.scene.library import load_scene
 
 if TYPE_CHECKING:
@@ -121,10 +124,43 @@ class Tab:
             [self.widget(label), values],
         )
 
+    def panel(self, name: str) -> None:
+        """Bring a tab of a panel to the front."""
+        self.page.get_by_role("tab", name=name, exact=True).click()
+
+    def upload(self, name: str, content: bytes) -> None:
+        """Give a file to the page."""
+        self.page.locator("input[type=file]").set_input_files(
+            {"name": name, "mimeType": "text/plain", "buffer": content}
+        )
+
     def choose(self, label: str, option: str) -> None:
         """Choose an option of a dropdown."""
         self.page.get_by_label(label, exact=True).first.click()
         self.page.get_by_role("option", name=option, exact=True).first.click()
+
+
+SCENES = [load_scene(name) for name in ("dvf5000_first", "dvf5000_second", "teach_tilted_c")]
+"""What the app with services is started with, the first of them shown."""
+
+
+def drawn_nodes(frame: Frame) -> np.ndarray:
+    """Where a frame draws the nodes of its surface, [M, 3], mm."""
+    return frame.drawn_mm.reshape(-1, 3)[frame.topology.surface.nodes]
+
+
+def state_of(viewer: Viewer, tab: Tab) -> AppState:
+    """State of the newest session: that of the tab under test."""
+    tab.page.wait_for_timeout(200)
+    return viewer.sessions[-1].state
+
+
+@pytest.fixture(scope="session")
+def serving_viewer() -> Iterator[Viewer]:
+    """The app with figures and exports, as the command line starts it."""
+    scenes = {scene.title: scene for scene in SCENES}
+    with Viewer(SCENES[0], scenes, services=build_services()) as running:
+        yield running
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app.conftest import Tab
+from app.conftest import Tab, drawn_nodes
 from warpspace.app.live import Frame, LiveModel
 from warpspace.app.state import AppState, start_state
 from warpspace.app.tonemap import vertex_colours
@@ -23,10 +23,6 @@ def model(state: AppState) -> Frame:
     return LIVE.frame(state)
 
 
-def drawn(frame: Frame) -> np.ndarray:
-    return frame.drawn_mm.reshape(-1, 3)[frame.topology.surface.nodes]
-
-
 def check_numbers(tab: Tab, frame: Frame) -> None:
     for name, value in (
         ("mean", frame.statistics.mean_um),
@@ -39,7 +35,7 @@ def check_numbers(tab: Tab, frame: Frame) -> None:
 
 def test_first_screen(tab: Tab) -> None:
     frame = model(START)
-    tab.until(lambda: tab.shows(drawn(frame)))
+    tab.until(lambda: tab.shows(drawn_nodes(frame)))
     check_numbers(tab, frame)
     assert tab.text("factor") == "displacement drawn ×1\u202f000"
     assert tab.text("max at") == "X 275, Y −225, Z −51 mm"
@@ -62,18 +58,18 @@ def test_mesh_is_drawn_in_the_colours_of_the_bar(tab: Tab) -> None:
 
 def test_keyboard_on_a_slider_bends_the_box_and_reset_brings_it_back(tab: Tab) -> None:
     start = model(START)
-    tab.until(lambda: tab.shows(drawn(start)))
+    tab.until(lambda: tab.shows(drawn_nodes(start)))
     tab.thumb("EXX").focus()
     for _ in range(25):
         tab.page.keyboard.press("ArrowRight")
         tab.page.wait_for_timeout(20)
     moved = model(START.with_amplitude("EXX", 2.5))
-    tab.until(lambda: tab.shows(drawn(moved)))
+    tab.until(lambda: tab.shows(drawn_nodes(moved)))
     check_numbers(tab, moved)
     assert tab.box("EXX").input_value() == "2.5"
-    assert np.abs(drawn(moved) - drawn(start)).max() > 2.0
+    assert np.abs(drawn_nodes(moved) - drawn_nodes(start)).max() > 2.0
     tab.page.get_by_role("button", name="Reset", exact=True).click()
-    tab.until(lambda: tab.shows(drawn(start)))
+    tab.until(lambda: tab.shows(drawn_nodes(start)))
     check_numbers(tab, start)
     assert float(tab.box("EXX").input_value()) == 0.0
 
@@ -82,7 +78,7 @@ def test_last_position_of_a_fast_drag_is_what_is_shown(tab: Tab) -> None:
     for value in np.linspace(-10.0, 10.0, 60).round(1):
         tab.send("EYX", f"{value}")
         tab.page.wait_for_timeout(8)
-    tab.until(lambda: tab.shows(drawn(model(START.with_amplitude("EYX", 10.0)))))
+    tab.until(lambda: tab.shows(drawn_nodes(model(START.with_amplitude("EYX", 10.0)))))
     check_numbers(tab, model(START.with_amplitude("EYX", 10.0)))
 
 
@@ -93,7 +89,7 @@ def test_hostile_values_are_clamped_and_shown_as_clamped(tab: Tab, sent: str, ke
     tab.send("EAX", sent)
     tab.until(lambda: tab.page.get_by_text("Clamped").count() > 0)
     expected = START.with_amplitude("EAX", kept)
-    tab.until(lambda: tab.shows(drawn(model(expected))))
+    tab.until(lambda: tab.shows(drawn_nodes(model(expected))))
     tab.until(lambda: float(tab.box("EAX").input_value()) == kept)
     check_numbers(tab, model(expected))
     assert tab.page.get_by_text(r"EAX =").first.is_visible()
@@ -108,13 +104,13 @@ def test_hostile_density_factor_and_words(tab: Tab) -> None:
     tab.page.wait_for_timeout(500)
     tab.send("EXX", "4")
     wanted = START.with_amplitude("EXX", 4.0).with_exaggeration(1.0)
-    tab.until(lambda: tab.shows(drawn(model(wanted))))
+    tab.until(lambda: tab.shows(drawn_nodes(model(wanted))))
 
 
 def test_number_box_takes_a_typed_value(tab: Tab) -> None:
     tab.box("EXX").fill("5.5")
     tab.box("EXX").press("Enter")
-    tab.until(lambda: tab.shows(drawn(model(START.with_amplitude("EXX", 5.5)))))
+    tab.until(lambda: tab.shows(drawn_nodes(model(START.with_amplitude("EXX", 5.5)))))
 
 
 def test_exaggeration_component_density_loop_and_positions(tab: Tab) -> None:
@@ -129,7 +125,7 @@ def test_exaggeration_component_density_loop_and_positions(tab: Tab) -> None:
     tab.send("B [°]", "-30")
     state = START.with_component("x").with_loop("relative").with_nodes(11).with_position("B", -30.0)
     frame = model(state)
-    tab.until(lambda: tab.shows(drawn(frame)))
+    tab.until(lambda: tab.shows(drawn_nodes(frame)))
     values = frame.values.reshape(-1)[frame.topology.surface.nodes]
     _, colours = tab.surface()
     np.testing.assert_allclose(colours, vertex_colours(frame.scale, values), atol=1e-5)
@@ -139,7 +135,7 @@ def test_exaggeration_component_density_loop_and_positions(tab: Tab) -> None:
 def test_another_scene_brings_its_title_sliders_and_box(tab: Tab) -> None:
     scene = load_scene("teach_tilted_c")
     tab.choose("Scene", scene.title)
-    tab.until(lambda: tab.shows(drawn(model(start_state(scene)))))
+    tab.until(lambda: tab.shows(drawn_nodes(model(start_state(scene)))))
     assert scene.title in tab.page.title()
     assert float(tab.box("EA0C").input_value()) == 40.0
     assert tab.page.get_by_text("Rotary positions").is_visible()
@@ -148,9 +144,9 @@ def test_another_scene_brings_its_title_sliders_and_box(tab: Tab) -> None:
 def test_two_tabs_are_independent(tab: Tab, open_tab: Callable[[], Tab], viewer: Viewer) -> None:
     other = open_tab()
     tab.send("EXX", "6")
-    tab.until(lambda: tab.shows(drawn(model(START.with_amplitude("EXX", 6.0)))))
+    tab.until(lambda: tab.shows(drawn_nodes(model(START.with_amplitude("EXX", 6.0)))))
     other.page.wait_for_timeout(500)
-    assert other.shows(drawn(model(START)))
+    assert other.shows(drawn_nodes(model(START)))
     open_now = len(viewer.sessions)
     other.page.close()
     tab.until(lambda: len(viewer.sessions) == open_now - 1)
@@ -166,4 +162,4 @@ def test_exception_in_the_session_is_shown_and_the_session_goes_on(
     tab.until(lambda: tab.page.get_by_text("a wheel came off").count() > 0)
     assert "a wheel came off" in caplog.text
     tab.send("EXX", "4")
-    tab.until(lambda: tab.shows(drawn(model(START.with_amplitude("EXX", 4.0)))))
+    tab.until(lambda: tab.shows(drawn_nodes(model(START.with_amplitude("EXX", 4.0)))))

@@ -11,29 +11,26 @@ from urllib.parse import urlencode
 import numpy as np
 import pytest
 
-from app.conftest import Tab
+from app.conftest import SCENES, Tab, drawn_nodes, state_of
 from warpspace.app import edits, links
 from warpspace.app.compare import scene_side, with_pin, with_sides
 from warpspace.app.comparison import Side
 from warpspace.app.conventions import Effects, with_choice
 from warpspace.app.document import open_text, state_to_toml
-from warpspace.app.live import Frame, LiveModel
+from warpspace.app.live import LiveModel
 from warpspace.app.mapmesh import map_mesh
 from warpspace.app.picked import Picked
 from warpspace.app.resulting import scene_of
 from warpspace.app.state import AppState, start_state
 from warpspace.app.viewer import Viewer
-from warpspace.cli.services import build_services
 from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import Table
-from warpspace.scene.library import load_scene
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext
 
 pytestmark = pytest.mark.browser
 LIVE = LiveModel()
-SCENES = [load_scene(name) for name in ("dvf5000_first", "dvf5000_second", "teach_tilted_c")]
 START = start_state(SCENES[0])
 LISTEN = """window.said = new Set();
 new MutationObserver(() => document.querySelectorAll('.mantine-Notification-root').forEach(
@@ -44,31 +41,9 @@ WORKSPACE = b"[workspace]\nX = [-275, 275]\nY = [-225, 225]\nZ = [-480, -80]\nB 
 
 
 @pytest.fixture(scope="module")
-def viewer() -> Iterator[Viewer]:
-    """The app with figures and exports, as the command line starts it."""
-    scenes = {scene.title: scene for scene in SCENES}
-    with Viewer(SCENES[0], scenes, services=build_services()) as running:
-        yield running
-
-
-def drawn(frame: Frame) -> np.ndarray:
-    return frame.drawn_mm.reshape(-1, 3)[frame.topology.surface.nodes]
-
-
-def panel(tab: Tab, name: str) -> None:
-    tab.page.get_by_role("tab", name=name, exact=True).click()
-
-
-def state_of(viewer: Viewer, tab: Tab) -> AppState:
-    """State of the newest session: that of the tab under test."""
-    tab.page.wait_for_timeout(200)
-    return viewer.sessions[-1].state
-
-
-def upload(tab: Tab, name: str, content: bytes) -> None:
-    tab.page.locator("input[type=file]").set_input_files(
-        {"name": name, "mimeType": "text/plain", "buffer": content}
-    )
+def viewer(serving_viewer: Viewer) -> Viewer:
+    """The app these tests look at."""
+    return serving_viewer
 
 
 @pytest.fixture
@@ -94,13 +69,13 @@ def test_a_link_to_another_scene_with_changed_errors_leaves_no_message(
 ) -> None:
     """Sliders of the former scene must not be told anything once they are to be replaced."""
     tab = follow("scene=dvf5000_second&EXX=4&EC0Y=1")
-    tab.until(lambda: state_of(viewer, tab).scene is SCENES[1])
+    tab.until(lambda: state_of(viewer, tab).scene.name == SCENES[1].name)
     tab.page.wait_for_timeout(1500)
 
 
 def compare_with_pin(tab: Tab, viewer: Viewer) -> AppState:
     """Pin, change an error, and draw the difference; give the state it amounts to."""
-    panel(tab, "Compare")
+    tab.panel("Compare")
     tab.page.get_by_role("button", name="Pin now and compare").click()
     tab.until(lambda: tab.page.locator("[data-compared='mean A − B']").count() == 1)
     tab.send("EXX", "10")
@@ -108,7 +83,7 @@ def compare_with_pin(tab: Tab, viewer: Viewer) -> AppState:
     state = replace(state, comparison=state.comparison.with_shown("difference"))
     tab.page.wait_for_timeout(100)
     tab.page.get_by_role("button", name="A − B", exact=True).click()
-    tab.until(lambda: tab.shows(drawn(LIVE.frame(state))))
+    tab.until(lambda: tab.shows(drawn_nodes(LIVE.frame(state))))
     assert state_of(viewer, tab) == state
     return state
 
@@ -120,7 +95,7 @@ def said(tab: Tab) -> list[str]:
 
 def press_link(tab: Tab) -> str:
     """Press Link; give what stands in the address bar."""
-    panel(tab, "Files")
+    tab.panel("Files")
     tab.page.get_by_role("button", name="Link", exact=True).click()
     tab.until(lambda: f"{links.PARAMETER}=" in tab.page.url)
     return links.unpack(tab.page.url.partition(f"{links.PARAMETER}=")[2].split("&")[0])
@@ -131,40 +106,40 @@ def test_a_link_brings_the_comparison_with_its_snapshot(
 ) -> None:
     state = compare_with_pin(tab, viewer)
     other = follow(press_link(tab))
-    other.until(lambda: other.shows(drawn(LIVE.frame(state))))
+    other.until(lambda: other.shows(drawn_nodes(LIVE.frame(state))))
     assert state_of(viewer, other) == state
-    panel(other, "Compare")
+    other.panel("Compare")
     other.until(lambda: other.page.locator("[data-compared='mean A − B']").count() == 1)
     snapshot = state.comparison.pinned.title
     assert other.page.get_by_label("B", exact=True).input_value() == snapshot
     assert other.page.get_by_label("A", exact=True).input_value() == "now"
     # and it goes on from there
     other.page.get_by_role("button", name="B", exact=True).click()
-    other.until(lambda: other.shows(drawn(LIVE.frame(START))))
+    other.until(lambda: other.shows(drawn_nodes(LIVE.frame(START))))
 
 
 def test_a_saved_scene_brings_the_comparison_of_two_scenes(
     tab: Tab, viewer: Viewer, open_tab: Callable[[], Tab]
 ) -> None:
-    panel(tab, "Compare")
+    tab.panel("Compare")
     tab.choose("B", SCENES[1].title)
     tab.until(lambda: tab.page.locator("[data-compared='mean A − B']").count() == 1)
     state = with_sides(START, Side(), scene_side(SCENES[1]))
-    panel(tab, "Files")
+    tab.panel("Files")
     with tab.page.expect_download() as waiting:
         tab.page.get_by_role("button", name="Save scene", exact=True).click()
     content = Path(waiting.value.path()).read_bytes()
     other = open_tab()
-    panel(other, "Files")
-    upload(other, "dvf5000_first.toml", content)
+    other.panel("Files")
+    other.upload("dvf5000_first.toml", content)
     other.until(lambda: state_of(viewer, other).comparison == state.comparison)
-    panel(other, "Compare")
+    other.panel("Compare")
     other.until(lambda: other.page.get_by_label("B", exact=True).input_value() == SCENES[1].title)
     other.page.get_by_role("button", name="A − B", exact=True).click()
     frame = LIVE.frame(replace(state, comparison=state.comparison.with_shown("difference")))
-    other.until(lambda: other.shows(drawn(frame)))
+    other.until(lambda: other.shows(drawn_nodes(frame)))
     # a scene that says nothing of how it is looked at leaves the comparison alone
-    upload(other, "plain.toml", b'title = "Plain"\nmachine = "dvf5000"\n' + WORKSPACE)
+    other.upload("plain.toml", b'title = "Plain"\nmachine = "dvf5000"\n' + WORKSPACE)
     other.until(lambda: state_of(viewer, other).scene.title == "Plain")
     assert viewer.sessions[-1].state.comparison.b == state.comparison.b
     assert other.errors == []
@@ -180,11 +155,11 @@ def test_a_point_of_a_trace_and_its_lever_come_with_a_link(
         lever="EC0B",
     )
     viewer.sessions[-1].post(lambda _: asked)
-    panel(tab, "Why")
+    tab.panel("Why")
     tab.until(lambda: tab.page.locator("[data-value='why norm']").count() == 1)
     norm = tab.text("why norm")
     other = follow(press_link(tab))
-    panel(other, "Why")
+    other.panel("Why")
     other.until(lambda: other.page.locator("[data-value='why norm']").count() == 1)
     assert other.text("why norm") == norm
     assert "mm" in other.text("lever")
@@ -233,7 +208,7 @@ def test_what_is_too_large_for_a_link_is_left_out_and_named(tab: Tab, viewer: Vi
 def test_exports_show_the_difference_that_is_drawn(tab: Tab, viewer: Viewer) -> None:
     state = compare_with_pin(tab, viewer)
     frame = LIVE.frame(state)
-    panel(tab, "Files")
+    tab.panel("Files")
     tab.until(lambda: tab.page.locator("[data-value='exported']").count() == 1)
     assert tab.text("exported").startswith(f"Pictures and exports show {frame.compared.title}")
     contents: dict[str, bytes] = {}
@@ -248,14 +223,14 @@ def test_exports_show_the_difference_that_is_drawn(tab: Tab, viewer: Viewer) -> 
     assert largest == pytest.approx(frame.statistics.max_um, abs=1e-6)
     assert frame.compared.title in contents["html"].decode()
     assert b"A \xe2\x88\x92 B" in contents["glb"]
-    panel(tab, "Compare")
+    tab.panel("Compare")
     tab.choose("B", "nothing")
-    panel(tab, "Files")
+    tab.panel("Files")
     tab.until(lambda: tab.page.locator("[data-value='exported']").count() == 0)
 
 
 def test_the_difference_is_drawn_in_slices_and_cut_open(tab: Tab) -> None:
-    panel(tab, "Compare")
+    tab.panel("Compare")
     tab.choose("B", SCENES[1].title)
     tab.page.wait_for_timeout(100)
     tab.page.get_by_role("button", name="A − B", exact=True).click()
@@ -269,16 +244,16 @@ def test_the_difference_is_drawn_in_slices_and_cut_open(tab: Tab) -> None:
 
 
 def test_a_linear_axis_is_turned_round_in_the_conventions(tab: Tab) -> None:
-    panel(tab, "Conventions")
+    tab.panel("Conventions")
     effect = Effects().of(START)["direction X=-1"]
     row = tab.page.locator("[data-choice='direction X=-1']")
     tab.until(lambda: "…" not in row.inner_text())
     assert row.inner_text().split()[-2:] == [f"{effect.mean_um:.2f}", f"{effect.max_um:.2f}"]
     row.click()
-    tab.until(lambda: tab.shows(drawn(LIVE.frame(with_choice(START, "direction X=-1")))))
+    tab.until(lambda: tab.shows(drawn_nodes(LIVE.frame(with_choice(START, "direction X=-1")))))
     tab.until(lambda: row.get_attribute("aria-checked") == "true")
     tab.page.get_by_role("button", name="Conventions of the scene").click()
-    tab.until(lambda: tab.shows(drawn(LIVE.frame(START))))
+    tab.until(lambda: tab.shows(drawn_nodes(LIVE.frame(START))))
 
 
 @pytest.mark.slow
@@ -289,13 +264,13 @@ def test_opened_scenes_do_not_pile_up(
     # the page shows a few messages at a time, which would take minutes
     client = viewer.sessions[-1]._client
     monkeypatch.setattr(client, "add_notification", lambda _, text, **__: notes.append(text))
-    panel(tab, "Files")
+    tab.panel("Files")
     for number in range(22):
         scene = replace(SCENES[1], title=f"Machine {number}", name=f"machine {number}")
-        upload(tab, f"machine {number}.toml", state_to_toml(start_state(scene)).encode())
+        tab.upload(f"machine {number}.toml", state_to_toml(start_state(scene)).encode())
         tab.until(lambda n=number: viewer.sessions[-1].state.scene.title == f"Machine {n}")
     tab.until(lambda: any("Machine 1 left the list" in text for text in notes))
-    panel(tab, "View")
+    tab.panel("View")
     tab.page.get_by_label("Scene", exact=True).first.click()
     tab.page.wait_for_timeout(300)
     options = tab.page.get_by_role("option").all_inner_texts()

@@ -1,28 +1,26 @@
 """Why, compare, conventions and files in a real Chromium: what is done, and what is then shown."""
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from app.conftest import Tab, wait_until_open
+from app.conftest import SCENES, Tab, drawn_nodes, state_of, wait_until_open
 from warpspace.app.compare import scene_side, with_sides
 from warpspace.app.comparison import Side
 from warpspace.app.conventions import Effects, with_choice
 from warpspace.app.document import state_to_toml
-from warpspace.app.live import Frame, LiveModel
-from warpspace.app.state import AppState, start_state
+from warpspace.app.live import LiveModel
+from warpspace.app.state import start_state
 from warpspace.app.viewer import Viewer
 from warpspace.app.why import Picked, answer
-from warpspace.cli.services import build_services
 from warpspace.scene.library import load_scene
 
 pytestmark = pytest.mark.browser
 LIVE = LiveModel()
-SCENES = [load_scene(name) for name in ("dvf5000_first", "dvf5000_second", "teach_tilted_c")]
 START = start_state(SCENES[0])
 PLACE = """name => {
   const node = window.__viserMutable.nodeRefFromName[name];
@@ -31,25 +29,9 @@ PLACE = """name => {
 
 
 @pytest.fixture(scope="module")
-def viewer() -> Iterator[Viewer]:
-    """The app with figures and exports, as the command line starts it."""
-    scenes = {scene.title: scene for scene in SCENES}
-    with Viewer(SCENES[0], scenes, services=build_services()) as running:
-        yield running
-
-
-def drawn(frame: Frame) -> np.ndarray:
-    return frame.drawn_mm.reshape(-1, 3)[frame.topology.surface.nodes]
-
-
-def panel(tab: Tab, name: str) -> None:
-    tab.page.get_by_role("tab", name=name, exact=True).click()
-
-
-def shown_state(viewer: Viewer, tab: Tab) -> AppState:
-    """State of the newest session: that of the tab under test."""
-    tab.page.wait_for_timeout(200)
-    return viewer.sessions[-1].state
+def viewer(serving_viewer: Viewer) -> Viewer:
+    """The app these tests look at."""
+    return serving_viewer
 
 
 def click_box(tab: Tab) -> None:
@@ -63,15 +45,9 @@ def numbers(text: str) -> list[float]:
     return [float(n.replace("−", "-")) for n in re.findall(r"[+−-]?\d+\.?\d*", text)]
 
 
-def upload(tab: Tab, name: str, content: bytes) -> None:
-    tab.page.locator("input[type=file]").set_input_files(
-        {"name": name, "mimeType": "text/plain", "buffer": content}
-    )
-
-
 def test_a_click_on_the_box_says_why(tab: Tab, viewer: Viewer) -> None:
     click_box(tab)
-    picked = shown_state(viewer, tab).picked
+    picked = state_of(viewer, tab).picked
     assert picked is not None
     frame = LIVE.frame(START)
     found = answer(START, picked, frame.exaggeration)
@@ -104,7 +80,7 @@ def test_choosing_a_contribution_draws_axis_and_lever_and_follows(tab: Tab, view
     before = tab.page.evaluate(PLACE, "/why/marker")
     tab.send("EXX", "9")
     state = START.with_amplitude("EXX", 9.0)
-    picked = shown_state(viewer, tab).picked
+    picked = state_of(viewer, tab).picked
     assert picked is not None
     tab.until(lambda: tab.page.evaluate(PLACE, "/why/marker") != before)
     found = answer(state, picked, LIVE.frame(state).exaggeration)
@@ -120,13 +96,13 @@ def test_choosing_a_contribution_draws_axis_and_lever_and_follows(tab: Tab, view
 
 
 def test_two_scenes_are_compared_with_one_scale(tab: Tab) -> None:
-    panel(tab, "Compare")
+    tab.panel("Compare")
     tab.choose("B", SCENES[1].title)
     state = with_sides(START, Side(), scene_side(SCENES[1]))
     for name, word in (("B", "b"), ("A − B", "difference"), ("A", "a")):
         frame = LIVE.frame(replace(state, comparison=state.comparison.with_shown(word)))
         tab.page.get_by_role("button", name=name, exact=True).click()
-        tab.until(lambda frame=frame: tab.shows(drawn(frame)))
+        tab.until(lambda frame=frame: tab.shows(drawn_nodes(frame)))
         tab.page.get_by_role("button", name=f"▸ {name}", exact=True).wait_for()
         assert ("second machine" in tab.text("compared")) == (word != "a")
         for column, found in (
@@ -140,11 +116,11 @@ def test_two_scenes_are_compared_with_one_scale(tab: Tab) -> None:
     tab.until(lambda: tab.page.evaluate(PLACE, "/compare/other") is not None)
     tab.choose("B", "nothing")
     tab.until(lambda: tab.page.evaluate(PLACE, "/compare/other") is None)
-    tab.until(lambda: tab.shows(drawn(LIVE.frame(START))))
+    tab.until(lambda: tab.shows(drawn_nodes(LIVE.frame(START))))
 
 
 def test_now_is_compared_with_a_pinned_snapshot(tab: Tab) -> None:
-    panel(tab, "Compare")
+    tab.panel("Compare")
     tab.page.get_by_role("button", name="Pin now and compare").click()
     tab.until(lambda: tab.page.locator("[data-compared='mean A − B']").count() == 1)
     tab.send("EXX", "10")
@@ -155,7 +131,7 @@ def test_now_is_compared_with_a_pinned_snapshot(tab: Tab) -> None:
 
 
 def test_a_convention_changes_the_map_and_says_by_how_much(tab: Tab) -> None:
-    panel(tab, "Conventions")
+    tab.panel("Conventions")
     effect = Effects().of(START)["component_errors=before_motion"]
     row = tab.page.locator("[data-choice='component_errors=before_motion']")
     tab.until(lambda: "…" not in row.inner_text())
@@ -164,20 +140,20 @@ def test_a_convention_changes_the_map_and_says_by_how_much(tab: Tab) -> None:
     )
     row.click()
     state = with_choice(START, "component_errors=before_motion")
-    tab.until(lambda: tab.shows(drawn(LIVE.frame(state))))
+    tab.until(lambda: tab.shows(drawn_nodes(LIVE.frame(state))))
     tab.page.get_by_role("button", name="Conventions of the scene").click()
-    tab.until(lambda: tab.shows(drawn(LIVE.frame(START))))
+    tab.until(lambda: tab.shows(drawn_nodes(LIVE.frame(START))))
 
 
 def test_the_reference_is_picked_on_the_box(tab: Tab, viewer: Viewer) -> None:
-    panel(tab, "Conventions")
+    tab.panel("Conventions")
     tab.page.get_by_role("button", name="Pick the reference in 3-D").click()
     tab.page.wait_for_timeout(400)
     tab.page.mouse.click(760, 480)
-    tab.until(lambda: shown_state(viewer, tab).scene.reference is not None)
-    state = shown_state(viewer, tab)
+    tab.until(lambda: state_of(viewer, tab).scene.reference is not None)
+    state = state_of(viewer, tab)
     assert state.picked is None
-    tab.until(lambda: tab.shows(drawn(LIVE.frame(state))))
+    tab.until(lambda: tab.shows(drawn_nodes(LIVE.frame(state))))
     at = Picked(dict(state.scene.reference or {}))
     assert np.linalg.norm(answer(state, at, 1.0).explanation.error_um) < 1e-6
 
@@ -190,19 +166,19 @@ def test_a_saved_scene_opens_to_the_identical_state(
     tab.send("B [°]", "-20")
     tab.page.wait_for_timeout(100)
     tab.choose("Colour", "E_y")
-    state = shown_state(viewer, tab)
+    state = state_of(viewer, tab)
     assert state.positions["B"] == -20.0
-    panel(tab, "Files")
+    tab.panel("Files")
     with tab.page.expect_download() as waiting:
         tab.page.get_by_role("button", name="Save scene", exact=True).click()
     assert waiting.value.suggested_filename == "dvf5000_first.toml"
     path = tmp_path / "dvf5000_first.toml"
     waiting.value.save_as(path)
     other = open_tab()
-    panel(other, "Files")
-    upload(other, "dvf5000_first.toml", path.read_bytes())
-    other.until(lambda: other.shows(drawn(LIVE.frame(state))))
-    back = shown_state(viewer, other)
+    other.panel("Files")
+    other.upload("dvf5000_first.toml", path.read_bytes())
+    other.until(lambda: other.shows(drawn_nodes(LIVE.frame(state))))
+    back = state_of(viewer, other)
     assert back.amplitudes == state.amplitudes
     assert back.component == "y"
     assert load_scene(path).errors.amplitude("EXX") == 7.5
@@ -215,7 +191,7 @@ def test_a_link_brings_camera_and_settings(tab: Tab, viewer: Viewer) -> None:
     tab.page.mouse.move(760, 480)
     tab.page.mouse.wheel(0, 400)
     tab.page.wait_for_timeout(600)
-    panel(tab, "Files")
+    tab.panel("Files")
     tab.page.get_by_role("button", name="Link", exact=True).click()
     tab.until(lambda: "view=" in tab.page.url)
     link = tab.page.url
@@ -238,7 +214,7 @@ def test_a_link_brings_camera_and_settings(tab: Tab, viewer: Viewer) -> None:
 
 @pytest.mark.parametrize(("name", "ending"), [("View", "png"), ("HTML", "html"), ("GLB", "glb")])
 def test_pictures_and_exports_are_downloaded(tab: Tab, name: str, ending: str) -> None:
-    panel(tab, "Files")
+    tab.panel("Files")
     with tab.page.expect_download(timeout=60_000) as waiting:
         tab.page.get_by_role("button", name=name, exact=True).click()
     content = Path(waiting.value.path()).read_bytes()
@@ -249,7 +225,7 @@ def test_pictures_and_exports_are_downloaded(tab: Tab, name: str, ending: str) -
 
 @pytest.mark.render
 def test_the_figure_is_drawn_and_can_be_cancelled(tab: Tab, renderer: str) -> None:
-    panel(tab, "Files")
+    tab.panel("Files")
     tab.page.get_by_role("button", name="Figure", exact=True).click()
     tab.page.get_by_role("button", name="Cancel", exact=True).click()
     tab.until(lambda: tab.page.get_by_text("Cancelled").count() > 0)
@@ -260,20 +236,20 @@ def test_the_figure_is_drawn_and_can_be_cancelled(tab: Tab, renderer: str) -> No
 
 
 def test_bad_uploads_are_refused_in_the_page_and_the_session_goes_on(tab: Tab) -> None:
-    panel(tab, "Files")
+    tab.panel("Files")
     problems = b'machine = "dvf5001"\nsurprise = 1\n[errors]\nEC0X = "a"\n'
-    upload(tab, "../../evil.toml", problems)
+    tab.upload("../../evil.toml", problems)
     tab.until(lambda: tab.page.get_by_text("4 problems").count() > 0)
-    upload(tab, "noise.toml", b"\xff\xfe\x00\x01")
+    tab.upload("noise.toml", b"\xff\xfe\x00\x01")
     tab.until(lambda: tab.page.get_by_text("not UTF-8").count() > 0)
-    upload(tab, "big.toml", b"x" * (5 * 2**20))
+    tab.upload("big.toml", b"x" * (5 * 2**20))
     tab.until(lambda: tab.page.get_by_text("at most 4 MB").count() > 0)
     tab.send("EXX", "4")
-    tab.until(lambda: tab.shows(drawn(LIVE.frame(START.with_amplitude("EXX", 4.0)))))
+    tab.until(lambda: tab.shows(drawn_nodes(LIVE.frame(START.with_amplitude("EXX", 4.0)))))
 
 
 def test_a_200_mb_upload_announced_by_a_hostile_page_is_not_kept(tab: Tab, viewer: Viewer) -> None:
-    panel(tab, "Files")
+    tab.panel("Files")
     uuid = tab.page.locator("input[type=file]").get_attribute("id").removeprefix("file_upload_")
     script = """([uuid, transfer, size, parts]) => {
       const viewer = window.__viserMutable;
@@ -290,19 +266,19 @@ def test_a_200_mb_upload_announced_by_a_hostile_page_is_not_kept(tab: Tab, viewe
     tab.until(lambda: tab.page.get_by_text("more has arrived").count() > 0)
     assert viewer.sessions[-1]._client.gui._current_file_upload_states == {}
     tab.send("EXX", "4")
-    tab.until(lambda: tab.shows(drawn(LIVE.frame(START.with_amplitude("EXX", 4.0)))))
+    tab.until(lambda: tab.shows(drawn_nodes(LIVE.frame(START.with_amplitude("EXX", 4.0)))))
 
 
 def test_ten_uploads_at_once_and_a_script_in_a_title(tab: Tab, viewer: Viewer) -> None:
-    panel(tab, "Files")
+    tab.panel("Files")
     evil = "<img src=x onerror='window.hacked=1'><script>window.hacked=2</script>"
     scene = replace(SCENES[1], title=evil)
     text = state_to_toml(start_state(scene))
     for number in range(10):
-        upload(tab, f"scene {number}.toml", text.encode())
-    tab.until(lambda: tab.shows(drawn(LIVE.frame(start_state(SCENES[1])))), 30.0)
-    tab.until(lambda: shown_state(viewer, tab).scene.name == "scene 9", 30.0)
-    panel(tab, "Compare")
+        tab.upload(f"scene {number}.toml", text.encode())
+    tab.until(lambda: tab.shows(drawn_nodes(LIVE.frame(start_state(SCENES[1])))), 30.0)
+    tab.until(lambda: state_of(viewer, tab).scene.name == "scene 9", 30.0)
+    tab.panel("Compare")
     tab.page.get_by_role("button", name="Pin now and compare").click()
     tab.page.wait_for_timeout(800)
     assert tab.page.evaluate("window.hacked") is None

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from app.conftest import Tab, wait_until_open
+from app.conftest import Tab, drawn_nodes, wait_until_open
 from warpspace.app import edits
 from warpspace.app.live import Frame, LiveModel
 from warpspace.app.state import AppState, start_state
@@ -31,8 +31,7 @@ def model(state: AppState) -> Frame:
 
 
 def drawn(state: AppState) -> np.ndarray:
-    frame = model(state)
-    return frame.drawn_mm.reshape(-1, 3)[frame.topology.surface.nodes]
+    return drawn_nodes(model(state))
 
 
 def shows(tab: Tab, state: AppState) -> None:
