@@ -2,7 +2,10 @@
 
 import re
 import secrets
+import threading
+import time
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,7 +20,8 @@ from websockets.sync.connection import Connection
 from warpspace.app import opening
 from warpspace.app.arrivals import CARRIER, MOST_HEARD, Arrivals
 from warpspace.app.opening import drawn_script, stage_script
-from warpspace.app.state import start_state
+from warpspace.app.panels.contents import Contents
+from warpspace.app.state import AppState, start_state
 from warpspace.app.viewer import Viewer
 from warpspace.machine.parameters import PARAMETERS
 from warpspace.scene.library import load_scene
@@ -104,14 +108,18 @@ def viewer() -> Iterator[Viewer]:
         yield running
 
 
-@pytest.fixture
-def wire(viewer: Viewer) -> Iterator[Wire]:
-    with connect(
+def dial(viewer: Viewer) -> Connection:
+    return connect(
         viewer.url.replace("http", "ws", 1),
         subprotocols=[f"viser-v{viser.__version__}"],  # pyright: ignore[reportArgumentType]
         max_size=None,
         compression=None,
-    ) as socket:
+    )
+
+
+@pytest.fixture
+def wire(viewer: Viewer) -> Iterator[Wire]:
+    with dial(viewer) as socket:
         yield Wire(socket)
 
 
@@ -146,6 +154,47 @@ def test_a_page_that_does_not_answer_gets_all_of_it(
     monkeypatch.setattr(opening, "ANSWER_S", 0.05)
     assert wire.read_until(lambda: OPEN in wire.scripts)
     assert wire.keys == KEYS
+
+
+def test_pages_that_open_at_once_get_all_of_it(
+    viewer: Viewer, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(opening, "ANSWER_S", 0.0)
+    with ExitStack() as stack:
+        wires = [Wire(stack.enter_context(dial(viewer))) for _ in range(8)]
+        for wire in wires:
+            assert wire.read_until(lambda wire=wire: OPEN in wire.scripts)
+            assert wire.keys == KEYS
+            assert "Conventions of the scene" in wire.labels
+            assert "NotificationShowMessage" not in wire.kinds
+    assert not caplog.records
+
+
+@pytest.mark.filterwarnings("ignore:Queued an? .* on a closed connection")  # as `run_viewer` does
+def test_a_page_that_leaves_while_it_is_built_leaves_nothing_behind(
+    viewer: Viewer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reached, left, build = threading.Event(), threading.Event(), Contents._build_behind
+
+    def build_late(contents: Contents, state: AppState) -> Any:
+        reached.set()
+        assert left.wait(20.0)
+        return build(contents, state)
+
+    monkeypatch.setattr(Contents, "_build_behind", build_late)
+    monkeypatch.setattr(opening, "ANSWER_S", 0.0)
+    places = viewer._places._tabs
+    with dial(viewer) as socket:
+        Wire(socket)
+        assert reached.wait(20.0)
+        (session,) = viewer.sessions
+        assert places["View"]._children
+    while viewer.sessions:
+        time.sleep(0.01)
+    left.set()
+    session._worker.join(20.0)
+    assert not session._worker.is_alive()
+    assert {name: len(tab._children) for name, tab in places.items() if tab._children} == {}
 
 
 def test_the_scripts_carry_what_the_page_is_to_say() -> None:

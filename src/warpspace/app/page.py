@@ -29,6 +29,11 @@ class Page:
         event = connection.get_message_buffer().message_event
         event.set = _set_on_loop(event)
 
+    def leave(self) -> None:
+        """Take out of the server's tabs what has been built since the connection ended."""
+        # viser does so when the connection ends, when a step may still be on its way
+        self._client.gui._release_cross_scope_nesting()  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
+
     def run_script(self, source: str) -> None:
         """Run JavaScript of our own in the page; no word of a user's may be in it unescaped."""
         # viser has a message for it and no method

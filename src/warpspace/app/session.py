@@ -127,6 +127,7 @@ class Session:
                 self._turn()
         finally:
             self.board.unsubscribe(self.changed)
+            self._guarded(self._page.leave)
             # what is large is let go at once, not when cycles happen to be looked for
             self._parts, self._opening, self._shown = Parts(), None, None
 

@@ -44,7 +44,7 @@ class Contents:
     def __init__(
         self, desk: Desk, outside: Outside, places: Places, fit_view: Choose, play: Play
     ) -> None:
-        self._desk, self._outside, self._tabs = desk, outside, places.tabs
+        self._desk, self._outside, self._places = desk, outside, places
         self._fit_view, self._play = fit_view, play
         self._errors: ErrorsPanel | None = None
         self._shape: ShapePanel | None = None
@@ -55,9 +55,9 @@ class Contents:
         self._outside.run_script(SCRIPT)
         commands = CommandsPanel(self._desk, lambda: self._fit_view(None, None))
         self._errors = errors = ErrorsPanel(self._desk, state, self._choose, self._open_curve)
-        with self._tabs["Result"]:
+        with self._places.at("Result"):
             summary = summary_panel(self._desk)
-        with self._tabs["heading"]:
+        with self._places.at("heading"):
             heading = heading_panel(self._desk)
         return [errors, commands, summary, heading]
 
@@ -86,7 +86,7 @@ class Contents:
         curve.dock_below(gui.main_panel)
         self._outside.run_script(split_script())
         self._expand = curve.expand
-        with self._tabs["View"]:
+        with self._places.at("View"):
             view = ViewPanel(self._desk, state, self._outside.scenes)
             looks = LooksPanel(self._desk, state)
             camera = CameraPanel(self._desk, self._fit_view)
@@ -94,21 +94,21 @@ class Contents:
 
     def _build_behind(self, state: AppState) -> Sequence[Panel]:
         """Build the tabs behind the numbers and behind the view."""
-        with self._tabs["Why"]:
+        with self._places.at("Why"):
             why = WhyPanel(self._desk, self._outside)
-        with self._tabs["Gains"]:
+        with self._places.at("Gains"):
             gains = GainsPanel(self._desk)
-        with self._tabs["Compare"]:
+        with self._places.at("Compare"):
             compare = ComparePanel(self._desk, self._outside.scenes)
-        with self._tabs["Files"]:
+        with self._places.at("Files"):
             files = FilesPanel(self._desk, self._outside)
-        with self._tabs["Machine"]:
+        with self._places.at("Machine"):
             machine = MachinePanel(self._desk, state)
-        with self._tabs["Table"]:
+        with self._places.at("Table"):
             rotary = RotaryPanel(self._desk, state, self._play)
-        with self._tabs["Chance"]:
+        with self._places.at("Chance"):
             chance = ChancePanel(self._desk, state)
-        with self._tabs["Conventions"]:
+        with self._places.at("Conventions"):
             conventions = ConventionsPanel(self._desk, state)
         Pointing(self._outside, self._desk, conventions)
         return [why, gains, compare, files, machine, rotary, chance, conventions]

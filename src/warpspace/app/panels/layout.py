@@ -4,8 +4,9 @@ The places are the server's, the same for every tab, and on their way as soon as
 what stands in them belongs to each tab.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import threading
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
 
 from viser import GuiApi, GuiTabHandle
 
@@ -93,11 +94,10 @@ def split_script(share: float = ERRORS_SHARE) -> str:
 }})();"""
 
 
-@dataclass(frozen=True, slots=True)
 class Places:
     """Where a tab puts its panels.
 
-    Attributes
+    Parameters
     ----------
     tabs : mapping of str to viser.GuiTabHandle
         By the word on them. What has no tab stands in the main panel.
@@ -105,8 +105,16 @@ class Places:
         Whether a page starts dark.
     """
 
-    tabs: Mapping[str, GuiTabHandle]
-    dark: bool
+    def __init__(self, tabs: Mapping[str, GuiTabHandle], *, dark: bool) -> None:
+        self._tabs = dict(tabs)
+        self.dark = dark
+        self._lock = threading.Lock()
+
+    @contextmanager
+    def at(self, name: str) -> Generator[None]:
+        """Build within a tab; pages that open at once take turns, as viser's handles want it."""
+        with self._lock, self._tabs[name]:
+            yield
 
 
 def lay_out(gui: GuiApi, *, dark: bool) -> Places:
@@ -153,4 +161,4 @@ def lay_out(gui: GuiApi, *, dark: bool) -> Places:
     top = gui.add_panel()
     tabs["heading"] = top.add_tab("warpspace")
     top.float(x=12, y=12, width=520)
-    return Places(tabs, dark)
+    return Places(tabs, dark=dark)
