@@ -21,6 +21,7 @@ from warpspace.app import opening
 from warpspace.app.arrivals import CARRIER, MOST_HEARD, Arrivals
 from warpspace.app.opening import drawn_script, stage_script
 from warpspace.app.panels.contents import Contents
+from warpspace.app.session import Session
 from warpspace.app.state import AppState, start_state
 from warpspace.app.viewer import Viewer
 from warpspace.machine.parameters import PARAMETERS
@@ -195,6 +196,32 @@ def test_a_page_that_leaves_while_it_is_built_leaves_nothing_behind(
     session._worker.join(20.0)
     assert not session._worker.is_alive()
     assert {name: len(tab._children) for name, tab in places.items() if tab._children} == {}
+
+
+def test_what_fails_because_a_page_has_just_gone_is_no_error(
+    viewer: Viewer, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    told, stop = threading.Event(), Session.stop
+
+    def stop_late(session: Session) -> None:
+        assert told.wait(20.0)
+        stop(session)
+
+    def fail() -> None:
+        raise RuntimeError("Cannot assign to a removed handle")
+
+    monkeypatch.setattr(Session, "stop", stop_late)
+    with dial(viewer) as socket:
+        Wire(socket).read_until(lambda: bool(viewer.sessions))
+        (session,) = viewer.sessions
+        session._guarded(fail)
+        assert "Cannot assign" in caplog.text
+        caplog.clear()
+    while viewer._server.get_clients():
+        time.sleep(0.01)
+    session._guarded(fail)
+    told.set()
+    assert not caplog.records
 
 
 def test_the_scripts_carry_what_the_page_is_to_say() -> None:

@@ -29,6 +29,12 @@ class Page:
         event = connection.get_message_buffer().message_event
         event.set = _set_on_loop(event)
 
+    @property
+    def is_open(self) -> bool:
+        """Whether the page is connected; it ends before its session is told."""
+        server = self._client._viser_server  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
+        return self._client.client_id in server.get_clients()
+
     def leave(self) -> None:
         """Take out of the server's tabs what has been built since the connection ended."""
         # viser does so when the connection ends, when a step may still be on its way

@@ -148,8 +148,8 @@ class Session:
         try:
             step()
         except Exception as error:
-            if self._stopped.is_set():
-                return
+            if self._stopped.is_set() or not self._page.is_open:
+                return  # nobody is there to be told, and its widgets are gone
             if is_passing(error):
                 self._wake.set()
                 return
