@@ -6,19 +6,17 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from types import SimpleNamespace
 from typing import Any
 
 import msgspec.msgpack
 import pytest
 import viser
 import zstandard
-from viser import _messages as messages
 from websockets.sync.client import connect
 from websockets.sync.connection import Connection
 
 from warpspace.app import opening
-from warpspace.app.arrivals import CARRIER, MOST_HEARD, Arrivals
+from warpspace.app.arrivals import CARRIER
 from warpspace.app.opening import drawn_script, stage_script
 from warpspace.app.panels.contents import Contents
 from warpspace.app.session import Session
@@ -228,67 +226,3 @@ def test_the_scripts_carry_what_the_page_is_to_say() -> None:
     assert '"some-widget"' in drawn_script("some-widget", 7)
     assert '"7"' in drawn_script("some-widget", 7)
     assert "requestAnimationFrame" in drawn_script("some-widget", 7)
-
-
-class Connections:
-    """Stands for viser's connections."""
-
-    def __init__(self) -> None:
-        self.handler: Any = None
-        self.sent: list[Any] = []
-
-    def register_handler(self, _: type, handler: Any) -> None:
-        self.handler = handler
-
-    def queue_message(self, message: Any) -> None:
-        self.sent.append(message)
-
-    def say(self, client: int, uuid: str, value: object) -> None:
-        self.handler(client, messages.GuiUpdateMessage(uuid, {"value": value}))
-
-
-@pytest.fixture
-def connections() -> Connections:
-    return Connections()
-
-
-@pytest.fixture
-def arrivals(connections: Connections) -> Arrivals:
-    return Arrivals(SimpleNamespace(_websock_server=connections))  # pyright: ignore[reportArgumentType]
-
-
-def test_a_token_is_heard_before_and_after_a_page_is_expected(
-    arrivals: Arrivals, connections: Connections
-) -> None:
-    assert CARRIER in connections.sent[0].source
-    connections.say(3, CARRIER, "early")
-    woken: list[int] = []
-    early, late = arrivals.expect(3), arrivals.expect(4)
-    assert early.wait(0.0, lambda: woken.append(3))
-    assert early.token == "early"
-    assert not late.wait(0.0, lambda: woken.append(4))
-    connections.say(4, CARRIER, "late")
-    connections.say(4, CARRIER, "later")  # only the first counts
-    assert late.is_there
-    assert late.token == "late"
-    assert woken == [4]
-
-
-@pytest.mark.parametrize("value", [None, 1, ["a"], {"a": 1}])
-def test_what_is_no_text_is_not_heard(
-    arrivals: Arrivals, connections: Connections, value: object
-) -> None:
-    connections.say(1, CARRIER, value)
-    connections.say(1, "some-widget", "text")
-    assert not arrivals.expect(1).is_there
-
-
-def test_pages_that_never_show_anything_are_forgotten(
-    arrivals: Arrivals, connections: Connections
-) -> None:
-    first = arrivals.expect(0)
-    for client in range(1, MOST_HEARD + 1):
-        connections.say(client, CARRIER, "x")
-    assert arrivals.expect(0) is not first
-    arrivals.forget(5)
-    assert not arrivals.expect(5).is_there

@@ -1,4 +1,4 @@
-"""Hearing which tab a page is, as soon as it is connected.
+"""Hearing which tab a page is, and how wide, as soon as it is connected.
 
 A page says so while it is still being put together; a session that asked for itself would have to
 wait for an answer until the page has drawn what it got so far.
@@ -16,23 +16,33 @@ from warpspace.app.tabs import ask_script
 
 CARRIER = "warpspace-tab-token"
 """Stands for a widget in the message of a page; viser knows none of this name."""
+LEAST_WIDTH, MOST_WIDTH = 200, 20_000
+"""Widths of pages that are believed, CSS pixels."""
 MOST_HEARD = 256
 """Pages that are remembered: one that says its token and never shows anything is forgotten."""
 
 
 class Arrival:
-    """The token of one page, once it is heard."""
+    """Token and width of one page, once they are heard.
+
+    Attributes
+    ----------
+    token : str
+    width : float or None
+        CSS pixels, whatever stands beside the drawing by now; None where the page does not say.
+    """
 
     def __init__(self) -> None:
         self._there = threading.Event()
         self._told: Callable[[], None] | None = None
         self.token = ""
+        self.width: float | None = None
 
-    def hear(self, token: str) -> None:
-        """Take note of a token; only the first counts."""
+    def hear(self, token: str, width: float | None = None) -> None:
+        """Take note of a page; only the first time counts."""
         if self._there.is_set():
             return
-        self.token = token
+        self.token, self.width = token, width
         self._there.set()
         if self._told is not None:
             self._told()
@@ -93,6 +103,8 @@ class Arrivals:
         """Take the token out of a message, if it is one of these; a browser may send anything."""
         if message.uuid != CARRIER:
             return
-        token = message.updates.get("value")
+        token, width = message.updates.get("value"), message.updates.get("width")
         if isinstance(token, str):
-            self.expect(client_id).hear(token)
+            if not isinstance(width, int | float) or not LEAST_WIDTH <= width <= MOST_WIDTH:
+                width = None
+            self.expect(client_id).hear(token, width)

@@ -87,18 +87,24 @@ class Eye:
         bars = [bar_lines(frame)[1].reshape(-1, 3)] if frame.state.look.bars else []
         return np.concatenate([room, frame.drawn_mm.reshape(-1, 3), *bars])
 
-    def fit(self, frame: Frame, *, docked: bool) -> None:
+    def fit(self, frame: Frame, *, docked: bool, page_width: float | None = None) -> None:
         """Fill the room between the panels with the box, its traces and axes.
 
         Parameters
         ----------
         frame : Frame
         docked : bool
-            Whether the panels have taken their room already.
+            Whether the panels have taken their room already, in what is known of the camera.
+        page_width : float, optional
+            Of the whole page, CSS pixels; by default that of the camera's picture if the panels
+            have not taken their room.
         """
         camera = self._camera
-        taken = 0 if docked else sum(side_widths())
-        width = max(camera.image_width - taken, LEAST_SIZE)
+        if docked:
+            width = camera.image_width
+        else:
+            width = (page_width or camera.image_width) - sum(side_widths())
+        width = max(width, LEAST_SIZE)
         height = max(camera.image_height, LEAST_SIZE)
         points = self._room_mm(frame)
         pose = view_pose(points, width / height, self._stand, heading_share(height))

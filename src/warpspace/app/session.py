@@ -72,6 +72,7 @@ class Session:
         self.board, self._places = board, places
         self.token = new_token()
         self._arrival: Arrival | None = arrival
+        self._page_width: float | None = None
         self._claim = claim
         self._eye, self._page = Eye(client), Page(client)
         self._camera: CameraMemory | None = None
@@ -158,7 +159,7 @@ class Session:
 
     def _adopt(self, arrival: Arrival) -> None:
         """Take over what the tab has left behind, if it was here before."""
-        self._arrival = None
+        self._arrival, self._page_width = None, arrival.width
         left = self._claim(self, arrival.token) if self._claim is not None else None
         if left is not None:
             self.board.unsubscribe(self.changed)
@@ -289,4 +290,4 @@ class Session:
         if memory is not None:
             self._eye.restore(memory)
         else:
-            self._eye.fit(frame, docked=self._shown is not None)
+            self._eye.fit(frame, docked=self._shown is not None, page_width=self._page_width)

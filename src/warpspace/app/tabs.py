@@ -115,7 +115,7 @@ def is_token(text: str) -> bool:
 
 
 def ask_script(carrier: str) -> str:
-    """Write the script that makes a page hand over its token.
+    """Write the script that makes a page hand over its token, and its width in CSS pixels.
 
     Parameters
     ----------
@@ -141,7 +141,8 @@ def ask_script(carrier: str) -> str:
     const viewer = window.__viserMutable;
     if (!viewer) {{ if (tries++ < 200) setTimeout(hand, 25); return; }}
     viewer.sendMessage({{
-      type: "GuiUpdateMessage", uuid: {json.dumps(carrier)}, updates: {{ value: token }}
+      type: "GuiUpdateMessage", uuid: {json.dumps(carrier)},
+      updates: {{ value: token, width: innerWidth }}
     }});
   }};
   hand();
