@@ -64,6 +64,7 @@ def test_what_is_no_text_is_not_heard(
 ) -> None:
     connections.say(1, CARRIER, value)
     connections.say(1, "some-widget", "text")
+    connections.handler(1, messages.GuiUpdateMessage(CARRIER, [1]))  # pyright: ignore[reportArgumentType]
     assert not arrivals.expect(1).is_there
 
 

@@ -103,7 +103,10 @@ class Arrivals:
         """Take the token out of a message, if it is one of these; a browser may send anything."""
         if message.uuid != CARRIER:
             return
-        token, width = message.updates.get("value"), message.updates.get("width")
+        said: Any = message.updates
+        if not isinstance(said, dict):
+            return
+        token, width = said.get("value"), said.get("width")
         if isinstance(token, str):
             if not isinstance(width, int | float) or not LEAST_WIDTH <= width <= MOST_WIDTH:
                 width = None
