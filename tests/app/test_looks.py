@@ -51,8 +51,9 @@ def test_whole_surface_is_the_outer_surface_with_its_edges():
     assert {frozenset(e) for e in found.edge_segments.tolist()} == {
         frozenset(e) for e in edges.tolist()
     }
-    corner = found.outwards[0]
-    assert corner.tolist() == [-1, -1, -1]
+    at_corner = found.edge_outwards[found.edge_segments == 0]
+    assert len(at_corner) == 3
+    assert (at_corner == -1).all()
 
 
 def test_cut_octant_opens_the_corner_towards_the_operator():

@@ -25,10 +25,9 @@ class Topology:
     surface : Surface
     grid_segments, edge_segments : ndarray, [S, 2]
         Flat node indices of the ends of each piece of line.
-    outwards : ndarray, [N, 3]
-        Per node, the sum of the outward directions of the faces it lies on.
     grid_outwards, edge_outwards : ndarray of float32, [S, 2, 3]
-        The same at the ends of the pieces of line.
+        At the ends of the pieces of line, the sum of the outward directions of the faces that the
+        node lies on.
     faces : tuple of ndarray, [a, b]
         Rectangular patches of nodes that the surface consists of.
     normals : ndarray, [F, 3]
@@ -38,7 +37,6 @@ class Topology:
     surface: surfaces.Surface
     grid_segments: surfaces.Index
     edge_segments: surfaces.Index
-    outwards: Array
     grid_outwards: Floats
     edge_outwards: Floats
     faces: tuple[surfaces.Index, ...]
@@ -74,7 +72,6 @@ def topology(shape: surfaces.Shape, *, cut: bool = False) -> Topology:
         surfaces.triangulate(faces),
         grid,
         edges,
-        outwards,
         outwards[grid].astype(np.float32),
         outwards[edges].astype(np.float32),
         tuple(faces),
