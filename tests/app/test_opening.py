@@ -49,6 +49,8 @@ class Wire:
         self.kinds: list[str] = []
         self.labels: list[str] = []
         self.scripts: list[str] = []
+        self.widgets: dict[str, str] = {}
+        self.chosen: list[str] = []
         self.send({"type": "GuiUpdateMessage", "uuid": CARRIER, "updates": {"value": new_token()}})
         self.send(CAMERA)
 
@@ -79,6 +81,9 @@ class Wire:
         label = message.get("props", {}).get("label") if "props" in message else None
         if isinstance(label, str):
             self.labels.append(label)
+            self.widgets.setdefault(label.split(" ")[0], message["uuid"])
+        if isinstance(value := message.get("updates", {}).get("value"), str):
+            self.chosen.append(value)
         if message["type"] == "RunJavascriptMessage":
             self.scripts.append(message["source"])
 
@@ -145,6 +150,22 @@ def test_the_map_and_its_first_sliders_come_before_all_else(
         assert wire.read_until(lambda asked=asked: len(wire.scripts) > asked)
     assert wire.keys == KEYS
     assert {"Scene", "Structural loop", "Conventions of the scene"} <= set(wire.labels)
+
+
+def test_a_slider_that_is_moved_early_has_its_curve_shown(
+    wire: Wire, viewer: Viewer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(opening, "ANSWER_S", 1e6)
+    assert wire.read_until(lambda: "EBX" in wire.keys)
+    wire.update(wire.widgets["EBX"], 3.0)
+    (session,) = viewer.sessions
+    while session.state.amplitudes["EBX"] != 3.0:
+        time.sleep(0.01)
+    while OPEN not in wire.scripts:
+        asked = len(wire.scripts)
+        wire.update(*wire.question)
+        assert wire.read_until(lambda asked=asked: len(wire.scripts) > asked)
+    assert any(value.startswith("EBX") for value in wire.chosen)
 
 
 def test_a_page_that_does_not_answer_gets_all_of_it(

@@ -48,6 +48,7 @@ class Contents:
         self._fit_view, self._play = fit_view, play
         self._errors: ErrorsPanel | None = None
         self._shape: ShapePanel | None = None
+        self._wanted = ""
         self._expand: Callable[[], None] = lambda: None
 
     def build_first(self, state: AppState) -> Sequence[Panel]:
@@ -66,7 +67,8 @@ class Contents:
         return (self._build_seen, self._build_behind)
 
     def _choose(self, key: str) -> None:
-        """Show the curve of an error."""
+        """Show the curve of an error, as soon as there is a panel for it."""
+        self._wanted = key
         if self._shape is not None:
             self._shape.choose(key)
 
@@ -83,6 +85,8 @@ class Contents:
         curve = gui.add_panel()
         with curve.add_tab("One error"):
             self._shape = ShapePanel(self._desk, state)
+        if self._wanted:
+            self._shape.choose(self._wanted)
         curve.dock_below(gui.main_panel)
         self._outside.run_script(split_script())
         self._expand = curve.expand
