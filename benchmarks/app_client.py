@@ -104,7 +104,7 @@ class Tab:
 
     async def _run(self, source: str) -> None:
         """Do what a script asks a page for: its token, and whether it has drawn everything."""
-        asked = re.search(r'uuid: "([^"]+)", updates: \{ value: (?:token|"(\d+)") \}', source)
+        asked = re.search(r'uuid: "([^"]+)",\s+updates: \{ value: (?:token\b|"(\d+)")', source)
         if asked is not None:
             await self._update(asked[1], asked[2] or self.token)
         elif 'dataset.warpspace = "open"' in source:
