@@ -79,7 +79,7 @@ def browser(chromium_path: str) -> "Iterator[Browser]":
 
 @pytest.fixture
 def page(browser: "Browser") -> "Iterator[Page]":
-    """A fresh page of 1600 × 900 in a context of its own."""
+    """A fresh page of 1280 × 720 in a context of its own."""
     context = browser.new_context(viewport={"width": 1280, "height": 720})
     yield context.new_page()
     context.close()

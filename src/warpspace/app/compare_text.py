@@ -4,6 +4,7 @@ import html
 
 from warpspace.analysis.statistics import Statistics
 from warpspace.app.compare import Compared
+from warpspace.app.comparison import SHOWN
 from warpspace.app.legend import gradient
 from warpspace.app.live import Frame
 from warpspace.app.where import spell_point
@@ -34,9 +35,8 @@ def comparison_html(frame: Frame) -> str:
     found = frame.compared
     if found is None:
         return NOTHING
-    columns = {"A": found.a, "B": found.b, "A − B": found.difference}
-    drawn = {"a": "A", "b": "B", "difference": "A − B"}[found.shown]
-    head = "".join(f"<th {_NUMBER}>{MARK if name == drawn else ''}{name}</th>" for name in columns)
+    columns = dict(zip(SHOWN.values(), (found.a, found.b, found.difference), strict=True))
+    head = "".join(f"<th {_NUMBER}>{name}</th>" for name in marked(found.shown))
     rows = "".join(
         f'<tr><td style="opacity:.7">{label}</td>'
         + "".join(_cell(name, label, getattr(s, field, None)) for name, s in columns.items())
@@ -51,6 +51,11 @@ def comparison_html(frame: Frame) -> str:
         f'<tr><th style="text-align:left;font-weight:400;opacity:.7">|E| [µm]</th>{head}</tr>{rows}'
         f"</table>{places}{refused}{bar(frame)}</div>"
     )
+
+
+def marked(shown: str) -> tuple[str, ...]:
+    """Name what can be drawn, with a mark before what is: a key of `SHOWN`."""
+    return tuple(f"{MARK}{name}" if word == shown else name for word, name in SHOWN.items())
 
 
 def _titles(found: Compared) -> str:

@@ -17,6 +17,7 @@ from warpspace.app.widgets import Told
 from warpspace.geometry.annotations import (
     CornerArrows,
     ScaleBar,
+    WorstPoint,
     corner_arrows,
     scale_bars,
     spell_micrometres,
@@ -119,11 +120,12 @@ class AnnotationsLayer:
 
     def show(self, frame: Frame) -> None:
         """Follow the frame."""
-        self._show_arrows(frame)
-        self._show_worst(frame)
+        worst = worst_point(frame.values, frame.grid.nominal_mm, frame.drawn_mm)
+        self._show_arrows(frame, worst)
+        self._show_worst(frame, worst)
         self._show_bars(frame)
 
-    def _show_arrows(self, frame: Frame) -> None:
+    def _show_arrows(self, frame: Frame, worst: WorstPoint) -> None:
         """Draw the displacement of the corners."""
         if not frame.state.look.arrows:
             for part in (*self._corner_labels, *([self._arrows] if self._arrows else ())):
@@ -153,22 +155,14 @@ class AnnotationsLayer:
         self._arrows.put(
             vertices=vertices.astype(np.float32), color=palette(frame).edge, visible=True
         )
-        marked = self._is_marked(frame, arrows)
+        marked = _is_marked(frame, arrows, worst)
         for label, text, at, hidden in zip(
             self._corner_labels, arrows.texts, arrows.label_mm, marked, strict=False
         ):
             label.put(text=text, position=at * SCENE_PER_MM, visible=not hidden)
 
-    def _is_marked(self, frame: Frame, arrows: CornerArrows) -> NDArray[np.bool_]:
-        """Tell which corners carry the mark of the largest error, which says the same number."""
-        if not frame.state.look.worst or frame.state.component != "norm":
-            return np.zeros(len(arrows.norm_um), dtype=bool)
-        found = worst_point(frame.values, frame.grid.nominal_mm, frame.drawn_mm)
-        return np.all(np.isclose(arrows.start_mm, found.nominal_mm), axis=1)
-
-    def _show_worst(self, frame: Frame) -> None:
+    def _show_worst(self, frame: Frame, found: WorstPoint) -> None:
         """Mark the largest value."""
-        found = worst_point(frame.values, frame.grid.nominal_mm, frame.drawn_mm)
         on = frame.state.look.worst and found.value != 0.0
         self._worst.put(visible=on)
         if self._ball is not None:
@@ -211,3 +205,10 @@ class AnnotationsLayer:
         )
         for label, text, at in zip(self._bar_labels, texts, labels, strict=True):
             label.put(text=text, position=at * SCENE_PER_MM)
+
+
+def _is_marked(frame: Frame, arrows: CornerArrows, worst: WorstPoint) -> NDArray[np.bool_]:
+    """Tell which corners carry the mark of the largest error, which says the same number."""
+    if not frame.state.look.worst or frame.state.component != "norm":
+        return np.zeros(len(arrows.norm_um), dtype=bool)
+    return np.all(np.isclose(arrows.start_mm, worst.nominal_mm), axis=1)

@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 from warpspace.app.compare import scene_side, with_pin, with_sides
-from warpspace.app.compare_text import MARK, NOTHING, comparison_html
+from warpspace.app.compare_text import MARK, NOTHING, comparison_html, marked
 from warpspace.app.comparison import NOBODY, NOW, SHOWN, Side
 from warpspace.app.kept import Same
 from warpspace.app.live import Frame
@@ -52,7 +52,7 @@ class ComparePanel:
         )
         self._shown: Any = gui.add_button_group(
             "Drawn",
-            _options(SHOWN["a"]),
+            marked("a"),
             visible=False,
             hint="What is drawn. The difference is taken node by node.",
         )
@@ -109,15 +109,10 @@ class ComparePanel:
         self._b.show(NOBODY if comparison.b is None else comparison.b.title)
         self._ghost.show(comparison.ghost)
         self._shown.visible = comparison.b is not None
-        marked = _options(SHOWN[comparison.shown])
-        if self._shown.options != marked:
-            self._shown.options = marked
+        words = marked(comparison.shown)
+        if self._shown.options != words:
+            self._shown.options = words
         self._text.content = comparison_html(frame)
-
-
-def _options(drawn: str) -> tuple[str, ...]:
-    """Spell the buttons, the one of what is drawn marked as in the table."""
-    return tuple(f"{MARK}{word}" if word == drawn else word for word in SHOWN.values())
 
 
 def _drawn(text: str) -> Update:
