@@ -10,6 +10,7 @@ import pytest
 from warpspace.app.cameras import VIEWS, Stand, change_lens, clipping, view_pose
 from warpspace.app.circles import circle_rows, circle_table
 from warpspace.app.facets import topology
+from warpspace.app.layers.annotations import carries_worst
 from warpspace.app.live import LiveModel
 from warpspace.app.look import (
     SURFACES,
@@ -28,6 +29,7 @@ from warpspace.app.ranges import Span
 from warpspace.app.rotation import played_axis, played_position, points_on_traces
 from warpspace.app.state import start_state
 from warpspace.app.turning import Player
+from warpspace.geometry.annotations import corner_arrows, worst_point
 from warpspace.geometry.surfaces import box_edges, outer_surface, segments
 from warpspace.scene.library import load_scene
 from warpspace.scene.pipeline import evaluate
@@ -301,3 +303,22 @@ def test_other_scenes_can_be_looked_at_in_every_way(name):
         isoline_pieces(frame)
         tool_point(frame)
     assert np.isfinite(LIVE.frame(state.with_scene(SCENE)).drawn_mm).all()
+
+
+@pytest.mark.parametrize(
+    ("changes", "component", "hidden"),
+    [
+        ({}, "norm", 1),
+        ({"worst": False}, "norm", 0),
+        ({"quantity": "orientation"}, "norm", 0),  # the mark then says µrad
+        ({}, "z", 0),
+    ],
+)
+def test_a_corner_is_silent_only_where_the_worst_point_says_its_number(changes, component, hidden):
+    frame = LIVE.frame(looking(arrows=True, **changes).with_component(component))
+    grid = frame.grid
+    arrows = corner_arrows(grid.shape, grid.nominal_mm, frame.field.error_um, frame.exaggeration)
+    worst = worst_point(frame.values, grid.nominal_mm, frame.drawn_mm)
+    silent = carries_worst(frame, arrows, worst)
+    assert silent.sum() == hidden
+    assert (arrows.norm_um[silent] == frame.statistics.max_um).all()

@@ -155,7 +155,7 @@ class AnnotationsLayer:
         self._arrows.put(
             vertices=vertices.astype(np.float32), color=palette(frame).edge, visible=True
         )
-        marked = _is_marked(frame, arrows, worst)
+        marked = carries_worst(frame, arrows, worst)
         for label, text, at, hidden in zip(
             self._corner_labels, arrows.texts, arrows.label_mm, marked, strict=False
         ):
@@ -207,8 +207,9 @@ class AnnotationsLayer:
             label.put(text=text, position=at * SCENE_PER_MM)
 
 
-def _is_marked(frame: Frame, arrows: CornerArrows, worst: WorstPoint) -> NDArray[np.bool_]:
+def carries_worst(frame: Frame, arrows: CornerArrows, worst: WorstPoint) -> NDArray[np.bool_]:
     """Tell which corners carry the mark of the largest error, which says the same number."""
-    if not frame.state.look.worst or frame.state.component != "norm":
+    look = frame.state.look
+    if not look.worst or look.tilts or frame.state.component != "norm":
         return np.zeros(len(arrows.norm_um), dtype=bool)
     return np.all(np.isclose(arrows.start_mm, worst.nominal_mm), axis=1)
