@@ -217,6 +217,30 @@ def test_a_page_that_leaves_while_it_is_built_leaves_nothing_behind(
     assert {name: len(tab._children) for name, tab in places.items() if tab._children} == {}
 
 
+def test_what_comes_just_as_a_wait_ends_is_not_lost(
+    wire: Wire, viewer: Viewer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert wire.read_until(lambda: bool(viewer.sessions))
+    session = viewer.sessions[-1]
+    session.stop()
+    session._worker.join(20.0)
+    done: list[str] = []
+
+    class Late(threading.Event):
+        def wait(self, timeout: float | None = None) -> bool:
+            if super().wait(0.0):
+                return True
+            session.act(lambda: done.append("upload"))
+            return False
+
+    session._wake, session._stopped = Late(), threading.Event()
+    monkeypatch.setattr(session, "_step", lambda: session._actions.popleft()())
+    session._turn()
+    assert done == []
+    session._turn()
+    assert done == ["upload"]
+
+
 def test_what_fails_because_a_page_has_just_gone_is_no_error(
     viewer: Viewer, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

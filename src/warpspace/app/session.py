@@ -136,7 +136,8 @@ class Session:
         """Wait for one change, or for a pause in them, and follow."""
         waits = (self._parts.pause_s, self._opening and self._opening.remaining_s())
         woken = self._wake.wait(min((wait for wait in waits if wait is not None), default=None))
-        self._wake.clear()
+        if woken:  # else what has come since the wait ended would be lost
+            self._wake.clear()
         if woken and not self._stopped.is_set():
             self._guarded(self._step)
         if self._opening is not None and self._opening.is_due and self._shown is not None:
