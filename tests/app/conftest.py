@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from warpspace.app.board import Board
 from warpspace.app.live import Frame
-from warpspace.app.state import AppState
+from warpspace.app.session import Session
+from warpspace.app.state import AppState, start_state
 from warpspace.app.viewer import Viewer
 from warpspace.cli.services import build_services
 from warpspace.scene.library import load_scene
@@ -29,6 +31,13 @@ VERTICES = """() => {
   });
   return found;
 }"""
+TIDY = """() => {
+  history.replaceState(null, '', location.pathname + '?fixedDpr=1');
+  document.querySelectorAll('.mantine-Notification-closeButton').forEach(b => b.click());
+  return document.querySelectorAll('.mantine-Notification-root').length;
+}"""
+"""Takes the link out of the address, closes the messages, and counts those that were there."""
+FAILED = pytest.StashKey[bool]()
 
 
 def wait_until_open(page: "Page") -> None:
@@ -37,16 +46,48 @@ def wait_until_open(page: "Page") -> None:
 
 
 class Tab:
-    """A browser tab with the app in it."""
+    """A browser tab with the app in it; `query` goes into its address."""
 
-    def __init__(self, page: "Page", url: str) -> None:
-        self.page = page
+    def __init__(self, page: "Page", viewer: Viewer, query: str = "") -> None:
+        self.page, self.viewer = page, viewer
         self.errors: list[str] = []
         page.on("pageerror", lambda error: self.errors.append(str(error)))
         page.on("console", self._listen)
-        page.goto(f"{url}/?fixedDpr=1")
+        page.goto(f"{viewer.url}/?fixedDpr=1{query}")
         wait_until_open(page)
         self.until(lambda: self.vertices() is not None)
+        self._camera = self.session._eye.remember()
+
+    @property
+    def session(self) -> Session:
+        """The session of this tab."""
+        token = self.page.evaluate("window.__warpspaceTab")
+        return next(session for session in self.viewer.sessions if session.token == token)
+
+    def state(self) -> AppState:
+        """State of the tab, once what is on its way has arrived."""
+        self.page.wait_for_timeout(200)
+        return self.session.state
+
+    def begin_anew(self) -> None:
+        """Make the page again what it was when it was opened, in a tenth of the time."""
+        start, session = start_state(SCENES[0]), self.session
+
+        def forget() -> None:
+            session.board.unsubscribe(session.changed)
+            session.board = Board(start)
+            session.board.subscribe(session.changed)
+
+        self.page.wait_for_selector("html[data-warpspace=open]")
+        self.page.keyboard.press("Escape")
+        self.written("Find an error").fill("")
+        self.panel("Result")
+        self.panel("View")
+        session.act(forget)
+        session._look_from(self._camera)
+        self.until(lambda: self.page.evaluate(TIDY) == 0)
+        wanted = drawn_nodes(session._live.frame(start))
+        self.until(lambda: session.state == start and self.shows(wanted))
 
     def _listen(self, message: Any) -> None:
         if message.type == "error" and not any(word in message.text for word in HARMLESS):
@@ -99,6 +140,11 @@ class Tab:
         """Number box of the slider whose label begins with a word."""
         return self.page.locator(f"[id='{self.widget(label)}'] ~ div input")
 
+    def written(self, label: str) -> Any:
+        """Text box beside a label; viser does not tie them together."""
+        row = self.page.locator(f"//label[text()='{label}']/ancestor::div[2]")
+        return row.locator("input, textarea").first
+
     def thumb(self, label: str) -> Any:
         """Thumb of the slider whose label begins with a word."""
         return self.page.locator(f"[id='{self.widget(label)}'] [role=slider]")
@@ -149,45 +195,80 @@ def drawn_nodes(frame: Frame) -> np.ndarray:
     return frame.drawn_mm.reshape(-1, 3)[frame.topology.surface.nodes]
 
 
-def state_of(viewer: Viewer, tab: Tab) -> AppState:
-    """State of the newest session: that of the tab under test."""
-    tab.page.wait_for_timeout(200)
-    return viewer.sessions[-1].state
+def open_page(
+    viewer: Viewer, browser: "Browser", query: str = "", size: tuple[int, int] = (1280, 720)
+) -> Tab:
+    """Open the app as a visitor of its own; `query` goes into the address."""
+    context = browser.new_context(viewport={"width": size[0], "height": size[1]})
+    return Tab(context.new_page(), viewer, query)
 
 
 @pytest.fixture(scope="session")
-def serving_viewer() -> Iterator[Viewer]:
+def viewer() -> Iterator[Viewer]:
     """The app with figures and exports, as the command line starts it."""
     scenes = {scene.title: scene for scene in SCENES}
     with Viewer(SCENES[0], scenes, services=build_services()) as running:
         yield running
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
+    """Remember which tests have failed: what they leave of a page is not used again."""
+    report = yield
+    if report.failed:
+        item.stash[FAILED] = True
+    return report
+
+
 @pytest.fixture(scope="session")
-def viewer() -> Iterator[Viewer]:
-    """The app, serving the thesis machine and two more scenes."""
-    scenes = [load_scene(n) for n in ("dvf5000_first", "dvf5000_nominal", "teach_tilted_c")]
-    with Viewer(scenes[0], {scene.title: scene for scene in scenes}) as running:
-        yield running
+def kept_tabs(browser: "Browser") -> Iterator[list[Tab]]:
+    """The page that one test hands on to the next, if there is one."""
+    tabs: list[Tab] = []
+    yield tabs
+    for tab in tabs:
+        tab.page.context.close()
+
+
+def take(kept_tabs: list[Tab], viewer: Viewer, browser: "Browser") -> Tab:
+    """Give the page that the last test has left, or open one."""
+    if kept_tabs:
+        try:
+            kept_tabs[0].begin_anew()
+        except pytest.fail.Exception:
+            kept_tabs.pop().page.context.close()
+    if not kept_tabs:
+        kept_tabs.append(open_page(viewer, browser))
+    return kept_tabs[0]
 
 
 @pytest.fixture
-def tab(viewer: Viewer, page: "Page") -> Iterator[Tab]:
-    """A tab with the app; fails the test if the page reported an error."""
-    opened = Tab(page, viewer.url)
-    yield opened
-    assert opened.errors == []
+def tab(
+    viewer: Viewer, browser: "Browser", kept_tabs: list[Tab], request: pytest.FixtureRequest
+) -> Iterator[Tab]:
+    """A tab with the app at its start; fails the test if the page reported an error.
+
+    To open a page takes software rendering seconds, so that tests use one after the other, but for
+    those marked `own_page`.
+    """
+    own = request.node.get_closest_marker("own_page") is not None
+    tab = open_page(viewer, browser) if own else take(kept_tabs, viewer, browser)
+    yield tab
+    if own:
+        tab.page.context.close()
+    elif request.node.stash.get(FAILED, False) or tab.errors:
+        kept_tabs.pop().page.context.close()
+    assert tab.errors == []
 
 
 @pytest.fixture
-def open_tab(viewer: Viewer, browser: "Browser") -> Iterator[Callable[[], Tab]]:
-    """Open further tabs, each as a visitor of its own."""
-    contexts: list[Any] = []
+def open_tab(viewer: Viewer, browser: "Browser") -> Iterator[Callable[..., Tab]]:
+    """Open further tabs, each as a visitor of its own; takes query and size of `open_page`."""
+    tabs: list[Tab] = []
 
-    def open_one() -> Tab:
-        contexts.append(browser.new_context(viewport={"width": 1280, "height": 720}))
-        return Tab(contexts[-1].new_page(), viewer.url)
+    def open_one(**how: Any) -> Tab:
+        tabs.append(open_page(viewer, browser, **how))
+        return tabs[-1]
 
     yield open_one
-    for context in contexts:
-        context.close()
+    for tab in tabs:
+        tab.page.context.close()

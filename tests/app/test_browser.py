@@ -11,7 +11,6 @@ from app.conftest import Tab, drawn_nodes
 from warpspace.app.live import Frame, LiveModel
 from warpspace.app.state import AppState, start_state
 from warpspace.app.tonemap import vertex_colours
-from warpspace.app.viewer import Viewer
 from warpspace.scene.library import load_scene
 
 pytestmark = pytest.mark.browser
@@ -33,6 +32,7 @@ def check_numbers(tab: Tab, frame: Frame) -> None:
         assert tab.number(name) == pytest.approx(value, abs=0.006)
 
 
+@pytest.mark.own_page
 def test_first_screen(tab: Tab) -> None:
     frame = model(START)
     tab.until(lambda: tab.shows(drawn_nodes(frame)))
@@ -141,24 +141,25 @@ def test_another_scene_brings_its_title_sliders_and_box(tab: Tab) -> None:
     assert tab.page.get_by_text("Rotary positions").is_visible()
 
 
-def test_two_tabs_are_independent(tab: Tab, open_tab: Callable[[], Tab], viewer: Viewer) -> None:
+def test_two_tabs_are_independent(tab: Tab, open_tab: Callable[[], Tab]) -> None:
     other = open_tab()
     tab.send("EXX", "6")
     tab.until(lambda: tab.shows(drawn_nodes(model(START.with_amplitude("EXX", 6.0)))))
     other.page.wait_for_timeout(500)
     assert other.shows(drawn_nodes(model(START)))
-    open_now = len(viewer.sessions)
+    ended = other.session
     other.page.close()
-    tab.until(lambda: len(viewer.sessions) == open_now - 1)
+    tab.until(lambda: ended not in tab.viewer.sessions)
+    assert tab.session in tab.viewer.sessions
 
 
 def test_exception_in_the_session_is_shown_and_the_session_goes_on(
-    tab: Tab, viewer: Viewer, caplog: pytest.LogCaptureFixture
+    tab: Tab, caplog: pytest.LogCaptureFixture
 ) -> None:
     def broken(state: AppState) -> AppState:
         raise RuntimeError("a wheel came off")
 
-    viewer.sessions[-1].post(broken)
+    tab.session.post(broken)
     tab.until(lambda: tab.page.get_by_text("a wheel came off").count() > 0)
     assert "a wheel came off" in caplog.text
     tab.send("EXX", "4")

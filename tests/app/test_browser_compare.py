@@ -11,7 +11,7 @@ from urllib.parse import urlencode
 import numpy as np
 import pytest
 
-from app.conftest import SCENES, Tab, drawn_nodes, state_of
+from app.conftest import SCENES, Tab, drawn_nodes
 from warpspace.app import edits, links
 from warpspace.app.compare import scene_side, with_pin, with_sides
 from warpspace.app.comparison import Side
@@ -40,12 +40,6 @@ new MutationObserver(() => document.querySelectorAll('.mantine-Notification-root
 WORKSPACE = b"[workspace]\nX = [-275, 275]\nY = [-225, 225]\nZ = [-480, -80]\nB = 0\nC = 0\n"
 
 
-@pytest.fixture(scope="module")
-def viewer(serving_viewer: Viewer) -> Viewer:
-    """The app these tests look at."""
-    return serving_viewer
-
-
 @pytest.fixture
 def follow(viewer: Viewer, browser: "Browser") -> Iterator[Callable[[str], Tab]]:
     """Open links, each as a visitor of its own; no page may report an error."""
@@ -54,8 +48,8 @@ def follow(viewer: Viewer, browser: "Browser") -> Iterator[Callable[[str], Tab]]
     def open_link(link: str) -> Tab:
         context = browser.new_context(viewport={"width": 1280, "height": 720})
         context.add_init_script(LISTEN)
-        address = f"{viewer.url}/?fixedDpr=1&{links.PARAMETER}={links.pack(link)}#"
-        opened.append((context, Tab(context.new_page(), address)))
+        query = f"&{links.PARAMETER}={links.pack(link)}#"
+        opened.append((context, Tab(context.new_page(), viewer, query)))
         return opened[-1][1]
 
     yield open_link
@@ -65,15 +59,15 @@ def follow(viewer: Viewer, browser: "Browser") -> Iterator[Callable[[str], Tab]]
 
 
 def test_a_link_to_another_scene_with_changed_errors_leaves_no_message(
-    viewer: Viewer, follow: Callable[[str], Tab]
+    follow: Callable[[str], Tab],
 ) -> None:
     """Sliders of the former scene must not be told anything once they are to be replaced."""
     tab = follow("scene=dvf5000_second&EXX=4&EC0Y=1")
-    tab.until(lambda: state_of(viewer, tab).scene.name == SCENES[1].name)
+    tab.until(lambda: tab.state().scene.name == SCENES[1].name)
     tab.page.wait_for_timeout(1500)
 
 
-def compare_with_pin(tab: Tab, viewer: Viewer) -> AppState:
+def compare_with_pin(tab: Tab) -> AppState:
     """Pin, change an error, and draw the difference; give the state it amounts to."""
     tab.panel("Compare")
     tab.page.get_by_role("button", name="Pin now and compare").click()
@@ -84,7 +78,7 @@ def compare_with_pin(tab: Tab, viewer: Viewer) -> AppState:
     tab.page.wait_for_timeout(100)
     tab.page.get_by_role("button", name="A − B", exact=True).click()
     tab.until(lambda: tab.shows(drawn_nodes(LIVE.frame(state))))
-    assert state_of(viewer, tab) == state
+    assert tab.state() == state
     return state
 
 
@@ -102,12 +96,12 @@ def press_link(tab: Tab) -> str:
 
 
 def test_a_link_brings_the_comparison_with_its_snapshot(
-    tab: Tab, viewer: Viewer, follow: Callable[[str], Tab]
+    tab: Tab, follow: Callable[[str], Tab]
 ) -> None:
-    state = compare_with_pin(tab, viewer)
+    state = compare_with_pin(tab)
     other = follow(press_link(tab))
     other.until(lambda: other.shows(drawn_nodes(LIVE.frame(state))))
-    assert state_of(viewer, other) == state
+    assert other.state() == state
     other.panel("Compare")
     other.until(lambda: other.page.locator("[data-compared='mean A − B']").count() == 1)
     snapshot = state.comparison.pinned.title
@@ -119,7 +113,7 @@ def test_a_link_brings_the_comparison_with_its_snapshot(
 
 
 def test_a_saved_scene_brings_the_comparison_of_two_scenes(
-    tab: Tab, viewer: Viewer, open_tab: Callable[[], Tab]
+    tab: Tab, open_tab: Callable[[], Tab]
 ) -> None:
     tab.panel("Compare")
     tab.choose("B", SCENES[1].title)
@@ -132,7 +126,7 @@ def test_a_saved_scene_brings_the_comparison_of_two_scenes(
     other = open_tab()
     other.panel("Files")
     other.upload("dvf5000_first.toml", content)
-    other.until(lambda: state_of(viewer, other).comparison == state.comparison)
+    other.until(lambda: other.state().comparison == state.comparison)
     other.panel("Compare")
     other.until(lambda: other.page.get_by_label("B", exact=True).input_value() == SCENES[1].title)
     other.page.get_by_role("button", name="A − B", exact=True).click()
@@ -140,13 +134,13 @@ def test_a_saved_scene_brings_the_comparison_of_two_scenes(
     other.until(lambda: other.shows(drawn_nodes(frame)))
     # a scene that says nothing of how it is looked at leaves the comparison alone
     other.upload("plain.toml", b'title = "Plain"\nmachine = "dvf5000"\n' + WORKSPACE)
-    other.until(lambda: state_of(viewer, other).scene.title == "Plain")
-    assert viewer.sessions[-1].state.comparison.b == state.comparison.b
+    other.until(lambda: other.state().scene.title == "Plain")
+    assert other.session.state.comparison.b == state.comparison.b
     assert other.errors == []
 
 
 def test_a_point_of_a_trace_and_its_lever_come_with_a_link(
-    tab: Tab, viewer: Viewer, follow: Callable[[str], Tab]
+    tab: Tab, follow: Callable[[str], Tab]
 ) -> None:
     at = {"X": 0.0, "Y": 0.0, "Z": -280.0, "B": 0.0, "C": 45.0}
     asked = replace(
@@ -154,7 +148,7 @@ def test_a_point_of_a_trace_and_its_lever_come_with_a_link(
         picked=Picked(at, Loop.WORKPIECE, (275.0, 0.0, 0.0)),
         lever="EC0B",
     )
-    viewer.sessions[-1].post(lambda _: asked)
+    tab.session.post(lambda _: asked)
     tab.panel("Why")
     tab.until(lambda: tab.page.locator("[data-value='why norm']").count() == 1)
     norm = tab.text("why norm")
@@ -163,7 +157,7 @@ def test_a_point_of_a_trace_and_its_lever_come_with_a_link(
     other.until(lambda: other.page.locator("[data-value='why norm']").count() == 1)
     assert other.text("why norm") == norm
     assert "mm" in other.text("lever")
-    assert state_of(viewer, other) == asked
+    assert other.state() == asked
 
 
 @pytest.mark.parametrize(
@@ -175,15 +169,15 @@ def test_a_point_of_a_trace_and_its_lever_come_with_a_link(
     ],
 )
 def test_a_link_with_a_broken_comparison_says_so_and_changes_nothing(
-    viewer: Viewer, follow: Callable[[str], Tab], pairs: dict[str, str], message: str
+    follow: Callable[[str], Tab], pairs: dict[str, str], message: str
 ) -> None:
     tab = follow(f"scene=dvf5000_second&EXX=7&{urlencode(pairs)}")
     tab.until(lambda: any(message in text for text in said(tab)))
     assert len([text for text in said(tab) if "Link: failed" in text]) == 1
-    assert state_of(viewer, tab) == START
+    assert tab.state() == START
 
 
-def test_what_is_too_large_for_a_link_is_left_out_and_named(tab: Tab, viewer: Viewer) -> None:
+def test_what_is_too_large_for_a_link_is_left_out_and_named(tab: Tab) -> None:
     rows = np.linspace(-275.0, 275.0, 200)
     noise = np.random.default_rng(1).normal(size=(3, 200))
     big = START
@@ -191,7 +185,7 @@ def test_what_is_too_large_for_a_link_is_left_out_and_named(tab: Tab, viewer: Vi
         curve = Table((-275.0, 275.0), tuple(zip(rows.tolist(), values.tolist(), strict=True)))
         big = edits.with_curve(big, key, curve)
     state = replace(START, comparison=with_pin(big).comparison)
-    viewer.sessions[-1].post(lambda _: state)
+    tab.session.post(lambda _: state)
     tab.until(lambda: tab.page.locator("[data-value='compared']").count() == 1)
     link = press_link(tab)
     tab.until(lambda: tab.page.get_by_text("Without the comparison").count() == 1)
@@ -205,8 +199,8 @@ def test_what_is_too_large_for_a_link_is_left_out_and_named(tab: Tab, viewer: Vi
     assert back.pinned.state.scene.errors == scene_of(big).errors
 
 
-def test_exports_show_the_difference_that_is_drawn(tab: Tab, viewer: Viewer) -> None:
-    state = compare_with_pin(tab, viewer)
+def test_exports_show_the_difference_that_is_drawn(tab: Tab) -> None:
+    state = compare_with_pin(tab)
     frame = LIVE.frame(state)
     tab.panel("Files")
     tab.until(lambda: tab.page.locator("[data-value='exported']").count() == 1)
@@ -257,18 +251,19 @@ def test_a_linear_axis_is_turned_round_in_the_conventions(tab: Tab) -> None:
 
 
 @pytest.mark.slow
-def test_opened_scenes_do_not_pile_up(
-    tab: Tab, viewer: Viewer, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.own_page
+def test_opened_scenes_do_not_pile_up(tab: Tab, monkeypatch: pytest.MonkeyPatch) -> None:
     notes: list[str] = []
     # the page shows a few messages at a time, which would take minutes
-    client = viewer.sessions[-1]._client
-    monkeypatch.setattr(client, "add_notification", lambda _, text, **__: notes.append(text))
+    session = tab.session
+    monkeypatch.setattr(
+        session._client, "add_notification", lambda _, text, **__: notes.append(text)
+    )
     tab.panel("Files")
     for number in range(22):
         scene = replace(SCENES[1], title=f"Machine {number}", name=f"machine {number}")
         tab.upload(f"machine {number}.toml", state_to_toml(start_state(scene)).encode())
-        tab.until(lambda n=number: viewer.sessions[-1].state.scene.title == f"Machine {n}")
+        tab.until(lambda n=number: session.state.scene.title == f"Machine {n}")
     tab.until(lambda: any("Machine 1 left the list" in text for text in notes))
     tab.panel("View")
     tab.page.get_by_label("Scene", exact=True).first.click()

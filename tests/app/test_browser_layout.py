@@ -1,8 +1,7 @@
 """Where the panels stand in a real Chromium, and the names they call things by."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -11,11 +10,7 @@ from app.conftest import Tab
 from warpspace.app.live import LiveModel
 from warpspace.app.state import start_state
 from warpspace.app.tonemap import vertex_colours
-from warpspace.app.viewer import Viewer
 from warpspace.scene.library import load_scene
-
-if TYPE_CHECKING:
-    from playwright.sync_api import Browser
 
 pytestmark = pytest.mark.browser
 LIVE = LiveModel()
@@ -33,20 +28,6 @@ OVERLAPS = """() => [...document.querySelectorAll('.ws-error')].filter(row => {
 DIVIDER = "[data-dock-region=left] [data-dock-divider=column]"
 
 
-@pytest.fixture
-def sized(viewer: Viewer, browser: "Browser") -> Iterator[Callable[[int, int], Tab]]:
-    """Open tabs of a given size."""
-    contexts: list[Any] = []
-
-    def open_one(width: int, height: int) -> Tab:
-        contexts.append(browser.new_context(viewport={"width": width, "height": height}))
-        return Tab(contexts[-1].new_page(), viewer.url)
-
-    yield open_one
-    for context in contexts:
-        context.close()
-
-
 def shares(tab: Tab) -> tuple[float, float]:
     errors, curve = tab.page.evaluate(HEIGHTS)
     return errors / (errors + curve), float(errors + curve)
@@ -54,9 +35,9 @@ def shares(tab: Tab) -> tuple[float, float]:
 
 @pytest.mark.parametrize(("width", "height"), [(1600, 900), (1280, 800)])
 def test_tabs_stand_on_one_line_and_sliders_have_the_height(
-    sized: Callable[[int, int], Tab], width: int, height: int
+    open_tab: Callable[..., Tab], width: int, height: int
 ) -> None:
-    tab = sized(width, height)
+    tab = open_tab(size=(width, height))
     assert set(tab.page.evaluate(STRIPS)) == {1}
     tab.until(lambda: shares(tab)[0] > 0.66)
     # labels do not reach below the buttons beside them
@@ -65,6 +46,7 @@ def test_tabs_stand_on_one_line_and_sliders_have_the_height(
     assert tab.errors == []
 
 
+@pytest.mark.own_page
 def test_the_divider_on_the_left_can_be_moved(tab: Tab) -> None:
     tab.until(lambda: shares(tab)[0] > 0.66)
     before, height = shares(tab)

@@ -4,18 +4,18 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
 
-from app.conftest import SCENES, Tab, drawn_nodes, state_of, wait_until_open
+from app.conftest import SCENES, Tab, drawn_nodes
 from warpspace.app.compare import scene_side, with_sides
 from warpspace.app.comparison import Side
 from warpspace.app.conventions import Effects, with_choice
 from warpspace.app.document import state_to_toml
 from warpspace.app.live import LiveModel
 from warpspace.app.state import start_state
-from warpspace.app.viewer import Viewer
 from warpspace.app.why import Picked, answer
 from warpspace.scene.library import load_scene
 
@@ -26,12 +26,6 @@ PLACE = """name => {
   const node = window.__viserMutable.nodeRefFromName[name];
   return node && node.visible ? [node.position.x, node.position.y, node.position.z] : null;
 }"""
-
-
-@pytest.fixture(scope="module")
-def viewer(serving_viewer: Viewer) -> Viewer:
-    """The app these tests look at."""
-    return serving_viewer
 
 
 def click_box(tab: Tab) -> None:
@@ -45,9 +39,9 @@ def numbers(text: str) -> list[float]:
     return [float(n.replace("−", "-")) for n in re.findall(r"[+−-]?\d+\.?\d*", text)]
 
 
-def test_a_click_on_the_box_says_why(tab: Tab, viewer: Viewer) -> None:
+def test_a_click_on_the_box_says_why(tab: Tab) -> None:
     click_box(tab)
-    picked = state_of(viewer, tab).picked
+    picked = tab.state().picked
     assert picked is not None
     frame = LIVE.frame(START)
     found = answer(START, picked, frame.exaggeration)
@@ -71,7 +65,7 @@ def test_a_click_on_the_box_says_why(tab: Tab, viewer: Viewer) -> None:
     )
 
 
-def test_choosing_a_contribution_draws_axis_and_lever_and_follows(tab: Tab, viewer: Viewer) -> None:
+def test_choosing_a_contribution_draws_axis_and_lever_and_follows(tab: Tab) -> None:
     click_box(tab)
     tab.page.locator("[data-contribution='EA0Z']").click()
     tab.until(lambda: tab.page.evaluate(PLACE, "/why/lever") is not None)
@@ -80,7 +74,7 @@ def test_choosing_a_contribution_draws_axis_and_lever_and_follows(tab: Tab, view
     before = tab.page.evaluate(PLACE, "/why/marker")
     tab.send("EXX", "9")
     state = START.with_amplitude("EXX", 9.0)
-    picked = state_of(viewer, tab).picked
+    picked = tab.state().picked
     assert picked is not None
     tab.until(lambda: tab.page.evaluate(PLACE, "/why/marker") != before)
     found = answer(state, picked, LIVE.frame(state).exaggeration)
@@ -145,13 +139,13 @@ def test_a_convention_changes_the_map_and_says_by_how_much(tab: Tab) -> None:
     tab.until(lambda: tab.shows(drawn_nodes(LIVE.frame(START))))
 
 
-def test_the_reference_is_picked_on_the_box(tab: Tab, viewer: Viewer) -> None:
+def test_the_reference_is_picked_on_the_box(tab: Tab) -> None:
     tab.panel("Conventions")
     tab.page.get_by_role("button", name="Pick the reference in 3-D").click()
     tab.page.wait_for_timeout(400)
     tab.page.mouse.click(760, 480)
-    tab.until(lambda: state_of(viewer, tab).scene.reference is not None)
-    state = state_of(viewer, tab)
+    tab.until(lambda: tab.state().scene.reference is not None)
+    state = tab.state()
     assert state.picked is None
     tab.until(lambda: tab.shows(drawn_nodes(LIVE.frame(state))))
     at = Picked(dict(state.scene.reference or {}))
@@ -159,14 +153,14 @@ def test_the_reference_is_picked_on_the_box(tab: Tab, viewer: Viewer) -> None:
 
 
 def test_a_saved_scene_opens_to_the_identical_state(
-    tab: Tab, viewer: Viewer, open_tab: Callable[[], Tab], tmp_path: Path
+    tab: Tab, open_tab: Callable[[], Tab], tmp_path: Path
 ) -> None:
     tab.send("EXX", "7.5")
     tab.page.wait_for_timeout(100)
     tab.send("B [°]", "-20")
     tab.page.wait_for_timeout(100)
     tab.choose("Colour", "E_y")
-    state = state_of(viewer, tab)
+    state = tab.state()
     assert state.positions["B"] == -20.0
     tab.panel("Files")
     with tab.page.expect_download() as waiting:
@@ -178,13 +172,14 @@ def test_a_saved_scene_opens_to_the_identical_state(
     other.panel("Files")
     other.upload("dvf5000_first.toml", path.read_bytes())
     other.until(lambda: other.shows(drawn_nodes(LIVE.frame(state))))
-    back = state_of(viewer, other)
+    back = other.state()
     assert back.amplitudes == state.amplitudes
     assert back.component == "y"
     assert load_scene(path).errors.amplitude("EXX") == 7.5
 
 
-def test_a_link_brings_camera_and_settings(tab: Tab, viewer: Viewer) -> None:
+@pytest.mark.own_page
+def test_a_link_brings_camera_and_settings(tab: Tab, open_tab: Callable[..., Tab]) -> None:
     tab.send("EXX", "4")
     tab.page.wait_for_timeout(100)
     tab.page.get_by_role("button", name="True scale").click()
@@ -194,22 +189,14 @@ def test_a_link_brings_camera_and_settings(tab: Tab, viewer: Viewer) -> None:
     tab.panel("Files")
     tab.page.get_by_role("button", name="Link", exact=True).click()
     tab.until(lambda: "view=" in tab.page.url)
-    link = tab.page.url
-    camera = viewer.sessions[-1]._eye.remember()
-    second = tab.page.context.browser.new_context(viewport={"width": 1280, "height": 720})
-    other = second.new_page()
-    other.goto(link)
-    wait_until_open(other)
-    for _ in range(200):
-        other.wait_for_timeout(100)
-        if "true scale" in other.inner_text("[data-value='factor']"):
-            break
-    other.wait_for_timeout(800)
-    session = viewer.sessions[-1]
-    assert session.state.amplitudes["EXX"] == 4.0
-    assert session.state.exaggeration == 1.0
-    np.testing.assert_allclose(session._eye.remember().position, camera.position, rtol=1e-3)
-    second.close()
+    query = urlsplit(tab.page.url).query
+    camera = tab.session._eye.remember()
+    other = open_tab(query=f"&{query}")
+    other.until(lambda: other.text("factor") == "true scale")
+    other.page.wait_for_timeout(800)
+    assert other.session.state.amplitudes["EXX"] == 4.0
+    assert other.session.state.exaggeration == 1.0
+    np.testing.assert_allclose(other.session._eye.remember().position, camera.position, rtol=1e-3)
 
 
 @pytest.mark.parametrize(("name", "ending"), [("View", "png"), ("HTML", "html"), ("GLB", "glb")])
@@ -248,7 +235,7 @@ def test_bad_uploads_are_refused_in_the_page_and_the_session_goes_on(tab: Tab) -
     tab.until(lambda: tab.shows(drawn_nodes(LIVE.frame(START.with_amplitude("EXX", 4.0)))))
 
 
-def test_a_200_mb_upload_announced_by_a_hostile_page_is_not_kept(tab: Tab, viewer: Viewer) -> None:
+def test_a_200_mb_upload_announced_by_a_hostile_page_is_not_kept(tab: Tab) -> None:
     tab.panel("Files")
     uuid = tab.page.locator("input[type=file]").get_attribute("id").removeprefix("file_upload_")
     script = """([uuid, transfer, size, parts]) => {
@@ -264,12 +251,13 @@ def test_a_200_mb_upload_announced_by_a_hostile_page_is_not_kept(tab: Tab, viewe
     tab.until(lambda: tab.page.get_by_text("200.0 MB large").count() > 0)
     tab.page.evaluate(script, [uuid, "liar", 100, 20])
     tab.until(lambda: tab.page.get_by_text("more has arrived").count() > 0)
-    assert viewer.sessions[-1]._client.gui._current_file_upload_states == {}
+    assert tab.session._client.gui._current_file_upload_states == {}
     tab.send("EXX", "4")
     tab.until(lambda: tab.shows(drawn_nodes(LIVE.frame(START.with_amplitude("EXX", 4.0)))))
 
 
-def test_ten_uploads_at_once_and_a_script_in_a_title(tab: Tab, viewer: Viewer) -> None:
+@pytest.mark.own_page
+def test_ten_uploads_at_once_and_a_script_in_a_title(tab: Tab) -> None:
     tab.panel("Files")
     evil = "<img src=x onerror='window.hacked=1'><script>window.hacked=2</script>"
     scene = replace(SCENES[1], title=evil)
@@ -277,7 +265,7 @@ def test_ten_uploads_at_once_and_a_script_in_a_title(tab: Tab, viewer: Viewer) -
     for number in range(10):
         tab.upload(f"scene {number}.toml", text.encode())
     tab.until(lambda: tab.shows(drawn_nodes(LIVE.frame(start_state(SCENES[1])))), 30.0)
-    tab.until(lambda: state_of(viewer, tab).scene.name == "scene 9", 30.0)
+    tab.until(lambda: tab.state().scene.name == "scene 9", 30.0)
     tab.panel("Compare")
     tab.page.get_by_role("button", name="Pin now and compare").click()
     tab.page.wait_for_timeout(800)

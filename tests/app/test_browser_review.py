@@ -3,12 +3,12 @@
 import json
 import time
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
-from app.conftest import Tab, drawn_nodes, wait_until_open
+from app.conftest import Tab, drawn_nodes, open_page, wait_until_open
 from warpspace.app import edits
 from warpspace.app.live import Frame, LiveModel
 from warpspace.app.state import AppState, start_state
@@ -49,12 +49,6 @@ def labels(tab: Tab) -> list[str]:
     return tab.page.evaluate("[...document.querySelectorAll('label')].map(l => l.textContent)")
 
 
-def written(tab: Tab, label: str) -> Any:
-    """Text box beside a label; viser does not tie them together."""
-    row = tab.page.locator(f"//label[text()='{label}']/ancestor::div[2]")
-    return row.locator("input, textarea").first
-
-
 def keys_of_sliders(tab: Tab) -> set[str]:
     return {text.split(" ")[0] for text in labels(tab) if " · " in text and "±" not in text}
 
@@ -63,7 +57,7 @@ def keys_of_sliders(tab: Tab) -> set[str]:
 
 
 def test_search_narrows_the_sliders_down(tab: Tab) -> None:
-    search = written(tab, "Find an error")
+    search = tab.written("Find an error")
     search.fill("squareness")
     tab.until(lambda: keys_of_sliders(tab) == {"EC0Y", "EA0Z", "EB0Z"})
     search.fill("roll x")
@@ -134,8 +128,8 @@ def test_the_shape_of_an_error_is_edited_and_its_curve_drawn(tab: Tab) -> None:
     # the panel follows the slider that was touched
     tab.until(lambda: tab.page.get_by_label("Error", exact=True).input_value().startswith("EXX"))
     tab.choose("Curve", "table")
-    tab.until(lambda: written(tab, "Numbers").input_value().count("\n") == 4)
-    written(tab, "Numbers").fill("-275 0\n0 8\n275 -2")
+    tab.until(lambda: tab.written("Numbers").input_value().count("\n") == 4)
+    tab.written("Numbers").fill("-275 0\n0 8\n275 -2")
     curve = Table((-275.0, 275.0), ((-275.0, 0.0), (0.0, 8.0), (275.0, -2.0)))
     start = START.with_amplitude("EXX", 5.0)
     wanted = edits.with_curve(start, "EXX", curve)
@@ -147,12 +141,12 @@ def test_the_shape_of_an_error_is_edited_and_its_curve_drawn(tab: Tab) -> None:
     tab.until(lambda: tab.page.evaluate(charts)[0][1][-1] == -2.0)
     at, value, _ = tab.page.evaluate(charts)[0]
     np.testing.assert_allclose(value, curve.evaluate(np.array(at)), atol=1e-9)
-    written(tab, "Numbers").fill("-275 0\nbanana 8")
+    tab.written("Numbers").fill("-275 0\nbanana 8")
     tab.until(lambda: "no number" in tab.text("curve problem"))
     shows(tab, wanted)
     tab.page.get_by_role("button", name="Reset X").click()
     shows(tab, START)
-    tab.until(lambda: written(tab, "Numbers").input_value() == "0")
+    tab.until(lambda: tab.written("Numbers").input_value() == "0")
 
 
 def test_undo_and_redo_of_everything(tab: Tab) -> None:
@@ -204,11 +198,11 @@ def test_tolerances_are_traded_by_hand(tab: Tab) -> None:
 
 
 def test_a_tolerance_change_is_answered_within_300_ms_on_the_server(
-    viewer: Viewer, tab: Tab
+    tab: Tab,
 ) -> None:
     tab.page.get_by_role("tab", name="Chance").click()
     tab.page.wait_for_selector("[data-value='chance']")
-    (session,) = viewer.sessions
+    session = tab.session
     panel = next(p for p in session._parts.panels if type(p).__name__ == "ChancePanel")
     times = []
     for half_width in (3.0, 9.0, 15.0, 21.0, 5.0):
@@ -239,15 +233,15 @@ def test_gain_chart_follows_the_errors(tab: Tab) -> None:
 # --- 10. sessions ----------------------------------------------------------------------------
 
 
-def test_a_dropped_connection_finds_its_state_again(tab: Tab, viewer: Viewer) -> None:
+def test_a_dropped_connection_finds_its_state_again(tab: Tab) -> None:
     tab.send("EXX", "7")
     moved = START.with_amplitude("EXX", 7.0)
     shows(tab, moved)
-    (before,) = viewer.sessions
+    before, viewer = tab.session, tab.viewer
     viewer._server._websock_server.disconnect_all_clients()
     # the page connects anew at once
-    tab.until(lambda: len(viewer.sessions) == 1 and viewer.sessions[0] is not before)
-    tab.until(lambda: viewer.sessions[0].state == moved)
+    tab.until(lambda: before not in viewer.sessions)
+    tab.until(lambda: any(s.token == before.token and s.state == moved for s in viewer.sessions))
     shows(tab, moved)
     tab.until(lambda: float(tab.box("EXX").input_value()) == 7.0)
     # its history as well
@@ -255,8 +249,9 @@ def test_a_dropped_connection_finds_its_state_again(tab: Tab, viewer: Viewer) ->
     shows(tab, START)
 
 
+@pytest.mark.own_page
 def test_a_reloaded_page_finds_its_state_again_and_a_new_tab_does_not(
-    tab: Tab, viewer: Viewer
+    tab: Tab,
 ) -> None:
     tab.send("EXX", "-6")
     moved = START.with_amplitude("EXX", -6.0)
@@ -265,25 +260,23 @@ def test_a_reloaded_page_finds_its_state_again_and_a_new_tab_does_not(
     wait_until_open(tab.page)
     shows(tab, moved)
     other = tab.page.context.new_page()
-    fresh = Tab(other, viewer.url)
+    fresh = Tab(other, tab.viewer)
     shows(fresh, START)
-    tokens = {session.token for session in viewer.sessions}
-    assert len(tokens) == 2
+    assert fresh.session is not tab.session
 
 
 @pytest.fixture
 def shared_tabs(browser: "Browser") -> Iterator[Callable[[], Tab]]:
-    contexts: list[Any] = []
-    scene = load_scene("dvf5000_first")
+    scene, tabs = load_scene("dvf5000_first"), []
     with Viewer(scene, {scene.title: scene}, shared=True) as viewer:
 
         def open_one() -> Tab:
-            contexts.append(browser.new_context(viewport={"width": 1300, "height": 800}))
-            return Tab(contexts[-1].new_page(), viewer.url)
+            tabs.append(open_page(viewer, browser))
+            return tabs[-1]
 
         yield open_one
-        for context in contexts:
-            context.close()
+        for tab in tabs:
+            tab.page.context.close()
 
 
 def test_in_a_shared_review_all_see_and_steer_one_state(shared_tabs: Callable[[], Tab]) -> None:
@@ -318,7 +311,7 @@ def test_keys_do_the_main_actions(tab: Tab) -> None:
     press(tab, "1")
     shows(tab, START)
     # in a text box they are letters
-    written(tab, "Find an error").press_sequentially("t0")
+    tab.written("Find an error").press_sequentially("t0")
     tab.page.wait_for_timeout(300)
     assert "1\u202f000" in tab.text("factor")
 
@@ -336,7 +329,6 @@ def test_dark_mode(tab: Tab) -> None:
 
 
 def test_the_palette_and_the_help_list_what_there_is(tab: Tab) -> None:
-    tab.page.locator("#webgl-software-rendering button").click()  # viser's, of this machine
     press(tab, "Control+k")
     tab.page.get_by_placeholder("Search commands").fill("true scale")
     tab.page.keyboard.press("Enter")
@@ -349,8 +341,8 @@ def test_the_palette_and_the_help_list_what_there_is(tab: Tab) -> None:
     tab.until(lambda: tab.page.get_by_text("Keys and help").count() == 0)
 
 
-def test_every_control_explains_itself(tab: Tab, viewer: Viewer) -> None:
-    (session,) = viewer.sessions
+def test_every_control_explains_itself(tab: Tab) -> None:
+    session = tab.session
     handles = session._client.gui._gui_input_handle_from_uuid.values()
     silent = [
         handle.label
@@ -360,6 +352,7 @@ def test_every_control_explains_itself(tab: Tab, viewer: Viewer) -> None:
     assert silent == []
 
 
+@pytest.mark.own_page
 def test_the_first_hint_leaves_by_itself_and_does_not_come_back(tab: Tab) -> None:
     hint = tab.page.locator("#warpspace-hint")
     assert hint.is_visible()
@@ -377,7 +370,7 @@ def test_the_first_hint_leaves_by_itself_and_does_not_come_back(tab: Tab) -> Non
 
 def test_messages_for_removed_and_unknown_widgets_are_ignored(tab: Tab) -> None:
     gone = tab.widget("EXX")
-    written(tab, "Find an error").fill("roll x")
+    tab.written("Find an error").fill("roll x")
     tab.until(lambda: keys_of_sliders(tab) == {"EAX"})
     for widget in (gone, "no-such-widget", "'; drop"):
         message = {"type": "GuiUpdateMessage", "uuid": widget, "updates": {"value": 3}}
@@ -387,12 +380,12 @@ def test_messages_for_removed_and_unknown_widgets_are_ignored(tab: Tab) -> None:
 
 
 def test_a_broken_update_takes_nothing_else_with_it(
-    tab: Tab, viewer: Viewer, caplog: pytest.LogCaptureFixture
+    tab: Tab, caplog: pytest.LogCaptureFixture
 ) -> None:
     def broken(state: AppState) -> AppState:
         raise RuntimeError("a wheel came off")
 
-    (session,) = viewer.sessions
+    session = tab.session
     session.post(broken)
     session.post(lambda state: edits.with_curve(state, "EXX", Constant((-275.0, 275.0), 4.0)))
     tab.until(lambda: tab.page.get_by_text("a wheel came off").count() > 0)

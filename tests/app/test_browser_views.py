@@ -15,7 +15,6 @@ from warpspace.app.machine import drawn_bodies, tool_point
 from warpspace.app.mapmesh import isoline_pieces, map_mesh
 from warpspace.app.state import start_state
 from warpspace.app.tonemap import vertex_colours
-from warpspace.app.viewer import Viewer
 from warpspace.geometry.annotations import corner_arrows
 from warpspace.geometry.colour import colour_table
 from warpspace.scene.library import load_scene
@@ -141,8 +140,9 @@ def test_orientation_error_and_colour_ranges(tab: Tab) -> None:
     tab.until(lambda: coloured(LIVE.frame(looking(quantity="orientation", range_mode="shared"))))
 
 
-def test_cameras(tab: Tab, viewer: Viewer) -> None:
-    camera = viewer.sessions[-1]._client.camera
+@pytest.mark.own_page
+def test_cameras(tab: Tab) -> None:
+    camera = tab.session._client.camera
 
     def looks_along(direction: tuple[float, float, float]) -> bool:
         away = camera.position - camera.look_at
@@ -167,7 +167,8 @@ def test_cameras(tab: Tab, viewer: Viewer) -> None:
     tab.until(lambda: abs(camera.fov - wide) < 1e-6)
 
 
-def test_pixels_have_the_colours_of_the_bar(tab: Tab, viewer: Viewer) -> None:
+@pytest.mark.own_page
+def test_pixels_have_the_colours_of_the_bar(tab: Tab) -> None:
     for label in (
         "Rotary traces",
         "Nominal box",
@@ -186,7 +187,7 @@ def test_pixels_have_the_colours_of_the_bar(tab: Tab, viewer: Viewer) -> None:
     tick(tab, "Orthographic")
     tab.page.wait_for_timeout(2500)
     frame = LIVE.frame(START)
-    camera = viewer.sessions[-1]._client.camera
+    camera = tab.session._client.camera
     rect = tab.page.evaluate(
         "() => { const r = document.querySelector('canvas').getBoundingClientRect();"
         " return [r.left, r.top, r.width, r.height]; }"
@@ -296,7 +297,8 @@ def settled(tab: Tab) -> tuple[object, str]:
     return now
 
 
-def test_rotation_plays_pauses_and_stops_with_its_session(tab: Tab, viewer: Viewer) -> None:
+@pytest.mark.own_page
+def test_rotation_plays_pauses_and_stops_with_its_session(tab: Tab) -> None:
     go(tab, "Machine")
     tick(tab, "Machine bodies")
     go(tab, "Table")
@@ -316,7 +318,7 @@ def test_rotation_plays_pauses_and_stops_with_its_session(tab: Tab, viewer: View
     tab.until(lambda: np.allclose(drawn(tab, "/machine/C_table"), still, atol=1e-3))
     tab.until(lambda: drawn(tab, "/rotation/actual") is None)
     tab.page.get_by_role("button", name="Play rotation").click()
-    stage = viewer.sessions[-1]._opening._stage
+    stage = tab.session._opening._stage
     tab.until(lambda: stage.playing)
     tab.page.goto("about:blank")
     tab.until(lambda: not stage.playing)

@@ -234,7 +234,11 @@ def test_what_comes_just_as_a_wait_ends_is_not_lost(
             return False
 
     session._wake, session._stopped = Late(), threading.Event()
-    monkeypatch.setattr(session, "_step", lambda: session._actions.popleft()())
+
+    def step() -> None:
+        session._actions.popleft()()
+
+    monkeypatch.setattr(session, "_step", step)
     session._turn()
     assert done == []
     session._turn()
