@@ -21,6 +21,7 @@ from warpspace.app.picture import view_png
 from warpspace.app.state import AppState, start_state
 from warpspace.cli.services import draw_figure, write_export
 from warpspace.exceptions import OptionError
+from warpspace.outputs.exports import draw_scene
 from warpspace.outputs.figures.catalogue import draw_figure as draw
 from warpspace.outputs.figures.settings import A_MINUS_B, FigureSettings
 from warpspace.scene.library import load_scene
@@ -135,6 +136,64 @@ def test_the_figure_is_a_sheet_of_both_and_the_difference_as_the_app_takes_it(
     )
     with pytest.raises(OptionError, match="A − B"):
         FigureSettings(difference="A + B")
+
+
+def ranged(top: float) -> Frame:
+    return LIVE.frame(replace(START, look=START.look.with_top(top)))
+
+
+def tilted(top: float | None = None) -> Frame:
+    look = START.look.with_choice(quantity="orientation")
+    return LIVE.frame(replace(START, look=look if top is None else look.with_top(top)))
+
+
+@pytest.mark.parametrize("top", [None, 7.0])
+def test_glb_has_the_tilts_and_the_range_that_are_coloured(top: float | None) -> None:
+    frame = tilted(top)
+    extras = read_glb(write_export(build_request(frame), ".glb"))["asset"]["extras"]
+    assert extras["settings"]["coloured"] == "tool-orientation error"
+    assert extras["colours"] == {
+        "map": frame.scale.name,
+        "low": 0.0,
+        "high": frame.scale.high if top is None else top,
+        "label": "|φ|",
+        "unit": "µrad",
+    }
+    request = build_request(frame)
+    drawing = draw_scene(request.scene, grid=request.nodes, loop=request.loop)
+    np.testing.assert_allclose(replace(drawing, tilts=True).values, frame.values, atol=1e-9)
+    assert exported_words(frame).startswith("The figure shows the tilts")
+
+
+@pytest.mark.render
+@pytest.mark.parametrize(
+    ("frame", "title", "figure"),
+    [
+        (tilted(7.0), "Orientation error of the tool axis", "orientation-map"),
+        (
+            LIVE.frame(replace(START, look=START.look.with_top(7.0))),
+            "Volumetric error",
+            "error-map",
+        ),
+    ],
+)
+def test_the_figure_shows_what_is_coloured_in_the_range_that_is_fixed(
+    renderer: str, frame: Frame, title: str, figure: str
+) -> None:
+    content = draw_figure(build_request(frame), threading.Event())
+    about = Image.open(io.BytesIO(content)).info
+    assert about["Title"].startswith(title)
+    said = dict(pair.split("=") for pair in about["Description"].partition(";")[0].split(", "))
+    assert (said["figure"], said["range"]) == (figure, "7")
+
+
+@pytest.mark.render
+def test_tilts_are_compared_by_position_errors_on_the_sheet_and_it_says_so(renderer: str) -> None:
+    look = BOTH.look.with_choice(quantity="orientation")
+    frame = frame_of("difference", replace(BOTH, look=look))
+    assert "shows the position errors of A, B and A − B" in exported_words(frame)
+    content = draw_figure(build_request(frame), threading.Event())
+    assert "range" not in Image.open(io.BytesIO(content)).info["Description"]
 
 
 def test_two_loops_on_one_sheet_are_refused_in_words() -> None:

@@ -34,7 +34,6 @@ def build_request(frame: Frame) -> Request:
     loops = [side.loop for side in found.sides]
     return replace(
         request,
-        largest=None if frame.state.look.tilts else max(-frame.scale.low, frame.scale.high),
         minus=Beside(b, loops[1].value) if found.shown == "difference" else None,
         pair=(a, b) if not found.refused and loops[0] == loops[1] else None,
     )
@@ -54,6 +53,8 @@ def _request(frame: Frame, state: AppState, scene: Scene) -> Request:
         frame.state.nodes,
         frame.exaggeration,
         frame.state.shown.dark,
+        frame.state.look.tilts,
+        frame.scale,
     )
 
 
@@ -75,7 +76,8 @@ def exported_words(frame: Frame) -> str:
     """Say what pictures and exports show, where that is not simply what is steered."""
     found = frame.compared
     if found is None:
-        return ""
+        tilts = frame.state.look.tilts
+        return "The figure shows the tilts of the tool axis as needles on the box." if tilts else ""
     sheet = build_sheet_words(frame)
     return f"Pictures and exports show {found.title}.{sheet} Save and Link keep the comparison."
 
@@ -85,4 +87,5 @@ def build_sheet_words(frame: Frame) -> str:
     found = frame.compared
     if found is None or found.refused or found.sides[0].loop != found.sides[1].loop:
         return ""
-    return " The figure shows A, B and A − B on one sheet."
+    what = "the position errors of " if frame.state.look.tilts else ""
+    return f" The figure shows {what}A, B and A − B on one sheet."

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from warpspace.exceptions import WarpspaceError
+from warpspace.geometry.colour import ColourScale
 from warpspace.scene.model import Scene
 
 
@@ -41,8 +42,11 @@ class Request:
         Display factor in force.
     dark : bool
         Light ink on a dark ground.
-    largest : float or None
-        Largest magnitude of the colours where other maps share them, µm.
+    tilts : bool
+        Whether the tool-orientation error is coloured, not the position error.
+    colours : ColourScale or None
+        The colours that are shown, where they are not those of the request's own map: fixed by the
+        user, or shared with other maps.
     minus : Beside or None
         What is subtracted, where a difference is wanted.
     pair : tuple of Scene, (2,), or None
@@ -55,7 +59,8 @@ class Request:
     nodes: int
     exaggeration: float
     dark: bool
-    largest: float | None = None
+    tilts: bool = False
+    colours: ColourScale | None = None
     minus: Beside | None = None
     pair: tuple[Scene, Scene] | None = None
 

@@ -21,7 +21,9 @@ def build_services() -> Services:
 
 
 def draw_figure(request: Request, cancelled: threading.Event) -> bytes:
-    """Draw the error map of a request as a PNG; of a comparison both sides and the difference.
+    """Draw the map of a request as a PNG; of a comparison both sides and the difference.
+
+    Where tilts are coloured it is the orientation map; a comparison is always of position errors.
 
     Parameters
     ----------
@@ -50,15 +52,21 @@ def draw_figure(request: Request, cancelled: threading.Event) -> bytes:
         loop=request.loop,
         grid=request.nodes,
         difference=A_MINUS_B,
+        range_top=None if request.colours is None else request.colours.high,
     )
     name, scenes = "error-map", [request.scene]
     if request.pair is not None:
+        if request.tilts:
+            settings = replace(settings, range_top=None)
         name, scenes = "comparison", list(request.pair)
     elif request.minus is not None:
         raise OptionError(
             f"A is seen through the {request.loop} loop, B through the {request.minus.loop} loop; a"
             " figure of both needs one loop. GLB, CSV and HTML show their difference."
         )
+    elif request.tilts:
+        # the lean of the needles has a factor of its own
+        name, settings = "orientation-map", replace(settings, exaggeration="auto")
     while not _renderers.acquire(timeout=POLL_S):
         if cancelled.is_set():
             raise CancelledError("cancelled while waiting for a renderer")
@@ -101,7 +109,8 @@ def write_export(request: Request, ending: str) -> bytes:
                 loop=part.loop,
                 component=request.component,
             ),
-            largest_um=request.largest,
+            tilts=request.tilts,
+            colours=request.colours,
         )
         for part in (request, request.minus)
         if part is not None

@@ -274,9 +274,8 @@ class FilesPanel:
 
     def show(self, frame: Frame) -> None:
         """Remember what is drawn, and say so where it is not what is steered."""
-        before, self._frame = self._frame, frame
-        if frame.compared is not None or (before is not None and before.compared is not None):
-            self._tell(exported_words(frame))
+        self._frame = frame
+        self._tell(exported_words(frame))
 
     def _tell(self, words: str) -> None:
         """Say what pictures and exports show."""

@@ -97,7 +97,8 @@ def subtract_drawings(one: Drawing, other: Drawing) -> Difference:
         picture,
         one.exaggeration,
         one.component,
-        one.largest_um,
+        one.tilts,
+        one.colours,
         one=one,
         other=other,
     )

@@ -19,7 +19,7 @@ from warpspace.machine.parameters import parameter
 from warpspace.scene.model import Scene
 from warpspace.scene.pipeline import ScenePicture, evaluate_picture
 from warpspace.scene.save import scene_to_toml
-from warpspace.units import Array
+from warpspace.units import MICROMETRE, MICRORADIAN, Array
 
 Exaggeration = float | Literal["auto"] | None
 """A display factor, "auto" for a round one that suits the scene, None for what the scene says."""
@@ -57,14 +57,17 @@ class Drawing:
         Display factor of all displacements.
     component : str
         What the colours show: "norm", "x", "y" or "z".
-    largest_um : float or None
-        Largest magnitude of the colour scale where other maps share it, µm.
+    tilts : bool
+        Whether that is of the tool-orientation error, not of the position error.
+    colours : ColourScale or None
+        The colours where they are given, for instance shared with other maps.
     """
 
     picture: ScenePicture
     exaggeration: float
     component: str = "norm"
-    largest_um: float | None = None
+    tilts: bool = False
+    colours: ColourScale | None = None
 
     @property
     def scene(self) -> Scene:
@@ -77,15 +80,21 @@ class Drawing:
         return deform(self.picture.grid.nominal_mm, self.picture.field.error_um, self.exaggeration)
 
     @cached_property
-    def values_um(self) -> Array:
-        """What the colours show at each node, [nx, ny, nz], µm."""
-        return component_values(self.picture.field.error_um, self.component)
+    def values(self) -> Array:
+        """What the colours show at each node, [nx, ny, nz], µm or µrad."""
+        field = self.picture.field
+        return component_values(
+            field.orientation_urad if self.tilts else field.error_um, self.component
+        )
 
     @cached_property
     def scale(self) -> ColourScale:
         """Colour scale of the values."""
-        largest = float(np.abs(self.values_um).max())
-        return build_scale(max(largest, self.largest_um or 0.0), self.component)
+        if self.colours is not None:
+            return self.colours
+        symbol, unit = ("φ", MICRORADIAN) if self.tilts else ("E", MICROMETRE)
+        largest = float(np.abs(self.values).max())
+        return build_scale(largest, self.component, quantity=symbol, unit=unit)
 
     @cached_property
     def traces(self) -> tuple[DrawnTrace, ...]:
@@ -116,6 +125,7 @@ class Drawing:
             "nodes": list(self.picture.grid.shape),
             "exaggeration": self.exaggeration,
             "component": self.component,
+            "coloured": "tool-orientation error" if self.tilts else "position error",
         }
 
     @property

@@ -109,7 +109,7 @@ def _surface(builder: GltfBuilder, drawing: Drawing) -> list[int]:
     position, back = _placed(grid.nominal_mm.reshape(-1, 3)[at], error, drawing.exaggeration)
     attributes = {
         **position,
-        "COLOR_0": srgb_to_linear(drawing.scale.colours(drawing.values_um.reshape(-1)[at])),
+        "COLOR_0": srgb_to_linear(drawing.scale.colours(drawing.values.reshape(-1)[at])),
         "_ERROR_UM": error,
         "_ORIENTATION_URAD": field.orientation_urad.reshape(-1, 3)[at],
     }

@@ -5,13 +5,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from warpspace.analysis.statistics import Statistics, statistics
-from warpspace.geometry.colour import build_scale, component_values
+from warpspace.geometry.colour import component_values
 from warpspace.outputs.canvas import Canvas
 from warpspace.outputs.figures.content import Drawing, DrawnMap, MapContent
 from warpspace.outputs.figures.error_map import isoline_words, quantity_words, view_words
 from warpspace.outputs.figures.map3d import draw_map, fit_map
 from warpspace.outputs.figures.panel import draw_colour_bar, draw_scale_bars
-from warpspace.outputs.figures.settings import B_MINUS_A, FigureSettings, choose_exaggeration
+from warpspace.outputs.figures.settings import (
+    B_MINUS_A,
+    FigureSettings,
+    choose_exaggeration,
+    choose_scale,
+)
 from warpspace.outputs.figures.sheet import map_legend, metadata, scene_facts, start_sheet
 from warpspace.outputs.projection import Rect
 from warpspace.outputs.style import SIZES
@@ -40,7 +45,7 @@ def draw_comparison(scenes: Sequence[Scene], settings: FigureSettings, *, exact:
     fields = [*(picture.field for picture in pictures), difference_field(*ordered)]
     exaggeration = choose_exaggeration(settings, *pictures)
     values = [component_values(field.error_um, settings.component) for field in fields]
-    scale = build_scale(max(float(abs(part).max()) for part in values), settings.component)
+    scale = choose_scale(settings, *values)
     contents = [
         MapContent(field.nominal_mm, field.error_um, part, scale, exaggeration)
         for field, part in zip(fields, values, strict=True)

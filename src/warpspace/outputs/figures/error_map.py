@@ -2,14 +2,14 @@
 
 from collections.abc import Sequence
 
-from warpspace.geometry.colour import ColourScale, build_scale, component_values
+from warpspace.geometry.colour import ColourScale, component_values
 from warpspace.geometry.faces import MIN_CUT_NODES
 from warpspace.geometry.isolines import isoline_levels
 from warpspace.geometry.surfaces import Shape
 from warpspace.outputs.figures.content import Drawing, MapContent
 from warpspace.outputs.figures.map3d import draw_map
 from warpspace.outputs.figures.panel import Row, draw_panel
-from warpspace.outputs.figures.settings import FigureSettings, choose_exaggeration
+from warpspace.outputs.figures.settings import FigureSettings, choose_exaggeration, choose_scale
 from warpspace.outputs.figures.sheet import (
     content_rect,
     draw_footer,
@@ -55,7 +55,7 @@ def draw_picture(picture: ScenePicture, settings: FigureSettings, *, exact: bool
     scene = picture.scene
     exaggeration = choose_exaggeration(settings, picture)
     values = component_values(picture.field.error_um, settings.component)
-    scale = build_scale(float(abs(values).max()), settings.component)
+    scale = choose_scale(settings, values)
     title = f"{map_title(settings.component)}: {scene.title}"
     canvas = new_canvas(settings, exact=exact)
     facts = [*scene_facts(picture, exaggeration), view_words(settings.view, picture.grid.shape)]

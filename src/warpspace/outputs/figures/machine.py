@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpspace.geometry.colour import build_scale, component_values
+from warpspace.geometry.colour import component_values
 from warpspace.geometry.deform import deform
 from warpspace.geometry.faces import crease_lines, face_lines, outer_faces
 from warpspace.geometry.surfaces import box_edges, line_spacing, triangulate
@@ -15,7 +15,7 @@ from warpspace.outputs.figures.content import Drawing, DrawnMap
 from warpspace.outputs.figures.error_map import quantity_words, statistics_rows, value_marks
 from warpspace.outputs.figures.map3d import GHOST_DASHES
 from warpspace.outputs.figures.panel import draw_panel
-from warpspace.outputs.figures.settings import FigureSettings, choose_exaggeration
+from warpspace.outputs.figures.settings import FigureSettings, choose_exaggeration, choose_scale
 from warpspace.outputs.figures.sheet import LegendEntry, metadata, scene_facts, start_sheet
 from warpspace.outputs.lines import split_visible
 from warpspace.outputs.projection import Projection, Rect, fit_projection
@@ -114,7 +114,7 @@ def draw_machine(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bo
     picture = evaluate_picture(scenes[0], grid=settings.grid, loop=settings.loop)
     exaggeration = choose_exaggeration(settings, picture)
     values = component_values(picture.field.error_um, settings.component)
-    scale = build_scale(float(abs(values).max()), settings.component)
+    scale = choose_scale(settings, values)
     title = f"Machine and working volume: {picture.scene.title}"
     placed = place_bodies(picture, exaggeration, settings.theme)
     facts = [

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpspace.geometry.colour import build_scale, component_values
+from warpspace.geometry.colour import component_values
 from warpspace.geometry.surfaces import Index, corners, triangulate
 from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import TOOL_AXIS
@@ -15,7 +15,7 @@ from warpspace.outputs.figures.content import Drawing, MapContent
 from warpspace.outputs.figures.error_map import isoline_words, view_words
 from warpspace.outputs.figures.map3d import draw_map, fit_map, map_faces
 from warpspace.outputs.figures.panel import draw_panel
-from warpspace.outputs.figures.settings import FigureSettings
+from warpspace.outputs.figures.settings import FigureSettings, choose_scale
 from warpspace.outputs.figures.sheet import (
     LegendEntry,
     map_legend,
@@ -87,9 +87,7 @@ def draw_orientation(scenes: Sequence[Scene], settings: FigureSettings, *, exact
     picture = evaluate_picture(scenes[0], grid=settings.grid, loop=settings.loop)
     orientation = picture.field.orientation_urad
     values = component_values(orientation, settings.component)
-    scale = build_scale(
-        float(abs(values).max()), settings.component, quantity="tilt", unit=MICRORADIAN
-    )
+    scale = choose_scale(settings, values, quantity="tilt", unit=MICRORADIAN)
     given = settings.exaggeration
     automatic = lean_factor(float(np.linalg.norm(orientation, axis=-1).max()))
     factor = automatic if given is None or given == "auto" else given

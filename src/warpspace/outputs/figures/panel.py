@@ -113,7 +113,8 @@ def _draw_marks(
         heights[-1] -= over
         for index in range(len(heights) - 2, -1, -1):
             heights[index] = min(heights[index], heights[index + 1] - distance)
-    for (name, _), spot, height in zip(ordered, spots, heights, strict=True):
+    for (name, value), spot, height in zip(ordered, spots, heights, strict=True):
+        beyond = " ↑" if value > scale.high else " ↓" if value < scale.low else ""
         tip = left - canvas.px(2.0)
         side = canvas.px(5.0)
         base = tip - canvas.px(9.0)
@@ -123,8 +124,9 @@ def _draw_marks(
         if abs(height - spot) > canvas.px(1.0):
             canvas.line([(base, spot), (base - canvas.px(5.0), height)], width=SIZES.hair)
         canvas.text(
-            base - canvas.px(7.0), height, name, size=SIZES.small, ha="right", va="center_baseline"
-        )
+            base - canvas.px(7.0), height, name + beyond, size=SIZES.small, ha="right",
+            va="center_baseline",
+        )  # fmt: skip
 
 
 def draw_scale_bars(

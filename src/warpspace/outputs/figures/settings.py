@@ -1,15 +1,19 @@
 """What a figure is asked for."""
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
+import numpy as np
+
 from warpspace.exceptions import OptionError
-from warpspace.geometry.colour import COMPONENTS
+from warpspace.geometry.colour import COMPONENTS, ColourScale, build_scale
 from warpspace.geometry.deform import MAX_EXAGGERATION, auto_exaggeration
 from warpspace.outputs.projection import VIEWS
 from warpspace.outputs.style import DARK, LIGHT, Theme
 from warpspace.scene.model import Scene
 from warpspace.scene.pipeline import ScenePicture
+from warpspace.units import MICROMETRE, Array
 
 SMALLEST_SIZE = (400, 300)
 LARGEST_SIDE = 12_000
@@ -40,6 +44,9 @@ class FigureSettings:
         Nodes per axis of the working volume.
     difference : str
         Which way two scenes A and B are subtracted: `B_MINUS_A` or `A_MINUS_B`.
+    range_top : float or None, µm or µrad
+        Where the colours end (a signed component's begin at its negative); None for a round value
+        that holds all of the map.
 
     Raises
     ------
@@ -55,6 +62,7 @@ class FigureSettings:
     loop: str = "tool"
     grid: int = 21
     difference: str = B_MINUS_A
+    range_top: float | None = None
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -71,6 +79,8 @@ class FigureSettings:
             )
         if self.difference not in (B_MINUS_A, A_MINUS_B):
             raise OptionError(f"difference {self.difference!r}; expected B − A or A − B")
+        if self.range_top is not None and not 0.0 < self.range_top < math.inf:
+            raise OptionError(f"range_top {self.range_top:g}; expected a number above 0")
         check_size(self.size)
 
     @property
@@ -124,6 +134,29 @@ def choose_exaggeration(settings: FigureSettings, *pictures: ScenePicture) -> fl
     return auto_exaggeration(largest, max(picture.grid.longest_edge_mm for picture in pictures))
 
 
+def choose_scale(
+    settings: FigureSettings, *values: Array, quantity: str = "E", unit: str = MICROMETRE
+) -> ColourScale:
+    """Choose the colours of maps that share one bar.
+
+    Parameters
+    ----------
+    settings : FigureSettings
+    *values : ndarray, µm or µrad
+        What each map colours.
+    quantity, unit : str, optional
+        Symbol and unit of what is coloured.
+
+    Returns
+    -------
+    ColourScale
+    """
+    largest = max(float(np.abs(part).max()) for part in values)
+    scale = build_scale(largest, settings.component, quantity=quantity, unit=unit)
+    top = settings.range_top
+    return scale if top is None else replace(scale, low=-top if scale.diverging else 0.0, high=top)
+
+
 def spell_settings(settings: FigureSettings, exaggeration: float, **more: Any) -> str:
     """Spell the settings for metadata, ``key=value`` with commas between."""
     values = {
@@ -134,6 +167,7 @@ def spell_settings(settings: FigureSettings, exaggeration: float, **more: Any) -
         "exaggeration": f"{exaggeration:.10g}",
         "size": f"{settings.size[0]}x{settings.size[1]}",
         "theme": settings.theme.name,
+        **({} if settings.range_top is None else {"range": f"{settings.range_top:.10g}"}),
         **more,
     }
     return ", ".join(f"{key}={value}" for key, value in values.items())

@@ -7,7 +7,7 @@ import numpy as np
 
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import evaluate_first_order
-from warpspace.geometry.colour import ColourScale, build_scale, component_values
+from warpspace.geometry.colour import ColourScale, component_values
 from warpspace.geometry.faces import crease_lines, outer_faces
 from warpspace.geometry.slices import build_slice, slice_ranges
 from warpspace.geometry.surfaces import box_edges, triangulate
@@ -21,7 +21,7 @@ from warpspace.outputs.figures.error_map import (
 )
 from warpspace.outputs.figures.map3d import GHOST_DASHES, draw_map, fit_map
 from warpspace.outputs.figures.panel import draw_panel
-from warpspace.outputs.figures.settings import FigureSettings, choose_exaggeration
+from warpspace.outputs.figures.settings import FigureSettings, choose_exaggeration, choose_scale
 from warpspace.outputs.figures.sheet import map_legend, metadata, scene_facts, start_sheet
 from warpspace.outputs.lines import split_visible
 from warpspace.outputs.projection import Rect, fit_projection
@@ -83,7 +83,7 @@ def draw_slices(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     picture = evaluate_picture(scenes[0], grid=settings.grid, loop=settings.loop)
     exaggeration = choose_exaggeration(settings, picture)
     values = component_values(picture.field.error_um, settings.component)
-    scale = build_scale(float(abs(values).max()), settings.component)
+    scale = choose_scale(settings, values)
     slices = _evaluate_slices(picture, settings, scale, exaggeration)
     title = f"Slices through the working volume: {picture.scene.title}"
     legend = map_legend(

@@ -7,7 +7,7 @@ import numpy as np
 
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import View, evaluate_first_order
-from warpspace.geometry.colour import ColourScale, build_scale, component_values
+from warpspace.geometry.colour import ColourScale, component_values
 from warpspace.geometry.deform import auto_exaggeration, deform
 from warpspace.geometry.traces import Trace, build_traces
 from warpspace.machine.description import Vector
@@ -16,7 +16,7 @@ from warpspace.outputs.figures.content import Drawing
 from warpspace.outputs.figures.error_map import quantity_words
 from warpspace.outputs.figures.machine import draw_body_edges, place_bodies
 from warpspace.outputs.figures.panel import Row, draw_panel
-from warpspace.outputs.figures.settings import FigureSettings, given_exaggeration
+from warpspace.outputs.figures.settings import FigureSettings, choose_scale, given_exaggeration
 from warpspace.outputs.figures.sheet import LegendEntry, metadata, scene_facts, start_sheet
 from warpspace.outputs.labels import Occupancy, place_label
 from warpspace.outputs.lines import split_visible
@@ -90,7 +90,7 @@ def draw_traces(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     if factor is None:
         factor = auto_exaggeration(2.0 * largest, float(np.ptp(nominal, axis=0).max()))
     values = np.concatenate([trace.values for trace in traces])
-    scale = build_scale(float(abs(values).max()), settings.component)
+    scale = choose_scale(settings, values)
     picture = evaluate_picture(scene, grid=2, loop="workpiece")
     placed = place_bodies(picture, factor, settings.theme, BODIES)
     title = f"Traces of the rotary axes: {scene.title}"
