@@ -125,10 +125,18 @@ class CommandsPanel:
                 None,
                 does(lambda state: state.with_exaggeration(TRUE_SCALE)),
             ),
-            Command("Colour: |E|", "Length of the error", "1", None, coloured("norm")),
-            Command("Colour: E_x", "Error in x", "2", None, coloured("x")),
-            Command("Colour: E_y", "Error in y", "3", None, coloured("y")),
-            Command("Colour: E_z", "Error in z", "4", None, coloured("z")),
+            Command(
+                "Colour: magnitude", "Length of the error, or tilt", "1", None, coloured("norm")
+            ),
+            Command(
+                "Colour: x component", "Error along x, or tilt about x", "2", None, coloured("x")
+            ),
+            Command(
+                "Colour: y component", "Error along y, or tilt about y", "3", None, coloured("y")
+            ),
+            Command(
+                "Colour: z component", "Error along z, or tilt about z", "4", None, coloured("z")
+            ),
             Command("Grid lines", "Show or hide", "G", None, does(_toggled("grid_lines"))),
             Command("Nominal box", "Show or hide", "B", None, does(_toggled("ghost"))),
             Command("Rotary traces", "Show or hide", "C", None, does(_toggled("traces"))),
