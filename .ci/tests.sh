@@ -1,21 +1,13 @@
 #!/usr/bin/env bash
-# Run every test: the browser tests one after the other, and beside them, with what they leave of
-# the processor, all others. Both parts always run; coverage is that of both.
+# Run every test: first those without a browser, on two workers, then the browser tests one by one,
+# since drawing in software takes both cores. Both parts always run.
+# Arguments go to both runs of pytest.
 set -u
 python=.venv/bin/python
 # The workers are the parallelism; threads below them would only compete.
 export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 LP_NUM_THREADS=1
 
 status=0
-rm -f .coverage .coverage.*
-browser=$(mktemp)
-trap 'rm -f "$browser"' EXIT
-# What runs in the background is deaf to Ctrl-C, which the others test.
-COVERAGE_FILE=.coverage.browser $python -m pytest -m browser --durations=10 \
-    --cov --cov-report= >"$browser" 2>&1 &
-COVERAGE_FILE=.coverage.others nice -n 10 $python -m pytest -n 2 --dist loadfile -m "not browser" \
-    --durations=10 --cov --cov-report= || status=$?
-wait $! || status=$?
-cat "$browser"
-$python -m coverage combine --quiet && $python -m coverage report || status=$?
+$python -m pytest -n 2 --dist loadfile -m "not browser" --durations=10 "$@" || status=$?
+$python -m pytest -m browser --durations=10 "$@" || status=$?
 exit "$status"

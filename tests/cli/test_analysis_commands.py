@@ -206,16 +206,23 @@ def test_bad_tolerances_are_one_message(warpspace, tmp_path, text: str, fragment
 def test_ctrl_c_ends_cleanly(tmp_path: Path) -> None:
     target = tmp_path / "x.png"
     command = [sys.executable, "-m", "warpspace", *SAMPLE, "--samples", "900000000"]
-    process = subprocess.Popen(
-        [*command, "--plot", str(target)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        restore_signals=True,
-    )
-    time.sleep(3.0)
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=20)
+    # what a shell runs in the background is deaf to it, and so are its children
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        process = subprocess.Popen(
+            [*command, "--plot", str(target)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+    finally:
+        signal.signal(signal.SIGINT, before)
+    try:
+        time.sleep(3.0)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=20)
+    finally:
+        process.kill()
     assert process.returncode == 130
     assert out == ""
     assert err.strip() == "warpspace: interrupted"

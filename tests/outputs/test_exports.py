@@ -121,7 +121,7 @@ def test_glb_colours_are_linear_and_unlit() -> None:
     linear = np.frombuffer(data, "<f4", accessor["count"] * 3, start).reshape(-1, 3)
     shown = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     at = outer_surface(drawing.picture.grid.shape).nodes
-    wanted = drawing.scale.colours(drawing.values_um.reshape(-1)[at])
+    wanted = drawing.scale.colours(drawing.values.reshape(-1)[at])
     np.testing.assert_allclose(shown * 255.0, wanted, atol=0.01)
 
 
