@@ -2,9 +2,11 @@
 
 import io
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 from PIL import Image
 
 from warpspace import load_scene, scene_names
@@ -161,6 +163,33 @@ def test_auto_overrides_the_exaggeration_of_a_scene() -> None:
     assert draw_figure("error-map", [scene], settings).maps[0].exaggeration == 500.0
     settings = FigureSettings(size=(500, 400), grid=3, exaggeration="auto")
     assert draw_figure("error-map", [scene], settings).maps[0].exaggeration == 5000.0
+
+
+@pytest.mark.parametrize(("component", "low"), [("norm", 0.0), ("x", -7.0)])
+@pytest.mark.parametrize(
+    "name", ["error-map", "slices", "orientation-map", "machine", "comparison"]
+)
+def test_a_range_that_is_given_is_that_of_every_map(name: str, component: str, low: float) -> None:
+    size = (1000, 750)
+    settings = FigureSettings(component=component, size=size, grid=5, range_top=7.0)
+    drawing = draw_figure(name, pair(name), settings)
+    assert {(part.scale.low, part.scale.high) for part in drawing.maps} == {(low, 7.0)}
+    inside(drawing, size)
+    assert ", range=7" in drawing.facts["settings"]
+    # a value beyond the bar is marked as such, no other
+    said = {text.get_text() for text in drawing.figure.findobj(Text)}
+    plain = draw_figure(name, pair(name), replace(settings, range_top=None))
+    marks = {text.get_text() for text in plain.figure.findobj(Text)} - said
+    assert not any("↑" in text or "↓" in text for text in marks)
+    if name in {"error-map", "orientation-map"}:
+        assert "max ↑" in said
+        assert "max" in marks
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])
+def test_impossible_ranges_are_refused(value: float) -> None:
+    with pytest.raises(OptionError, match="range_top"):
+        FigureSettings(range_top=value)
 
 
 def test_writing_keeps_an_existing_file(tmp_path) -> None:
