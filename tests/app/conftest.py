@@ -1,5 +1,6 @@
 """The app as it runs, and a tab of a real Chromium that looks at it."""
 
+import base64
 import json
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 from warpspace.app.board import Board
+from warpspace.app.cameras import Stand
 from warpspace.app.live import Frame
 from warpspace.app.session import Session
 from warpspace.app.state import AppState, start_state
@@ -21,12 +23,18 @@ if TYPE_CHECKING:
 # What the client or Chromium says of itself in a software renderer.
 HARMLESS = ("THREE.Clock", "GL Driver Message", "SwiftShader", "Software WebGL", "favicon")
 VERTICES = """() => {
+  const pack = array => {
+    const bytes = new Uint8Array(Float32Array.from(array).buffer), parts = [];
+    for (let at = 0; at < bytes.length; at += 8192)
+      parts.push(String.fromCharCode(...bytes.subarray(at, at + 8192)));
+    return btoa(parts.join(''));
+  };
   const node = window.__viserMutable.nodeRefFromName['/box/surface'];
   let found = null;
   if (node) node.traverse(o => {
     if (o.isMesh && o.geometry.attributes.color) {
       const p = o.geometry.attributes.position, c = o.geometry.attributes.color;
-      found = [Array.from(p.array), Array.from(c.array)];
+      found = [pack(p.array), pack(c.array)];
     }
   });
   return found;
@@ -77,6 +85,7 @@ class Tab:
             session.board.unsubscribe(session.changed)
             session.board = Board(start)
             session.board.subscribe(session.changed)
+            session._eye._stand = Stand()
 
         self.page.wait_for_selector("html[data-warpspace=open]")
         self.page.keyboard.press("Escape")
@@ -95,10 +104,10 @@ class Tab:
 
     def until(self, fine: Callable[[], bool], seconds: float = 15.0) -> None:
         """Wait until something holds."""
-        for _ in range(int(seconds / 0.1)):
+        for _ in range(int(seconds / 0.05)):
             if fine():
                 return
-            self.page.wait_for_timeout(100)
+            self.page.wait_for_timeout(50)
         pytest.fail(f"did not come true within {seconds:g} s")
 
     def surface(self) -> tuple[np.ndarray, np.ndarray] | None:
@@ -106,7 +115,8 @@ class Tab:
         found = self.page.evaluate(VERTICES)
         if found is None:
             return None
-        return np.reshape(found[0], (-1, 3)), np.reshape(found[1], (-1, 3))
+        points, colours = (np.frombuffer(base64.b64decode(part), "<f4") for part in found)
+        return points.reshape(-1, 3).astype(float), colours.reshape(-1, 3).astype(float)
 
     def vertices(self) -> np.ndarray | None:
         """Vertices of the drawn surface, [M, 3], mm."""

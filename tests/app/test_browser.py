@@ -32,7 +32,6 @@ def check_numbers(tab: Tab, frame: Frame) -> None:
         assert tab.number(name) == pytest.approx(value, abs=0.006)
 
 
-@pytest.mark.own_page
 def test_first_screen(tab: Tab) -> None:
     frame = model(START)
     tab.until(lambda: tab.shows(drawn_nodes(frame)))

@@ -160,19 +160,11 @@ def test_a_point_of_a_trace_and_its_lever_come_with_a_link(
     assert other.state() == asked
 
 
-@pytest.mark.parametrize(
-    ("pairs", "message"),
-    [
-        ({"compare.b": "scene=nobody"}, "which is not here"),
-        ({"compare.b": "file=!!!"}, "is cut off"),
-        ({"compare.b": "now", "compare.shown": "<b>"}, "does not say what is drawn"),
-    ],
-)
 def test_a_link_with_a_broken_comparison_says_so_and_changes_nothing(
-    follow: Callable[[str], Tab], pairs: dict[str, str], message: str
+    follow: Callable[[str], Tab],
 ) -> None:
-    tab = follow(f"scene=dvf5000_second&EXX=7&{urlencode(pairs)}")
-    tab.until(lambda: any(message in text for text in said(tab)))
+    tab = follow(f"scene=dvf5000_second&EXX=7&{urlencode({'compare.b': 'file=!!!'})}")
+    tab.until(lambda: any("is cut off" in text for text in said(tab)))
     assert len([text for text in said(tab) if "Link: failed" in text]) == 1
     assert tab.state() == START
 

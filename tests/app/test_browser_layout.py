@@ -33,31 +33,29 @@ def shares(tab: Tab) -> tuple[float, float]:
     return errors / (errors + curve), float(errors + curve)
 
 
-@pytest.mark.parametrize(("width", "height"), [(1600, 900), (1280, 800)])
 def test_tabs_stand_on_one_line_and_sliders_have_the_height(
-    open_tab: Callable[..., Tab], width: int, height: int
+    tab: Tab, open_tab: Callable[..., Tab]
 ) -> None:
-    tab = open_tab(size=(width, height))
-    assert set(tab.page.evaluate(STRIPS)) == {1}
-    tab.until(lambda: shares(tab)[0] > 0.66)
-    # labels do not reach below the buttons beside them
-    overlaps = tab.page.evaluate(OVERLAPS)
-    assert overlaps == 0
-    assert tab.errors == []
+    for page in (tab, open_tab(size=(1600, 900))):
+        assert set(page.page.evaluate(STRIPS)) == {1}
+        page.until(lambda page=page: shares(page)[0] > 0.66)
+        # labels do not reach below the buttons beside them
+        assert page.page.evaluate(OVERLAPS) == 0
+        assert page.errors == []
 
 
-@pytest.mark.own_page
 def test_the_divider_on_the_left_can_be_moved(tab: Tab) -> None:
     tab.until(lambda: shares(tab)[0] > 0.66)
     before, height = shares(tab)
     at = tab.page.locator(DIVIDER).bounding_box()
     x, y = at["x"] + 60, at["y"] + at["height"] / 2
-    tab.page.mouse.move(x, y)
-    tab.page.mouse.down()
-    tab.page.mouse.move(x, y - 40)
-    tab.page.mouse.move(x, y - 90)
-    tab.page.mouse.up()
-    tab.until(lambda: abs(shares(tab)[0] - (before - 90 / height)) < 0.02)
+    for start, end, share in ((y, y - 90, before - 90 / height), (y - 90, y, before)):
+        tab.page.mouse.move(x, start)
+        tab.page.mouse.down()
+        tab.page.mouse.move(x, (start + end) / 2)
+        tab.page.mouse.move(x, end)
+        tab.page.mouse.up()
+        tab.until(lambda share=share: abs(shares(tab)[0] - share) < 0.02)
 
 
 def test_the_colours_of_tilts_are_called_tilts(tab: Tab) -> None:

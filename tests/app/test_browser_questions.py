@@ -178,7 +178,6 @@ def test_a_saved_scene_opens_to_the_identical_state(
     assert load_scene(path).errors.amplitude("EXX") == 7.5
 
 
-@pytest.mark.own_page
 def test_a_link_brings_camera_and_settings(tab: Tab, open_tab: Callable[..., Tab]) -> None:
     tab.send("EXX", "4")
     tab.page.wait_for_timeout(100)

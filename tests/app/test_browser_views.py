@@ -140,7 +140,6 @@ def test_orientation_error_and_colour_ranges(tab: Tab) -> None:
     tab.until(lambda: coloured(LIVE.frame(looking(quantity="orientation", range_mode="shared"))))
 
 
-@pytest.mark.own_page
 def test_cameras(tab: Tab) -> None:
     camera = tab.session._client.camera
 
@@ -167,7 +166,6 @@ def test_cameras(tab: Tab) -> None:
     tab.until(lambda: abs(camera.fov - wide) < 1e-6)
 
 
-@pytest.mark.own_page
 def test_pixels_have_the_colours_of_the_bar(tab: Tab) -> None:
     for label in (
         "Rotary traces",
