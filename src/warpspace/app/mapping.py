@@ -1,7 +1,5 @@
 """From a field to what is coloured: position error or tilt, and the range of its colours."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from warpspace.app.state import AppState
@@ -50,11 +48,8 @@ def choose_scale(
     largest = float(np.abs(values).max())
     if mode == "shared":
         largest = _shared_largest(state, basis, field)
-    scale = build_scale(largest, state.component, quantity=symbol, unit=unit)
-    if mode == "fixed":
-        top = state.look.range_top
-        return replace(scale, low=-top if scale.diverging else 0.0, high=top)
-    return scale
+    end = state.look.range_top if mode == "fixed" else None
+    return build_scale(largest, state.component, quantity=symbol, unit=unit, end=end)
 
 
 def _shared_largest(state: AppState, basis: ErrorBasis, field: ErrorField) -> float:

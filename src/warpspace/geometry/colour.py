@@ -118,9 +118,14 @@ def component_values(error: Array, component: str) -> Array:
 
 
 def build_scale(
-    largest: float, component: str, *, quantity: str = "E", unit: str = MICROMETRE
+    largest: float,
+    component: str,
+    *,
+    quantity: str = "E",
+    unit: str = MICROMETRE,
+    end: float | None = None,
 ) -> ColourScale:
-    """Choose a scale with round ends for values up to a largest magnitude.
+    """Choose a scale with round ends for values up to a largest magnitude, or with a given end.
 
     Parameters
     ----------
@@ -131,6 +136,8 @@ def build_scale(
     quantity : str, optional
         Symbol of what is shown.
     unit : str, optional
+    end : float, optional
+        Where it ends, whatever the values; a signed component's begins at its negative.
 
     Returns
     -------
@@ -141,6 +148,8 @@ def build_scale(
     if math.isfinite(largest) and largest > 0.0:
         step = nice_step(largest if component == "norm" else 2.0 * largest)
         top = step * math.ceil(largest / step * (1.0 - 1e-9))
+    if end is not None:
+        top = end
     if component == "norm":
         return ColourScale(0.0, top, diverging=False, label=f"|{quantity}|", unit=unit)
     return ColourScale(-top, top, diverging=True, label=f"{quantity}_{component}", unit=unit)

@@ -1,7 +1,7 @@
 """What a figure is asked for."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -152,9 +152,9 @@ def choose_scale(
     ColourScale
     """
     largest = max(float(np.abs(part).max()) for part in values)
-    scale = build_scale(largest, settings.component, quantity=quantity, unit=unit)
-    top = settings.range_top
-    return scale if top is None else replace(scale, low=-top if scale.diverging else 0.0, high=top)
+    return build_scale(
+        largest, settings.component, quantity=quantity, unit=unit, end=settings.range_top
+    )
 
 
 def spell_settings(settings: FigureSettings, exaggeration: float, **more: Any) -> str:
