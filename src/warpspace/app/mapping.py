@@ -4,11 +4,8 @@ import numpy as np
 
 from warpspace.app.state import AppState
 from warpspace.field.basis import ErrorBasis, ErrorField
-from warpspace.geometry.colour import ColourScale, build_scale, component_values
-from warpspace.units import MICROMETRE, MICRORADIAN, Array
-
-SYMBOLS = {"position": ("E", MICROMETRE), "orientation": ("φ", MICRORADIAN)}
-"""Symbol and unit of what can be coloured."""
+from warpspace.geometry.colour import SYMBOLS, ColourScale, build_scale, component_values
+from warpspace.units import Array
 
 
 def shown_error(state: AppState, field: ErrorField) -> Array:

@@ -9,10 +9,12 @@ from cmap import Colormap
 from numpy.typing import NDArray
 
 from warpspace.exceptions import OptionError
-from warpspace.units import MICROMETRE, Array
+from warpspace.units import MICROMETRE, MICRORADIAN, Array
 
 SEQUENTIAL = "viridis"
 DIVERGING = "crameri:vik"
+SYMBOLS = {"position": ("E", MICROMETRE), "orientation": ("φ", MICRORADIAN)}
+"""Symbol and unit of what can be coloured."""
 COMPONENTS = ("norm", "x", "y", "z")
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 _INTERVALS = 10

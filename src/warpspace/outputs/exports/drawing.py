@@ -11,7 +11,7 @@ from warpspace import __version__
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import evaluate_first_order
 from warpspace.field.grid import DEFAULT_NODES
-from warpspace.geometry.colour import ColourScale, build_scale, component_values
+from warpspace.geometry.colour import SYMBOLS, ColourScale, build_scale, component_values
 from warpspace.geometry.deform import MAX_EXAGGERATION, auto_exaggeration, deform
 from warpspace.geometry.traces import Trace, build_traces
 from warpspace.kinematics.model import Loop
@@ -19,7 +19,7 @@ from warpspace.machine.parameters import parameter
 from warpspace.scene.model import Scene
 from warpspace.scene.pipeline import ScenePicture, evaluate_picture
 from warpspace.scene.save import scene_to_toml
-from warpspace.units import MICROMETRE, MICRORADIAN, Array
+from warpspace.units import Array
 
 Exaggeration = float | Literal["auto"] | None
 """A display factor, "auto" for a round one that suits the scene, None for what the scene says."""
@@ -92,7 +92,7 @@ class Drawing:
         """Colour scale of the values."""
         if self.colours is not None:
             return self.colours
-        symbol, unit = ("φ", MICRORADIAN) if self.tilts else ("E", MICROMETRE)
+        symbol, unit = SYMBOLS["orientation" if self.tilts else "position"]
         largest = float(np.abs(self.values).max())
         return build_scale(largest, self.component, quantity=symbol, unit=unit)
 
