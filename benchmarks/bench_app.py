@@ -37,12 +37,12 @@ from playwright.sync_api import Browser, Page, Playwright, sync_playwright
 from viser.infra import WebsockClientConnection
 from websockets.asyncio.server import ServerConnection
 
-from warpspace.app.layers.lights import light_scene
-from warpspace.app.live import LiveModel
+from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.panels.layout import side_widths
-from warpspace.app.session import Session
-from warpspace.app.state import AppState, start_state
-from warpspace.app.viewer import Viewer
+from warpspace.app.server.session import Session
+from warpspace.app.server.viewer import Viewer
+from warpspace.app.state.app_state import AppState, start_state
+from warpspace.app.viewport.layers.lights import light_scene
 from warpspace.scene.library import load_scene
 
 LIMITS = {

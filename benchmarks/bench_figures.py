@@ -14,7 +14,7 @@ from pathlib import Path
 import psutil
 
 from warpspace import load_scene
-from warpspace.outputs.figures.settings import FigureSettings
+from warpspace.outputs.drawing.settings import FigureSettings
 from warpspace.outputs.save import render_figure
 
 PICTURES = 200

@@ -16,9 +16,9 @@ import numpy as np
 from app_client import NUMBERS, Tab, rss_mb, running_app
 
 from warpspace import load_scene
-from warpspace.app import legend
-from warpspace.app.live import LiveModel
-from warpspace.app.state import start_state
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.readouts import summary as legend
+from warpspace.app.state.app_state import start_state
 
 KEY = "EAY"
 POSITIONS = 61

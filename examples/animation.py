@@ -7,9 +7,9 @@ import sys
 from pathlib import Path
 
 import warpspace
-from warpspace.outputs.animation import write_animation
-from warpspace.outputs.figures.settings import FigureSettings
-from warpspace.outputs.frames import AnimationSettings
+from warpspace.outputs.animation.pictures import AnimationSettings
+from warpspace.outputs.animation.write import write_animation
+from warpspace.outputs.drawing.settings import FigureSettings
 
 
 def main(folder: Path = Path()) -> None:

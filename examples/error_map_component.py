@@ -6,7 +6,7 @@ Run ``python examples/error_map_component.py [FILE]``; FILE ends in .png, .svg o
 import sys
 
 from warpspace import load_scene
-from warpspace.outputs.figures.settings import FigureSettings
+from warpspace.outputs.drawing.settings import FigureSettings
 from warpspace.outputs.save import write_figure
 
 target = sys.argv[1] if len(sys.argv) > 1 else "error_map_component.png"

@@ -22,7 +22,7 @@ from PIL import Image
 from playwright.sync_api import Browser, Page, sync_playwright
 
 from warpspace.app.panels.layout import LEFT_WIDTH, RIGHT_WIDTH
-from warpspace.app.viewer import Viewer
+from warpspace.app.server.viewer import Viewer
 from warpspace.cli.services import build_services
 from warpspace.scene.library import load_scene
 

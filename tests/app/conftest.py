@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from warpspace.app.board import Board
-from warpspace.app.cameras import Stand
-from warpspace.app.live import Frame
-from warpspace.app.session import Session
-from warpspace.app.state import AppState, start_state
-from warpspace.app.viewer import Viewer
+from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.server.session import Session
+from warpspace.app.server.viewer import Viewer
+from warpspace.app.state.app_state import AppState, start_state
+from warpspace.app.state.shared_state import Board
+from warpspace.app.viewport.named_views import Stand
 from warpspace.cli.services import build_services
 from warpspace.scene.library import load_scene
 

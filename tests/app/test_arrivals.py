@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from viser import _messages as messages
 
-from warpspace.app.arrivals import CARRIER, MOST_HEARD, Arrivals
-from warpspace.app.eye import Eye
-from warpspace.app.live import LiveModel
-from warpspace.app.state import start_state
+from warpspace.app.browser.arrivals import CARRIER, MOST_HEARD, Arrivals
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.state.app_state import start_state
+from warpspace.app.viewport.tab_camera import Eye
 from warpspace.scene.library import load_scene
 
 

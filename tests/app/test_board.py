@@ -5,10 +5,7 @@ import threading
 import pytest
 
 from warpspace import load_scene
-from warpspace.app.board import Board
-from warpspace.app.history import STEPS
-from warpspace.app.state import AppState, start_state
-from warpspace.app.tabs import (
+from warpspace.app.server.tab_memory import (
     KEPT_SECONDS,
     KEPT_TABS,
     Keeper,
@@ -18,6 +15,9 @@ from warpspace.app.tabs import (
     new_token,
     rename_script,
 )
+from warpspace.app.state.app_state import AppState, start_state
+from warpspace.app.state.history import STEPS
+from warpspace.app.state.shared_state import Board
 
 STATE = start_state(load_scene("dvf5000_first"))
 

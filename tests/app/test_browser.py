@@ -8,9 +8,9 @@ import pytest
 from PIL import Image
 
 from app.conftest import Tab, drawn_nodes
-from warpspace.app.live import Frame, LiveModel
-from warpspace.app.state import AppState, start_state
-from warpspace.app.tonemap import vertex_colours
+from warpspace.app.evaluation.evaluate import Frame, LiveModel
+from warpspace.app.state.app_state import AppState, start_state
+from warpspace.app.viewport.tone_map import vertex_colours
 from warpspace.scene.library import load_scene
 
 pytestmark = pytest.mark.browser

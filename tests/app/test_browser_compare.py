@@ -12,17 +12,18 @@ import numpy as np
 import pytest
 
 from app.conftest import SCENES, Tab, drawn_nodes
-from warpspace.app import edits, links
-from warpspace.app.compare import scene_side, with_pin, with_sides
-from warpspace.app.comparison import Side
-from warpspace.app.conventions import Effects, with_choice
-from warpspace.app.document import open_text, state_to_toml
-from warpspace.app.live import LiveModel
-from warpspace.app.mapmesh import map_mesh
-from warpspace.app.picked import Picked
-from warpspace.app.resulting import scene_of
-from warpspace.app.state import AppState, start_state
-from warpspace.app.viewer import Viewer
+from warpspace.app.documents import links
+from warpspace.app.documents.scene_file import open_text, state_to_toml
+from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
+from warpspace.app.evaluation.conventions import Effects, with_choice
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.map_mesh import map_mesh
+from warpspace.app.evaluation.resulting_scene import scene_of
+from warpspace.app.server.viewer import Viewer
+from warpspace.app.state import edits
+from warpspace.app.state.app_state import AppState, start_state
+from warpspace.app.state.comparison import Side
+from warpspace.app.state.picked import Picked
 from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import Table
 

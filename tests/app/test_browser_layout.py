@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from app.conftest import Tab
-from warpspace.app.live import LiveModel
-from warpspace.app.state import start_state
-from warpspace.app.tonemap import vertex_colours
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.state.app_state import start_state
+from warpspace.app.viewport.tone_map import vertex_colours
 from warpspace.scene.library import load_scene
 
 pytestmark = pytest.mark.browser

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from app.conftest import SCENES, Tab, drawn_nodes
-from warpspace.app.compare import scene_side, with_sides
-from warpspace.app.comparison import Side
-from warpspace.app.conventions import Effects, with_choice
-from warpspace.app.document import state_to_toml
-from warpspace.app.live import LiveModel
-from warpspace.app.state import start_state
-from warpspace.app.why import Picked, answer
+from warpspace.app.documents.scene_file import state_to_toml
+from warpspace.app.evaluation.budget import Picked, answer
+from warpspace.app.evaluation.compare import scene_side, with_sides
+from warpspace.app.evaluation.conventions import Effects, with_choice
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.state.app_state import start_state
+from warpspace.app.state.comparison import Side
 from warpspace.scene.library import load_scene
 
 pytestmark = pytest.mark.browser

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from app.conftest import Tab, drawn_nodes, open_page, wait_until_open
-from warpspace.app import edits
-from warpspace.app.live import Frame, LiveModel
-from warpspace.app.state import AppState, start_state
-from warpspace.app.viewer import Viewer
+from warpspace.app.evaluation.evaluate import Frame, LiveModel
+from warpspace.app.server.viewer import Viewer
+from warpspace.app.state import edits
+from warpspace.app.state.app_state import AppState, start_state
 from warpspace.machine.errors import Constant, Table
 from warpspace.scene.library import load_scene
 

@@ -8,15 +8,15 @@ import pytest
 from PIL import Image
 
 from app.conftest import Tab
-from warpspace.app.layers import SCENE_PER_MM
-from warpspace.app.live import LiveModel
-from warpspace.app.look import linear_spans, slice_spans
-from warpspace.app.machine import drawn_bodies, tool_point
-from warpspace.app.mapmesh import isoline_pieces, map_mesh
-from warpspace.app.state import start_state
-from warpspace.app.tonemap import vertex_colours
-from warpspace.geometry.annotations import corner_arrows
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.machine import drawn_bodies, tool_point
+from warpspace.app.evaluation.map_mesh import isoline_pieces, map_mesh
+from warpspace.app.state.app_state import start_state
+from warpspace.app.state.look import linear_spans, slice_spans
+from warpspace.app.viewport.layers import SCENE_PER_MM
+from warpspace.app.viewport.tone_map import vertex_colours
 from warpspace.geometry.colour import colour_table
+from warpspace.picture.marks import corner_arrows
 from warpspace.scene.library import load_scene
 
 pytestmark = pytest.mark.browser

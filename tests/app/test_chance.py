@@ -9,7 +9,7 @@ import pytest
 from warpspace import load_scene
 from warpspace.analysis.draws import Distribution, build_draws
 from warpspace.analysis.montecarlo import Over, Plan, montecarlo
-from warpspace.app.chance import (
+from warpspace.app.evaluation.probability import (
     SAMPLES,
     build_ensemble,
     estimate,

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from warpspace.app.compare import pinned_side, scene_side, with_pin, with_sides
-from warpspace.app.compare_text import comparison_html
-from warpspace.app.comparison import Side
-from warpspace.app.facets import topology
-from warpspace.app.live import Frame, LiveModel
-from warpspace.app.mapmesh import map_mesh
-from warpspace.app.ranges import Span
-from warpspace.app.state import AppState, start_state
+from warpspace.app.evaluation.compare import pinned_side, scene_side, with_pin, with_sides
+from warpspace.app.evaluation.evaluate import Frame, LiveModel
+from warpspace.app.evaluation.map_mesh import map_mesh
+from warpspace.app.evaluation.topology import topology
+from warpspace.app.readouts.comparison import comparison_html
+from warpspace.app.state.app_state import AppState, start_state
+from warpspace.app.state.comparison import Side
+from warpspace.app.state.ranges import Span
 from warpspace.geometry.colour import component_values
 from warpspace.geometry.deform import deform
 from warpspace.scene.library import load_scene

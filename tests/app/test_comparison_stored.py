@@ -9,16 +9,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from warpspace.app import edits
-from warpspace.app.compare import pinned_side, scene_side, with_pin, with_sides
-from warpspace.app.comparison import Comparison, Side
-from warpspace.app.conventions import with_choice
-from warpspace.app.document import open_link, open_text, state_to_link, state_to_toml
-from warpspace.app.live import LiveModel
-from warpspace.app.picked import Picked
-from warpspace.app.resulting import scene_of
-from warpspace.app.sides import NAMES, PREFIX
-from warpspace.app.state import AppState, start_state
+from warpspace.app.documents.scene_file import open_link, open_text, state_to_link, state_to_toml
+from warpspace.app.documents.stored_comparison import NAMES, PREFIX
+from warpspace.app.evaluation.compare import pinned_side, scene_side, with_pin, with_sides
+from warpspace.app.evaluation.conventions import with_choice
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.resulting_scene import scene_of
+from warpspace.app.state import edits
+from warpspace.app.state.app_state import AppState, start_state
+from warpspace.app.state.comparison import Comparison, Side
+from warpspace.app.state.picked import Picked
 from warpspace.exceptions import OptionError, SceneError, WarpspaceError
 from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import Ramp, Table

@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from warpspace.app.conventions import (
+from warpspace.app.documents.scene_file import open_text, state_to_toml
+from warpspace.app.evaluation.conventions import (
     Effects,
     choices,
     chosen,
@@ -13,14 +14,13 @@ from warpspace.app.conventions import (
     with_own_conventions,
     with_reference,
 )
-from warpspace.app.conventions_text import switchboard_html
-from warpspace.app.document import open_text, state_to_toml
-from warpspace.app.live import LiveModel
-from warpspace.app.mapmesh import edge_pieces
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.map_mesh import edge_pieces
 from warpspace.app.panels import conventions as panel_module
 from warpspace.app.panels.conventions import ConventionsPanel
-from warpspace.app.parts import Parts
-from warpspace.app.state import start_state
+from warpspace.app.readouts.conventions import switchboard_html
+from warpspace.app.server.followers import Parts
+from warpspace.app.state.app_state import start_state
 from warpspace.scene.library import load_scene
 
 LIVE = LiveModel()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from warpspace.app.curves import (
+from warpspace.app.state.curve_text import (
     KINDS,
     convert_shape,
     parse_shape,

@@ -6,22 +6,22 @@ from dataclasses import fields, replace
 
 import pytest
 
-from warpspace.app import edits
-from warpspace.app.conventions import with_choice, with_reference
-from warpspace.app.document import (
+from warpspace.app.documents.received_files import safe_name, upload_text
+from warpspace.app.documents.scene_file import (
     MAX_PACKED_TEXT,
     open_link,
     open_text,
     state_to_link,
     state_to_toml,
 )
-from warpspace.app.incoming import safe_name, upload_text
-from warpspace.app.look import Look, MachineLook, RotaryLook
-from warpspace.app.settings import camera_of, settings_line, with_settings
-from warpspace.app.specification import Specification
-from warpspace.app.state import AppState, Shown, start_state
-from warpspace.app.tabs import CameraMemory
-from warpspace.app.why import Picked
+from warpspace.app.documents.view_settings import camera_of, settings_line, with_settings
+from warpspace.app.evaluation.budget import Picked
+from warpspace.app.evaluation.conventions import with_choice, with_reference
+from warpspace.app.server.tab_memory import CameraMemory
+from warpspace.app.state import edits
+from warpspace.app.state.app_state import AppState, Shown, start_state
+from warpspace.app.state.look import Look, MachineLook, RotaryLook
+from warpspace.app.state.specification import Specification
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.machine.errors import Ramp
 from warpspace.scene.library import load_scene, scene_names

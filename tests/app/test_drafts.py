@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from warpspace import load_scene
-from warpspace.app import parts as parts_module
-from warpspace.app.comparison import Comparison
-from warpspace.app.drafts import box_picture, build_draft, only_moved
-from warpspace.app.live import LiveModel
-from warpspace.app.mapmesh import drafted, grid_pieces, map_mesh
-from warpspace.app.painter import Painter
-from warpspace.app.parts import Parts, make_draft
-from warpspace.app.state import AppState, start_state
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.map_mesh import drafted, grid_pieces, map_mesh
+from warpspace.app.server import followers as parts_module
+from warpspace.app.server.followers import Parts, make_draft
+from warpspace.app.state.app_state import AppState, start_state
+from warpspace.app.state.comparison import Comparison
+from warpspace.app.viewport.drafts import box_picture, build_draft, only_moved
+from warpspace.app.viewport.painter import Painter
 
 STATE = start_state(load_scene("dvf5000_first"))
 LIVE = LiveModel()

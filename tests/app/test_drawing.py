@@ -10,13 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from warpspace.app import legend
-from warpspace.app.camera import fit_camera
-from warpspace.app.glb import build_glb
-from warpspace.app.layers.axes import tick_values
-from warpspace.app.live import LiveModel
-from warpspace.app.state import start_state
-from warpspace.app.tonemap import (
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.readouts import summary as legend
+from warpspace.app.state.app_state import start_state
+from warpspace.app.viewport.camera import fit_camera
+from warpspace.app.viewport.glb import build_glb
+from warpspace.app.viewport.layers.axes import tick_values
+from warpspace.app.viewport.tone_map import (
     inverse_tone_map,
     line_colour,
     linear_to_srgb,

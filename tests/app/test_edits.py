@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from warpspace import load_scene
-from warpspace.app import edits
-from warpspace.app.history import describe_change
-from warpspace.app.live import LiveModel
-from warpspace.app.state import start_state
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.state import edits
+from warpspace.app.state.app_state import start_state
+from warpspace.app.state.history import describe_change
 from warpspace.machine.errors import Constant, Harmonics, Ramp, Table
 from warpspace.scene.library import parse_scene
 from warpspace.scene.save import scene_to_toml

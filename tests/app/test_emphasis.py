@@ -1,6 +1,6 @@
 """Solo and mute silence amplitudes without touching them."""
 
-from warpspace.app.emphasis import Emphasis
+from warpspace.app.state.exclusions import Emphasis
 
 AMPLITUDES = {"EAX": 5.0, "EBX": -2.0, "EC0Y": 23.1}
 

@@ -6,14 +6,13 @@ from html.parser import HTMLParser
 import pytest
 
 from warpspace import load_scene
-from warpspace.app import edits
-from warpspace.app.emphasis import Emphasis
-from warpspace.app.emphasis_text import emphasis_buttons, with_switched
-from warpspace.app.history import History
-from warpspace.app.panels.clicks import LONGEST_WORD, MOST_CLICKS, SCRIPT, read_clicks
+from warpspace.app.browser.clicks import LONGEST_WORD, MOST_CLICKS, SCRIPT, read_clicks
 from warpspace.app.panels.layout import split_script
 from warpspace.app.panels.view import COMPONENT_NAMES, component_of
-from warpspace.app.state import start_state
+from warpspace.app.readouts.exclusions import emphasis_buttons, with_switched
+from warpspace.app.state import edits, start_state
+from warpspace.app.state.exclusions import Emphasis
+from warpspace.app.state.history import History
 from warpspace.machine.parameters import parameter
 
 STATE = start_state(load_scene("dvf5000_first"))

@@ -11,19 +11,19 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from warpspace.app.compare import scene_side, with_pin, with_sides
-from warpspace.app.comparison import Side
-from warpspace.app.conventions import with_choice
-from warpspace.app.exported import build_request, exported_words, file_stem
-from warpspace.app.live import Frame, LiveModel
-from warpspace.app.offline import build_offline_html
-from warpspace.app.picture import view_png
-from warpspace.app.state import AppState, start_state
+from warpspace.app.documents.export_request import build_request, exported_words, file_stem
+from warpspace.app.documents.offline_page import build_offline_html
+from warpspace.app.documents.view_image import view_png
+from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
+from warpspace.app.evaluation.conventions import with_choice
+from warpspace.app.evaluation.evaluate import Frame, LiveModel
+from warpspace.app.state.app_state import AppState, start_state
+from warpspace.app.state.comparison import Side
 from warpspace.cli.services import draw_figure, write_export
 from warpspace.exceptions import OptionError
+from warpspace.outputs.drawing.settings import A_MINUS_B, FigureSettings
 from warpspace.outputs.exports import draw_scene
 from warpspace.outputs.figures.catalogue import draw_figure as draw
-from warpspace.outputs.figures.settings import A_MINUS_B, FigureSettings
 from warpspace.scene.library import load_scene
 
 LIVE = LiveModel()

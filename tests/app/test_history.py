@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from warpspace.app.history import SAME_STEP_S, History, describe_change
+from warpspace.app.state.history import SAME_STEP_S, History, describe_change
 
 
 @dataclass(frozen=True)

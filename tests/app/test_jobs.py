@@ -2,8 +2,8 @@
 
 import threading
 
-from warpspace.app.jobs import Jobs, Progress
-from warpspace.app.services import CancelledError
+from warpspace.app.documents.jobs import Jobs, Progress
+from warpspace.app.documents.services import CancelledError
 
 
 class Watcher:

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from warpspace.app.layers.box import dashes, ghost_dashes
-from warpspace.app.layers.traces import apart, is_here, trace_colours
-from warpspace.app.live import Frame, Kept, LiveModel
-from warpspace.app.state import start_state
+from warpspace.app.evaluation.evaluate import Frame, Kept, LiveModel
+from warpspace.app.state.app_state import start_state
+from warpspace.app.viewport.layers.box import dashes, ghost_dashes
+from warpspace.app.viewport.layers.traces import apart, is_here, trace_colours
 from warpspace.field.evaluate import evaluate_first_order
 from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import ErrorSet

@@ -7,12 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from warpspace.app.cameras import VIEWS, Stand, change_lens, clipping, view_pose
-from warpspace.app.circles import circle_rows, circle_table
-from warpspace.app.facets import topology
-from warpspace.app.layers.annotations import carries_worst
-from warpspace.app.live import LiveModel
-from warpspace.app.look import (
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.machine import drawn_bodies, machine_room_mm, tool_point
+from warpspace.app.evaluation.map_mesh import (
+    edge_pieces,
+    grid_pieces,
+    isoline_pieces,
+    line_mesh,
+    map_mesh,
+)
+from warpspace.app.evaluation.rotation import played_axis, played_position, points_on_traces
+from warpspace.app.evaluation.topology import topology
+from warpspace.app.readouts.circles import circle_rows, circle_table
+from warpspace.app.state.app_state import start_state
+from warpspace.app.state.look import (
     SURFACES,
     Look,
     default_held,
@@ -23,14 +31,12 @@ from warpspace.app.look import (
     slice_positions,
     slice_spans,
 )
-from warpspace.app.machine import drawn_bodies, machine_room_mm, tool_point
-from warpspace.app.mapmesh import edge_pieces, grid_pieces, isoline_pieces, line_mesh, map_mesh
-from warpspace.app.ranges import Span
-from warpspace.app.rotation import played_axis, played_position, points_on_traces
-from warpspace.app.state import start_state
-from warpspace.app.turning import Player
-from warpspace.geometry.annotations import corner_arrows, worst_point
+from warpspace.app.state.ranges import Span
+from warpspace.app.viewport.layers.annotations import carries_worst
+from warpspace.app.viewport.named_views import VIEWS, Stand, change_lens, clipping, view_pose
+from warpspace.app.viewport.rotation_player import Player
 from warpspace.geometry.surfaces import box_edges, outer_surface, segments
+from warpspace.picture.marks import corner_arrows, worst_point
 from warpspace.scene.library import load_scene
 from warpspace.scene.pipeline import evaluate
 

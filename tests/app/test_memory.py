@@ -8,8 +8,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from warpspace.app import memory
-from warpspace.app.memory import Tidier, give_back_memory, limit_arenas, settle_memory
+from warpspace.app.server import memory
+from warpspace.app.server.memory import Tidier, give_back_memory, limit_arenas, settle_memory
 
 WAIT_S = 0.05
 

@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from warpspace.app import network, viewer
-from warpspace.app.board import Board
-from warpspace.app.network import free_port, is_local, page_url, resolve_host
-from warpspace.app.state import start_state
-from warpspace.app.tabs import Left, new_token
+from warpspace.app.server import network, viewer
+from warpspace.app.server.network import free_port, is_local, page_url, resolve_host
+from warpspace.app.server.tab_memory import Left, new_token
+from warpspace.app.state.app_state import start_state
+from warpspace.app.state.shared_state import Board
 from warpspace.exceptions import OptionError
 from warpspace.scene.library import load_scene
 

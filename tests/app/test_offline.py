@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from warpspace import load_scene
-from warpspace.app.offline import build_offline_html, offline_frame
+from warpspace.app.documents.offline_page import build_offline_html, offline_frame
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -15,13 +15,13 @@ import zstandard
 from websockets.sync.client import connect
 from websockets.sync.connection import Connection
 
-from warpspace.app import opening
-from warpspace.app.arrivals import CARRIER
-from warpspace.app.opening import drawn_script, stage_script
+from warpspace.app.browser.arrivals import CARRIER
 from warpspace.app.panels.contents import Contents
-from warpspace.app.session import Session
-from warpspace.app.state import AppState, start_state
-from warpspace.app.viewer import Viewer
+from warpspace.app.server import page_steps as opening
+from warpspace.app.server.page_steps import drawn_script, stage_script
+from warpspace.app.server.session import Session
+from warpspace.app.server.viewer import Viewer
+from warpspace.app.state.app_state import AppState, start_state
 from warpspace.machine.parameters import PARAMETERS
 from warpspace.scene.library import load_scene
 

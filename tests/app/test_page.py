@@ -4,7 +4,7 @@ from collections import deque
 
 import pytest
 
-from warpspace.app.page import is_passing
+from warpspace.app.browser.page import is_passing
 
 
 def test_the_race_inside_viser_passes_and_nothing_else_does() -> None:

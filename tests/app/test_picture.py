@@ -5,9 +5,9 @@ from io import BytesIO
 import numpy as np
 from PIL import Image
 
-from warpspace.app.live import LiveModel
-from warpspace.app.picture import BAND_PX, HEAD_PX, view_png
-from warpspace.app.state import start_state
+from warpspace.app.documents.view_image import BAND_PX, HEAD_PX, view_png
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.state.app_state import start_state
 from warpspace.scene.library import load_scene
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from warpspace import load_scene
-from warpspace.app.ranking import node_coordinates, rank_gains
+from warpspace.app.evaluation.sensitivities import node_coordinates, rank_gains
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import Loop
 from warpspace.scene.pipeline import grid_basis

@@ -3,7 +3,7 @@
 import pytest
 
 from warpspace import load_scene
-from warpspace.app.search import find_parameters
+from warpspace.app.state.search import find_parameters
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from warpspace.app.shelf import MOST_OPENED, Shelf
+from warpspace.app.documents.scene_list import MOST_OPENED, Shelf
 from warpspace.scene.library import load_scene
 
 FIRST, SECOND = load_scene("dvf5000_first"), load_scene("dvf5000_second")

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from warpspace.app.ranges import amplitude_span, round_up
-from warpspace.app.state import EXAGGERATION, NODES, AppState, start_state
+from warpspace.app.state.app_state import EXAGGERATION, NODES, AppState, start_state
+from warpspace.app.state.ranges import amplitude_span, round_up
 from warpspace.kinematics.model import Loop
 from warpspace.machine.tolerances import Tolerance
 from warpspace.scene.library import load_scene, scene_names

@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from warpspace.app.turns import Turns
+from warpspace.app.viewport.turns import Turns
 
 
 def test_those_who_wait_are_served_in_the_order_of_asking() -> None:

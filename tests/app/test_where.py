@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from warpspace.app.legend import worst_place
-from warpspace.app.live import LiveModel
-from warpspace.app.panels.gains import rank_frame
-from warpspace.app.state import start_state
-from warpspace.app.where import plain, spell_point, spell_positions
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.panels.sensitivities import rank_frame
+from warpspace.app.readouts.positions import plain, spell_point, spell_positions
+from warpspace.app.readouts.summary import worst_place
+from warpspace.app.state.app_state import start_state
 from warpspace.scene.library import load_scene
 
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from warpspace.app.history import History
-from warpspace.app.live import Frame, LiveModel
-from warpspace.app.state import start_state
-from warpspace.app.why import answer, pick, with_lever, with_picked
-from warpspace.app.why_text import answer_html
+from warpspace.app.evaluation.budget import answer, pick, with_lever, with_picked
+from warpspace.app.evaluation.evaluate import Frame, LiveModel
+from warpspace.app.readouts.budget import answer_html
+from warpspace.app.state.app_state import start_state
+from warpspace.app.state.history import History
 from warpspace.kinematics.model import Loop
 from warpspace.scene.library import load_scene
 
@@ -78,7 +78,7 @@ def test_contributions_add_up_to_the_error_with_the_remainder() -> None:
 
 
 def test_what_is_muted_contributes_nothing() -> None:
-    from warpspace.app.edits import with_muted
+    from warpspace.app.state.edits import with_muted
 
     frame = LIVE.frame(START)
     picked = pick(frame, *look_at(frame, frame.drawn_mm[7, 0, 11]))

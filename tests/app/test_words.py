@@ -8,12 +8,12 @@ import pytest
 from warpspace import load_scene
 from warpspace.analysis.distribution import Histogram, Probability
 from warpspace.analysis.montecarlo import Over
-from warpspace.app.chance import Chance
-from warpspace.app.live import LiveModel
-from warpspace.app.odds import spell_chance, spell_refusal
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.probability import Chance
 from warpspace.app.panels.commands import Command, help_text, hint_script, spell_change
-from warpspace.app.panels.gains import rank_frame, spell_ranking
-from warpspace.app.state import start_state
+from warpspace.app.panels.sensitivities import rank_frame, spell_ranking
+from warpspace.app.readouts.probability import spell_chance, spell_refusal
+from warpspace.app.state.app_state import start_state
 
 LIVE = LiveModel()
 FRAME = LIVE.frame(start_state(load_scene("dvf5000_first")))

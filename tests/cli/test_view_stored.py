@@ -3,7 +3,7 @@
 import numpy as np
 from click.testing import CliRunner
 
-from warpspace.app.live import LiveModel
+from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.cli.main import cli
 from warpspace.cli.view import _stored_start
 from warpspace.outputs.exports import load_stored_field

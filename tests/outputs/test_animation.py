@@ -12,9 +12,14 @@ from PIL import Image
 
 from warpspace import load_scene
 from warpspace.exceptions import OptionError, OutputError
-from warpspace.outputs.animation import write_animation
-from warpspace.outputs.figures.settings import FigureSettings
-from warpspace.outputs.frames import AnimationSettings, draw_frame, one_round, sweep_factor
+from warpspace.outputs.animation.pictures import (
+    AnimationSettings,
+    draw_frame,
+    one_round,
+    sweep_factor,
+)
+from warpspace.outputs.animation.write import write_animation
+from warpspace.outputs.drawing.settings import FigureSettings
 
 
 def decoded(path: Path) -> np.ndarray:

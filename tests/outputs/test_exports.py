@@ -15,6 +15,7 @@ import pyvista as pv
 import trimesh
 
 from warpspace import SceneError, evaluate, load_scene
+from warpspace.bodies.placed import load_bodies
 from warpspace.exceptions import OptionError, OutputError
 from warpspace.geometry.deform import deform
 from warpspace.geometry.surfaces import outer_surface
@@ -28,7 +29,6 @@ from warpspace.outputs.exports import (
 from warpspace.outputs.exports.bodies import drawn_bodies
 from warpspace.outputs.exports.glb import build_glb
 from warpspace.outputs.files import check_target
-from warpspace.scene.bodies import load_bodies
 
 SCENES = ("dvf5000_first", "teach_wobbling_table", "dvf5000_nominal")
 

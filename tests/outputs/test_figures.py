@@ -11,9 +11,9 @@ from PIL import Image
 
 from warpspace import load_scene, scene_names
 from warpspace.exceptions import OptionError, UnknownNameError
+from warpspace.outputs.drawing.content import Drawing
+from warpspace.outputs.drawing.settings import FigureSettings
 from warpspace.outputs.figures.catalogue import FIGURES, draw_figure
-from warpspace.outputs.figures.content import Drawing
-from warpspace.outputs.figures.settings import FigureSettings
 from warpspace.outputs.save import figure_bytes, render_figure, write_figure
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import Scene

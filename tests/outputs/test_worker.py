@@ -11,7 +11,7 @@ import pytest
 from warpspace import load_scene
 from warpspace.exceptions import OptionError, RenderError
 from warpspace.outputs import worker as workers
-from warpspace.outputs.figures.settings import FigureSettings
+from warpspace.outputs.drawing.settings import FigureSettings
 from warpspace.outputs.worker import FigureWorker, probe_renderer
 from warpspace.scene.library import parse_scene
 

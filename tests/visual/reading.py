@@ -7,9 +7,9 @@ import numpy as np
 from warpspace.geometry.colour import ColourScale, colour_table
 from warpspace.geometry.faces import crease_lines
 from warpspace.geometry.surfaces import Surface, triangulate
-from warpspace.outputs.figures.content import DrawnMap
-from warpspace.outputs.figures.map3d import map_faces
-from warpspace.outputs.render import Raster
+from warpspace.outputs.drawing.content import DrawnMap
+from warpspace.outputs.drawing.map3d import map_faces
+from warpspace.outputs.drawing.render import Raster
 from warpspace.units import Array
 
 SLOPE_TOLERANCE = 0.005

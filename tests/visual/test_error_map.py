@@ -8,8 +8,8 @@ import pytest
 from visual.reading import Reading, read_map
 from warpspace import load_scene
 from warpspace.geometry.colour import component_values
+from warpspace.outputs.drawing.settings import FigureSettings
 from warpspace.outputs.figures.catalogue import draw_figure
-from warpspace.outputs.figures.settings import FigureSettings
 from warpspace.scene.pipeline import ScenePicture, evaluate_picture
 from warpspace.units import MM_PER_UM, Array
 

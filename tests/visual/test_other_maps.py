@@ -5,8 +5,8 @@ import pytest
 
 from visual.reading import read_map
 from warpspace import evaluate, load_scene
+from warpspace.outputs.drawing.settings import FigureSettings
 from warpspace.outputs.figures.catalogue import draw_figure
-from warpspace.outputs.figures.settings import FigureSettings
 from warpspace.scene.pipeline import evaluate_picture
 from warpspace.units import MM_PER_UM
 

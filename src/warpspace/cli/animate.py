@@ -58,9 +58,9 @@ def animate(
 
     from tqdm import tqdm
 
-    from warpspace.outputs.animation import ENDINGS, write_animation
+    from warpspace.outputs.animation.pictures import AnimationSettings
+    from warpspace.outputs.animation.write import ENDINGS, write_animation
     from warpspace.outputs.files import check_target
-    from warpspace.outputs.frames import AnimationSettings
     from warpspace.scene.library import load_scene
 
     check_target(output, ENDINGS, overwrite=force)

@@ -26,9 +26,9 @@ def compare(
     with one colour scale and one exaggeration.
     """
     from warpspace.analysis.statistics import statistics
+    from warpspace.outputs.drawing.style import FIGURE_ENDINGS
     from warpspace.outputs.files import check_target, write_atomically
-    from warpspace.outputs.style import FIGURE_ENDINGS
-    from warpspace.scene.difference import difference_field
+    from warpspace.picture.difference import difference_field
     from warpspace.scene.library import load_scene
     from warpspace.scene.pipeline import evaluate_picture
 

@@ -88,7 +88,7 @@ def write_export(drawing: "Drawing", target: "Path", *, overwrite: bool) -> None
 
             write_csv(drawing, target, overwrite=overwrite)
         case _:
-            from warpspace.app.offline import build_offline_html, offline_frame
+            from warpspace.app.documents.offline_page import build_offline_html, offline_frame
             from warpspace.outputs.files import write_atomically
 
             frame = offline_frame(

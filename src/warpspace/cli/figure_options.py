@@ -10,7 +10,7 @@ from warpspace.cli.targets import exaggeration_option, force_option, parse_exagg
 from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
-    from warpspace.outputs.figures.settings import FigureSettings
+    from warpspace.outputs.drawing.settings import FigureSettings
 
 VIEWS = ("iso", "front", "right", "top")
 _OPTIONS = (
@@ -75,7 +75,7 @@ def parse_settings(
         If one of them cannot be drawn with.
     """
     from warpspace.field.grid import node_counts
-    from warpspace.outputs.figures.settings import FigureSettings
+    from warpspace.outputs.drawing.settings import FigureSettings
 
     node_counts(grid)
     factor = parse_exaggeration(exaggeration)

@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import replace
 from pathlib import Path
 
-from warpspace.app.services import CancelledError, Request, Services
+from warpspace.app.documents.services import CancelledError, Request, Services
 from warpspace.exceptions import OptionError
 
 MOST_RENDERERS = 2
@@ -42,7 +42,7 @@ def draw_figure(request: Request, cancelled: threading.Event) -> bytes:
     RenderError
         If it cannot be drawn here.
     """
-    from warpspace.outputs.figures.settings import A_MINUS_B, FigureSettings
+    from warpspace.outputs.drawing.settings import A_MINUS_B, FigureSettings
     from warpspace.outputs.worker import FigureWorker
 
     settings = FigureSettings(

@@ -31,8 +31,8 @@ def snapshot(scene: str, output: str, figure: str, *, force: bool, **options: An
     The picture carries its exaggeration, scale bars, statistics and provenance. It is the same,
     byte for byte, whenever it is repeated. Charts keep their own height to the width given.
     """
+    from warpspace.outputs.drawing.style import FIGURE_ENDINGS
     from warpspace.outputs.files import check_target, write_atomically
-    from warpspace.outputs.style import FIGURE_ENDINGS
     from warpspace.outputs.worker import FigureWorker
     from warpspace.scene.library import load_scene
 

@@ -8,7 +8,7 @@ import click
 from warpspace.cli.options import scene_argument
 
 if TYPE_CHECKING:
-    from warpspace.app.state import AppState
+    from warpspace.app.state.app_state import AppState
 
 
 @click.command()
@@ -36,7 +36,7 @@ def view(scene: str, host: str, port: int | None, *, shared: bool, no_browser: b
     # Before numpy is loaded: a slider move is one short product, and threads of OpenBLAS that spin
     # for it beside a browser that draws in software make it thirty times slower.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from warpspace.app.viewer import run_viewer
+    from warpspace.app.server.viewer import run_viewer
     from warpspace.cli.services import build_services
     from warpspace.scene.library import load_scene, scene_names
 
@@ -59,7 +59,7 @@ def view(scene: str, host: str, port: int | None, *, shared: bool, no_browser: b
 
 def _stored_start(path: str) -> "AppState":
     """Read a stored field and show it as it was stored."""
-    from warpspace.app.state import start_state
+    from warpspace.app.state.app_state import start_state
     from warpspace.outputs.exports import load_stored_field
 
     drawing = load_stored_field(path).drawing

@@ -10,11 +10,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
+from warpspace.outputs.drawing.content import Drawing
+from warpspace.outputs.drawing.settings import FigureSettings
+from warpspace.outputs.drawing.style import FIGURE_ENDINGS, SAVE_RC
 from warpspace.outputs.figures.catalogue import draw_figure
-from warpspace.outputs.figures.content import Drawing
-from warpspace.outputs.figures.settings import FigureSettings
 from warpspace.outputs.files import check_target, write_atomically
-from warpspace.outputs.style import FIGURE_ENDINGS, SAVE_RC
 from warpspace.scene.model import Scene
 
 

@@ -9,7 +9,7 @@ from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 
 from warpspace.exceptions import OptionError, RenderError, SceneError, UnknownNameError
-from warpspace.outputs.figures.settings import FigureSettings
+from warpspace.outputs.drawing.settings import FigureSettings
 from warpspace.scene.model import Scene
 
 PICTURES_PER_PROCESS = 100

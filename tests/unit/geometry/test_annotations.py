@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from warpspace.geometry.annotations import corner_arrows, scale_bars, worst_point
+from warpspace.picture.marks import corner_arrows, scale_bars, worst_point
 from warpspace.units import MM_PER_UM
 
 

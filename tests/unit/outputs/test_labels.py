@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from warpspace.outputs.labels import Occupancy, place_label
+from warpspace.outputs.drawing.labels import Occupancy, place_label
 
 FRAME = (0.0, 0.0, 400.0, 300.0)
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from warpspace.outputs.lines import split_visible
-from warpspace.outputs.projection import Projection
-from warpspace.outputs.render import Raster
+from warpspace.outputs.drawing.lines import split_visible
+from warpspace.outputs.drawing.projection import Projection
+from warpspace.outputs.drawing.render import Raster
 
 FRONT = Projection(
     np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]), np.array([0.0, -1.0, 0.0]),

@@ -2,7 +2,7 @@
 
 import pytest
 
-from warpspace.outputs.words import spell, spell_factor, spell_point, spell_short
+from warpspace.picture.words import spell, spell_factor, spell_point, spell_short
 
 
 @pytest.mark.parametrize(

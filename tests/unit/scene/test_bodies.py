@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 
 import warpspace
+from warpspace.bodies.placed import BODY_FILE, load_bodies, place_points, view_motions
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import View, build_basis
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.machine.description import build_machine
-from warpspace.scene.bodies import BODY_FILE, load_bodies, place_points, view_motions
 
 
 @pytest.fixture(scope="module")

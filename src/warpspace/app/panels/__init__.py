@@ -10,9 +10,9 @@ from typing import Protocol, runtime_checkable
 
 from viser import GuiApi
 
-from warpspace.app.board import Board, Update
-from warpspace.app.live import Frame
-from warpspace.app.state import AppState
+from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.state.app_state import AppState
+from warpspace.app.state.shared_state import Board, Update
 
 __all__ = ["Choosy", "Desk", "Panel", "Settling", "Update"]
 

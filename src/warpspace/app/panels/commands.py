@@ -5,10 +5,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from warpspace.app import edits
-from warpspace.app.live import Frame
+from warpspace.app.evaluation.evaluate import Frame
 from warpspace.app.panels import Desk, Update
-from warpspace.app.state import TRUE_SCALE, AppState
+from warpspace.app.state import edits
+from warpspace.app.state.app_state import TRUE_SCALE, AppState
 from warpspace.machine.parameters import PARAMETERS
 
 HINT_SECONDS = 12

@@ -4,14 +4,14 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from warpspace.app.compare import scene_side, with_pin, with_sides
-from warpspace.app.compare_text import MARK, NOTHING, comparison_html, marked
-from warpspace.app.comparison import NOBODY, NOW, SHOWN, Side
-from warpspace.app.kept import Same
-from warpspace.app.live import Frame
+from warpspace.app.browser.handles import Bound
+from warpspace.app.evaluation.cache import Same
+from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
+from warpspace.app.evaluation.evaluate import Frame
 from warpspace.app.panels import Desk, Update
-from warpspace.app.state import AppState
-from warpspace.app.widgets import Bound
+from warpspace.app.readouts.comparison import MARK, NOTHING, comparison_html, marked
+from warpspace.app.state.app_state import AppState
+from warpspace.app.state.comparison import NOBODY, NOW, SHOWN, Side
 from warpspace.scene.model import Scene
 
 

@@ -2,26 +2,26 @@
 
 from collections.abc import Callable, Sequence
 
-from warpspace.app.outside import Outside
+from warpspace.app.browser.clicks import SCRIPT
 from warpspace.app.panels import Desk, Panel
-from warpspace.app.panels.chance import ChancePanel
-from warpspace.app.panels.clicks import SCRIPT
+from warpspace.app.panels.appearance import CameraPanel, Choose, LooksPanel
+from warpspace.app.panels.budget import WhyPanel
 from warpspace.app.panels.commands import CommandsPanel
 from warpspace.app.panels.compare import ComparePanel
 from warpspace.app.panels.conventions import ConventionsPanel
+from warpspace.app.panels.error_curve import ShapePanel
 from warpspace.app.panels.errors import ErrorsPanel
 from warpspace.app.panels.files import FilesPanel
-from warpspace.app.panels.gains import GainsPanel
 from warpspace.app.panels.layout import Places, split_script
-from warpspace.app.panels.looks import CameraPanel, Choose, LooksPanel
 from warpspace.app.panels.machine import MachinePanel
-from warpspace.app.panels.rotary import Play, RotaryPanel
-from warpspace.app.panels.shape import ShapePanel
+from warpspace.app.panels.rotary_axes import Play, RotaryPanel
+from warpspace.app.panels.sensitivities import GainsPanel
 from warpspace.app.panels.summary import heading_panel, summary_panel
+from warpspace.app.panels.tolerances import ChancePanel
 from warpspace.app.panels.view import ViewPanel
-from warpspace.app.panels.why import WhyPanel
-from warpspace.app.pointing import Pointing
-from warpspace.app.state import AppState
+from warpspace.app.server.pointing import Pointing
+from warpspace.app.server.tab_services import Outside
+from warpspace.app.state.app_state import AppState
 
 Build = Callable[[AppState], Sequence[Panel]]
 

@@ -3,7 +3,10 @@
 from dataclasses import replace
 from typing import Any
 
-from warpspace.app.conventions import (
+from warpspace.app.browser.clicks import Clicks
+from warpspace.app.browser.handles import Bound
+from warpspace.app.evaluation.cache import Same
+from warpspace.app.evaluation.conventions import (
     Effect,
     Effects,
     reference_spans,
@@ -11,13 +14,10 @@ from warpspace.app.conventions import (
     with_own_conventions,
     with_reference,
 )
-from warpspace.app.conventions_text import switchboard_html
-from warpspace.app.kept import Same
-from warpspace.app.live import Frame
+from warpspace.app.evaluation.evaluate import Frame
 from warpspace.app.panels import Desk
-from warpspace.app.panels.clicks import Clicks
-from warpspace.app.state import AppState, start_loop
-from warpspace.app.widgets import Bound
+from warpspace.app.readouts.conventions import switchboard_html
+from warpspace.app.state.app_state import AppState, start_loop
 from warpspace.scene.model import Scene
 
 

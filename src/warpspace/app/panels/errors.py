@@ -8,16 +8,16 @@ from collections.abc import Callable
 from itertools import groupby
 from typing import Any
 
-from warpspace.app import edits
-from warpspace.app.emphasis_text import CURVE, STYLE, emphasis_buttons, with_switched
-from warpspace.app.kept import Same
-from warpspace.app.live import Frame
+from warpspace.app.browser.clicks import Clicks
+from warpspace.app.browser.handles import Bound
+from warpspace.app.evaluation.cache import Same
+from warpspace.app.evaluation.evaluate import Frame
 from warpspace.app.panels import Desk
-from warpspace.app.panels.clicks import Clicks
-from warpspace.app.ranges import Span
-from warpspace.app.search import find_parameters
-from warpspace.app.state import AppState
-from warpspace.app.widgets import Bound
+from warpspace.app.readouts.exclusions import CURVE, STYLE, emphasis_buttons, with_switched
+from warpspace.app.state import edits
+from warpspace.app.state.app_state import AppState
+from warpspace.app.state.ranges import Span
+from warpspace.app.state.search import find_parameters
 from warpspace.machine.parameters import Parameter, parameter
 from warpspace.scene.model import Scene
 

@@ -8,19 +8,21 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from warpspace.app import document, incoming, links
-from warpspace.app.comparison import Comparison
-from warpspace.app.exported import build_request, exported_words, file_stem
-from warpspace.app.jobs import Jobs, Progress
-from warpspace.app.live import Frame
-from warpspace.app.outside import Outside
+from warpspace.app.browser.handles import dom_id
+from warpspace.app.browser.uploads import Uploads, size_script
+from warpspace.app.documents import links
+from warpspace.app.documents import received_files as incoming
+from warpspace.app.documents import scene_file as document
+from warpspace.app.documents.export_request import build_request, exported_words, file_stem
+from warpspace.app.documents.jobs import Jobs, Progress
+from warpspace.app.documents.scene_list import MOST_OPENED
+from warpspace.app.documents.services import CancelledError
+from warpspace.app.evaluation.evaluate import Frame
 from warpspace.app.panels import Desk
-from warpspace.app.services import CancelledError
-from warpspace.app.shelf import MOST_OPENED
-from warpspace.app.state import AppState
-from warpspace.app.tabs import CameraMemory
-from warpspace.app.uploads import Uploads, size_script
-from warpspace.app.widgets import dom_id
+from warpspace.app.server.tab_memory import CameraMemory
+from warpspace.app.server.tab_services import Outside
+from warpspace.app.state.app_state import AppState
+from warpspace.app.state.comparison import Comparison
 from warpspace.exceptions import OptionError, WarpspaceError
 
 logger = logging.getLogger(__name__)
@@ -196,7 +198,7 @@ class FilesPanel:
 
     def _view(self) -> None:
         """Have the browser render the view, and put title, factor and colour bar around it."""
-        from warpspace.app.picture import view_png
+        from warpspace.app.documents.view_image import view_png
 
         client, frame = self._outside.client, self._frame
         if frame is None:
@@ -214,7 +216,7 @@ class FilesPanel:
 
     def _page(self) -> None:
         """Write the offline page of what is drawn."""
-        from warpspace.app.offline import build_offline_html
+        from warpspace.app.documents.offline_page import build_offline_html
 
         frame = self._frame
         if frame is not None:

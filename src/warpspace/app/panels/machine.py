@@ -3,13 +3,13 @@
 from dataclasses import replace
 from typing import Any
 
-from warpspace.app.kept import Same
-from warpspace.app.live import Frame
-from warpspace.app.look import linear_positions, linear_spans
+from warpspace.app.browser.handles import Bound
+from warpspace.app.evaluation.cache import Same
+from warpspace.app.evaluation.evaluate import Frame
 from warpspace.app.panels import Desk
-from warpspace.app.state import AppState
-from warpspace.app.widgets import Bound
-from warpspace.scene.bodies import load_bodies
+from warpspace.app.state.app_state import AppState
+from warpspace.app.state.look import linear_positions, linear_spans
+from warpspace.bodies.placed import load_bodies
 from warpspace.scene.model import Scene
 
 SWITCHES = {

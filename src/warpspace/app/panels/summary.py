@@ -1,10 +1,10 @@
 """What is always in view: heading with the display factor, colour bar, statistics, scale bars."""
 
-from warpspace.app.drafts import TEXTS
-from warpspace.app.live import Frame
+from warpspace.app.browser.handles import Told
+from warpspace.app.evaluation.evaluate import Frame
 from warpspace.app.panels import Desk
-from warpspace.app.state import AppState
-from warpspace.app.widgets import Told
+from warpspace.app.state.app_state import AppState
+from warpspace.app.viewport.drafts import TEXTS
 
 
 class HtmlPanel:

@@ -4,12 +4,12 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from warpspace.app.kept import Same
-from warpspace.app.live import Frame
+from warpspace.app.browser.handles import Bound, dom_id
+from warpspace.app.documents.scene_list import MOST_OPENED, Shelf
+from warpspace.app.evaluation.cache import Same
+from warpspace.app.evaluation.evaluate import Frame
 from warpspace.app.panels import Desk
-from warpspace.app.shelf import MOST_OPENED, Shelf
-from warpspace.app.state import EXAGGERATION, NODES, TRUE_SCALE, AppState
-from warpspace.app.widgets import Bound, dom_id
+from warpspace.app.state.app_state import EXAGGERATION, NODES, TRUE_SCALE, AppState
 from warpspace.kinematics.model import Loop
 from warpspace.scene.model import Scene
 

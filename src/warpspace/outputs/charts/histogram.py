@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from warpspace.analysis.distribution import Probability
 from warpspace.analysis.montecarlo import MonteCarlo
 from warpspace.outputs.charts.paper import SMALL, TEXT, ground, key_colour, quiet, sheet, style
-from warpspace.outputs.style import LIGHT
+from warpspace.outputs.drawing.style import LIGHT
 
 WIDTH_IN, HEIGHT_IN = 9.0, 5.4
 

@@ -10,8 +10,8 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from warpspace.outputs.drawing.style import FONT, LIGHT, Theme
 from warpspace.outputs.files import check_target, write_atomically
-from warpspace.outputs.style import FONT, LIGHT, Theme
 
 CHART_ENDINGS = (".png", ".svg", ".pdf")
 DPI = 160.0

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
+from warpspace.bodies.placed import Body, load_bodies, place_points, view_motions
 from warpspace.field.evaluate import View
-from warpspace.scene.bodies import Body, load_bodies, place_points, view_motions
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 

@@ -9,7 +9,7 @@ import numpy as np
 from warpspace.analysis.statistics import statistics
 from warpspace.machine.errors import ErrorSet
 from warpspace.outputs.exports.drawing import Drawing, DrawnTrace
-from warpspace.scene.difference import SAME_MM, difference_field
+from warpspace.picture.difference import SAME_MM, difference_field
 
 
 @dataclass(frozen=True, kw_only=True)

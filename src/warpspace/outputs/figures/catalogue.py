@@ -5,8 +5,8 @@ from importlib import import_module
 from types import MappingProxyType
 
 from warpspace.exceptions import OptionError, UnknownNameError
-from warpspace.outputs.figures.content import Drawing
-from warpspace.outputs.figures.settings import FigureSettings
+from warpspace.outputs.drawing.content import Drawing
+from warpspace.outputs.drawing.settings import FigureSettings
 from warpspace.scene.model import Scene
 
 Builder = Callable[..., Drawing]

@@ -8,10 +8,10 @@ from warpspace import __version__
 from warpspace.analysis.gains import DEFAULT_SHARE
 from warpspace.outputs.charts import ballbar_chart, gains_chart, montecarlo_chart
 from warpspace.outputs.charts.paper import on_ground
-from warpspace.outputs.figures.content import Drawing
-from warpspace.outputs.figures.settings import FigureSettings
-from warpspace.outputs.figures.sheet import LOOP_WORDS, metadata
-from warpspace.outputs.style import FONT
+from warpspace.outputs.drawing.content import Drawing
+from warpspace.outputs.drawing.settings import FigureSettings
+from warpspace.outputs.drawing.sheet import LOOP_WORDS, metadata
+from warpspace.outputs.drawing.style import FONT
 from warpspace.scene import verbs
 from warpspace.scene.model import Scene
 from warpspace.scene.pipeline import choose_view

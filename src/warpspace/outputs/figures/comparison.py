@@ -6,22 +6,22 @@ import numpy as np
 
 from warpspace.analysis.statistics import Statistics, statistics
 from warpspace.geometry.colour import component_values
-from warpspace.outputs.canvas import Canvas
-from warpspace.outputs.figures.content import Drawing, DrawnMap, MapContent
-from warpspace.outputs.figures.error_map import isoline_words, quantity_words, view_words
-from warpspace.outputs.figures.map3d import draw_map, fit_map
-from warpspace.outputs.figures.panel import draw_colour_bar, draw_scale_bars
-from warpspace.outputs.figures.settings import (
+from warpspace.outputs.drawing.canvas import Canvas
+from warpspace.outputs.drawing.content import Drawing, DrawnMap, MapContent
+from warpspace.outputs.drawing.map3d import draw_map, fit_map
+from warpspace.outputs.drawing.panel import draw_colour_bar, draw_scale_bars
+from warpspace.outputs.drawing.projection import Rect
+from warpspace.outputs.drawing.settings import (
     B_MINUS_A,
     FigureSettings,
     choose_exaggeration,
     choose_scale,
 )
-from warpspace.outputs.figures.sheet import map_legend, metadata, scene_facts, start_sheet
-from warpspace.outputs.projection import Rect
-from warpspace.outputs.style import SIZES
-from warpspace.outputs.words import spell
-from warpspace.scene.difference import difference_field
+from warpspace.outputs.drawing.sheet import map_legend, metadata, scene_facts, start_sheet
+from warpspace.outputs.drawing.style import SIZES
+from warpspace.outputs.figures.error_map import isoline_words, quantity_words, view_words
+from warpspace.picture.difference import difference_field
+from warpspace.picture.words import spell
 from warpspace.scene.model import Scene
 from warpspace.scene.pipeline import evaluate_picture
 

@@ -8,17 +8,17 @@ import numpy as np
 from warpspace.machine.description import Axis
 from warpspace.machine.parameters import AXES, LINEAR_AXES, ROTARY_AXES, parameter
 from warpspace.machine.tolerances import Tolerance
-from warpspace.outputs.canvas import POINTS_PER_PX, Canvas
-from warpspace.outputs.figures.content import Drawing
-from warpspace.outputs.figures.settings import FigureSettings
-from warpspace.outputs.figures.sheet import (
+from warpspace.outputs.drawing.canvas import POINTS_PER_PX, Canvas
+from warpspace.outputs.drawing.content import Drawing
+from warpspace.outputs.drawing.projection import Rect
+from warpspace.outputs.drawing.settings import FigureSettings
+from warpspace.outputs.drawing.sheet import (
     LegendEntry,
     metadata,
     reference_words,
     start_sheet,
 )
-from warpspace.outputs.projection import Rect
-from warpspace.outputs.style import FONT, SIZES, Theme
+from warpspace.outputs.drawing.style import FONT, SIZES, Theme
 from warpspace.scene.model import Scene
 from warpspace.units import MICROMETRE, MICRORADIAN
 

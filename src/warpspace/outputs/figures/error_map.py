@@ -6,11 +6,11 @@ from warpspace.geometry.colour import ColourScale, component_values
 from warpspace.geometry.faces import MIN_CUT_NODES
 from warpspace.geometry.isolines import isoline_levels
 from warpspace.geometry.surfaces import Shape
-from warpspace.outputs.figures.content import Drawing, MapContent
-from warpspace.outputs.figures.map3d import draw_map
-from warpspace.outputs.figures.panel import Row, draw_panel
-from warpspace.outputs.figures.settings import FigureSettings, choose_exaggeration, choose_scale
-from warpspace.outputs.figures.sheet import (
+from warpspace.outputs.drawing.content import Drawing, MapContent
+from warpspace.outputs.drawing.map3d import draw_map
+from warpspace.outputs.drawing.panel import Row, draw_panel
+from warpspace.outputs.drawing.settings import FigureSettings, choose_exaggeration, choose_scale
+from warpspace.outputs.drawing.sheet import (
     content_rect,
     draw_footer,
     draw_heading,
@@ -20,7 +20,7 @@ from warpspace.outputs.figures.sheet import (
     panel_rect,
     scene_facts,
 )
-from warpspace.outputs.words import spell, spell_point, spell_short
+from warpspace.picture.words import spell, spell_point, spell_short
 from warpspace.scene.model import Scene
 from warpspace.scene.pipeline import ScenePicture, evaluate_picture
 from warpspace.units import Array

@@ -5,23 +5,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from warpspace.bodies import placed as shapes
 from warpspace.geometry.colour import component_values
 from warpspace.geometry.deform import deform
 from warpspace.geometry.faces import crease_lines, face_lines, outer_faces
 from warpspace.geometry.surfaces import box_edges, line_spacing, triangulate
 from warpspace.kinematics.bodies import BASE
-from warpspace.outputs.canvas import Canvas
-from warpspace.outputs.figures.content import Drawing, DrawnMap
+from warpspace.outputs.drawing.canvas import Canvas
+from warpspace.outputs.drawing.content import Drawing, DrawnMap
+from warpspace.outputs.drawing.lines import split_visible
+from warpspace.outputs.drawing.map3d import GHOST_DASHES
+from warpspace.outputs.drawing.panel import draw_panel
+from warpspace.outputs.drawing.projection import Projection, Rect, fit_projection
+from warpspace.outputs.drawing.render import Body, Raster, render_bodies
+from warpspace.outputs.drawing.settings import FigureSettings, choose_exaggeration, choose_scale
+from warpspace.outputs.drawing.sheet import LegendEntry, metadata, scene_facts, start_sheet
+from warpspace.outputs.drawing.style import SIZES, Theme
 from warpspace.outputs.figures.error_map import quantity_words, statistics_rows, value_marks
-from warpspace.outputs.figures.map3d import GHOST_DASHES
-from warpspace.outputs.figures.panel import draw_panel
-from warpspace.outputs.figures.settings import FigureSettings, choose_exaggeration, choose_scale
-from warpspace.outputs.figures.sheet import LegendEntry, metadata, scene_facts, start_sheet
-from warpspace.outputs.lines import split_visible
-from warpspace.outputs.projection import Projection, Rect, fit_projection
-from warpspace.outputs.render import Body, Raster, render_bodies
-from warpspace.outputs.style import SIZES, Theme
-from warpspace.scene import bodies as shapes
 from warpspace.scene.model import Scene
 from warpspace.scene.pipeline import ScenePicture, evaluate_picture
 from warpspace.units import Array

@@ -10,25 +10,25 @@ from warpspace.geometry.colour import component_values
 from warpspace.geometry.surfaces import Index, corners, triangulate
 from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import TOOL_AXIS
-from warpspace.outputs.canvas import Canvas
-from warpspace.outputs.figures.content import Drawing, MapContent
-from warpspace.outputs.figures.error_map import isoline_words, view_words
-from warpspace.outputs.figures.map3d import draw_map, fit_map, map_faces
-from warpspace.outputs.figures.panel import draw_panel
-from warpspace.outputs.figures.settings import FigureSettings, choose_scale
-from warpspace.outputs.figures.sheet import (
+from warpspace.outputs.drawing.canvas import Canvas
+from warpspace.outputs.drawing.content import Drawing, MapContent
+from warpspace.outputs.drawing.labels import Occupancy, place_label
+from warpspace.outputs.drawing.lines import split_visible
+from warpspace.outputs.drawing.map3d import draw_map, fit_map, map_faces
+from warpspace.outputs.drawing.panel import draw_panel
+from warpspace.outputs.drawing.projection import Projection, Rect
+from warpspace.outputs.drawing.render import Raster
+from warpspace.outputs.drawing.settings import FigureSettings, choose_scale
+from warpspace.outputs.drawing.sheet import (
     LegendEntry,
     map_legend,
     metadata,
     scene_facts,
     start_sheet,
 )
-from warpspace.outputs.labels import Occupancy, place_label
-from warpspace.outputs.lines import split_visible
-from warpspace.outputs.projection import Projection, Rect
-from warpspace.outputs.render import Raster
-from warpspace.outputs.style import SIZES
-from warpspace.outputs.words import spell, spell_factor, spell_point
+from warpspace.outputs.drawing.style import SIZES
+from warpspace.outputs.figures.error_map import isoline_words, view_words
+from warpspace.picture.words import spell, spell_factor, spell_point
 from warpspace.scene.model import Scene
 from warpspace.scene.pipeline import ScenePicture, evaluate_picture
 from warpspace.units import MICRORADIAN, RAD_PER_URAD, Array

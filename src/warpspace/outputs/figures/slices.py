@@ -11,23 +11,23 @@ from warpspace.geometry.colour import ColourScale, component_values
 from warpspace.geometry.faces import crease_lines, outer_faces
 from warpspace.geometry.slices import build_slice, slice_ranges
 from warpspace.geometry.surfaces import box_edges, triangulate
-from warpspace.outputs.canvas import Canvas
-from warpspace.outputs.figures.content import Drawing, DrawnMap, MapContent
+from warpspace.outputs.drawing.canvas import Canvas
+from warpspace.outputs.drawing.content import Drawing, DrawnMap, MapContent
+from warpspace.outputs.drawing.lines import split_visible
+from warpspace.outputs.drawing.map3d import GHOST_DASHES, draw_map, fit_map
+from warpspace.outputs.drawing.panel import draw_panel
+from warpspace.outputs.drawing.projection import Rect, fit_projection
+from warpspace.outputs.drawing.render import Body, render_bodies
+from warpspace.outputs.drawing.settings import FigureSettings, choose_exaggeration, choose_scale
+from warpspace.outputs.drawing.sheet import map_legend, metadata, scene_facts, start_sheet
+from warpspace.outputs.drawing.style import SIZES
 from warpspace.outputs.figures.error_map import (
     isoline_words,
     quantity_words,
     statistics_rows,
     value_marks,
 )
-from warpspace.outputs.figures.map3d import GHOST_DASHES, draw_map, fit_map
-from warpspace.outputs.figures.panel import draw_panel
-from warpspace.outputs.figures.settings import FigureSettings, choose_exaggeration, choose_scale
-from warpspace.outputs.figures.sheet import map_legend, metadata, scene_facts, start_sheet
-from warpspace.outputs.lines import split_visible
-from warpspace.outputs.projection import Rect, fit_projection
-from warpspace.outputs.render import Body, render_bodies
-from warpspace.outputs.style import SIZES
-from warpspace.outputs.words import spell_short
+from warpspace.picture.words import spell_short
 from warpspace.scene.model import Scene
 from warpspace.scene.pipeline import ScenePicture, evaluate_picture
 from warpspace.units import Array

@@ -11,19 +11,19 @@ from warpspace.geometry.colour import ColourScale, component_values
 from warpspace.geometry.deform import auto_exaggeration, deform
 from warpspace.geometry.traces import Trace, build_traces
 from warpspace.machine.description import Vector
-from warpspace.outputs.canvas import Canvas
-from warpspace.outputs.figures.content import Drawing
+from warpspace.outputs.drawing.canvas import Canvas
+from warpspace.outputs.drawing.content import Drawing
+from warpspace.outputs.drawing.labels import Occupancy, place_label
+from warpspace.outputs.drawing.lines import split_visible
+from warpspace.outputs.drawing.panel import Row, draw_panel
+from warpspace.outputs.drawing.projection import Projection, Rect, fit_projection
+from warpspace.outputs.drawing.render import Raster, render_bodies
+from warpspace.outputs.drawing.settings import FigureSettings, choose_scale, given_exaggeration
+from warpspace.outputs.drawing.sheet import LegendEntry, metadata, scene_facts, start_sheet
+from warpspace.outputs.drawing.style import SIZES
 from warpspace.outputs.figures.error_map import quantity_words
 from warpspace.outputs.figures.machine import draw_body_edges, place_bodies
-from warpspace.outputs.figures.panel import Row, draw_panel
-from warpspace.outputs.figures.settings import FigureSettings, choose_scale, given_exaggeration
-from warpspace.outputs.figures.sheet import LegendEntry, metadata, scene_facts, start_sheet
-from warpspace.outputs.labels import Occupancy, place_label
-from warpspace.outputs.lines import split_visible
-from warpspace.outputs.projection import Projection, Rect, fit_projection
-from warpspace.outputs.render import Raster, render_bodies
-from warpspace.outputs.style import SIZES
-from warpspace.outputs.words import MINUS, spell, spell_point
+from warpspace.picture.words import MINUS, spell, spell_point
 from warpspace.scene.model import Scene
 from warpspace.scene.pipeline import evaluate_picture
 from warpspace.units import MICROMETRE, Array

@@ -5,7 +5,7 @@ from warpspace.outputs.report.blocks import Block, Column, Text, table
 from warpspace.outputs.report.review import Reviewed
 from warpspace.outputs.report.sections import MOST_ROWS, prefixed
 from warpspace.outputs.report.wording import limit, percent
-from warpspace.outputs.words import spell, spell_short
+from warpspace.picture.words import spell, spell_short
 from warpspace.units import MICROMETRE
 
 

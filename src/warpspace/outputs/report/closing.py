@@ -13,7 +13,7 @@ from warpspace.outputs.report.blocks import Block, Code, Column, Items, Section,
 from warpspace.outputs.report.clock import report_time
 from warpspace.outputs.report.review import Review
 from warpspace.outputs.report.wording import factor_words, reference_words
-from warpspace.outputs.words import spell
+from warpspace.picture.words import spell
 from warpspace.scene.save import scene_to_toml
 
 CONVENTION_WORDS = {

@@ -146,7 +146,7 @@ class Painter:
 
     def _map(self, name: str, scenes: Sequence[Scene], caption: str, width: float = 1.0) -> Picture:
         """Draw a figure of the catalogue."""
-        from warpspace.outputs.figures.settings import FigureSettings
+        from warpspace.outputs.drawing.settings import FigureSettings
 
         settings = FigureSettings(
             exaggeration=self._review.exaggeration,

@@ -27,7 +27,7 @@ from warpspace.outputs.report.wording import (
     verdict,
     worst_place,
 )
-from warpspace.outputs.words import spell, spell_point, spell_short
+from warpspace.picture.words import spell, spell_point, spell_short
 from warpspace.units import MICROMETRE
 
 MOST_ROWS = 15

@@ -7,7 +7,7 @@ from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import ErrorFunction, Harmonics, Poly, Ramp, Table
 from warpspace.machine.parameters import LINEAR_AXES, parameter
 from warpspace.outputs.report.review import Chance, Review, Reviewed
-from warpspace.outputs.words import MINUS, TIMES, spell, spell_factor, spell_short
+from warpspace.picture.words import MINUS, TIMES, spell, spell_factor, spell_short
 from warpspace.scene.model import Scene
 from warpspace.units import MICROMETRE
 

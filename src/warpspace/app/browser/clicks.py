@@ -1,0 +1,107 @@
+"""HTML whose parts can be clicked: one invisible text widget carries the words of the parts."""
+
+import html
+from collections.abc import Callable
+
+from viser import GuiApi
+
+from warpspace.app.browser.handles import dom_id
+
+LONGEST_WORD = 100
+MOST_CLICKS = 8
+"""Clicks that one message carries: the latest and those before it, should some have got lost."""
+SCRIPT = f"""(() => {{
+  const sent = {{}};
+  window.warpspaceClick = (part, uuid) => {{
+    const word = part.dataset.word, clicks = (sent[uuid] ??= {{count: 0, latest: []}});
+    clicks.latest = [...clicks.latest, `${{++clicks.count}}:${{word}}`].slice(-{MOST_CLICKS});
+    __viserMutable.sendMessage({{
+      type: "GuiUpdateMessage", uuid, updates: {{value: clicks.latest.join("\\n")}},
+    }});
+    // the answer replaces the part: what had the focus keeps it
+    const watch = new MutationObserver(() => {{
+      if (part.isConnected) return;
+      watch.disconnect();
+      if (document.activeElement === document.body)
+        document.querySelector(`[data-word="${{CSS.escape(word)}}"]`)?.focus({{
+          preventScroll: true }});
+    }});
+    watch.observe(document.body, {{childList: true, subtree: true}});
+    setTimeout(() => watch.disconnect(), 10000);
+  }};
+}})();"""
+"""Has to run in the page before anything is clicked."""
+
+
+class Clicks:
+    """Makes pieces of HTML into buttons.
+
+    Parameters
+    ----------
+    gui : viser.GuiApi
+    clicked : callable
+        Gets the word of what was clicked, once per click and in their order. The word comes from a
+        browser and may be anything, so it is to be looked up, never trusted; the callable must only
+        take note.
+    """
+
+    def __init__(self, gui: GuiApi, clicked: Callable[[str], None]) -> None:
+        self._carrier = gui.add_text("", "", visible=False)
+        self._clicked = clicked
+        self._count = 0
+
+        async def take(event: object) -> None:  # in order, which a plain function would not be
+            if getattr(event, "client", None) is not None:
+                self._take(str(self._carrier.value))
+
+        self._carrier.on_update(take)
+
+    def _take(self, text: str) -> None:
+        """Pass on what has not been seen; a message may be read late, twice or not at all."""
+        for number, word in read_clicks(text):
+            if number > self._count:
+                self._count = number
+                self._clicked(word)
+
+    def attributes(self, word: str, role: str = "button") -> str:
+        """Spell the attributes of an element that is clicked, or reached with Tab and Enter.
+
+        Parameters
+        ----------
+        word : str
+            What `clicked` gets.
+        role : str, optional
+            ARIA role.
+        """
+        keys = "if(event.key==='Enter'||event.key===' '){event.preventDefault();this.click()}"
+        return f'role="{role}" tabindex="0" onkeydown="{keys}" {self._sends(word)}'
+
+    def button(self, word: str) -> str:
+        """Spell the attributes of a real button, which needs no more to be reached by key."""
+        return f'type="button" {self._sends(word)}'
+
+    def _sends(self, word: str) -> str:
+        """Spell the attributes of what sends a word when it is clicked."""
+        spelt = html.escape(word, quote=True)
+        return f'data-word="{spelt}" onclick="warpspaceClick(this,\'{dom_id(self._carrier)}\')"'
+
+
+def read_clicks(text: str) -> tuple[tuple[int, str], ...]:
+    """Read what a page has sent: its latest clicks, numbered.
+
+    Parameters
+    ----------
+    text : str
+        Lines ``number:word``; anything else in it is left out.
+
+    Returns
+    -------
+    tuple of (int, str)
+        In the order of the lines.
+    """
+    found: list[tuple[int, str]] = []
+    for line in text[: MOST_CLICKS * (LONGEST_WORD + 20)].split("\n")[:MOST_CLICKS]:
+        number, colon, word = line.partition(":")
+        if colon and number.isascii() and number.isdigit() and len(number) < 16:
+            found.append((int(number), word[:LONGEST_WORD]))
+    return tuple(found)

@@ -1,0 +1,204 @@
+"""One file with the interactive scene that needs no network: for a mail, a share, an archive.
+
+The scene is exported by a throwaway server that nobody connects to; the page around it (heading,
+colour bar, statistics, factor, parameters) is ours, since the export has no widgets.
+"""
+
+import contextlib
+import io
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import viser
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from warpspace import __version__
+from warpspace.app.evaluation.budget import heard_errors
+from warpspace.app.evaluation.compare import both_words, drawn_title, is_difference
+from warpspace.app.evaluation.evaluate import Frame, LiveModel
+from warpspace.app.readouts import summary as legend
+from warpspace.app.state.app_state import AppState, start_state
+from warpspace.app.viewport.camera import fit_camera
+from warpspace.app.viewport.layers import SCENE_PER_MM
+from warpspace.app.viewport.layers.axes import AxesLayer
+from warpspace.app.viewport.layers.box import BoxLayer
+from warpspace.app.viewport.layers.lights import light_scene
+from warpspace.app.viewport.layers.other import OtherLayer
+from warpspace.app.viewport.layers.traces import TracesLayer
+from warpspace.geometry.colour import build_scale
+from warpspace.kinematics.model import ComponentErrors, Loop
+from warpspace.machine.errors import ErrorFunction
+from warpspace.machine.parameters import parameter
+from warpspace.scene.model import Scene
+
+POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' blob: data:;"
+    " style-src 'unsafe-inline'; img-src data: blob:; font-src data: blob:;"
+    " connect-src data: blob:; worker-src blob: data:; frame-src 'self'"
+)
+"""What the browser may load: what is in the file, and nothing else."""
+ASPECT = 1.5
+MARGIN = 1.3
+"""Room around the box, for the axes beside it."""
+COMPONENT_ERRORS = {
+    ComponentErrors.AFTER_MOTION: "component errors ride on the moving body",
+    ComponentErrors.BEFORE_MOTION: "component errors in fixed directions",
+}
+
+
+def offline_frame(
+    scene: Scene,
+    *,
+    exaggeration: float,
+    nodes: int,
+    loop: Loop = Loop.TOOL,
+    component: str = "norm",
+    largest: float | None = None,
+) -> Frame:
+    """Evaluate a scene for a page.
+
+    Parameters
+    ----------
+    scene : Scene
+    exaggeration : float
+        Display factor.
+    nodes : int
+        Grid nodes per axis.
+    loop : Loop, optional
+    component : str, optional
+        What is coloured: norm, x, y or z.
+    largest : float, optional
+        Largest magnitude of the colour scale, µm, where it is shared with other pages.
+
+    Returns
+    -------
+    Frame
+    """
+    state = replace(
+        start_state(scene), exaggeration=exaggeration, nodes=nodes, loop=loop, component=component
+    )
+    frame = LiveModel().frame(state)
+    return frame if largest is None else replace(frame, scale=build_scale(largest, component))
+
+
+def build_scene_html(frame: Frame, aspect: float = ASPECT) -> str:
+    """Export the 3-D scene of a frame as a page of its own, without a word around it.
+
+    Parameters
+    ----------
+    frame : Frame
+    aspect : float, optional
+        Width over height of the room it will fill.
+
+    Returns
+    -------
+    str
+        HTML that requests nothing.
+    """
+    with contextlib.redirect_stdout(io.StringIO()):  # the server says hello and goodbye
+        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        try:
+            light_scene(server.scene)
+            for layer in (BoxLayer, TracesLayer, AxesLayer, OtherLayer):
+                layer(server.scene, frame)
+            _place_camera(server, frame, aspect)
+            return server.scene.as_html(dark_mode=frame.state.shown.dark)
+        finally:
+            server.stop()
+
+
+def _place_camera(server: viser.ViserServer, frame: Frame, aspect: float) -> None:
+    """Let the page open with the whole box in view, from the operator's side."""
+    drawn = np.concatenate([frame.grid.nominal_mm, frame.drawn_mm])
+    pose = fit_camera(drawn, aspect, margin=MARGIN)
+    camera = server.initial_camera
+    camera.up = (0.0, 0.0, 1.0)
+    camera.fov = pose.fov_rad
+    camera.position = pose.position * SCENE_PER_MM
+    camera.look_at = pose.look_at * SCENE_PER_MM
+
+
+def build_offline_html(frame: Frame, provenance: Mapping[str, Any] | None = None) -> str:
+    """Build the page: the interactive scene with its colour bar, numbers and factor.
+
+    Parameters
+    ----------
+    frame : Frame
+    provenance : mapping, optional
+        Program, scene and settings, stored in the page as JSON.
+
+    Returns
+    -------
+    str
+        HTML that requests nothing and carries everything.
+    """
+    # a page in an attribute: only these two characters would end or change it
+    inner = build_scene_html(frame).replace("&", "&amp;").replace('"', "&quot;")
+    stored = json.dumps(provenance or {}, ensure_ascii=False, allow_nan=False)
+    templates = Environment(
+        loader=PackageLoader("warpspace.app"), autoescape=True, undefined=StrictUndefined
+    )
+    return templates.get_template("offline.html.j2").render(
+        title=drawn_title(frame),
+        program=f"warpspace {__version__}",
+        policy=POLICY,
+        heading=Markup(legend.heading(frame)),  # noqa: S704 - escaped where it is built
+        summary=Markup(legend.summary(frame)),  # noqa: S704
+        scene=Markup(inner),  # noqa: S704
+        parameters=parameter_rows(frame),
+        counted="unlike in A and B" if is_difference(frame) else "not zero",
+        remarks=remarks(frame),
+        provenance=Markup(stored.replace("<", "\\u003c")),  # noqa: S704
+    )
+
+
+def parameter_rows(frame: Frame) -> list[dict[str, str]]:
+    """Spell the errors that are drawn: key, plain name, value with unit.
+
+    Those that are not zero; of a difference those that are unlike on both sides.
+    """
+    drawn = frame.subject or frame.state
+    if frame.compared is None or not is_difference(frame):
+        return [_row(key, f"{value:+g}") for key, value in drawn.heard.items() if value != 0.0]
+    a, b = (heard_errors(side).functions for side in frame.compared.sides)
+    return [
+        _row(key, f"A {_amplitude(a.get(key))}, B {_amplitude(b.get(key))}")
+        for key in {**a, **b}
+        if a.get(key) != b.get(key)
+    ]
+
+
+def _row(key: str, value: str) -> dict[str, str]:
+    """Spell one error."""
+    row = parameter(key)
+    return {"key": key, "name": row.name, "value": f"{value} {row.unit}".replace("-", "−")}
+
+
+def _amplitude(function: ErrorFunction | None) -> str:
+    """Spell the amplitude of an error."""
+    return "0" if function is None else f"{function.amplitude:+g}"
+
+
+def remarks(frame: Frame) -> list[str]:
+    """Spell how the scene is looked at; of a difference for both sides."""
+    return [
+        f"{both_words(frame, lambda state: state.loop.value)} loop",
+        both_words(frame, _reference_words),
+        both_words(frame, lambda state: COMPONENT_ERRORS[state.scene.model.component_errors]),
+        "first-order model",
+        "error = actual − nominal",
+        "drag to turn, wheel to zoom",
+        f"warpspace {__version__}",
+    ]
+
+
+def _reference_words(state: AppState) -> str:
+    """Say what is held still."""
+    held = state.scene.reference
+    if held is None:
+        return "absolute errors"
+    return "held still at " + ", ".join(f"{axis} {at:g}" for axis, at in held.items())

@@ -1,0 +1,280 @@
+"""A state as a scene file, and as a link; both read back to the same state.
+
+The file is an ordinary scene; comments at its head hold how it was looked at and what it was
+compared with, which only the app reads. A link holds the name of a scene the app knows and what
+differs from it, or the whole file, packed.
+"""
+
+import base64
+import binascii
+import re
+import zlib
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from urllib.parse import parse_qsl, urlencode
+
+from warpspace import __version__
+from warpspace.app.documents.received_files import LONGEST_NAME, safe_name
+from warpspace.app.documents.stored_comparison import PREFIX as COMPARISON
+from warpspace.app.documents.stored_comparison import comparison_line, with_comparison
+from warpspace.app.documents.view_settings import (
+    MAX_FIELDS,
+    camera_of,
+    settings_line,
+    with_settings,
+)
+from warpspace.app.evaluation.resulting_scene import scene_of
+from warpspace.app.server.tab_memory import CameraMemory
+from warpspace.app.state.app_state import AppState, start_state
+from warpspace.exceptions import OptionError
+from warpspace.scene.library import load_scene, parse_scene, scene_names
+from warpspace.scene.machines import load_machine, machine_names
+from warpspace.scene.model import Scene
+from warpspace.scene.save import scene_to_toml
+
+MARK = "# warpspace-view: "
+COMPARED = "# warpspace-compare: "
+MAX_LINK = 5_500
+"""Characters of a link before it is packed: servers take request lines of 8 kB."""
+MAX_COMPARED = 400_000
+"""Characters of a comparison in a file."""
+MAX_PACKED_TEXT = 1_000_000
+SCENE, PACKED, NAME = "scene", "file", "name"
+_HEAD = re.compile(r"(?:[ \t]*(?:#[^\n]*)?\n)*")
+_VIEW, _COMPARISON = (
+    re.compile(rf"^{re.escape(mark)}(\S*)\s*$", re.MULTILINE) for mark in (MARK, COMPARED)
+)
+Find = Callable[[str], Scene | None]
+"""Gives the scene that whoever opens a file or a link also has under a name."""
+
+
+def state_to_toml(state: AppState, camera: CameraMemory | None = None) -> str:
+    """Spell a state as a scene file.
+
+    Parameters
+    ----------
+    state : AppState
+    camera : CameraMemory, optional
+
+    Returns
+    -------
+    str
+        TOML that every reader of scenes takes; `open_text` gives the identical state back.
+
+    Raises
+    ------
+    OptionError
+        If what the state is compared with is too large to be stored beside it.
+    """
+    line = comparison_line(state.comparison, lambda side: _write(side, None, _bundled))
+    if len(line) > MAX_COMPARED:
+        raise OptionError("what is compared is too large to be stored with the scene")
+    compared = f"{COMPARED}{line}\n" if line else ""
+    head = f"# Saved by warpspace {__version__}. Below stands how it was looked at.\n"
+    return f"{head}{_with_view(state, camera, compared)}"
+
+
+def _with_view(state: AppState, camera: CameraMemory | None, remarks: str = "") -> str:
+    """Spell a state without its comparison as a scene file."""
+    scene = scene_of(state)
+    saved = replace(state, scene=scene, loaded=None)
+    return f"{MARK}{settings_line(saved, camera)}\n{remarks}\n{scene_to_toml(scene)}"
+
+
+def open_text(text: str, name: str, source: str) -> tuple[AppState, CameraMemory | None]:
+    """Build the state of a scene file that somebody has uploaded.
+
+    Parameters
+    ----------
+    text : str
+    name : str
+        Name of the scene.
+    source : str
+        What the file is called in messages.
+
+    Returns
+    -------
+    tuple of (AppState, CameraMemory or None)
+
+    Raises
+    ------
+    SceneError, OptionError
+        With every problem of the text, or what is wrong with the comparison in it.
+    """
+    state, camera = _read_text(text, name, source)
+    found = _COMPARISON.search(_head(text))
+    if found is not None:
+        pairs = _pairs(found[1], MAX_COMPARED, "the comparison")
+        state = with_comparison(state, pairs, lambda link: _read_link(link, _bundled)[0])
+    return state, camera
+
+
+def _read_text(text: str, name: str, source: str) -> tuple[AppState, CameraMemory | None]:
+    """Build a state from a file without looking at a comparison in it."""
+    state = start_state(_recognised(parse_scene(text, name, source, folder=None)))
+    found = _VIEW.search(_head(text))
+    if found is None:
+        return state, None
+    return with_settings(state, found[1]), camera_of(found[1])
+
+
+def is_looked_at(text: str) -> bool:
+    """Tell whether a scene file says how it was looked at."""
+    return _VIEW.search(_head(text)) is not None
+
+
+def _head(text: str) -> str:
+    """Give the comments that a file begins with."""
+    found = _HEAD.match(text)
+    return found[0] if found else ""
+
+
+def _bundled(name: str) -> Scene | None:
+    """Give a scene that everybody has."""
+    return load_scene(name) if name in scene_names() else None
+
+
+def _recognised(scene: Scene) -> Scene:
+    """Give a machine written inline its bodies back where only directions make it another one."""
+    machine = scene.machine
+    for name in machine_names():
+        known = load_machine(name)
+        if known.axes.keys() != machine.axes.keys():
+            continue
+        axes = {
+            key: replace(axis, direction=known.axes[key].direction)
+            for key, axis in machine.axes.items()
+        }
+        same = replace(known, axes=machine.axes)
+        offsets = machine.fixed_mm == known.fixed_mm and machine.chain == known.chain
+        if offsets and axes == known.axes:
+            return replace(scene, model=replace(scene.model, machine=same))
+    return scene
+
+
+def state_to_link(state: AppState, camera: CameraMemory | None, known: Iterable[Scene]) -> str:
+    """Spell a state as a link.
+
+    Parameters
+    ----------
+    state : AppState
+    camera : CameraMemory or None
+    known : iterable of Scene
+        Scenes that whoever opens the link has as well.
+
+    Returns
+    -------
+    str
+        A query string.
+
+    Raises
+    ------
+    OptionError
+        If the scene, or what it is compared with, is too large for a link.
+    """
+    find = _among(known)
+    link = _write(state, camera, find)
+    if not link.startswith(f"{SCENE}="):
+        link = _packed(state.scene.name, state_to_toml(state, camera))
+    else:
+        link += _behind(comparison_line(state.comparison, lambda side: _write(side, None, find)))
+    if len(link) > MAX_LINK:
+        raise OptionError("this is too large for a link; save it as a file instead")
+    return link
+
+
+def _write(state: AppState, camera: CameraMemory | None, find: Find) -> str:
+    """Spell a state without its comparison as a link of any length."""
+    plain = state.loaded is None and state.tolerances == state.scene.tolerances
+    if plain and find(state.scene.name) == state.scene:
+        return urlencode({SCENE: state.scene.name}) + _behind(settings_line(state, camera))
+    return _packed(state.scene.name, _with_view(state, camera))
+
+
+def _among(known: Iterable[Scene]) -> Find:
+    """Find scenes among those a server offers; of two with one name the first."""
+    named: dict[str, Scene] = {}
+    for scene in known:
+        named.setdefault(scene.name, scene)
+    return named.get
+
+
+def _behind(line: str) -> str:
+    """Put settings behind the name of a scene."""
+    return f"&{line}" if line else ""
+
+
+def open_link(link: str, known: Iterable[Scene]) -> tuple[AppState, CameraMemory | None]:
+    """Build the state that a link describes.
+
+    Parameters
+    ----------
+    link : str
+        A query string; anything, since anybody can write one.
+    known : iterable of Scene
+        Scenes it may name.
+
+    Returns
+    -------
+    tuple of (AppState, CameraMemory or None)
+
+    Raises
+    ------
+    OptionError, SceneError
+        If it names no scene, or holds none that can be read, or a comparison that cannot.
+    """
+    pairs = _pairs(link, MAX_LINK, "the link")
+    find = _among(known)
+    if PACKED in pairs:
+        return open_text(_unpack(pairs[PACKED]), *_named(pairs))
+    state, camera = _read_link(link, find)
+    return with_comparison(state, pairs, lambda part: _read_link(part, find)[0]), camera
+
+
+def _pairs(line: str, longest: int, what: str) -> dict[str, str]:
+    """Take a query string apart that may be anything."""
+    if len(line) > longest:
+        raise OptionError(f"{what} is {len(line):,} characters long; expected at most {longest:,}")
+    try:
+        return dict(parse_qsl(line, max_num_fields=MAX_FIELDS))
+    except ValueError:
+        raise OptionError(f"{what} has too many parts; it was not made by this program") from None
+
+
+def _read_link(link: str, find: Find) -> tuple[AppState, CameraMemory | None]:
+    """Build the state of a link without looking at a comparison in it."""
+    pairs = _pairs(link, MAX_COMPARED, "the link")
+    if PACKED in pairs:
+        return _read_text(_unpack(pairs[PACKED]), *_named(pairs))
+    name = pairs.get(SCENE, "")
+    scene = find(name)
+    if scene is None:
+        raise OptionError(f"the link names the scene {name[:LONGEST_NAME]!r}, which is not here")
+    line = urlencode(
+        [(k, v) for k, v in pairs.items() if k != SCENE and not k.startswith(COMPARISON)]
+    )
+    return with_settings(start_state(scene), line), camera_of(line)
+
+
+def _packed(name: str, text: str) -> str:
+    """Pack a file into a link."""
+    word = base64.urlsafe_b64encode(zlib.compress(text.encode(), 9)).decode().rstrip("=")
+    return urlencode({NAME: name, PACKED: word})
+
+
+def _named(pairs: Mapping[str, str]) -> tuple[str, str]:
+    """Name the file in a link, for itself and for messages."""
+    return safe_name(pairs.get(NAME, ""), "link"), "the scene in the link"
+
+
+def _unpack(packed: str) -> str:
+    """Unpack the file in a link, up to a size."""
+    try:
+        data = base64.urlsafe_b64decode(packed + "=" * (-len(packed) % 4))
+        reader = zlib.decompressobj()
+        text = reader.decompress(data, MAX_PACKED_TEXT)
+        if reader.unconsumed_tail or not reader.eof:
+            raise OptionError("the scene in the link is cut off or too large")
+        return text.decode("utf-8")
+    except (binascii.Error, zlib.error, ValueError):
+        raise OptionError("the scene in the link cannot be read; was the link cut?") from None

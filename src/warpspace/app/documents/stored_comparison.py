@@ -1,0 +1,118 @@
+"""A comparison as one line of text: what is compared, what is drawn, and the pinned snapshot.
+
+A side that is a scene, and the snapshot, are spelt as links of their own, so that they come back as
+they are seen: by the name of a scene that is known, or with all that is in them.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from urllib.parse import urlencode
+
+from warpspace.app.evaluation.compare import scene_side
+from warpspace.app.state.app_state import AppState
+from warpspace.app.state.comparison import NOBODY, NOW, SHOWN, Comparison, Side
+from warpspace.exceptions import OptionError
+
+PREFIX = "compare."
+PINNED = "pinned"
+SNAPSHOT = "snapshot: "
+LONGEST_TITLE = 200
+NAMES = frozenset({"a", "b", "shown", "ghost", PINNED, "a.title", "b.title", "pinned.title"})
+Write = Callable[[AppState], str]
+Read = Callable[[str], AppState]
+
+
+def comparison_line(comparison: Comparison, write: Write) -> str:
+    """Spell a comparison as a query string.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    write : callable
+        Spells a plain state as a link.
+
+    Returns
+    -------
+    str
+        Empty where nothing is compared and nothing pinned.
+    """
+    pairs: list[tuple[str, str]] = []
+    for name, side in (("a", comparison.a), ("b", comparison.b)):
+        if side is None or (name == "a" and side.state is None):
+            continue
+        pairs.append((name, _side_text(side, write)))
+        if side.is_scene and side.state and side.title != scene_side(side.state.scene).title:
+            pairs.append((f"{name}.title", side.title))
+    if comparison.shown != Comparison().shown:
+        pairs.append(("shown", comparison.shown))
+    if not comparison.ghost:
+        pairs.append(("ghost", "0"))
+    pinned = comparison.pinned
+    if pinned is not None and pinned.state is not None:
+        pairs += [(PINNED, write(pinned.state)), ("pinned.title", pinned.title)]
+    return urlencode([(PREFIX + name, value) for name, value in pairs])
+
+
+def _side_text(side: Side, write: Write) -> str:
+    """Spell one side; a snapshot is the pinned one."""
+    if side.state is None:
+        return NOW
+    return write(side.state) if side.is_scene else PINNED
+
+
+def with_comparison(state: AppState, pairs: Mapping[str, str], read: Read) -> AppState:
+    """Give a state the comparison that somebody has written down.
+
+    Parameters
+    ----------
+    state : AppState
+    pairs : mapping of str to str
+        Anything: it comes from a link or an uploaded file. What does not begin with `PREFIX` is
+        not looked at.
+    read : callable
+        Builds the plain state of a link; raises where there is none.
+
+    Returns
+    -------
+    AppState
+        Numbers of the snapshot that are out of range are clamped; `notes` says so.
+
+    Raises
+    ------
+    WarpspaceError
+        If anything in it means nothing: half a comparison would be another one.
+    """
+    given = {k.removeprefix(PREFIX): v for k, v in pairs.items() if k.startswith(PREFIX)}
+    if not given:
+        return state
+    for name in given:
+        if name not in NAMES:
+            raise OptionError(f"the comparison says {name[:30]!r}, which means nothing")
+    pinned = None
+    notes = state.notes
+    if PINNED in given:
+        snapshot = read(given[PINNED])
+        notes = (*notes, *(f"snapshot: {note}" for note in snapshot.notes))
+        plain = replace(snapshot, comparison=Comparison(), picked=None, lever="", notes=())
+        title = SNAPSHOT + given.get("pinned.title", "").removeprefix(SNAPSHOT)
+        pinned = Side(title[:LONGEST_TITLE], plain)
+    a, b = (_side(given, name, pinned, read) for name in "ab")
+    shown, ghost = given.get("shown", Comparison().shown), given.get("ghost", "1")
+    if shown not in SHOWN or ghost not in ("0", "1"):
+        raise OptionError("the comparison does not say what is drawn: expected a, b or difference")
+    found = Comparison(a or Side(), b, shown, ghost == "1", pinned)
+    return replace(state, comparison=found, notes=notes)
+
+
+def _side(given: Mapping[str, str], name: str, pinned: Side | None, read: Read) -> Side | None:
+    """Read one side; None where there is none."""
+    text = given.get(name)
+    if text is None or text == NOW:
+        return None if text is None else Side()
+    if text == PINNED:
+        if pinned is None:
+            raise OptionError("the comparison is with a snapshot, but holds none")
+        return pinned
+    side = scene_side(read(text).scene)
+    title = given.get(f"{name}.title", side.title)[:LONGEST_TITLE]
+    return side if title in (NOW, NOBODY, "") else replace(side, title=title)

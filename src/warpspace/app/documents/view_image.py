@@ -1,0 +1,95 @@
+"""A picture of the 3-D view as PNG that says what it shows: title, factor, numbers, colour bar."""
+
+from functools import cache
+from importlib.util import find_spec
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont, PngImagePlugin
+
+from warpspace import __version__
+from warpspace.app.evaluation.compare import both_words, drawn_title
+from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.readouts.summary import spell_factor
+
+LIGHT, DARK = ((255, 255, 255), (27, 38, 59)), ((26, 27, 30), (222, 226, 232))
+"""Ground and ink."""
+BAND_PX = 150
+HEAD_PX = 64
+
+
+def view_png(pixels: NDArray[np.uint8], frame: Frame) -> bytes:
+    """Put a rendered view under a heading and beside its colour bar.
+
+    Parameters
+    ----------
+    pixels : ndarray of uint8, [h, w, 3 or 4]
+        With a transparent ground where there are four channels.
+    frame : Frame
+        What it shows.
+
+    Returns
+    -------
+    bytes
+        PNG.
+    """
+    ground, ink = DARK if frame.state.shown.dark else LIGHT
+    view = Image.fromarray(pixels).convert("RGBA")
+    page = Image.new("RGBA", (view.width + BAND_PX, view.height + HEAD_PX), (*ground, 255))
+    page.alpha_composite(view, (0, HEAD_PX))
+    draw = ImageDraw.Draw(page)
+    _heading(draw, frame, ink)
+    _colour_bar(page, draw, frame, ink)
+    facts = PngImagePlugin.PngInfo()
+    facts.add_text("Software", f"warpspace {__version__}")
+    facts.add_itxt("Title", drawn_title(frame))
+    facts.add_itxt("Description", f"displacement drawn {spell_factor(frame.exaggeration)}")
+    written = BytesIO()
+    page.convert("RGB").save(written, "PNG", pnginfo=facts)
+    return written.getvalue()
+
+
+@cache
+def _font(size: int) -> "ImageFont.ImageFont | ImageFont.FreeTypeFont":
+    """Give a font that has µ, × and −: the one that comes with the figures' library, unloaded."""
+    library = find_spec("matplotlib")
+    if library is not None and library.origin is not None:
+        path = Path(library.origin).parent / "mpl-data/fonts/ttf/DejaVuSans.ttf"
+        if path.is_file():
+            return ImageFont.truetype(str(path), size)
+    return ImageFont.load_default(size)
+
+
+def _heading(draw: ImageDraw.ImageDraw, frame: Frame, ink: tuple[int, int, int]) -> None:
+    """Write title, factor and numbers."""
+    found = frame.statistics
+    title = drawn_title(frame)
+    factor = spell_factor(frame.exaggeration).replace("\u202f", " ")
+    draw.text((16, 10), title[:110], ink, _font(22))
+    draw.text(
+        (16, 38),
+        f"displacement drawn {factor} · |E| mean {found.mean_um:.2f} µm, max {found.max_um:.2f} µm"
+        f" · {both_words(frame, lambda state: state.loop.value)} loop",
+        ink,
+        _font(15),
+    )
+
+
+def _colour_bar(
+    page: Image.Image, draw: ImageDraw.ImageDraw, frame: Frame, ink: tuple[int, int, int]
+) -> None:
+    """Draw the colour bar with ticks and unit on the right."""
+    scale = frame.scale
+    left, top = page.width - BAND_PX + 20, HEAD_PX + 60
+    height = max(page.height - top - 40, 40)
+    values = np.linspace(scale.high, scale.low, height)
+    strip = np.repeat(scale.colours(values)[:, None, :], 24, axis=1)
+    page.paste(Image.fromarray(strip.astype(np.uint8)), (left, top))
+    font = _font(15)
+    draw.text((left, top - 34), f"{scale.label} [{scale.unit}]", ink, font)
+    for tick in scale.ticks:
+        at = top + (scale.high - tick) / (scale.high - scale.low) * (height - 1)
+        draw.line([(left + 24, at), (left + 30, at)], ink, 1)
+        draw.text((left + 35, at - 9), f"{tick:g}".replace("-", "−"), ink, font)

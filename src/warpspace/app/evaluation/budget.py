@@ -1,0 +1,201 @@
+"""Why a point is where it is: which point a click means, and what its error is made of."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from warpspace.analysis.explain import Explanation, explain
+from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.state.app_state import AppState
+from warpspace.app.state.edits import axis_span
+from warpspace.app.state.picked import Picked
+from warpspace.field.grid import Grid
+from warpspace.geometry.deform import deform
+from warpspace.geometry.pick import pick_point, pick_surface
+from warpspace.geometry.surfaces import Index, outer_surface
+from warpspace.kinematics import transforms
+from warpspace.kinematics.chain import branch_pose, nominal_point
+from warpspace.kinematics.model import Loop
+from warpspace.machine.errors import Constant, ErrorSet
+from warpspace.machine.parameters import LINEAR_AXES
+from warpspace.units import Array
+
+TOLERANCE_RAD = 0.0032
+"""How far a click may pass a trace: about seven pixels of the usual view."""
+BETWEEN = 5
+"""Places looked at between two samples of a trace: one degree apart."""
+REACH_MM = 1e7
+"""Rays from farther away than this come from no camera."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """A picked point explained, as it is drawn.
+
+    Attributes
+    ----------
+    at : mapping of str to float, mm or degrees
+        Positions of all axes.
+    loop : Loop
+    explanation : Explanation
+    shift_mm : ndarray, [3], mm
+        From R to where things are drawn, on machines whose linear axes carry the workpiece.
+    drawn_mm : ndarray, [3], mm
+        Where the displaced point is drawn.
+    """
+
+    at: Mapping[str, float]
+    loop: Loop
+    explanation: Explanation
+    shift_mm: Array
+    drawn_mm: Array
+
+
+def pick(frame: Frame, origin_mm: Array, direction: Array) -> Picked | None:
+    """Find the point of a drawn trace or surface that a click means.
+
+    Parameters
+    ----------
+    frame : Frame
+    origin_mm, direction : ndarray, [3]
+        The ray from the eye; anything, since it comes from a browser.
+
+    Returns
+    -------
+    Picked or None
+        None where it meets nothing. A trace in front of the surface comes before it.
+    """
+    ray = np.concatenate([np.ravel(origin_mm), np.ravel(direction)]).astype(float)
+    if ray.shape != (6,) or not np.isfinite(ray).all() or np.abs(ray).max() > REACH_MM:
+        return None
+    length = float(np.linalg.norm(ray[3:]))
+    if length == 0.0:
+        return None
+    origin, unit = ray[:3], ray[3:] / length
+    surface = _on_surface(frame, origin, unit)
+    trace = _on_trace(frame, origin, unit) if frame.state.shown.traces else None
+    if trace is not None and (surface is None or trace[1] <= surface[1]):
+        return trace[0]
+    return None if surface is None else surface[0]
+
+
+def _on_surface(frame: Frame, origin: Array, unit: Array) -> tuple[Picked, float] | None:
+    """Intersect the drawn surface, or the slices; give the point and its distance, mm."""
+    drawn = [(frame.grid, frame.drawn_mm, frame.topology.surface)]
+    if frame.slices:
+        drawn = [(cut.grid, cut.drawn_mm, outer_surface(cut.grid.shape)) for cut in frame.slices]
+    best: tuple[Picked, float] | None = None
+    for grid, drawn_mm, surface in drawn:
+        points = drawn_mm.reshape(-1, 3)[surface.nodes]
+        hit = pick_surface(origin, unit, points, surface.triangles)
+        if hit is not None and (best is None or hit.distance < best[1]):
+            nodes = surface.nodes[hit.vertices]
+            best = _between_nodes(grid, nodes, hit.weights), hit.distance
+    return best
+
+
+def _between_nodes(grid: Grid, nodes: Index, weights: Array) -> Picked:
+    """Interpolate the axis positions of flat grid nodes."""
+    return Picked(
+        {
+            name: float(np.broadcast_to(values, grid.shape).reshape(-1)[nodes] @ weights)
+            for name, values in grid.coordinates.items()
+            if name in LINEAR_AXES
+        }
+    )
+
+
+def _on_trace(frame: Frame, origin: Array, unit: Array) -> tuple[Picked, float] | None:
+    """Find the nearest of the drawn traces; give the point and its distance, mm."""
+    best: tuple[Picked, float] | None = None
+    for lines in frame.traces:
+        shape = lines.actual_mm.shape[:2]
+        dense = _denser(lines.actual_mm)
+        found = pick_point(origin, unit, dense.reshape(-1, 3), TOLERANCE_RAD)
+        if found is None or (best is not None and best[1] <= found[1]):
+            continue
+        number, sample = divmod(found[0], dense.shape[1])
+        trace = lines.group.traces[number]
+        at = {
+            name: float(_denser(np.broadcast_to(values, shape)[..., None])[number, sample, 0])
+            for name, values in lines.group.coordinates.items()
+        }
+        best = Picked(at, lines.group.loop, trace.point_mm), found[1]
+    return best
+
+
+def _denser(samples: Array) -> Array:
+    """Put `BETWEEN` steps between two samples, [T, n, d] → [T, (n−1)·BETWEEN + 1, d]."""
+    count = samples.shape[1]
+    place = np.linspace(0.0, count - 1.0, (count - 1) * BETWEEN + 1)
+    first = np.minimum(place.astype(int), count - 2)
+    part = (place - first)[:, None]
+    return samples[:, first] * (1.0 - part) + samples[:, first + 1] * part
+
+
+def heard_errors(state: AppState) -> ErrorSet:
+    """Give the error set with the amplitudes that count in a state."""
+    functions = state.scene.errors.functions
+    return ErrorSet(
+        {
+            key: (functions.get(key) or Constant(axis_span(state, key))).with_amplitude(value)
+            for key, value in state.heard.items()
+            if value != 0.0
+        }
+    )
+
+
+def answer(state: AppState, picked: Picked, exaggeration: float) -> Answer:
+    """Explain the error of a picked point.
+
+    Parameters
+    ----------
+    state : AppState
+    picked : Picked
+    exaggeration : float
+        Display factor in force.
+
+    Returns
+    -------
+    Answer
+    """
+    model = state.scene.model
+    stands = {**state.scene.workspace.positions, **state.positions, **picked.at}
+    at = {name: stands.get(name, 0.0) for name in model.machine.axes}
+    coordinates = {name: np.asarray(value) for name, value in at.items()}
+    loop = picked.loop or state.loop
+    if picked.point_mm is None:
+        point = nominal_point(model, Loop.TOOL, coordinates)
+    else:
+        side = "workpiece" if loop is Loop.WORKPIECE else "tool"
+        pose = branch_pose(model, side, coordinates)
+        point = transforms.apply(pose, np.asarray(picked.point_mm))
+    found = explain(model, heard_errors(state), coordinates, state.scene.view(loop), point)
+    shift = np.zeros(3) if picked.point_mm is not None else _shift_mm(state, at, point)
+    drawn = deform(found.nominal_mm + shift, found.error_um, exaggeration)
+    return Answer(at, loop, found, shift, drawn)
+
+
+def _shift_mm(state: AppState, at: Mapping[str, float], point: Array) -> Array:
+    """Tell how far from its place in R a node is drawn (see `Grid.nominal_mm`), [3], mm."""
+    model, middle = state.scene.model, state.scene.workspace.positions
+    carrying = [axis.name for axis in model.machine.branch("workpiece") if axis.is_linear]
+    if not carrying:
+        return np.zeros(3)
+    here = {name: np.asarray(value) for name, value in at.items()}
+    home = {**here, **{name: np.asarray(middle.get(name, 0.0)) for name in carrying}}
+    there = transforms.inverse(branch_pose(model, "workpiece", here))
+    moved = branch_pose(model, "workpiece", home) @ there
+    return transforms.apply(moved, point) - point
+
+
+def with_picked(state: AppState, picked: Picked | None) -> AppState:
+    """Ask about a point, or about none; the chosen contribution stays while there is a point."""
+    return replace(state, picked=picked, lever=state.lever if picked else "")
+
+
+def with_lever(state: AppState, key: str) -> AppState:
+    """Choose the contribution whose axis and lever are drawn; the same one again ends it."""
+    known = key in state.amplitudes
+    return replace(state, lever="" if not known or key == state.lever else key)

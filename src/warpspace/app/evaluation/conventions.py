@@ -1,0 +1,223 @@
+"""The conventions a map is drawn with: changing them, and what each choice does to the map.
+
+Changed conventions live in the state's scene, so that everything drawn from it (map, traces, why,
+exports) has them; `AppState.origin` keeps the scene's own ones.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from warpspace.app.state.app_state import AppState, start_loop
+from warpspace.app.state.ranges import Span
+from warpspace.field.evaluate import View, build_basis
+from warpspace.field.grid import build_grid
+from warpspace.kinematics.model import ComponentErrors, Loop
+from warpspace.machine.parameters import LINEAR_AXES
+from warpspace.scene.model import Scene
+from warpspace.units import Array
+
+NODES = 7
+"""Nodes per axis at which the effect of a choice is worked out."""
+Reference = Mapping[str, float] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """What one choice does to the map, against the scene's own conventions.
+
+    Attributes
+    ----------
+    choice : str
+        For instance "component_errors=before_motion".
+    mean_um, max_um : float, µm
+        Mean and largest length of the change over the grid.
+    """
+
+    choice: str
+    mean_um: float
+    max_um: float
+
+
+def reference_spans(scene: Scene) -> dict[str, Span]:
+    """Give the ranges of a reference point, mm: the working volume's, by linear axis."""
+    ranges = scene.workspace.ranges
+    return {
+        name: Span(*(ranges.get(name) or scene.machine.axes[name].travel), 1.0)
+        for name in LINEAR_AXES
+        if name in scene.machine.axes
+    }
+
+
+def with_component_errors(state: AppState, order: str) -> AppState:
+    """Let component errors act before or after the motion; an unknown word changes nothing."""
+    if order not in [*ComponentErrors]:
+        return state
+    model = replace(state.scene.model, component_errors=ComponentErrors(order))
+    return _with_scene(state, replace(state.scene, model=model))
+
+
+def with_direction(state: AppState, axis: str, direction: int) -> AppState:
+    """Let an axis move with (+1) or against (−1) its name; anything else changes nothing."""
+    machine = state.scene.machine
+    if axis not in machine.axes or direction not in (1, -1):
+        return state
+    axes = {**machine.axes, axis: replace(machine.axes[axis], direction=direction)}
+    model = replace(state.scene.model, machine=replace(machine, axes=axes))
+    return _with_scene(state, replace(state.scene, model=model))
+
+
+def with_reference(state: AppState, at: Reference) -> AppState:
+    """Hold a point still, mm in axis coordinates; None shows absolute errors.
+
+    Coordinates outside the working volume are clamped and noted; what is no number stays.
+    """
+    if at is None:
+        return _with_scene(state, replace(state.scene, reference=None))
+    before = {**state.scene.workspace.positions, **(state.scene.reference or {})}
+    kept: dict[str, float] = {}
+    notes = state.notes
+    for name, span in reference_spans(state.scene).items():
+        wanted = float(at.get(name, before.get(name, 0.0)))
+        kept[name] = span.clamp(wanted, before.get(name, 0.0))
+        if kept[name] != wanted:
+            notes = (*notes, f"reference {name} = {wanted:g} mm: clamped to {kept[name]:g} mm")
+    scene = replace(state.scene, reference=kept)
+    return replace(_with_scene(state, scene), notes=notes)
+
+
+def with_choice(state: AppState, choice: str) -> AppState:
+    """Apply a choice as a page spells it, for instance "direction C=-1"; others change nothing."""
+    what, _, value = choice.partition("=")
+    match what.split(" "):
+        case ["component_errors"]:
+            return with_component_errors(state, value)
+        case ["loop"] if value in [*Loop]:
+            return state.with_loop(value)
+        case ["reference"] if value == "absolute":
+            return with_reference(state, None)
+        case ["reference"] if value == "point":
+            own = state.origin.reference or {}
+            return with_reference(state, state.scene.reference or own)
+        case ["direction", axis] if value in ("1", "-1"):
+            return with_direction(state, axis, int(value))
+        case _:
+            return state
+
+
+def with_own_conventions(state: AppState) -> AppState:
+    """Go back to the conventions of the scene."""
+    own = state.origin
+    axes = {
+        name: replace(axis, direction=own.machine.axes[name].direction)
+        for name, axis in state.scene.machine.axes.items()
+    }
+    model = replace(
+        state.scene.model,
+        component_errors=own.model.component_errors,
+        machine=replace(state.scene.machine, axes=axes),
+    )
+    return _with_scene(state, replace(state.scene, model=model, reference=own.reference))
+
+
+def _with_scene(state: AppState, scene: Scene) -> AppState:
+    """Show a scene with changed conventions and remember the one it came from."""
+    if scene == state.scene:
+        return state
+    own = state.origin
+    return (
+        replace(state, scene=own, loaded=None)
+        if scene == own
+        else replace(state, scene=scene, loaded=own)
+    )
+
+
+def choices(state: AppState) -> list[str]:
+    """List what can be chosen, as `with_choice` takes it, in the order shown."""
+    axes = sorted(state.scene.machine.axes.values(), key=lambda axis: (axis.is_linear, axis.name))
+    return [
+        *(f"component_errors={order}" for order in ComponentErrors),
+        *(f"loop={loop}" for loop in Loop),
+        "reference=absolute",
+        "reference=point",
+        *(f"direction {axis.name}={sign}" for axis in axes for sign in (1, -1)),
+    ]
+
+
+def chosen(state: AppState) -> set[str]:
+    """Tell which choices are in force."""
+    scene = state.scene
+    return {
+        f"component_errors={scene.model.component_errors}",
+        f"loop={state.loop}",
+        "reference=absolute" if scene.reference is None else "reference=point",
+        *(f"direction {axis.name}={axis.direction}" for axis in scene.machine.axes.values()),
+    }
+
+
+class Effects:
+    """Works out what every choice does; keeps the responses while only amplitudes change."""
+
+    def __init__(self) -> None:
+        self._for: tuple[object, ...] = ()
+        self._own: Array | None = None
+        self._bases: dict[str, Array] = {}
+
+    def of(self, state: AppState) -> dict[str, Effect]:
+        """Compare each choice, taken alone, with the scene's own conventions.
+
+        Parameters
+        ----------
+        state : AppState
+
+        Returns
+        -------
+        dict of str to Effect
+            By choice; "all" is the present combination. Over 7 × 7 × 7 nodes, first order, at the
+            same axis positions. What the scene itself chooses changes nothing.
+        """
+        needed = (state.origin, state.scene, tuple(state.positions.items()), state.loop)
+        if self._own is None or not _same(needed, self._for):
+            own = own_state(state)
+            self._for = needed
+            self._own = _response(own)
+            self._bases = {
+                choice: _response(with_choice(own, choice))
+                for choice in choices(state)
+                if choice not in chosen(own)
+            }
+            if state.scene.reference is not None:
+                held = with_reference(own, state.scene.reference)
+                self._bases["reference=point"] = _response(held)
+            self._bases["all"] = _response(state)
+        amplitudes = np.fromiter(state.heard.values(), float, len(state.amplitudes))
+        base = self._own
+        found = {choice: Effect(choice, 0.0, 0.0) for choice in choices(state)}
+        for choice, response in self._bases.items():
+            change = np.tensordot(amplitudes, response - base, axes=1)
+            length = np.linalg.norm(change, axis=-1)
+            found[choice] = Effect(choice, float(length.mean()), float(length.max()))
+        return found
+
+
+def own_state(state: AppState) -> AppState:
+    """Give the state with the conventions of its scene: order, reference, directions and loop."""
+    return replace(with_own_conventions(state), loop=start_loop(state.origin))
+
+
+def _same(new: tuple[object, ...], old: tuple[object, ...]) -> bool:
+    """Compare what responses were worked out for, scenes by identity."""
+    return len(new) == len(old) and all(
+        a is b if isinstance(a, Scene) else a == b for a, b in zip(new, old, strict=True)
+    )
+
+
+def _response(state: AppState) -> Array:
+    """Respond to every amplitude over a coarse grid, [K, nx, ny, nz, 3]."""
+    scene = state.scene
+    grid = build_grid(scene.model, scene.workspace.moved(state.positions), NODES)
+    view = View(loop=state.loop, reference=scene.reference)
+    keys = tuple(state.amplitudes)
+    basis = build_basis(scene.model, scene.errors, keys, grid.coordinates, view, grid.point_mm)
+    return basis.position

@@ -1,0 +1,194 @@
+"""The coloured map of a frame as triangles and pieces of line: whole, cut open, or in slices."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.evaluation.topology import Topology, topology
+from warpspace.geometry.isolines import isoline_levels, isoline_segments
+from warpspace.geometry.surfaces import Index, line_spacing
+from warpspace.units import Array
+
+LIFT = 0.0012
+"""How far grid lines are lifted off the surface, as a part of the longest edge."""
+EDGE_LIFT, ISOLINE_LIFT = 1.5, 1.25
+"""Edges and isolines, in multiples of that."""
+Pieces = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True)
+class MapMesh:
+    """What is drawn of a map, mm in R.
+
+    Attributes
+    ----------
+    vertices_mm : ndarray, [M, 3], mm
+    triangles : ndarray, [T, 3] or [S, 2]
+    values : ndarray, [M]
+        What is coloured, in the unit of the frame's scale.
+    """
+
+    vertices_mm: Array
+    triangles: NDArray[np.intp]
+    values: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One grid of a map: the volume, or a slice."""
+
+    drawn_mm: Array
+    values: Array
+    drawn_of: Topology
+    lifts: tuple[float, ...]
+    ways: Array
+    """Direction of each axis of the grid, +1 or −1: an axis may run against its name."""
+
+    def pieces(self, segments: Index, outwards: Pieces, times: float) -> list[Pieces]:
+        """Give pieces of line off the surface, on each side that is seen, [S, 2, 3] each, mm."""
+        ends = self.drawn_mm.reshape(-1, 3).take(segments, axis=0).astype(np.float32)
+        return [
+            ends + (outwards * (lift * times * self.ways)).astype(np.float32) for lift in self.lifts
+        ]
+
+
+def map_parts(frame: Frame) -> list[Part]:
+    """List the grids that a map consists of; a slice is seen from both sides."""
+    lift = LIFT * frame.grid.longest_edge_mm
+    if not frame.slices:
+        return [Part(frame.drawn_mm, frame.values, frame.topology, (lift,), frame.grid.ways)]
+    return [
+        Part(
+            part.drawn_mm,
+            part.values,
+            topology(part.grid.shape),
+            (lift, -lift),
+            part.grid.ways,
+        )
+        for part in frame.slices
+    ]
+
+
+def drafted(frame: Frame) -> Frame:
+    """Thin out a map to every second node along each axis, a third of the bytes.
+
+    Parameters
+    ----------
+    frame : Frame
+
+    Returns
+    -------
+    Frame
+        The same one where thinning would move its grid lines or its cut, and where slices are
+        drawn. Statistics, scale and everything else in it stay those of all nodes.
+    """
+    shape = tuple(nodes // 2 + 1 for nodes in frame.grid.shape)
+    fits = all(
+        nodes % 4 == 1 and line_spacing(nodes) == 2 * line_spacing(thin)
+        for nodes, thin in zip(frame.grid.shape, shape, strict=True)
+    )
+    if frame.slices or not fits:
+        return frame
+    return replace(
+        frame,
+        drawn_mm=np.ascontiguousarray(frame.drawn_mm[::2, ::2, ::2]),
+        values=np.ascontiguousarray(frame.values[::2, ::2, ::2]),
+        topology=topology((shape[0], shape[1], shape[2]), cut=frame.state.look.surface == "cut"),
+    )
+
+
+def map_mesh(frame: Frame) -> MapMesh:
+    """Collect the triangles of a map.
+
+    Parameters
+    ----------
+    frame : Frame
+
+    Returns
+    -------
+    MapMesh
+    """
+    vertices: list[Array] = []
+    triangles: list[NDArray[np.intp]] = []
+    values: list[Array] = []
+    parts = map_parts(frame)
+    if len(parts) == 1:
+        surface = parts[0].drawn_of.surface
+        return MapMesh(
+            parts[0].drawn_mm.reshape(-1, 3).take(surface.nodes, axis=0),
+            surface.triangles,
+            parts[0].values.reshape(-1).take(surface.nodes),
+        )
+    count = 0
+    for part in parts:
+        surface = part.drawn_of.surface
+        vertices.append(part.drawn_mm.reshape(-1, 3)[surface.nodes])
+        values.append(part.values.reshape(-1)[surface.nodes])
+        triangles.append(surface.triangles + count)
+        count += len(surface.nodes)
+    return MapMesh(np.concatenate(vertices), np.concatenate(triangles), np.concatenate(values))
+
+
+def grid_pieces(frame: Frame) -> Pieces:
+    """Collect the grid lines on a map, [S, 2, 3], mm."""
+    return _joined(
+        [
+            pieces
+            for part in map_parts(frame)
+            for pieces in part.pieces(part.drawn_of.grid_segments, part.drawn_of.grid_outwards, 1.0)
+        ]
+    )
+
+
+def line_mesh(frame: Frame) -> MapMesh:
+    """Collect grid lines and edges of a map as pieces of line between nodes, [S, 2]."""
+    vertices: list[Array] = []
+    segments: list[NDArray[np.intp]] = []
+    values: list[Array] = []
+    count = 0
+    for part in map_parts(frame):
+        of = part.drawn_of
+        used, numbered = np.unique(
+            np.concatenate([of.grid_segments, of.edge_segments]), return_inverse=True
+        )
+        vertices.append(part.drawn_mm.reshape(-1, 3)[used])
+        values.append(part.values.reshape(-1)[used])
+        segments.append(numbered.reshape(-1, 2) + count)
+        count += len(used)
+    return MapMesh(np.concatenate(vertices), np.concatenate(segments), np.concatenate(values))
+
+
+def edge_pieces(frame: Frame) -> Pieces:
+    """Collect the edges of a map, [S, 2, 3], mm."""
+    return _joined(
+        [
+            part.pieces(part.drawn_of.edge_segments, part.drawn_of.edge_outwards, EDGE_LIFT)[0]
+            for part in map_parts(frame)
+        ]
+    )
+
+
+def isoline_pieces(frame: Frame) -> Pieces:
+    """Collect the lines of equal value on a map, at the ticks of its scale, [S, 2, 3], mm."""
+    levels = isoline_levels(frame.scale)
+    found: list[Pieces] = []
+    for part in map_parts(frame):
+        nodes, values = part.drawn_mm.reshape(-1, 3), part.values.reshape(-1)
+        faces, normals = part.drawn_of.faces, part.drawn_of.normals * part.ways
+        found += [
+            isoline_segments(faces, nodes, values, levels, ISOLINE_LIFT * lift * normals).astype(
+                np.float32
+            )
+            for lift in part.lifts
+        ]
+    return _joined(found)
+
+
+def _joined(parts: list[Pieces]) -> Pieces:
+    """Put pieces of line together; one without length where there are none (viser wants some)."""
+    kept = [part for part in parts if len(part)]
+    if not kept:
+        return np.zeros((1, 2, 3), np.float32)
+    return kept[0] if len(kept) == 1 else np.concatenate(kept)

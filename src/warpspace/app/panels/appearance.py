@@ -1,0 +1,215 @@
+"""More of the view tab: surface, slices, colour range, what is written on the map, camera."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+from warpspace.app.browser.handles import Bound
+from warpspace.app.evaluation.cache import Same
+from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.panels import Desk
+from warpspace.app.state.app_state import AppState
+from warpspace.app.state.look import RANGES, SURFACES, slice_positions, slice_spans
+from warpspace.app.viewport.named_views import VIEWS
+from warpspace.geometry.slices import PLANES
+from warpspace.scene.model import Scene
+
+QUANTITY_NAMES = {
+    "position": "position error [µm]",
+    "orientation": "tool-orientation error [µrad]",
+}
+VIEW_NAMES = {"iso": "Iso", "front": "Front", "right": "Right", "top": "Top"}
+SWITCHES = {
+    "isolines": ("Isolines", "Lines of equal value at the numbers of the colour bar."),
+    "arrows": ("Corner arrows", "Displacement of the eight corners, with its length."),
+    "worst": ("Worst point", "Where the coloured value is largest."),
+    "bars": ("Scale bars", "Two lengths in the picture: geometry in mm, error in µm."),
+}
+Choose = Callable[[str | None, bool | None], None]
+
+
+class CameraPanel:
+    """Named views and the lens.
+
+    Parameters
+    ----------
+    desk : Desk
+    choose : callable
+        Takes a named view or None, and whether to be orthographic or None.
+    """
+
+    def __init__(self, desk: Desk, choose: Choose) -> None:
+        keys = {name: key for key, name in VIEW_NAMES.items()}
+        assert set(keys.values()) == set(VIEWS)  # noqa: S101 - names and views belong together
+        buttons = desk.gui.add_button_group(
+            "Camera",
+            tuple(keys),
+            hint="Look from the operator's side, the front, the right, above.",
+        )
+
+        def look_from(event: Any) -> None:
+            view = keys[event.target.value]
+            desk.act(lambda: choose(view, None))
+
+        buttons.on_click(look_from)
+        self._choose, self._desk = choose, desk
+        self._lens: Bound[bool] = Bound(
+            desk.gui.add_checkbox(
+                "Orthographic (telephoto)",
+                initial_value=False,
+                hint="From far away with a narrow lens: parallel edges stay parallel.",
+            ),
+            desk.changed,
+        )
+
+    def read(self, state: AppState) -> AppState:
+        """Pass a change of the lens on; it is no part of the state."""
+        on = self._lens.poll()
+        if on is not None:
+            self._desk.act(lambda: self._choose(None, on))
+        return state
+
+    def show(self, frame: Frame) -> None:
+        """Nothing follows the frame."""
+
+
+class LooksPanel:
+    """What is drawn of the field.
+
+    Parameters
+    ----------
+    desk : Desk
+    state : AppState
+    """
+
+    def __init__(self, desk: Desk, state: AppState) -> None:
+        self._desk = desk
+        self._surface = self._names(
+            "Show as", SURFACES, state.look.surface, "How the volume is drawn."
+        )
+        self._home: Any = desk.gui.add_folder(None)
+        self._scene: Scene | None = None
+        self._folder: Any = None
+        self._slices: dict[str, Bound[float]] = {}
+        self._quantity = self._names(
+            "Colour shows", QUANTITY_NAMES, state.look.quantity, "Which error the colours mean."
+        )
+        self._range = self._names(
+            "Colour range",
+            RANGES,
+            state.look.range_mode,
+            "auto: round ends for what is shown. fixed: the number below. shared: one range for"
+            " all components, for now and for the scene as opened.",
+        )
+        self._top: Bound[float] = Bound(
+            desk.gui.add_number(
+                "Range ends at [µm or µrad]",
+                initial_value=state.look.range_top,
+                min=0.001,
+                max=1e6,
+                hint="End of a fixed range; signed components run from minus to plus.",
+            ),
+            desk.changed,
+        )
+        self._switches: dict[str, Bound[bool]] = {
+            name: Bound(
+                desk.gui.add_checkbox(text, initial_value=getattr(state.look, name), hint=hint),
+                desk.changed,
+            )
+            for name, (text, hint) in SWITCHES.items()
+        }
+        self._build(state)
+
+    def _names(
+        self, label: str, names: Mapping[str, str], value: str, hint: str
+    ) -> tuple[Bound[str], Mapping[str, str]]:
+        """Add a dropdown of names."""
+        handle = self._desk.gui.add_dropdown(
+            label, tuple(names.values()), initial_value=names[value], hint=hint
+        )
+        return Bound(handle, self._desk.changed), names
+
+    def _build(self, state: AppState) -> None:
+        """Add the sliders of the slices of a scene."""
+        if self._folder is not None:
+            self._folder.remove()
+        self._scene = state.scene
+        positions = slice_positions(state.scene, state.look, state.machine)
+        with self._home:
+            self._folder = self._desk.gui.add_folder("Slices", visible=False)
+        with self._folder:
+            self._follow: Bound[bool] = Bound(
+                self._desk.gui.add_checkbox(
+                    "Through the tool point",
+                    initial_value=state.look.follow,
+                    hint="The slices go where the machine's X, Y and Z stand.",
+                ),
+                self._desk.changed,
+            )
+            self._slices = {
+                axis: Bound(
+                    self._desk.gui.add_slider(
+                        f"Slice {PLANES[axis]} at {axis} [mm]",
+                        min=span.low,
+                        max=span.high,
+                        step=span.step,
+                        initial_value=positions[axis],
+                        hint=f"Where the {PLANES[axis]} plane is cut.",
+                    ),
+                    self._desk.changed,
+                )
+                for axis, span in slice_spans(state.scene).items()
+            }
+
+    def read(self, state: AppState) -> AppState:
+        """Take over what a browser has chosen."""
+        look = state.look
+        for field, (bound, names) in (
+            ("surface", self._surface),
+            ("quantity", self._quantity),
+            ("range_mode", self._range),
+        ):
+            text = bound.poll()
+            if text is not None:
+                keys = {shown: key for key, shown in names.items()}
+                look = look.with_choice(**{field: keys.get(text, "")})
+        top, follow = self._top.poll(), self._follow.poll()
+        if top is not None:
+            look = look.with_top(top)
+        if follow is not None:
+            look = look.switched(follow=follow)
+        spans = slice_spans(state.scene)
+        for axis, bound in self._slices.items():
+            position = bound.poll()
+            if position is not None and axis in spans:
+                look = look.with_slice(axis, position, spans[axis]).switched(follow=False)
+        for name, bound in self._switches.items():
+            on = bound.poll()
+            if on is not None:
+                look = look.switched(**{name: on})
+        return state if look is state.look else replace(state, look=look)
+
+    def concerns(self, frame: Frame) -> tuple[object, ...]:
+        """Give what the widgets show."""
+        state = frame.state
+        return Same(state.scene), Same(state.look), Same(state.machine), frame.scale.high
+
+    def show(self, frame: Frame) -> None:
+        """Make the widgets show the state."""
+        state, look = frame.state, frame.state.look
+        if self._scene is None or state.scene.workspace != self._scene.workspace:
+            self._build(state)
+        self._folder.visible = look.surface == "slices" and bool(self._slices)
+        for (bound, names), key in (
+            (self._surface, look.surface),
+            (self._quantity, look.quantity),
+            (self._range, look.range_mode),
+        ):
+            bound.show(names[key])
+        self._top.show(look.range_top if look.range_mode == "fixed" else frame.scale.high)
+        self._follow.show(look.follow)
+        for axis, position in slice_positions(state.scene, look, state.machine).items():
+            if axis in self._slices:
+                self._slices[axis].show(position)
+        for name, bound in self._switches.items():
+            bound.show(getattr(look, name))

@@ -1,0 +1,222 @@
+"""The panel of one error: its curve along the travel, edited as rows of numbers."""
+
+import html
+from typing import Any
+
+import numpy as np
+from viser import uplot
+
+from warpspace.app.browser.handles import Bound, dom_id
+from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.panels import Desk
+from warpspace.app.state import edits
+from warpspace.app.state.app_state import AppState
+from warpspace.app.state.curve_text import (
+    KINDS,
+    convert_shape,
+    parse_shape,
+    sample_curve,
+    shape_kind,
+    spell_rows,
+)
+from warpspace.exceptions import OptionError
+from warpspace.machine.errors import ErrorFunction
+from warpspace.machine.parameters import Parameter, parameter
+
+CURVE_COLOUR = "#4a7ab5"
+ZERO_COLOUR = "#9aa3af"
+CHART_HEIGHT = 128
+LABEL_WIDTH = 76
+"""Room for the labels, which stand beside their controls here, CSS pixels."""
+
+
+class ShapePanel:
+    """The error that was touched last, or chosen.
+
+    Parameters
+    ----------
+    desk : Desk
+    state : AppState
+    """
+
+    def __init__(self, desk: Desk, state: AppState) -> None:
+        self._desk, gui = desk, desk.gui
+        self._key = _first(state)
+        self._keys = tuple(state.amplitudes)
+        # what the numbers stand for, and what is drawn
+        self._written: ErrorFunction | None = None
+        self._drawn: ErrorFunction | None = None
+        self._which: Bound[str] = Bound(
+            gui.add_dropdown(
+                "Error",
+                _options(self._keys),
+                initial_value=parameter(self._key).label,
+                hint="The error whose curve is shown; moving a slider chooses its error.",
+            ),
+            desk.changed,
+        )
+        self._chart: Any = gui.add_uplot(
+            _chart_data(None, (0.0, 1.0)),
+            (
+                uplot.Series(label="q"),
+                uplot.Series(label="error", stroke=CURVE_COLOUR, width=2),
+                uplot.Series(label="zero", stroke=ZERO_COLOUR, width=1),
+            ),
+            scales={"x": uplot.Scale(time=False)},
+            legend=uplot.Legend(show=False),
+            height=CHART_HEIGHT,
+            padding=(8, 14, 0, 0),
+        )
+        self._kind: Bound[str] = Bound(
+            gui.add_dropdown(
+                "Curve",
+                tuple(KINDS),
+                hint="Along the axis: constant, ramp from the lower end, polynomial, harmonics or"
+                " table.",
+            ),
+            desk.changed,
+        )
+        self._rows: Bound[str] = Bound(
+            gui.add_text("Numbers", "0", multiline=True, hint=_rows_hint("constant")),
+            desk.changed,
+        )
+        self._problem: Any = gui.add_html("")
+        gui.add_html(_style(self._which.handle, self._kind.handle, self._rows.handle))
+        self._show(state)
+
+    def choose(self, key: str) -> None:
+        """Show another error; for the session's worker."""
+        if key != self._key and key in self._keys:
+            self._key = key
+            self._written = self._drawn = None
+            # after the state has been dealt with; the widgets still show the error before
+            self._desk.act(lambda: self._show(self._desk.board().state))
+
+    def read(self, state: AppState) -> AppState:
+        """Take over what a browser has chosen or written."""
+        label = self._which.poll()
+        if label is not None:
+            self.choose(label.split(" ", 1)[0])
+        kind, rows = self._kind.poll(), self._rows.poll()
+        if kind is None and rows is None:
+            return state
+        return self._edited(state, kind, rows)
+
+    def _edited(self, state: AppState, kind: str | None, rows: str | None) -> AppState:
+        """Apply an edited curve; what cannot be read is said and changes nothing."""
+        span = edits.axis_span(state, self._key)
+        present = edits.curve_of(state, self._key)
+        try:
+            if kind is not None and kind != shape_kind(present):
+                function = convert_shape(present, kind, span)
+                # numbers of the kind before mean something else now
+                rows = None
+            elif rows is not None:
+                function = parse_shape(shape_kind(present), rows, span)
+            else:
+                return state
+        except OptionError as error:
+            self._problem.content = _problem(str(error))
+            return state
+        self._problem.content = ""
+        if rows is not None:
+            # what is being written stays as it was written
+            self._written = function
+        state = edits.with_curve(state, self._key, function)
+        self._desk.act(lambda: self._show(self._desk.board().state))
+        return state
+
+    def show(self, frame: Frame) -> None:
+        """Nothing that must follow at once."""
+
+    def settle(self, frame: Frame) -> None:
+        """Follow the state."""
+        self._show(frame.state)
+
+    def _show(self, state: AppState) -> None:
+        """Show the chosen error of a state."""
+        if tuple(state.amplitudes) != self._keys:
+            self._keys = tuple(state.amplitudes)
+            self._which.handle.options = _options(self._keys)
+            self._written = self._drawn = None
+        if self._key not in state.amplitudes:
+            self._key = _first(state)
+        row = parameter(self._key)
+        self._which.show(row.label)
+        function = edits.curve_of(state, self._key)
+        if function != self._written:
+            self._write(function, row)
+        if function != self._drawn:
+            self._draw(function, row, state)
+
+    def _write(self, function: ErrorFunction, row: Parameter) -> None:
+        """Write kind and numbers of a curve."""
+        self._written = function
+        kind = shape_kind(function)
+        kinds = ("constant",) if row.is_constant else tuple(KINDS)
+        if self._kind.handle.options != kinds:
+            self._kind.handle.options = kinds
+        self._kind.show(kind)
+        self._rows.handle.hint = _rows_hint(kind)
+        self._rows.show(spell_rows(function))
+        self._problem.content = ""
+
+    def _draw(self, function: ErrorFunction, row: Parameter, state: AppState) -> None:
+        """Draw the curve along the travel."""
+        self._drawn = function
+        unit = state.scene.machine.axes[row.axis].unit
+        self._chart.data = _chart_data(function, edits.axis_span(state, row.key))
+        self._chart.axes = (
+            uplot.Axis(label=f"{row.axis} [{unit}]", size=34, labelSize=16, font="11px sans-serif"),
+            uplot.Axis(
+                label=f"{row.key} [{row.unit}]",
+                size=44,
+                labelSize=16,
+                font="11px sans-serif",
+                space=18,
+            ),
+        )
+
+
+def _style(*handles: Any) -> str:
+    """Put labels beside their controls, since there is little height."""
+    labels = ",".join(f"label[for='{dom_id(handle)}']" for handle in handles)
+    return (
+        f"<style>div:has(> div > p > :is({labels})) {{ flex-wrap: nowrap !important; }}"
+        f"div:has(> p > :is({labels})) {{ width: {LABEL_WIDTH}px !important; }}</style>"
+    )
+
+
+def _first(state: AppState) -> str:
+    """Choose what is shown first: the largest error that varies along its axis."""
+    varying = {
+        key: abs(value) for key, value in state.amplitudes.items() if not parameter(key).is_constant
+    }
+    return max(varying or dict.fromkeys(state.amplitudes, 0.0), key=lambda key: varying.get(key, 0))
+
+
+def _options(keys: tuple[str, ...]) -> tuple[str, ...]:
+    """List what can be chosen."""
+    return tuple(parameter(key).label for key in keys)
+
+
+def _rows_hint(kind: str) -> str:
+    """Say how the numbers of a kind of curve are written."""
+    text = KINDS[kind].rows
+    return f"{text[0].upper()}{text[1:]}. Blanks between numbers; q in mm or degrees."
+
+
+def _chart_data(
+    function: ErrorFunction | None, span: tuple[float, float]
+) -> tuple[np.ndarray, ...]:
+    """Give position, value and zero for the chart."""
+    at, value = sample_curve(function, span)
+    return at, value, np.zeros(at.shape)
+
+
+def _problem(text: str) -> str:
+    """Spell why numbers were refused; what a user has written is escaped."""
+    return (
+        '<div data-value="curve problem" style="margin:0 10px 8px;font-size:12px;color:#c2410c">'
+        f"{html.escape(text)}</div>"
+    )

@@ -1,0 +1,205 @@
+"""The chance panel: tolerance sliders, and what machines within them are likely to be."""
+
+from itertools import groupby
+from typing import TYPE_CHECKING, Any
+
+from warpspace.app.browser.handles import Bound
+from warpspace.app.evaluation.cache import Kept, Same
+from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.panels import Desk
+from warpspace.app.readouts import probability as odds
+from warpspace.app.state import edits
+from warpspace.app.state.app_state import AppState
+from warpspace.app.state.specification import LIMIT_UM, MAX, NORMAL, SAMPLED, UNIFORM
+from warpspace.exceptions import WarpspaceError
+from warpspace.kinematics.model import Loop
+from warpspace.machine.parameters import parameter
+
+if TYPE_CHECKING:
+    from warpspace.app.evaluation.probability import Ensemble
+
+OVER_NAMES = {SAMPLED: "a random point (thesis)", MAX: "the worst point of each machine"}
+SPREAD_NAMES = {UNIFORM: "uniform", NORMAL: "normal, 3σ at the limits"}
+KEPT_BYTES = 100_000_000
+
+
+def _new_store() -> "Kept[Ensemble]":
+    """Make the store of ensembles."""
+    return Kept(KEPT_BYTES)
+
+
+ENSEMBLES = _new_store()
+"""Sampled machines before their tolerances are known, for all sessions together."""
+
+
+class ChancePanel:
+    """Specification, histogram and tolerance sliders; all of it follows when changes pause.
+
+    Parameters
+    ----------
+    desk : Desk
+    state : AppState
+    """
+
+    def __init__(self, desk: Desk, state: AppState) -> None:
+        self._desk, gui = desk, desk.gui
+        wanted = state.specification
+        self._limit: Bound[float] = Bound(
+            gui.add_slider(
+                "|E| allowed [µm]",
+                min=LIMIT_UM.low,
+                max=LIMIT_UM.high,
+                step=LIMIT_UM.step,
+                initial_value=wanted.limit_um,
+                marks=((LIMIT_UM.low, ""), (100.0, "100"), (LIMIT_UM.high, f"{LIMIT_UM.high:g}")),
+                hint="The specification: the largest volumetric error that is accepted.",
+            ),
+            desk.changed,
+        )
+        self._over: Bound[str] = Bound(
+            gui.add_dropdown(
+                "Must hold at",
+                tuple(OVER_NAMES.values()),
+                initial_value=OVER_NAMES[wanted.over],
+                hint="Where each sampled machine is measured.",
+            ),
+            desk.changed,
+        )
+        self._spread: Bound[str] = Bound(
+            gui.add_dropdown(
+                "Errors in their tolerance",
+                tuple(SPREAD_NAMES.values()),
+                initial_value=SPREAD_NAMES[wanted.distribution],
+                hint="How the errors of the machines are spread over their tolerances.",
+            ),
+            desk.changed,
+        )
+        self._picture = gui.add_html("")
+        reset = gui.add_button(
+            "Tolerances of the scene", color="gray", hint="Give all tolerances the scene's values."
+        )
+        reset.on_click(lambda _: desk.post(edits.with_scene_tolerances))
+        self._home: Any = gui.add_folder(None)
+        self._folders: list[Any] = []
+        self._sliders: dict[str, Bound[float]] = {}
+        self._built_for: tuple[object, ...] = ()
+        self._shown: tuple[object, ...] = ()
+
+    def read(self, state: AppState) -> AppState:
+        """Take over what a browser has set."""
+        limit, over, spread = self._limit.poll(), self._over.poll(), self._spread.poll()
+        wanted = state.specification
+        if limit is not None:
+            wanted = wanted.with_limit(limit)
+        if over is not None:
+            wanted = wanted.with_over(_value(OVER_NAMES, over))
+        if spread is not None:
+            wanted = wanted.with_distribution(_value(SPREAD_NAMES, spread))
+        if wanted != state.specification:
+            state = edits.with_specification(state, wanted)
+        for key, slider in self._sliders.items():
+            half_width = slider.poll()
+            if half_width is not None:
+                state = edits.with_half_width(state, key, half_width)
+        return state
+
+    def concerns(self, frame: Frame) -> tuple[object, ...]:
+        """Give what the widgets show."""
+        state = frame.state
+        return Same(state.specification), Same(state.tolerances), Same(state.origin)
+
+    def show(self, frame: Frame) -> None:
+        """Put the widgets where the state has them."""
+        state = frame.state
+        self._limit.show(state.specification.limit_um)
+        self._over.show(OVER_NAMES[state.specification.over])
+        self._spread.show(SPREAD_NAMES[state.specification.distribution])
+        if self._built_for[:1] != (Same(state.origin),):
+            return  # other sliders are on their way: a page must not hear of these any more
+        for key, slider in self._sliders.items():
+            slider.show(edits.half_width_of(state, key))
+
+    def settle(self, frame: Frame) -> None:
+        """Sample again, which takes some milliseconds, and draw."""
+        state = frame.state
+        moving = tuple(state.positions.items()) if state.loop is Loop.RELATIVE else ()
+        sampled = (
+            Same(state.scene.model),
+            Same(state.scene.workspace),
+            str(state.scene.reference),
+            state.scene.parameter_keys,
+            state.loop,
+            state.specification.over,
+            state.specification.distribution,
+            moving,
+        )
+        shown = (sampled, state.tolerances, state.specification.limit_um)
+        if shown == self._shown:
+            return
+        self._shown = shown
+        try:
+            ensemble = ENSEMBLES.get(sampled, lambda: _draw(state), lambda found: found.size)
+        except WarpspaceError as error:
+            self._picture.content = odds.spell_refusal(str(error))
+            return
+        self._picture.content = _picture(ensemble, state)
+        wanted = (Same(state.origin), ensemble.keys)
+        if wanted != self._built_for:
+            self._built_for = wanted
+            self._build(state, ensemble.keys)
+
+    def _build(self, state: AppState, keys: tuple[str, ...]) -> None:
+        """Lay out the sliders of the parameters of a loop."""
+        gui = self._desk.gui
+        for folder in self._folders:
+            folder.remove()
+        self._folders, self._sliders = [], {}
+        rows = sorted(map(parameter, keys), key=lambda row: "XYZABC".index(row.axis))
+        for axis, members in groupby(rows, key=lambda row: row.axis):
+            with self._home:
+                folder = gui.add_folder(f"Tolerances of {axis}", expand_by_default=False)
+            self._folders.append(folder)
+            with folder:
+                for row in members:
+                    span = edits.half_width_span(state, row.key)
+                    centre = found.centre if (found := state.tolerances.get(row.key)) else 0.0
+                    slider = gui.add_slider(
+                        f"{row.key} · {row.name} ± [{row.unit}]",
+                        min=span.low,
+                        max=span.high,
+                        step=span.step,
+                        initial_value=edits.half_width_of(state, row.key),
+                        hint=f"Half width of the tolerance of {row.name} about {centre:g}"
+                        f" {row.unit}; 0 holds it there.",
+                    )
+                    self._sliders[row.key] = Bound(slider, self._desk.changed)
+
+
+def _value(names: dict[str, str], text: str) -> str:
+    """Give the value that is shown as a text; empty for a text there is not."""
+    return next((value for value, name in names.items() if name == text), "")
+
+
+def _draw(state: AppState) -> "Ensemble":
+    """Draw the machines for a state."""
+    # scipy's distributions take half a second to import: not before the first picture
+    from warpspace.analysis.draws import Distribution
+    from warpspace.analysis.montecarlo import Over
+    from warpspace.app.evaluation.probability import build_ensemble
+
+    return build_ensemble(
+        state.scene,
+        state.loop,
+        over=Over(state.specification.over),
+        distribution=Distribution(state.specification.distribution),
+        positions=state.positions,
+    )
+
+
+def _picture(ensemble: "Ensemble", state: AppState) -> str:
+    """Work out and draw what the tolerances of a state give."""
+    from warpspace.app.evaluation.probability import estimate, tolerance_shares
+
+    chance = estimate(ensemble, state.tolerances, state.specification.limit_um)
+    shares = tolerance_shares(ensemble, state.tolerances, ensemble.keys)
+    return odds.spell_chance(chance, shares)

@@ -1,0 +1,1 @@
+"""Numbers as HTML: pure text, every foreign word escaped."""

@@ -1,0 +1,1 @@
+"""Starts viser and gives each browser tab its session."""

@@ -1,0 +1,64 @@
+"""What a click in the drawing means: a question why, or the choice of a reference point."""
+
+from typing import Any
+
+import numpy as np
+
+from warpspace.app.evaluation.budget import pick, with_picked
+from warpspace.app.evaluation.conventions import with_reference
+from warpspace.app.panels import Desk
+from warpspace.app.panels.conventions import ConventionsPanel
+from warpspace.app.server.tab_services import Outside
+from warpspace.app.viewport.layers import SCENE_PER_MM
+
+FORWARD = """(() => {
+  const tab = [...document.querySelectorAll('[role="tab"]')]
+    .find(tab => tab.textContent.trim() === "Why");
+  if (!tab || tab.getAttribute("aria-selected") === "true") return;
+  const { x, y } = tab.getBoundingClientRect();
+  for (const what of ["pointerdown", "pointerup"])
+    tab.dispatchEvent(new PointerEvent(what, { bubbles: true, cancelable: true, button: 0,
+      clientX: x + 4, clientY: y + 4, pointerId: 1, isPrimary: true }));
+})();"""
+"""Brings the panel "Why" to the front: viser has no call for it, its tabs follow the pointer."""
+
+
+class Pointing:
+    """Listens to clicks in the drawing of one tab.
+
+    Parameters
+    ----------
+    outside : Outside
+    desk : Desk
+    conventions : ConventionsPanel
+        May be waiting for a reference point.
+    """
+
+    def __init__(self, outside: Outside, desk: Desk, conventions: ConventionsPanel) -> None:
+        self._outside, self._desk, self._conventions = outside, desk, conventions
+
+        @outside.client.scene.on_click()
+        def _(event: Any) -> None:
+            origin, direction = event.ray_origin, event.ray_direction
+            desk.act(lambda: self._clicked(origin, direction))
+
+    def _clicked(self, origin: Any, direction: Any) -> None:
+        """Find what was clicked and note it in the state; by the session's worker."""
+        frame = self._outside.shown()
+        if frame is None:
+            return
+        try:
+            ray = np.array([origin, direction], dtype=float)
+        except (TypeError, ValueError):
+            return
+        if ray.shape != (2, 3):
+            return
+        picked = pick(frame, ray[0] / SCENE_PER_MM, ray[1])
+        if picked is None:
+            return
+        if self._conventions.picking and picked.point_mm is None:
+            self._conventions.wait(picking=False)
+            self._desk.post(lambda state: with_reference(state, picked.at))
+            return
+        self._outside.run_script(FORWARD)
+        self._desk.post(lambda state: with_picked(state, picked))

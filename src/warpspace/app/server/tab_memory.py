@@ -1,0 +1,156 @@
+"""Which browser tab is which: what a dropped tab leaves behind, and how it is known again.
+
+viser numbers connections, not tabs: after a dropped connection the page connects anew and counts as
+a new client. The page therefore keeps a random token in its `sessionStorage`, which belongs to one
+tab and survives a reload, and hands it over after connecting. What a tab leaves behind is kept for
+a while under its token.
+
+Limits: a page whose browser forbids `sessionStorage`, and a tab that was closed and opened anew,
+start afresh; after `KEPT_SECONDS`, or when more than `KEPT_TABS` tabs have left, the oldest are
+forgotten; a restarted server knows no one.
+"""
+
+import json
+import re
+import secrets
+import threading
+import time
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from warpspace.app.state.shared_state import Board
+
+KEPT_SECONDS = 600.0
+KEPT_TABS = 64
+STORAGE_KEY = "warpspace-tab"
+_TOKEN = re.compile(r"[0-9a-f]{32}")
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class CameraMemory:
+    """Where a tab's camera stood, in units of the drawing.
+
+    Attributes
+    ----------
+    position, look_at, up : tuple of float, (3,)
+    fov_rad : float
+    """
+
+    position: Vector
+    look_at: Vector
+    up: Vector
+    fov_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class Left:
+    """What a tab leaves behind.
+
+    Attributes
+    ----------
+    board : Board
+        State and history.
+    camera : CameraMemory or None
+    """
+
+    board: Board
+    camera: CameraMemory | None
+
+
+class Keeper:
+    """Keeps what tabs leave behind, bounded in time and number; usable from any thread.
+
+    Parameters
+    ----------
+    clock : callable, optional
+        Gives the time, s.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._kept: OrderedDict[str, tuple[float, Left]] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def keep(self, token: str, left: Left) -> None:
+        """Keep what a tab leaves behind."""
+        if not is_token(token):
+            return
+        with self._lock:
+            self._kept.pop(token, None)
+            self._kept[token] = (self._clock() + KEPT_SECONDS, left)
+            while len(self._kept) > KEPT_TABS:
+                self._kept.popitem(last=False)
+            self._forget()
+
+    def take(self, token: str) -> Left | None:
+        """Give back what a tab has left behind, once; None where there is nothing."""
+        with self._lock:
+            self._forget()
+            found = self._kept.pop(token, None)
+        return None if found is None else found[1]
+
+    def __len__(self) -> int:
+        """Count the tabs that are remembered."""
+        with self._lock:
+            self._forget()
+            return len(self._kept)
+
+    def _forget(self) -> None:
+        """Drop what is too old."""
+        now = self._clock()
+        for token in [token for token, (until, _) in self._kept.items() if until < now]:
+            del self._kept[token]
+
+
+def new_token() -> str:
+    """Make a token that nobody guesses."""
+    return secrets.token_hex(16)
+
+
+def is_token(text: str) -> bool:
+    """Tell whether a text that a browser has sent may be a token."""
+    return _TOKEN.fullmatch(text) is not None
+
+
+def ask_script(carrier: str) -> str:
+    """Write the script that makes a page hand over its token, and its width in CSS pixels.
+
+    Parameters
+    ----------
+    carrier : str
+        What stands for a widget in the message.
+
+    Returns
+    -------
+    str
+        JavaScript. A page without a token makes one; where the browser forbids `sessionStorage` it
+        has it until it is reloaded.
+    """
+    return f"""(() => {{
+  const key = {json.dumps(STORAGE_KEY)};
+  let token = window.__warpspaceTab;
+  try {{ token = sessionStorage.getItem(key) || token; }} catch {{}}
+  token = token || [...crypto.getRandomValues(new Uint8Array(16))]
+    .map(byte => byte.toString(16).padStart(2, "0")).join("");
+  window.__warpspaceTab = token;
+  try {{ sessionStorage.setItem(key, token); }} catch {{}}
+  let tries = 0;
+  const hand = () => {{
+    const viewer = window.__viserMutable;
+    if (!viewer) {{ if (tries++ < 200) setTimeout(hand, 25); return; }}
+    viewer.sendMessage({{
+      type: "GuiUpdateMessage", uuid: {json.dumps(carrier)},
+      updates: {{ value: token, width: innerWidth }}
+    }});
+  }};
+  hand();
+}})();"""
+
+
+def rename_script(token: str) -> str:
+    """Write the script that gives a page another token (a duplicated tab comes with a copy)."""
+    key, value = json.dumps(STORAGE_KEY), json.dumps(token)
+    store = f"sessionStorage.setItem({key}, {value});"
+    return f"window.__warpspaceTab = {value}; try {{ {store} }} catch {{}}"

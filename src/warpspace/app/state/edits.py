@@ -1,0 +1,120 @@
+"""Changes of a state that reach into its scene: curves and tolerances. Pure, and clamped."""
+
+from dataclasses import replace
+
+from warpspace.app.state.app_state import AppState
+from warpspace.app.state.ranges import Span, amplitude_span, round_up
+from warpspace.app.state.specification import Specification
+from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet
+from warpspace.machine.parameters import parameter
+from warpspace.machine.tolerances import Tolerance
+
+MAX_HALF_WIDTH = 1000.0
+LEAST_HALF_WIDTH = 10.0
+
+
+def axis_span(state: AppState, key: str) -> tuple[float, float]:
+    """Give the range over which the curve of a parameter runs, mm or degrees."""
+    axis = parameter(key).axis
+    low, high = state.scene.workspace.ranges[axis]
+    return (low, high) if low < high else state.scene.machine.axes[axis].travel
+
+
+def curve_of(state: AppState, key: str) -> ErrorFunction:
+    """Give the curve of a parameter with its present amplitude."""
+    function = state.scene.errors.functions.get(key) or Constant(axis_span(state, key))
+    return function.with_amplitude(state.amplitudes[key])
+
+
+def with_curve(state: AppState, key: str, function: ErrorFunction) -> AppState:
+    """Give a parameter another curve and its amplitude.
+
+    Parameters
+    ----------
+    state : AppState
+    key : str
+    function : ErrorFunction
+        Checked, see `warpspace.app.state.curve_text.parse_shape`.
+
+    Returns
+    -------
+    AppState
+        The slider's range grows where the amplitude lies beyond. A parameter that the machine does
+        not have, and a curve for a constant one, change nothing but the notes.
+    """
+    if key not in state.amplitudes:
+        return replace(state, notes=(*state.notes, f"{key}: no parameter of this machine"))
+    row = parameter(key)
+    if row.is_constant and not isinstance(function, Constant):
+        note = f"{key} is constant along its axis; expected one number"
+        return replace(state, notes=(*state.notes, note))
+    if function == curve_of(state, key):
+        return state
+    amplitude = function.amplitude
+    span = state.spans[key]
+    if not span.low <= amplitude <= span.high:
+        span = amplitude_span(key, amplitude, state.scene.tolerances.get(key))
+    errors = ErrorSet({**state.scene.errors.functions, key: function})
+    return replace(
+        state,
+        scene=replace(state.scene, errors=errors),
+        loaded=state.origin,
+        amplitudes={**state.amplitudes, key: amplitude},
+        spans={**state.spans, key: span},
+    )
+
+
+def half_width_of(state: AppState, key: str) -> float:
+    """Give the half width of a parameter's tolerance, µm or µrad; 0 where it has none."""
+    found = state.tolerances.get(key)
+    return 0.0 if found is None else found.half_width
+
+
+def half_width_span(state: AppState, key: str) -> Span:
+    """Choose the range of a tolerance slider: up to about twice the scene's half width."""
+    found = state.origin.tolerances.get(key)
+    widest = max(2.0 * (found.half_width if found else 0.0), LEAST_HALF_WIDTH)
+    return Span(0.0, round_up(widest), 0.1)
+
+
+def with_half_width(state: AppState, key: str, half_width: float) -> AppState:
+    """Set the half width of one tolerance, µm or µrad; its centre stays."""
+    if key not in state.amplitudes:
+        return replace(state, notes=(*state.notes, f"{key}: no parameter of this machine"))
+    present = state.tolerances.get(key) or Tolerance(0.0, 0.0)
+    span = Span(0.0, max(MAX_HALF_WIDTH, half_width_span(state, key).high), 0.1)
+    kept = span.clamp(half_width, present.half_width)
+    notes = state.notes
+    if kept != half_width:
+        notes = (*notes, f"tolerance of {key} = {half_width:g}: clamped to ±{kept:g}")
+    own = {**state.tolerances.own, key: Tolerance(present.centre, kept)}
+    return replace(state, tolerances=replace(state.tolerances, own=own), notes=notes)
+
+
+def with_scene_tolerances(state: AppState) -> AppState:
+    """Go back to the tolerances of the scene."""
+    return replace(state, tolerances=state.origin.tolerances)
+
+
+def with_muted(state: AppState, key: str, muted: bool) -> AppState:
+    """Silence one parameter, or let it be heard again."""
+    if key not in state.amplitudes:
+        return state
+    return replace(state, emphasis=state.emphasis.with_muted(key, muted))
+
+
+def with_soloed(state: AppState, key: str, soloed: bool) -> AppState:
+    """Add one parameter to those heard alone, or take it away."""
+    if key not in state.amplitudes:
+        return state
+    return replace(state, emphasis=state.emphasis.with_soloed(key, soloed))
+
+
+def all_heard(state: AppState) -> AppState:
+    """End all solo and mute."""
+    return replace(state, emphasis=type(state.emphasis)())
+
+
+def with_specification(state: AppState, specification: Specification) -> AppState:
+    """Hold the tolerances against another specification."""
+    return replace(state, specification=specification)

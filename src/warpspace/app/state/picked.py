@@ -1,0 +1,51 @@
+"""The point somebody asks about."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from warpspace.app.documents.spelling import read_point, refuse, spell_numbers
+from warpspace.kinematics.model import Loop
+from warpspace.machine.description import Vector
+
+FARTHEST_MM = 1e5
+"""Farthest point of a workpiece that a link may ask about."""
+
+
+@dataclass(frozen=True, slots=True)
+class Picked:
+    """A point somebody asks about; it stays where the axes stand while errors change.
+
+    Attributes
+    ----------
+    at : mapping of str to float, mm or degrees
+        Axis positions: those of the linear axes for a point of the surface (the rotary ones stand
+        where the state has them), those of all axes for a point of a trace.
+    loop : Loop or None
+        Loop of a trace; None for a point of the surface, which follows the loop of the view.
+    point_mm : tuple of float, (3,), mm, or None
+        The traced point in the workpiece (or tool) frame; None for the surface.
+    """
+
+    at: Mapping[str, float]
+    loop: Loop | None = None
+    point_mm: Vector | None = None
+
+
+def spell_trace(picked: Picked) -> str:
+    """Spell which trace a point lies on: loop and traced point; `read_trace` reads it back."""
+    return f"{picked.loop},{spell_numbers(picked.point_mm or ())}"
+
+
+def read_trace(text: str) -> Picked:
+    """Read which trace a point lies on; where the axes stand is still to come.
+
+    Raises
+    ------
+    Unreadable
+        If it means nothing.
+    """
+    loop, _, point = text.partition(",")
+    point_mm = read_point(point)
+    if loop not in [*Loop] or max(map(abs, point_mm)) > FARTHEST_MM:
+        refuse()
+    return Picked({}, Loop(loop), point_mm)

@@ -1,0 +1,1 @@
+"""Everything in 3-D, and the camera."""

@@ -1,0 +1,96 @@
+"""What of a picture follows every move of a slider, worked out in one go and without viser.
+
+A draft is what a busy server shows while a slider moves: the map of every second node, and the
+numbers of all nodes. All else waits until the slider rests.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+
+from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.evaluation.map_mesh import (
+    Pieces,
+    drafted,
+    edge_pieces,
+    grid_pieces,
+    isoline_pieces,
+    line_mesh,
+    map_mesh,
+)
+from warpspace.app.readouts import summary as legend
+from warpspace.app.state.app_state import AppState
+from warpspace.app.viewport.glb import build_glb
+from warpspace.app.viewport.tone_map import vertex_colours
+
+TEXTS: Mapping[str, Callable[[Frame], str]] = {
+    "summary": legend.summary,
+    "heading": legend.heading,
+}
+"""What is always in view beside the picture."""
+
+
+@dataclass(frozen=True, slots=True)
+class BoxPicture:
+    """The bent box as it is sent; None where something is not drawn.
+
+    Attributes
+    ----------
+    surface : bytes
+        GLB, vertices in mm.
+    grid, edges, isolines : ndarray of float32, [S, 2, 3], mm, or None
+        Pieces of line.
+    """
+
+    surface: bytes
+    grid: Pieces | None
+    edges: Pieces | None
+    isolines: Pieces | None
+
+
+@dataclass(frozen=True, slots=True)
+class Draft:
+    """What a busy server shows while a slider moves.
+
+    Attributes
+    ----------
+    box : BoxPicture
+        Of every second node.
+    texts : mapping of str to str
+        HTML by the names in `TEXTS`, of all nodes.
+    """
+
+    box: BoxPicture
+    texts: Mapping[str, str]
+
+
+def surface_glb(frame: Frame) -> bytes:
+    """Write the coloured map of a frame, or its lines alone, vertices in mm."""
+    mesh = line_mesh(frame) if frame.state.look.surface == "grid" else map_mesh(frame)
+    return build_glb(mesh.vertices_mm, mesh.triangles, vertex_colours(frame.scale, mesh.values))
+
+
+def box_picture(frame: Frame) -> BoxPicture:
+    """Work out what is sent of the bent box."""
+    look = frame.state.look
+    on_map = look.surface != "grid"
+    return BoxPicture(
+        surface_glb(frame),
+        grid_pieces(frame) if on_map and frame.state.shown.grid_lines else None,
+        edge_pieces(frame) if on_map else None,
+        isoline_pieces(frame) if on_map and look.isolines else None,
+    )
+
+
+def build_draft(frame: Frame) -> Draft:
+    """Work out the draft of a frame."""
+    texts = {name: spell(frame) for name, spell in TEXTS.items()}
+    return Draft(box_picture(drafted(frame)), texts)
+
+
+def only_moved(old: AppState, new: AppState) -> bool:
+    """Tell whether two states differ in nothing but amplitudes, and compare nothing."""
+    return new.comparison.b is None and all(
+        getattr(old, field.name) is getattr(new, field.name)
+        for field in fields(AppState)
+        if field.name != "amplitudes"
+    )

@@ -1,0 +1,37 @@
+"""What several layers add to a scene: pieces of line, markers of points."""
+
+from viser import SceneApi
+
+from warpspace.app.browser.handles import Told
+from warpspace.app.viewport.layers import NOTHING, SCENE_PER_MM, colour_bytes
+from warpspace.app.viewport.tone_map import Rgb
+
+
+def add_lines(
+    scene: SceneApi, name: str, rgb: Rgb, thickness: float, *, visible: bool = True
+) -> Told:
+    """Add pieces of line in one colour, as thick on screen from near and far; none of them yet."""
+    return Told(
+        scene.add_line_segments(
+            name,
+            NOTHING,
+            colour_bytes(rgb),
+            thickness=thickness,
+            thickness_units="screen",
+            scale=SCENE_PER_MM,
+            visible=visible,
+        )
+    )
+
+
+def add_ball(scene: SceneApi, name: str, radius_mm: float, rgb: Rgb) -> Told:
+    """Add the marker of a point."""
+    return Told(
+        scene.add_icosphere(
+            name,
+            radius_mm * SCENE_PER_MM,
+            color=rgb,
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+    )

@@ -1,0 +1,113 @@
+"""Axes of the machine frame in mm beside the nominal box."""
+
+import numpy as np
+from numpy.typing import NDArray
+from viser import SceneApi
+
+from warpspace.app.browser.handles import Told
+from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes, palette
+from warpspace.app.viewport.layers.adding import add_lines
+from warpspace.geometry.colour import nice_step
+from warpspace.units import Array
+
+AWAY = 0.13
+"""Distance of the axes from the nominal box, as a part of the longest edge: the bend has room."""
+TICK = 0.022
+LABEL_ROOM = 0.05
+MAX_TICKS = 6
+
+
+def tick_values(low: float, high: float) -> list[float]:
+    """Choose up to seven round coordinates within a range, mm."""
+    if not high > low:
+        return [low]
+    step = nice_step((high - low) * 10.0 / MAX_TICKS)
+    first, last = int(np.ceil(low / step - 1e-9)), int(np.floor(high / step + 1e-9))
+    return [round(step * number, 9) for number in range(first, last + 1)]
+
+
+def axis_frames(low: Array, high: Array, away: float) -> list[tuple[Array, Array]]:
+    """Place the three axes: a point on each (its own coordinate zero) and the way its ticks point.
+
+    X runs along the front, Y along the right, Z up the left of the front.
+    """
+    return [
+        (np.array([0.0, low[1] - away, low[2]]), np.array([0.0, -1.0, 0.0])),
+        (np.array([high[0] + away, 0.0, low[2]]), np.array([1.0, 0.0, 0.0])),
+        (np.array([low[0] - away, low[1], 0.0]), np.array([-1.0, 0.0, 0.0])),
+    ]
+
+
+def axes_room_mm(frame: Frame) -> Array:
+    """Give points around the nominal box that leave room for axes and their numbers, [8, 3], mm."""
+    low, high = frame.grid.bounds_mm
+    away = (AWAY + LABEL_ROOM) * frame.grid.longest_edge_mm
+    x, y, z = (low[0] - away, high[0] + away), (low[1] - away, high[1]), (low[2], high[2])
+    return np.stack(np.meshgrid(x, y, z), axis=-1).reshape(-1, 3)
+
+
+class AxesLayer:
+    """Lines, ticks and numbers; laid out anew when the nominal box changes.
+
+    Parameters
+    ----------
+    scene : viser.SceneApi
+    frame : Frame
+    """
+
+    def __init__(self, scene: SceneApi, frame: Frame) -> None:
+        self._scene = scene
+        self._labels: list[Told] = []
+        self._box: Array | None = None
+        self._lines = add_lines(scene, "/axes/lines", palette(frame).axis, 1.2)
+        self.show(frame)
+
+    def show(self, frame: Frame) -> None:
+        """Follow the nominal box and the switch."""
+        box = frame.grid.bounds_mm
+        # their numbers would cover the machine
+        visible = frame.state.shown.axes and not frame.state.machine.shown
+        if box is not self._box:
+            if self._box is None or not np.array_equal(box, self._box):
+                self._lay_out(box, frame.grid.longest_edge_mm)
+            self._box = box
+        self._lines.put(visible=visible, colors=colour_bytes(palette(frame).axis))
+        for label in self._labels:
+            label.put(visible=visible)
+
+    def _lay_out(self, box: Array, longest: float) -> None:
+        """Build lines and labels for a nominal box, [2, 3]."""
+        for label in self._labels:
+            label.handle.remove()
+        self._labels = []
+        low, high = box
+        lines: list[NDArray[np.float64]] = []
+        for index, (foot, out) in enumerate(axis_frames(low, high, AWAY * longest)):
+            along = np.eye(3)[index]
+            lines.append(np.stack([foot + low[index] * along, foot + high[index] * along]))
+            ticks = tick_values(low[index], high[index])
+            for value in ticks:
+                at = foot + value * along
+                lines.append(np.stack([at, at + TICK * longest * out]))
+                self._label(f"{value:g}".replace("-", "−"), at + 2.4 * TICK * longest * out, 0.8)
+            # between two numbers; that of X at the end, clear of the scale bars
+            first = len(ticks) - 2 if index == 0 else len(ticks) // 2
+            between = np.mean(ticks[max(first, 0) :][:2])
+            title = foot + between * along + 6.0 * TICK * longest * out
+            self._label(f"{'XYZ'[index]} [mm]", title, 1.0)
+        self._lines.put(points=np.stack(lines).astype(np.float32))
+
+    def _label(self, text: str, at: Array, size: float) -> None:
+        """Add one label at a point in mm."""
+        self._labels.append(
+            Told(
+                self._scene.add_label(
+                    f"/axes/label{len(self._labels)}",
+                    text,
+                    position=at * SCENE_PER_MM,
+                    font_screen_scale=size,
+                    anchor="center-center",
+                )
+            )
+        )

@@ -1,0 +1,121 @@
+"""The schematic machine: bodies in quiet greys, and the tool point in the deformed grid."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from viser import SceneApi
+
+from warpspace.app.browser.handles import Told
+from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.evaluation.machine import DrawnBody, drawn_bodies, tool_point
+from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes, palette
+from warpspace.app.viewport.layers.adding import add_ball
+from warpspace.app.viewport.tone_map import Rgb
+from warpspace.picture.marks import spell_micrometres
+
+EDGE: Rgb = (70, 78, 90)
+DARK_EDGE: Rgb = (150, 158, 170)
+BALL = 0.010
+"""Marker of the tool point, as a part of the longest edge."""
+
+
+class MachineLayer:
+    """Bodies of the machine, moved by its positions and bent by its errors.
+
+    Parameters
+    ----------
+    scene : viser.SceneApi
+    frame : Frame
+    """
+
+    def __init__(self, scene: SceneApi, frame: Frame) -> None:
+        self._scene = scene
+        self._bodies: dict[str, tuple[Told, Told]] = {}
+        self._ball: Told | None = None
+        self._label = Told(
+            scene.add_label(
+                "/machine/label", "", visible=False, font_screen_scale=0.8, anchor="center-left"
+            )
+        )
+        self._turned: Mapping[str, float] = {}
+        self._frame = frame
+        self.show(frame)
+
+    def show(self, frame: Frame) -> None:
+        """Follow the frame."""
+        self._frame = frame
+        self._draw()
+
+    def turn(self, turned: Mapping[str, float]) -> None:
+        """Stand with some axes at other positions, degrees; none for those of the state."""
+        self._turned = dict(turned)
+        self._draw()
+
+    def _draw(self) -> None:
+        """Place everything."""
+        frame, look = self._frame, self._frame.state.machine
+        for mesh, lines in self._bodies.values():
+            mesh.put(visible=look.shown)
+            lines.put(visible=look.shown)
+        self._label.put(visible=look.shown)
+        if self._ball is not None:
+            self._ball.put(visible=look.shown)
+        if not look.shown:
+            return
+        placed = drawn_bodies(frame, self._turned)
+        for name in set(self._bodies) - {part.body.name for part in placed}:
+            for part in self._bodies.pop(name):
+                part.handle.remove()
+        edge = colour_bytes(DARK_EDGE if frame.state.shown.dark else EDGE)
+        for part in placed:
+            self._draw_body(part, edge)
+        self._draw_tool_point(frame)
+
+    def _draw_body(self, part: DrawnBody, edge: Any) -> None:
+        """Add a body, or move its vertices where they have changed."""
+        name = part.body.name
+        vertices = part.vertices_mm.astype(np.float32)
+        edges = part.edges_mm.astype(np.float32)
+        known = self._bodies.get(name)
+        if known is not None and known[0].handle.vertices.shape == vertices.shape:
+            mesh, lines = known
+            if not np.array_equal(mesh.handle.vertices, vertices):
+                mesh.put(vertices=vertices)
+                lines.put(points=edges)
+            lines.put(colors=edge)
+            return
+        mesh = self._scene.add_mesh_simple(
+            f"/machine/{name}",
+            vertices,
+            part.body.triangles.astype(np.uint32),
+            color=part.body.colour,
+            flat_shading=True,
+            scale=SCENE_PER_MM,
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+        lines = self._scene.add_line_segments(
+            f"/machine/{name}_edges",
+            edges,
+            edge,
+            thickness=0.9,
+            thickness_units="screen",
+            scale=SCENE_PER_MM,
+        )
+        self._bodies[name] = (Told(mesh), Told(lines))
+
+    def _draw_tool_point(self, frame: Frame) -> None:
+        """Mark the tool point where the deformed grid has it."""
+        found = tool_point(frame)
+        longest = frame.grid.longest_edge_mm
+        if self._ball is None:
+            self._ball = add_ball(
+                self._scene, "/machine/tool_point", BALL * longest, palette(frame).edge
+            )
+        self._ball.put(position=found.drawn_mm * SCENE_PER_MM)
+        length = float(np.linalg.norm(found.error_um))
+        self._label.put(
+            text=f"tool point, |E| {spell_micrometres(length)}",
+            position=(found.drawn_mm + 0.03 * longest * np.eye(3)[0]) * SCENE_PER_MM,
+        )

@@ -1,0 +1,78 @@
+"""The traced points while the table turns: nominal light, actual dark, on their circles."""
+
+from typing import Any
+
+import numpy as np
+from viser import SceneApi
+
+from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.evaluation.rotation import points_on_traces
+from warpspace.app.viewport.layers import SCENE_PER_MM, palette
+from warpspace.units import Array
+
+SIZE = 0.014
+"""Diameter of a point, as a part of the longest edge."""
+
+
+class RotationLayer:
+    """A pair of points on every circle of the played axis; nothing while none is played.
+
+    Parameters
+    ----------
+    scene : viser.SceneApi
+    frame : Frame
+    """
+
+    def __init__(self, scene: SceneApi, frame: Frame) -> None:
+        self._scene = scene
+        self._frame = frame
+        self._position: dict[str, float] | None = None
+        self._clouds: list[Any] = []
+
+    def show(self, frame: Frame) -> None:
+        """Follow the frame."""
+        self._frame = frame
+        self._draw()
+
+    def turn(self, position: dict[str, float] | None) -> None:
+        """Draw the points at a position of the played axis, degrees; None takes them away."""
+        self._position = position
+        self._draw()
+
+    def _draw(self) -> None:
+        """Place the points."""
+        frame, position = self._frame, self._position
+        visible = False
+        if position is not None and frame.state.shown.traces:
+            points = points_on_traces(frame, position)
+            visible = len(points[0]) > 0
+            if visible:
+                self._place(points)
+        for cloud in self._clouds:
+            cloud.visible = visible
+
+    def _place(self, points: tuple[Array, Array]) -> None:
+        """Add the two clouds, or move their points."""
+        if self._clouds:
+            for cloud, at in zip(self._clouds, points, strict=True):
+                cloud.points = at.astype(np.float32)
+            return
+        colours = palette(self._frame)
+        for name, at, rgb in zip(
+            ("nominal", "actual"),
+            points,
+            (colours.trace_nominal, colours.trace_actual),
+            strict=True,
+        ):
+            self._clouds.append(
+                self._scene.add_point_cloud(
+                    f"/rotation/{name}",
+                    at.astype(np.float32),
+                    np.array(rgb, dtype=np.uint8),
+                    point_size=SIZE * self._frame.grid.longest_edge_mm,
+                    point_shape="circle",
+                    point_shading="flat",
+                    precision="float32",
+                    scale=SCENE_PER_MM,
+                )
+            )

@@ -1,0 +1,115 @@
+"""Map notes, machine and turning table as one layer, with the player that turns the table."""
+
+from collections.abc import Callable
+
+from viser import ClientHandle, SceneApi
+
+from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.evaluation.rotation import played_position
+from warpspace.app.viewport.layers import Layer
+from warpspace.app.viewport.layers.annotations import AnnotationsLayer
+from warpspace.app.viewport.layers.axes import AxesLayer
+from warpspace.app.viewport.layers.machine import MachineLayer
+from warpspace.app.viewport.layers.other import OtherLayer
+from warpspace.app.viewport.layers.rotation import RotationLayer
+from warpspace.app.viewport.layers.traces import TracesLayer
+from warpspace.app.viewport.layers.why import WhyLayer
+from warpspace.app.viewport.rotation_player import Player
+
+Tell = Callable[[str], None]
+
+
+def draw_around(scene: SceneApi, frame: Frame) -> list[Layer]:
+    """Draw what lies on and around the map."""
+    kinds = (TracesLayer, AxesLayer, OtherLayer, WhyLayer)
+    return [kind(scene, frame) for kind in kinds]
+
+
+class StageLayer:
+    """Everything around the map that may also move by itself.
+
+    The player only asks for a picture; the session's worker draws it, as it draws all else.
+
+    Parameters
+    ----------
+    client : viser.ClientHandle
+    frame : Frame
+    act : callable
+        Queues something for the session's worker; returns at once.
+    """
+
+    def __init__(
+        self, client: ClientHandle, frame: Frame, act: Callable[[Callable[[], None]], None]
+    ) -> None:
+        self._client, self._act = client, act
+        self._frame = frame
+        self._annotations = AnnotationsLayer(client.scene, frame)
+        self._machine = MachineLayer(client.scene, frame)
+        self._rotation = RotationLayer(client.scene, frame)
+        self._tell: Tell = _nobody
+        self._due = False
+        self._player = Player(self._ask)
+
+    def show(self, frame: Frame) -> None:
+        """Draw a frame; where the axis itself has been moved, the rotation starts there anew."""
+        before, self._frame = self._frame.state, frame
+        if before.origin is not frame.state.origin or before.positions != frame.state.positions:
+            self._player.rewind()
+            self._rotation.turn(None)
+            self._machine.turn({})
+            self._tell("")
+        self._annotations.show(frame)
+        self._rotation.show(frame)
+        self._machine.show(frame)
+
+    def play(self, on: bool | None, tell: Tell) -> None:
+        """Play (True), pause (False), or go back to where the axis stands (None).
+
+        Parameters
+        ----------
+        on : bool or None
+        tell : callable
+            Takes the spelt position of the played axis, empty for none.
+        """
+        self._tell = tell
+        if on:
+            self._player.play()
+        elif on is False:
+            self._player.pause()
+        elif self._player.rewind():
+            with self._client.atomic():
+                self._rotation.turn(None)
+                self._machine.turn({})
+                tell("")
+            self._client.flush()
+
+    @property
+    def playing(self) -> bool:
+        """Whether the table turns."""
+        return self._player.playing
+
+    def stop(self) -> None:
+        """End the player for good."""
+        self._player.pause()
+
+    def _ask(self) -> None:
+        """Ask for a picture, unless one is still to be drawn."""
+        if not self._due:
+            self._due = True
+            self._act(self._turn)
+
+    def _turn(self) -> None:
+        """Draw the table and its points where the player is."""
+        self._due = False
+        if not self._player.playing:
+            return
+        position = played_position(self._frame.state, self._player.angle_deg)
+        with self._client.atomic():
+            self._rotation.turn(position)
+            self._machine.turn(position)
+            self._tell(", ".join(f"{axis} = {value:.0f}°" for axis, value in position.items()))
+        self._client.flush()
+
+
+def _nobody(_text: str) -> None:
+    """Nobody is told yet."""

@@ -1,0 +1,143 @@
+"""The camera of one tab: put where all of the box is seen, remembered, put back."""
+
+import numpy as np
+from viser import ClientHandle
+
+from warpspace.app.evaluation.cache import Same
+from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.evaluation.machine import machine_room_mm
+from warpspace.app.panels.layout import side_widths
+from warpspace.app.server.tab_memory import CameraMemory
+from warpspace.app.state.app_state import AppState
+from warpspace.app.viewport.camera import heading_share
+from warpspace.app.viewport.layers import SCENE_PER_MM
+from warpspace.app.viewport.layers.annotations import bar_lines
+from warpspace.app.viewport.layers.axes import axes_room_mm
+from warpspace.app.viewport.named_views import (
+    TELEPHOTO_DEG,
+    VIEWS,
+    Stand,
+    change_lens,
+    clipping,
+    view_pose,
+)
+from warpspace.units import Array
+
+LEAST_SIZE = 200
+"""CSS pixels of a picture that is taken to be one."""
+
+
+def focus(state: AppState) -> tuple[Same, bool]:
+    """Tell what the camera is set up for: the scene, and whether its machine is shown."""
+    return Same(state.origin), state.machine.shown
+
+
+class Eye:
+    """The camera of a tab.
+
+    Parameters
+    ----------
+    client : viser.ClientHandle
+    """
+
+    def __init__(self, client: ClientHandle) -> None:
+        self._camera = client.camera
+        self._stand = Stand()
+
+    @property
+    def stand(self) -> Stand:
+        """Named view and lens that were chosen last."""
+        return self._stand
+
+    def choose(self, frame: Frame, view: str | None = None, lens: bool | None = None) -> None:
+        """Take a named view, or another lens from where the camera stands.
+
+        Parameters
+        ----------
+        frame : Frame
+        view : str or None
+            A key of `VIEWS`; None stays, or with no lens goes back to it.
+        lens : bool or None
+            Whether to be orthographic; None stays.
+        """
+        if view is not None and view not in VIEWS:
+            return
+        stand = self._stand
+        orthographic = stand.orthographic if lens is None else lens
+        self._stand = Stand(view or stand.view, orthographic)
+        if view is not None or lens is None:
+            self.fit(frame, docked=True)
+        elif orthographic != stand.orthographic:
+            self._change_lens(frame)
+
+    def _change_lens(self, frame: Frame) -> None:
+        """Go to the other field of view; what is looked at keeps its size."""
+        camera, fov = self._camera, float(np.deg2rad(self._stand.fov_deg))
+        look_at = camera.look_at.copy()
+        position = change_lens(camera.position, look_at, camera.fov, fov)
+        self._clip(position, self._room_mm(frame))
+        camera.fov = fov
+        camera.position = position
+        camera.look_at = look_at  # the former takes it along
+
+    def _clip(self, position: Array, points_mm: Array) -> None:
+        """Set the clipping planes for a position in scene units."""
+        near, far = clipping(
+            position, points_mm * SCENE_PER_MM, orthographic=self._stand.orthographic
+        )
+        self._camera.near, self._camera.far = near, far
+
+    def _room_mm(self, frame: Frame) -> Array:
+        """Give points around all that is to be seen, mm."""
+        shown = frame.state.machine.shown
+        room = machine_room_mm(frame) if shown else axes_room_mm(frame)
+        bars = [bar_lines(frame)[1].reshape(-1, 3)] if frame.state.look.bars else []
+        return np.concatenate([room, frame.drawn_mm.reshape(-1, 3), *bars])
+
+    def fit(self, frame: Frame, *, docked: bool, page_width: float | None = None) -> None:
+        """Fill the room between the panels with the box, its traces and axes.
+
+        Parameters
+        ----------
+        frame : Frame
+        docked : bool
+            Whether the panels have taken their room already, in what is known of the camera.
+        page_width : float, optional
+            Of the whole page, CSS pixels; by default that of the camera's picture if the panels
+            have not taken their room.
+        """
+        camera = self._camera
+        if docked:
+            width = camera.image_width
+        else:
+            width = (page_width or camera.image_width) - sum(side_widths())
+        width = max(width, LEAST_SIZE)
+        height = max(camera.image_height, LEAST_SIZE)
+        points = self._room_mm(frame)
+        pose = view_pose(points, width / height, self._stand, heading_share(height))
+        self._clip(pose.position * SCENE_PER_MM, points)
+        camera.up_direction = (0.0, 0.0, 1.0)
+        camera.fov = pose.fov_rad
+        camera.position = pose.position * SCENE_PER_MM
+        camera.look_at = pose.look_at * SCENE_PER_MM
+
+    def remember(self) -> CameraMemory:
+        """Give where it stands."""
+        camera = self._camera
+        return CameraMemory(
+            tuple(camera.position.tolist()),
+            tuple(camera.look_at.tolist()),
+            tuple(camera.up_direction.tolist()),
+            camera.fov,
+        )
+
+    def restore(self, memory: CameraMemory) -> None:
+        """Put it where it stood."""
+        camera = self._camera
+        camera.up_direction = memory.up
+        telephoto = memory.fov_rad < np.deg2rad(2.0 * TELEPHOTO_DEG)
+        self._stand = Stand(self._stand.view, telephoto)
+        self._clip(np.array(memory.position), np.array([memory.look_at]) / SCENE_PER_MM)
+        camera.fov = memory.fov_rad
+        camera.position = memory.position
+        camera.look_at = memory.look_at

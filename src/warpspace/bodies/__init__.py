@@ -1,0 +1,1 @@
+"""What a machine looks like: meshes, generated or read with trimesh."""

@@ -1,0 +1,1 @@
+"""Animations: pictures of a motion, joined to a GIF, WebP or MP4."""

@@ -1,0 +1,294 @@
+"""Bodies drawn by VTK off screen: colours exact, background transparent, depth in millimetres.
+
+VTK itself is used, without PyVista's plotter: its import takes a second less.
+"""
+
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpspace.exceptions import RenderError
+from warpspace.geometry.colour import LEVELS, ColourScale, colour_table
+from warpspace.outputs.drawing.projection import Projection
+from warpspace.units import Array
+
+Bytes = NDArray[np.uint8]
+_LARGEST_SIDE_PX = 8192
+_LARGEST_AREA_PX = 24_000_000
+SUPERSAMPLING = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """Triangles to draw.
+
+    Attributes
+    ----------
+    vertices_mm : ndarray, [M, 3], mm
+        Where they are drawn.
+    triangles : ndarray of int, [T, 3]
+    values : ndarray, [M], optional
+        What the colour shows; interpolated over each triangle before it becomes a colour.
+    scale : ColourScale, optional
+        Colours of the values.
+    colour : tuple of float, (3,), optional
+        One colour (sRGB, 0 to 1) for a body without values.
+    shaded : bool
+        Whether light falls on it: for machine bodies, never for coloured errors.
+    opacity : float
+    """
+
+    vertices_mm: Array
+    triangles: NDArray[np.intp]
+    values: Array | None = None
+    scale: ColourScale | None = None
+    colour: tuple[float, float, float] = (0.7, 0.7, 0.7)
+    shaded: bool = False
+    opacity: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Raster:
+    """Drawn bodies.
+
+    Attributes
+    ----------
+    rgba : ndarray of uint8, [h, w, 4]
+        First row at the top.
+    depth_mm : ndarray, [h, w], mm
+        As `Projection.depth_mm`; infinite where nothing is.
+    farthest_mm : ndarray, [h, w], mm
+        The largest depth within a pixel of the figure around each.
+    rect : tuple of float, (4,), px
+        Box of the figure it covers.
+    """
+
+    rgba: Bytes
+    depth_mm: NDArray[np.float32]
+    farthest_mm: NDArray[np.float32]
+    rect: tuple[float, float, float, float]
+
+    @property
+    def sampling(self) -> float:
+        """Pixels of the raster per pixel of the figure."""
+        return self.rgba.shape[1] / (self.rect[2] - self.rect[0])
+
+    def reduced(self) -> Bytes:
+        """Average to one pixel per pixel of the figure."""
+        step = round(self.sampling)
+        if step == 1:
+            return self.rgba
+        total = np.zeros((self.rgba.shape[0] // step, self.rgba.shape[1] // step, 4), np.uint16)
+        for row in range(step):
+            for column in range(step):
+                total += self.rgba[row::step, column::step]
+        # the background is black and clear, so that sums are weighted with alpha already
+        result = (total + np.uint16(step**2 // 2)) // np.uint16(step**2)
+        edge = (result[..., 3] > 0) & (result[..., 3] < 255)
+        scaled = result[edge, :3] * np.uint32(255) // result[edge, 3:]
+        result[edge, :3] = np.minimum(scaled, 255)
+        return result.astype(np.uint8)
+
+    def depth_at(self, points_px: Array, *, spread: bool = False) -> Array:
+        """Read the depth at pixels of the figure.
+
+        Parameters
+        ----------
+        points_px : ndarray, [..., 2], px
+        spread : bool
+            Give the farthest depth close around each point.
+
+        Returns
+        -------
+        ndarray, [...], mm
+            Infinite outside the raster and where nothing is.
+        """
+        left, _, _, top = self.rect
+        i = np.floor((top - points_px[..., 1]) * self.sampling).astype(np.intp)
+        j = np.floor((points_px[..., 0] - left) * self.sampling).astype(np.intp)
+        height, width = self.depth_mm.shape
+        inside = (i >= 0) & (i < height) & (j >= 0) & (j < width)
+        depth = self.farthest_mm if spread else self.depth_mm
+        return np.where(inside, depth[np.where(inside, i, 0), np.where(inside, j, 0)], np.inf)
+
+
+def render_bodies(bodies: Sequence[Body], projection: Projection, margin_px: int = 4) -> Raster:
+    """Draw bodies.
+
+    Parameters
+    ----------
+    bodies : sequence of Body
+        At least one with triangles.
+    projection : Projection
+    margin_px : int, optional
+        Room around them.
+
+    Returns
+    -------
+    Raster
+
+    Raises
+    ------
+    RenderError
+        If VTK gives no picture.
+    """
+    points = np.concatenate([body.vertices_mm for body in bodies])
+    spots = projection.project(points)
+    left, bottom = (np.floor(spots.min(axis=0)) - margin_px).astype(int)
+    right, top = (np.ceil(spots.max(axis=0)) + margin_px).astype(int)
+    width, height = int(right - left), int(top - bottom)
+    small = max(width, height) * SUPERSAMPLING <= _LARGEST_SIDE_PX
+    small = small and width * height * SUPERSAMPLING**2 <= _LARGEST_AREA_PX
+    step = SUPERSAMPLING if small else 1
+    middle = np.array([(left + right) / 2.0, (bottom + top) / 2.0])
+    rgba, depth = _draw(bodies, projection, middle, (width * step, height * step), step)
+    farthest = _spread(depth, step)
+    return Raster(rgba, depth, farthest, (float(left), float(bottom), float(right), float(top)))
+
+
+def _spread(depth: NDArray[np.float32], reach: int) -> NDArray[np.float32]:
+    """Give the largest value within so many pixels to each side."""
+    for _ in range(reach):
+        for axis in (0, 1):
+            moved = np.moveaxis(depth, axis, 0)
+            wide = moved.copy()
+            np.maximum(wide[1:], moved[:-1], out=wide[1:])
+            np.maximum(wide[:-1], moved[1:], out=wide[:-1])
+            depth = np.moveaxis(wide, 0, axis)
+    return depth
+
+
+def _draw(
+    bodies: Sequence[Body],
+    projection: Projection,
+    middle_px: Array,
+    size: tuple[int, int],
+    step: int,
+) -> tuple[Bytes, NDArray[np.float32]]:
+    """Let VTK draw; colours and depth, first row at the top."""
+    if sys.platform == "linux":
+        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+    import vtkmodules.vtkRenderingOpenGL2  # noqa: F401  # pyright: ignore[reportUnusedImport]
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkCommonCore import vtkFloatArray, vtkUnsignedCharArray
+    from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
+
+    offset = (middle_px - projection.centre_px) / projection.px_per_mm
+    focus = projection.centre_mm + offset[0] * projection.right + offset[1] * projection.up
+    depths = np.concatenate([projection.depth_mm(body.vertices_mm) for body in bodies])
+    room = 1.0 + 0.02 * float(np.ptp(depths))
+    near, far = float(depths.min()) - room, float(depths.max()) + room
+
+    window = vtkRenderWindow()
+    try:
+        window.SetOffScreenRendering(True)
+        window.SetMultiSamples(0)
+        window.SetAlphaBitPlanes(1)
+        window.SetSize(*size)
+        renderer = vtkRenderer()
+        renderer.SetBackground(0.0, 0.0, 0.0)
+        renderer.SetBackgroundAlpha(0.0)
+        window.AddRenderer(renderer)
+        for body in bodies:
+            renderer.AddActor(_actor(body))
+        if any(body.shaded for body in bodies):
+            _add_lights(renderer, projection)
+        camera = renderer.GetActiveCamera()
+        camera.ParallelProjectionOn()
+        eye = focus + (1.0 - near) * projection.towards
+        camera.SetPosition(*eye)
+        camera.SetFocalPoint(*(eye - projection.towards))
+        camera.SetViewUp(*projection.up)
+        camera.SetParallelScale(size[1] / step / 2.0 / projection.px_per_mm)
+        camera.SetClippingRange(1.0, 1.0 + far - near)
+        window.Render()
+        corner = (size[0] - 1, size[1] - 1)
+        colours: Any = vtkUnsignedCharArray()
+        buffer = vtkFloatArray()
+        window.GetRGBACharPixelData(0, 0, *corner, 0, colours)
+        window.GetZbufferData(0, 0, *corner, buffer)
+        rgba = vtk_to_numpy(colours).reshape(size[1], size[0], 4)[::-1].copy()
+        raw = vtk_to_numpy(buffer).reshape(size[1], size[0])[::-1]
+    except (ValueError, AttributeError) as error:
+        raise RenderError(
+            f"the picture could not be drawn: VTK gave no pixels ({error})"
+        ) from error
+    finally:
+        window.Finalize()
+    depth = np.where(raw < 1.0, near + raw * np.float32(far - near), np.float32(np.inf))
+    return rgba, depth.astype(np.float32)
+
+
+def _actor(body: Body) -> Any:
+    """Build what VTK draws of a body."""
+    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
+    from vtkmodules.vtkCommonCore import vtkPoints
+    from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+    from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
+
+    points = vtkPoints()
+    points.SetData(numpy_to_vtk(np.ascontiguousarray(body.vertices_mm, dtype=float), deep=True))
+    cells = vtkCellArray()
+    flat = np.ascontiguousarray(body.triangles.ravel(), dtype=np.int64)
+    cells.SetData(3, numpy_to_vtkIdTypeArray(flat, deep=True))
+    mesh = vtkPolyData()
+    mesh.SetPoints(points)
+    mesh.SetPolys(cells)
+    mapper = vtkPolyDataMapper()
+    mapper.SetInputData(mesh)
+    actor = vtkActor()
+    actor.SetMapper(mapper)
+    style = actor.GetProperty()
+    style.SetColor(*body.colour)
+    style.SetOpacity(body.opacity)
+    if body.shaded:
+        style.SetInterpolationToFlat()
+        style.SetAmbient(0.45)
+        style.SetDiffuse(0.6)
+    else:
+        style.LightingOff()
+    if body.values is not None and body.scale is not None:
+        values = numpy_to_vtk(np.ascontiguousarray(body.values, dtype=float), deep=True)
+        mesh.GetPointData().SetScalars(values)
+        mapper.SetLookupTable(_lookup(body.scale))
+        # VTK lays the first and the last colour half a colour inside the ends of its range
+        half = 0.5 * (body.scale.high - body.scale.low) / (LEVELS - 1)
+        mapper.SetScalarRange(body.scale.low - half, body.scale.high + half)
+        mapper.InterpolateScalarsBeforeMappingOn()
+    else:
+        mapper.ScalarVisibilityOff()
+    return actor
+
+
+def _lookup(scale: ColourScale) -> Any:
+    """Give VTK the colours of a scale."""
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+    from vtkmodules.vtkCommonCore import vtkLookupTable
+
+    colours = colour_table(diverging=scale.diverging)
+    opaque = np.column_stack([colours, np.full(len(colours), 255, dtype=np.uint8)])
+    table = vtkLookupTable()
+    table.SetNumberOfTableValues(len(colours))
+    levels: Any = numpy_to_vtk(np.ascontiguousarray(opaque), deep=True)
+    table.SetTable(levels)
+    return table
+
+
+def _add_lights(renderer: Any, projection: Projection) -> None:
+    """Light machine bodies from above on the left of the viewer."""
+    from vtkmodules.vtkRenderingCore import vtkLight
+
+    renderer.AutomaticLightCreationOff()
+    direction = projection.towards + 1.1 * projection.up - 0.7 * projection.right
+    light = vtkLight()
+    light.SetLightTypeToSceneLight()
+    light.PositionalOff()
+    light.SetFocalPoint(0.0, 0.0, 0.0)
+    light.SetPosition(*direction)
+    light.SetIntensity(1.0)
+    renderer.AddLight(light)
