@@ -130,10 +130,10 @@ def serving_s() -> float:
 def model_part() -> dict[str, float]:
     """The model alone: a slider move, and a new rotary position."""
     live, state = LiveModel(), start_state(load_scene("dvf5000_first"))
-    live.frame(state)
+    live.evaluate(state)
     return {
-        "model_ms": median_ms(lambda n: live.frame(state.with_amplitude("EXX", n / 10)), 50),
-        "new_place_ms": median_ms(lambda n: live.frame(state.with_position("B", -1.0 - n)), 10),
+        "model_ms": median_ms(lambda n: live.evaluate(state.with_amplitude("EXX", n / 10)), 50),
+        "new_place_ms": median_ms(lambda n: live.evaluate(state.with_position("B", -1.0 - n)), 10),
     }
 
 

@@ -32,7 +32,7 @@ def expected() -> tuple[np.ndarray, dict[tuple, int]]:
     values = np.linspace(-90.0, 90.0, POSITIONS).round(1)
     live, state = LiveModel(), start_state(load_scene("dvf5000_first"))
     shown = {
-        tuple(NUMBERS.findall(legend.summary(live.frame(state.with_amplitude(KEY, v))))): i
+        tuple(NUMBERS.findall(legend.summary(live.evaluate(state.with_amplitude(KEY, v))))): i
         for i, v in enumerate(values.tolist())
     }
     assert len(shown) == POSITIONS, "positions cannot be told apart by their numbers"

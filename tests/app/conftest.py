@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.evaluation.evaluate import LivePicture
 from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import AppState, start_state
-from warpspace.app.state.shared_state import Board
-from warpspace.app.viewport.named_views import Stand
+from warpspace.app.state.store import StateStore
+from warpspace.app.viewport.named_views import CameraSetup
 from warpspace.cli.services import build_services
 from warpspace.scene.library import load_scene
 
@@ -82,10 +82,10 @@ class Tab:
         start, session = start_state(SCENES[0]), self.session
 
         def forget() -> None:
-            session.board.unsubscribe(session.changed)
-            session.board = Board(start)
-            session.board.subscribe(session.changed)
-            session._eye._stand = Stand()
+            session.store.unsubscribe(session.changed)
+            session.store = StateStore(start)
+            session.store.subscribe(session.changed)
+            session._eye._stand = CameraSetup()
 
         self.page.wait_for_selector("html[data-warpspace=open]")
         self.page.keyboard.press("Escape")
@@ -95,7 +95,7 @@ class Tab:
         session.act(forget)
         session._look_from(self._camera)
         self.until(lambda: self.page.evaluate(TIDY) == 0)
-        wanted = drawn_nodes(session._live.frame(start))
+        wanted = drawn_nodes(session._live.evaluate(start))
         self.until(lambda: session.state == start and self.shows(wanted))
 
     def _listen(self, message: Any) -> None:
@@ -200,9 +200,9 @@ SCENES = [load_scene(name) for name in ("dvf5000_first", "dvf5000_second", "teac
 """What the app with services is started with, the first of them shown."""
 
 
-def drawn_nodes(frame: Frame) -> np.ndarray:
-    """Where a frame draws the nodes of its surface, [M, 3], mm."""
-    return frame.drawn_mm.reshape(-1, 3)[frame.topology.surface.nodes]
+def drawn_nodes(picture: LivePicture) -> np.ndarray:
+    """Where a picture draws the nodes of its surface, [M, 3], mm."""
+    return picture.drawn_mm.reshape(-1, 3)[picture.topology.surface.nodes]
 
 
 def open_page(

@@ -10,7 +10,7 @@ from viser import _messages as messages
 from warpspace.app.browser.arrivals import CARRIER, MOST_HEARD, Arrivals
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import start_state
-from warpspace.app.viewport.tab_camera import Eye
+from warpspace.app.viewport.tab_camera import TabCamera
 from warpspace.scene.library import load_scene
 
 
@@ -94,9 +94,9 @@ def test_pages_that_never_show_anything_are_forgotten(
 def fitted(image_width: int, *, docked: bool, page_width: float | None) -> np.ndarray:
     """Position of a camera whose picture was this wide when it was put in place."""
     camera = SimpleNamespace(image_width=image_width, image_height=720)
-    frame = LiveModel().frame(start_state(load_scene("dvf5000_first")))
-    Eye(SimpleNamespace(camera=camera)).fit(  # pyright: ignore[reportArgumentType]
-        frame, docked=docked, page_width=page_width
+    picture = LiveModel().evaluate(start_state(load_scene("dvf5000_first")))
+    TabCamera(SimpleNamespace(camera=camera)).fit(  # pyright: ignore[reportArgumentType]
+        picture, docked=docked, page_width=page_width
     )
     return camera.position
 

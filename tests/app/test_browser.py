@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from app.conftest import Tab, drawn_nodes
-from warpspace.app.evaluation.evaluate import Frame, LiveModel
+from warpspace.app.evaluation.evaluate import LiveModel, LivePicture
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.viewport.tone_map import vertex_colours
 from warpspace.scene.library import load_scene
@@ -18,24 +18,24 @@ LIVE = LiveModel()
 START = start_state(load_scene("dvf5000_first"))
 
 
-def model(state: AppState) -> Frame:
-    return LIVE.frame(state)
+def model(state: AppState) -> LivePicture:
+    return LIVE.evaluate(state)
 
 
-def check_numbers(tab: Tab, frame: Frame) -> None:
+def check_numbers(tab: Tab, picture: LivePicture) -> None:
     for name, value in (
-        ("mean", frame.statistics.mean_um),
-        ("RMS", frame.statistics.rms_um),
-        ("P95", frame.statistics.p95_um),
-        ("max", frame.statistics.max_um),
+        ("mean", picture.statistics.mean_um),
+        ("RMS", picture.statistics.rms_um),
+        ("P95", picture.statistics.p95_um),
+        ("max", picture.statistics.max_um),
     ):
         assert tab.number(name) == pytest.approx(value, abs=0.006)
 
 
 def test_first_screen(tab: Tab) -> None:
-    frame = model(START)
-    tab.until(lambda: tab.shows(drawn_nodes(frame)))
-    check_numbers(tab, frame)
+    picture = model(START)
+    tab.until(lambda: tab.shows(drawn_nodes(picture)))
+    check_numbers(tab, picture)
     assert tab.text("factor") == "displacement drawn ×1\u202f000"
     assert tab.text("max at") == "X 275, Y −225, Z −51 mm"
     assert "DVF5000, first machine measured" in tab.page.title()
@@ -43,8 +43,8 @@ def test_first_screen(tab: Tab) -> None:
         assert tab.page.get_by_text(words).first.is_visible()
     # colours as sent by the model
     _, colours = tab.surface()
-    values = frame.values.reshape(-1)[frame.topology.surface.nodes]
-    np.testing.assert_allclose(colours, vertex_colours(frame.scale, values), atol=1e-5)
+    values = picture.values.reshape(-1)[picture.topology.surface.nodes]
+    np.testing.assert_allclose(colours, vertex_colours(picture.scale, values), atol=1e-5)
 
 
 def test_mesh_is_drawn_in_the_colours_of_the_bar(tab: Tab) -> None:
@@ -123,12 +123,12 @@ def test_exaggeration_component_density_loop_and_positions(tab: Tab) -> None:
     tab.page.wait_for_timeout(100)
     tab.send("B [°]", "-30")
     state = START.with_component("x").with_loop("relative").with_nodes(11).with_position("B", -30.0)
-    frame = model(state)
-    tab.until(lambda: tab.shows(drawn_nodes(frame)))
-    values = frame.values.reshape(-1)[frame.topology.surface.nodes]
+    picture = model(state)
+    tab.until(lambda: tab.shows(drawn_nodes(picture)))
+    values = picture.values.reshape(-1)[picture.topology.surface.nodes]
     _, colours = tab.surface()
-    np.testing.assert_allclose(colours, vertex_colours(frame.scale, values), atol=1e-5)
-    check_numbers(tab, frame)
+    np.testing.assert_allclose(colours, vertex_colours(picture.scale, values), atol=1e-5)
+    check_numbers(tab, picture)
 
 
 def test_another_scene_brings_its_title_sliders_and_box(tab: Tab) -> None:

@@ -78,7 +78,7 @@ def compare_with_pin(tab: Tab) -> AppState:
     state = replace(state, comparison=state.comparison.with_shown("difference"))
     tab.page.wait_for_timeout(100)
     tab.page.get_by_role("button", name="A − B", exact=True).click()
-    tab.until(lambda: tab.shows(drawn_nodes(LIVE.frame(state))))
+    tab.until(lambda: tab.shows(drawn_nodes(LIVE.evaluate(state))))
     assert tab.state() == state
     return state
 
@@ -101,7 +101,7 @@ def test_a_link_brings_the_comparison_with_its_snapshot(
 ) -> None:
     state = compare_with_pin(tab)
     other = follow(press_link(tab))
-    other.until(lambda: other.shows(drawn_nodes(LIVE.frame(state))))
+    other.until(lambda: other.shows(drawn_nodes(LIVE.evaluate(state))))
     assert other.state() == state
     other.panel("Compare")
     other.until(lambda: other.page.locator("[data-compared='mean A − B']").count() == 1)
@@ -110,7 +110,7 @@ def test_a_link_brings_the_comparison_with_its_snapshot(
     assert other.page.get_by_label("A", exact=True).input_value() == "now"
     # and it goes on from there
     other.page.get_by_role("button", name="B", exact=True).click()
-    other.until(lambda: other.shows(drawn_nodes(LIVE.frame(START))))
+    other.until(lambda: other.shows(drawn_nodes(LIVE.evaluate(START))))
 
 
 def test_a_saved_scene_brings_the_comparison_of_two_scenes(
@@ -131,8 +131,8 @@ def test_a_saved_scene_brings_the_comparison_of_two_scenes(
     other.panel("Compare")
     other.until(lambda: other.page.get_by_label("B", exact=True).input_value() == SCENES[1].title)
     other.page.get_by_role("button", name="A − B", exact=True).click()
-    frame = LIVE.frame(replace(state, comparison=state.comparison.with_shown("difference")))
-    other.until(lambda: other.shows(drawn_nodes(frame)))
+    picture = LIVE.evaluate(replace(state, comparison=state.comparison.with_shown("difference")))
+    other.until(lambda: other.shows(drawn_nodes(picture)))
     # a scene that says nothing of how it is looked at leaves the comparison alone
     other.upload("plain.toml", b'title = "Plain"\nmachine = "dvf5000"\n' + WORKSPACE)
     other.until(lambda: other.state().scene.title == "Plain")
@@ -194,10 +194,10 @@ def test_what_is_too_large_for_a_link_is_left_out_and_named(tab: Tab) -> None:
 
 def test_exports_show_the_difference_that_is_drawn(tab: Tab) -> None:
     state = compare_with_pin(tab)
-    frame = LIVE.frame(state)
+    picture = LIVE.evaluate(state)
     tab.panel("Files")
     tab.until(lambda: tab.page.locator("[data-value='exported']").count() == 1)
-    assert tab.text("exported").startswith(f"Pictures and exports show {frame.compared.title}")
+    assert tab.text("exported").startswith(f"Pictures and exports show {picture.compared.title}")
     contents: dict[str, bytes] = {}
     for name, ending in (("CSV", "csv"), ("HTML", "html"), ("GLB", "glb")):
         with tab.page.expect_download(timeout=60_000) as waiting:
@@ -207,8 +207,8 @@ def test_exports_show_the_difference_that_is_drawn(tab: Tab) -> None:
         tab.until(lambda: tab.page.get_by_role("button", name="Cancel", exact=True).count() == 0)
     rows = list(csv.DictReader(io.StringIO(contents["csv"].decode())))
     largest = max(float(row["norm_um"]) for row in rows)
-    assert largest == pytest.approx(frame.statistics.max_um, abs=1e-6)
-    assert frame.compared.title in contents["html"].decode()
+    assert largest == pytest.approx(picture.statistics.max_um, abs=1e-6)
+    assert picture.compared.title in contents["html"].decode()
     assert b"A \xe2\x88\x92 B" in contents["glb"]
     tab.panel("Compare")
     tab.choose("B", "nothing")
@@ -226,7 +226,7 @@ def test_the_difference_is_drawn_in_slices_and_cut_open(tab: Tab) -> None:
     for shown, word in (("slices", "slices"), ("cut octant", "cut")):
         tab.choose("Show as", shown)
         look = state.look.with_choice(surface=word)
-        mesh = map_mesh(LIVE.frame(replace(state, look=look)))
+        mesh = map_mesh(LIVE.evaluate(replace(state, look=look)))
         tab.until(lambda mesh=mesh: tab.shows(mesh.vertices_mm))
 
 
@@ -237,10 +237,10 @@ def test_a_linear_axis_is_turned_round_in_the_conventions(tab: Tab) -> None:
     tab.until(lambda: "…" not in row.inner_text())
     assert row.inner_text().split()[-2:] == [f"{effect.mean_um:.2f}", f"{effect.max_um:.2f}"]
     row.click()
-    tab.until(lambda: tab.shows(drawn_nodes(LIVE.frame(with_choice(START, "direction X=-1")))))
+    tab.until(lambda: tab.shows(drawn_nodes(LIVE.evaluate(with_choice(START, "direction X=-1")))))
     tab.until(lambda: row.get_attribute("aria-checked") == "true")
     tab.page.get_by_role("button", name="Conventions of the scene").click()
-    tab.until(lambda: tab.shows(drawn_nodes(LIVE.frame(START))))
+    tab.until(lambda: tab.shows(drawn_nodes(LIVE.evaluate(START))))
 
 
 @pytest.mark.slow

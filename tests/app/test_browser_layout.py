@@ -64,11 +64,15 @@ def test_the_colours_of_tilts_are_called_tilts(tab: Tab) -> None:
     tab.until(lambda: colour.input_value() == "|φ| tilt of the tool axis")
     tab.choose("Colour", "φ_y tilt about y")
     tilted = replace(START, look=START.look.with_choice(quantity="orientation"))
-    frame = LIVE.frame(tilted.with_component("y"))
-    wanted = vertex_colours(frame.scale, frame.values.reshape(-1)[frame.topology.surface.nodes])
+    picture = LIVE.evaluate(tilted.with_component("y"))
+    wanted = vertex_colours(
+        picture.scale, picture.values.reshape(-1)[picture.topology.surface.nodes]
+    )
     tab.until(lambda: np.allclose(tab.surface()[1], wanted, atol=1e-5))
     worst = tab.page.locator("[data-mark='max']").get_attribute("title")
     assert worst.endswith("µrad")
-    assert float(worst.split()[0].replace("−", "-")) == pytest.approx(frame.values.max(), abs=0.006)
+    assert float(worst.split()[0].replace("−", "-")) == pytest.approx(
+        picture.values.max(), abs=0.006
+    )
     tab.choose("Colour shows", "position error [µm]")
     tab.until(lambda: colour.input_value() == "E_y")

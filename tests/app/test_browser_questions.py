@@ -43,8 +43,8 @@ def test_a_click_on_the_box_says_why(tab: Tab) -> None:
     click_box(tab)
     picked = tab.state().picked
     assert picked is not None
-    frame = LIVE.frame(START)
-    found = answer(START, picked, frame.exaggeration)
+    picture = LIVE.evaluate(START)
+    found = answer(START, picked, picture.exaggeration)
     assert tab.number("why norm") == pytest.approx(
         float(np.linalg.norm(found.explanation.error_um)), abs=0.006
     )
@@ -77,7 +77,7 @@ def test_choosing_a_contribution_draws_axis_and_lever_and_follows(tab: Tab) -> N
     picked = tab.state().picked
     assert picked is not None
     tab.until(lambda: tab.page.evaluate(PLACE, "/why/marker") != before)
-    found = answer(state, picked, LIVE.frame(state).exaggeration)
+    found = answer(state, picked, LIVE.evaluate(state).exaggeration)
     tab.until(
         lambda: np.allclose(
             np.array(tab.page.evaluate(PLACE, "/why/marker")) * 100.0, found.drawn_mm, atol=0.5
@@ -94,15 +94,15 @@ def test_two_scenes_are_compared_with_one_scale(tab: Tab) -> None:
     tab.choose("B", SCENES[1].title)
     state = with_sides(START, Side(), scene_side(SCENES[1]))
     for name, word in (("B", "b"), ("A − B", "difference"), ("A", "a")):
-        frame = LIVE.frame(replace(state, comparison=state.comparison.with_shown(word)))
+        picture = LIVE.evaluate(replace(state, comparison=state.comparison.with_shown(word)))
         tab.page.get_by_role("button", name=name, exact=True).click()
-        tab.until(lambda frame=frame: tab.shows(drawn_nodes(frame)))
+        tab.until(lambda picture=picture: tab.shows(drawn_nodes(picture)))
         tab.page.get_by_role("button", name=f"▸ {name}", exact=True).wait_for()
         assert ("second machine" in tab.text("compared")) == (word != "a")
         for column, found in (
-            ("A", frame.compared.a),
-            ("B", frame.compared.b),
-            ("A − B", frame.compared.difference),
+            ("A", picture.compared.a),
+            ("B", picture.compared.b),
+            ("A − B", picture.compared.difference),
         ):
             for row, value in (("mean", found.mean_um), ("RMS", found.rms_um)):
                 shown = tab.page.inner_text(f"[data-compared='{row} {column}']")
@@ -110,7 +110,7 @@ def test_two_scenes_are_compared_with_one_scale(tab: Tab) -> None:
     tab.until(lambda: tab.page.evaluate(PLACE, "/compare/other") is not None)
     tab.choose("B", "nothing")
     tab.until(lambda: tab.page.evaluate(PLACE, "/compare/other") is None)
-    tab.until(lambda: tab.shows(drawn_nodes(LIVE.frame(START))))
+    tab.until(lambda: tab.shows(drawn_nodes(LIVE.evaluate(START))))
 
 
 def test_now_is_compared_with_a_pinned_snapshot(tab: Tab) -> None:
@@ -118,9 +118,9 @@ def test_now_is_compared_with_a_pinned_snapshot(tab: Tab) -> None:
     tab.page.get_by_role("button", name="Pin now and compare").click()
     tab.until(lambda: tab.page.locator("[data-compared='mean A − B']").count() == 1)
     tab.send("EXX", "10")
-    wanted = f"{LIVE.frame(START.with_amplitude('EXX', 10.0)).statistics.mean_um:.2f}"
+    wanted = f"{LIVE.evaluate(START.with_amplitude('EXX', 10.0)).statistics.mean_um:.2f}"
     tab.until(lambda: tab.page.inner_text("[data-compared='mean A']") == wanted)
-    mean = f"{LIVE.frame(START).statistics.mean_um:.2f}"
+    mean = f"{LIVE.evaluate(START).statistics.mean_um:.2f}"
     assert tab.page.inner_text("[data-compared='mean B']") == mean
 
 
@@ -134,9 +134,9 @@ def test_a_convention_changes_the_map_and_says_by_how_much(tab: Tab) -> None:
     )
     row.click()
     state = with_choice(START, "component_errors=before_motion")
-    tab.until(lambda: tab.shows(drawn_nodes(LIVE.frame(state))))
+    tab.until(lambda: tab.shows(drawn_nodes(LIVE.evaluate(state))))
     tab.page.get_by_role("button", name="Conventions of the scene").click()
-    tab.until(lambda: tab.shows(drawn_nodes(LIVE.frame(START))))
+    tab.until(lambda: tab.shows(drawn_nodes(LIVE.evaluate(START))))
 
 
 def test_the_reference_is_picked_on_the_box(tab: Tab) -> None:
@@ -147,7 +147,7 @@ def test_the_reference_is_picked_on_the_box(tab: Tab) -> None:
     tab.until(lambda: tab.state().scene.reference is not None)
     state = tab.state()
     assert state.picked is None
-    tab.until(lambda: tab.shows(drawn_nodes(LIVE.frame(state))))
+    tab.until(lambda: tab.shows(drawn_nodes(LIVE.evaluate(state))))
     at = Picked(dict(state.scene.reference or {}))
     assert np.linalg.norm(answer(state, at, 1.0).explanation.error_um) < 1e-6
 
@@ -171,7 +171,7 @@ def test_a_saved_scene_opens_to_the_identical_state(
     other = open_tab()
     other.panel("Files")
     other.upload("dvf5000_first.toml", path.read_bytes())
-    other.until(lambda: other.shows(drawn_nodes(LIVE.frame(state))))
+    other.until(lambda: other.shows(drawn_nodes(LIVE.evaluate(state))))
     back = other.state()
     assert back.amplitudes == state.amplitudes
     assert back.component == "y"
@@ -231,7 +231,7 @@ def test_bad_uploads_are_refused_in_the_page_and_the_session_goes_on(tab: Tab) -
     tab.upload("big.toml", b"x" * (5 * 2**20))
     tab.until(lambda: tab.page.get_by_text("at most 4 MB").count() > 0)
     tab.send("EXX", "4")
-    tab.until(lambda: tab.shows(drawn_nodes(LIVE.frame(START.with_amplitude("EXX", 4.0)))))
+    tab.until(lambda: tab.shows(drawn_nodes(LIVE.evaluate(START.with_amplitude("EXX", 4.0)))))
 
 
 def test_a_200_mb_upload_announced_by_a_hostile_page_is_not_kept(tab: Tab) -> None:
@@ -252,7 +252,7 @@ def test_a_200_mb_upload_announced_by_a_hostile_page_is_not_kept(tab: Tab) -> No
     tab.until(lambda: tab.page.get_by_text("more has arrived").count() > 0)
     assert tab.session._client.gui._current_file_upload_states == {}
     tab.send("EXX", "4")
-    tab.until(lambda: tab.shows(drawn_nodes(LIVE.frame(START.with_amplitude("EXX", 4.0)))))
+    tab.until(lambda: tab.shows(drawn_nodes(LIVE.evaluate(START.with_amplitude("EXX", 4.0)))))
 
 
 @pytest.mark.own_page
@@ -263,7 +263,7 @@ def test_ten_uploads_at_once_and_a_script_in_a_title(tab: Tab) -> None:
     text = state_to_toml(start_state(scene))
     for number in range(10):
         tab.upload(f"scene {number}.toml", text.encode())
-    tab.until(lambda: tab.shows(drawn_nodes(LIVE.frame(start_state(SCENES[1])))), 30.0)
+    tab.until(lambda: tab.shows(drawn_nodes(LIVE.evaluate(start_state(SCENES[1])))), 30.0)
     tab.until(lambda: tab.state().scene.name == "scene 9", 30.0)
     tab.panel("Compare")
     tab.page.get_by_role("button", name="Pin now and compare").click()

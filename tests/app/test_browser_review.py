@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.conftest import Tab, drawn_nodes, open_page, wait_until_open
-from warpspace.app.evaluation.evaluate import Frame, LiveModel
+from warpspace.app.evaluation.evaluate import LiveModel, LivePicture
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, start_state
@@ -26,8 +26,8 @@ PAUSE = 100
 """Milliseconds between two widgets: the client's throttle is one for all of them."""
 
 
-def model(state: AppState) -> Frame:
-    return LIVE.frame(state)
+def model(state: AppState) -> LivePicture:
+    return LIVE.evaluate(state)
 
 
 def drawn(state: AppState) -> np.ndarray:

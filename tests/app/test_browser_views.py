@@ -79,33 +79,33 @@ def go(tab: Tab, name: str) -> None:
 
 def test_surface_cut_slices_and_lines(tab: Tab) -> None:
     tab.choose("Show as", "cut octant")
-    cut = LIVE.frame(looking(surface="cut"))
+    cut = LIVE.evaluate(looking(surface="cut"))
     tab.until(lambda: tab.shows(map_mesh(cut).vertices_mm))
     tab.choose("Show as", "slices")
-    tab.until(lambda: tab.shows(map_mesh(LIVE.frame(looking(surface="slices"))).vertices_mm))
+    tab.until(lambda: tab.shows(map_mesh(LIVE.evaluate(looking(surface="slices"))).vertices_mm))
     tab.thumb("Slice YZ").focus()
     for _ in range(4):
         tab.page.keyboard.press("ArrowRight")
         tab.page.wait_for_timeout(70)
     look = looking(surface="slices").look.with_slice("X", 4.0, slice_spans(START.scene)["X"])
-    moved = LIVE.frame(replace(START, look=look))
+    moved = LIVE.evaluate(replace(START, look=look))
     tab.until(lambda: tab.shows(map_mesh(moved).vertices_mm))
     assert drawn(tab, "/box/grid") is not None
     tab.choose("Show as", "grid lines only")
     tab.until(lambda: drawn(tab, "/box/grid") is None)
     tab.choose("Show as", "surface")
-    tab.until(lambda: tab.shows(map_mesh(LIVE.frame(START)).vertices_mm))
+    tab.until(lambda: tab.shows(map_mesh(LIVE.evaluate(START)).vertices_mm))
     tab.until(lambda: drawn(tab, "/box/grid") is not None)
 
 
 def test_isolines_arrows_worst_point_and_bars(tab: Tab) -> None:
     assert drawn(tab, "/box/isolines") is None
     tick(tab, "Isolines")
-    frame = LIVE.frame(looking(isolines=True))
-    tab.until(lambda: ends(tab, "/box/isolines", isoline_pieces(frame)))
+    picture = LIVE.evaluate(looking(isolines=True))
+    tab.until(lambda: ends(tab, "/box/isolines", isoline_pieces(picture)))
     tick(tab, "Corner arrows")
     arrows = corner_arrows(
-        frame.grid.shape, frame.grid.nominal_mm, frame.field.error_um, frame.exaggeration
+        picture.grid.shape, picture.grid.nominal_mm, picture.field.error_um, picture.exaggeration
     )
     tab.until(lambda: drawn(tab, "/marks/arrows") is not None)
     found = drawn(tab, "/marks/arrows")
@@ -113,9 +113,9 @@ def test_isolines_arrows_worst_point_and_bars(tab: Tab) -> None:
         for at in (start, end):
             assert np.linalg.norm(found - at, axis=-1).min() < 0.01
     worst = np.array(tab.page.evaluate(PLACE, "/marks/ball")) / SCENE_PER_MM
-    at = np.unravel_index(np.argmax(frame.values), frame.values.shape)
+    at = np.unravel_index(np.argmax(picture.values), picture.values.shape)
     # the page turns z upwards into three.js' y upwards
-    wanted = frame.drawn_mm[at]
+    wanted = picture.drawn_mm[at]
     assert sorted(np.abs(worst)) == pytest.approx(sorted(np.abs(wanted)), abs=0.01)
     assert drawn(tab, "/marks/bars") is not None
     tick(tab, "Scale bars")
@@ -124,20 +124,20 @@ def test_isolines_arrows_worst_point_and_bars(tab: Tab) -> None:
 
 def test_orientation_error_and_colour_ranges(tab: Tab) -> None:
     tab.choose("Colour shows", "tool-orientation error [µrad]")
-    frame = LIVE.frame(looking(quantity="orientation"))
+    picture = LIVE.evaluate(looking(quantity="orientation"))
 
-    def coloured(frame) -> bool:
+    def coloured(picture) -> bool:
         found = tab.surface()
-        wanted = vertex_colours(frame.scale, map_mesh(frame).values)
+        wanted = vertex_colours(picture.scale, map_mesh(picture).values)
         return found is not None and np.allclose(found[1], wanted, atol=1e-5)
 
-    tab.until(lambda: coloured(frame))
+    tab.until(lambda: coloured(picture))
     assert tab.page.get_by_text("|φ| [µrad]").first.is_visible()
     tab.send("Range ends at", "100")
-    fixed = LIVE.frame(looking(quantity="orientation", range_mode="fixed", range_top=100.0))
+    fixed = LIVE.evaluate(looking(quantity="orientation", range_mode="fixed", range_top=100.0))
     tab.until(lambda: coloured(fixed))
     tab.choose("Colour range", "shared")
-    tab.until(lambda: coloured(LIVE.frame(looking(quantity="orientation", range_mode="shared"))))
+    tab.until(lambda: coloured(LIVE.evaluate(looking(quantity="orientation", range_mode="shared"))))
 
 
 def test_cameras(tab: Tab) -> None:
@@ -184,7 +184,7 @@ def test_pixels_have_the_colours_of_the_bar(tab: Tab) -> None:
     tab.page.wait_for_timeout(300)
     tick(tab, "Orthographic")
     tab.page.wait_for_timeout(2500)
-    frame = LIVE.frame(START)
+    picture = LIVE.evaluate(START)
     camera = tab.session._client.camera
     rect = tab.page.evaluate(
         "() => { const r = document.querySelector('canvas').getBoundingClientRect();"
@@ -192,8 +192,8 @@ def test_pixels_have_the_colours_of_the_bar(tab: Tab) -> None:
     )
     picture = np.asarray(Image.open(BytesIO(tab.page.screenshot())).convert("RGB")).astype(int)
     # inner nodes of the front face, projected
-    nodes = frame.drawn_mm[2:-2, 0, 2:-2].reshape(-1, 3) * SCENE_PER_MM
-    values = frame.values[2:-2, 0, 2:-2].reshape(-1)
+    nodes = picture.drawn_mm[2:-2, 0, 2:-2].reshape(-1, 3) * SCENE_PER_MM
+    values = picture.values[2:-2, 0, 2:-2].reshape(-1)
     back = camera.position - camera.look_at
     back /= np.linalg.norm(back)
     right = np.cross((0.0, 0.0, 1.0), back)
@@ -204,10 +204,10 @@ def test_pixels_have_the_colours_of_the_bar(tab: Tab) -> None:
     row = np.floor(rect[1] + rect[3] / 2.0 - scale * (seen @ up)).astype(int)
     free = (column > 900) | (row > 160)  # not under the heading
     pixels = picture[row[free], column[free]]
-    wanted = frame.scale.colours(values[free]).astype(int)
+    wanted = picture.scale.colours(values[free]).astype(int)
     # a pixel beside the node, whose value differs by less than a step of the map, is still right
     table = colour_table().astype(int)
-    index = np.rint(frame.scale.fraction(values[free]) * 255).astype(int)
+    index = np.rint(picture.scale.fraction(values[free]) * 255).astype(int)
     near = np.stack([table[np.clip(index + step, 0, 255)] for step in (-1, 0, 1)])
     assert free.sum() > 200
     assert np.abs(pixels - near).max(axis=-1).min(axis=0).max() <= 3
@@ -220,7 +220,7 @@ def test_pixels_have_the_colours_of_the_bar(tab: Tab) -> None:
 
 
 def machine_vertices(state) -> dict[str, np.ndarray]:
-    return {p.body.name: p.vertices_mm for p in drawn_bodies(LIVE.frame(state))}
+    return {p.body.name: p.vertices_mm for p in drawn_bodies(LIVE.evaluate(state))}
 
 
 def test_machine_moves_bends_and_carries_the_tool_point(tab: Tab) -> None:
@@ -246,7 +246,7 @@ def test_machine_moves_bends_and_carries_the_tool_point(tab: Tab) -> None:
     tab.send("Machine B", "-30")
     state = replace(state, machine=machine).with_position("B", -30.0)
     tab.until(lambda: stands(state))
-    point = tool_point(LIVE.frame(state))
+    point = tool_point(LIVE.evaluate(state))
     at = np.array(tab.page.evaluate(PLACE, "/machine/tool_point")) / SCENE_PER_MM
     assert sorted(np.abs(at)) == pytest.approx(sorted(np.abs(point.drawn_mm)), abs=0.01)
     tick(tab, "Bodies bent by the errors")

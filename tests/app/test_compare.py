@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from warpspace.app.evaluation.compare import pinned_side, scene_side, with_pin, with_sides
-from warpspace.app.evaluation.evaluate import Frame, LiveModel
+from warpspace.app.evaluation.evaluate import LiveModel, LivePicture
 from warpspace.app.evaluation.map_mesh import map_mesh
 from warpspace.app.evaluation.topology import topology
 from warpspace.app.readouts.comparison import comparison_html
@@ -22,14 +22,14 @@ FIRST, SECOND = (load_scene(f"dvf5000_{name}") for name in ("first", "second"))
 START = start_state(FIRST, nodes=9)
 
 
-def frame_of(state: AppState, shown: str) -> Frame:
-    return LIVE.frame(replace(state, comparison=state.comparison.with_shown(shown)))
+def picture_of(state: AppState, shown: str) -> LivePicture:
+    return LIVE.evaluate(replace(state, comparison=state.comparison.with_shown(shown)))
 
 
 def test_a_b_and_difference_share_colours_factor_and_numbers() -> None:
     state = with_sides(START, Side(), scene_side(SECOND))
-    a, b, difference = (frame_of(state, shown) for shown in ("a", "b", "difference"))
-    alone = [LIVE.frame(start_state(scene, nodes=9)) for scene in (FIRST, SECOND)]
+    a, b, difference = (picture_of(state, shown) for shown in ("a", "b", "difference"))
+    alone = [LIVE.evaluate(start_state(scene, nodes=9)) for scene in (FIRST, SECOND)]
     np.testing.assert_array_equal(a.field.error_um, alone[0].field.error_um)
     np.testing.assert_array_equal(b.field.error_um, alone[1].field.error_um)
     np.testing.assert_allclose(
@@ -46,28 +46,28 @@ def test_a_b_and_difference_share_colours_factor_and_numbers() -> None:
 
 def test_now_against_a_snapshot_moves_while_the_snapshot_stays() -> None:
     state = with_pin(START).with_amplitude("EXX", 8.0)
-    difference = frame_of(state, "difference")
-    alone = LIVE.frame(
+    difference = picture_of(state, "difference")
+    alone = LIVE.evaluate(
         start_state(load_scene("dvf5000_nominal"), nodes=9).with_amplitude("EXX", 8.0)
     )
     np.testing.assert_allclose(difference.field.error_um, alone.field.error_um, atol=1e-9)
-    assert frame_of(with_pin(START), "difference").statistics.max_um == 0.0
+    assert picture_of(with_pin(START), "difference").statistics.max_um == 0.0
 
 
 def test_other_volumes_have_no_difference_but_both_sides() -> None:
     other = replace(SECOND, workspace=SECOND.workspace.moved({}), name="other")
     ranges = {**other.workspace.ranges, "X": (-100.0, 100.0)}
     other = replace(other, workspace=type(other.workspace)(ranges))
-    frame = frame_of(with_sides(START, Side(), scene_side(other)), "difference")
-    assert frame.compared is not None
-    assert frame.compared.refused
-    assert frame.compared.difference is None
-    assert frame.compared.shown == "a"
+    picture = picture_of(with_sides(START, Side(), scene_side(other)), "difference")
+    assert picture.compared is not None
+    assert picture.compared.refused
+    assert picture.compared.difference is None
+    assert picture.compared.shown == "a"
 
 
 def test_titles_are_escaped() -> None:
     evil = replace(SECOND, title="<img src=x onerror=alert(1)>")
-    text = comparison_html(LIVE.frame(with_sides(START, Side(), scene_side(evil))))
+    text = comparison_html(LIVE.evaluate(with_sides(START, Side(), scene_side(evil))))
     assert "<img" not in text
     assert "&lt;img" in text
 
@@ -93,7 +93,7 @@ def test_the_difference_is_cut_into_slices_evaluated_where_they_lie() -> None:
             START, look=look.with_choice(quantity=quantity), component=component
         ).with_amplitude("EAX", 9.0)
         state = with_sides(state, Side(), scene_side(SECOND))
-        a, b, difference = (frame_of(state, shown) for shown in ("a", "b", "difference"))
+        a, b, difference = (picture_of(state, shown) for shown in ("a", "b", "difference"))
         assert [part.axis for part in difference.slices] == [part.axis for part in a.slices]
         assert difference.slices[0].position_mm == 31.0
         for one, two, part in zip(a.slices, b.slices, difference.slices, strict=True):
@@ -118,11 +118,11 @@ def test_slices_of_both_sides_follow_the_tool_point_of_now() -> None:
     machine = START.machine.with_linear("Y", 50.0, Span(-225.0, 225.0, 1.0))
     state = with_sides(replace(START, look=look, machine=machine), Side(), scene_side(SECOND))
     for shown in ("a", "b", "difference"):
-        at = {part.axis: part.position_mm for part in frame_of(state, shown).slices}
+        at = {part.axis: part.position_mm for part in picture_of(state, shown).slices}
         assert at["Y"] == 50.0
 
 
 def test_the_difference_is_cut_open() -> None:
     state = replace(START, look=START.look.with_choice(surface="cut"))
-    difference = frame_of(with_sides(state, Side(), scene_side(SECOND)), "difference")
+    difference = picture_of(with_sides(state, Side(), scene_side(SECOND)), "difference")
     assert difference.topology is topology(difference.grid.shape, cut=True)

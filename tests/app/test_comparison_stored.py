@@ -109,10 +109,10 @@ def test_an_edited_snapshot_and_an_opened_scene_come_back_as_they_were(way: str)
     else:
         back, _ = open_link(state_to_link(state, None, KNOWN), KNOWN)
     assert back.notes == ()
-    frames = [LiveModel().frame(one.with_nodes(5)) for one in (state, back)]
-    assert frames[0].statistics == frames[1].statistics
-    assert (frames[0].drawn_mm == frames[1].drawn_mm).all()
-    assert frames[0].compared.titles == frames[1].compared.titles
+    pictures = [LiveModel().evaluate(one.with_nodes(5)) for one in (state, back)]
+    assert pictures[0].statistics == pictures[1].statistics
+    assert (pictures[0].drawn_mm == pictures[1].drawn_mm).all()
+    assert pictures[0].compared.titles == pictures[1].compared.titles
     assert back.comparison.a == state.comparison.a
     assert back.comparison.pinned is back.comparison.b
 

@@ -19,7 +19,7 @@ from warpspace.app.evaluation.map_mesh import edge_pieces
 from warpspace.app.panels import conventions as panel_module
 from warpspace.app.panels.conventions import ConventionsPanel
 from warpspace.app.readouts.conventions import switchboard_html
-from warpspace.app.server.followers import Parts
+from warpspace.app.server.followers import Followers
 from warpspace.app.state.app_state import start_state
 from warpspace.scene.library import load_scene
 
@@ -32,7 +32,7 @@ def test_every_choice_can_be_made_and_measures_its_change(choice: str) -> None:
     state = with_choice(START, choice)
     assert choice in chosen(state)
     effect = Effects().of(START)[choice]
-    change = LIVE.frame(state).field.error_um - LIVE.frame(START).field.error_um
+    change = LIVE.evaluate(state).field.error_um - LIVE.evaluate(START).field.error_um
     length = np.linalg.norm(change, axis=-1)
     assert effect.mean_um == pytest.approx(float(length.mean()), abs=1e-9)
     assert effect.max_um == pytest.approx(float(length.max()), abs=1e-9)
@@ -45,8 +45,8 @@ def test_nonsense_changes_nothing() -> None:
 
 def test_a_reference_is_held_still_clamped_and_taken_back() -> None:
     state = with_reference(START, {"X": 0.0, "Y": 0.0, "Z": -280.0})
-    frame = LIVE.frame(state)
-    assert np.abs(frame.field.error_um[3, 3, 3]).max() < 1e-9
+    picture = LIVE.evaluate(state)
+    assert np.abs(picture.field.error_um[3, 3, 3]).max() < 1e-9
     assert with_own_conventions(state) == START
     wild = with_reference(START, {"X": 1e9, "Y": float("nan")})
     assert wild.scene.reference is not None
@@ -63,7 +63,7 @@ def test_reset_of_the_errors_keeps_the_conventions() -> None:
 
 def test_the_effect_of_all_choices_is_that_of_the_state() -> None:
     state = with_choice(with_choice(START, "component_errors=before_motion"), "loop=workpiece")
-    change = LIVE.frame(state).field.error_um - LIVE.frame(START).field.error_um
+    change = LIVE.evaluate(state).field.error_um - LIVE.evaluate(START).field.error_um
     found = Effects().of(state)["all"]
     assert found.max_um == pytest.approx(float(np.linalg.norm(change, axis=-1).max()))
 
@@ -87,15 +87,15 @@ def test_linear_axes_have_a_direction_like_rotary_ones() -> None:
         assert begin < text.index(f'data-choice="direction {axis}=-1"') < end
     turned = with_choice(START, "direction X=-1")
     assert turned.scene.machine.axes["X"].direction == -1
-    along_x = LIVE.frame(turned).grid.nominal_mm[:, 0, 0, 0]
+    along_x = LIVE.evaluate(turned).grid.nominal_mm[:, 0, 0, 0]
     assert along_x[0] > along_x[-1]
     assert Effects().of(START)["direction Z=-1"].max_um > 0.0
     assert with_own_conventions(turned) == START
 
 
 def test_lines_stay_on_the_outside_of_a_mirrored_volume() -> None:
-    frame = LIVE.frame(with_choice(START.zeroed(), "direction X=-1"))
-    lines, nodes = edge_pieces(frame).reshape(-1, 3), frame.grid.nominal_mm.reshape(-1, 3)
+    picture = LIVE.evaluate(with_choice(START.zeroed(), "direction X=-1"))
+    lines, nodes = edge_pieces(picture).reshape(-1, 3), picture.grid.nominal_mm.reshape(-1, 3)
     assert (lines.max(axis=0) > nodes.max(axis=0)).all()
     assert (lines.min(axis=0) < nodes.min(axis=0)).all()
 
@@ -119,17 +119,17 @@ def test_the_panel_does_nothing_while_a_slider_moves(monkeypatch: pytest.MonkeyP
     panel._scene, panel._known, panel._at = START.origin, {}, {}
     panel._effects, panel._text = Effects(), SimpleNamespace(content="")
     panel._clicks = SimpleNamespace(attributes=None)
-    parts = Parts((), [panel])
-    parts.show(LIVE.frame(START))
+    parts = Followers((), [panel])
+    parts.show(LIVE.evaluate(START))
     assert calls == ["written"]
     moved = START
     for value in (1.0, 2.0, 3.0):
         moved = moved.with_amplitude("EXX", value)
-        parts.show(LIVE.frame(moved))
+        parts.show(LIVE.evaluate(moved))
     assert calls == ["written"]
-    panel.settle(LIVE.frame(moved))
+    panel.settle(LIVE.evaluate(moved))
     assert len(calls) == 2
-    panel.settle(LIVE.frame(moved))
+    panel.settle(LIVE.evaluate(moved))
     assert len(calls) == 2
-    parts.show(LIVE.frame(with_choice(moved, "loop=relative")))
+    parts.show(LIVE.evaluate(with_choice(moved, "loop=relative")))
     assert len(calls) == 3

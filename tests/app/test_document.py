@@ -42,7 +42,7 @@ LOOKED = {
     "loop",
     "nodes",
     "shown",
-    "emphasis",
+    "exclusions",
     "tolerances",
     "specification",
     "look",
@@ -160,7 +160,7 @@ def test_hostile_settings_are_clamped_or_left_out_and_named() -> None:
     assert back.loop == START.loop
     assert back.look.surface == "surface"
     assert back.rotary.off == frozenset({0})
-    assert back.emphasis.muted == frozenset({"EXX"})
+    assert back.exclusions.muted == frozenset({"EXX"})
     assert back.picked is not None
     assert abs(back.picked.at["X"]) <= 300.0
     assert any("left out" in note for note in back.notes)

@@ -12,7 +12,7 @@ from warpspace import load_scene
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.map_mesh import drafted, grid_pieces, map_mesh
 from warpspace.app.server import followers as parts_module
-from warpspace.app.server.followers import Parts, make_draft
+from warpspace.app.server.followers import Followers, make_draft
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.comparison import Comparison
 from warpspace.app.viewport.drafts import box_picture, build_draft, only_moved
@@ -28,33 +28,33 @@ def looking(**look: object) -> AppState:
 
 @pytest.mark.parametrize("surface", ["surface", "cut", "grid"])
 def test_a_draft_has_every_second_node_and_the_same_lines(surface: str) -> None:
-    frame = LIVE.frame(looking(surface=surface))
-    thin = drafted(frame)
-    vertices = {tuple(v) for v in np.round(map_mesh(frame).vertices_mm, 6)}
+    picture = LIVE.evaluate(looking(surface=surface))
+    thin = drafted(picture)
+    vertices = {tuple(v) for v in np.round(map_mesh(picture).vertices_mm, 6)}
     few = {tuple(v) for v in np.round(map_mesh(thin).vertices_mm, 6)}
     assert few < vertices
     assert len(few) < len(vertices) / 3
-    ends = {tuple(p) for p in np.round(grid_pieces(frame).reshape(-1, 3), 3)}
+    ends = {tuple(p) for p in np.round(grid_pieces(picture).reshape(-1, 3), 3)}
     assert {tuple(p) for p in np.round(grid_pieces(thin).reshape(-1, 3), 3)} < ends
-    assert thin.statistics is frame.statistics
-    assert thin.scale is frame.scale
-    assert len(box_picture(thin).surface) < len(box_picture(frame).surface) / 2
+    assert thin.statistics is picture.statistics
+    assert thin.scale is picture.scale
+    assert len(box_picture(thin).surface) < len(box_picture(picture).surface) / 2
 
 
 @pytest.mark.parametrize("nodes", [3, 11, 13, 19])
 def test_what_thinning_would_change_is_not_thinned(nodes: int) -> None:
-    frame = LIVE.frame(STATE.with_nodes(nodes))
-    assert drafted(frame) is frame
+    picture = LIVE.evaluate(STATE.with_nodes(nodes))
+    assert drafted(picture) is picture
 
 
 def test_slices_are_not_thinned() -> None:
-    frame = LIVE.frame(looking(surface="slices"))
-    assert drafted(frame) is frame
+    picture = LIVE.evaluate(looking(surface="slices"))
+    assert drafted(picture) is picture
 
 
 def test_numbers_of_a_draft_are_those_of_all_nodes() -> None:
-    frame = LIVE.frame(STATE.with_amplitude("EAX", 33.0))
-    assert f"{frame.statistics.max_um:.2f} µm" in build_draft(frame).texts["summary"]
+    picture = LIVE.evaluate(STATE.with_amplitude("EAX", 33.0))
+    assert f"{picture.statistics.max_um:.2f} µm" in build_draft(picture).texts["summary"]
 
 
 def test_only_amplitudes_are_drafted() -> None:
@@ -87,7 +87,7 @@ def test_the_other_process_draws_the_same(painter: Painter) -> None:
     assert painter.paint(STATE) is None, "it must not keep anybody waiting while it starts"
     started(painter)
     for state in (STATE, STATE.with_amplitude("EAX", 12.0), looking(isolines=True, surface="cut")):
-        found, wanted = painter.paint(state), build_draft(LIVE.frame(state))
+        found, wanted = painter.paint(state), build_draft(LIVE.evaluate(state))
         assert found is not None
         assert found.box.surface == wanted.box.surface
         assert found.texts == wanted.texts
@@ -106,7 +106,7 @@ def test_without_the_other_process_the_app_goes_on(
     assert painter.paint(moved) is None
     assert "goes on without it" in caplog.text
     monkeypatch.setattr(parts_module, "PAINTER", painter)
-    assert make_draft(LIVE, moved).texts == build_draft(LIVE.frame(moved)).texts
+    assert make_draft(LIVE, moved).texts == build_draft(LIVE.evaluate(moved)).texts
 
 
 class Follower:
@@ -115,26 +115,26 @@ class Follower:
     def __init__(self) -> None:
         self.states: list[AppState] = []
 
-    def show(self, frame: Any) -> None:
-        self.states.append(frame.state)
+    def show(self, picture: Any) -> None:
+        self.states.append(picture.state)
 
     def read(self, state: AppState) -> AppState:
         return state
 
 
 def test_all_that_was_put_off_follows_when_it_settles() -> None:
-    frame, part = LIVE.frame(STATE), Follower()
-    parts = Parts([part], [], frame)
+    picture, part = LIVE.evaluate(STATE), Follower()
+    parts = Followers([part], [], picture)
     moved = STATE.with_amplitude("EAX", 5.0)
     assert not parts.takes_draft(moved)
     parts.waited(1.0)
     assert parts.takes_draft(moved)
     assert not parts.takes_draft(moved.with_nodes(11))
-    parts.show_draft(moved, build_draft(LIVE.frame(moved)))
+    parts.show_draft(moved, build_draft(LIVE.evaluate(moved)))
     assert parts.state is moved
     assert part.states == []
     assert not parts.is_due(paused=False)
     assert parts.is_due(paused=True)
-    parts.settle(LIVE.frame(moved), lambda step: step())
+    parts.settle(LIVE.evaluate(moved), lambda step: step())
     assert part.states == [moved]
     assert not parts.is_due(paused=True)

@@ -93,29 +93,29 @@ def test_legend_escapes_what_a_scene_file_says() -> None:
     text = 'title = "<script>alert(1)</script>"\nmachine = "dvf5000"\n'
     workspace = "[workspace]\nX = [0, 10]\nY = [0, 10]\nZ = [-20, -10]\nB = 0\nC = 0\n"
     scene = parse_scene(text + workspace, "evil")
-    frame = LiveModel().frame(start_state(scene, nodes=3))
-    assert "<script>" not in legend.heading(frame)
-    assert "&lt;script&gt;" in legend.heading(frame)
+    picture = LiveModel().evaluate(start_state(scene, nodes=3))
+    assert "<script>" not in legend.heading(picture)
+    assert "&lt;script&gt;" in legend.heading(picture)
 
 
 def test_legend_says_factor_units_numbers_and_place() -> None:
     live = LiveModel()
-    frame = live.frame(start_state(load_scene("dvf5000_first")))
-    assert "displacement drawn ×1\u202f000" in legend.heading(frame)
-    summary = legend.summary(frame)
-    assert f"{frame.statistics.mean_um:.2f} µm" in summary
+    picture = live.evaluate(start_state(load_scene("dvf5000_first")))
+    assert "displacement drawn ×1\u202f000" in legend.heading(picture)
+    summary = legend.summary(picture)
+    assert f"{picture.statistics.mean_um:.2f} µm" in summary
     assert "X 275, Y −225, Z −51 mm" in summary
     assert "|E| [µm]" in summary
     assert "100 mm geometry" in summary
     assert "100 µm error" in summary
-    true = live.frame(frame.state.with_exaggeration(1.0))
+    true = live.evaluate(picture.state.with_exaggeration(1.0))
     assert "true scale" in legend.heading(true)
     assert "(auto)" not in legend.heading(true)
 
 
-def marks(frame) -> dict[str, float]:
-    found = re.findall(r'data-mark="(\w+)" title="([^ ]+) (µm|µrad)"', legend.colour_bar(frame))
-    assert {unit for _, _, unit in found} == {frame.scale.unit}
+def marks(picture) -> dict[str, float]:
+    found = re.findall(r'data-mark="(\w+)" title="([^ ]+) (µm|µrad)"', legend.colour_bar(picture))
+    assert {unit for _, _, unit in found} == {picture.scale.unit}
     return {name: float(value.replace("−", "-")) for name, value, _ in found}
 
 
@@ -123,7 +123,7 @@ def test_the_bar_marks_what_is_coloured() -> None:
     live, start = LiveModel(), start_state(load_scene("dvf5000_first"))
     tilted = replace(start, look=start.look.with_choice(quantity="orientation"))
     for state in (start, tilted):
-        lengths = live.frame(state)
+        lengths = live.evaluate(state)
         assert marks(lengths) == pytest.approx(
             {
                 "mean": lengths.values.mean(),
@@ -132,7 +132,7 @@ def test_the_bar_marks_what_is_coloured() -> None:
             },
             abs=0.006,
         )
-        signed = live.frame(state.with_component("y"))
+        signed = live.evaluate(state.with_component("y"))
         assert marks(signed) == pytest.approx(
             {
                 "min": signed.values.min(),

@@ -25,7 +25,7 @@ def test_a_curve_moves_amplitude_slider_and_picture():
     assert state.amplitudes["EXX"] == 30.0
     assert state.spans["EXX"].high >= 30.0
     assert edits.curve_of(state, "EXX") == curve
-    before, after = LIVE.frame(STATE), LIVE.frame(state)
+    before, after = LIVE.evaluate(STATE), LIVE.evaluate(state)
     moved = (after.field.error_um - before.field.error_um)[:, 10, 10, 0]
     np.testing.assert_allclose(moved[[0, 10, 20]], [0.0, 30.0, -4.0], atol=1e-9)
 
@@ -88,14 +88,14 @@ def test_unknown_keys_change_nothing():
 
 
 def test_solo_draws_one_error_alone_and_mute_leaves_it_out():
-    alone = LIVE.frame(edits.with_soloed(STATE, "EC0Y", True))
-    without = LIVE.frame(edits.with_muted(STATE, "EC0Y", True))
-    whole = LIVE.frame(STATE)
+    alone = LIVE.evaluate(edits.with_soloed(STATE, "EC0Y", True))
+    without = LIVE.evaluate(edits.with_muted(STATE, "EC0Y", True))
+    whole = LIVE.evaluate(STATE)
     np.testing.assert_allclose(
         alone.field.error_um + without.field.error_um, whole.field.error_um, atol=1e-9
     )
     assert alone.state.amplitudes == STATE.amplitudes
-    assert edits.all_heard(without.state) == STATE
+    assert edits.include_all(without.state) == STATE
 
 
 @pytest.mark.parametrize("limit", [float("nan"), float("inf"), -3.0, 1e9])

@@ -1,32 +1,32 @@
 """Solo and mute silence amplitudes without touching them."""
 
-from warpspace.app.state.exclusions import Emphasis
+from warpspace.app.state.exclusions import Exclusions
 
 AMPLITUDES = {"EAX": 5.0, "EBX": -2.0, "EC0Y": 23.1}
 
 
 def test_nothing_silenced_is_the_same_mapping():
-    assert Emphasis().effective(AMPLITUDES) is AMPLITUDES
+    assert Exclusions().effective(AMPLITUDES) is AMPLITUDES
 
 
 def test_muted_is_zero():
-    found = Emphasis().with_muted("EAX", True).effective(AMPLITUDES)
+    found = Exclusions().with_muted("EAX", True).effective(AMPLITUDES)
     assert found == {**AMPLITUDES, "EAX": 0.0}
 
 
 def test_soloed_is_heard_alone_and_two_together():
-    emphasis = Emphasis().with_soloed("EAX", True)
-    assert emphasis.effective(AMPLITUDES) == {"EAX": 5.0, "EBX": 0.0, "EC0Y": 0.0}
-    both = emphasis.with_soloed("EBX", True)
+    exclusions = Exclusions().with_soloed("EAX", True)
+    assert exclusions.effective(AMPLITUDES) == {"EAX": 5.0, "EBX": 0.0, "EC0Y": 0.0}
+    both = exclusions.with_soloed("EBX", True)
     assert both.effective(AMPLITUDES) == {"EAX": 5.0, "EBX": -2.0, "EC0Y": 0.0}
 
 
 def test_mute_wins_over_solo_and_all_comes_back():
-    emphasis = Emphasis().with_soloed("EAX", True).with_muted("EAX", True)
-    assert set(emphasis.effective(AMPLITUDES).values()) == {0.0}
-    assert not emphasis.with_soloed("EAX", False).with_muted("EAX", False)
+    exclusions = Exclusions().with_soloed("EAX", True).with_muted("EAX", True)
+    assert set(exclusions.effective(AMPLITUDES).values()) == {0.0}
+    assert not exclusions.with_soloed("EAX", False).with_muted("EAX", False)
 
 
 def test_what_another_machine_lacks_is_forgotten():
-    emphasis = Emphasis(frozenset({"EAX"}), frozenset({"EXA"}))
-    assert emphasis.within(AMPLITUDES) == Emphasis(frozenset({"EAX"}))
+    exclusions = Exclusions(frozenset({"EAX"}), frozenset({"EXA"}))
+    assert exclusions.within(AMPLITUDES) == Exclusions(frozenset({"EAX"}))

@@ -11,7 +11,7 @@ from warpspace.app.panels.layout import split_script
 from warpspace.app.panels.view import COMPONENT_NAMES, component_of
 from warpspace.app.readouts.exclusions import emphasis_buttons, with_switched
 from warpspace.app.state import edits, start_state
-from warpspace.app.state.exclusions import Emphasis
+from warpspace.app.state.exclusions import Exclusions
 from warpspace.app.state.history import History
 from warpspace.machine.parameters import parameter
 
@@ -35,19 +35,21 @@ class _Buttons(HTMLParser):
             self.group = given
 
 
-def buttons(emphasis: Emphasis, key: str = "EAX") -> _Buttons:
+def buttons(exclusions: Exclusions, key: str = "EAX") -> _Buttons:
     return _Buttons(
-        emphasis_buttons(parameter(key), emphasis, lambda word: f'type="button" data-word="{word}"')
+        emphasis_buttons(
+            parameter(key), exclusions, lambda word: f'type="button" data-word="{word}"'
+        )
     )
 
 
-def pressed(emphasis: Emphasis, key: str = "EAX") -> tuple[str, str]:
-    solo, mute, _ = buttons(emphasis, key).found
+def pressed(exclusions: Exclusions, key: str = "EAX") -> tuple[str, str]:
+    solo, mute, _ = buttons(exclusions, key).found
     return solo["aria-pressed"], mute["aria-pressed"]
 
 
 def test_the_buttons_say_what_they_do_to_which_error():
-    solo, mute, curve = buttons(Emphasis()).found
+    solo, mute, curve = buttons(Exclusions()).found
     assert [b["data-word"] for b in (solo, mute, curve)] == ["solo EAX", "mute EAX", "curve EAX"]
     assert solo["aria-label"] == "Solo EAX, roll of X"
     assert mute["aria-label"] == "Mute EAX, roll of X"
@@ -56,9 +58,9 @@ def test_the_buttons_say_what_they_do_to_which_error():
 
 
 def test_the_buttons_show_what_is_pressed_and_who_is_silent():
-    assert pressed(Emphasis()) == ("false", "false")
-    assert pressed(Emphasis().with_muted("EAX", True)) == ("false", "true")
-    alone = Emphasis().with_soloed("EAX", True)
+    assert pressed(Exclusions()) == ("false", "false")
+    assert pressed(Exclusions().with_muted("EAX", True)) == ("false", "true")
+    alone = Exclusions().with_soloed("EAX", True)
     assert pressed(alone) == ("true", "false")
     assert pressed(alone, "EBX") == ("false", "false")
     assert "silent" not in buttons(alone).group["aria-label"]
@@ -72,7 +74,7 @@ def test_a_click_switches_and_a_second_one_switches_back():
     assert once == edits.with_soloed(STATE, "EAX", True)
     assert with_switched(once, "solo EAX") == STATE
     muted = with_switched(STATE, "mute EC0Y")
-    assert muted.emphasis.muted == frozenset({"EC0Y"})
+    assert muted.exclusions.muted == frozenset({"EC0Y"})
     assert with_switched(muted, "mute EC0Y") == STATE
 
 
@@ -85,11 +87,11 @@ def test_each_switch_is_a_step_however_fast_they_follow_each_other():
     history = History(STATE)
     for number, word in enumerate(("mute EAX", "mute EBX", "mute EBX", "solo EBX")):
         history = history.push(with_switched(history.present, word), 0.01 * number)
-    assert history.undoes == "emphasis.soloed.+EBX"
+    assert history.undoes == "exclusions.soloed.+EBX"
     history = history.undo()
-    assert history.present.emphasis == Emphasis(frozenset({"EAX"}))
+    assert history.present.exclusions == Exclusions(frozenset({"EAX"}))
     history = history.undo()
-    assert history.present.emphasis == Emphasis(frozenset({"EAX", "EBX"}))
+    assert history.present.exclusions == Exclusions(frozenset({"EAX", "EBX"}))
     assert history.undo().undo().present == STATE
 
 

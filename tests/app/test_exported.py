@@ -16,7 +16,7 @@ from warpspace.app.documents.offline_page import build_offline_html
 from warpspace.app.documents.view_image import view_png
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
 from warpspace.app.evaluation.conventions import with_choice
-from warpspace.app.evaluation.evaluate import Frame, LiveModel
+from warpspace.app.evaluation.evaluate import LiveModel, LivePicture
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.comparison import Side
 from warpspace.cli.services import draw_figure, write_export
@@ -37,8 +37,8 @@ WORDS = {
 }
 
 
-def frame_of(shown: str, state: AppState = BOTH) -> Frame:
-    return LIVE.frame(replace(state, comparison=state.comparison.with_shown(shown)))
+def picture_of(shown: str, state: AppState = BOTH) -> LivePicture:
+    return LIVE.evaluate(replace(state, comparison=state.comparison.with_shown(shown)))
 
 
 def read_glb(data: bytes) -> dict:
@@ -47,27 +47,27 @@ def read_glb(data: bytes) -> dict:
 
 @pytest.mark.parametrize("shown", WORDS)
 def test_csv_holds_the_numbers_that_are_drawn(shown: str) -> None:
-    frame = frame_of(shown)
-    text = write_export(build_request(frame), ".csv").decode()
+    picture = picture_of(shown)
+    text = write_export(build_request(picture), ".csv").decode()
     rows = list(csv.DictReader(io.StringIO(text)))
     errors = np.array([[float(row[f"error_{c}_um"]) for c in "xyz"] for row in rows])
-    np.testing.assert_allclose(errors, frame.field.error_um.reshape(-1, 3), atol=1e-6)
+    np.testing.assert_allclose(errors, picture.field.error_um.reshape(-1, 3), atol=1e-6)
     assert all(title in rows[0]["scene"] for title in WORDS[shown].split(": ", 1)[1].split(" − "))
     assert rows[0]["loop"] == "tool"
 
 
 @pytest.mark.parametrize("shown", WORDS)
 def test_glb_has_the_title_the_factor_and_the_shared_colours(shown: str) -> None:
-    frame = frame_of(shown)
-    document = read_glb(write_export(build_request(frame), ".glb"))
+    picture = picture_of(shown)
+    document = read_glb(write_export(build_request(picture), ".glb"))
     extras = document["asset"]["extras"]
-    assert extras["settings"]["exaggeration"] == frame.exaggeration
+    assert extras["settings"]["exaggeration"] == picture.exaggeration
     assert (extras["colours"]["low"], extras["colours"]["high"]) == (
-        frame.scale.low,
-        frame.scale.high,
+        picture.scale.low,
+        picture.scale.high,
     )
-    assert extras["statistics"]["max_um"] == pytest.approx(frame.statistics.max_um)
-    for title in frame.compared.titles if shown == "difference" else [WORDS[shown][3:]]:
+    assert extras["statistics"]["max_um"] == pytest.approx(picture.statistics.max_um)
+    for title in picture.compared.titles if shown == "difference" else [WORDS[shown][3:]]:
         assert title in extras["title"]
     if shown == "difference":
         assert extras["settings"]["difference"] == "A − B"
@@ -79,8 +79,8 @@ def test_glb_has_the_title_the_factor_and_the_shared_colours(shown: str) -> None
 
 
 def test_traces_of_a_difference_are_displaced_by_the_difference() -> None:
-    frame = frame_of("difference", with_sides(START, Side(), Side()))
-    document = read_glb(write_export(build_request(frame), ".glb"))
+    picture = picture_of("difference", with_sides(START, Side(), Side()))
+    document = read_glb(write_export(build_request(picture), ".glb"))
     assert document["asset"]["extras"]["statistics"]["max_um"] == 0.0
     bounds = {
         node["name"]: document["accessors"][
@@ -96,7 +96,7 @@ def test_traces_of_a_difference_are_displaced_by_the_difference() -> None:
 
 @pytest.mark.parametrize("shown", WORDS)
 def test_the_offline_page_says_what_it_shows(shown: str) -> None:
-    page = build_offline_html(frame_of(shown))
+    page = build_offline_html(picture_of(shown))
     head = page.partition("<main>")[0]
     assert WORDS[shown] in head
     rest = page.partition("<aside>")[2]
@@ -110,13 +110,13 @@ def test_the_offline_page_says_what_it_shows(shown: str) -> None:
 
 def test_the_page_of_a_difference_names_what_is_unlike_on_both_sides() -> None:
     other = with_choice(with_pin(START), "component_errors=before_motion").with_loop("relative")
-    page = build_offline_html(frame_of("difference", other))
+    page = build_offline_html(picture_of("difference", other))
     assert "relative − tool loop" in page
     assert "component errors in fixed directions − component errors ride" in page
 
 
 def test_pictures_of_the_view_carry_the_title_of_what_is_drawn() -> None:
-    content = view_png(np.zeros((200, 300, 3), np.uint8), frame_of("difference"))
+    content = view_png(np.zeros((200, 300, 3), np.uint8), picture_of("difference"))
     assert Image.open(io.BytesIO(content)).info["Title"] == WORDS["difference"]
 
 
@@ -124,11 +124,11 @@ def test_pictures_of_the_view_carry_the_title_of_what_is_drawn() -> None:
 def test_the_figure_is_a_sheet_of_both_and_the_difference_as_the_app_takes_it(
     renderer: str,
 ) -> None:
-    request = build_request(frame_of("a"))
+    request = build_request(picture_of("a"))
     assert [scene.title for scene in request.pair] == [f"now, {FIRST.title}", SECOND.title]
     settings = FigureSettings(grid=5, exaggeration=request.exaggeration, difference=A_MINUS_B)
     drawing = draw("comparison", list(request.pair), settings)
-    difference = frame_of("difference")
+    difference = picture_of("difference")
     np.testing.assert_allclose(drawing.maps[2].values, difference.values, atol=1e-6)
     np.testing.assert_allclose(drawing.maps[2].drawn_mm, difference.drawn_mm, atol=1e-6)
     assert any("A − B" in text.get_text() for text in drawing.figure.texts) or any(
@@ -138,31 +138,31 @@ def test_the_figure_is_a_sheet_of_both_and_the_difference_as_the_app_takes_it(
         FigureSettings(difference="A + B")
 
 
-def ranged(top: float) -> Frame:
-    return LIVE.frame(replace(START, look=START.look.with_top(top)))
+def ranged(top: float) -> LivePicture:
+    return LIVE.evaluate(replace(START, look=START.look.with_top(top)))
 
 
-def tilted(top: float | None = None) -> Frame:
+def tilted(top: float | None = None) -> LivePicture:
     look = START.look.with_choice(quantity="orientation")
-    return LIVE.frame(replace(START, look=look if top is None else look.with_top(top)))
+    return LIVE.evaluate(replace(START, look=look if top is None else look.with_top(top)))
 
 
 @pytest.mark.parametrize("top", [None, 7.0])
 def test_glb_has_the_tilts_and_the_range_that_are_coloured(top: float | None) -> None:
-    frame = tilted(top)
-    extras = read_glb(write_export(build_request(frame), ".glb"))["asset"]["extras"]
+    picture = tilted(top)
+    extras = read_glb(write_export(build_request(picture), ".glb"))["asset"]["extras"]
     assert extras["settings"]["coloured"] == "tool-orientation error"
     assert extras["colours"] == {
-        "map": frame.scale.name,
+        "map": picture.scale.name,
         "low": 0.0,
-        "high": frame.scale.high if top is None else top,
+        "high": picture.scale.high if top is None else top,
         "label": "|φ|",
         "unit": "µrad",
     }
-    request = build_request(frame)
+    request = build_request(picture)
     drawing = draw_scene(request.scene, grid=request.nodes, loop=request.loop)
-    np.testing.assert_allclose(replace(drawing, tilts=True).values, frame.values, atol=1e-9)
-    assert exported_words(frame).startswith("The figure shows the tilts")
+    np.testing.assert_allclose(replace(drawing, tilts=True).values, picture.values, atol=1e-9)
+    assert exported_words(picture).startswith("The figure shows the tilts")
 
 
 @pytest.mark.render
@@ -171,16 +171,16 @@ def test_glb_has_the_tilts_and_the_range_that_are_coloured(top: float | None) ->
     [
         (tilted(7.0), "Orientation error of the tool axis", "orientation-map"),
         (
-            LIVE.frame(replace(START, look=START.look.with_top(7.0))),
+            LIVE.evaluate(replace(START, look=START.look.with_top(7.0))),
             "Volumetric error",
             "error-map",
         ),
     ],
 )
 def test_the_figure_shows_what_is_coloured_in_the_range_that_is_fixed(
-    renderer: str, frame: Frame, title: str, figure: str
+    renderer: str, picture: LivePicture, title: str, figure: str
 ) -> None:
-    content = draw_figure(build_request(frame), threading.Event())
+    content = draw_figure(build_request(picture), threading.Event())
     about = Image.open(io.BytesIO(content)).info
     assert about["Title"].startswith(title)
     said = dict(pair.split("=") for pair in about["Description"].partition(";")[0].split(", "))
@@ -190,21 +190,21 @@ def test_the_figure_shows_what_is_coloured_in_the_range_that_is_fixed(
 @pytest.mark.render
 def test_tilts_are_compared_by_position_errors_on_the_sheet_and_it_says_so(renderer: str) -> None:
     look = BOTH.look.with_choice(quantity="orientation")
-    frame = frame_of("difference", replace(BOTH, look=look))
-    assert "shows the position errors of A, B and A − B" in exported_words(frame)
-    content = draw_figure(build_request(frame), threading.Event())
+    picture = picture_of("difference", replace(BOTH, look=look))
+    assert "shows the position errors of A, B and A − B" in exported_words(picture)
+    content = draw_figure(build_request(picture), threading.Event())
     assert "range" not in Image.open(io.BytesIO(content)).info["Description"]
 
 
 def test_two_loops_on_one_sheet_are_refused_in_words() -> None:
-    frame = frame_of("difference", with_pin(START).with_loop("relative"))
+    picture = picture_of("difference", with_pin(START).with_loop("relative"))
     with pytest.raises(OptionError, match="one loop"):
-        draw_figure(build_request(frame), threading.Event())
+        draw_figure(build_request(picture), threading.Event())
     # the other exports draw each side through its own
-    text = write_export(build_request(frame), ".csv").decode()
+    text = write_export(build_request(picture), ".csv").decode()
     rows = list(csv.DictReader(io.StringIO(text)))
     errors = np.array([[float(row[f"error_{c}_um"]) for c in "xyz"] for row in rows])
-    np.testing.assert_allclose(errors, frame.field.error_um.reshape(-1, 3), atol=1e-6)
+    np.testing.assert_allclose(errors, picture.field.error_um.reshape(-1, 3), atol=1e-6)
     assert rows[0]["loop"] == "relative − tool"
 
 
@@ -213,19 +213,19 @@ def test_two_loops_on_one_sheet_are_refused_in_words() -> None:
     [("a", "A_now"), ("b", "B_dvf5000_second"), ("difference", "now_minus_dvf5000_second")],
 )
 def test_files_and_the_panel_name_what_is_exported(shown: str, stem: str) -> None:
-    frame = frame_of(shown)
-    assert file_stem(frame) == stem
-    assert exported_words(frame).startswith(f"Pictures and exports show {WORDS[shown]}.")
-    assert exported_words(LIVE.frame(START)) == ""
-    assert file_stem(LIVE.frame(START)) == "dvf5000_first"
+    picture = picture_of(shown)
+    assert file_stem(picture) == stem
+    assert exported_words(picture).startswith(f"Pictures and exports show {WORDS[shown]}.")
+    assert exported_words(LIVE.evaluate(START)) == ""
+    assert file_stem(LIVE.evaluate(START)) == "dvf5000_first"
 
 
 def test_volumes_that_differ_export_the_side_that_is_drawn() -> None:
     ranges = {**SECOND.workspace.ranges, "X": (-100.0, 100.0)}
     other = replace(SECOND, name="other", workspace=type(SECOND.workspace)(ranges))
-    frame = frame_of("difference", with_sides(START, Side(), scene_side(other)))
-    request = build_request(frame)
+    picture = picture_of("difference", with_sides(START, Side(), scene_side(other)))
+    request = build_request(picture)
     assert request.pair is None
     assert request.minus is None
-    assert file_stem(frame) == "A_now"
-    assert "sheet" not in exported_words(frame)
+    assert file_stem(picture) == "A_now"
+    assert "sheet" not in exported_words(picture)

@@ -1,9 +1,9 @@
-"""From a state to a frame: the numbers of the model, and nothing computed twice."""
+"""From a state to a picture: the numbers of the model, and nothing computed twice."""
 
 import numpy as np
 import pytest
 
-from warpspace.app.evaluation.evaluate import Frame, Kept, LiveModel
+from warpspace.app.evaluation.evaluate import Cache, LiveModel, LivePicture
 from warpspace.app.state.app_state import start_state
 from warpspace.app.viewport.layers.box import dashes, ghost_dashes
 from warpspace.app.viewport.layers.traces import apart, is_here, trace_colours
@@ -23,12 +23,12 @@ def live() -> LiveModel:
 
 
 @pytest.fixture(scope="module")
-def frame(live: LiveModel) -> Frame:
-    return live.frame(STATE)
+def picture(live: LiveModel) -> LivePicture:
+    return live.evaluate(STATE)
 
 
-def test_field_is_that_of_the_scene(frame: Frame) -> None:
-    np.testing.assert_allclose(frame.field.error_um, evaluate(SCENE, grid=21).error_um, atol=1e-9)
+def test_field_is_that_of_the_scene(picture: LivePicture) -> None:
+    np.testing.assert_allclose(picture.field.error_um, evaluate(SCENE, grid=21).error_um, atol=1e-9)
 
 
 def test_moved_slider_gives_the_field_of_the_changed_set(live: LiveModel) -> None:
@@ -36,24 +36,24 @@ def test_moved_slider_gives_the_field_of_the_changed_set(live: LiveModel) -> Non
     changed: ErrorSet = SCENE.errors
     for key, value in (("EXX", 7.0), ("EAY", 10.0)):
         changed = changed.with_amplitude(key, value, (0.0, 1.0))
-    frame = live.frame(state)
-    wanted = evaluate_first_order(SCENE.model, changed, frame.grid.coordinates)
-    np.testing.assert_allclose(frame.field.error_um, wanted.error_um, atol=1e-9)
+    picture = live.evaluate(state)
+    wanted = evaluate_first_order(SCENE.model, changed, picture.grid.coordinates)
+    np.testing.assert_allclose(picture.field.error_um, wanted.error_um, atol=1e-9)
 
 
-def test_exaggeration_auto_number_and_true_scale(live: LiveModel, frame: Frame) -> None:
-    assert frame.exaggeration == 1000.0
+def test_exaggeration_auto_number_and_true_scale(live: LiveModel, picture: LivePicture) -> None:
+    assert picture.exaggeration == 1000.0
     for factor in (1.0, 250.0):
-        drawn = live.frame(STATE.with_exaggeration(factor))
+        drawn = live.evaluate(STATE.with_exaggeration(factor))
         shift = drawn.drawn_mm - drawn.grid.nominal_mm
-        np.testing.assert_allclose(shift, factor * 1e-3 * frame.field.error_um, atol=1e-9)
+        np.testing.assert_allclose(shift, factor * 1e-3 * picture.field.error_um, atol=1e-9)
 
 
 def test_component_chooses_values_and_scale(live: LiveModel) -> None:
-    frame = live.frame(STATE.with_component("y"))
-    np.testing.assert_array_equal(frame.values, frame.field.error_um[..., 1])
-    assert frame.scale.diverging
-    assert frame.scale.high >= np.abs(frame.values).max()
+    picture = live.evaluate(STATE.with_component("y"))
+    np.testing.assert_array_equal(picture.values, picture.field.error_um[..., 1])
+    assert picture.scale.diverging
+    assert picture.scale.high >= np.abs(picture.values).max()
 
 
 def test_response_is_kept_until_grid_place_or_loop_change(live: LiveModel) -> None:
@@ -71,20 +71,20 @@ def test_response_is_kept_until_grid_place_or_loop_change(live: LiveModel) -> No
 def test_rotary_positions_matter_in_the_relative_loop(live: LiveModel) -> None:
     tilted = start_state(load_scene("teach_tilted_c")).with_nodes(3)
     assert tilted.loop is Loop.RELATIVE
-    here = live.frame(tilted).field.error_um
-    there = live.frame(tilted.with_position("B", -90.0)).field.error_um
+    here = live.evaluate(tilted).field.error_um
+    there = live.evaluate(tilted.with_position("B", -90.0)).field.error_um
     assert np.abs(here - there).max() > 1.0
 
 
 def test_scene_without_errors_is_drawn_where_it_is_nominal(live: LiveModel) -> None:
-    frame = live.frame(start_state(load_scene("dvf5000_nominal"), nodes=5))
-    assert frame.statistics.max_um == 0.0
-    np.testing.assert_array_equal(frame.drawn_mm, frame.grid.nominal_mm)
+    picture = live.evaluate(start_state(load_scene("dvf5000_nominal"), nodes=5))
+    assert picture.statistics.max_um == 0.0
+    np.testing.assert_array_equal(picture.drawn_mm, picture.grid.nominal_mm)
 
 
 def test_traces_are_displaced_by_the_workpiece_loop(live: LiveModel) -> None:
-    frame = live.frame(start_state(load_scene("teach_tilted_c"), nodes=3))
-    lines = frame.traces[0]
+    picture = live.evaluate(start_state(load_scene("teach_tilted_c"), nodes=3))
+    lines = picture.traces[0]
     shift = np.linalg.norm(lines.actual_mm - lines.nominal_mm, axis=-1)
     assert shift.max() > 1.0
     assert len(apart(lines, 0.5)) > 100
@@ -92,28 +92,28 @@ def test_traces_are_displaced_by_the_workpiece_loop(live: LiveModel) -> None:
 
 
 def test_traces_at_the_present_positions_are_dark(live: LiveModel) -> None:
-    frame = live.frame(STATE)
-    here = is_here(frame.traces[0].group, dict(STATE.positions))
+    picture = live.evaluate(STATE)
+    here = is_here(picture.traces[0].group, dict(STATE.positions))
     assert here.any()
     assert not here.all()
-    colours = trace_colours(frame)
+    colours = trace_colours(picture)
     assert colours.shape[1:] == (2, 3)
     assert len(np.unique(colours.reshape(-1, 3), axis=0)) == 2
 
 
-def test_dashes_begin_and_end_at_the_corners(frame: Frame) -> None:
+def test_dashes_begin_and_end_at_the_corners(picture: LivePicture) -> None:
     found = dashes(np.array([[[0.0, 0.0, 0.0], [100.0, 0.0, 0.0]]]), 12.0, 8.0)
     assert found[0, 0, 0] == 0.0
     assert found[-1, 1, 0] == pytest.approx(100.0)
     assert (np.diff(found[..., 0].reshape(-1)) > 0.0).all()
-    drawn = ghost_dashes(frame).reshape(-1, 3)
-    nominal = frame.grid.nominal_mm.reshape(-1, 3)
+    drawn = ghost_dashes(picture).reshape(-1, 3)
+    nominal = picture.grid.nominal_mm.reshape(-1, 3)
     np.testing.assert_allclose(drawn.min(axis=0), nominal.min(axis=0), atol=1e-3)
     np.testing.assert_allclose(drawn.max(axis=0), nominal.max(axis=0), atol=1e-3)
 
 
 def test_kept_results_are_dropped_oldest_first() -> None:
-    kept: Kept[str] = Kept(10)
+    kept: Cache[str] = Cache(10)
     built: list[str] = []
 
     def build(name: str) -> str:

@@ -33,7 +33,7 @@ from warpspace.app.state.look import (
 )
 from warpspace.app.state.ranges import Span
 from warpspace.app.viewport.layers.annotations import carries_worst
-from warpspace.app.viewport.named_views import VIEWS, Stand, change_lens, clipping, view_pose
+from warpspace.app.viewport.named_views import VIEWS, CameraSetup, change_lens, clipping, view_pose
 from warpspace.app.viewport.rotation_player import Player
 from warpspace.geometry.surfaces import box_edges, outer_surface, segments
 from warpspace.picture.marks import corner_arrows, worst_point
@@ -65,8 +65,8 @@ def test_whole_surface_is_the_outer_surface_with_its_edges():
 
 
 def test_cut_octant_opens_the_corner_towards_the_operator():
-    frame = LIVE.frame(looking(surface="cut"))
-    nodes = frame.grid.nominal_mm.reshape(-1, 3)[frame.topology.surface.nodes]
+    picture = LIVE.evaluate(looking(surface="cut"))
+    nodes = picture.grid.nominal_mm.reshape(-1, 3)[picture.topology.surface.nodes]
     low, high = nodes.min(axis=0), nodes.max(axis=0)
     right_front_top = np.array([high[0], low[1], high[2]])
     assert np.linalg.norm(nodes - right_front_top, axis=-1).min() > 150.0
@@ -76,10 +76,10 @@ def test_cut_octant_opens_the_corner_towards_the_operator():
 
 @pytest.mark.parametrize("surface", SURFACES)
 def test_every_way_of_drawing_stays_within_the_model(surface):
-    frame = LIVE.frame(looking(surface=surface))
-    mesh = line_mesh(frame) if surface == "grid" else map_mesh(frame)
+    picture = LIVE.evaluate(looking(surface=surface))
+    mesh = line_mesh(picture) if surface == "grid" else map_mesh(picture)
     assert mesh.triangles.max() == len(mesh.vertices_mm) - 1 == len(mesh.values) - 1
-    for pieces in (grid_pieces(frame), edge_pieces(frame), isoline_pieces(frame)):
+    for pieces in (grid_pieces(picture), edge_pieces(picture), isoline_pieces(picture)):
         assert len(pieces) > 10
         near = np.linalg.norm(pieces[:, 0] - pieces[:, 1], axis=-1)
         assert near.max() < 60.0
@@ -87,15 +87,15 @@ def test_every_way_of_drawing_stays_within_the_model(surface):
 
 def test_slices_lie_where_they_are_put_and_have_the_models_errors():
     state = looking(surface="slices", slices_mm={"X": 100.0, "Y": -50.5, "Z": -100.0})
-    frame = LIVE.frame(state)
-    assert {part.axis: part.position_mm for part in frame.slices} == {
+    picture = LIVE.evaluate(state)
+    assert {part.axis: part.position_mm for part in picture.slices} == {
         "X": 100.0, "Y": -50.5, "Z": -100.0,
     }  # fmt: skip
-    for part in frame.slices:
+    for part in picture.slices:
         at = {k: np.broadcast_to(v, part.grid.shape) for k, v in part.grid.coordinates.items()}
         direct = evaluate(SCENE, at=at)
         assert part.values == pytest.approx(direct.norm_um, abs=1e-6)
-        expected = direct.nominal_mm + frame.exaggeration * 1e-3 * direct.error_um
+        expected = direct.nominal_mm + picture.exaggeration * 1e-3 * direct.error_um
         assert part.drawn_mm == pytest.approx(expected, abs=1e-6)
 
 
@@ -123,24 +123,24 @@ def test_unknown_words_change_nothing():
 
 
 def test_tilt_is_coloured_in_microradians():
-    frame = LIVE.frame(looking(quantity="orientation"))
-    assert (frame.scale.label, frame.scale.unit) == ("|φ|", "µrad")
-    assert frame.values == pytest.approx(np.linalg.norm(frame.field.orientation_urad, axis=-1))
-    assert frame.statistics.max_um == LIVE.frame(START).statistics.max_um
+    picture = LIVE.evaluate(looking(quantity="orientation"))
+    assert (picture.scale.label, picture.scale.unit) == ("|φ|", "µrad")
+    assert picture.values == pytest.approx(np.linalg.norm(picture.field.orientation_urad, axis=-1))
+    assert picture.statistics.max_um == LIVE.evaluate(START).statistics.max_um
 
 
 def test_colour_ranges():
-    fixed = LIVE.frame(replace(looking(range_mode="fixed", range_top=33.0), component="x")).scale
+    fixed = LIVE.evaluate(replace(looking(range_mode="fixed", range_top=33.0), component="x")).scale
     assert (fixed.low, fixed.high, fixed.diverging) == (-33.0, 33.0, True)
     # one range for all components, however little of the errors is left
     less = {key: value / 10.0 for key, value in START.amplitudes.items()}
     tops = {
-        LIVE.frame(replace(looking(range_mode="shared"), component=c, amplitudes=a)).scale.high
+        LIVE.evaluate(replace(looking(range_mode="shared"), component=c, amplitudes=a)).scale.high
         for c in ("norm", "x", "y", "z")
         for a in (START.amplitudes, less)
     }
     assert len(tops) <= 2  # round ends of the signed and the unsigned scale
-    auto = LIVE.frame(replace(START, amplitudes=less)).scale.high
+    auto = LIVE.evaluate(replace(START, amplitudes=less)).scale.high
     assert auto < 0.2 * min(tops)
 
 
@@ -152,11 +152,11 @@ def test_tool_point_lies_in_the_deformed_grid_and_the_tool_ends_in_it():
     for axis, node in (("X", 5), ("Y", 12), ("Z", 17)):
         low, high = scene.workspace.ranges[axis]
         machine = machine.with_linear(axis, low + node * (high - low) / 20.0, spans[axis])
-    frame = LIVE.frame(replace(grid_state, machine=machine))
-    found = tool_point(frame)
-    assert found.drawn_mm == pytest.approx(frame.drawn_mm[5, 12, 17], abs=1e-9)
-    assert found.value == pytest.approx(frame.values[5, 12, 17], abs=1e-9)
-    tool = next(part for part in drawn_bodies(frame) if part.body.name == "t_tool")
+    picture = LIVE.evaluate(replace(grid_state, machine=machine))
+    found = tool_point(picture)
+    assert found.drawn_mm == pytest.approx(picture.drawn_mm[5, 12, 17], abs=1e-9)
+    assert found.value == pytest.approx(picture.values[5, 12, 17], abs=1e-9)
+    tool = next(part for part in drawn_bodies(picture) if part.body.name == "t_tool")
     tip = tool.vertices_mm[np.argmin(tool.body.vertices_mm[:, 2])]
     assert np.linalg.norm(tip - found.drawn_mm) < 9.0  # the rim of the tool's end, 8 mm
 
@@ -164,7 +164,7 @@ def test_tool_point_lies_in_the_deformed_grid_and_the_tool_ends_in_it():
 def test_bodies_move_with_their_axes_and_bend_only_where_chosen():
     def vertices(**machine):
         state = replace(START, machine=replace(START.machine, shown=True, **machine))
-        return {p.body.name: p.vertices_mm for p in drawn_bodies(LIVE.frame(state))}
+        return {p.body.name: p.vertices_mm for p in drawn_bodies(LIVE.evaluate(state))}
 
     still = vertices(bent=False)
     moved = vertices(bent=False, linear_mm={"X": 100.0})
@@ -177,7 +177,7 @@ def test_bodies_move_with_their_axes_and_bend_only_where_chosen():
     bent = vertices(bent=True)
     assert np.abs(bent["t_tool"] - still["t_tool"]).max() > 1.0
     assert np.array_equal(bent["R_bed"], still["R_bed"])
-    room = machine_room_mm(LIVE.frame(START))
+    room = machine_room_mm(LIVE.evaluate(START))
     assert np.ptp(room, axis=0).min() > 1000.0
 
 
@@ -185,7 +185,7 @@ def test_bodies_move_with_their_axes_and_bend_only_where_chosen():
 @pytest.mark.parametrize("orthographic", [False, True])
 def test_named_views_show_everything_from_their_side(view, orthographic):
     points = np.random.default_rng(1).uniform((-3, -2, -1), (3, 2, 4), (50, 3))
-    stand = Stand(view, orthographic)
+    stand = CameraSetup(view, orthographic)
     pose = view_pose(points, 1.5, stand)
     back = pose.position - pose.look_at
     back /= np.linalg.norm(back)
@@ -234,7 +234,7 @@ def test_traces_run_over_c_at_several_b_and_over_b_at_several_c():
     }  # fmt: skip
     assert quarters(SCENE, "C") == (0.0, 90.0, 180.0, 270.0)
     rotary = START.rotary.with_held("C", (0.0, 90.0, 180.0)).with_held("B", (-60.0, 15.0))
-    rows = circle_rows(LIVE.frame(replace(START, rotary=rotary.with_point(1, on=False))))
+    rows = circle_rows(LIVE.evaluate(replace(START, rotary=rotary.with_point(1, on=False))))
     assert [(row.trace.axis, *row.trace.at.items()) for row in rows] == [
         ("B", ("C", 0.0)), ("B", ("C", 90.0)), ("B", ("C", 180.0)),
         ("C", ("B", -60.0)), ("C", ("B", 15.0)),
@@ -244,7 +244,7 @@ def test_traces_run_over_c_at_several_b_and_over_b_at_several_c():
 def test_circle_numbers_are_those_of_a_tilted_axis():
     scene = load_scene("teach_tilted_c")
     state = replace(start_state(scene), rotary=START.rotary.with_own((100.0, 0.0, 50.0)))
-    rows = [row for row in circle_rows(LIVE.frame(state)) if row.trace.axis == "C"]
+    rows = [row for row in circle_rows(LIVE.evaluate(state)) if row.trace.axis == "C"]
     tilts = [row.deviation.tilt_urad for row in rows if row.deviation]
     wanted = np.hypot(scene.errors.amplitude("EA0C"), scene.errors.amplitude("EB0C"))
     assert tilts == pytest.approx([wanted] * len(tilts), rel=1e-6)
@@ -255,18 +255,18 @@ def test_circle_numbers_are_those_of_a_tilted_axis():
 
 def test_point_on_its_axis_has_no_circle():
     state = replace(START, rotary=START.rotary.with_own((0.0, 0.0, 80.0)))
-    rows = circle_rows(LIVE.frame(state))
+    rows = circle_rows(LIVE.evaluate(state))
     assert any(row.deviation is None for row in rows)
     assert "on the axis" in circle_table(rows)
 
 
 def test_played_points_stay_on_their_circles():
-    frame = LIVE.frame(START)
+    picture = LIVE.evaluate(START)
     assert played_axis(START) == "C"
     assert played_position(START, 90.0) == {"C": 90.0}
     assert played_position(START.with_position("C", 350.0), 20.0) == {"C": 10.0}
-    nominal, actual = points_on_traces(frame, {"C": 90.0})
-    traces = [t for t in frame.traces[0].group.traces if t.axis == "C"]
+    nominal, actual = points_on_traces(picture, {"C": 90.0})
+    traces = [t for t in picture.traces[0].group.traces if t.axis == "C"]
     assert nominal.shape == actual.shape == (len(traces), 3)
     for trace, point in zip(traces, nominal, strict=True):
         # on the table a point is turned against the machine: Ry(B)·Rz(90°)
@@ -304,11 +304,11 @@ def test_player_turns_pauses_and_rewinds():
 def test_other_scenes_can_be_looked_at_in_every_way(name):
     state = start_state(load_scene(name))
     for surface in SURFACES:
-        frame = LIVE.frame(replace(state, look=replace(state.look, surface=surface)))
-        assert np.isfinite(map_mesh(frame).vertices_mm).all()
-        isoline_pieces(frame)
-        tool_point(frame)
-    assert np.isfinite(LIVE.frame(state.with_scene(SCENE)).drawn_mm).all()
+        picture = LIVE.evaluate(replace(state, look=replace(state.look, surface=surface)))
+        assert np.isfinite(map_mesh(picture).vertices_mm).all()
+        isoline_pieces(picture)
+        tool_point(picture)
+    assert np.isfinite(LIVE.evaluate(state.with_scene(SCENE)).drawn_mm).all()
 
 
 @pytest.mark.parametrize(
@@ -321,10 +321,12 @@ def test_other_scenes_can_be_looked_at_in_every_way(name):
     ],
 )
 def test_a_corner_is_silent_only_where_the_worst_point_says_its_number(changes, component, hidden):
-    frame = LIVE.frame(looking(arrows=True, **changes).with_component(component))
-    grid = frame.grid
-    arrows = corner_arrows(grid.shape, grid.nominal_mm, frame.field.error_um, frame.exaggeration)
-    worst = worst_point(frame.values, grid.nominal_mm, frame.drawn_mm)
-    silent = carries_worst(frame, arrows, worst)
+    picture = LIVE.evaluate(looking(arrows=True, **changes).with_component(component))
+    grid = picture.grid
+    arrows = corner_arrows(
+        grid.shape, grid.nominal_mm, picture.field.error_um, picture.exaggeration
+    )
+    worst = worst_point(picture.values, grid.nominal_mm, picture.drawn_mm)
+    silent = carries_worst(picture, arrows, worst)
     assert silent.sum() == hidden
-    assert (arrows.norm_um[silent] == frame.statistics.max_um).all()
+    assert (arrows.norm_um[silent] == picture.statistics.max_um).all()

@@ -11,9 +11,9 @@ import pytest
 
 from warpspace.app.server import network, viewer
 from warpspace.app.server.network import free_port, is_local, page_url, resolve_host
-from warpspace.app.server.tab_memory import Left, new_token
+from warpspace.app.server.tab_memory import TabRecord, new_token
 from warpspace.app.state.app_state import start_state
-from warpspace.app.state.shared_state import Board
+from warpspace.app.state.store import StateStore
 from warpspace.exceptions import OptionError
 from warpspace.scene.library import load_scene
 
@@ -80,12 +80,12 @@ def test_public_tunnel_is_off_and_a_second_app_takes_another_port() -> None:
 
 def test_a_connection_that_is_gone_takes_nothing_from_the_tab_that_comes_back() -> None:
     scene = load_scene("dvf5000_nominal")
-    token, left = new_token(), Left(Board(start_state(scene)), None)
+    token, left = new_token(), TabRecord(StateStore(start_state(scene)), None)
     gone: Any = SimpleNamespace(token="")
     with viewer.Viewer(scene) as running:
-        running._keeper.keep(token, left)
+        running._memory.keep(token, left)
         assert running._claim(gone, token) is None
-        assert running._keeper.take(token) is left
+        assert running._memory.take(token) is left
 
 
 def test_run_warns_of_a_public_address_and_ends_on_ctrl_c(monkeypatch: pytest.MonkeyPatch) -> None:

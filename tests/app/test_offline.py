@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from warpspace import load_scene
-from warpspace.app.documents.offline_page import build_offline_html, offline_frame
+from warpspace.app.documents.offline_page import build_offline_html, offline_picture
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -22,7 +22,7 @@ EVIL = "</script><script>window.hacked=1</script><img src=x onerror='window.hack
 
 def page_of(scene, **changes) -> str:
     choices = {"exaggeration": 1000.0, "nodes": 21, **changes}
-    return build_offline_html(offline_frame(scene, **choices), {"title": scene.title, "n": 1})
+    return build_offline_html(offline_picture(scene, **choices), {"title": scene.title, "n": 1})
 
 
 def test_the_page_is_small_and_says_what_it_shows() -> None:
@@ -78,8 +78,8 @@ def test_opens_without_network_and_draws(browser: "Browser", tmp_path: "Path", t
     assert page.title() == f"{title} · warpspace"
     assert page.evaluate("window.hacked") is None
     assert problems == []
-    outside = [url for url in requests if not url.startswith(("blob:", "data:", "about:"))]
-    assert outside == [path.as_uri()]
+    tab = [url for url in requests if not url.startswith(("blob:", "data:", "about:"))]
+    assert tab == [path.as_uri()]
     context.close()
 
 

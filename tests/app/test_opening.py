@@ -16,7 +16,7 @@ from websockets.sync.client import connect
 from websockets.sync.connection import Connection
 
 from warpspace.app.browser.arrivals import CARRIER
-from warpspace.app.panels.contents import Contents
+from warpspace.app.panels.contents import PanelBuilder
 from warpspace.app.server import page_steps as opening
 from warpspace.app.server.page_steps import drawn_script, stage_script
 from warpspace.app.server.session import Session
@@ -194,14 +194,14 @@ def test_pages_that_open_at_once_get_all_of_it(
 def test_a_page_that_leaves_while_it_is_built_leaves_nothing_behind(
     viewer: Viewer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    reached, left, build = threading.Event(), threading.Event(), Contents._build_behind
+    reached, left, build = threading.Event(), threading.Event(), PanelBuilder._build_behind
 
-    def build_late(contents: Contents, state: AppState) -> Any:
+    def build_late(contents: PanelBuilder, state: AppState) -> Any:
         reached.set()
         assert left.wait(20.0)
         return build(contents, state)
 
-    monkeypatch.setattr(Contents, "_build_behind", build_late)
+    monkeypatch.setattr(PanelBuilder, "_build_behind", build_late)
     monkeypatch.setattr(opening, "ANSWER_S", 0.0)
     places = viewer._places._tabs
     with dial(viewer) as socket:

@@ -2,14 +2,14 @@
 
 from dataclasses import replace
 
-from warpspace.app.documents.scene_list import MOST_OPENED, Shelf
+from warpspace.app.documents.scene_list import MOST_OPENED, SceneList
 from warpspace.scene.library import load_scene
 
 FIRST, SECOND = load_scene("dvf5000_first"), load_scene("dvf5000_second")
 
 
 def test_opened_scenes_are_bounded_and_the_oldest_goes() -> None:
-    shelf = Shelf({FIRST.title: FIRST})
+    shelf = SceneList({FIRST.title: FIRST})
     opened = [replace(SECOND, name=f"upload {n}", title=f"Upload {n}") for n in range(23)]
     dropped = [shelf.add(scene)[1] for scene in opened]
     assert dropped == [""] * MOST_OPENED + ["Upload 0", "Upload 1", "Upload 2"]
@@ -22,7 +22,7 @@ def test_opened_scenes_are_bounded_and_the_oldest_goes() -> None:
 
 
 def test_titles_are_unique_and_never_words_of_the_page() -> None:
-    shelf = Shelf({FIRST.title: FIRST})
+    shelf = SceneList({FIRST.title: FIRST})
     again = replace(FIRST, name="other")
     assert shelf.add(again) == (f"{FIRST.title} (2)", "")
     assert shelf.add(replace(SECOND, title="now"))[0] == "now (2)"
@@ -31,6 +31,6 @@ def test_titles_are_unique_and_never_words_of_the_page() -> None:
 
 
 def test_an_equal_scene_needs_no_second_title() -> None:
-    shelf = Shelf({FIRST.title: FIRST})
+    shelf = SceneList({FIRST.title: FIRST})
     assert shelf.add(load_scene("dvf5000_first")) == (FIRST.title, "")
     assert len(shelf) == 1

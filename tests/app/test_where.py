@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.panels.sensitivities import rank_frame
+from warpspace.app.panels.sensitivities import rank_picture
 from warpspace.app.readouts.positions import plain, spell_point, spell_positions
 from warpspace.app.readouts.summary import worst_place
 from warpspace.app.state.app_state import start_state
@@ -25,10 +25,10 @@ def test_points_and_positions_carry_their_units() -> None:
 
 
 def test_result_and_gains_name_the_worst_point_alike() -> None:
-    frame = LiveModel().frame(start_state(load_scene("dvf5000_first")))
-    ranking = rank_frame(frame)
-    assert ranking.place == spell_point(frame.statistics.max_at_mm)
-    assert ranking.place in worst_place(frame)
+    picture = LiveModel().evaluate(start_state(load_scene("dvf5000_first")))
+    ranking = rank_picture(picture)
+    assert ranking.place == spell_point(picture.statistics.max_at_mm)
+    assert ranking.place in worst_place(picture)
     # Z of the drawing counts from the table, that of the axis from its upper end
     assert ranking.positions.startswith("X 275, Y −225, Z −480 mm")
-    assert np.isclose(frame.statistics.max_at_mm[2], -51.0)
+    assert np.isclose(picture.statistics.max_at_mm[2], -51.0)

@@ -11,12 +11,12 @@ from warpspace.analysis.montecarlo import Over
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.probability import Chance
 from warpspace.app.panels.commands import Command, help_text, hint_script, spell_change
-from warpspace.app.panels.sensitivities import rank_frame, spell_ranking
+from warpspace.app.panels.sensitivities import rank_picture, spell_ranking
 from warpspace.app.readouts.probability import spell_chance, spell_refusal
 from warpspace.app.state.app_state import start_state
 
 LIVE = LiveModel()
-FRAME = LIVE.frame(start_state(load_scene("dvf5000_first")))
+FRAME = LIVE.evaluate(start_state(load_scene("dvf5000_first")))
 
 
 def chance(probability, low, high, counts=(5, 10, 5)):
@@ -62,7 +62,7 @@ def test_refusals_are_escaped():
 
 
 def test_gain_bars_rank_the_worst_point():
-    ranking = rank_frame(FRAME)
+    ranking = rank_picture(FRAME)
     assert ranking.error_um == pytest.approx(FRAME.statistics.max_um)
     text = spell_ranking(ranking)
     keys = re.findall(r'data-bar="(\w+)"', text)
@@ -71,7 +71,7 @@ def test_gain_bars_rank_the_worst_point():
 
 
 def test_gain_bars_rank_by_what_the_errors_do():
-    ranking = rank_frame(FRAME, middle=True, by_effect=True)
+    ranking = rank_picture(FRAME, middle=True, by_effect=True)
     moved = [bar.moved_um for bar in ranking.bars]
     assert moved == sorted(moved, reverse=True)
     assert sum(bar.along_um for bar in ranking.bars) == pytest.approx(ranking.error_um)
@@ -86,10 +86,10 @@ def test_gain_bars_rank_by_what_the_errors_do():
         ("shown.dark", "dark mode"),
         ("tolerances.own.EAX", "tolerance of roll of X"),
         ("specification.limit_um", "specification"),
-        ("emphasis.muted", "solo and mute"),
-        ("emphasis.muted.+EAX", "mute of roll of X"),
-        ("emphasis.soloed.-EAX", "solo of roll of X"),
-        ("emphasis.muted.-EAX, emphasis.soloed.-EBX", "mute of roll of X and 1 more"),
+        ("exclusions.muted", "solo and mute"),
+        ("exclusions.muted.+EAX", "mute of roll of X"),
+        ("exclusions.soloed.-EAX", "solo of roll of X"),
+        ("exclusions.muted.-EAX, exclusions.soloed.-EBX", "mute of roll of X and 1 more"),
         ("rotary.off.+2", "rotary traces"),
         ("scene.errors.functions.EXX, amplitudes.EXX, loaded", "positioning of X"),
         ("something_new", "something new"),

@@ -88,10 +88,10 @@ def write_export(drawing: "Drawing", target: "Path", *, overwrite: bool) -> None
 
             write_csv(drawing, target, overwrite=overwrite)
         case _:
-            from warpspace.app.documents.offline_page import build_offline_html, offline_frame
+            from warpspace.app.documents.offline_page import build_offline_html, offline_picture
             from warpspace.outputs.files import write_atomically
 
-            frame = offline_frame(
+            frame = offline_picture(
                 drawing.scene,
                 exaggeration=drawing.exaggeration,
                 nodes=max(drawing.picture.grid.shape),

@@ -95,10 +95,10 @@ def embed_view(
     scene: "Scene", *, exaggeration: float, nodes: int, loop: str, largest: float
 ) -> str:
     """Build the page with the interactive scene; outputs know nothing of the app."""
-    from warpspace.app.documents.offline_page import build_offline_html, offline_frame
+    from warpspace.app.documents.offline_page import build_offline_html, offline_picture
     from warpspace.kinematics.model import Loop
 
-    frame = offline_frame(
+    frame = offline_picture(
         scene, exaggeration=exaggeration, nodes=nodes, loop=Loop(loop), largest=largest
     )
     return build_offline_html(frame)

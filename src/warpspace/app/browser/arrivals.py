@@ -79,7 +79,7 @@ class Arrivals:
     """
 
     def __init__(self, server: viser.ViserServer) -> None:
-        self._heard: OrderedDict[int, Arrival] = OrderedDict()
+        self._known: OrderedDict[int, Arrival] = OrderedDict()
         self._lock = threading.Lock()
         # viser hands on what widgets say only once the page has told of its camera
         connections: Any = server._websock_server  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
@@ -89,15 +89,15 @@ class Arrivals:
     def expect(self, client_id: int) -> Arrival:
         """Give what is, or will be, known of a connection."""
         with self._lock:
-            arrival = self._heard.setdefault(client_id, Arrival())
-            while len(self._heard) > MOST_HEARD:
-                self._heard.popitem(last=False)
+            arrival = self._known.setdefault(client_id, Arrival())
+            while len(self._known) > MOST_HEARD:
+                self._known.popitem(last=False)
         return arrival
 
     def forget(self, client_id: int) -> None:
         """Drop what is known of a connection that has ended."""
         with self._lock:
-            self._heard.pop(client_id, None)
+            self._known.pop(client_id, None)
 
     def _hear(self, client_id: int, message: messages.GuiUpdateMessage) -> None:
         """Take the token out of a message, if it is one of these; a browser may send anything."""

@@ -10,7 +10,7 @@ Changed = Callable[[], None]
 _UNSET = object()
 
 
-class Bound(Generic[T]):
+class Input(Generic[T]):
     """A viser input and the value of it that the program has dealt with.
 
     What the browser sets meanwhile is never overwritten: `show` writes only where the wanted value
@@ -55,7 +55,7 @@ class Bound(Generic[T]):
             self.handle.value = value
 
 
-class Told:
+class Handle:
     """A handle that is only told what has changed.
 
     Every assignment to a handle costs viser's checks even where nothing is sent; a picture consists

@@ -4,18 +4,18 @@ from dataclasses import replace
 
 from warpspace.app.documents.received_files import safe_name
 from warpspace.app.documents.services import Beside, Request
-from warpspace.app.evaluation.evaluate import Frame
-from warpspace.app.evaluation.resulting_scene import heard_scene
+from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.state.app_state import AppState
 from warpspace.scene.model import Scene
 
 
-def build_request(frame: Frame) -> Request:
-    """Say what a figure or an export of a frame is made of.
+def build_request(picture: LivePicture) -> Request:
+    """Say what a figure or an export of a picture is made of.
 
     Parameters
     ----------
-    frame : Frame
+    picture : LivePicture
 
     Returns
     -------
@@ -23,14 +23,14 @@ def build_request(frame: Frame) -> Request:
         The side that is drawn, or A with B to be subtracted; with the factor that is drawn, and the
         colours that all maps of the comparison share.
     """
-    found, drawn = frame.compared, frame.subject or frame.state
+    found, drawn = picture.compared, picture.subject or picture.state
     if found is None:
-        return _request(frame, drawn, _scene(drawn, frame))
+        return _request(picture, drawn, _scene(drawn, picture))
     a, b = (
-        replace(_scene(side, frame), name=f"{name}: {title}", title=title)
+        replace(_scene(side, picture), name=f"{name}: {title}", title=title)
         for name, title, side in zip("AB", found.titles, found.sides, strict=True)
     )
-    request = _request(frame, drawn, b if found.shown == "b" else a)
+    request = _request(picture, drawn, b if found.shown == "b" else a)
     loops = [side.loop for side in found.sides]
     return replace(
         request,
@@ -39,53 +39,53 @@ def build_request(frame: Frame) -> Request:
     )
 
 
-def _scene(state: AppState, frame: Frame) -> Scene:
-    """Give the scene of a state as it is heard, drawn with the factor of the frame."""
-    return replace(heard_scene(state), exaggeration=frame.exaggeration)
+def _scene(state: AppState, picture: LivePicture) -> Scene:
+    """Give the scene of a state as it is heard, drawn with the factor of the picture."""
+    return replace(active_scene(state), exaggeration=picture.exaggeration)
 
 
-def _request(frame: Frame, state: AppState, scene: Scene) -> Request:
+def _request(picture: LivePicture, state: AppState, scene: Scene) -> Request:
     """Ask for one scene, looked at as in a state."""
     return Request(
         scene,
         state.loop.value,
-        frame.state.component,
-        frame.state.nodes,
-        frame.exaggeration,
-        frame.state.shown.dark,
-        frame.state.look.tilts,
-        frame.scale,
+        picture.state.component,
+        picture.state.nodes,
+        picture.exaggeration,
+        picture.state.shown.dark,
+        picture.state.look.tilts,
+        picture.scale,
     )
 
 
-def file_stem(frame: Frame) -> str:
-    """Name the files of a frame, without an ending."""
-    found = frame.compared
+def file_stem(picture: LivePicture) -> str:
+    """Name the files of a picture, without an ending."""
+    found = picture.compared
     if found is None:
-        return safe_name(frame.state.scene.name)
+        return safe_name(picture.state.scene.name)
     a, b = (
         "now" if side.state is None else side.state.scene.name if side.is_scene else "snapshot"
-        for side in (frame.state.comparison.a, frame.state.comparison.b)
+        for side in (picture.state.comparison.a, picture.state.comparison.b)
         if side is not None
     )
     words = {"a": f"A_{a}", "b": f"B_{b}", "difference": f"{a}_minus_{b}"}
     return safe_name(words[found.shown])
 
 
-def exported_words(frame: Frame) -> str:
+def exported_words(picture: LivePicture) -> str:
     """Say what pictures and exports show, where that is not simply what is steered."""
-    found = frame.compared
+    found = picture.compared
     if found is None:
-        tilts = frame.state.look.tilts
+        tilts = picture.state.look.tilts
         return "The figure shows the tilts of the tool axis as needles on the box." if tilts else ""
-    sheet = build_sheet_words(frame)
+    sheet = build_sheet_words(picture)
     return f"Pictures and exports show {found.title}.{sheet} Save and Link keep the comparison."
 
 
-def build_sheet_words(frame: Frame) -> str:
+def build_sheet_words(picture: LivePicture) -> str:
     """Say what the figure shows beyond what is drawn."""
-    found = frame.compared
+    found = picture.compared
     if found is None or found.refused or found.sides[0].loop != found.sides[1].loop:
         return ""
-    what = "the position errors of " if frame.state.look.tilts else ""
+    what = "the position errors of " if picture.state.look.tilts else ""
     return f" The figure shows {what}A, B and A − B on one sheet."

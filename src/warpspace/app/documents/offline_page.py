@@ -17,9 +17,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from warpspace import __version__
-from warpspace.app.evaluation.budget import heard_errors
+from warpspace.app.evaluation.budget import active_errors
 from warpspace.app.evaluation.compare import both_words, drawn_title, is_difference
-from warpspace.app.evaluation.evaluate import Frame, LiveModel
+from warpspace.app.evaluation.evaluate import LiveModel, LivePicture
 from warpspace.app.readouts import summary as legend
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.viewport.camera import fit_camera
@@ -50,7 +50,7 @@ COMPONENT_ERRORS = {
 }
 
 
-def offline_frame(
+def offline_picture(
     scene: Scene,
     *,
     exaggeration: float,
@@ -58,7 +58,7 @@ def offline_frame(
     loop: Loop = Loop.TOOL,
     component: str = "norm",
     largest: float | None = None,
-) -> Frame:
+) -> LivePicture:
     """Evaluate a scene for a page.
 
     Parameters
@@ -76,21 +76,21 @@ def offline_frame(
 
     Returns
     -------
-    Frame
+    LivePicture
     """
     state = replace(
         start_state(scene), exaggeration=exaggeration, nodes=nodes, loop=loop, component=component
     )
-    frame = LiveModel().frame(state)
-    return frame if largest is None else replace(frame, scale=build_scale(largest, component))
+    picture = LiveModel().evaluate(state)
+    return picture if largest is None else replace(picture, scale=build_scale(largest, component))
 
 
-def build_scene_html(frame: Frame, aspect: float = ASPECT) -> str:
-    """Export the 3-D scene of a frame as a page of its own, without a word around it.
+def build_scene_html(picture: LivePicture, aspect: float = ASPECT) -> str:
+    """Export the 3-D scene of a picture as a page of its own, without a word around it.
 
     Parameters
     ----------
-    frame : Frame
+    picture : LivePicture
     aspect : float, optional
         Width over height of the room it will fill.
 
@@ -104,16 +104,16 @@ def build_scene_html(frame: Frame, aspect: float = ASPECT) -> str:
         try:
             light_scene(server.scene)
             for layer in (BoxLayer, TracesLayer, AxesLayer, OtherLayer):
-                layer(server.scene, frame)
-            _place_camera(server, frame, aspect)
-            return server.scene.as_html(dark_mode=frame.state.shown.dark)
+                layer(server.scene, picture)
+            _place_camera(server, picture, aspect)
+            return server.scene.as_html(dark_mode=picture.state.shown.dark)
         finally:
             server.stop()
 
 
-def _place_camera(server: viser.ViserServer, frame: Frame, aspect: float) -> None:
+def _place_camera(server: viser.ViserServer, picture: LivePicture, aspect: float) -> None:
     """Let the page open with the whole box in view, from the operator's side."""
-    drawn = np.concatenate([frame.grid.nominal_mm, frame.drawn_mm])
+    drawn = np.concatenate([picture.grid.nominal_mm, picture.drawn_mm])
     pose = fit_camera(drawn, aspect, margin=MARGIN)
     camera = server.initial_camera
     camera.up = (0.0, 0.0, 1.0)
@@ -122,12 +122,12 @@ def _place_camera(server: viser.ViserServer, frame: Frame, aspect: float) -> Non
     camera.look_at = pose.look_at * SCENE_PER_MM
 
 
-def build_offline_html(frame: Frame, provenance: Mapping[str, Any] | None = None) -> str:
+def build_offline_html(picture: LivePicture, provenance: Mapping[str, Any] | None = None) -> str:
     """Build the page: the interactive scene with its colour bar, numbers and factor.
 
     Parameters
     ----------
-    frame : Frame
+    picture : LivePicture
     provenance : mapping, optional
         Program, scene and settings, stored in the page as JSON.
 
@@ -137,34 +137,34 @@ def build_offline_html(frame: Frame, provenance: Mapping[str, Any] | None = None
         HTML that requests nothing and carries everything.
     """
     # a page in an attribute: only these two characters would end or change it
-    inner = build_scene_html(frame).replace("&", "&amp;").replace('"', "&quot;")
+    inner = build_scene_html(picture).replace("&", "&amp;").replace('"', "&quot;")
     stored = json.dumps(provenance or {}, ensure_ascii=False, allow_nan=False)
     templates = Environment(
         loader=PackageLoader("warpspace.app"), autoescape=True, undefined=StrictUndefined
     )
     return templates.get_template("offline.html.j2").render(
-        title=drawn_title(frame),
+        title=drawn_title(picture),
         program=f"warpspace {__version__}",
         policy=POLICY,
-        heading=Markup(legend.heading(frame)),  # noqa: S704 - escaped where it is built
-        summary=Markup(legend.summary(frame)),  # noqa: S704
+        heading=Markup(legend.heading(picture)),  # noqa: S704 - escaped where it is built
+        summary=Markup(legend.summary(picture)),  # noqa: S704
         scene=Markup(inner),  # noqa: S704
-        parameters=parameter_rows(frame),
-        counted="unlike in A and B" if is_difference(frame) else "not zero",
-        remarks=remarks(frame),
+        parameters=parameter_rows(picture),
+        counted="unlike in A and B" if is_difference(picture) else "not zero",
+        remarks=remarks(picture),
         provenance=Markup(stored.replace("<", "\\u003c")),  # noqa: S704
     )
 
 
-def parameter_rows(frame: Frame) -> list[dict[str, str]]:
+def parameter_rows(picture: LivePicture) -> list[dict[str, str]]:
     """Spell the errors that are drawn: key, plain name, value with unit.
 
     Those that are not zero; of a difference those that are unlike on both sides.
     """
-    drawn = frame.subject or frame.state
-    if frame.compared is None or not is_difference(frame):
-        return [_row(key, f"{value:+g}") for key, value in drawn.heard.items() if value != 0.0]
-    a, b = (heard_errors(side).functions for side in frame.compared.sides)
+    drawn = picture.subject or picture.state
+    if picture.compared is None or not is_difference(picture):
+        return [_row(key, f"{value:+g}") for key, value in drawn.active.items() if value != 0.0]
+    a, b = (active_errors(side).functions for side in picture.compared.sides)
     return [
         _row(key, f"A {_amplitude(a.get(key))}, B {_amplitude(b.get(key))}")
         for key in {**a, **b}
@@ -183,12 +183,12 @@ def _amplitude(function: ErrorFunction | None) -> str:
     return "0" if function is None else f"{function.amplitude:+g}"
 
 
-def remarks(frame: Frame) -> list[str]:
+def remarks(picture: LivePicture) -> list[str]:
     """Spell how the scene is looked at; of a difference for both sides."""
     return [
-        f"{both_words(frame, lambda state: state.loop.value)} loop",
-        both_words(frame, _reference_words),
-        both_words(frame, lambda state: COMPONENT_ERRORS[state.scene.model.component_errors]),
+        f"{both_words(picture, lambda state: state.loop.value)} loop",
+        both_words(picture, _reference_words),
+        both_words(picture, lambda state: COMPONENT_ERRORS[state.scene.model.component_errors]),
         "first-order model",
         "error = actual − nominal",
         "drag to turn, wheel to zoom",

@@ -8,7 +8,7 @@ from warpspace.scene.model import Scene
 MOST_OPENED = 20
 
 
-class Shelf(Mapping[str, Scene]):
+class SceneList(Mapping[str, Scene]):
     """Scenes by the title shown, each title once.
 
     Parameters

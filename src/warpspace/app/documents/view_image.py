@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw, ImageFont, PngImagePlugin
 
 from warpspace import __version__
 from warpspace.app.evaluation.compare import both_words, drawn_title
-from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.evaluation.evaluate import LivePicture
 from warpspace.app.readouts.summary import spell_factor
 
 LIGHT, DARK = ((255, 255, 255), (27, 38, 59)), ((26, 27, 30), (222, 226, 232))
@@ -20,14 +20,14 @@ BAND_PX = 150
 HEAD_PX = 64
 
 
-def view_png(pixels: NDArray[np.uint8], frame: Frame) -> bytes:
+def view_png(pixels: NDArray[np.uint8], picture: LivePicture) -> bytes:
     """Put a rendered view under a heading and beside its colour bar.
 
     Parameters
     ----------
     pixels : ndarray of uint8, [h, w, 3 or 4]
         With a transparent ground where there are four channels.
-    frame : Frame
+    picture : LivePicture
         What it shows.
 
     Returns
@@ -35,17 +35,17 @@ def view_png(pixels: NDArray[np.uint8], frame: Frame) -> bytes:
     bytes
         PNG.
     """
-    ground, ink = DARK if frame.state.shown.dark else LIGHT
+    ground, ink = DARK if picture.state.shown.dark else LIGHT
     view = Image.fromarray(pixels).convert("RGBA")
     page = Image.new("RGBA", (view.width + BAND_PX, view.height + HEAD_PX), (*ground, 255))
     page.alpha_composite(view, (0, HEAD_PX))
     draw = ImageDraw.Draw(page)
-    _heading(draw, frame, ink)
-    _colour_bar(page, draw, frame, ink)
+    _heading(draw, picture, ink)
+    _colour_bar(page, draw, picture, ink)
     facts = PngImagePlugin.PngInfo()
     facts.add_text("Software", f"warpspace {__version__}")
-    facts.add_itxt("Title", drawn_title(frame))
-    facts.add_itxt("Description", f"displacement drawn {spell_factor(frame.exaggeration)}")
+    facts.add_itxt("Title", drawn_title(picture))
+    facts.add_itxt("Description", f"displacement drawn {spell_factor(picture.exaggeration)}")
     written = BytesIO()
     page.convert("RGB").save(written, "PNG", pnginfo=facts)
     return written.getvalue()
@@ -62,26 +62,26 @@ def _font(size: int) -> "ImageFont.ImageFont | ImageFont.FreeTypeFont":
     return ImageFont.load_default(size)
 
 
-def _heading(draw: ImageDraw.ImageDraw, frame: Frame, ink: tuple[int, int, int]) -> None:
+def _heading(draw: ImageDraw.ImageDraw, picture: LivePicture, ink: tuple[int, int, int]) -> None:
     """Write title, factor and numbers."""
-    found = frame.statistics
-    title = drawn_title(frame)
-    factor = spell_factor(frame.exaggeration).replace("\u202f", " ")
+    found = picture.statistics
+    title = drawn_title(picture)
+    factor = spell_factor(picture.exaggeration).replace("\u202f", " ")
     draw.text((16, 10), title[:110], ink, _font(22))
     draw.text(
         (16, 38),
         f"displacement drawn {factor} · |E| mean {found.mean_um:.2f} µm, max {found.max_um:.2f} µm"
-        f" · {both_words(frame, lambda state: state.loop.value)} loop",
+        f" · {both_words(picture, lambda state: state.loop.value)} loop",
         ink,
         _font(15),
     )
 
 
 def _colour_bar(
-    page: Image.Image, draw: ImageDraw.ImageDraw, frame: Frame, ink: tuple[int, int, int]
+    page: Image.Image, draw: ImageDraw.ImageDraw, picture: LivePicture, ink: tuple[int, int, int]
 ) -> None:
     """Draw the colour bar with ticks and unit on the right."""
-    scale = frame.scale
+    scale = picture.scale
     left, top = page.width - BAND_PX + 20, HEAD_PX + 60
     height = max(page.height - top - 40, 40)
     values = np.linspace(scale.high, scale.low, height)

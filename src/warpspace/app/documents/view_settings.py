@@ -22,7 +22,7 @@ from warpspace.app.documents.spelling import (
 )
 from warpspace.app.server.tab_memory import CameraMemory
 from warpspace.app.state.app_state import AppState, Shown, start_state
-from warpspace.app.state.exclusions import Emphasis
+from warpspace.app.state.exclusions import Exclusions
 from warpspace.app.state.look import linear_spans, slice_spans
 from warpspace.app.state.picked import Picked, read_trace, spell_trace
 from warpspace.kinematics.model import Loop
@@ -97,7 +97,7 @@ def _differences(state: AppState) -> Iterator[tuple[str, str]]:
         if axis in state.positions:
             yield f"rotary.held.{axis}", spell_numbers(at)
     for name in ("muted", "soloed"):
-        if keys := getattr(state.emphasis, name):
+        if keys := getattr(state.exclusions, name):
             yield name, ",".join(sorted(keys))
     if state.picked is not None:
         if state.picked.point_mm is not None:
@@ -232,11 +232,11 @@ def _with_top(state: AppState, value: float) -> AppState:
 
 def _with_silenced(state: AppState, *, muted: str = "", soloed: str = "") -> AppState:
     """Set what is muted or soloed from a list of keys."""
-    emphasis = Emphasis(
-        frozenset(muted.split(",")) if muted else state.emphasis.muted,
-        frozenset(soloed.split(",")) if soloed else state.emphasis.soloed,
+    exclusions = Exclusions(
+        frozenset(muted.split(",")) if muted else state.exclusions.muted,
+        frozenset(soloed.split(",")) if soloed else state.exclusions.soloed,
     )
-    return replace(state, emphasis=emphasis.within(state.amplitudes.keys()))
+    return replace(state, exclusions=exclusions.within(state.amplitudes.keys()))
 
 
 def _with_held(state: AppState, axis: str, text: str) -> AppState:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpspace.analysis.explain import Explanation, explain
-from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.evaluation.evaluate import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.edits import axis_span
 from warpspace.app.state.picked import Picked
@@ -52,12 +52,12 @@ class Answer:
     drawn_mm: Array
 
 
-def pick(frame: Frame, origin_mm: Array, direction: Array) -> Picked | None:
+def pick(picture: LivePicture, origin_mm: Array, direction: Array) -> Picked | None:
     """Find the point of a drawn trace or surface that a click means.
 
     Parameters
     ----------
-    frame : Frame
+    picture : LivePicture
     origin_mm, direction : ndarray, [3]
         The ray from the eye; anything, since it comes from a browser.
 
@@ -73,18 +73,18 @@ def pick(frame: Frame, origin_mm: Array, direction: Array) -> Picked | None:
     if length == 0.0:
         return None
     origin, unit = ray[:3], ray[3:] / length
-    surface = _on_surface(frame, origin, unit)
-    trace = _on_trace(frame, origin, unit) if frame.state.shown.traces else None
+    surface = _on_surface(picture, origin, unit)
+    trace = _on_trace(picture, origin, unit) if picture.state.shown.traces else None
     if trace is not None and (surface is None or trace[1] <= surface[1]):
         return trace[0]
     return None if surface is None else surface[0]
 
 
-def _on_surface(frame: Frame, origin: Array, unit: Array) -> tuple[Picked, float] | None:
+def _on_surface(picture: LivePicture, origin: Array, unit: Array) -> tuple[Picked, float] | None:
     """Intersect the drawn surface, or the slices; give the point and its distance, mm."""
-    drawn = [(frame.grid, frame.drawn_mm, frame.topology.surface)]
-    if frame.slices:
-        drawn = [(cut.grid, cut.drawn_mm, outer_surface(cut.grid.shape)) for cut in frame.slices]
+    drawn = [(picture.grid, picture.drawn_mm, picture.topology.surface)]
+    if picture.slices:
+        drawn = [(cut.grid, cut.drawn_mm, outer_surface(cut.grid.shape)) for cut in picture.slices]
     best: tuple[Picked, float] | None = None
     for grid, drawn_mm, surface in drawn:
         points = drawn_mm.reshape(-1, 3)[surface.nodes]
@@ -106,10 +106,10 @@ def _between_nodes(grid: Grid, nodes: Index, weights: Array) -> Picked:
     )
 
 
-def _on_trace(frame: Frame, origin: Array, unit: Array) -> tuple[Picked, float] | None:
+def _on_trace(picture: LivePicture, origin: Array, unit: Array) -> tuple[Picked, float] | None:
     """Find the nearest of the drawn traces; give the point and its distance, mm."""
     best: tuple[Picked, float] | None = None
-    for lines in frame.traces:
+    for lines in picture.traces:
         shape = lines.actual_mm.shape[:2]
         dense = _denser(lines.actual_mm)
         found = pick_point(origin, unit, dense.reshape(-1, 3), TOLERANCE_RAD)
@@ -134,13 +134,13 @@ def _denser(samples: Array) -> Array:
     return samples[:, first] * (1.0 - part) + samples[:, first + 1] * part
 
 
-def heard_errors(state: AppState) -> ErrorSet:
+def active_errors(state: AppState) -> ErrorSet:
     """Give the error set with the amplitudes that count in a state."""
     functions = state.scene.errors.functions
     return ErrorSet(
         {
             key: (functions.get(key) or Constant(axis_span(state, key))).with_amplitude(value)
-            for key, value in state.heard.items()
+            for key, value in state.active.items()
             if value != 0.0
         }
     )
@@ -171,7 +171,7 @@ def answer(state: AppState, picked: Picked, exaggeration: float) -> Answer:
         side = "workpiece" if loop is Loop.WORKPIECE else "tool"
         pose = branch_pose(model, side, coordinates)
         point = transforms.apply(pose, np.asarray(picked.point_mm))
-    found = explain(model, heard_errors(state), coordinates, state.scene.view(loop), point)
+    found = explain(model, active_errors(state), coordinates, state.scene.view(loop), point)
     shift = np.zeros(3) if picked.point_mm is not None else _shift_mm(state, at, point)
     drawn = deform(found.nominal_mm + shift, found.error_um, exaggeration)
     return Answer(at, loop, found, shift, drawn)

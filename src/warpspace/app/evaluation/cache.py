@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar
 T = TypeVar("T")
 
 
-class Kept(Generic[T]):
+class Cache(Generic[T]):
     """The latest results of slow functions, up to a number of bytes, for all sessions together."""
 
     def __init__(self, limit_bytes: int) -> None:
@@ -31,14 +31,14 @@ class Kept(Generic[T]):
         return value
 
 
-class Same:
+class Identity:
     """An object as part of a key, compared by identity (and held, so that its id stays its own)."""
 
     def __init__(self, thing: Any) -> None:
         self.thing = thing
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Same) and other.thing is self.thing
+        return isinstance(other, Identity) and other.thing is self.thing
 
     def __hash__(self) -> int:
         return id(self.thing)

@@ -23,7 +23,7 @@ from warpspace.scene.model import Scene
 from warpspace.units import Array
 
 if TYPE_CHECKING:
-    from warpspace.app.evaluation.evaluate import Frame, TraceLines
+    from warpspace.app.evaluation.evaluate import LivePicture, TraceLines
 
 SAME_PLACE_MM = 1e-6
 
@@ -65,28 +65,28 @@ class Compared:
         return {"a": f"A: {a}", "b": f"B: {b}", "difference": f"A − B: {a} − {b}"}[self.shown]
 
 
-def drawn_title(frame: "Frame") -> str:
+def drawn_title(picture: "LivePicture") -> str:
     """Name what is drawn: the scene, or a side of a comparison, or the difference."""
-    return frame.state.scene.title if frame.compared is None else frame.compared.title
+    return picture.state.scene.title if picture.compared is None else picture.compared.title
 
 
-def is_difference(frame: "Frame") -> bool:
+def is_difference(picture: "LivePicture") -> bool:
     """Tell whether a difference of two states is drawn."""
-    return frame.compared is not None and frame.compared.shown == "difference"
+    return picture.compared is not None and picture.compared.shown == "difference"
 
 
-def both_words(frame: "Frame", word: Callable[[AppState], str]) -> str:
+def both_words(picture: "LivePicture", word: Callable[[AppState], str]) -> str:
     """Say something of what is drawn; of a difference for both sides where they are not alike.
 
     Parameters
     ----------
-    frame : Frame
+    picture : LivePicture
     word : callable
         Says it of a state.
     """
-    found = frame.compared
-    if found is None or not is_difference(frame):
-        return word(frame.subject or frame.state)
+    found = picture.compared
+    if found is None or not is_difference(picture):
+        return word(picture.subject or picture.state)
     a, b = (word(side) for side in found.sides)
     return a if a == b else f"{a} − {b}"
 
@@ -147,7 +147,7 @@ def pinned_side(state: AppState) -> Side:
     return Side(f"snapshot: {title}", plain)
 
 
-def compare_frames(single: "Callable[[AppState], Frame]", state: AppState) -> "Frame":
+def compare_pictures(single: "Callable[[AppState], LivePicture]", state: AppState) -> "LivePicture":
     """Evaluate a state that compares two.
 
     Parameters
@@ -159,16 +159,18 @@ def compare_frames(single: "Callable[[AppState], Frame]", state: AppState) -> "F
 
     Returns
     -------
-    Frame
-        Of what is drawn; `Frame.subject` is the side it shows.
+    LivePicture
+        Of what is drawn; `LivePicture.subject` is the side it shows.
     """
     chosen = state.comparison
     other_side = chosen.b or Side()
     first = [single(side_state(state, side)) for side in (chosen.a, other_side)]
-    factor = state.exaggeration or min(frame.exaggeration for frame in first)
+    factor = state.exaggeration or min(picture.exaggeration for picture in first)
     a, b = (
-        frame if frame.exaggeration == factor else single(replace(frame.state, exaggeration=factor))
-        for frame in first
+        picture
+        if picture.exaggeration == factor
+        else single(replace(picture.state, exaggeration=factor))
+        for picture in first
     )
     refused = _why_not(a, b)
     difference = None if refused else _difference(a, b, factor)
@@ -196,14 +198,14 @@ def _title(state: AppState, side: Side) -> str:
     return side.title if side.state else f"now, {state.scene.title or state.scene.name}"
 
 
-def _why_not(a: "Frame", b: "Frame") -> str:
+def _why_not(a: "LivePicture", b: "LivePicture") -> str:
     """Say why there is no difference; empty where there is one."""
     if not _same_place(a.grid.nominal_mm, b.grid.nominal_mm):
         return "The working volumes are not the same, so there is no difference node by node."
     return ""
 
 
-def _difference(a: "Frame", b: "Frame", factor: float) -> "Frame":
+def _difference(a: "LivePicture", b: "LivePicture", factor: float) -> "LivePicture":
     """Subtract b from a: node by node, slice by slice and trace by trace."""
     field = _subtract(a.field, b.field)
     return replace(
@@ -226,7 +228,7 @@ def _subtract(one: ErrorField, two: ErrorField) -> ErrorField:
     )
 
 
-def _slice_differences(a: "Frame", b: "Frame", factor: float) -> tuple[SliceMap, ...]:
+def _slice_differences(a: "LivePicture", b: "LivePicture", factor: float) -> tuple[SliceMap, ...]:
     """Subtract what the model says on the slices themselves, where both lie in one place."""
     return tuple(
         draw_slice(
@@ -242,7 +244,7 @@ def _same_place(one: Array, two: Array) -> bool:
     return one.shape == two.shape and np.allclose(one, two, rtol=0.0, atol=SAME_PLACE_MM)
 
 
-def _trace_differences(a: "Frame", b: "Frame") -> "tuple[TraceLines, ...]":
+def _trace_differences(a: "LivePicture", b: "LivePicture") -> "tuple[TraceLines, ...]":
     """Subtract traces where they are the same ones."""
     found: list[TraceLines] = []
     for one, two in zip(a.traces, b.traces, strict=False):
@@ -251,12 +253,12 @@ def _trace_differences(a: "Frame", b: "Frame") -> "tuple[TraceLines, ...]":
     return tuple(found)
 
 
-def _shared_scale(state: AppState, maps: "list[Frame]") -> ColourScale:
+def _shared_scale(state: AppState, maps: "list[LivePicture]") -> ColourScale:
     """Give one colour scale that holds all maps."""
-    widest = max((frame.scale for frame in maps), key=lambda scale: scale.high)
+    widest = max((picture.scale for picture in maps), key=lambda scale: scale.high)
     if state.look.range_mode == "fixed":
         return maps[0].scale
-    largest = max(float(np.abs(frame.values).max()) for frame in maps)
+    largest = max(float(np.abs(picture.values).max()) for picture in maps)
     if largest <= widest.high:
         return widest
     found = build_scale(largest, state.component)

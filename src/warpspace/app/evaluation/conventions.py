@@ -191,7 +191,7 @@ class Effects:
                 held = with_reference(own, state.scene.reference)
                 self._bases["reference=point"] = _response(held)
             self._bases["all"] = _response(state)
-        amplitudes = np.fromiter(state.heard.values(), float, len(state.amplitudes))
+        amplitudes = np.fromiter(state.active.values(), float, len(state.amplitudes))
         base = self._own
         found = {choice: Effect(choice, 0.0, 0.0) for choice in choices(state)}
         for choice, response in self._bases.items():

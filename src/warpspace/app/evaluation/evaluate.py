@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpspace.analysis.statistics import Statistics, statistics
-from warpspace.app.evaluation.cache import Kept, Same
+from warpspace.app.evaluation.cache import Cache, Identity
 from warpspace.app.evaluation.colouring import choose_scale, shown_values
-from warpspace.app.evaluation.compare import Compared, compare_frames
+from warpspace.app.evaluation.compare import Compared, compare_pictures
 from warpspace.app.evaluation.slices import SliceMap, SliceSource
 from warpspace.app.evaluation.topology import Topology, topology
 from warpspace.app.state.app_state import AppState
@@ -31,7 +31,7 @@ TRACE_SAMPLES = 73
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class LivePicture:
     """One picture in numbers, mm and µm in R.
 
     Attributes
@@ -102,21 +102,21 @@ class LiveModel:
     """Turns states into frames; one for all sessions, usable from any thread."""
 
     def __init__(self) -> None:
-        self._kept: Kept[Response] = Kept(KEPT_BYTES)
+        self._cache: Cache[Response] = Cache(KEPT_BYTES)
         self._slices = SliceSource()
 
     def response(self, state: AppState) -> Response:
         """Give grid and responses of a state, kept from an earlier one where possible."""
         key = (
-            Same(state.scene),
+            Identity(state.scene),
             state.nodes,
             tuple(state.positions.items()),
             state.loop,
             state.rotary,
         )
-        return self._kept.get(key, lambda: _build(state), lambda response: response.size)
+        return self._cache.get(key, lambda: _build(state), lambda response: response.size)
 
-    def frame(self, state: AppState) -> Frame:
+    def evaluate(self, state: AppState) -> LivePicture:
         """Evaluate a state.
 
         Parameters
@@ -125,23 +125,23 @@ class LiveModel:
 
         Returns
         -------
-        Frame
+        LivePicture
             Where two states are compared, of the one that is drawn.
         """
         if state.comparison.b is not None:
-            return compare_frames(self._single, state)
+            return compare_pictures(self._single, state)
         return self._single(state)
 
-    def _single(self, state: AppState) -> Frame:
+    def _single(self, state: AppState) -> LivePicture:
         """Evaluate a state without what it is compared with."""
         response = self.response(state)
         grid = response.grid
-        amplitudes = np.fromiter(state.heard.values(), float, len(state.amplitudes))
+        amplitudes = np.fromiter(state.active.values(), float, len(state.amplitudes))
         field = response.basis.evaluate(amplitudes, orientation=state.look.tilts)
         found = statistics(field)
         factor = state.exaggeration or auto_exaggeration(found.max_um, grid.longest_edge_mm)
         values = shown_values(state, field)
-        return Frame(
+        return LivePicture(
             state,
             grid,
             field,

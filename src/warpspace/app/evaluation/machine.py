@@ -1,4 +1,4 @@
-"""The schematic machine of a frame: where its bodies and its tool point are drawn."""
+"""The schematic machine of a picture: where its bodies and its tool point are drawn."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpspace.app.evaluation.colouring import shown_values
-from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.evaluation.evaluate import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import linear_positions
 from warpspace.bodies.placed import Body, load_bodies, place_points, view_motions
@@ -77,18 +77,20 @@ def machine_motions(
     return view_motions(
         scene.model,
         scene.errors,
-        state.heard,
+        state.active,
         machine_positions(state, turned),
         scene.view(state.loop),
     )
 
 
-def drawn_bodies(frame: Frame, turned: Mapping[str, float] | None = None) -> tuple[DrawnBody, ...]:
-    """Place the bodies of a frame's machine, bent where that is chosen.
+def drawn_bodies(
+    picture: LivePicture, turned: Mapping[str, float] | None = None
+) -> tuple[DrawnBody, ...]:
+    """Place the bodies of a picture's machine, bent where that is chosen.
 
     Parameters
     ----------
-    frame : Frame
+    picture : LivePicture
     turned : mapping of str to float, degrees, optional
         Axes that are being turned at the moment.
 
@@ -97,8 +99,8 @@ def drawn_bodies(frame: Frame, turned: Mapping[str, float] | None = None) -> tup
     tuple of DrawnBody
         Empty for a machine without bodies.
     """
-    state = frame.state
-    factor = frame.exaggeration if state.machine.bent else 0.0
+    state = picture.state
+    factor = picture.exaggeration if state.machine.bent else 0.0
     motions = machine_motions(state, turned)
     return tuple(
         DrawnBody(
@@ -110,19 +112,19 @@ def drawn_bodies(frame: Frame, turned: Mapping[str, float] | None = None) -> tup
     )
 
 
-def tool_point(frame: Frame) -> ToolPoint:
-    """Find the tool point in the deformed grid of a frame.
+def tool_point(picture: LivePicture) -> ToolPoint:
+    """Find the tool point in the deformed grid of a picture.
 
     Parameters
     ----------
-    frame : Frame
+    picture : LivePicture
 
     Returns
     -------
     ToolPoint
         Evaluated where the axes stand, so that it lies in the grid between its nodes too.
     """
-    state, scene = frame.state, frame.state.scene
+    state, scene = picture.state, picture.state.scene
     coordinates = complete_coordinates(scene.machine, machine_positions(state))
     motion = machine_motions(state)["t"]
     nominal = transforms.apply(motion.nominal, scene.model.tool_point_mm)
@@ -134,20 +136,20 @@ def tool_point(frame: Frame) -> ToolPoint:
         scene.view(state.loop),
         nominal,
     )
-    field = basis.evaluate(np.array([state.heard[key] for key in basis.keys]))
+    field = basis.evaluate(np.array([state.active[key] for key in basis.keys]))
     return ToolPoint(
         nominal,
-        deform(nominal, field.error_um, frame.exaggeration),
+        deform(nominal, field.error_um, picture.exaggeration),
         float(shown_values(state, field)),
         field.error_um,
     )
 
 
-def machine_room_mm(frame: Frame) -> Array:
+def machine_room_mm(picture: LivePicture) -> Array:
     """Give the points of the nominal machine and the corners of the grid, [n, 3], mm."""
-    motions = machine_motions(frame.state)
+    motions = machine_motions(picture.state)
     placed = [
         place_points(motions[body.frame], body.vertices_mm, 0.0)
-        for body in load_bodies(frame.state.scene.machine)
+        for body in load_bodies(picture.state.scene.machine)
     ]
-    return np.concatenate([frame.grid.bounds_mm, *placed])
+    return np.concatenate([picture.grid.bounds_mm, *placed])

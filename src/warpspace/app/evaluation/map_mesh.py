@@ -1,11 +1,11 @@
-"""The coloured map of a frame as triangles and pieces of line: whole, cut open, or in slices."""
+"""The coloured map of a picture as triangles and pieces of line: whole, cut open, or in slices."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.evaluation.evaluate import LivePicture
 from warpspace.app.evaluation.topology import Topology, topology
 from warpspace.geometry.isolines import isoline_levels, isoline_segments
 from warpspace.geometry.surfaces import Index, line_spacing
@@ -27,7 +27,7 @@ class MapMesh:
     vertices_mm : ndarray, [M, 3], mm
     triangles : ndarray, [T, 3] or [S, 2]
     values : ndarray, [M]
-        What is coloured, in the unit of the frame's scale.
+        What is coloured, in the unit of the picture's scale.
     """
 
     vertices_mm: Array
@@ -54,11 +54,13 @@ class Part:
         ]
 
 
-def map_parts(frame: Frame) -> list[Part]:
+def map_parts(picture: LivePicture) -> list[Part]:
     """List the grids that a map consists of; a slice is seen from both sides."""
-    lift = LIFT * frame.grid.longest_edge_mm
-    if not frame.slices:
-        return [Part(frame.drawn_mm, frame.values, frame.topology, (lift,), frame.grid.ways)]
+    lift = LIFT * picture.grid.longest_edge_mm
+    if not picture.slices:
+        return [
+            Part(picture.drawn_mm, picture.values, picture.topology, (lift,), picture.grid.ways)
+        ]
     return [
         Part(
             part.drawn_mm,
@@ -67,44 +69,44 @@ def map_parts(frame: Frame) -> list[Part]:
             (lift, -lift),
             part.grid.ways,
         )
-        for part in frame.slices
+        for part in picture.slices
     ]
 
 
-def drafted(frame: Frame) -> Frame:
+def drafted(picture: LivePicture) -> LivePicture:
     """Thin out a map to every second node along each axis, a third of the bytes.
 
     Parameters
     ----------
-    frame : Frame
+    picture : LivePicture
 
     Returns
     -------
-    Frame
+    LivePicture
         The same one where thinning would move its grid lines or its cut, and where slices are
         drawn. Statistics, scale and everything else in it stay those of all nodes.
     """
-    shape = tuple(nodes // 2 + 1 for nodes in frame.grid.shape)
+    shape = tuple(nodes // 2 + 1 for nodes in picture.grid.shape)
     fits = all(
         nodes % 4 == 1 and line_spacing(nodes) == 2 * line_spacing(thin)
-        for nodes, thin in zip(frame.grid.shape, shape, strict=True)
+        for nodes, thin in zip(picture.grid.shape, shape, strict=True)
     )
-    if frame.slices or not fits:
-        return frame
+    if picture.slices or not fits:
+        return picture
     return replace(
-        frame,
-        drawn_mm=np.ascontiguousarray(frame.drawn_mm[::2, ::2, ::2]),
-        values=np.ascontiguousarray(frame.values[::2, ::2, ::2]),
-        topology=topology((shape[0], shape[1], shape[2]), cut=frame.state.look.surface == "cut"),
+        picture,
+        drawn_mm=np.ascontiguousarray(picture.drawn_mm[::2, ::2, ::2]),
+        values=np.ascontiguousarray(picture.values[::2, ::2, ::2]),
+        topology=topology((shape[0], shape[1], shape[2]), cut=picture.state.look.surface == "cut"),
     )
 
 
-def map_mesh(frame: Frame) -> MapMesh:
+def map_mesh(picture: LivePicture) -> MapMesh:
     """Collect the triangles of a map.
 
     Parameters
     ----------
-    frame : Frame
+    picture : LivePicture
 
     Returns
     -------
@@ -113,7 +115,7 @@ def map_mesh(frame: Frame) -> MapMesh:
     vertices: list[Array] = []
     triangles: list[NDArray[np.intp]] = []
     values: list[Array] = []
-    parts = map_parts(frame)
+    parts = map_parts(picture)
     if len(parts) == 1:
         surface = parts[0].drawn_of.surface
         return MapMesh(
@@ -131,24 +133,24 @@ def map_mesh(frame: Frame) -> MapMesh:
     return MapMesh(np.concatenate(vertices), np.concatenate(triangles), np.concatenate(values))
 
 
-def grid_pieces(frame: Frame) -> Pieces:
+def grid_pieces(picture: LivePicture) -> Pieces:
     """Collect the grid lines on a map, [S, 2, 3], mm."""
     return _joined(
         [
             pieces
-            for part in map_parts(frame)
+            for part in map_parts(picture)
             for pieces in part.pieces(part.drawn_of.grid_segments, part.drawn_of.grid_outwards, 1.0)
         ]
     )
 
 
-def line_mesh(frame: Frame) -> MapMesh:
+def line_mesh(picture: LivePicture) -> MapMesh:
     """Collect grid lines and edges of a map as pieces of line between nodes, [S, 2]."""
     vertices: list[Array] = []
     segments: list[NDArray[np.intp]] = []
     values: list[Array] = []
     count = 0
-    for part in map_parts(frame):
+    for part in map_parts(picture):
         of = part.drawn_of
         used, numbered = np.unique(
             np.concatenate([of.grid_segments, of.edge_segments]), return_inverse=True
@@ -160,21 +162,21 @@ def line_mesh(frame: Frame) -> MapMesh:
     return MapMesh(np.concatenate(vertices), np.concatenate(segments), np.concatenate(values))
 
 
-def edge_pieces(frame: Frame) -> Pieces:
+def edge_pieces(picture: LivePicture) -> Pieces:
     """Collect the edges of a map, [S, 2, 3], mm."""
     return _joined(
         [
             part.pieces(part.drawn_of.edge_segments, part.drawn_of.edge_outwards, EDGE_LIFT)[0]
-            for part in map_parts(frame)
+            for part in map_parts(picture)
         ]
     )
 
 
-def isoline_pieces(frame: Frame) -> Pieces:
+def isoline_pieces(picture: LivePicture) -> Pieces:
     """Collect the lines of equal value on a map, at the ticks of its scale, [S, 2, 3], mm."""
-    levels = isoline_levels(frame.scale)
+    levels = isoline_levels(picture.scale)
     found: list[Pieces] = []
-    for part in map_parts(frame):
+    for part in map_parts(picture):
         nodes, values = part.drawn_mm.reshape(-1, 3), part.values.reshape(-1)
         faces, normals = part.drawn_of.faces, part.drawn_of.normals * part.ways
         found += [

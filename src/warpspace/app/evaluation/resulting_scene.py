@@ -38,6 +38,6 @@ def scene_of(state: AppState) -> Scene:
     )
 
 
-def heard_scene(state: AppState) -> Scene:
+def active_scene(state: AppState) -> Scene:
     """Give the scene as it is drawn: what is silenced by solo and mute is left out."""
-    return scene_of(replace(state, amplitudes=dict(state.heard)))
+    return scene_of(replace(state, amplitudes=dict(state.active)))

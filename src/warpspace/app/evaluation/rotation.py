@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.evaluation.evaluate import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.units import Array
 
@@ -32,23 +32,23 @@ def played_position(state: AppState, angle_deg: float) -> dict[str, float]:
     return {axis: low + (swing if swing <= high - low else 2.0 * (high - low) - swing)}
 
 
-def points_on_traces(frame: Frame, position: dict[str, float]) -> tuple[Array, Array]:
+def points_on_traces(picture: LivePicture, position: dict[str, float]) -> tuple[Array, Array]:
     """Find where the traced points are at a position of the played axis.
 
     Parameters
     ----------
-    frame : Frame
+    picture : LivePicture
     position : dict of str to float, degrees
         As `played_position` gives it.
 
     Returns
     -------
     tuple of ndarray, [n, 3], mm
-        Nominal, and as drawn: on the circles of the frame, one a trace over that axis.
+        Nominal, and as drawn: on the circles of the picture, one a trace over that axis.
     """
     nominal: list[Array] = []
     actual: list[Array] = []
-    for lines in frame.traces:
+    for lines in picture.traces:
         for number, trace in enumerate(lines.group.traces):
             if trace.axis in position:
                 sweep = lines.group.coordinates[trace.axis][number]

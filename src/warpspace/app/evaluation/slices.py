@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from warpspace.app.evaluation.cache import Kept, Same
+from warpspace.app.evaluation.cache import Cache, Identity
 from warpspace.app.evaluation.colouring import shown_values
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import slice_positions
@@ -45,7 +45,7 @@ class SliceSource:
     """Slices of states; usable from any thread."""
 
     def __init__(self) -> None:
-        self._kept: Kept[tuple[Grid, ErrorBasis]] = Kept(KEPT_BYTES)
+        self._cache: Cache[tuple[Grid, ErrorBasis]] = Cache(KEPT_BYTES)
 
     def maps(self, state: AppState, amplitudes: Array, exaggeration: float) -> tuple[SliceMap, ...]:
         """Evaluate the slices of a state; none where it does not show any.
@@ -73,14 +73,14 @@ class SliceSource:
         """Give grid and response of one slice."""
         scene = state.scene
         turned = tuple(state.positions.items())
-        key = (Same(scene), state.nodes, turned, state.loop, axis, at)
+        key = (Identity(scene), state.nodes, turned, state.loop, axis, at)
 
         def build() -> tuple[Grid, ErrorBasis]:
             workspace = scene.workspace.moved(state.positions)
             grid = build_slice(scene.model, workspace, axis, at, state.nodes)
             return grid, grid_basis(scene, grid, scene.view(state.loop))
 
-        return self._kept.get(key, build, _size)
+        return self._cache.get(key, build, _size)
 
 
 def draw_slice(

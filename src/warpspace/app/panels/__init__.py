@@ -1,7 +1,7 @@
 """The panels of the page, one module each.
 
 A panel binds widgets to the state: `read` takes what a browser has set and returns the new state,
-`show` makes the widgets show a frame. Neither knows of other panels or of threads.
+`show` makes the widgets show a picture. Neither knows of other panels or of threads.
 """
 
 from collections.abc import Callable
@@ -10,15 +10,15 @@ from typing import Protocol, runtime_checkable
 
 from viser import GuiApi
 
-from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.evaluation.evaluate import LivePicture
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.shared_state import Board, Update
+from warpspace.app.state.store import StateStore, Update
 
-__all__ = ["Choosy", "Desk", "Panel", "Settling", "Update"]
+__all__ = ["Deferred", "Panel", "PanelContext", "Selective", "Update"]
 
 
 @dataclass(frozen=True, slots=True)
-class Desk:
+class PanelContext:
     """What a panel gets from its session.
 
     Attributes
@@ -32,7 +32,7 @@ class Desk:
     act : callable
         To be called from callbacks with something to be done beside the state (undo, a modal):
         it is done by the session's worker, and what it raises is shown and logged.
-    board : callable
+    store : callable
         Gives the board with state and history.
     notify : callable
         Shows a message in this tab: title, text, colour. For the worker.
@@ -42,7 +42,7 @@ class Desk:
     changed: Callable[[], None]
     post: Callable[[Update], None]
     act: Callable[[Callable[[], None]], None]
-    board: Callable[[], Board]
+    store: Callable[[], StateStore]
     notify: Callable[[str, str, str], None]
 
 
@@ -53,24 +53,24 @@ class Panel(Protocol):
         """Take over what a browser has set since the last call."""
         ...
 
-    def show(self, frame: Frame) -> None:
-        """Make the widgets show a frame."""
+    def show(self, picture: LivePicture) -> None:
+        """Make the widgets show a picture."""
         ...
 
 
 @runtime_checkable
-class Choosy(Protocol):
-    """A part of the page that need not follow every frame."""
+class Selective(Protocol):
+    """A part of the page that need not follow every picture."""
 
-    def concerns(self, frame: Frame) -> tuple[object, ...]:
-        """Give what it shows of a frame; as long as that is equal it is not asked to show it."""
+    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
+        """Give what it shows of a picture; as long as that is equal it is not asked to show it."""
         ...
 
 
 @runtime_checkable
-class Settling(Protocol):
+class Deferred(Protocol):
     """A panel with something slow that follows when changes pause."""
 
-    def settle(self, frame: Frame) -> None:
+    def settle(self, picture: LivePicture) -> None:
         """Bring charts up to date; some tens of milliseconds at most."""
         ...

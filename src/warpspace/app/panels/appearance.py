@@ -4,10 +4,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from warpspace.app.browser.handles import Bound
-from warpspace.app.evaluation.cache import Same
-from warpspace.app.evaluation.evaluate import Frame
-from warpspace.app.panels import Desk
+from warpspace.app.browser.handles import Input
+from warpspace.app.evaluation.cache import Identity
+from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.panels import PanelContext
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import RANGES, SURFACES, slice_positions, slice_spans
 from warpspace.app.viewport.named_views import VIEWS
@@ -33,15 +33,15 @@ class CameraPanel:
 
     Parameters
     ----------
-    desk : Desk
+    context : PanelContext
     choose : callable
         Takes a named view or None, and whether to be orthographic or None.
     """
 
-    def __init__(self, desk: Desk, choose: Choose) -> None:
+    def __init__(self, context: PanelContext, choose: Choose) -> None:
         keys = {name: key for key, name in VIEW_NAMES.items()}
         assert set(keys.values()) == set(VIEWS)  # noqa: S101 - names and views belong together
-        buttons = desk.gui.add_button_group(
+        buttons = context.gui.add_button_group(
             "Camera",
             tuple(keys),
             hint="Look from the operator's side, the front, the right, above.",
@@ -49,28 +49,28 @@ class CameraPanel:
 
         def look_from(event: Any) -> None:
             view = keys[event.target.value]
-            desk.act(lambda: choose(view, None))
+            context.act(lambda: choose(view, None))
 
         buttons.on_click(look_from)
-        self._choose, self._desk = choose, desk
-        self._lens: Bound[bool] = Bound(
-            desk.gui.add_checkbox(
+        self._choose, self._context = choose, context
+        self._lens: Input[bool] = Input(
+            context.gui.add_checkbox(
                 "Orthographic (telephoto)",
                 initial_value=False,
                 hint="From far away with a narrow lens: parallel edges stay parallel.",
             ),
-            desk.changed,
+            context.changed,
         )
 
     def read(self, state: AppState) -> AppState:
         """Pass a change of the lens on; it is no part of the state."""
         on = self._lens.poll()
         if on is not None:
-            self._desk.act(lambda: self._choose(None, on))
+            self._context.act(lambda: self._choose(None, on))
         return state
 
-    def show(self, frame: Frame) -> None:
-        """Nothing follows the frame."""
+    def show(self, picture: LivePicture) -> None:
+        """Nothing follows the picture."""
 
 
 class LooksPanel:
@@ -78,19 +78,19 @@ class LooksPanel:
 
     Parameters
     ----------
-    desk : Desk
+    context : PanelContext
     state : AppState
     """
 
-    def __init__(self, desk: Desk, state: AppState) -> None:
-        self._desk = desk
+    def __init__(self, context: PanelContext, state: AppState) -> None:
+        self._context = context
         self._surface = self._names(
             "Show as", SURFACES, state.look.surface, "How the volume is drawn."
         )
-        self._home: Any = desk.gui.add_folder(None)
+        self._home: Any = context.gui.add_folder(None)
         self._scene: Scene | None = None
         self._folder: Any = None
-        self._slices: dict[str, Bound[float]] = {}
+        self._slices: dict[str, Input[float]] = {}
         self._quantity = self._names(
             "Colour shows", QUANTITY_NAMES, state.look.quantity, "Which error the colours mean."
         )
@@ -101,20 +101,20 @@ class LooksPanel:
             "auto: round ends for what is shown. fixed: the number below. shared: one range for"
             " all components, for now and for the scene as opened.",
         )
-        self._top: Bound[float] = Bound(
-            desk.gui.add_number(
+        self._top: Input[float] = Input(
+            context.gui.add_number(
                 "Range ends at [µm or µrad]",
                 initial_value=state.look.range_top,
                 min=0.001,
                 max=1e6,
                 hint="End of a fixed range; signed components run from minus to plus.",
             ),
-            desk.changed,
+            context.changed,
         )
-        self._switches: dict[str, Bound[bool]] = {
-            name: Bound(
-                desk.gui.add_checkbox(text, initial_value=getattr(state.look, name), hint=hint),
-                desk.changed,
+        self._switches: dict[str, Input[bool]] = {
+            name: Input(
+                context.gui.add_checkbox(text, initial_value=getattr(state.look, name), hint=hint),
+                context.changed,
             )
             for name, (text, hint) in SWITCHES.items()
         }
@@ -122,12 +122,12 @@ class LooksPanel:
 
     def _names(
         self, label: str, names: Mapping[str, str], value: str, hint: str
-    ) -> tuple[Bound[str], Mapping[str, str]]:
+    ) -> tuple[Input[str], Mapping[str, str]]:
         """Add a dropdown of names."""
-        handle = self._desk.gui.add_dropdown(
+        handle = self._context.gui.add_dropdown(
             label, tuple(names.values()), initial_value=names[value], hint=hint
         )
-        return Bound(handle, self._desk.changed), names
+        return Input(handle, self._context.changed), names
 
     def _build(self, state: AppState) -> None:
         """Add the sliders of the slices of a scene."""
@@ -136,19 +136,19 @@ class LooksPanel:
         self._scene = state.scene
         positions = slice_positions(state.scene, state.look, state.machine)
         with self._home:
-            self._folder = self._desk.gui.add_folder("Slices", visible=False)
+            self._folder = self._context.gui.add_folder("Slices", visible=False)
         with self._folder:
-            self._follow: Bound[bool] = Bound(
-                self._desk.gui.add_checkbox(
+            self._follow: Input[bool] = Input(
+                self._context.gui.add_checkbox(
                     "Through the tool point",
                     initial_value=state.look.follow,
                     hint="The slices go where the machine's X, Y and Z stand.",
                 ),
-                self._desk.changed,
+                self._context.changed,
             )
             self._slices = {
-                axis: Bound(
-                    self._desk.gui.add_slider(
+                axis: Input(
+                    self._context.gui.add_slider(
                         f"Slice {PLANES[axis]} at {axis} [mm]",
                         min=span.low,
                         max=span.high,
@@ -156,7 +156,7 @@ class LooksPanel:
                         initial_value=positions[axis],
                         hint=f"Where the {PLANES[axis]} plane is cut.",
                     ),
-                    self._desk.changed,
+                    self._context.changed,
                 )
                 for axis, span in slice_spans(state.scene).items()
             }
@@ -189,14 +189,19 @@ class LooksPanel:
                 look = look.switched(**{name: on})
         return state if look is state.look else replace(state, look=look)
 
-    def concerns(self, frame: Frame) -> tuple[object, ...]:
+    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
         """Give what the widgets show."""
-        state = frame.state
-        return Same(state.scene), Same(state.look), Same(state.machine), frame.scale.high
+        state = picture.state
+        return (
+            Identity(state.scene),
+            Identity(state.look),
+            Identity(state.machine),
+            picture.scale.high,
+        )
 
-    def show(self, frame: Frame) -> None:
+    def show(self, picture: LivePicture) -> None:
         """Make the widgets show the state."""
-        state, look = frame.state, frame.state.look
+        state, look = picture.state, picture.state.look
         if self._scene is None or state.scene.workspace != self._scene.workspace:
             self._build(state)
         self._folder.visible = look.surface == "slices" and bool(self._slices)
@@ -206,7 +211,7 @@ class LooksPanel:
             (self._range, look.range_mode),
         ):
             bound.show(names[key])
-        self._top.show(look.range_top if look.range_mode == "fixed" else frame.scale.high)
+        self._top.show(look.range_top if look.range_mode == "fixed" else picture.scale.high)
         self._follow.show(look.follow)
         for axis, position in slice_positions(state.scene, look, state.machine).items():
             if axis in self._slices:

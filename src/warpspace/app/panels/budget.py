@@ -3,14 +3,14 @@
 import numpy as np
 
 from warpspace.app.browser.clicks import Clicks
-from warpspace.app.browser.handles import Told
+from warpspace.app.browser.handles import Handle
 from warpspace.app.evaluation.budget import answer, with_lever, with_picked
 from warpspace.app.evaluation.compare import is_difference
-from warpspace.app.evaluation.evaluate import Frame
-from warpspace.app.panels import Desk
+from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.panels import PanelContext
 from warpspace.app.readouts.budget import ASK, REFUSED, answer_html
+from warpspace.app.server.tab_context import TabContext
 from warpspace.app.server.tab_memory import CameraMemory
-from warpspace.app.server.tab_services import Outside
 from warpspace.app.state.app_state import AppState
 from warpspace.app.viewport.camera import fit_camera, heading_share
 from warpspace.app.viewport.layers import SCENE_PER_MM
@@ -21,63 +21,63 @@ class WhyPanel:
 
     Parameters
     ----------
-    desk : Desk
-    outside : Outside
+    context : PanelContext
+    tab : TabContext
     """
 
-    def __init__(self, desk: Desk, outside: Outside) -> None:
-        gui = desk.gui
-        self._desk, self._outside = desk, outside
-        self._clicks = Clicks(gui, lambda key: desk.post(lambda s: with_lever(s, key)))
-        self._text = Told(gui.add_html(ASK))
+    def __init__(self, context: PanelContext, tab: TabContext) -> None:
+        gui = context.gui
+        self._context, self._tab = context, tab
+        self._clicks = Clicks(gui, lambda key: context.post(lambda s: with_lever(s, key)))
+        self._text = Handle(gui.add_html(ASK))
         far = gui.add_button(
             "Show the whole lever",
             color="gray",
             visible=False,
             hint="Move the camera back until axis, lever and box are all in view (F goes back).",
         )
-        far.on_click(lambda _: desk.act(self._stand_back))
+        far.on_click(lambda _: context.act(self._stand_back))
         clear = gui.add_button(
             "Clear",
             color="gray",
             visible=False,
             hint="Forget the point (N does the same).",
         )
-        clear.on_click(lambda _: desk.post(forget))
-        self._far, self._clear = Told(far), Told(clear)
+        clear.on_click(lambda _: context.post(forget))
+        self._far, self._clear = Handle(far), Handle(clear)
         command = gui.add_command("Forget the point", description="End the question", hotkey="N")
-        command.on_trigger(lambda _: desk.post(forget))
+        command.on_trigger(lambda _: context.post(forget))
 
     def read(self, state: AppState) -> AppState:
         """Nothing to take over: clicks post what they change."""
         return state
 
-    def show(self, frame: Frame) -> None:
+    def show(self, picture: LivePicture) -> None:
         """Explain the point in the state that is drawn."""
-        state = frame.subject or frame.state
-        picked = frame.state.picked
+        state = picture.subject or picture.state
+        picked = picture.state.picked
         self._clear.put(visible=picked is not None)
-        self._far.put(visible=picked is not None and bool(frame.state.lever))
+        self._far.put(visible=picked is not None and bool(picture.state.lever))
         if picked is None:
             self._text.put(content=ASK)
-        elif is_difference(frame):
+        elif is_difference(picture):
             self._text.put(content=REFUSED)
         else:
-            found = answer(state, picked, frame.exaggeration)
-            self._text.put(content=answer_html(found, frame.state.lever, self._clicks.attributes))
+            found = answer(state, picked, picture.exaggeration)
+            self._text.put(content=answer_html(found, picture.state.lever, self._clicks.attributes))
 
     def _stand_back(self) -> None:
         """Move the camera back until the frame of the chosen contribution is in view."""
-        frame, camera = self._outside.shown(), self._outside.camera()
-        if frame is None or frame.state.picked is None:
+        picture, camera = self._tab.shown(), self._tab.camera()
+        if picture is None or picture.state.picked is None:
             return
-        found = answer(frame.subject or frame.state, frame.state.picked, frame.exaggeration)
+        found = answer(picture.subject or picture.state, picture.state.picked, picture.exaggeration)
         parts = found.explanation.contributions
-        origins = [p.origin_mm + found.shift_mm for p in parts if p.key == frame.state.lever]
+        origins = [p.origin_mm + found.shift_mm for p in parts if p.key == picture.state.lever]
         if not origins:
             return
-        points = np.concatenate([frame.drawn_mm.reshape(-1, 3), np.stack(origins)])
-        size = self._outside.client.camera
+        points = np.concatenate([picture.drawn_mm.reshape(-1, 3), np.stack(origins)])
+        size = self._tab.client.camera
         width, height = max(size.image_width, 200), max(size.image_height, 200)
         pose = fit_camera(
             points,
@@ -88,7 +88,7 @@ class WhyPanel:
         )
         x, y, z = (float(value) * SCENE_PER_MM for value in pose.position)
         at = tuple(float(value) * SCENE_PER_MM for value in pose.look_at)
-        self._outside.look_from(
+        self._tab.look_from(
             CameraMemory((x, y, z), (at[0], at[1], at[2]), (0.0, 0.0, 1.0), camera.fov_rad)
         )
 

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from warpspace.app.evaluation.evaluate import Frame
-from warpspace.app.panels import Desk, Update
+from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.panels import PanelContext, Update
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import TRUE_SCALE, AppState
 from warpspace.machine.parameters import PARAMETERS
@@ -21,7 +21,7 @@ WORDS = {
     "component": "colour",
     "loop": "loop",
     "nodes": "grid density",
-    "emphasis": "solo and mute",
+    "exclusions": "solo and mute",
     "rotary": "rotary traces",
     "tolerances": "tolerance",
     "specification": "specification",
@@ -69,37 +69,37 @@ class CommandsPanel:
 
     Parameters
     ----------
-    desk : Desk
+    context : PanelContext
     fit_view : callable
         Puts the camera back.
     """
 
-    def __init__(self, desk: Desk, fit_view: Callable[[], None]) -> None:
-        self._desk = desk
+    def __init__(self, context: PanelContext, fit_view: Callable[[], None]) -> None:
+        self._context = context
         self._help: Any = None
-        buttons = desk.gui.add_button_group(
+        buttons = context.gui.add_button_group(
             "History",
             ("Undo", "Redo", "Help"),
             hint="Undo takes the latest change back (Ctrl+Z), Redo does it again (Ctrl+Shift+Z),"
             " Help lists all keys (H).",
         )
         actions = {"Undo": self._undo, "Redo": self._redo, "Help": self._toggle_help}
-        buttons.on_click(lambda event: desk.act(actions[event.target.value]))
+        buttons.on_click(lambda event: context.act(actions[event.target.value]))
         self.commands = self._commands(fit_view)
         for command in self.commands:
-            handle = desk.gui.add_command(
+            handle = context.gui.add_command(
                 command.label,
                 description=command.description,
                 hotkey=command.key,  # pyright: ignore[reportArgumentType]
                 modifier=command.modifier,  # pyright: ignore[reportArgumentType]
             )
-            handle.on_trigger(lambda _, run=command.run: desk.act(run))
+            handle.on_trigger(lambda _, run=command.run: context.act(run))
 
     def _commands(self, fit_view: Callable[[], None]) -> tuple[Command, ...]:
         """List what there is."""
 
         def does(update: Update) -> Callable[[], None]:
-            return lambda: self._desk.post(update)
+            return lambda: self._context.post(update)
 
         def coloured(component: str) -> Callable[[], None]:
             return does(lambda state: state.with_component(component))
@@ -110,7 +110,7 @@ class CommandsPanel:
             Command("Fit view", "Camera to the operator's side", "F", None, fit_view),
             Command("Reset errors", "Values of the scene", "R", None, does(AppState.reset)),
             Command("All errors zero", "The nominal machine", "0", None, does(AppState.zeroed)),
-            Command("Hear all errors", "End solo and mute", "L", None, does(edits.all_heard)),
+            Command("Hear all errors", "End solo and mute", "L", None, does(edits.include_all)),
             Command(
                 "Exaggeration auto",
                 "A round factor that shows the error",
@@ -146,18 +146,18 @@ class CommandsPanel:
 
     def _undo(self) -> None:
         """Take the latest change back and say what it was."""
-        self._say("Undone", self._desk.board().undo())
+        self._say("Undone", self._context.store().undo())
 
     def _redo(self) -> None:
         """Do again what was undone and say what it is."""
-        self._say("Done again", self._desk.board().redo())
+        self._say("Done again", self._context.store().redo())
 
     def _say(self, done: str, what: str) -> None:
         """Tell the user what was changed, or that there is nothing."""
         if what:
-            self._desk.notify(f"{done}: {spell_change(what)}", "", "gray")
+            self._context.notify(f"{done}: {spell_change(what)}", "", "gray")
         else:
-            self._desk.notify(f"Nothing to be {done.lower()}", "", "gray")
+            self._context.notify(f"Nothing to be {done.lower()}", "", "gray")
 
     def _toggle_help(self) -> None:
         """Open the list of keys, or close it."""
@@ -165,18 +165,18 @@ class CommandsPanel:
         if opened is not None:
             opened.close()
             return
-        gui = self._desk.gui
+        gui = self._context.gui
         self._help = gui.add_modal("Keys and help")
         with self._help:
             gui.add_markdown(help_text(self.commands))
             close = gui.add_button("Close", hint="Close this window; H does the same.")
-            close.on_click(lambda _: self._desk.act(self._toggle_help))
+            close.on_click(lambda _: self._context.act(self._toggle_help))
 
     def read(self, state: AppState) -> AppState:
         """Nothing to take over."""
         return state
 
-    def show(self, frame: Frame) -> None:
+    def show(self, picture: LivePicture) -> None:
         """Nothing to show."""
 
 
@@ -203,7 +203,7 @@ def spell_change(what: str) -> str:
             word = f"position of {parts[1]}"
         elif parts[0] == "shown":
             word = WORDS.get(parts[-1], parts[-1].replace("_", " "))
-        elif parts[0] == "emphasis" and name:
+        elif parts[0] == "exclusions" and name:
             word = f"{'solo' if parts[1] == 'soloed' else 'mute'} of {word}"
         words.append(f"tolerance of {word}" if parts[0] == "tolerances" and name else word)
     unique = list(dict.fromkeys(words))

@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from warpspace.app.browser.handles import Bound
-from warpspace.app.evaluation.cache import Same
+from warpspace.app.browser.handles import Input
+from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
-from warpspace.app.evaluation.evaluate import Frame
-from warpspace.app.panels import Desk, Update
+from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.panels import PanelContext, Update
 from warpspace.app.readouts.comparison import MARK, NOTHING, comparison_html, marked
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.comparison import NOBODY, NOW, SHOWN, Side
@@ -20,13 +20,13 @@ class ComparePanel:
 
     Parameters
     ----------
-    desk : Desk
+    context : PanelContext
     scenes : mapping of str to Scene
         Scenes to choose from, by the title shown; it may grow.
     """
 
-    def __init__(self, desk: Desk, scenes: Mapping[str, Scene]) -> None:
-        gui = desk.gui
+    def __init__(self, context: PanelContext, scenes: Mapping[str, Scene]) -> None:
+        gui = context.gui
         self._scenes = scenes
         self._options: tuple[str, ...] = tuple(scenes)
         pin = gui.add_button(
@@ -34,21 +34,21 @@ class ComparePanel:
             color="gray",
             hint="Take a snapshot of what is shown now; changes are then compared with it.",
         )
-        pin.on_click(lambda _: desk.post(with_pin))
-        self._a: Bound[str] = Bound(
+        pin.on_click(lambda _: context.post(with_pin))
+        self._a: Input[str] = Input(
             gui.add_dropdown(
                 "A", (NOW, *scenes), initial_value=NOW, hint="One side; now: what is steered."
             ),
-            desk.changed,
+            context.changed,
         )
-        self._b: Bound[str] = Bound(
+        self._b: Input[str] = Input(
             gui.add_dropdown(
                 "B",
                 (NOBODY, NOW, *scenes),
                 initial_value=NOBODY,
                 hint="The other side. Scenes are taken as opened, at the present rotary positions.",
             ),
-            desk.changed,
+            context.changed,
         )
         self._shown: Any = gui.add_button_group(
             "Drawn",
@@ -56,14 +56,14 @@ class ComparePanel:
             visible=False,
             hint="What is drawn. The difference is taken node by node.",
         )
-        self._shown.on_click(lambda event: desk.post(_drawn(event.target.value)))
-        self._ghost: Bound[bool] = Bound(
+        self._shown.on_click(lambda event: context.post(_drawn(event.target.value)))
+        self._ghost: Input[bool] = Input(
             gui.add_checkbox(
                 "Wireframe of the other",
                 initial_value=True,
                 hint="Edges of the box that is not drawn, dotted.",
             ),
-            desk.changed,
+            context.changed,
         )
         self._text: Any = gui.add_html(NOTHING)
 
@@ -90,13 +90,13 @@ class ComparePanel:
         scene = self._scenes.get(title)
         return None if scene is None else replace(scene_side(scene), title=title)
 
-    def concerns(self, frame: Frame) -> tuple[object, ...]:
+    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
         """Give what the widgets show: the comparison, its numbers, the scenes there are."""
-        return Same(frame.state.comparison), Same(frame.compared), *self._scenes
+        return Identity(picture.state.comparison), Identity(picture.compared), *self._scenes
 
-    def show(self, frame: Frame) -> None:
+    def show(self, picture: LivePicture) -> None:
         """Make the widgets show the comparison."""
-        comparison = frame.state.comparison
+        comparison = picture.state.comparison
         used = (comparison.pinned, comparison.a, comparison.b)
         own = (side.title for side in used if side is not None and side.state is not None)
         # a title twice would end the page's dropdown
@@ -112,7 +112,7 @@ class ComparePanel:
         words = marked(comparison.shown)
         if self._shown.options != words:
             self._shown.options = words
-        self._text.content = comparison_html(frame)
+        self._text.content = comparison_html(picture)
 
 
 def _drawn(text: str) -> Update:

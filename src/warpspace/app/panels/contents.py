@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 
 from warpspace.app.browser.clicks import SCRIPT
-from warpspace.app.panels import Desk, Panel
+from warpspace.app.panels import Panel, PanelContext
 from warpspace.app.panels.appearance import CameraPanel, Choose, LooksPanel
 from warpspace.app.panels.budget import WhyPanel
 from warpspace.app.panels.commands import CommandsPanel
@@ -20,19 +20,19 @@ from warpspace.app.panels.summary import heading_panel, summary_panel
 from warpspace.app.panels.tolerances import ChancePanel
 from warpspace.app.panels.view import ViewPanel
 from warpspace.app.server.pointing import Pointing
-from warpspace.app.server.tab_services import Outside
+from warpspace.app.server.tab_context import TabContext
 from warpspace.app.state.app_state import AppState
 
 Build = Callable[[AppState], Sequence[Panel]]
 
 
-class Contents:
+class PanelBuilder:
     """The panels of one tab.
 
     Parameters
     ----------
-    desk : Desk
-    outside : Outside
+    context : PanelContext
+    tab : TabContext
         Camera, page and files of the tab.
     places : Places
     fit_view : callable
@@ -42,9 +42,9 @@ class Contents:
     """
 
     def __init__(
-        self, desk: Desk, outside: Outside, places: Places, fit_view: Choose, play: Play
+        self, context: PanelContext, tab: TabContext, places: Places, fit_view: Choose, play: Play
     ) -> None:
-        self._desk, self._outside, self._places = desk, outside, places
+        self._context, self._tab, self._places = context, tab, places
         self._fit_view, self._play = fit_view, play
         self._errors: ErrorsPanel | None = None
         self._shape: ShapePanel | None = None
@@ -53,13 +53,13 @@ class Contents:
 
     def build_first(self, state: AppState) -> Sequence[Panel]:
         """Build what a page cannot be without: sliders, numbers, heading."""
-        self._outside.run_script(SCRIPT)
-        commands = CommandsPanel(self._desk, lambda: self._fit_view(None, None))
-        self._errors = errors = ErrorsPanel(self._desk, state, self._choose, self._open_curve)
+        self._tab.run_script(SCRIPT)
+        commands = CommandsPanel(self._context, lambda: self._fit_view(None, None))
+        self._errors = errors = ErrorsPanel(self._context, state, self._choose, self._open_curve)
         with self._places.at("Result"):
-            summary = summary_panel(self._desk)
+            summary = summary_panel(self._context)
         with self._places.at("heading"):
-            heading = heading_panel(self._desk)
+            heading = heading_panel(self._context)
         return [errors, commands, summary, heading]
 
     def others(self) -> tuple[Build, ...]:
@@ -81,38 +81,38 @@ class Contents:
         """Build what is in front, and the other sliders."""
         if self._errors is not None:
             self._errors.add_axes(state)
-        gui = self._desk.gui
+        gui = self._context.gui
         curve = gui.add_panel()
         with curve.add_tab("One error"):
-            self._shape = ShapePanel(self._desk, state)
+            self._shape = ShapePanel(self._context, state)
         if self._wanted:
             self._shape.choose(self._wanted)
         curve.dock_below(gui.main_panel)
-        self._outside.run_script(split_script())
+        self._tab.run_script(split_script())
         self._expand = curve.expand
         with self._places.at("View"):
-            view = ViewPanel(self._desk, state, self._outside.scenes)
-            looks = LooksPanel(self._desk, state)
-            camera = CameraPanel(self._desk, self._fit_view)
+            view = ViewPanel(self._context, state, self._tab.scenes)
+            looks = LooksPanel(self._context, state)
+            camera = CameraPanel(self._context, self._fit_view)
         return [self._shape, view, looks, camera]
 
     def _build_behind(self, state: AppState) -> Sequence[Panel]:
         """Build the tabs behind the numbers and behind the view."""
         with self._places.at("Why"):
-            why = WhyPanel(self._desk, self._outside)
+            why = WhyPanel(self._context, self._tab)
         with self._places.at("Gains"):
-            gains = GainsPanel(self._desk)
+            gains = GainsPanel(self._context)
         with self._places.at("Compare"):
-            compare = ComparePanel(self._desk, self._outside.scenes)
+            compare = ComparePanel(self._context, self._tab.scenes)
         with self._places.at("Files"):
-            files = FilesPanel(self._desk, self._outside)
+            files = FilesPanel(self._context, self._tab)
         with self._places.at("Machine"):
-            machine = MachinePanel(self._desk, state)
+            machine = MachinePanel(self._context, state)
         with self._places.at("Table"):
-            rotary = RotaryPanel(self._desk, state, self._play)
+            rotary = RotaryPanel(self._context, state, self._play)
         with self._places.at("Chance"):
-            chance = ChancePanel(self._desk, state)
+            chance = ChancePanel(self._context, state)
         with self._places.at("Conventions"):
-            conventions = ConventionsPanel(self._desk, state)
-        Pointing(self._outside, self._desk, conventions)
+            conventions = ConventionsPanel(self._context, state)
+        Pointing(self._tab, self._context, conventions)
         return [why, gains, compare, files, machine, rotary, chance, conventions]

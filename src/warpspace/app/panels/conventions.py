@@ -4,8 +4,8 @@ from dataclasses import replace
 from typing import Any
 
 from warpspace.app.browser.clicks import Clicks
-from warpspace.app.browser.handles import Bound
-from warpspace.app.evaluation.cache import Same
+from warpspace.app.browser.handles import Input
+from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.conventions import (
     Effect,
     Effects,
@@ -14,8 +14,8 @@ from warpspace.app.evaluation.conventions import (
     with_own_conventions,
     with_reference,
 )
-from warpspace.app.evaluation.evaluate import Frame
-from warpspace.app.panels import Desk
+from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.panels import PanelContext
 from warpspace.app.readouts.conventions import switchboard_html
 from warpspace.app.state.app_state import AppState, start_loop
 from warpspace.scene.model import Scene
@@ -26,15 +26,15 @@ class ConventionsPanel:
 
     Parameters
     ----------
-    desk : Desk
+    context : PanelContext
     state : AppState
     """
 
-    def __init__(self, desk: Desk, state: AppState) -> None:
-        gui = desk.gui
-        self._desk, self._effects = desk, Effects()
+    def __init__(self, context: PanelContext, state: AppState) -> None:
+        gui = context.gui
+        self._context, self._effects = context, Effects()
         self._known: dict[str, Effect] = {}
-        self._clicks = Clicks(gui, lambda word: desk.post(lambda s: with_choice(s, word)))
+        self._clicks = Clicks(gui, lambda word: context.post(lambda s: with_choice(s, word)))
         self._text: Any = gui.add_html("")
         self.picking = False
         self._pick: Any = gui.add_button(
@@ -42,15 +42,15 @@ class ConventionsPanel:
             color="gray",
             hint="The next click on the box chooses the point that is held still.",
         )
-        self._pick.on_click(lambda _: desk.act(self._toggle_picking))
+        self._pick.on_click(lambda _: context.act(self._toggle_picking))
         self._home: Any = gui.add_folder(None)
         self._scene: Scene | None = None
-        self._at: dict[str, Bound[float]] = {}
+        self._at: dict[str, Input[float]] = {}
         self._build(state)
         back = gui.add_button(
             "Conventions of the scene", color="gray", hint="Undo all choices made here."
         )
-        back.on_click(lambda _: desk.post(_back))
+        back.on_click(lambda _: context.post(_back))
 
     def _build(self, state: AppState) -> None:
         """Add a number box per linear axis of the scene's machine."""
@@ -60,7 +60,7 @@ class ConventionsPanel:
         middle = state.scene.workspace.positions
         with self._home:
             for axis, span in reference_spans(state.scene).items():
-                box = self._desk.gui.add_number(
+                box = self._context.gui.add_number(
                     f"Reference {axis} [mm]",
                     initial_value=float((state.scene.reference or middle).get(axis, 0.0)),
                     min=span.low,
@@ -68,7 +68,7 @@ class ConventionsPanel:
                     step=1.0,
                     hint="Position of the axis at the point that is held still.",
                 )
-                self._at[axis] = Bound(box, self._desk.changed)
+                self._at[axis] = Input(box, self._context.changed)
 
     def _toggle_picking(self) -> None:
         """Wait for a click on the box, or do not any more."""
@@ -84,14 +84,19 @@ class ConventionsPanel:
         typed = {axis: value for axis, b in self._at.items() if (value := b.poll()) is not None}
         return with_reference(state, typed) if typed else state
 
-    def concerns(self, frame: Frame) -> tuple[object, ...]:
+    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
         """Give what is in force."""
-        state = frame.state
-        return Same(state.origin), Same(state.scene.model), state.scene.reference, state.loop
+        state = picture.state
+        return (
+            Identity(state.origin),
+            Identity(state.scene.model),
+            state.scene.reference,
+            state.loop,
+        )
 
-    def show(self, frame: Frame) -> None:
+    def show(self, picture: LivePicture) -> None:
         """Show what is in force; the effects follow when changes pause."""
-        state = frame.state
+        state = picture.state
         if state.origin is not self._scene:
             self._known = {}
             self._build(state)
@@ -101,12 +106,12 @@ class ConventionsPanel:
                 bound.show(float(reference.get(axis, bound.handle.value)))
         self._write(state)
 
-    def settle(self, frame: Frame) -> None:
+    def settle(self, picture: LivePicture) -> None:
         """Work out what every choice changes."""
-        known = self._effects.of(frame.state)
+        known = self._effects.of(picture.state)
         if known != self._known:
             self._known = known
-            self._write(frame.state)
+            self._write(picture.state)
 
     def _write(self, state: AppState) -> None:
         """Write the switchboard."""

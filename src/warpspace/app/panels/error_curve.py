@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from viser import uplot
 
-from warpspace.app.browser.handles import Bound, dom_id
-from warpspace.app.evaluation.evaluate import Frame
-from warpspace.app.panels import Desk
+from warpspace.app.browser.handles import Input, dom_id
+from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.panels import PanelContext
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.curve_text import (
@@ -35,25 +35,25 @@ class ShapePanel:
 
     Parameters
     ----------
-    desk : Desk
+    context : PanelContext
     state : AppState
     """
 
-    def __init__(self, desk: Desk, state: AppState) -> None:
-        self._desk, gui = desk, desk.gui
+    def __init__(self, context: PanelContext, state: AppState) -> None:
+        self._context, gui = context, context.gui
         self._key = _first(state)
         self._keys = tuple(state.amplitudes)
         # what the numbers stand for, and what is drawn
         self._written: ErrorFunction | None = None
         self._drawn: ErrorFunction | None = None
-        self._which: Bound[str] = Bound(
+        self._which: Input[str] = Input(
             gui.add_dropdown(
                 "Error",
                 _options(self._keys),
                 initial_value=parameter(self._key).label,
                 hint="The error whose curve is shown; moving a slider chooses its error.",
             ),
-            desk.changed,
+            context.changed,
         )
         self._chart: Any = gui.add_uplot(
             _chart_data(None, (0.0, 1.0)),
@@ -67,18 +67,18 @@ class ShapePanel:
             height=CHART_HEIGHT,
             padding=(8, 14, 0, 0),
         )
-        self._kind: Bound[str] = Bound(
+        self._kind: Input[str] = Input(
             gui.add_dropdown(
                 "Curve",
                 tuple(KINDS),
                 hint="Along the axis: constant, ramp from the lower end, polynomial, harmonics or"
                 " table.",
             ),
-            desk.changed,
+            context.changed,
         )
-        self._rows: Bound[str] = Bound(
+        self._rows: Input[str] = Input(
             gui.add_text("Numbers", "0", multiline=True, hint=_rows_hint("constant")),
-            desk.changed,
+            context.changed,
         )
         self._problem: Any = gui.add_html("")
         gui.add_html(_style(self._which.handle, self._kind.handle, self._rows.handle))
@@ -90,7 +90,7 @@ class ShapePanel:
             self._key = key
             self._written = self._drawn = None
             # after the state has been dealt with; the widgets still show the error before
-            self._desk.act(lambda: self._show(self._desk.board().state))
+            self._context.act(lambda: self._show(self._context.store().state))
 
     def read(self, state: AppState) -> AppState:
         """Take over what a browser has chosen or written."""
@@ -123,15 +123,15 @@ class ShapePanel:
             # what is being written stays as it was written
             self._written = function
         state = edits.with_curve(state, self._key, function)
-        self._desk.act(lambda: self._show(self._desk.board().state))
+        self._context.act(lambda: self._show(self._context.store().state))
         return state
 
-    def show(self, frame: Frame) -> None:
+    def show(self, picture: LivePicture) -> None:
         """Nothing that must follow at once."""
 
-    def settle(self, frame: Frame) -> None:
+    def settle(self, picture: LivePicture) -> None:
         """Follow the state."""
-        self._show(frame.state)
+        self._show(picture.state)
 
     def _show(self, state: AppState) -> None:
         """Show the chosen error of a state."""

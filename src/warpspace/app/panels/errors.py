@@ -9,10 +9,10 @@ from itertools import groupby
 from typing import Any
 
 from warpspace.app.browser.clicks import Clicks
-from warpspace.app.browser.handles import Bound
-from warpspace.app.evaluation.cache import Same
-from warpspace.app.evaluation.evaluate import Frame
-from warpspace.app.panels import Desk
+from warpspace.app.browser.handles import Input
+from warpspace.app.evaluation.cache import Identity
+from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.panels import PanelContext
 from warpspace.app.readouts.exclusions import CURVE, STYLE, emphasis_buttons, with_switched
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
@@ -44,7 +44,7 @@ class ErrorsPanel:
 
     Parameters
     ----------
-    desk : Desk
+    context : PanelContext
     state : AppState
     touched : callable
         Called, by the session's worker, with the key of a slider that was moved or found alone.
@@ -54,29 +54,29 @@ class ErrorsPanel:
 
     def __init__(
         self,
-        desk: Desk,
+        context: PanelContext,
         state: AppState,
         touched: Callable[[str], None],
         opened: Callable[[str], None],
     ) -> None:
-        self._desk, self._touched, self._opened = desk, touched, opened
+        self._context, self._touched, self._opened = context, touched, opened
         self._found: tuple[str, ...] = ()
-        self._looks: tuple[Same, ...] = ()
-        self._search: Bound[str] = Bound(
-            desk.gui.add_text(
+        self._looks: tuple[Identity, ...] = ()
+        self._search: Input[str] = Input(
+            context.gui.add_text(
                 "Find an error",
                 "",
                 hint="Key, symbol, plain name or axis: EAX, squareness, roll x, γ.",
             ),
-            desk.changed,
+            context.changed,
         )
         self._scene: Scene | None = None
-        self._bound: dict[str, Bound[float]] = {}
+        self._bound: dict[str, Input[float]] = {}
         self._buttons: dict[str, Any] = {}
         self._parts: list[Any] = []
-        self._clicks = Clicks(desk.gui, self._clicked)
-        desk.gui.add_html(STYLE)
-        buttons = desk.gui.add_button_group(
+        self._clicks = Clicks(context.gui, self._clicked)
+        context.gui.add_html(STYLE)
+        buttons = context.gui.add_button_group(
             "All errors",
             ("Reset", "All zero", "Hear all"),
             hint="Reset: the values of the scene. All zero: the nominal machine. Hear all: end all"
@@ -85,10 +85,10 @@ class ErrorsPanel:
         updates = {
             "Reset": AppState.reset,
             "All zero": AppState.zeroed,
-            "Hear all": edits.all_heard,
+            "Hear all": edits.include_all,
         }
-        buttons.on_click(lambda event: desk.post(updates[event.target.value]))
-        self._home: Any = desk.gui.add_folder(None)
+        buttons.on_click(lambda event: context.post(updates[event.target.value]))
+        self._home: Any = context.gui.add_folder(None)
         self._missing: deque[tuple[Parameter, ...]] = deque()
         self._begin(state, tuple(state.amplitudes))
         self._add_axis(state)
@@ -103,10 +103,10 @@ class ErrorsPanel:
         for part in self._parts:
             part.remove()
         self._scene, self._bound, self._buttons, self._parts = state.origin, {}, {}, []
-        self._found, self._looks = keys, (Same(state.emphasis), Same(state.spans))
+        self._found, self._looks = keys, (Identity(state.exclusions), Identity(state.spans))
         if not keys:
             with self._home:
-                self._parts.append(self._desk.gui.add_markdown("No error goes by this name."))
+                self._parts.append(self._context.gui.add_markdown("No error goes by this name."))
         rows = sorted(map(parameter, keys), key=_by_axis)
         self._missing = deque(tuple(own) for _, own in groupby(rows, key=lambda row: row.axis))
 
@@ -117,7 +117,7 @@ class ErrorsPanel:
 
     def _add_axis(self, state: AppState) -> None:
         """Lay out the folder of the next axis."""
-        gui, own = self._desk.gui, self._missing.popleft()
+        gui, own = self._context.gui, self._missing.popleft()
         axis = own[0].axis
         narrowed = len(self._found) < len(state.amplitudes)
         used = narrowed or any(state.amplitudes[row.key] for row in own)
@@ -128,20 +128,20 @@ class ErrorsPanel:
         with folder:
             for row in own:
                 self._buttons[row.key] = gui.add_html(
-                    emphasis_buttons(row, state.emphasis, self._clicks.button)
+                    emphasis_buttons(row, state.exclusions, self._clicks.button)
                 )
-                self._bound[row.key] = Bound(self._slider(state, row), self._desk.changed)
+                self._bound[row.key] = Input(self._slider(state, row), self._context.changed)
             button = gui.add_button(
                 f"Reset {axis}",
                 color="gray",
                 hint=f"Give all errors of {axis} the values of the scene again.",
             )
-            button.on_click(lambda _, axis=axis: self._desk.post(lambda s: s.reset(axis)))
+            button.on_click(lambda _, axis=axis: self._context.post(lambda s: s.reset(axis)))
 
     def _slider(self, state: AppState, row: Parameter) -> Any:
         """Add the slider of one parameter."""
         span = state.spans[row.key]
-        return self._desk.gui.add_slider(
+        return self._context.gui.add_slider(
             row.label,
             min=span.low,
             max=span.high,
@@ -155,9 +155,9 @@ class ErrorsPanel:
         """Take note of a click of solo, mute or curve."""
         what, _, key = word.partition(" ")
         if what == CURVE:
-            self._desk.act(lambda: self._opened(key))
+            self._context.act(lambda: self._opened(key))
         else:
-            self._desk.post(lambda state: with_switched(state, word))
+            self._context.post(lambda state: with_switched(state, word))
 
     def read(self, state: AppState) -> AppState:
         """Take over the sliders that a browser has moved."""
@@ -173,22 +173,22 @@ class ErrorsPanel:
                 self._touched(found[0])
             if found != self._found:
                 # after the state has been dealt with, since widgets come and go
-                self._desk.act(lambda: self._build(self._desk.board().state, found))
+                self._context.act(lambda: self._build(self._context.store().state, found))
         return state
 
-    def show(self, frame: Frame) -> None:
+    def show(self, picture: LivePicture) -> None:
         """Put the sliders where the state has them."""
-        state = frame.state
+        state = picture.state
         if state.origin is not self._scene:
             self._search.show("")
             self._build(state, tuple(state.amplitudes))
-        looks = (Same(state.emphasis), Same(state.spans))
+        looks = (Identity(state.exclusions), Identity(state.spans))
         if looks != self._looks:
             self._looks = looks
             for key, bound in self._bound.items():
                 _refresh(bound.handle, state.spans[key])
             for key, handle in self._buttons.items():
-                text = emphasis_buttons(parameter(key), state.emphasis, self._clicks.button)
+                text = emphasis_buttons(parameter(key), state.exclusions, self._clicks.button)
                 if handle.content != text:
                     handle.content = text
         for key, bound in self._bound.items():

@@ -17,10 +17,10 @@ from warpspace.app.documents.export_request import build_request, exported_words
 from warpspace.app.documents.jobs import Jobs, Progress
 from warpspace.app.documents.scene_list import MOST_OPENED
 from warpspace.app.documents.services import CancelledError
-from warpspace.app.evaluation.evaluate import Frame
-from warpspace.app.panels import Desk
+from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.panels import PanelContext
+from warpspace.app.server.tab_context import TabContext
 from warpspace.app.server.tab_memory import CameraMemory
-from warpspace.app.server.tab_services import Outside
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.comparison import Comparison
 from warpspace.exceptions import OptionError, WarpspaceError
@@ -41,17 +41,17 @@ class FilesPanel:
 
     Parameters
     ----------
-    desk : Desk
-    outside : Outside
+    context : PanelContext
+    tab : TabContext
     """
 
-    def __init__(self, desk: Desk, outside: Outside) -> None:
-        self._desk, self._outside = desk, outside
-        self._frame: Frame | None = None
+    def __init__(self, context: PanelContext, tab: TabContext) -> None:
+        self._context, self._tab = context, tab
+        self._picture: LivePicture | None = None
         self._jobs = Jobs(self._report, self._failed)
         self._add_scene_files()
         self._add_outputs()
-        gui = desk.gui
+        gui = context.gui
         self._shows: Any = gui.add_html("", visible=False)
         self._status: Any = gui.add_markdown("", visible=False)
         self._bar: Any = gui.add_progress_bar(0.0, visible=False, animated=True)
@@ -62,20 +62,20 @@ class FilesPanel:
 
     def _add_scene_files(self) -> None:
         """Add opening, saving and the link."""
-        gui, outside = self._desk.gui, self._outside
+        gui, tab = self._context.gui, self._tab
         upload = gui.add_upload_button(
             "Open a scene …",
             mime_type=".toml",
             hint="A scene file (TOML, at most 4 MB). All its problems are listed; undo goes back.",
         )
         Uploads(
-            outside.client,
-            lambda name, content: self._desk.act(partial(self._open, name, content)),
-            lambda text: self._desk.notify("Not opened", text, "red"),
+            tab.client,
+            lambda name, content: self._context.act(partial(self._open, name, content)),
+            lambda text: self._context.notify("Not opened", text, "red"),
         )
         refused = gui.add_text("", "", visible=False)
-        refused.on_update(lambda _: self._desk.act(lambda: self._refuse(str(refused.value))))
-        outside.run_script(size_script(upload, refused))
+        refused.on_update(lambda _: self._context.act(lambda: self._refuse(str(refused.value))))
+        tab.run_script(size_script(upload, refused))
         self._group(
             "Keep scene, settings and camera",
             {"Save scene": self._save, "Link": self._link},
@@ -83,12 +83,12 @@ class FilesPanel:
             " into the clipboard where the browser allows it.",
         )
         link = gui.add_text("", "", visible=False)
-        link.on_update(lambda _: self._desk.act(lambda: self._follow(str(link.value))))
-        outside.run_script(links.listen_script(dom_id(link)))
+        link.on_update(lambda _: self._context.act(lambda: self._follow(str(link.value))))
+        tab.run_script(links.listen_script(dom_id(link)))
 
     def _add_outputs(self) -> None:
         """Add pictures and exports."""
-        services = self._outside.services
+        services = self._tab.services
         pictures = {} if services.draw_figure is None else {"Figure": self._figure}
         self._group(
             "Picture (PNG)",
@@ -106,13 +106,13 @@ class FilesPanel:
 
     def _group(self, label: str, actions: Mapping[str, Callable[[], None]], hint: str) -> None:
         """Add buttons whose actions the worker does."""
-        group = self._desk.gui.add_button_group(label, tuple(actions), hint=hint)
+        group = self._context.gui.add_button_group(label, tuple(actions), hint=hint)
 
         @group.on_click
         def _(event: Any) -> None:
             name = str(event.target.value)
             if name in actions:
-                self._desk.act(partial(self._try, name, actions[name]))
+                self._context.act(partial(self._try, name, actions[name]))
 
     def _try(self, label: str, action: Callable[[], None]) -> None:
         """Do something and show what it raises, so that what waits behind it goes on."""
@@ -129,7 +129,7 @@ class FilesPanel:
             text = incoming.upload_text(content, f"{title}.toml")
             opened, camera = document.open_text(text, title, f"{title}.toml")
             self._show(opened, camera, whole=document.is_looked_at(text))
-            self._desk.notify("Opened", f"{title}.toml", "green")
+            self._context.notify("Opened", f"{title}.toml", "green")
 
         self._try("Not opened", read)
 
@@ -138,70 +138,70 @@ class FilesPanel:
         _, size, name = (*message.split(":", 2), "", "")[:3]
         megabytes = float(size) if size.isdigit() and len(size) < 16 else 0.0
         text = incoming.size_message(f"{incoming.safe_name(name)}.toml", megabytes)
-        self._desk.notify("Not opened", text, "red")
+        self._context.notify("Not opened", text, "red")
 
     def _follow(self, message: str) -> None:
         """Show what a link describes."""
-        word, scenes = message.partition(":")[2], self._outside.scenes.fixed
+        word, scenes = message.partition(":")[2], self._tab.scenes.fixed
         self._try("Link", lambda: self._show(*document.open_link(links.unpack(word), scenes)))
 
     def _show(self, opened: AppState, camera: CameraMemory | None, *, whole: bool = True) -> None:
         """Show an opened state from its camera; beside a plain scene the comparison stays."""
         # here, since not every opened scene is drawn where many follow each other
-        _, dropped = self._outside.scenes.add(opened.origin)
+        _, dropped = self._tab.scenes.add(opened.origin)
         if dropped:
             text = f"The newest {MOST_OPENED} opened scenes are kept; {dropped} left the list."
-            self._desk.notify("Scenes", text, "gray")
+            self._context.notify("Scenes", text, "gray")
 
         def update(now: AppState) -> AppState:
             if camera is not None:
                 # with this change, not before it: another scene places the camera anew
-                self._outside.look_from(camera)
+                self._tab.look_from(camera)
             return opened if whole else replace(opened, comparison=now.comparison)
 
-        self._desk.post(update)
+        self._context.post(update)
 
     def _save(self) -> None:
         """Send the state as a scene file."""
-        state, camera = self._desk.board().state, self._outside.camera()
+        state, camera = self._context.store().state, self._tab.camera()
         text = self._alone_if_large(lambda s: document.state_to_toml(s, camera))
         self._send(incoming.safe_name(state.scene.name), ".toml", text.encode())
 
     def _link(self) -> None:
         """Put a link into the address bar."""
-        scenes, camera = self._outside.scenes.fixed, self._outside.camera()
+        scenes, camera = self._tab.scenes.fixed, self._tab.camera()
         link = self._alone_if_large(lambda s: document.state_to_link(s, camera, scenes))
-        self._outside.run_script(links.show_script(link))
-        self._outside.client.flush()
-        self._desk.notify(
+        self._tab.run_script(links.show_script(link))
+        self._tab.client.flush()
+        self._context.notify(
             "Link", "It stands in the address bar, and in the clipboard where allowed.", "green"
         )
 
     def _alone_if_large(self, write: Callable[[AppState], str]) -> str:
         """Write the state; without what it is compared with where both are too large."""
-        state = self._desk.board().state
+        state = self._context.store().state
         try:
             return write(state)
         except OptionError as error:
             if state.comparison == Comparison():
                 raise
             text = write(replace(state, comparison=Comparison()))
-            self._desk.notify("Without the comparison", str(error), "yellow")
+            self._context.notify("Without the comparison", str(error), "yellow")
             return text
 
     def _figure(self) -> None:
         """Draw the figure in a process of its own."""
-        draw, frame = self._outside.services.draw_figure, self._frame
-        if draw is not None and frame is not None:
-            request = build_request(frame)
+        draw, picture = self._tab.services.draw_figure, self._picture
+        if draw is not None and picture is not None:
+            request = build_request(picture)
             self._make("Figure", ".png", FIGURE_S, lambda cancelled: draw(request, cancelled))
 
     def _view(self) -> None:
         """Have the browser render the view, and put title, factor and colour bar around it."""
         from warpspace.app.documents.view_image import view_png
 
-        client, frame = self._outside.client, self._frame
-        if frame is None:
+        client, picture = self._tab.client, self._picture
+        if picture is None:
             return
         width = min(max(client.camera.image_width, 64), LARGEST_VIEW_PX)
         height = min(max(client.camera.image_height, 64), LARGEST_VIEW_PX)
@@ -210,7 +210,7 @@ class FilesPanel:
             pixels = client.get_render(
                 height, width, transport_format="png", timeout=RENDER_TIMEOUT_S
             )
-            return view_png(pixels, frame)
+            return view_png(pixels, picture)
 
         self._make("View", ".png", VIEW_S, make)
 
@@ -218,21 +218,23 @@ class FilesPanel:
         """Write the offline page of what is drawn."""
         from warpspace.app.documents.offline_page import build_offline_html
 
-        frame = self._frame
-        if frame is not None:
+        picture = self._picture
+        if picture is not None:
             toml = {"scene_toml": self._alone_if_large(document.state_to_toml)}
-            self._make("Page", ".html", PAGE_S, lambda _: build_offline_html(frame, toml).encode())
+            self._make(
+                "Page", ".html", PAGE_S, lambda _: build_offline_html(picture, toml).encode()
+            )
 
     def _export(self, name: str, ending: str) -> None:
         """Write an export."""
-        write, frame = self._outside.services.write_export, self._frame
-        if write is not None and frame is not None:
-            request = build_request(frame)
+        write, picture = self._tab.services.write_export, self._picture
+        if write is not None and picture is not None:
+            request = build_request(picture)
             self._make(name, ending, EXPORT_S, lambda _: write(request, ending))
 
     def _make(self, name: str, ending: str, usual_s: float, make: Make) -> None:
         """Make a file beside the session and send it."""
-        stem = "view" if self._frame is None else file_stem(self._frame)
+        stem = "view" if self._picture is None else file_stem(self._picture)
 
         def work(cancelled: threading.Event) -> None:
             content = make(cancelled)
@@ -240,11 +242,13 @@ class FilesPanel:
                 self._send(stem, ending, content)
 
         if not self._jobs.start(name, work, usual_s):
-            self._desk.notify("Busy", "One file at a time; wait for the other or cancel it", "gray")
+            self._context.notify(
+                "Busy", "One file at a time; wait for the other or cancel it", "gray"
+            )
 
     def _send(self, stem: str, ending: str, content: bytes) -> None:
         """Have the browser save a file."""
-        client = self._outside.client
+        client = self._tab.client
         client.send_file_download(f"{stem}{ending}", content, save_immediately=True)
         client.flush()
 
@@ -257,27 +261,27 @@ class FilesPanel:
         for handle in (self._status, self._bar, self._cancel):
             if handle.visible != busy:
                 handle.visible = busy
-        self._outside.client.flush()
+        self._tab.client.flush()
 
     def _failed(self, name: str, error: Exception) -> None:
         """Show what went wrong, log what nobody foresaw."""
         if isinstance(error, CancelledError):
-            self._desk.notify("Cancelled", name, "gray")
+            self._context.notify("Cancelled", name, "gray")
             return
         if not isinstance(error, WarpspaceError):
             logger.error("%s", name, exc_info=error)
         known = isinstance(error, WarpspaceError)
         text = str(error) if known else f"{type(error).__name__}: {error}"
-        self._desk.notify(name if name == "Not opened" else f"{name}: failed", text, "red")
+        self._context.notify(name if name == "Not opened" else f"{name}: failed", text, "red")
 
     def read(self, state: AppState) -> AppState:
         """Nothing to take over."""
         return state
 
-    def show(self, frame: Frame) -> None:
+    def show(self, picture: LivePicture) -> None:
         """Remember what is drawn, and say so where it is not what is steered."""
-        self._frame = frame
-        self._tell(exported_words(frame))
+        self._picture = picture
+        self._tell(exported_words(picture))
 
     def _tell(self, words: str) -> None:
         """Say what pictures and exports show."""

@@ -3,10 +3,10 @@
 from dataclasses import replace
 from typing import Any
 
-from warpspace.app.browser.handles import Bound
-from warpspace.app.evaluation.cache import Same
-from warpspace.app.evaluation.evaluate import Frame
-from warpspace.app.panels import Desk
+from warpspace.app.browser.handles import Input
+from warpspace.app.evaluation.cache import Identity
+from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.panels import PanelContext
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import linear_positions, linear_spans
 from warpspace.bodies.placed import load_bodies
@@ -30,25 +30,27 @@ class MachinePanel:
 
     Parameters
     ----------
-    desk : Desk
+    context : PanelContext
     state : AppState
     """
 
-    def __init__(self, desk: Desk, state: AppState) -> None:
-        self._desk = desk
-        self._switches: dict[str, Bound[bool]] = {
-            name: Bound(
-                desk.gui.add_checkbox(text, initial_value=getattr(state.machine, name), hint=hint),
-                desk.changed,
+    def __init__(self, context: PanelContext, state: AppState) -> None:
+        self._context = context
+        self._switches: dict[str, Input[bool]] = {
+            name: Input(
+                context.gui.add_checkbox(
+                    text, initial_value=getattr(state.machine, name), hint=hint
+                ),
+                context.changed,
             )
             for name, (text, hint) in SWITCHES.items()
         }
-        self._note: Any = desk.gui.add_markdown(NO_BODIES, visible=False)
-        self._home: Any = desk.gui.add_folder("Axis positions")
+        self._note: Any = context.gui.add_markdown(NO_BODIES, visible=False)
+        self._home: Any = context.gui.add_folder("Axis positions")
         self._built_for: Scene | None = None
         self._sliders: dict[str, Any] = {}
-        self._linear: dict[str, Bound[float]] = {}
-        self._rotary: dict[str, Bound[float]] = {}
+        self._linear: dict[str, Input[float]] = {}
+        self._rotary: dict[str, Input[float]] = {}
         self._build(state)
 
     def _build(self, state: AppState) -> None:
@@ -60,7 +62,7 @@ class MachinePanel:
         spans = {**linear_spans(state.scene), **state.position_spans}
         with self._home:
             self._sliders = {
-                axis: self._desk.gui.add_slider(
+                axis: self._context.gui.add_slider(
                     f"Machine {axis} [{'mm' if axis in linear else '°'}]",
                     min=span.low,
                     max=span.high,
@@ -71,7 +73,7 @@ class MachinePanel:
                 )
                 for axis, span in spans.items()
             }
-        bound = {axis: Bound[float](s, self._desk.changed) for axis, s in self._sliders.items()}
+        bound = {axis: Input[float](s, self._context.changed) for axis, s in self._sliders.items()}
         self._linear = {axis: b for axis, b in bound.items() if axis in linear}
         self._rotary = {axis: b for axis, b in bound.items() if axis not in linear}
 
@@ -94,14 +96,14 @@ class MachinePanel:
                 state = state.with_position(axis, value)
         return state
 
-    def concerns(self, frame: Frame) -> tuple[object, ...]:
+    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
         """Give what the widgets show."""
-        state = frame.state
-        return Same(state.scene), Same(state.machine), Same(state.positions)
+        state = picture.state
+        return Identity(state.scene), Identity(state.machine), Identity(state.positions)
 
-    def show(self, frame: Frame) -> None:
+    def show(self, picture: LivePicture) -> None:
         """Make the widgets show the state."""
-        state = frame.state
+        state = picture.state
         if self._built_for is None or state.scene.machine is not self._built_for.machine:
             self._build(state)
         for name, switch in self._switches.items():

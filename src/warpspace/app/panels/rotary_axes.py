@@ -4,11 +4,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from warpspace.app.browser.handles import Bound
-from warpspace.app.evaluation.cache import Same
-from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.browser.handles import Input
+from warpspace.app.evaluation.cache import Identity
+from warpspace.app.evaluation.evaluate import LivePicture
 from warpspace.app.evaluation.rotation import played_axis
-from warpspace.app.panels import Desk
+from warpspace.app.panels import PanelContext
 from warpspace.app.readouts.circles import circle_rows, circle_table
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import parse_positions, quarters
@@ -23,29 +23,29 @@ class RotaryPanel:
 
     Parameters
     ----------
-    desk : Desk
+    context : PanelContext
     state : AppState
     play : callable
         Starts or pauses the rotation (True, False) or takes it back (None); is also given whom to
         tell the position.
     """
 
-    def __init__(self, desk: Desk, state: AppState, play: Play) -> None:
-        self._desk, self._play = desk, play
+    def __init__(self, context: PanelContext, state: AppState, play: Play) -> None:
+        self._context, self._play = context, play
         self._playing = False
-        gui = desk.gui
+        gui = context.gui
         self._button = gui.add_button(
             "Play rotation", color="gray", hint="Turn the table; points run along their circles."
         )
-        self._button.on_click(lambda _: desk.act(self._toggle))
+        self._button.on_click(lambda _: context.act(self._toggle))
         stop = gui.add_button("Stop", color="gray", hint="Stop, and stand where the axis stands.")
-        stop.on_click(lambda _: desk.act(self._stop))
+        stop.on_click(lambda _: context.act(self._stop))
         self._angle: Any = gui.add_html("")
         self._home: Any = gui.add_folder("Traced points", expand_by_default=False)
         self._scene: Scene | None = None
         self._parts: list[Any] = []
-        self._points: list[Bound[bool]] = []
-        self._held: dict[str, Bound[str]] = {}
+        self._points: list[Input[bool]] = []
+        self._held: dict[str, Input[str]] = {}
         self._build(state)
         self._table: Any = gui.add_html("")
         self._written = ""
@@ -82,7 +82,7 @@ class RotaryPanel:
         for part in self._parts:
             part.remove()
         self._scene = state.scene
-        gui, changed = self._desk.gui, self._desk.changed
+        gui, changed = self._context.gui, self._context.changed
         with self._home:
             boxes = [
                 gui.add_checkbox(
@@ -118,11 +118,11 @@ class RotaryPanel:
                 hint="Turn the first axis with the table at every quarter turn.",
                 visible=len(texts) > 1,
             )
-        button.on_click(lambda _: self._desk.post(_at_quarters))
-        self._points = [Bound(box, changed) for box in boxes]
-        self._own_on: Bound[bool] = Bound(own, changed)
-        self._own: Bound[Vector] = Bound(point, changed)
-        self._held = {axis: Bound(text, changed) for axis, text in texts.items()}
+        button.on_click(lambda _: self._context.post(_at_quarters))
+        self._points = [Input(box, changed) for box in boxes]
+        self._own_on: Input[bool] = Input(own, changed)
+        self._own: Input[Vector] = Input(point, changed)
+        self._held = {axis: Input(text, changed) for axis, text in texts.items()}
         self._parts = [*boxes, own, point, *texts.values(), button]
 
     def read(self, state: AppState) -> AppState:
@@ -146,14 +146,14 @@ class RotaryPanel:
             return state
         return replace(state, rotary=rotary, notes=notes)
 
-    def concerns(self, frame: Frame) -> tuple[object, ...]:
+    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
         """Give what the widgets show."""
-        state = frame.state
-        return Same(state.scene), Same(state.rotary), Same(state.positions)
+        state = picture.state
+        return Identity(state.scene), Identity(state.rotary), Identity(state.positions)
 
-    def show(self, frame: Frame) -> None:
+    def show(self, picture: LivePicture) -> None:
         """Make the widgets show the state."""
-        state = frame.state
+        state = picture.state
         if self._scene is None or (
             state.scene.trace_points_mm != self._scene.trace_points_mm
             or state.scene.machine is not self._scene.machine
@@ -172,9 +172,9 @@ class RotaryPanel:
             if span and parse_positions(bound.handle.value, span)[0] != held.get(axis, ()):
                 bound.show(_spell(state, axis))
 
-    def settle(self, frame: Frame) -> None:
+    def settle(self, picture: LivePicture) -> None:
         """Write the table of deviations."""
-        written = circle_table(circle_rows(frame) if frame.state.shown.traces else [])
+        written = circle_table(circle_rows(picture) if picture.state.shown.traces else [])
         if written != self._written:
             self._written = written
             self._table.content = written

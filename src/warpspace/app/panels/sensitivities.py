@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpspace.app.browser.handles import Bound
-from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.browser.handles import Input
+from warpspace.app.evaluation.evaluate import LivePicture
 from warpspace.app.evaluation.sensitivities import SHOWN_BARS, Bar, node_coordinates, rank_gains
-from warpspace.app.panels import Desk
+from warpspace.app.panels import PanelContext
 from warpspace.app.readouts.positions import spell_point, spell_positions
 from warpspace.app.state.app_state import AppState
 from warpspace.field.evaluate import build_basis
@@ -45,13 +45,13 @@ class GainsPanel:
 
     Parameters
     ----------
-    desk : Desk
+    context : PanelContext
     """
 
-    def __init__(self, desk: Desk) -> None:
-        gui = desk.gui
-        self._desk = desk
-        self._where: Bound[str] = Bound(
+    def __init__(self, context: PanelContext) -> None:
+        gui = context.gui
+        self._context = context
+        self._where: Input[str] = Input(
             gui.add_dropdown(
                 "Gains at the",
                 (WORST, MIDDLE),
@@ -59,7 +59,7 @@ class GainsPanel:
             ),
             self._choose,
         )
-        self._by: Bound[str] = Bound(
+        self._by: Input[str] = Input(
             gui.add_dropdown(
                 "Ranked by",
                 (BY_GAIN, BY_EFFECT),
@@ -68,40 +68,40 @@ class GainsPanel:
             self._choose,
         )
         self._chart = gui.add_html("")
-        self._frame: Frame | None = None
+        self._picture: LivePicture | None = None
 
     def _choose(self) -> None:
         """Draw anew where only the choice has changed."""
-        self._desk.act(self._draw)
+        self._context.act(self._draw)
 
     def read(self, state: AppState) -> AppState:
         """Nothing of the state is chosen here."""
         return state
 
-    def show(self, frame: Frame) -> None:
+    def show(self, picture: LivePicture) -> None:
         """Nothing that must follow at once."""
 
-    def settle(self, frame: Frame) -> None:
+    def settle(self, picture: LivePicture) -> None:
         """Rank again."""
-        self._frame = frame
+        self._picture = picture
         self._draw()
 
     def _draw(self) -> None:
         """Write the chart."""
-        if self._frame is not None:
+        if self._picture is not None:
             middle = self._where.handle.value == MIDDLE
             effect = self._by.handle.value == BY_EFFECT
-            text = spell_ranking(rank_frame(self._frame, middle=middle, by_effect=effect))
+            text = spell_ranking(rank_picture(self._picture, middle=middle, by_effect=effect))
             if text != self._chart.content:
                 self._chart.content = text
 
 
-def rank_frame(frame: Frame, *, middle: bool = False, by_effect: bool = False) -> Ranking:
-    """Rank the errors for a point of a frame.
+def rank_picture(picture: LivePicture, *, middle: bool = False, by_effect: bool = False) -> Ranking:
+    """Rank the errors for a point of a picture.
 
     Parameters
     ----------
-    frame : Frame
+    picture : LivePicture
     middle : bool, optional
         The middle of the volume instead of its worst point.
     by_effect : bool, optional
@@ -111,8 +111,8 @@ def rank_frame(frame: Frame, *, middle: bool = False, by_effect: bool = False) -
     -------
     Ranking
     """
-    state, grid = frame.state, frame.grid
-    norm = np.broadcast_to(frame.field.norm_um, grid.shape)
+    state, grid = picture.state, picture.grid
+    norm = np.broadcast_to(picture.field.norm_um, grid.shape)
     worst = np.unravel_index(int(np.argmax(norm)), grid.shape)
     chosen = tuple(n // 2 for n in grid.shape) if middle else worst
     node = tuple(int(index) for index in chosen)
@@ -126,7 +126,7 @@ def rank_frame(frame: Frame, *, middle: bool = False, by_effect: bool = False) -
         scene.view(state.loop),
         grid.nominal_mm[node],
     )
-    bars = rank_gains(scene.model, state.loop, basis, state.heard, (), at)
+    bars = rank_gains(scene.model, state.loop, basis, state.active, (), at)
     if by_effect:
         bars = tuple(sorted(bars, key=lambda bar: -round(bar.moved_um, 9)))
     return Ranking(

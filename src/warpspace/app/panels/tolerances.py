@@ -3,10 +3,10 @@
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
-from warpspace.app.browser.handles import Bound
-from warpspace.app.evaluation.cache import Kept, Same
-from warpspace.app.evaluation.evaluate import Frame
-from warpspace.app.panels import Desk
+from warpspace.app.browser.handles import Input
+from warpspace.app.evaluation.cache import Cache, Identity
+from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.panels import PanelContext
 from warpspace.app.readouts import probability as odds
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
@@ -23,9 +23,9 @@ SPREAD_NAMES = {UNIFORM: "uniform", NORMAL: "normal, 3σ at the limits"}
 KEPT_BYTES = 100_000_000
 
 
-def _new_store() -> "Kept[Ensemble]":
+def _new_store() -> "Cache[Ensemble]":
     """Make the store of ensembles."""
-    return Kept(KEPT_BYTES)
+    return Cache(KEPT_BYTES)
 
 
 ENSEMBLES = _new_store()
@@ -37,14 +37,14 @@ class ChancePanel:
 
     Parameters
     ----------
-    desk : Desk
+    context : PanelContext
     state : AppState
     """
 
-    def __init__(self, desk: Desk, state: AppState) -> None:
-        self._desk, gui = desk, desk.gui
+    def __init__(self, context: PanelContext, state: AppState) -> None:
+        self._context, gui = context, context.gui
         wanted = state.specification
-        self._limit: Bound[float] = Bound(
+        self._limit: Input[float] = Input(
             gui.add_slider(
                 "|E| allowed [µm]",
                 min=LIMIT_UM.low,
@@ -54,34 +54,34 @@ class ChancePanel:
                 marks=((LIMIT_UM.low, ""), (100.0, "100"), (LIMIT_UM.high, f"{LIMIT_UM.high:g}")),
                 hint="The specification: the largest volumetric error that is accepted.",
             ),
-            desk.changed,
+            context.changed,
         )
-        self._over: Bound[str] = Bound(
+        self._over: Input[str] = Input(
             gui.add_dropdown(
                 "Must hold at",
                 tuple(OVER_NAMES.values()),
                 initial_value=OVER_NAMES[wanted.over],
                 hint="Where each sampled machine is measured.",
             ),
-            desk.changed,
+            context.changed,
         )
-        self._spread: Bound[str] = Bound(
+        self._spread: Input[str] = Input(
             gui.add_dropdown(
                 "Errors in their tolerance",
                 tuple(SPREAD_NAMES.values()),
                 initial_value=SPREAD_NAMES[wanted.distribution],
                 hint="How the errors of the machines are spread over their tolerances.",
             ),
-            desk.changed,
+            context.changed,
         )
         self._picture = gui.add_html("")
         reset = gui.add_button(
             "Tolerances of the scene", color="gray", hint="Give all tolerances the scene's values."
         )
-        reset.on_click(lambda _: desk.post(edits.with_scene_tolerances))
+        reset.on_click(lambda _: context.post(edits.with_scene_tolerances))
         self._home: Any = gui.add_folder(None)
         self._folders: list[Any] = []
-        self._sliders: dict[str, Bound[float]] = {}
+        self._sliders: dict[str, Input[float]] = {}
         self._built_for: tuple[object, ...] = ()
         self._shown: tuple[object, ...] = ()
 
@@ -103,29 +103,29 @@ class ChancePanel:
                 state = edits.with_half_width(state, key, half_width)
         return state
 
-    def concerns(self, frame: Frame) -> tuple[object, ...]:
+    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
         """Give what the widgets show."""
-        state = frame.state
-        return Same(state.specification), Same(state.tolerances), Same(state.origin)
+        state = picture.state
+        return Identity(state.specification), Identity(state.tolerances), Identity(state.origin)
 
-    def show(self, frame: Frame) -> None:
+    def show(self, picture: LivePicture) -> None:
         """Put the widgets where the state has them."""
-        state = frame.state
+        state = picture.state
         self._limit.show(state.specification.limit_um)
         self._over.show(OVER_NAMES[state.specification.over])
         self._spread.show(SPREAD_NAMES[state.specification.distribution])
-        if self._built_for[:1] != (Same(state.origin),):
+        if self._built_for[:1] != (Identity(state.origin),):
             return  # other sliders are on their way: a page must not hear of these any more
         for key, slider in self._sliders.items():
             slider.show(edits.half_width_of(state, key))
 
-    def settle(self, frame: Frame) -> None:
+    def settle(self, picture: LivePicture) -> None:
         """Sample again, which takes some milliseconds, and draw."""
-        state = frame.state
+        state = picture.state
         moving = tuple(state.positions.items()) if state.loop is Loop.RELATIVE else ()
         sampled = (
-            Same(state.scene.model),
-            Same(state.scene.workspace),
+            Identity(state.scene.model),
+            Identity(state.scene.workspace),
             str(state.scene.reference),
             state.scene.parameter_keys,
             state.loop,
@@ -143,14 +143,14 @@ class ChancePanel:
             self._picture.content = odds.spell_refusal(str(error))
             return
         self._picture.content = _picture(ensemble, state)
-        wanted = (Same(state.origin), ensemble.keys)
+        wanted = (Identity(state.origin), ensemble.keys)
         if wanted != self._built_for:
             self._built_for = wanted
             self._build(state, ensemble.keys)
 
     def _build(self, state: AppState, keys: tuple[str, ...]) -> None:
         """Lay out the sliders of the parameters of a loop."""
-        gui = self._desk.gui
+        gui = self._context.gui
         for folder in self._folders:
             folder.remove()
         self._folders, self._sliders = [], {}
@@ -172,7 +172,7 @@ class ChancePanel:
                         hint=f"Half width of the tolerance of {row.name} about {centre:g}"
                         f" {row.unit}; 0 holds it there.",
                     )
-                    self._sliders[row.key] = Bound(slider, self._desk.changed)
+                    self._sliders[row.key] = Input(slider, self._context.changed)
 
 
 def _value(names: dict[str, str], text: str) -> str:

@@ -4,11 +4,11 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from warpspace.app.browser.handles import Bound, dom_id
-from warpspace.app.documents.scene_list import MOST_OPENED, Shelf
-from warpspace.app.evaluation.cache import Same
-from warpspace.app.evaluation.evaluate import Frame
-from warpspace.app.panels import Desk
+from warpspace.app.browser.handles import Input, dom_id
+from warpspace.app.documents.scene_list import MOST_OPENED, SceneList
+from warpspace.app.evaluation.cache import Identity
+from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.panels import PanelContext
 from warpspace.app.state.app_state import EXAGGERATION, NODES, TRUE_SCALE, AppState
 from warpspace.kinematics.model import Loop
 from warpspace.scene.model import Scene
@@ -69,17 +69,17 @@ class ViewPanel:
 
     Parameters
     ----------
-    desk : Desk
+    context : PanelContext
     state : AppState
-    scenes : Shelf
+    scenes : SceneList
         Scenes to choose from; what is opened is added.
     """
 
-    def __init__(self, desk: Desk, state: AppState, scenes: Shelf) -> None:
-        self._desk, self._scenes = desk, scenes
-        gui, changed = desk.gui, desk.changed
+    def __init__(self, context: PanelContext, state: AppState, scenes: SceneList) -> None:
+        self._context, self._scenes = context, scenes
+        gui, changed = context.gui, context.changed
         self._known, self._title = state.origin, scenes.add(state.origin)[0]
-        self._scene: Bound[str] = Bound(
+        self._scene: Input[str] = Input(
             gui.add_dropdown(
                 "Scene",
                 tuple(scenes),
@@ -90,7 +90,7 @@ class ViewPanel:
         )
         self._add_exaggeration(state)
         names = COMPONENT_NAMES[state.look.quantity]
-        self._component: Bound[str] = Bound(
+        self._component: Input[str] = Input(
             gui.add_dropdown(
                 "Colour",
                 tuple(names.values()),
@@ -101,7 +101,7 @@ class ViewPanel:
             changed,
         )
         self._loops = _Names(LOOP_NAMES)
-        self._loop: Bound[str] = Bound(
+        self._loop: Input[str] = Input(
             gui.add_dropdown(
                 "Structural loop",
                 self._loops.options,
@@ -110,7 +110,7 @@ class ViewPanel:
             ),
             changed,
         )
-        self._nodes: Bound[float] = Bound(
+        self._nodes: Input[float] = Input(
             gui.add_slider(
                 "Grid density [nodes per axis]",
                 min=NODES.low,
@@ -123,8 +123,8 @@ class ViewPanel:
         )
         self._home: Any = gui.add_folder(None)
         self._add_positions(state)
-        self._switches: dict[str, Bound[bool]] = {
-            name: Bound(
+        self._switches: dict[str, Input[bool]] = {
+            name: Input(
                 gui.add_checkbox(text, initial_value=getattr(state.shown, name), hint=hint), changed
             )
             for name, (text, hint) in SWITCHES.items()
@@ -132,9 +132,9 @@ class ViewPanel:
 
     def _add_exaggeration(self, state: AppState) -> None:
         """Add factor, logarithmic slider and the two buttons."""
-        gui, desk = self._desk.gui, self._desk
+        gui, context = self._context.gui, self._context
         start = state.exaggeration or TRUE_SCALE
-        self._factor: Bound[float] = Bound(
+        self._factor: Input[float] = Input(
             gui.add_number(
                 "Displacement drawn ×",
                 initial_value=float(start),
@@ -143,10 +143,10 @@ class ViewPanel:
                 step=1.0,
                 hint="Display factor of the errors, 1 to 1 000 000.",
             ),
-            desk.changed,
+            context.changed,
         )
         top = math.log10(EXAGGERATION.high)
-        self._log: Bound[float] = Bound(
+        self._log: Input[float] = Input(
             gui.add_slider(
                 "Exaggeration, logarithmic",
                 min=0.0,
@@ -156,7 +156,7 @@ class ViewPanel:
                 marks=((0.0, "×1"), (2.0, "×100"), (4.0, "×10 000"), (top, "×10⁶")),
                 hint="Display factor of the errors, each mark 100 times the one before.",
             ),
-            desk.changed,
+            context.changed,
         )
         # its own number box would show the logarithm
         gui.add_html(
@@ -173,17 +173,17 @@ class ViewPanel:
         factors = {"Auto": None, "True scale": TRUE_SCALE}
 
         def choose(name: str) -> None:
-            desk.post(lambda s: s.with_exaggeration(factors[name]))
+            context.post(lambda s: s.with_exaggeration(factors[name]))
 
         buttons.on_click(lambda event: choose(event.target.value))
 
     def _add_positions(self, state: AppState) -> None:
         """Add a folder with a slider per rotary axis of the scene's machine."""
-        gui = self._desk.gui
+        gui = self._context.gui
         self._built_for = state.origin
         with self._home:
             self._folder: Any = gui.add_folder("Rotary positions", visible=bool(state.positions))
-        self._positions: dict[str, Bound[float]] = {}
+        self._positions: dict[str, Input[float]] = {}
         with self._folder:
             for axis, value in state.positions.items():
                 span = state.position_spans[axis]
@@ -195,7 +195,7 @@ class ViewPanel:
                     initial_value=value,
                     hint=f"Where the {axis} axis stands while the working volume is traversed.",
                 )
-                self._positions[axis] = Bound(slider, self._desk.changed)
+                self._positions[axis] = Input(slider, self._context.changed)
 
     def read(self, state: AppState) -> AppState:
         """Take over what a browser has chosen."""
@@ -234,28 +234,28 @@ class ViewPanel:
             self._scene.handle.options = options
         if dropped:
             text = f"The newest {MOST_OPENED} opened scenes are kept; {dropped} left the list."
-            self._desk.notify("Scenes", text, "gray")
+            self._context.notify("Scenes", text, "gray")
 
-    def concerns(self, frame: Frame) -> tuple[object, ...]:
+    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
         """Give what the widgets show."""
-        state = frame.state
+        state = picture.state
         return (
-            Same(state.origin),
-            frame.exaggeration,
+            Identity(state.origin),
+            picture.exaggeration,
             (state.component, state.look.quantity, state.loop, state.nodes, state.shown),
-            Same(state.positions),
+            Identity(state.positions),
         )
 
-    def show(self, frame: Frame) -> None:
+    def show(self, picture: LivePicture) -> None:
         """Make the widgets show the state."""
-        state = frame.state
+        state = picture.state
         if state.origin is not self._built_for:
             self._folder.remove()
             self._add_positions(state)
         self._know(state.origin)
         self._scene.show(self._title)
-        self._factor.show(float(f"{frame.exaggeration:.4g}"))
-        self._log.show(round(math.log10(frame.exaggeration), 2))
+        self._factor.show(float(f"{picture.exaggeration:.4g}"))
+        self._log.show(round(math.log10(picture.exaggeration), 2))
         self._show_component(state)
         self._loop.show(self._loops.text(state.loop))
         self._nodes.show(float(state.nodes))

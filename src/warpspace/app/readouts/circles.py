@@ -1,10 +1,10 @@
-"""The traces of a frame as numbers: how each circle runs, as text for the page."""
+"""The traces of a picture as numbers: how each circle runs, as text for the page."""
 
 import html
 from dataclasses import dataclass
 
 from warpspace.analysis.circles import CircleDeviation, circle_deviation
-from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.evaluation.evaluate import LivePicture
 from warpspace.geometry.traces import Trace
 from warpspace.units import UM_PER_MM
 
@@ -27,12 +27,12 @@ class CircleRow:
     deviation: CircleDeviation | None
 
 
-def circle_rows(frame: Frame) -> list[CircleRow]:
-    """Take the errors of all traces of a frame apart.
+def circle_rows(picture: LivePicture) -> list[CircleRow]:
+    """Take the errors of all traces of a picture apart.
 
     Parameters
     ----------
-    frame : Frame
+    picture : LivePicture
 
     Returns
     -------
@@ -40,8 +40,8 @@ def circle_rows(frame: Frame) -> list[CircleRow]:
         At most forty.
     """
     rows: list[CircleRow] = []
-    for lines in frame.traces:
-        per_um = frame.exaggeration / UM_PER_MM
+    for lines in picture.traces:
+        per_um = picture.exaggeration / UM_PER_MM
         error_um = (lines.actual_mm - lines.nominal_mm) / per_um
         for trace, nominal, error in zip(
             lines.group.traces, lines.nominal_mm, error_um, strict=True

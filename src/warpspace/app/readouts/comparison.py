@@ -4,7 +4,7 @@ import html
 
 from warpspace.analysis.statistics import Statistics
 from warpspace.app.evaluation.compare import Compared
-from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.evaluation.evaluate import LivePicture
 from warpspace.app.readouts.positions import spell_point
 from warpspace.app.readouts.summary import gradient
 from warpspace.app.state.comparison import SHOWN
@@ -20,19 +20,19 @@ _NUMBER = 'style="text-align:right;padding:2px 0 2px 6px;font-variant-numeric:ta
 _ROWS = (("mean", "mean_um"), ("RMS", "rms_um"), ("P95", "p95_um"), ("max", "max_um"))
 
 
-def comparison_html(frame: Frame) -> str:
+def comparison_html(picture: LivePicture) -> str:
     """Spell the numbers of a comparison.
 
     Parameters
     ----------
-    frame : Frame
+    picture : LivePicture
 
     Returns
     -------
     str
         HTML; every title is escaped.
     """
-    found = frame.compared
+    found = picture.compared
     if found is None:
         return NOTHING
     columns = dict(zip(SHOWN.values(), (found.a, found.b, found.difference), strict=True))
@@ -49,7 +49,7 @@ def comparison_html(frame: Frame) -> str:
         f'<div style="padding:2px 14px 10px;line-height:1.45">{_titles(found)}'
         '<table style="width:100%;border-collapse:collapse;font-size:13px;margin:4px 0">'
         f'<tr><th style="text-align:left;font-weight:400;opacity:.7">|E| [µm]</th>{head}</tr>{rows}'
-        f"</table>{places}{refused}{bar(frame)}</div>"
+        f"</table>{places}{refused}{bar(picture)}</div>"
     )
 
 
@@ -78,9 +78,9 @@ def _place(name: str, found: Statistics) -> str:
     return f'<div style="font-size:11.5px;opacity:.8">max of {name} at {where}</div>'
 
 
-def bar(frame: Frame) -> str:
+def bar(picture: LivePicture) -> str:
     """Draw the colours shared by all maps as a flat bar."""
-    scale = frame.scale
+    scale = picture.scale
     ends = "".join(f"<span>{value:g}</span>".replace("-", "−") for value in (scale.low, scale.high))
     colours = gradient(diverging=scale.diverging).replace("to top", "to right")
     return (

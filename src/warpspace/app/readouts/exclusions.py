@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.exclusions import Emphasis
+from warpspace.app.state.exclusions import Exclusions
 from warpspace.machine.parameters import Parameter
 
 SOLO, MUTE, CURVE = "solo", "mute", "curve"
@@ -37,13 +37,13 @@ div:has(> .ws-silent) + div { opacity: .45; }
 """Put the buttons at the end of the line with the slider's label, which follows them."""
 
 
-def emphasis_buttons(row: Parameter, emphasis: Emphasis, button: Attributes) -> str:
+def emphasis_buttons(row: Parameter, exclusions: Exclusions, button: Attributes) -> str:
     """Draw the buttons of one error in their present state.
 
     Parameters
     ----------
     row : Parameter
-    emphasis : Emphasis
+    exclusions : Exclusions
     button : callable
         Gives the attributes of a button that sends a word.
 
@@ -53,10 +53,10 @@ def emphasis_buttons(row: Parameter, emphasis: Emphasis, button: Attributes) -> 
         HTML to stand directly before the error's slider, see `STYLE`.
     """
     name = html.escape(f"{row.key}, {row.name}", quote=True)
-    heard = emphasis.heard(row.key)
-    silent = "" if heard else " ws-silent"
-    group = name if heard else f"{name}, silent"
-    solo, mute = row.key in emphasis.soloed, row.key in emphasis.muted
+    active = exclusions.active(row.key)
+    silent = "" if active else " ws-silent"
+    group = name if active else f"{name}, silent"
+    solo, mute = row.key in exclusions.soloed, row.key in exclusions.muted
     switches = (
         (SOLO, "S", "Solo", solo, "Solo: hear this error alone, or with others on solo"),
         (MUTE, "M", "Mute", mute, "Mute: leave this error out; its value is kept"),
@@ -84,7 +84,7 @@ def with_switched(state: AppState, word: str) -> AppState:
     """
     what, _, key = word.partition(" ")
     if what == SOLO:
-        return edits.with_soloed(state, key, key not in state.emphasis.soloed)
+        return edits.with_soloed(state, key, key not in state.exclusions.soloed)
     if what == MUTE:
-        return edits.with_muted(state, key, key not in state.emphasis.muted)
+        return edits.with_muted(state, key, key not in state.exclusions.muted)
     return state

@@ -7,7 +7,7 @@ from functools import cache, lru_cache
 import numpy as np
 
 from warpspace.app.evaluation.compare import both_words
-from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.evaluation.evaluate import LivePicture
 from warpspace.app.readouts.positions import spell_point
 from warpspace.app.viewport.layers import palette
 from warpspace.geometry.colour import ColourScale, colour_table
@@ -40,23 +40,23 @@ def gradient(*, diverging: bool) -> str:
     return f"linear-gradient(to top,{spelt})"
 
 
-def colour_bar(frame: Frame) -> str:
+def colour_bar(picture: LivePicture) -> str:
     """Draw the colour bar with ticks, unit, and marks at mean, P95 and max of what is coloured."""
-    heading, bar = _empty_bar(frame.scale)
-    return heading + bar + "".join(_marks(frame.scale, _marked(frame))) + "</div>"
+    heading, bar = _empty_bar(picture.scale)
+    return heading + bar + "".join(_marks(picture.scale, _marked(picture))) + "</div>"
 
 
-def _marked(frame: Frame) -> dict[str, float]:
+def _marked(picture: LivePicture) -> dict[str, float]:
     """Choose what is marked, by name from the lowest value up, in the unit of the scale."""
-    found, values = frame.statistics, frame.values
-    if frame.scale.diverging:
+    found, values = picture.statistics, picture.values
+    if picture.scale.diverging:
         # the length of the error says nothing of a signed component: its own ends do
         return {
             "min": float(values.min()),
             "mean": float(values.mean()),
             "max": float(values.max()),
         }
-    if frame.scale.unit == MICROMETRE:
+    if picture.scale.unit == MICROMETRE:
         return {"mean": found.mean_um, "P95": found.p95_um, "max": found.max_um}
     return {
         "mean": float(values.mean()),
@@ -118,9 +118,9 @@ def _marks(scale: ColourScale, values: Mapping[str, float]) -> list[str]:
     return placed
 
 
-def numbers(frame: Frame) -> str:
+def numbers(picture: LivePicture) -> str:
     """Spell the statistics of the field as a table."""
-    found = frame.statistics
+    found = picture.statistics
     rows = [
         ("mean", f"{found.mean_um:.2f} µm", True),
         ("RMS", f"{found.rms_um:.2f} µm", False),
@@ -136,21 +136,21 @@ def numbers(frame: Frame) -> str:
     return f'<table style="width:100%;border-collapse:collapse;font-size:14px">{cells}</table>'
 
 
-def worst_place(frame: Frame) -> str:
+def worst_place(picture: LivePicture) -> str:
     """Spell where the largest error is."""
     return (
         '<div style="font-size:13px;margin-top:2px"><span style="opacity:.7">max at </span>'
-        f'<span data-value="max at">{spell_point(frame.statistics.max_at_mm)}</span></div>'
+        f'<span data-value="max at">{spell_point(picture.statistics.max_at_mm)}</span></div>'
     )
 
 
-def key_to_lines(frame: Frame) -> str:
+def key_to_lines(picture: LivePicture) -> str:
     """Explain the lines that are drawn."""
-    colours, shown = palette(frame), frame.state.shown
+    colours, shown = palette(picture), picture.state.shown
     rows = [("solid", colours.edge, "bent working volume")]
     if shown.ghost:
         rows.append(("dashed", colours.ghost, "nominal working volume"))
-    if shown.traces and frame.traces:
+    if shown.traces and picture.traces:
         rows += [
             ("solid", colours.trace_actual, "rotary traces, actual (paler: at other tilts)"),
             ("solid", colours.trace_nominal, "rotary traces, nominal, where apart"),
@@ -162,9 +162,9 @@ def key_to_lines(frame: Frame) -> str:
     )
 
 
-def scale_bars(frame: Frame) -> str:
+def scale_bars(picture: LivePicture) -> str:
     """Draw the two lengths side by side: geometry in mm, displacement in µm."""
-    factor = frame.exaggeration
+    factor = picture.exaggeration
     error = round_down(_BAR_MM / (factor * MM_PER_UM))
     width = error * MM_PER_UM * factor * _PX_PER_MM
     unit = f"{_number(error)} µm" if error < 1e4 else f"{_number(error * MM_PER_UM)} mm"
@@ -181,41 +181,41 @@ def scale_bars(frame: Frame) -> str:
     )
 
 
-def summary(frame: Frame) -> str:
+def summary(picture: LivePicture) -> str:
     """Put colour bar, numbers, scale bars and key into one block."""
-    nodes = f"{frame.field.norm_um.size:,}".replace(",", "\u202f")
+    nodes = f"{picture.field.norm_um.size:,}".replace(",", "\u202f")
     return (
         '<div style="padding:2px 14px 10px;line-height:1.4">'
         '<div style="display:flex;gap:14px">'
-        f'<div style="flex:0 0 124px">{colour_bar(frame)}</div>'
+        f'<div style="flex:0 0 124px">{colour_bar(picture)}</div>'
         '<div style="flex:1"><div style="font-weight:600">|E| over the grid</div>'
         '<div style="font-size:12px;opacity:.7;margin-bottom:6px">'
-        f"{nodes} nodes, {both_words(frame, lambda state: state.loop.value)} loop</div>"
-        f"{numbers(frame)}</div></div>"
-        f"{worst_place(frame)}"
+        f"{nodes} nodes, {both_words(picture, lambda state: state.loop.value)} loop</div>"
+        f"{numbers(picture)}</div></div>"
+        f"{worst_place(picture)}"
         '<div style="display:flex;gap:18px;align-items:end;margin:2px 0 8px">'
-        f"{scale_bars(frame)}</div>"
-        f"{key_to_lines(frame)}</div>"
+        f"{scale_bars(picture)}</div>"
+        f"{key_to_lines(picture)}</div>"
     )
 
 
-def heading(frame: Frame) -> str:
+def heading(picture: LivePicture) -> str:
     """Spell machine, error set and display factor."""
-    state = frame.subject or frame.state
-    factor = frame.exaggeration
+    state = picture.subject or picture.state
+    factor = picture.exaggeration
     how = "true scale" if factor == 1.0 else f"displacement drawn {spell_factor(factor)}"
-    auto = " (auto)" if frame.state.exaggeration is None else ""
+    auto = " (auto)" if picture.state.exaggeration is None else ""
     edited = len(state.changed_keys)
     note = f" · {edited} error{'s' if edited > 1 else ''} changed" if edited else ""
-    heard = state.heard
-    silent = sum(1 for key, value in state.amplitudes.items() if value != heard[key])
+    active = state.active
+    silent = sum(1 for key, value in state.amplitudes.items() if value != active[key])
     note += f" · {silent} silent" if silent else ""
-    nodes = "×".join(str(count) for count in frame.grid.shape)
-    size = " × ".join(f"{edge:.0f}" for edge in frame.grid.extent_mm)
+    nodes = "×".join(str(count) for count in picture.grid.shape)
+    size = " × ".join(f"{edge:.0f}" for edge in picture.grid.extent_mm)
     machine = f"{state.scene.machine.title}, chain {state.scene.machine.chain}"
     title = html.escape(state.scene.title)
-    if frame.compared is not None:
-        title = f'<span data-value="compared">{html.escape(frame.compared.title)}</span>'
+    if picture.compared is not None:
+        title = f'<span data-value="compared">{html.escape(picture.compared.title)}</span>'
     return (
         '<div style="padding:2px 14px 10px;line-height:1.4">'
         f'<div style="font-size:17px;font-weight:650">{title}'

@@ -1,4 +1,4 @@
-"""Everything of a tab that follows the frame: layers and panels, on a busy server by drafts."""
+"""Everything of a tab that follows the picture: layers and panels, on a busy server by drafts."""
 
 import time
 from collections import deque
@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
-from warpspace.app.evaluation.evaluate import Frame, LiveModel
-from warpspace.app.panels import Choosy, Panel, Settling
+from warpspace.app.evaluation.evaluate import LiveModel, LivePicture
+from warpspace.app.panels import Deferred, Panel, Selective
 from warpspace.app.panels.errors import ErrorsPanel
 from warpspace.app.panels.summary import HtmlPanel
 from warpspace.app.state.app_state import AppState
@@ -48,11 +48,11 @@ def make_draft(live: LiveModel, state: AppState) -> Draft:
     draft = PAINTER.paint(state)
     if draft is None:
         with TURN:
-            draft = build_draft(live.frame(state))
+            draft = build_draft(live.evaluate(state))
     return draft
 
 
-class Parts:
+class Followers:
     """Layers and panels of one tab.
 
     Parameters
@@ -65,25 +65,27 @@ class Parts:
         self,
         layers: Sequence[Layer] = (),
         panels: Sequence[Panel] = (),
-        frame: Frame | None = None,
+        picture: LivePicture | None = None,
     ) -> None:
         self.layers, self.panels = tuple(layers), tuple(panels)
-        self._frame, self._state = frame, None if frame is None else frame.state
+        self._picture, self._state = picture, None if picture is None else picture.state
         self._late: tuple[Layer | Panel, ...] = ()
         self._busy = False
         self._busy_until = 0.0
         self._since: float | None = None
-        self._concerns: dict[object, Callable[[Frame], tuple[object, ...]]] = {
-            part: part.concerns for part in (*layers, *panels) if isinstance(part, Choosy)
+        self._concerns: dict[object, Callable[[LivePicture], tuple[object, ...]]] = {
+            part: part.concerns for part in (*layers, *panels) if isinstance(part, Selective)
         }
         self._concerned: dict[object, tuple[object, ...]] = {}
 
-    def add(self, frame: Frame, layers: Sequence[Layer] = (), panels: Sequence[Panel] = ()) -> None:
-        """Have further parts follow, which show a frame that may be behind by now."""
+    def add(
+        self, picture: LivePicture, layers: Sequence[Layer] = (), panels: Sequence[Panel] = ()
+    ) -> None:
+        """Have further parts follow, which show a picture that may be behind by now."""
         self.layers, self.panels = (*self.layers, *layers), (*self.panels, *panels)
         added = (*layers, *panels)
-        self._concerns |= {part: part.concerns for part in added if isinstance(part, Choosy)}
-        if frame.state is not self._state:
+        self._concerns |= {part: part.concerns for part in added if isinstance(part, Selective)}
+        if picture.state is not self._state:
             self._late = (*self._late, *added)
         self.unsettle()
 
@@ -126,57 +128,57 @@ class Parts:
         for part in self.panels:
             if isinstance(part, HtmlPanel):
                 part.write(draft.texts[part.name])
-            elif isinstance(part, ErrorsPanel) and self._frame is not None:
-                part.show(replace(self._frame, state=state))
+            elif isinstance(part, ErrorsPanel) and self._picture is not None:
+                part.show(replace(self._picture, state=state))
         self._state = state
         self._late = (*self.layers, *self.panels)
         self.unsettle()
 
-    def show(self, frame: Frame, *, anew: bool = False) -> None:
-        """Follow a frame.
+    def show(self, picture: LivePicture, *, anew: bool = False) -> None:
+        """Follow a picture.
 
         Parameters
         ----------
-        frame : Frame
+        picture : LivePicture
         anew : bool, optional
             Also what shows the same as before: a widget may show what was refused.
         """
-        self._frame, self._state, self._late = frame, frame.state, ()
+        self._picture, self._state, self._late = picture, picture.state, ()
         for part in (*self.layers, *self.panels):
-            self._show(part, frame, anew=anew)
+            self._show(part, picture, anew=anew)
         self.unsettle()
 
-    def _show(self, part: Layer | Panel, frame: Frame, *, anew: bool = False) -> None:
+    def _show(self, part: Layer | Panel, picture: LivePicture, *, anew: bool = False) -> None:
         """Have one part follow, unless it shows all that already."""
         concerns = self._concerns.get(part)
         if concerns is not None:
-            concerned = concerns(frame)
+            concerned = concerns(picture)
             if not anew and self._concerned.get(part) == concerned:
                 return
             self._concerned.pop(part, None)
-            part.show(frame)
+            part.show(picture)
             self._concerned[part] = concerned
             return
-        part.show(frame)
+        part.show(picture)
 
     def unsettle(self) -> None:
         """Have charts follow soon."""
         if self._since is None:
             self._since = time.monotonic()
 
-    def settle(self, frame: Frame, guarded: Callable[[Callable[[], object]], None]) -> None:
+    def settle(self, picture: LivePicture, guarded: Callable[[Callable[[], object]], None]) -> None:
         """Bring everything up to date that has been put off.
 
         Parameters
         ----------
-        frame : Frame
+        picture : LivePicture
         guarded : callable
             Runs a step and reports what it raises.
         """
-        self._since, self._frame = None, frame
+        self._since, self._picture = None, picture
         late, self._late = self._late, ()
         for part in late:
-            guarded(partial(self._show, part, frame))
+            guarded(partial(self._show, part, picture))
         for panel in self.panels:
-            if isinstance(panel, Settling):
-                guarded(partial(panel.settle, frame))
+            if isinstance(panel, Deferred):
+                guarded(partial(panel.settle, picture))

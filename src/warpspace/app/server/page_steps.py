@@ -12,29 +12,29 @@ from collections.abc import Callable
 from functools import partial
 
 from warpspace.app.browser.handles import dom_id
-from warpspace.app.evaluation.evaluate import Frame
-from warpspace.app.panels import Desk
+from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.panels import PanelContext
 from warpspace.app.panels.appearance import Choose
 from warpspace.app.panels.commands import hint_script
-from warpspace.app.panels.contents import Build, Contents
+from warpspace.app.panels.contents import Build, PanelBuilder
 from warpspace.app.panels.layout import Places
-from warpspace.app.server.followers import Parts
-from warpspace.app.server.tab_services import Outside
+from warpspace.app.server.followers import Followers
+from warpspace.app.server.tab_context import TabContext
 from warpspace.app.viewport.layers.box import BoxLayer
 from warpspace.app.viewport.layers.stage import StageLayer, draw_around
 
 ANSWER_S = 1.0
 """How long a page may take for one step; one that does not answer gets the rest at once."""
-Step = Callable[[Frame], None]
+Step = Callable[[LivePicture], None]
 
 
-class Opening:
+class PageSteps:
     """Builds the page of one tab; every step is one atomic change.
 
     Parameters
     ----------
-    desk : Desk
-    outside : Outside
+    context : PanelContext
+    tab : TabContext
     places : Places
     fit_view : callable
         Puts the camera to a named view, or changes its lens.
@@ -44,15 +44,15 @@ class Opening:
 
     def __init__(
         self,
-        desk: Desk,
-        outside: Outside,
+        context: PanelContext,
+        tab: TabContext,
         places: Places,
         fit_view: Choose,
         told: Callable[[], None],
     ) -> None:
-        self._desk, self._outside = desk, outside
-        self._contents = Contents(desk, outside, places, fit_view, self._play)
-        self._answer = desk.gui.add_text("", "", visible=False)
+        self._context, self._tab = context, tab
+        self._contents = PanelBuilder(context, tab, places, fit_view, self._play)
+        self._answer = context.gui.add_text("", "", visible=False)
 
         @self._answer.on_update
         async def _(_: object) -> None:  # a plain function would take a thread of a pool
@@ -60,29 +60,29 @@ class Opening:
 
         self._steps: deque[Step] = deque()
         self._asked, self._patient, self._asked_at = 0, True, 0.0
-        self._parts = Parts()
+        self._parts = Followers()
         self._stage: StageLayer | None = None
 
-    def begin(self, frame: Frame) -> Parts:
+    def begin(self, picture: LivePicture) -> Followers:
         """Draw the map, its sliders and numbers.
 
         Parameters
         ----------
-        frame : Frame
+        picture : LivePicture
 
         Returns
         -------
         Parts
             To which the further steps add.
         """
-        box = BoxLayer(self._outside.client.scene, frame)
-        panels = self._contents.build_first(frame.state)
+        box = BoxLayer(self._tab.client.scene, picture)
+        panels = self._contents.build_first(picture.state)
         for panel in panels:
-            panel.show(frame)
-        self._parts = Parts([box], panels, frame)
+            panel.show(picture)
+        self._parts = Followers([box], panels, picture)
         self._steps.append(self._draw_around)
         self._steps.extend(partial(self._add_panels, build) for build in self._contents.others())
-        self._outside.run_script(stage_script("opening"))
+        self._tab.run_script(stage_script("opening"))
         self._ask()
         return self._parts
 
@@ -106,48 +106,48 @@ class Opening:
         left = self.remaining_s()
         return left == 0.0 or (left is not None and self._answer.value == str(self._asked))
 
-    def advance(self, frame: Frame) -> None:
+    def advance(self, picture: LivePicture) -> None:
         """Take the next step.
 
         Parameters
         ----------
-        frame : Frame
+        picture : LivePicture
             What is shown.
         """
         self._patient = self._patient and self.remaining_s() != 0.0
         step = self._steps.popleft()
-        with self._outside.client.atomic():
-            step(frame)
+        with self._tab.client.atomic():
+            step(picture)
             if self._steps:
                 self._ask()
             else:
                 self._end()
-        self._outside.client.flush()
+        self._tab.client.flush()
 
     def _ask(self) -> None:
         """Have the page say when it has drawn what it gets now."""
         self._asked += 1
         self._asked_at = time.monotonic()
-        self._outside.run_script(drawn_script(dom_id(self._answer), self._asked))
+        self._tab.run_script(drawn_script(dom_id(self._answer), self._asked))
 
-    def _draw_around(self, frame: Frame) -> None:
+    def _draw_around(self, picture: LivePicture) -> None:
         """Draw what lies on and around the map."""
-        client = self._outside.client
-        self._stage = StageLayer(client, frame, self._desk.act)
-        self._parts.add(frame, layers=[*draw_around(client.scene, frame), self._stage])
+        client = self._tab.client
+        self._stage = StageLayer(client, picture, self._context.act)
+        self._parts.add(picture, layers=[*draw_around(client.scene, picture), self._stage])
 
-    def _add_panels(self, build: Build, frame: Frame) -> None:
+    def _add_panels(self, build: Build, picture: LivePicture) -> None:
         """Build some panels."""
-        panels = build(frame.state)
+        panels = build(picture.state)
         for panel in panels:
-            panel.show(frame)
-        self._parts.add(frame, panels=panels)
+            panel.show(picture)
+        self._parts.add(picture, panels=panels)
 
     def _end(self) -> None:
         """Say how to begin."""
         self._answer.remove()
-        self._outside.run_script(hint_script())
-        self._outside.run_script(stage_script("open"))
+        self._tab.run_script(hint_script())
+        self._tab.run_script(stage_script("open"))
 
     def _play(self, on: bool | None, tell: Callable[[str], None]) -> None:
         """Play, pause or take back the rotation."""

@@ -6,9 +6,9 @@ import numpy as np
 
 from warpspace.app.evaluation.budget import pick, with_picked
 from warpspace.app.evaluation.conventions import with_reference
-from warpspace.app.panels import Desk
+from warpspace.app.panels import PanelContext
 from warpspace.app.panels.conventions import ConventionsPanel
-from warpspace.app.server.tab_services import Outside
+from warpspace.app.server.tab_context import TabContext
 from warpspace.app.viewport.layers import SCENE_PER_MM
 
 FORWARD = """(() => {
@@ -28,24 +28,26 @@ class Pointing:
 
     Parameters
     ----------
-    outside : Outside
-    desk : Desk
+    tab : TabContext
+    context : PanelContext
     conventions : ConventionsPanel
         May be waiting for a reference point.
     """
 
-    def __init__(self, outside: Outside, desk: Desk, conventions: ConventionsPanel) -> None:
-        self._outside, self._desk, self._conventions = outside, desk, conventions
+    def __init__(
+        self, tab: TabContext, context: PanelContext, conventions: ConventionsPanel
+    ) -> None:
+        self._tab, self._context, self._conventions = tab, context, conventions
 
-        @outside.client.scene.on_click()
+        @tab.client.scene.on_click()
         def _(event: Any) -> None:
             origin, direction = event.ray_origin, event.ray_direction
-            desk.act(lambda: self._clicked(origin, direction))
+            context.act(lambda: self._clicked(origin, direction))
 
     def _clicked(self, origin: Any, direction: Any) -> None:
         """Find what was clicked and note it in the state; by the session's worker."""
-        frame = self._outside.shown()
-        if frame is None:
+        picture = self._tab.shown()
+        if picture is None:
             return
         try:
             ray = np.array([origin, direction], dtype=float)
@@ -53,12 +55,12 @@ class Pointing:
             return
         if ray.shape != (2, 3):
             return
-        picked = pick(frame, ray[0] / SCENE_PER_MM, ray[1])
+        picked = pick(picture, ray[0] / SCENE_PER_MM, ray[1])
         if picked is None:
             return
         if self._conventions.picking and picked.point_mm is None:
             self._conventions.wait(picking=False)
-            self._desk.post(lambda state: with_reference(state, picked.at))
+            self._context.post(lambda state: with_reference(state, picked.at))
             return
-        self._outside.run_script(FORWARD)
-        self._desk.post(lambda state: with_picked(state, picked))
+        self._tab.run_script(FORWARD)
+        self._context.post(lambda state: with_picked(state, picked))

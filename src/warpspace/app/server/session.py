@@ -16,18 +16,18 @@ from viser import ClientHandle
 
 from warpspace.app.browser.arrivals import Arrival
 from warpspace.app.browser.page import Page, is_passing
-from warpspace.app.documents.scene_list import Shelf
+from warpspace.app.documents.scene_list import SceneList
 from warpspace.app.documents.services import Services
-from warpspace.app.evaluation.evaluate import Frame, LiveModel
-from warpspace.app.panels import Desk, Update
+from warpspace.app.evaluation.evaluate import LiveModel, LivePicture
+from warpspace.app.panels import PanelContext, Update
 from warpspace.app.panels.layout import Places, apply_theme
-from warpspace.app.server.followers import TURN, Parts, make_draft
-from warpspace.app.server.page_steps import Opening
-from warpspace.app.server.tab_memory import CameraMemory, Left, new_token, rename_script
-from warpspace.app.server.tab_services import Outside
+from warpspace.app.server.followers import TURN, Followers, make_draft
+from warpspace.app.server.page_steps import PageSteps
+from warpspace.app.server.tab_context import TabContext
+from warpspace.app.server.tab_memory import CameraMemory, TabRecord, new_token, rename_script
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.shared_state import Board, apply_each
-from warpspace.app.viewport.tab_camera import Eye, focus
+from warpspace.app.state.store import StateStore, apply_each
+from warpspace.app.viewport.tab_camera import TabCamera, focus
 
 logger = logging.getLogger(__name__)
 TOKEN_WAIT_S = 0.25
@@ -42,9 +42,9 @@ class Session:
     client : viser.ClientHandle
     live : LiveModel
         Shared by all sessions.
-    scenes : Shelf
+    scenes : SceneList
         Scenes to choose from.
-    board : Board
+    store : StateStore
         What is shown: the tab's own, or that of a shared review.
     places : Places
     arrival : Arrival
@@ -60,29 +60,29 @@ class Session:
         self,
         client: ClientHandle,
         live: LiveModel,
-        scenes: Shelf,
-        board: Board,
+        scenes: SceneList,
+        store: StateStore,
         places: Places,
         arrival: Arrival,
-        claim: "Callable[[Session, str], Left | None] | None" = None,
+        claim: "Callable[[Session, str], TabRecord | None] | None" = None,
         services: Services | None = None,
     ) -> None:
         self._client, self._live, self._scenes = client, live, scenes
         self._services = services or Services()
-        self.board, self._places = board, places
+        self.store, self._places = store, places
         self.token = new_token()
         self._arrival: Arrival | None = arrival
         self._page_width: float | None = None
         self._claim = claim
-        self._eye, self._page = Eye(client), Page(client)
+        self._eye, self._page = TabCamera(client), Page(client)
         self._camera: CameraMemory | None = None
         self._actions: deque[Callable[[], None]] = deque()
-        self._shown: Frame | None = None
+        self._shown: LivePicture | None = None
         self._posted: deque[Update] = deque()
         self._wake, self._changed_at = threading.Event(), time.monotonic()
         self._stopped = threading.Event()
-        self._parts = Parts()
-        self._opening: Opening | None = None
+        self._parts = Followers()
+        self._opening: PageSteps | None = None
         self._worker = threading.Thread(
             target=self._run, name=f"warpspace-session-{client.client_id}", daemon=True
         )
@@ -90,7 +90,7 @@ class Session:
     @property
     def state(self) -> AppState:
         """What is shown, or about to be."""
-        return self.board.state
+        return self.store.state
 
     def start(self) -> None:
         """Build page and drawing, then follow the widgets."""
@@ -102,7 +102,7 @@ class Session:
         self._wake.set()
         if self._opening is not None:
             self._opening.stop()
-        self.board.unsubscribe(self.changed)
+        self.store.unsubscribe(self.changed)
 
     def changed(self) -> None:
         """Take note that a widget has changed; returns at once."""
@@ -121,16 +121,16 @@ class Session:
 
     def _run(self) -> None:
         """Wait, take everything in, show once; let charts follow when it settles; until stopped."""
-        self.board.subscribe(self.changed)
+        self.store.subscribe(self.changed)
         try:
             self._guarded(self._build)
             while not self._stopped.is_set():
                 self._turn()
         finally:
-            self.board.unsubscribe(self.changed)
+            self.store.unsubscribe(self.changed)
             self._guarded(self._page.leave)
             # what is large is let go at once, not when cycles happen to be looked for
-            self._parts, self._opening, self._shown = Parts(), None, None
+            self._parts, self._opening, self._shown = Followers(), None, None
 
     def _turn(self) -> None:
         """Wait for one change, or for a pause in them, and follow."""
@@ -163,33 +163,33 @@ class Session:
         self._arrival, self._page_width = None, arrival.width
         left = self._claim(self, arrival.token) if self._claim is not None else None
         if left is not None:
-            self.board.unsubscribe(self.changed)
-            self.board, self._camera = left.board, left.camera
-            self.board.subscribe(self.changed)
+            self.store.unsubscribe(self.changed)
+            self.store, self._camera = left.store, left.camera
+            self.store.subscribe(self.changed)
 
     def renamed(self, token: str) -> None:
         """Give page and session another token, since two tabs came with one."""
         self.token = token
         self._page.run_script(rename_script(token))
 
-    def left(self) -> Left:
+    def left(self) -> TabRecord:
         """Give what is worth keeping of the tab."""
-        return Left(self.board, self._eye.remember())
+        return TabRecord(self.store, self._eye.remember())
 
     def _build(self) -> None:
         """Show map, sliders and numbers; line up all else."""
         if self._arrival is not None and self._arrival.wait(TOKEN_WAIT_S, self._wake.set):
             self._adopt(self._arrival)
-        frame = self._live.frame(self.state)
-        desk = Desk(
+        picture = self._live.evaluate(self.state)
+        context = PanelContext(
             self._client.gui,
             self.changed,
             self.post,
             self.act,
-            lambda: self.board,
+            lambda: self.store,
             self._page.notify,
         )
-        outside = Outside(
+        tab = TabContext(
             self._client,
             self._scenes,
             self._eye.remember,
@@ -198,15 +198,15 @@ class Session:
             self._services,
             lambda: self._shown,
         )
-        self._opening = Opening(desk, outside, self._places, self.fit_view, self._wake.set)
+        self._opening = PageSteps(context, tab, self._places, self.fit_view, self._wake.set)
         with self._client.atomic():
-            if frame.state.shown.dark != self._places.dark:
-                apply_theme(self._client.gui, dark=frame.state.shown.dark)
-            self._page.set_title(frame.state.scene.title)
-            self._restore_camera(frame)
-            self._parts = self._opening.begin(frame)
+            if picture.state.shown.dark != self._places.dark:
+                apply_theme(self._client.gui, dark=picture.state.shown.dark)
+            self._page.set_title(picture.state.scene.title)
+            self._restore_camera(picture)
+            self._parts = self._opening.begin(picture)
         self._client.flush()
-        self._shown = frame
+        self._shown = picture
         self._parts.unsettle()
 
     def _step(self) -> None:
@@ -215,10 +215,10 @@ class Session:
             self._adopt(self._arrival)
             if self._camera is not None and self._shown is not None:
                 self._restore_camera(self._shown)
-        notes = self.board.apply(self._take_in, by=self.changed, at=self._changed_at)
+        notes = self.store.apply(self._take_in, by=self.changed, at=self._changed_at)
         while self._actions:
             self._guarded(self._actions.popleft())
-        state = self.board.state
+        state = self.store.state
         shown = self._shown
         if self._camera and shown is not None and focus(shown.state) == focus(state):
             self._restore_camera(shown)
@@ -232,7 +232,7 @@ class Session:
         asked = time.monotonic()
         with TURN:
             self._parts.waited(time.monotonic() - asked)
-            self._show(self._live.frame(state), notes)
+            self._show(self._live.evaluate(state), notes)
 
     def _take_in(self, state: AppState) -> AppState:
         """Apply what widgets and buttons have changed to a state."""
@@ -241,17 +241,17 @@ class Session:
             updates.append(self._posted.popleft())
         return apply_each(state, updates, self._guarded)
 
-    def _show(self, frame: Frame, notes: tuple[str, ...]) -> None:
-        """Make page and drawing show a frame; on a busy server map and numbers first."""
+    def _show(self, picture: LivePicture, notes: tuple[str, ...]) -> None:
+        """Make page and drawing show a picture; on a busy server map and numbers first."""
         before = self._shown
         with self._client.atomic():
-            self._parts.show(frame, anew=bool(notes))
-            if before is not None and focus(before.state) != focus(frame.state):
-                self._page.set_title(frame.state.scene.title)
-                self._restore_camera(frame)
-            if before is not None and before.state.shown.dark != frame.state.shown.dark:
-                apply_theme(self._client.gui, dark=frame.state.shown.dark)
-        self._shown = frame
+            self._parts.show(picture, anew=bool(notes))
+            if before is not None and focus(before.state) != focus(picture.state):
+                self._page.set_title(picture.state.scene.title)
+                self._restore_camera(picture)
+            if before is not None and before.state.shown.dark != picture.state.shown.dark:
+                apply_theme(self._client.gui, dark=picture.state.shown.dark)
+        self._shown = picture
         if notes:
             self._page.notify("Clamped", "\n".join(notes), "yellow")
 
@@ -268,10 +268,10 @@ class Session:
             return
         if self._shown is None or self._shown.state is not self._parts.state:
             with TURN:
-                self._shown = self._live.frame(self._parts.state)
-        frame = self._shown
+                self._shown = self._live.evaluate(self._parts.state)
+        picture = self._shown
         with self._client.atomic():
-            self._parts.settle(frame, self._guarded)
+            self._parts.settle(picture, self._guarded)
         self._client.flush()
 
     def fit_view(self, view: str | None = None, lens: bool | None = None) -> None:
@@ -285,10 +285,10 @@ class Session:
         self._camera = memory
         self._wake.set()
 
-    def _restore_camera(self, frame: Frame) -> None:
+    def _restore_camera(self, picture: LivePicture) -> None:
         """Put the camera where the tab left it, else where all of the box is seen."""
         memory, self._camera = self._camera, None
         if memory is not None:
             self._eye.restore(memory)
         else:
-            self._eye.fit(frame, docked=self._shown is not None, page_width=self._page_width)
+            self._eye.fit(picture, docked=self._shown is not None, page_width=self._page_width)

@@ -19,7 +19,7 @@ from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from warpspace.app.state.shared_state import Board
+from warpspace.app.state.store import StateStore
 
 KEPT_SECONDS = 600.0
 KEPT_TABS = 64
@@ -45,21 +45,21 @@ class CameraMemory:
 
 
 @dataclass(frozen=True, slots=True)
-class Left:
+class TabRecord:
     """What a tab leaves behind.
 
     Attributes
     ----------
-    board : Board
+    store : StateStore
         State and history.
     camera : CameraMemory or None
     """
 
-    board: Board
+    store: StateStore
     camera: CameraMemory | None
 
 
-class Keeper:
+class TabMemory:
     """Keeps what tabs leave behind, bounded in time and number; usable from any thread.
 
     Parameters
@@ -70,38 +70,38 @@ class Keeper:
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
-        self._kept: OrderedDict[str, tuple[float, Left]] = OrderedDict()
+        self._cache: OrderedDict[str, tuple[float, TabRecord]] = OrderedDict()
         self._lock = threading.Lock()
 
-    def keep(self, token: str, left: Left) -> None:
+    def keep(self, token: str, left: TabRecord) -> None:
         """Keep what a tab leaves behind."""
         if not is_token(token):
             return
         with self._lock:
-            self._kept.pop(token, None)
-            self._kept[token] = (self._clock() + KEPT_SECONDS, left)
-            while len(self._kept) > KEPT_TABS:
-                self._kept.popitem(last=False)
+            self._cache.pop(token, None)
+            self._cache[token] = (self._clock() + KEPT_SECONDS, left)
+            while len(self._cache) > KEPT_TABS:
+                self._cache.popitem(last=False)
             self._forget()
 
-    def take(self, token: str) -> Left | None:
+    def take(self, token: str) -> TabRecord | None:
         """Give back what a tab has left behind, once; None where there is nothing."""
         with self._lock:
             self._forget()
-            found = self._kept.pop(token, None)
+            found = self._cache.pop(token, None)
         return None if found is None else found[1]
 
     def __len__(self) -> int:
         """Count the tabs that are remembered."""
         with self._lock:
             self._forget()
-            return len(self._kept)
+            return len(self._cache)
 
     def _forget(self) -> None:
         """Drop what is too old."""
         now = self._clock()
-        for token in [token for token, (until, _) in self._kept.items() if until < now]:
-            del self._kept[token]
+        for token in [token for token, (until, _) in self._cache.items() if until < now]:
+            del self._cache[token]
 
 
 def new_token() -> str:

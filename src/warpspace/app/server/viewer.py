@@ -15,16 +15,16 @@ from typing import Self
 import viser
 
 from warpspace.app.browser.arrivals import Arrivals
-from warpspace.app.documents.scene_list import Shelf
+from warpspace.app.documents.scene_list import SceneList
 from warpspace.app.documents.services import Services
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.panels.layout import lay_out
 from warpspace.app.server.memory import Tidier, limit_arenas, settle_memory
 from warpspace.app.server.network import free_port, is_local, page_url, resolve_host
 from warpspace.app.server.session import Session
-from warpspace.app.server.tab_memory import Keeper, Left, is_token, new_token
+from warpspace.app.server.tab_memory import TabMemory, TabRecord, is_token, new_token
 from warpspace.app.state.app_state import AppState, start_state
-from warpspace.app.state.shared_state import Board
+from warpspace.app.state.store import StateStore
 from warpspace.app.viewport.layers.lights import light_scene
 from warpspace.app.viewport.painter import PAINTER
 from warpspace.exceptions import OptionError
@@ -84,9 +84,9 @@ class Viewer:
         self._live = LiveModel()
         self._sessions: dict[int, Session] = {}
         self._lock = threading.Lock()
-        self._keeper = Keeper()
+        self._memory = TabMemory()
         self._tidier = Tidier()
-        self._shared = Board(self._start) if shared else None
+        self._shared = StateStore(self._start) if shared else None
         self._server = _serve(self.address, self.port)
         light_scene(self._server.scene)
         self._arrivals = Arrivals(self._server)
@@ -121,17 +121,17 @@ class Viewer:
 
     def _warm(self) -> None:
         """Do before the first tab what it would have to wait for."""
-        self._live.frame(self._start)
+        self._live.evaluate(self._start)
         importlib.import_module("warpspace.app.evaluation.probability")
 
     def _connect(self, client: viser.ClientHandle) -> None:
         """Give a new tab its session."""
-        board = self._shared or Board(self._start)
+        store = self._shared or StateStore(self._start)
         session = Session(
             client,
             self._live,
-            Shelf(self._scenes),
-            board,
+            SceneList(self._scenes),
+            store,
             self._places,
             self._arrivals.expect(client.client_id),
             self._claim,
@@ -143,7 +143,7 @@ class Viewer:
         if client.client_id not in self._server.get_clients():
             self._disconnect(client)
 
-    def _claim(self, session: Session, token: str) -> Left | None:
+    def _claim(self, session: Session, token: str) -> TabRecord | None:
         """Find what the tab whose page hands over a token has left behind."""
         if not is_token(token):
             return None
@@ -151,15 +151,15 @@ class Viewer:
             if session not in self._sessions.values():
                 return None  # its connection is gone already: it must not take what it left
             twins = [s for s in self._sessions.values() if s is not session and s.token == token]
-            left = self._keeper.take(token)
+            left = self._memory.take(token)
             if not twins:
                 session.token = token
         if twins:
             # a duplicated tab, or one whose old connection is not yet known to be dead
-            left = Left(twins[0].board.copy(), None)
+            left = TabRecord(twins[0].store.copy(), None)
             session.renamed(new_token())
         if left is not None and self._shared is not None:
-            return Left(self._shared, left.camera)
+            return TabRecord(self._shared, left.camera)
         return left
 
     def _disconnect(self, client: viser.ClientHandle) -> None:
@@ -168,7 +168,7 @@ class Viewer:
         with self._lock:
             session = self._sessions.pop(client.client_id, None)
             if session is not None:
-                self._keeper.keep(session.token, session.left())
+                self._memory.keep(session.token, session.left())
         if session is not None:
             session.stop()
             self._tidier.soon()

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from warpspace.app.state.comparison import Comparison
-from warpspace.app.state.exclusions import Emphasis
+from warpspace.app.state.exclusions import Exclusions
 from warpspace.app.state.look import Look, MachineLook, RotaryLook
 from warpspace.app.state.picked import Picked
 from warpspace.app.state.ranges import Span, amplitude_spans, position_spans
@@ -65,7 +65,7 @@ class AppState:
     nodes : int
         Grid nodes per axis.
     shown : Shown
-    emphasis : Emphasis
+    exclusions : Exclusions
         Parameters that are silenced or heard alone.
     tolerances : ToleranceSet
         What machines are sampled from: the scene's, as far as they have not been moved.
@@ -100,7 +100,7 @@ class AppState:
     loop: Loop = Loop.TOOL
     nodes: int = START_NODES
     shown: Shown = field(default_factory=Shown)
-    emphasis: Emphasis = field(default_factory=Emphasis)
+    exclusions: Exclusions = field(default_factory=Exclusions)
     tolerances: ToleranceSet = field(default_factory=ToleranceSet)
     specification: Specification = field(default_factory=Specification)
     loaded: Scene | None = None
@@ -118,9 +118,9 @@ class AppState:
         return self.loaded or self.scene
 
     @property
-    def heard(self) -> Mapping[str, float]:
+    def active(self) -> Mapping[str, float]:
         """Amplitudes that count, µm or µrad: those silenced by solo and mute are zero."""
-        return self.emphasis.effective(self.amplitudes)
+        return self.exclusions.effective(self.amplitudes)
 
     def with_amplitude(self, key: str, value: float) -> "AppState":
         """Set the amplitude of one parameter, µm or µrad, within its slider's range."""

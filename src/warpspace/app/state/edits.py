@@ -100,19 +100,19 @@ def with_muted(state: AppState, key: str, muted: bool) -> AppState:
     """Silence one parameter, or let it be heard again."""
     if key not in state.amplitudes:
         return state
-    return replace(state, emphasis=state.emphasis.with_muted(key, muted))
+    return replace(state, exclusions=state.exclusions.with_muted(key, muted))
 
 
 def with_soloed(state: AppState, key: str, soloed: bool) -> AppState:
     """Add one parameter to those heard alone, or take it away."""
     if key not in state.amplitudes:
         return state
-    return replace(state, emphasis=state.emphasis.with_soloed(key, soloed))
+    return replace(state, exclusions=state.exclusions.with_soloed(key, soloed))
 
 
-def all_heard(state: AppState) -> AppState:
+def include_all(state: AppState) -> AppState:
     """End all solo and mute."""
-    return replace(state, emphasis=type(state.emphasis)())
+    return replace(state, exclusions=type(state.exclusions)())
 
 
 def with_specification(state: AppState, specification: Specification) -> AppState:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True, slots=True)
-class Emphasis:
+class Exclusions:
     """Parameters that are silenced, and those heard alone.
 
     Attributes
@@ -23,7 +23,7 @@ class Emphasis:
         """Whether anything is silenced."""
         return bool(self.muted or self.soloed)
 
-    def heard(self, key: str) -> bool:
+    def active(self, key: str) -> bool:
         """Tell whether a parameter takes part."""
         return key not in self.muted and (not self.soloed or key in self.soloed)
 
@@ -31,19 +31,19 @@ class Emphasis:
         """Give the amplitudes that count, µm or µrad: zero for what is not heard."""
         if not self:
             return amplitudes
-        return {key: value if self.heard(key) else 0.0 for key, value in amplitudes.items()}
+        return {key: value if self.active(key) else 0.0 for key, value in amplitudes.items()}
 
-    def with_muted(self, key: str, muted: bool) -> "Emphasis":
+    def with_muted(self, key: str, muted: bool) -> "Exclusions":
         """Silence one parameter, or let it be heard again."""
         return replace(self, muted=_with(self.muted, key, muted))
 
-    def with_soloed(self, key: str, soloed: bool) -> "Emphasis":
+    def with_soloed(self, key: str, soloed: bool) -> "Exclusions":
         """Add one parameter to those heard alone, or take it away."""
         return replace(self, soloed=_with(self.soloed, key, soloed))
 
-    def within(self, keys: Collection[str]) -> "Emphasis":
+    def within(self, keys: Collection[str]) -> "Exclusions":
         """Keep what concerns the parameters of a machine."""
-        return Emphasis(self.muted & frozenset(keys), self.soloed & frozenset(keys))
+        return Exclusions(self.muted & frozenset(keys), self.soloed & frozenset(keys))
 
 
 def _with(keys: frozenset[str], key: str, on: bool) -> frozenset[str]:

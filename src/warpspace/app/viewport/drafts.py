@@ -7,7 +7,7 @@ numbers of all nodes. All else waits until the slider rests.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 
-from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.evaluation.evaluate import LivePicture
 from warpspace.app.evaluation.map_mesh import (
     Pieces,
     drafted,
@@ -22,7 +22,7 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.viewport.glb import build_glb
 from warpspace.app.viewport.tone_map import vertex_colours
 
-TEXTS: Mapping[str, Callable[[Frame], str]] = {
+TEXTS: Mapping[str, Callable[[LivePicture], str]] = {
     "summary": legend.summary,
     "heading": legend.heading,
 }
@@ -63,28 +63,28 @@ class Draft:
     texts: Mapping[str, str]
 
 
-def surface_glb(frame: Frame) -> bytes:
-    """Write the coloured map of a frame, or its lines alone, vertices in mm."""
-    mesh = line_mesh(frame) if frame.state.look.surface == "grid" else map_mesh(frame)
-    return build_glb(mesh.vertices_mm, mesh.triangles, vertex_colours(frame.scale, mesh.values))
+def surface_glb(picture: LivePicture) -> bytes:
+    """Write the coloured map of a picture, or its lines alone, vertices in mm."""
+    mesh = line_mesh(picture) if picture.state.look.surface == "grid" else map_mesh(picture)
+    return build_glb(mesh.vertices_mm, mesh.triangles, vertex_colours(picture.scale, mesh.values))
 
 
-def box_picture(frame: Frame) -> BoxPicture:
+def box_picture(picture: LivePicture) -> BoxPicture:
     """Work out what is sent of the bent box."""
-    look = frame.state.look
+    look = picture.state.look
     on_map = look.surface != "grid"
     return BoxPicture(
-        surface_glb(frame),
-        grid_pieces(frame) if on_map and frame.state.shown.grid_lines else None,
-        edge_pieces(frame) if on_map else None,
-        isoline_pieces(frame) if on_map and look.isolines else None,
+        surface_glb(picture),
+        grid_pieces(picture) if on_map and picture.state.shown.grid_lines else None,
+        edge_pieces(picture) if on_map else None,
+        isoline_pieces(picture) if on_map and look.isolines else None,
     )
 
 
-def build_draft(frame: Frame) -> Draft:
-    """Work out the draft of a frame."""
-    texts = {name: spell(frame) for name, spell in TEXTS.items()}
-    return Draft(box_picture(drafted(frame)), texts)
+def build_draft(picture: LivePicture) -> Draft:
+    """Work out the draft of a picture."""
+    texts = {name: spell(picture) for name, spell in TEXTS.items()}
+    return Draft(box_picture(drafted(picture)), texts)
 
 
 def only_moved(old: AppState, new: AppState) -> bool:

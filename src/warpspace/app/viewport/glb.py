@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.app.evaluation.cache import Same
+from warpspace.app.evaluation.cache import Identity
 from warpspace.app.viewport.tone_map import Floats
 from warpspace.units import Array
 
@@ -93,7 +93,7 @@ def _header(vertices: int, indices: int, mode: int) -> tuple[str, str, str]:
 
 
 @lru_cache(maxsize=8)
-def _indices(triangles: Same, kind: str) -> bytes:
+def _indices(triangles: Identity, kind: str) -> bytes:
     """Write vertex numbers; those of one array once."""
     return triangles.thing.astype(kind).tobytes()
 
@@ -117,7 +117,7 @@ def build_glb(vertices: Array, triangles: NDArray[np.integer], colours: Floats) 
     points = np.ascontiguousarray(vertices, dtype="<f4")
     columns = np.ascontiguousarray(points.T)
     low, high = columns.min(axis=1).tolist(), columns.max(axis=1).tolist()
-    indices = _indices(Same(triangles), "<u2" if len(points) <= _SMALL else "<u4")
+    indices = _indices(Identity(triangles), "<u2" if len(points) <= _SMALL else "<u4")
     before, between, after = _header(
         len(points), triangles.size, _LINES if triangles.shape[-1] == 2 else _TRIANGLES
     )

@@ -29,7 +29,7 @@ VIEWS: Mapping[str, Direction] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Stand:
+class CameraSetup:
     """How the camera is set up.
 
     Attributes
@@ -49,7 +49,7 @@ class Stand:
         return TELEPHOTO_DEG if self.orthographic else FOV_DEG
 
 
-def view_pose(points: Array, aspect: float, stand: Stand, top: float = 0.0) -> CameraPose:
+def view_pose(points: Array, aspect: float, stand: CameraSetup, top: float = 0.0) -> CameraPose:
     """Place a camera for a named view so that points fill the picture.
 
     Parameters
@@ -57,7 +57,7 @@ def view_pose(points: Array, aspect: float, stand: Stand, top: float = 0.0) -> C
     points : ndarray, [..., 3]
     aspect : float
         Width over height of the picture.
-    stand : Stand
+    stand : CameraSetup
     top : float, optional
         Part of the height at the top that is kept free.
 

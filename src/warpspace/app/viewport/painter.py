@@ -162,7 +162,7 @@ def _work(pipe: Connection) -> None:
         known = states[number]
         values = dict(zip(known.amplitudes, content, strict=True))
         try:
-            answer: Draft | str = build_draft(live.frame(replace(known, amplitudes=values)))
+            answer: Draft | str = build_draft(live.evaluate(replace(known, amplitudes=values)))
         except Exception as error:  # noqa: BLE001 - told to the one who asked, who logs it
             answer = f"{type(error).__name__}: {error}"
         pipe.send(answer)

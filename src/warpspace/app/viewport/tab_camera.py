@@ -3,8 +3,8 @@
 import numpy as np
 from viser import ClientHandle
 
-from warpspace.app.evaluation.cache import Same
-from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.evaluation.cache import Identity
+from warpspace.app.evaluation.evaluate import LivePicture
 from warpspace.app.evaluation.machine import machine_room_mm
 from warpspace.app.panels.layout import side_widths
 from warpspace.app.server.tab_memory import CameraMemory
@@ -16,7 +16,7 @@ from warpspace.app.viewport.layers.axes import axes_room_mm
 from warpspace.app.viewport.named_views import (
     TELEPHOTO_DEG,
     VIEWS,
-    Stand,
+    CameraSetup,
     change_lens,
     clipping,
     view_pose,
@@ -27,12 +27,12 @@ LEAST_SIZE = 200
 """CSS pixels of a picture that is taken to be one."""
 
 
-def focus(state: AppState) -> tuple[Same, bool]:
+def focus(state: AppState) -> tuple[Identity, bool]:
     """Tell what the camera is set up for: the scene, and whether its machine is shown."""
-    return Same(state.origin), state.machine.shown
+    return Identity(state.origin), state.machine.shown
 
 
-class Eye:
+class TabCamera:
     """The camera of a tab.
 
     Parameters
@@ -42,19 +42,21 @@ class Eye:
 
     def __init__(self, client: ClientHandle) -> None:
         self._camera = client.camera
-        self._stand = Stand()
+        self._stand = CameraSetup()
 
     @property
-    def stand(self) -> Stand:
+    def stand(self) -> CameraSetup:
         """Named view and lens that were chosen last."""
         return self._stand
 
-    def choose(self, frame: Frame, view: str | None = None, lens: bool | None = None) -> None:
+    def choose(
+        self, picture: LivePicture, view: str | None = None, lens: bool | None = None
+    ) -> None:
         """Take a named view, or another lens from where the camera stands.
 
         Parameters
         ----------
-        frame : Frame
+        picture : LivePicture
         view : str or None
             A key of `VIEWS`; None stays, or with no lens goes back to it.
         lens : bool or None
@@ -64,18 +66,18 @@ class Eye:
             return
         stand = self._stand
         orthographic = stand.orthographic if lens is None else lens
-        self._stand = Stand(view or stand.view, orthographic)
+        self._stand = CameraSetup(view or stand.view, orthographic)
         if view is not None or lens is None:
-            self.fit(frame, docked=True)
+            self.fit(picture, docked=True)
         elif orthographic != stand.orthographic:
-            self._change_lens(frame)
+            self._change_lens(picture)
 
-    def _change_lens(self, frame: Frame) -> None:
+    def _change_lens(self, picture: LivePicture) -> None:
         """Go to the other field of view; what is looked at keeps its size."""
         camera, fov = self._camera, float(np.deg2rad(self._stand.fov_deg))
         look_at = camera.look_at.copy()
         position = change_lens(camera.position, look_at, camera.fov, fov)
-        self._clip(position, self._room_mm(frame))
+        self._clip(position, self._room_mm(picture))
         camera.fov = fov
         camera.position = position
         camera.look_at = look_at  # the former takes it along
@@ -87,19 +89,19 @@ class Eye:
         )
         self._camera.near, self._camera.far = near, far
 
-    def _room_mm(self, frame: Frame) -> Array:
+    def _room_mm(self, picture: LivePicture) -> Array:
         """Give points around all that is to be seen, mm."""
-        shown = frame.state.machine.shown
-        room = machine_room_mm(frame) if shown else axes_room_mm(frame)
-        bars = [bar_lines(frame)[1].reshape(-1, 3)] if frame.state.look.bars else []
-        return np.concatenate([room, frame.drawn_mm.reshape(-1, 3), *bars])
+        shown = picture.state.machine.shown
+        room = machine_room_mm(picture) if shown else axes_room_mm(picture)
+        bars = [bar_lines(picture)[1].reshape(-1, 3)] if picture.state.look.bars else []
+        return np.concatenate([room, picture.drawn_mm.reshape(-1, 3), *bars])
 
-    def fit(self, frame: Frame, *, docked: bool, page_width: float | None = None) -> None:
+    def fit(self, picture: LivePicture, *, docked: bool, page_width: float | None = None) -> None:
         """Fill the room between the panels with the box, its traces and axes.
 
         Parameters
         ----------
-        frame : Frame
+        picture : LivePicture
         docked : bool
             Whether the panels have taken their room already, in what is known of the camera.
         page_width : float, optional
@@ -113,7 +115,7 @@ class Eye:
             width = (page_width or camera.image_width) - sum(side_widths())
         width = max(width, LEAST_SIZE)
         height = max(camera.image_height, LEAST_SIZE)
-        points = self._room_mm(frame)
+        points = self._room_mm(picture)
         pose = view_pose(points, width / height, self._stand, heading_share(height))
         self._clip(pose.position * SCENE_PER_MM, points)
         camera.up_direction = (0.0, 0.0, 1.0)
@@ -136,7 +138,7 @@ class Eye:
         camera = self._camera
         camera.up_direction = memory.up
         telephoto = memory.fov_rad < np.deg2rad(2.0 * TELEPHOTO_DEG)
-        self._stand = Stand(self._stand.view, telephoto)
+        self._stand = CameraSetup(self._stand.view, telephoto)
         self._clip(np.array(memory.position), np.array([memory.look_at]) / SCENE_PER_MM)
         camera.fov = memory.fov_rad
         camera.position = memory.position

@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.evaluation.evaluate import LivePicture
 from warpspace.app.viewport.tone_map import Rgb, line_colour
 from warpspace.units import Array
 
@@ -54,9 +54,9 @@ DARK = Palette(
 )
 
 
-def palette(frame: Frame) -> Palette:
-    """Choose the colours for the ground a frame is drawn on."""
-    return DARK if frame.state.shown.dark else LIGHT
+def palette(picture: LivePicture) -> Palette:
+    """Choose the colours for the ground a picture is drawn on."""
+    return DARK if picture.state.shown.dark else LIGHT
 
 
 @lru_cache(maxsize=64)
@@ -83,8 +83,8 @@ def polyline_pieces(lines: Sequence[Array] | Array) -> NDArray[np.float32]:
 
 
 class Layer(Protocol):
-    """Something drawn that follows the frame."""
+    """Something drawn that follows the picture."""
 
-    def show(self, frame: Frame) -> None:
-        """Draw a frame by changing handles in place."""
+    def show(self, picture: LivePicture) -> None:
+        """Draw a picture by changing handles in place."""
         ...

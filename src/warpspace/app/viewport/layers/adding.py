@@ -2,16 +2,16 @@
 
 from viser import SceneApi
 
-from warpspace.app.browser.handles import Told
+from warpspace.app.browser.handles import Handle
 from warpspace.app.viewport.layers import NOTHING, SCENE_PER_MM, colour_bytes
 from warpspace.app.viewport.tone_map import Rgb
 
 
 def add_lines(
     scene: SceneApi, name: str, rgb: Rgb, thickness: float, *, visible: bool = True
-) -> Told:
+) -> Handle:
     """Add pieces of line in one colour, as thick on screen from near and far; none of them yet."""
-    return Told(
+    return Handle(
         scene.add_line_segments(
             name,
             NOTHING,
@@ -24,9 +24,9 @@ def add_lines(
     )
 
 
-def add_ball(scene: SceneApi, name: str, radius_mm: float, rgb: Rgb) -> Told:
+def add_ball(scene: SceneApi, name: str, radius_mm: float, rgb: Rgb) -> Handle:
     """Add the marker of a point."""
-    return Told(
+    return Handle(
         scene.add_icosphere(
             name,
             radius_mm * SCENE_PER_MM,

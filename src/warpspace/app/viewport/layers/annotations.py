@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from viser import SceneApi
 
-from warpspace.app.browser.handles import Told
-from warpspace.app.evaluation.cache import Same
-from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.browser.handles import Handle
+from warpspace.app.evaluation.cache import Identity
+from warpspace.app.evaluation.evaluate import LivePicture
 from warpspace.app.evaluation.machine import machine_room_mm
 from warpspace.app.readouts.summary import spell_factor
 from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes, palette
@@ -33,10 +33,11 @@ BAR_BELOW, BAR_GAP, BAR_TICK = 0.15, 0.055, 0.012
 CORNERS = 8
 
 
-def worst_text(frame: Frame) -> str:
+def worst_text(picture: LivePicture) -> str:
     """Spell the largest value of what is coloured."""
     return _spell_value(
-        worst_point(frame.values, frame.grid.nominal_mm, frame.drawn_mm).value, frame.scale.unit
+        worst_point(picture.values, picture.grid.nominal_mm, picture.drawn_mm).value,
+        picture.scale.unit,
     )
 
 
@@ -47,21 +48,21 @@ def _spell_value(value: float, unit: str) -> str:
     return f"max {value:.1f} {unit}".replace("-", "−")
 
 
-def bar_room_mm(frame: Frame) -> tuple[Array, float]:
+def bar_room_mm(picture: LivePicture) -> tuple[Array, float]:
     """Give the left front lower corner that scale bars lie below, [3], and the longest edge, mm."""
-    if frame.state.machine.shown:
-        points = machine_room_mm(frame)
+    if picture.state.machine.shown:
+        points = machine_room_mm(picture)
         return points.min(axis=0), float(np.ptp(points, axis=0).max())
-    longest = frame.grid.longest_edge_mm
-    return frame.grid.bounds_mm[0] - AWAY * longest * np.array([1.0, 1.0, 0.0]), longest
+    longest = picture.grid.longest_edge_mm
+    return picture.grid.bounds_mm[0] - AWAY * longest * np.array([1.0, 1.0, 0.0]), longest
 
 
-def bar_lines(frame: Frame) -> tuple[tuple[ScaleBar, ScaleBar], Array, Array]:
+def bar_lines(picture: LivePicture) -> tuple[tuple[ScaleBar, ScaleBar], Array, Array]:
     """Lay the scale bars in front of the box, below the numbers of the X axis.
 
     Parameters
     ----------
-    frame : Frame
+    picture : LivePicture
 
     Returns
     -------
@@ -71,8 +72,8 @@ def bar_lines(frame: Frame) -> tuple[tuple[ScaleBar, ScaleBar], Array, Array]:
     labels_mm : ndarray, [2, 3], mm
         Right ends, where the lengths are written.
     """
-    low, longest = bar_room_mm(frame)
-    bars = scale_bars(longest, frame.exaggeration)
+    low, longest = bar_room_mm(picture)
+    bars = scale_bars(longest, picture.exaggeration)
     tick = np.array([0.0, 0.0, BAR_TICK * longest])
     lines: list[Array] = []
     labels: list[Array] = []
@@ -92,124 +93,129 @@ class AnnotationsLayer:
     Parameters
     ----------
     scene : viser.SceneApi
-    frame : Frame
+    picture : LivePicture
     """
 
-    def __init__(self, scene: SceneApi, frame: Frame) -> None:
+    def __init__(self, scene: SceneApi, picture: LivePicture) -> None:
         self._scene = scene
-        self._arrows: Told | None = None
+        self._arrows: Handle | None = None
         self._corner_labels = [
             self._label(f"/marks/corner{n}", "bottom-center") for n in range(CORNERS)
         ]
-        self._ball: Told | None = None
+        self._ball: Handle | None = None
         self._worst = self._label("/marks/max", "bottom-center")
-        self._bars = add_lines(scene, "/marks/bars", palette(frame).edge, 2.4)
+        self._bars = add_lines(scene, "/marks/bars", palette(picture).edge, 2.4)
         self._bar_labels = [
             self._label(f"/marks/bar{n}", "center-left", hidden=False) for n in range(2)
         ]
         self._bars_for: tuple[object, ...] = ()
-        self.show(frame)
+        self.show(picture)
 
-    def _label(self, name: str, anchor: Any, *, hidden: bool = True) -> Told:
+    def _label(self, name: str, anchor: Any, *, hidden: bool = True) -> Handle:
         """Add a label without text yet; one that the map may hide, or one always in front."""
-        return Told(
+        return Handle(
             self._scene.add_label(
                 name, "", visible=False, font_screen_scale=0.8, anchor=anchor, depth_test=hidden
             )
         )
 
-    def show(self, frame: Frame) -> None:
-        """Follow the frame."""
-        worst = worst_point(frame.values, frame.grid.nominal_mm, frame.drawn_mm)
-        self._show_arrows(frame, worst)
-        self._show_worst(frame, worst)
-        self._show_bars(frame)
+    def show(self, picture: LivePicture) -> None:
+        """Follow the picture."""
+        worst = worst_point(picture.values, picture.grid.nominal_mm, picture.drawn_mm)
+        self._show_arrows(picture, worst)
+        self._show_worst(picture, worst)
+        self._show_bars(picture)
 
-    def _show_arrows(self, frame: Frame, worst: WorstPoint) -> None:
+    def _show_arrows(self, picture: LivePicture, worst: WorstPoint) -> None:
         """Draw the displacement of the corners."""
-        if not frame.state.look.arrows:
+        if not picture.state.look.arrows:
             for part in (*self._corner_labels, *([self._arrows] if self._arrows else ())):
                 part.put(visible=False)
             return
         arrows = corner_arrows(
-            frame.grid.shape, frame.grid.nominal_mm, frame.field.error_um, frame.exaggeration
+            picture.grid.shape,
+            picture.grid.nominal_mm,
+            picture.field.error_um,
+            picture.exaggeration,
         )
         for label in self._corner_labels[len(arrows.norm_um) :]:
             label.put(visible=False)
-        longest = frame.grid.longest_edge_mm
+        longest = picture.grid.longest_edge_mm
         vertices, triangles = build_arrows(
             arrows.start_mm, arrows.end_mm, RADIUS * longest, HEAD * longest
         )
         if self._arrows is None or len(self._arrows.handle.vertices) != len(vertices):
-            self._arrows = Told(
+            self._arrows = Handle(
                 self._scene.add_mesh_simple(
                     "/marks/arrows",
                     vertices.astype(np.float32),
                     triangles.astype(np.uint32),
-                    color=palette(frame).edge,
+                    color=palette(picture).edge,
                     scale=SCENE_PER_MM,
                     cast_shadow=False,
                     receive_shadow=False,
                 )
             )
         self._arrows.put(
-            vertices=vertices.astype(np.float32), color=palette(frame).edge, visible=True
+            vertices=vertices.astype(np.float32), color=palette(picture).edge, visible=True
         )
-        marked = carries_worst(frame, arrows, worst)
+        marked = carries_worst(picture, arrows, worst)
         for label, text, at, hidden in zip(
             self._corner_labels, arrows.texts, arrows.label_mm, marked, strict=False
         ):
             label.put(text=text, position=at * SCENE_PER_MM, visible=not hidden)
 
-    def _show_worst(self, frame: Frame, found: WorstPoint) -> None:
+    def _show_worst(self, picture: LivePicture, found: WorstPoint) -> None:
         """Mark the largest value."""
-        on = frame.state.look.worst and found.value != 0.0
+        on = picture.state.look.worst and found.value != 0.0
         self._worst.put(visible=on)
         if self._ball is not None:
             self._ball.put(visible=on)
         if not on:
             return
-        longest = frame.grid.longest_edge_mm
+        longest = picture.grid.longest_edge_mm
         if self._ball is None:
-            self._ball = add_ball(self._scene, "/marks/ball", BALL * longest, palette(frame).edge)
-        self._ball.put(position=found.drawn_mm * SCENE_PER_MM, color=palette(frame).edge)
-        middle = frame.grid.bounds_mm.mean(axis=0)
+            self._ball = add_ball(self._scene, "/marks/ball", BALL * longest, palette(picture).edge)
+        self._ball.put(position=found.drawn_mm * SCENE_PER_MM, color=palette(picture).edge)
+        middle = picture.grid.bounds_mm.mean(axis=0)
         outwards = np.sign(np.round(found.nominal_mm - middle, 9)) * (1.0, 1.0, 0.0)
         self._worst.put(
-            text=_spell_value(found.value, frame.scale.unit),
+            text=_spell_value(found.value, picture.scale.unit),
             position=(found.drawn_mm + 0.03 * longest * outwards) * SCENE_PER_MM,
         )
 
-    def _show_bars(self, frame: Frame) -> None:
+    def _show_bars(self, picture: LivePicture) -> None:
         """Draw the two lengths, where they have changed."""
-        state = frame.state
+        state = picture.state
         on = state.look.bars
         self._bars.put(visible=on)
         for label in self._bar_labels:
             label.put(visible=on)
         bars_for = (
-            Same(frame.grid),
-            frame.exaggeration,
+            Identity(picture.grid),
+            picture.exaggeration,
             state.shown.dark,
-            Same(state.machine),
-            Same(state.positions),
+            Identity(state.machine),
+            Identity(state.positions),
         )
         if not on or bars_for == self._bars_for:
             return
         self._bars_for = bars_for
-        bars, lines, labels = bar_lines(frame)
-        self._bars.put(points=lines.astype(np.float32), colors=colour_bytes(palette(frame).edge))
+        bars, lines, labels = bar_lines(picture)
+        self._bars.put(points=lines.astype(np.float32), colors=colour_bytes(palette(picture).edge))
         texts = (
             f"{bars[0].text} geometry",
-            f"{bars[1].text} error, drawn {spell_factor(frame.exaggeration)}",
+            f"{bars[1].text} error, drawn {spell_factor(picture.exaggeration)}",
         )
         for label, text, at in zip(self._bar_labels, texts, labels, strict=True):
             label.put(text=text, position=at * SCENE_PER_MM)
 
 
-def carries_worst(frame: Frame, arrows: CornerArrows, worst: WorstPoint) -> NDArray[np.bool_]:
+def carries_worst(
+    picture: LivePicture, arrows: CornerArrows, worst: WorstPoint
+) -> NDArray[np.bool_]:
     """Tell which corners carry the mark of the largest error, which says the same number."""
-    look = frame.state.look
-    if not look.worst or look.tilts or frame.state.component != "norm":
+    look = picture.state.look
+    if not look.worst or look.tilts or picture.state.component != "norm":
         return np.zeros(len(arrows.norm_um), dtype=bool)
     return np.all(np.isclose(arrows.start_mm, worst.nominal_mm), axis=1)

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from viser import SceneApi
 
-from warpspace.app.browser.handles import Told
-from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.browser.handles import Handle
+from warpspace.app.evaluation.evaluate import LivePicture
 from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes, palette
 from warpspace.app.viewport.layers.adding import add_lines
 from warpspace.geometry.colour import nice_step
@@ -39,10 +39,10 @@ def axis_frames(low: Array, high: Array, away: float) -> list[tuple[Array, Array
     ]
 
 
-def axes_room_mm(frame: Frame) -> Array:
+def axes_room_mm(picture: LivePicture) -> Array:
     """Give points around the nominal box that leave room for axes and their numbers, [8, 3], mm."""
-    low, high = frame.grid.bounds_mm
-    away = (AWAY + LABEL_ROOM) * frame.grid.longest_edge_mm
+    low, high = picture.grid.bounds_mm
+    away = (AWAY + LABEL_ROOM) * picture.grid.longest_edge_mm
     x, y, z = (low[0] - away, high[0] + away), (low[1] - away, high[1]), (low[2], high[2])
     return np.stack(np.meshgrid(x, y, z), axis=-1).reshape(-1, 3)
 
@@ -53,26 +53,26 @@ class AxesLayer:
     Parameters
     ----------
     scene : viser.SceneApi
-    frame : Frame
+    picture : LivePicture
     """
 
-    def __init__(self, scene: SceneApi, frame: Frame) -> None:
+    def __init__(self, scene: SceneApi, picture: LivePicture) -> None:
         self._scene = scene
-        self._labels: list[Told] = []
+        self._labels: list[Handle] = []
         self._box: Array | None = None
-        self._lines = add_lines(scene, "/axes/lines", palette(frame).axis, 1.2)
-        self.show(frame)
+        self._lines = add_lines(scene, "/axes/lines", palette(picture).axis, 1.2)
+        self.show(picture)
 
-    def show(self, frame: Frame) -> None:
+    def show(self, picture: LivePicture) -> None:
         """Follow the nominal box and the switch."""
-        box = frame.grid.bounds_mm
+        box = picture.grid.bounds_mm
         # their numbers would cover the machine
-        visible = frame.state.shown.axes and not frame.state.machine.shown
+        visible = picture.state.shown.axes and not picture.state.machine.shown
         if box is not self._box:
             if self._box is None or not np.array_equal(box, self._box):
-                self._lay_out(box, frame.grid.longest_edge_mm)
+                self._lay_out(box, picture.grid.longest_edge_mm)
             self._box = box
-        self._lines.put(visible=visible, colors=colour_bytes(palette(frame).axis))
+        self._lines.put(visible=visible, colors=colour_bytes(palette(picture).axis))
         for label in self._labels:
             label.put(visible=visible)
 
@@ -101,7 +101,7 @@ class AxesLayer:
     def _label(self, text: str, at: Array, size: float) -> None:
         """Add one label at a point in mm."""
         self._labels.append(
-            Told(
+            Handle(
                 self._scene.add_label(
                     f"/axes/label{len(self._labels)}",
                     text,

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from viser import SceneApi
 
-from warpspace.app.browser.handles import Told
-from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.browser.handles import Handle
+from warpspace.app.evaluation.evaluate import LivePicture
 from warpspace.app.viewport.drafts import BoxPicture, box_picture, surface_glb
 from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes, palette
 from warpspace.app.viewport.layers.adding import add_lines
@@ -48,13 +48,13 @@ def dashes(points: Array, dash: float, gap: float) -> NDArray[np.float32]:
     return np.concatenate(parts).astype(np.float32) if parts else np.zeros((0, 2, 3), np.float32)
 
 
-def ghost_dashes(frame: Frame) -> NDArray[np.float32]:
+def ghost_dashes(picture: LivePicture) -> NDArray[np.float32]:
     """Dash the edges of the nominal box, [S, 2, 3], mm."""
-    nominal = frame.grid.nominal_mm.reshape(-1, 3)
+    nominal = picture.grid.nominal_mm.reshape(-1, 3)
     edges = np.array(
-        [(nominal[edge[0]], nominal[edge[-1]]) for edge in box_edges(frame.grid.shape)]
+        [(nominal[edge[0]], nominal[edge[-1]]) for edge in box_edges(picture.grid.shape)]
     )
-    longest = frame.grid.longest_edge_mm
+    longest = picture.grid.longest_edge_mm
     return dashes(edges.reshape(-1, 2, 3), DASH * longest, GAP * longest)
 
 
@@ -64,22 +64,22 @@ class BoxLayer:
     Parameters
     ----------
     scene : viser.SceneApi
-    frame : Frame
+    picture : LivePicture
     """
 
-    def __init__(self, scene: SceneApi, frame: Frame) -> None:
+    def __init__(self, scene: SceneApi, picture: LivePicture) -> None:
         self._nominal: Array | None = None
-        self._surface = Told(
+        self._surface = Handle(
             scene.add_glb(
                 SURFACE,
-                surface_glb(frame),
+                surface_glb(picture),
                 scale=SCENE_PER_MM,
                 cast_shadow=False,
                 receive_shadow=False,
             )
         )
         self._grid, self._edges, self._isolines, self._ghost = (
-            add_lines(scene, name, palette(frame).edge, thickness, visible=False)
+            add_lines(scene, name, palette(picture).edge, thickness, visible=False)
             for name, thickness in (
                 ("/box/grid", 0.7),
                 ("/box/edges", 1.8),
@@ -87,19 +87,19 @@ class BoxLayer:
                 ("/ghost", 1.5),
             )
         )
-        self.show(frame)
+        self.show(picture)
 
-    def show(self, frame: Frame) -> None:
+    def show(self, picture: LivePicture) -> None:
         """Move vertices, colours and lines."""
-        colours = palette(frame)
-        self.move(box_picture(frame))
+        colours = palette(picture)
+        self.move(box_picture(picture))
         self._grid.put(colors=colour_bytes(colours.grid))
         self._edges.put(colors=colour_bytes(colours.edge))
-        self._isolines.put(colors=colour_bytes(isoline_colour(frame)))
-        if frame.grid.nominal_mm is not self._nominal:
-            self._nominal = frame.grid.nominal_mm
-            self._ghost.put(points=ghost_dashes(frame))
-        self._ghost.put(colors=colour_bytes(colours.ghost), visible=frame.state.shown.ghost)
+        self._isolines.put(colors=colour_bytes(isoline_colour(picture)))
+        if picture.grid.nominal_mm is not self._nominal:
+            self._nominal = picture.grid.nominal_mm
+            self._ghost.put(points=ghost_dashes(picture))
+        self._ghost.put(colors=colour_bytes(colours.ghost), visible=picture.state.shown.ghost)
 
     def move(self, picture: BoxPicture) -> None:
         """Move the map and the lines on it; their colours stay."""
@@ -114,6 +114,6 @@ class BoxLayer:
             lines.put(visible=points is not None)
 
 
-def isoline_colour(frame: Frame) -> Rgb:
+def isoline_colour(picture: LivePicture) -> Rgb:
     """Choose a line that is seen on every colour of the scale."""
-    return DARK_ISOLINE if frame.scale.diverging else LIGHT_ISOLINE
+    return DARK_ISOLINE if picture.scale.diverging else LIGHT_ISOLINE

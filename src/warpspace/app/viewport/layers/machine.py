@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from viser import SceneApi
 
-from warpspace.app.browser.handles import Told
-from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.browser.handles import Handle
+from warpspace.app.evaluation.evaluate import LivePicture
 from warpspace.app.evaluation.machine import DrawnBody, drawn_bodies, tool_point
 from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes, palette
 from warpspace.app.viewport.layers.adding import add_ball
@@ -26,25 +26,25 @@ class MachineLayer:
     Parameters
     ----------
     scene : viser.SceneApi
-    frame : Frame
+    picture : LivePicture
     """
 
-    def __init__(self, scene: SceneApi, frame: Frame) -> None:
+    def __init__(self, scene: SceneApi, picture: LivePicture) -> None:
         self._scene = scene
-        self._bodies: dict[str, tuple[Told, Told]] = {}
-        self._ball: Told | None = None
-        self._label = Told(
+        self._bodies: dict[str, tuple[Handle, Handle]] = {}
+        self._ball: Handle | None = None
+        self._label = Handle(
             scene.add_label(
                 "/machine/label", "", visible=False, font_screen_scale=0.8, anchor="center-left"
             )
         )
         self._turned: Mapping[str, float] = {}
-        self._frame = frame
-        self.show(frame)
+        self._picture = picture
+        self.show(picture)
 
-    def show(self, frame: Frame) -> None:
-        """Follow the frame."""
-        self._frame = frame
+    def show(self, picture: LivePicture) -> None:
+        """Follow the picture."""
+        self._picture = picture
         self._draw()
 
     def turn(self, turned: Mapping[str, float]) -> None:
@@ -54,7 +54,7 @@ class MachineLayer:
 
     def _draw(self) -> None:
         """Place everything."""
-        frame, look = self._frame, self._frame.state.machine
+        picture, look = self._picture, self._picture.state.machine
         for mesh, lines in self._bodies.values():
             mesh.put(visible=look.shown)
             lines.put(visible=look.shown)
@@ -63,14 +63,14 @@ class MachineLayer:
             self._ball.put(visible=look.shown)
         if not look.shown:
             return
-        placed = drawn_bodies(frame, self._turned)
+        placed = drawn_bodies(picture, self._turned)
         for name in set(self._bodies) - {part.body.name for part in placed}:
             for part in self._bodies.pop(name):
                 part.handle.remove()
-        edge = colour_bytes(DARK_EDGE if frame.state.shown.dark else EDGE)
+        edge = colour_bytes(DARK_EDGE if picture.state.shown.dark else EDGE)
         for part in placed:
             self._draw_body(part, edge)
-        self._draw_tool_point(frame)
+        self._draw_tool_point(picture)
 
     def _draw_body(self, part: DrawnBody, edge: Any) -> None:
         """Add a body, or move its vertices where they have changed."""
@@ -103,15 +103,15 @@ class MachineLayer:
             thickness_units="screen",
             scale=SCENE_PER_MM,
         )
-        self._bodies[name] = (Told(mesh), Told(lines))
+        self._bodies[name] = (Handle(mesh), Handle(lines))
 
-    def _draw_tool_point(self, frame: Frame) -> None:
+    def _draw_tool_point(self, picture: LivePicture) -> None:
         """Mark the tool point where the deformed grid has it."""
-        found = tool_point(frame)
-        longest = frame.grid.longest_edge_mm
+        found = tool_point(picture)
+        longest = picture.grid.longest_edge_mm
         if self._ball is None:
             self._ball = add_ball(
-                self._scene, "/machine/tool_point", BALL * longest, palette(frame).edge
+                self._scene, "/machine/tool_point", BALL * longest, palette(picture).edge
             )
         self._ball.put(position=found.drawn_mm * SCENE_PER_MM)
         length = float(np.linalg.norm(found.error_um))

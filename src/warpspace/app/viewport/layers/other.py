@@ -2,7 +2,7 @@
 
 from viser import SceneApi
 
-from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.evaluation.evaluate import LivePicture
 from warpspace.app.viewport.layers import colour_bytes, palette, pieces
 from warpspace.app.viewport.layers.adding import add_lines
 
@@ -13,21 +13,21 @@ class OtherLayer:
     Parameters
     ----------
     scene : viser.SceneApi
-    frame : Frame
+    picture : LivePicture
     """
 
-    def __init__(self, scene: SceneApi, frame: Frame) -> None:
-        self._edges = add_lines(scene, "/compare/other", palette(frame).edge, 2.0, visible=False)
-        self.show(frame)
+    def __init__(self, scene: SceneApi, picture: LivePicture) -> None:
+        self._edges = add_lines(scene, "/compare/other", palette(picture).edge, 2.0, visible=False)
+        self.show(picture)
 
-    def show(self, frame: Frame) -> None:
+    def show(self, picture: LivePicture) -> None:
         """Follow the other side."""
-        other = None if frame.compared is None else frame.compared.other_mm
-        if other is None or not frame.state.comparison.ghost:
+        other = None if picture.compared is None else picture.compared.other_mm
+        if other is None or not picture.state.comparison.ghost:
             self._edges.put(visible=False)
             return
         self._edges.put(
-            points=pieces(other, frame.topology.edge_segments)[::2],
-            colors=colour_bytes(palette(frame).edge),
+            points=pieces(other, picture.topology.edge_segments)[::2],
+            colors=colour_bytes(palette(picture).edge),
             visible=True,
         )

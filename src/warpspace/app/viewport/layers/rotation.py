@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from viser import SceneApi
 
-from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.evaluation.evaluate import LivePicture
 from warpspace.app.evaluation.rotation import points_on_traces
 from warpspace.app.viewport.layers import SCENE_PER_MM, palette
 from warpspace.units import Array
@@ -20,18 +20,18 @@ class RotationLayer:
     Parameters
     ----------
     scene : viser.SceneApi
-    frame : Frame
+    picture : LivePicture
     """
 
-    def __init__(self, scene: SceneApi, frame: Frame) -> None:
+    def __init__(self, scene: SceneApi, picture: LivePicture) -> None:
         self._scene = scene
-        self._frame = frame
+        self._picture = picture
         self._position: dict[str, float] | None = None
         self._clouds: list[Any] = []
 
-    def show(self, frame: Frame) -> None:
-        """Follow the frame."""
-        self._frame = frame
+    def show(self, picture: LivePicture) -> None:
+        """Follow the picture."""
+        self._picture = picture
         self._draw()
 
     def turn(self, position: dict[str, float] | None) -> None:
@@ -41,10 +41,10 @@ class RotationLayer:
 
     def _draw(self) -> None:
         """Place the points."""
-        frame, position = self._frame, self._position
+        picture, position = self._picture, self._position
         visible = False
-        if position is not None and frame.state.shown.traces:
-            points = points_on_traces(frame, position)
+        if position is not None and picture.state.shown.traces:
+            points = points_on_traces(picture, position)
             visible = len(points[0]) > 0
             if visible:
                 self._place(points)
@@ -57,7 +57,7 @@ class RotationLayer:
             for cloud, at in zip(self._clouds, points, strict=True):
                 cloud.points = at.astype(np.float32)
             return
-        colours = palette(self._frame)
+        colours = palette(self._picture)
         for name, at, rgb in zip(
             ("nominal", "actual"),
             points,
@@ -69,7 +69,7 @@ class RotationLayer:
                     f"/rotation/{name}",
                     at.astype(np.float32),
                     np.array(rgb, dtype=np.uint8),
-                    point_size=SIZE * self._frame.grid.longest_edge_mm,
+                    point_size=SIZE * self._picture.grid.longest_edge_mm,
                     point_shape="circle",
                     point_shading="flat",
                     precision="float32",

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from viser import ClientHandle, SceneApi
 
-from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.evaluation.evaluate import LivePicture
 from warpspace.app.evaluation.rotation import played_position
 from warpspace.app.viewport.layers import Layer
 from warpspace.app.viewport.layers.annotations import AnnotationsLayer
@@ -19,10 +19,10 @@ from warpspace.app.viewport.rotation_player import Player
 Tell = Callable[[str], None]
 
 
-def draw_around(scene: SceneApi, frame: Frame) -> list[Layer]:
+def draw_around(scene: SceneApi, picture: LivePicture) -> list[Layer]:
     """Draw what lies on and around the map."""
     kinds = (TracesLayer, AxesLayer, OtherLayer, WhyLayer)
-    return [kind(scene, frame) for kind in kinds]
+    return [kind(scene, picture) for kind in kinds]
 
 
 class StageLayer:
@@ -33,34 +33,34 @@ class StageLayer:
     Parameters
     ----------
     client : viser.ClientHandle
-    frame : Frame
+    picture : LivePicture
     act : callable
         Queues something for the session's worker; returns at once.
     """
 
     def __init__(
-        self, client: ClientHandle, frame: Frame, act: Callable[[Callable[[], None]], None]
+        self, client: ClientHandle, picture: LivePicture, act: Callable[[Callable[[], None]], None]
     ) -> None:
         self._client, self._act = client, act
-        self._frame = frame
-        self._annotations = AnnotationsLayer(client.scene, frame)
-        self._machine = MachineLayer(client.scene, frame)
-        self._rotation = RotationLayer(client.scene, frame)
+        self._picture = picture
+        self._annotations = AnnotationsLayer(client.scene, picture)
+        self._machine = MachineLayer(client.scene, picture)
+        self._rotation = RotationLayer(client.scene, picture)
         self._tell: Tell = _nobody
         self._due = False
         self._player = Player(self._ask)
 
-    def show(self, frame: Frame) -> None:
-        """Draw a frame; where the axis itself has been moved, the rotation starts there anew."""
-        before, self._frame = self._frame.state, frame
-        if before.origin is not frame.state.origin or before.positions != frame.state.positions:
+    def show(self, picture: LivePicture) -> None:
+        """Draw a picture; where the axis itself has been moved, the rotation starts there anew."""
+        before, self._picture = self._picture.state, picture
+        if before.origin is not picture.state.origin or before.positions != picture.state.positions:
             self._player.rewind()
             self._rotation.turn(None)
             self._machine.turn({})
             self._tell("")
-        self._annotations.show(frame)
-        self._rotation.show(frame)
-        self._machine.show(frame)
+        self._annotations.show(picture)
+        self._rotation.show(picture)
+        self._machine.show(picture)
 
     def play(self, on: bool | None, tell: Tell) -> None:
         """Play (True), pause (False), or go back to where the axis stands (None).
@@ -103,7 +103,7 @@ class StageLayer:
         self._due = False
         if not self._player.playing:
             return
-        position = played_position(self._frame.state, self._player.angle_deg)
+        position = played_position(self._picture.state, self._player.angle_deg)
         with self._client.atomic():
             self._rotation.turn(position)
             self._machine.turn(position)

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from viser import SceneApi
 
-from warpspace.app.evaluation.cache import Same
-from warpspace.app.evaluation.evaluate import Frame, TraceLines
+from warpspace.app.evaluation.cache import Identity
+from warpspace.app.evaluation.evaluate import LivePicture, TraceLines
 from warpspace.app.viewport.layers import NOTHING, colour_bytes, palette, polyline_pieces
 from warpspace.app.viewport.layers.adding import add_lines
 from warpspace.app.viewport.tone_map import line_vertex_colours
@@ -36,12 +36,12 @@ def is_here(group: TraceGroup, positions: dict[str, float]) -> NDArray[np.bool_]
     )
 
 
-def trace_colours(frame: Frame) -> NDArray[np.uint8]:
+def trace_colours(picture: LivePicture) -> NDArray[np.uint8]:
     """Colour the pieces of all actual traces, [S, 2, 3]."""
-    colours = palette(frame)
+    colours = palette(picture)
     found: list[NDArray[np.uint8]] = []
-    for lines in frame.traces:
-        here = is_here(lines.group, dict(frame.state.positions))
+    for lines in picture.traces:
+        here = is_here(lines.group, dict(picture.state.positions))
         rgb = np.where(here[:, None], colours.trace_actual, colours.trace_elsewhere)
         pieces = lines.actual_mm.shape[1] - 1
         found.append(np.repeat(rgb.astype(np.uint8), pieces, axis=0))
@@ -55,32 +55,32 @@ class TracesLayer:
     Parameters
     ----------
     scene : viser.SceneApi
-    frame : Frame
+    picture : LivePicture
     """
 
-    def __init__(self, scene: SceneApi, frame: Frame) -> None:
+    def __init__(self, scene: SceneApi, picture: LivePicture) -> None:
         self._drawn_for: tuple[object, ...] = ()
         self._nominal, self._actual = (
-            add_lines(scene, name, palette(frame).trace_nominal, thickness)
+            add_lines(scene, name, palette(picture).trace_nominal, thickness)
             for name, thickness in (("/traces/nominal", 1.5), ("/traces/actual", 1.6))
         )
-        self.show(frame)
+        self.show(picture)
 
-    def show(self, frame: Frame) -> None:
+    def show(self, picture: LivePicture) -> None:
         """Move the traces."""
-        visible = frame.state.shown.traces and bool(frame.traces)
+        visible = picture.state.shown.traces and bool(picture.traces)
         self._nominal.put(visible=visible)
         self._actual.put(visible=visible)
         if not visible:
             return
-        distance = APART * frame.grid.longest_edge_mm
-        nominal = np.concatenate([apart(lines, distance) for lines in frame.traces])
+        distance = APART * picture.grid.longest_edge_mm
+        nominal = np.concatenate([apart(lines, distance) for lines in picture.traces])
         self._nominal.put(
             points=nominal if len(nominal) else NOTHING,
-            colors=colour_bytes(palette(frame).trace_nominal),
+            colors=colour_bytes(palette(picture).trace_nominal),
         )
-        self._actual.put(points=polyline_pieces([lines.actual_mm for lines in frame.traces]))
-        drawn_for = (Same(frame.traces[0].group), frame.state.shown.dark)
+        self._actual.put(points=polyline_pieces([lines.actual_mm for lines in picture.traces]))
+        drawn_for = (Identity(picture.traces[0].group), picture.state.shown.dark)
         if drawn_for != self._drawn_for:
             self._drawn_for = drawn_for
-            self._actual.put(colors=trace_colours(frame))
+            self._actual.put(colors=trace_colours(picture))

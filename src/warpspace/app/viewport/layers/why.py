@@ -5,9 +5,9 @@ from numpy.typing import NDArray
 from viser import SceneApi
 
 from warpspace.analysis.explain import Contribution
-from warpspace.app.browser.handles import Told
+from warpspace.app.browser.handles import Handle
 from warpspace.app.evaluation.budget import Answer, answer
-from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.evaluation.evaluate import LivePicture
 from warpspace.app.viewport.layers import NOTHING, SCENE_PER_MM
 from warpspace.app.viewport.layers.adding import add_lines
 from warpspace.app.viewport.layers.box import dashes
@@ -22,7 +22,7 @@ AXIS_HALF = 0.32
 """Half the length of the drawn axis, as a part of the longest edge."""
 DASH = 0.02
 LABEL_AT = 0.25
-"""Place of the lever's label between point and frame: it is seen where the frame is not."""
+"""Place of the lever's label between point and frame: it is seen where the picture is not."""
 
 
 class WhyLayer:
@@ -31,11 +31,11 @@ class WhyLayer:
     Parameters
     ----------
     scene : viser.SceneApi
-    frame : Frame
+    picture : LivePicture
     """
 
-    def __init__(self, scene: SceneApi, frame: Frame) -> None:
-        self._marker = Told(
+    def __init__(self, scene: SceneApi, picture: LivePicture) -> None:
+        self._marker = Handle(
             scene.add_icosphere(
                 "/why/marker",
                 radius=1.0,
@@ -51,22 +51,22 @@ class WhyLayer:
             for name, thickness in (("vector", 3.0), ("axis", 3.5), ("lever", 2.0))
         }
         self._labels = {
-            name: Told(
+            name: Handle(
                 scene.add_label(f"/why/label-{name}", "", visible=False, anchor="bottom-center")
             )
             for name in ("point", "axis", "lever")
         }
-        self.show(frame)
+        self.show(picture)
 
-    def show(self, frame: Frame) -> None:
+    def show(self, picture: LivePicture) -> None:
         """Follow the point and the chosen contribution."""
-        picked = frame.state.picked
-        different = frame.compared is not None and frame.compared.shown == "difference"
+        picked = picture.state.picked
+        different = picture.compared is not None and picture.compared.shown == "difference"
         if picked is None or different:
             self._hide(self._marker, *self._lines.values(), *self._labels.values())
             return
-        found = answer(frame.subject or frame.state, picked, frame.exaggeration)
-        size = frame.grid.longest_edge_mm
+        found = answer(picture.subject or picture.state, picked, picture.exaggeration)
+        size = picture.grid.longest_edge_mm
         self._marker.put(
             position=found.drawn_mm * SCENE_PER_MM,
             scale=RADIUS * size * SCENE_PER_MM,
@@ -78,7 +78,7 @@ class WhyLayer:
         self._label(
             "point", f"{length:.1f} µm", found.drawn_mm + 1.8 * RADIUS * size * np.eye(3)[2]
         )
-        chosen = [p for p in found.explanation.contributions if p.key == frame.state.lever]
+        chosen = [p for p in found.explanation.contributions if p.key == picture.state.lever]
         if chosen:
             self._show_lever(found, chosen[0], size)
         else:
@@ -108,7 +108,7 @@ class WhyLayer:
         """Show a label at a point, mm."""
         self._labels[name].put(text=text, position=at * SCENE_PER_MM, visible=True)
 
-    def _hide(self, *parts: Told) -> None:
+    def _hide(self, *parts: Handle) -> None:
         """Hide what is shown."""
         for part in parts:
             part.put(visible=False)

@@ -5,20 +5,20 @@ from dataclasses import dataclass
 
 from viser import ClientHandle
 
-from warpspace.app.documents.scene_list import Shelf
+from warpspace.app.documents.scene_list import SceneList
 from warpspace.app.documents.services import Services
-from warpspace.app.evaluation.evaluate import Frame
+from warpspace.app.evaluation.evaluate import LivePicture
 from warpspace.app.server.tab_memory import CameraMemory
 
 
 @dataclass(frozen=True, slots=True)
-class Outside:
+class TabContext:
     """What some panels need beside the desk.
 
     Attributes
     ----------
     client : viser.ClientHandle
-    scenes : Shelf
+    scenes : SceneList
         Scenes this tab can choose from.
     camera : callable
         Gives where the camera stands.
@@ -28,13 +28,13 @@ class Outside:
         Runs JavaScript of our own in the page.
     services : Services
     shown : callable
-        Gives the frame that is drawn; None before the first.
+        Gives the picture that is drawn; None before the first.
     """
 
     client: ClientHandle
-    scenes: Shelf
+    scenes: SceneList
     camera: Callable[[], CameraMemory]
     look_from: Callable[[CameraMemory], None]
     run_script: Callable[[str], None]
     services: Services
-    shown: Callable[[], Frame | None]
+    shown: Callable[[], LivePicture | None]

@@ -16,7 +16,7 @@ Update: TypeAlias = Callable[[AppState], AppState]
 Listener: TypeAlias = Callable[[], None]
 
 
-class Board:
+class StateStore:
     """A state with its history that any number of sessions share.
 
     Parameters
@@ -79,11 +79,11 @@ class Board:
         """Do again what was undone; give what it was."""
         return self._travel(lambda history: (history.redo(), history.redoes))
 
-    def copy(self) -> "Board":
+    def copy(self) -> "StateStore":
         """Give a board of its own with the same state and history."""
-        board = Board(self.state)
-        board._history = self._history
-        return board
+        store = StateStore(self.state)
+        store._history = self._history
+        return store
 
     def subscribe(self, listener: Listener) -> None:
         """Have a callable told (from any thread; it must return at once) of every change."""
