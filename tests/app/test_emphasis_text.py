@@ -10,7 +10,8 @@ from warpspace.app.browser.clicks import LONGEST_WORD, MOST_CLICKS, SCRIPT, read
 from warpspace.app.panels.layout import split_script
 from warpspace.app.panels.view import COMPONENT_NAMES, component_of
 from warpspace.app.readouts.exclusions import emphasis_buttons, with_switched
-from warpspace.app.state import edits, start_state
+from warpspace.app.state import edits
+from warpspace.app.state.app_state import start_state
 from warpspace.app.state.exclusions import Exclusions
 from warpspace.app.state.history import History
 from warpspace.machine.parameters import parameter

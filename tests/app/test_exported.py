@@ -167,7 +167,7 @@ def test_glb_has_the_tilts_and_the_range_that_are_coloured(top: float | None) ->
 
 @pytest.mark.render
 @pytest.mark.parametrize(
-    ("frame", "title", "figure"),
+    ("picture", "title", "figure"),
     [
         (tilted(7.0), "Orientation error of the tool axis", "orientation-map"),
         (

@@ -14,11 +14,11 @@ from warpspace.scene.library import load_scene
 def test_the_view_is_framed_by_heading_and_colour_bar() -> None:
     picture = LiveModel().evaluate(start_state(load_scene("dvf5000_first"), nodes=5))
     pixels = np.zeros((300, 400, 4), np.uint8)
-    picture = Image.open(BytesIO(view_png(pixels, picture)))
-    assert picture.size == (400 + BAND_PX, 300 + HEAD_PX)
-    assert "1" in picture.info["Description"]
-    column = np.asarray(picture)[:, 400 + 30]
+    drawn = Image.open(BytesIO(view_png(pixels, picture)))
+    assert drawn.size == (400 + BAND_PX, 300 + HEAD_PX)
+    assert "1" in drawn.info["Description"]
+    column = np.asarray(drawn)[:, 400 + 30]
     ends = picture.scale.colours(np.array([picture.scale.high, picture.scale.low]))
     for colour in ends:
         assert (column == colour).all(axis=-1).any()
-    assert (np.asarray(picture)[:HEAD_PX] < 128).any()
+    assert (np.asarray(drawn)[:HEAD_PX] < 128).any()
