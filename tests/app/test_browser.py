@@ -49,8 +49,8 @@ def test_first_screen(tab: Tab) -> None:
 
 def test_mesh_is_drawn_in_the_colours_of_the_bar(tab: Tab) -> None:
     tab.page.wait_for_timeout(1500)
-    picture = np.asarray(Image.open(BytesIO(tab.page.screenshot())).convert("RGB")).astype(int)
-    middle = picture[250:750, 500:1100].reshape(-1, 3)
+    screen = np.asarray(Image.open(BytesIO(tab.page.screenshot())).convert("RGB")).astype(int)
+    middle = screen[250:750, 500:1100].reshape(-1, 3)
     green = (middle[:, 1] > middle[:, 0] + 40) & (middle[:, 2] > middle[:, 0])
     assert green.mean() > 0.2
 

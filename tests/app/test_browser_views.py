@@ -190,7 +190,7 @@ def test_pixels_have_the_colours_of_the_bar(tab: Tab) -> None:
         "() => { const r = document.querySelector('canvas').getBoundingClientRect();"
         " return [r.left, r.top, r.width, r.height]; }"
     )
-    picture = np.asarray(Image.open(BytesIO(tab.page.screenshot())).convert("RGB")).astype(int)
+    screen = np.asarray(Image.open(BytesIO(tab.page.screenshot())).convert("RGB")).astype(int)
     # inner nodes of the front face, projected
     nodes = picture.drawn_mm[2:-2, 0, 2:-2].reshape(-1, 3) * SCENE_PER_MM
     values = picture.values[2:-2, 0, 2:-2].reshape(-1)
@@ -203,7 +203,7 @@ def test_pixels_have_the_colours_of_the_bar(tab: Tab) -> None:
     column = np.floor(rect[0] + rect[2] / 2.0 + scale * (seen @ right)).astype(int)
     row = np.floor(rect[1] + rect[3] / 2.0 - scale * (seen @ up)).astype(int)
     free = (column > 900) | (row > 160)  # not under the heading
-    pixels = picture[row[free], column[free]]
+    pixels = screen[row[free], column[free]]
     wanted = picture.scale.colours(values[free]).astype(int)
     # a pixel beside the node, whose value differs by less than a step of the map, is still right
     table = colour_table().astype(int)
