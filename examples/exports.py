@@ -8,18 +8,18 @@ from pathlib import Path
 
 import warpspace
 from warpspace.outputs.exports import (
-    draw_scene,
     load_stored_field,
     write_csv,
     write_glb,
     write_vts,
 )
+from warpspace.picture.scene_picture import evaluate_picture
 
 
 def main(folder: Path = Path()) -> None:
     """Write the three files into a folder."""
     scene = warpspace.load_scene("dvf5000_first")
-    drawing = draw_scene(scene, exaggeration="auto", grid=21, loop="tool")
+    drawing = evaluate_picture(scene, exaggeration="auto", grid=21, loop="tool")
     write_glb(drawing, folder / "dvf5000_first.glb")
     write_vts(drawing, folder / "dvf5000_first.vts")
     write_csv(drawing, folder / "dvf5000_first.csv")

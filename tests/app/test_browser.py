@@ -8,7 +8,8 @@ import pytest
 from PIL import Image
 
 from app.conftest import Tab, drawn_nodes
-from warpspace.app.evaluation.evaluate import LiveModel, LivePicture
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.viewport.tone_map import vertex_colours
 from warpspace.scene.library import load_scene
@@ -36,7 +37,7 @@ def test_first_screen(tab: Tab) -> None:
     picture = model(START)
     tab.until(lambda: tab.shows(drawn_nodes(picture)))
     check_numbers(tab, picture)
-    assert tab.text("factor") == "displacement drawn ×1\u202f000"
+    assert tab.text("factor") == "displacement drawn ×1000"
     assert tab.text("max at") == "X 275, Y −225, Z −51 mm"
     assert "DVF5000, first machine measured" in tab.page.title()
     for words in ("EAX · ε_xX · roll of X [µrad]", "|E| [µm]", "DVF5000, chain wCBFXYZt"):

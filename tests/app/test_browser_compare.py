@@ -17,7 +17,6 @@ from warpspace.app.documents.scene_file import open_text, state_to_toml
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
 from warpspace.app.evaluation.conventions import Effects, with_choice
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.evaluation.map_mesh import map_mesh
 from warpspace.app.evaluation.resulting_scene import scene_of
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state import edits
@@ -26,6 +25,7 @@ from warpspace.app.state.comparison import Side
 from warpspace.app.state.picked import Picked
 from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import Table
+from warpspace.picture.mesh import map_mesh
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext

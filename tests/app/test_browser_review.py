@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from app.conftest import Tab, drawn_nodes, open_page, wait_until_open
-from warpspace.app.evaluation.evaluate import LiveModel, LivePicture
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, start_state

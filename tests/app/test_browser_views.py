@@ -10,13 +10,13 @@ from PIL import Image
 from app.conftest import Tab
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.machine import drawn_bodies, tool_point
-from warpspace.app.evaluation.map_mesh import isoline_pieces, map_mesh
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.look import linear_spans, slice_spans
 from warpspace.app.viewport.layers import SCENE_PER_MM
 from warpspace.app.viewport.tone_map import vertex_colours
 from warpspace.geometry.colour import colour_table
 from warpspace.picture.marks import corner_arrows
+from warpspace.picture.mesh import isoline_pieces, map_mesh
 from warpspace.scene.library import load_scene
 
 pytestmark = pytest.mark.browser
@@ -214,7 +214,7 @@ def test_pixels_have_the_colours_of_the_bar(tab: Tab) -> None:
     assert np.median(np.abs(pixels - wanted).max(axis=-1)) <= 2
     # between the nodes too, every pixel of the face is a colour of the bar
     low, high = (row[free].min(), row[free].max()), (column[free].min(), column[free].max())
-    face = picture[low[0] : low[1], high[0] : high[1]].reshape(-1, 3)[::7]
+    face = screen[low[0] : low[1], high[0] : high[1]].reshape(-1, 3)[::7]
     apart = np.abs(face[:, None, :] - table[None]).max(axis=-1).min(axis=-1)
     assert apart.max() <= 3
 

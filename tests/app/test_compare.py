@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 
 from warpspace.app.evaluation.compare import pinned_side, scene_side, with_pin, with_sides
-from warpspace.app.evaluation.evaluate import LiveModel, LivePicture
-from warpspace.app.evaluation.map_mesh import map_mesh
-from warpspace.app.evaluation.topology import topology
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.readouts.comparison import comparison_html
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.comparison import Side
 from warpspace.app.state.ranges import Span
 from warpspace.geometry.colour import component_values
 from warpspace.geometry.deform import deform
+from warpspace.picture.mesh import map_mesh
+from warpspace.picture.topology import topology
 from warpspace.scene.library import load_scene
 
 LIVE = LiveModel()

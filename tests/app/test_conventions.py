@@ -15,12 +15,12 @@ from warpspace.app.evaluation.conventions import (
     with_reference,
 )
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.evaluation.map_mesh import edge_pieces
 from warpspace.app.panels import conventions as panel_module
 from warpspace.app.panels.conventions import ConventionsPanel
 from warpspace.app.readouts.conventions import switchboard_html
 from warpspace.app.server.followers import Followers
 from warpspace.app.state.app_state import start_state
+from warpspace.picture.mesh import edge_pieces
 from warpspace.scene.library import load_scene
 
 LIVE = LiveModel()

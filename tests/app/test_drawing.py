@@ -15,7 +15,6 @@ from warpspace.app.readouts import summary as legend
 from warpspace.app.state.app_state import start_state
 from warpspace.app.viewport.camera import fit_camera
 from warpspace.app.viewport.glb import build_glb
-from warpspace.app.viewport.layers.axes import tick_values
 from warpspace.app.viewport.tone_map import (
     inverse_tone_map,
     line_colour,
@@ -24,6 +23,7 @@ from warpspace.app.viewport.tone_map import (
     tone_map,
 )
 from warpspace.geometry.colour import colour_table
+from warpspace.picture.ticks import tick_values
 from warpspace.scene.library import load_scene, parse_scene
 
 
@@ -85,8 +85,8 @@ def test_camera_sees_every_point_below_the_heading(
 
 
 def test_ticks_are_round_and_inside() -> None:
-    assert tick_values(-275.0, 275.0) == [-200.0, -100.0, 0.0, 100.0, 200.0]
-    assert tick_values(5.0, 5.0) == [5.0]
+    assert tick_values(-275.0, 275.0, 6) == [-200.0, -100.0, 0.0, 100.0, 200.0]
+    assert tick_values(5.0, 5.0, 6) == [5.0]
 
 
 def test_legend_escapes_what_a_scene_file_says() -> None:
@@ -101,7 +101,7 @@ def test_legend_escapes_what_a_scene_file_says() -> None:
 def test_legend_says_factor_units_numbers_and_place() -> None:
     live = LiveModel()
     picture = live.evaluate(start_state(load_scene("dvf5000_first")))
-    assert "displacement drawn ×1\u202f000" in legend.heading(picture)
+    assert "displacement drawn ×1000" in legend.heading(picture)
     summary = legend.summary(picture)
     assert f"{picture.statistics.mean_um:.2f} µm" in summary
     assert "X 275, Y −225, Z −51 mm" in summary

@@ -16,14 +16,15 @@ from warpspace.app.documents.offline_page import build_offline_html
 from warpspace.app.documents.view_image import view_png
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
 from warpspace.app.evaluation.conventions import with_choice
-from warpspace.app.evaluation.evaluate import LiveModel, LivePicture
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.comparison import Side
 from warpspace.cli.services import draw_figure, write_export
 from warpspace.exceptions import OptionError
 from warpspace.outputs.drawing.settings import A_MINUS_B, FigureSettings
-from warpspace.outputs.exports import draw_scene
 from warpspace.outputs.figures.catalogue import draw_figure as draw
+from warpspace.picture.scene_picture import evaluate_picture
 from warpspace.scene.library import load_scene
 
 LIVE = LiveModel()
@@ -160,7 +161,7 @@ def test_glb_has_the_tilts_and_the_range_that_are_coloured(top: float | None) ->
         "unit": "µrad",
     }
     request = build_request(picture)
-    drawing = draw_scene(request.scene, grid=request.nodes, loop=request.loop)
+    drawing = evaluate_picture(request.scene, grid=request.nodes, loop=request.loop)
     np.testing.assert_allclose(replace(drawing, tilts=True).values, picture.values, atol=1e-9)
     assert exported_words(picture).startswith("The figure shows the tilts")
 

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from warpspace.app.evaluation.evaluate import Cache, LiveModel, LivePicture
+from warpspace.app.evaluation.cache import Cache
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import start_state
 from warpspace.app.viewport.layers.box import dashes, ghost_dashes
 from warpspace.app.viewport.layers.traces import apart, is_here, trace_colours

@@ -9,15 +9,7 @@ import pytest
 
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.machine import drawn_bodies, machine_room_mm, tool_point
-from warpspace.app.evaluation.map_mesh import (
-    edge_pieces,
-    grid_pieces,
-    isoline_pieces,
-    line_mesh,
-    map_mesh,
-)
 from warpspace.app.evaluation.rotation import played_axis, played_position, points_on_traces
-from warpspace.app.evaluation.topology import topology
 from warpspace.app.readouts.circles import circle_rows, circle_table
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.look import (
@@ -37,6 +29,14 @@ from warpspace.app.viewport.named_views import VIEWS, CameraSetup, change_lens, 
 from warpspace.app.viewport.rotation_player import Player
 from warpspace.geometry.surfaces import box_edges, outer_surface, segments
 from warpspace.picture.marks import corner_arrows, worst_point
+from warpspace.picture.mesh import (
+    edge_pieces,
+    grid_pieces,
+    isoline_pieces,
+    line_mesh,
+    map_mesh,
+)
+from warpspace.picture.topology import topology
 from warpspace.scene.library import load_scene
 from warpspace.scene.pipeline import evaluate
 

@@ -5,9 +5,9 @@ import pytest
 
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.panels.sensitivities import rank_picture
-from warpspace.app.readouts.positions import plain, spell_point, spell_positions
 from warpspace.app.readouts.summary import worst_place
 from warpspace.app.state.app_state import start_state
+from warpspace.picture.words import spell_coordinate, spell_place, spell_positions
 from warpspace.scene.library import load_scene
 
 
@@ -15,11 +15,11 @@ from warpspace.scene.library import load_scene
     ("value", "text"), [(0.0, "0"), (-0.04, "0"), (-50.96, "−51"), (2.5, "2.5"), (1e4, "10000")]
 )
 def test_numbers_are_spelt_to_a_tenth_with_a_proper_minus(value: float, text: str) -> None:
-    assert plain(value) == text
+    assert spell_coordinate(value) == text
 
 
 def test_points_and_positions_carry_their_units() -> None:
-    assert spell_point((275.0, -225.0, -51.0)) == "X 275, Y −225, Z −51 mm"
+    assert spell_place((275.0, -225.0, -51.0)) == "X 275, Y −225, Z −51 mm"
     assert spell_positions({"C": 90.0, "X": 1.0, "Z": -480.0}) == "X 1, Z −480 mm · C 90°"
     assert spell_positions({"B": -30.0}) == "B −30°"
 
@@ -27,7 +27,7 @@ def test_points_and_positions_carry_their_units() -> None:
 def test_result_and_gains_name_the_worst_point_alike() -> None:
     picture = LiveModel().evaluate(start_state(load_scene("dvf5000_first")))
     ranking = rank_picture(picture)
-    assert ranking.place == spell_point(picture.statistics.max_at_mm)
+    assert ranking.place == spell_place(picture.statistics.max_at_mm)
     assert ranking.place in worst_place(picture)
     # Z of the drawing counts from the table, that of the axis from its upper end
     assert ranking.positions.startswith("X 275, Y −225, Z −480 mm")

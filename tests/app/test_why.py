@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from warpspace.app.evaluation.budget import answer, pick, with_lever, with_picked
-from warpspace.app.evaluation.evaluate import LiveModel, LivePicture
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.readouts.budget import answer_html
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.history import History

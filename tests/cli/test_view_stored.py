@@ -16,6 +16,6 @@ def test_stored_field_is_shown_with_its_settings_and_its_errors(tmp_path):
     state = _stored_start(str(path))
     assert (state.loop, state.nodes, state.notes) == ("relative", 11, ())
     stored = load_stored_field(path)
-    assert state.exaggeration == stored.drawing.exaggeration
+    assert state.exaggeration == stored.picture.exaggeration
     shown = LiveModel().frame(state).field.error_um
     np.testing.assert_allclose(shown, stored.field.error_um, atol=1e-12)

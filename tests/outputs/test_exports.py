@@ -20,15 +20,15 @@ from warpspace.exceptions import OptionError, OutputError
 from warpspace.geometry.deform import deform
 from warpspace.geometry.surfaces import outer_surface
 from warpspace.outputs.exports import (
-    draw_scene,
     load_stored_field,
     write_csv,
     write_glb,
     write_vts,
 )
-from warpspace.outputs.exports.bodies import drawn_bodies
 from warpspace.outputs.exports.glb import build_glb
 from warpspace.outputs.files import check_target
+from warpspace.picture.bodies import place_bodies, scene_motions
+from warpspace.picture.scene_picture import evaluate_picture
 
 SCENES = ("dvf5000_first", "teach_wobbling_table", "dvf5000_nominal")
 
@@ -67,23 +67,23 @@ def gltf_document(data: bytes) -> dict:
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("loop", ["tool", "relative"])
 def test_glb_holds_geometry_and_errors(name, loop, tmp_path) -> None:
-    drawing = draw_scene(load_scene(name), grid=7, loop=loop)
+    drawing = evaluate_picture(load_scene(name), grid=7, loop=loop)
     write_glb(drawing, tmp_path / "a.glb")
     scene = trimesh.load_scene(tmp_path / "a.glb", process=False)
     mesh = scene.geometry["deformed_surface"]
-    at = outer_surface(drawing.picture.grid.shape).nodes
-    field = drawing.picture.field
-    x, y, z = (drawing.deformed_mm.reshape(-1, 3)[at] / 1000.0).T
+    at = outer_surface(drawing.grid.shape).nodes
+    field = drawing.field
+    x, y, z = (drawing.drawn_mm.reshape(-1, 3)[at] / 1000.0).T
     close(mesh.vertices, np.stack([x, z, -y], -1))
     close(mesh.vertex_attributes["_ERROR_UM"], field.error_um.reshape(-1, 3)[at])
     close(mesh.vertex_attributes["_ORIENTATION_URAD"], field.orientation_urad.reshape(-1, 3)[at])
     ghost = scene.geometry["ghost"].vertices
-    extent = drawing.picture.grid.extent_mm / 1000.0
+    extent = drawing.grid.extent_mm / 1000.0
     close(np.ptp(ghost, axis=0), extent[[0, 2, 1]])
 
 
 def test_glb_surface_faces_outwards_and_names_its_nodes() -> None:
-    drawing = draw_scene(load_scene("dvf5000_first"), grid=5)
+    drawing = evaluate_picture(load_scene("dvf5000_first"), grid=5)
     scene = trimesh.load_scene(
         trimesh.util.wrap_as_stream(build_glb(drawing)), file_type="glb", process=False
     )
@@ -97,18 +97,17 @@ def test_glb_surface_faces_outwards_and_names_its_nodes() -> None:
 
 def test_glb_tool_stands_in_the_deformed_grid() -> None:
     """The tool body is bent by the same factor as the grid it works in."""
-    drawing = draw_scene(load_scene("dvf5000_first"), grid=3)
-    (tool,) = [
-        b for b in drawn_bodies(drawing.scene, drawing.picture.view, 1e3) if b[0].frame == "t"
-    ]
-    moved = (tool[1] - tool[2])[np.argmin(tool[2][:, 2])]
-    middle = drawing.picture.field.error_um[1, 1, 1]
+    drawing = evaluate_picture(load_scene("dvf5000_first"), grid=3)
+    motions = scene_motions(drawing.scene, drawing.view)
+    (tool,) = place_bodies(drawing.scene, motions, 1e3, only=["t"])
+    moved = (tool.vertices_mm - tool.nominal_mm)[np.argmin(tool.nominal_mm[:, 2])]
+    middle = drawing.field.error_um[1, 1, 1]
     close(moved, middle)
 
 
 def test_glb_colours_are_linear_and_unlit() -> None:
     """A viewer that applies the sRGB curve to COLOR_0 shows the colours of the scale."""
-    drawing = draw_scene(load_scene("dvf5000_first"), grid=5)
+    drawing = evaluate_picture(load_scene("dvf5000_first"), grid=5)
     document = gltf_document(build_glb(drawing))
     assert all("KHR_materials_unlit" in m["extensions"] for m in document["materials"])
     assert document["extensionsUsed"] == ["KHR_materials_unlit"]
@@ -120,13 +119,13 @@ def test_glb_colours_are_linear_and_unlit() -> None:
     start = 28 + struct.unpack_from("<I", data, 12)[0] + view["byteOffset"]
     linear = np.frombuffer(data, "<f4", accessor["count"] * 3, start).reshape(-1, 3)
     shown = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    at = outer_surface(drawing.picture.grid.shape).nodes
+    at = outer_surface(drawing.grid.shape).nodes
     wanted = drawing.scale.colours(drawing.values.reshape(-1)[at])
     np.testing.assert_allclose(shown * 255.0, wanted, atol=0.01)
 
 
 def test_glb_morph_target_leads_back_to_the_nominal_place() -> None:
-    drawing = draw_scene(load_scene("dvf5000_first"), grid=3)
+    drawing = evaluate_picture(load_scene("dvf5000_first"), grid=3)
     data = build_glb(drawing)
     document = gltf_document(data)
     primitive = document["meshes"][0]["primitives"][0]
@@ -138,13 +137,13 @@ def test_glb_morph_target_leads_back_to_the_nominal_place() -> None:
         return np.frombuffer(data, "<f4", accessor["count"] * 3, offset).reshape(-1, 3)
 
     back = read(primitive["attributes"]["POSITION"]) + read(primitive["targets"][0]["POSITION"])
-    at = outer_surface(drawing.picture.grid.shape).nodes
-    x, y, z = (drawing.picture.grid.nominal_mm.reshape(-1, 3)[at] / 1000.0).T
+    at = outer_surface(drawing.grid.shape).nodes
+    x, y, z = (drawing.grid.nominal_mm.reshape(-1, 3)[at] / 1000.0).T
     close(back, np.stack([x, z, -y], -1))
 
 
 def test_glb_carries_scene_settings_and_version() -> None:
-    drawing = draw_scene(load_scene("dvf5000_first"), exaggeration=500, grid=3, component="x")
+    drawing = evaluate_picture(load_scene("dvf5000_first"), exaggeration=500, grid=3, component="x")
     asset = gltf_document(build_glb(drawing))["asset"]
     assert asset["generator"].startswith("warpspace ")
     assert asset["extras"]["settings"]["exaggeration"] == 500
@@ -155,10 +154,10 @@ def test_glb_carries_scene_settings_and_version() -> None:
 
 @pytest.mark.parametrize("name", SCENES)
 def test_vts_read_by_vtk(name, tmp_path) -> None:
-    drawing = draw_scene(load_scene(name), grid=5, exaggeration=200)
+    drawing = evaluate_picture(load_scene(name), grid=5, exaggeration=200)
     write_vts(drawing, tmp_path / "a.vts")
     mesh = pv.read(tmp_path / "a.vts")
-    field, shape = drawing.picture.field, drawing.picture.grid.shape
+    field, shape = drawing.field, drawing.grid.shape
     assert mesh.dimensions == shape
 
     def node(array: np.ndarray) -> np.ndarray:
@@ -174,22 +173,22 @@ def test_vts_read_by_vtk(name, tmp_path) -> None:
 
 def test_vts_is_shown_again_as_the_identical_scene(tmp_path) -> None:
     scene = load_scene("dvf5000_second")
-    drawing = draw_scene(scene, grid=4, loop="relative", component="z", exaggeration=300)
+    drawing = evaluate_picture(scene, grid=4, loop="relative", component="z", exaggeration=300)
     write_vts(drawing, tmp_path / "a.vts")
     stored = load_stored_field(tmp_path / "a.vts")
     assert stored.scene == scene
-    assert stored.drawing.settings == drawing.settings
-    np.testing.assert_array_equal(stored.field.error_um, drawing.picture.field.error_um)
+    assert stored.picture.settings == drawing.settings
+    np.testing.assert_array_equal(stored.field.error_um, drawing.field.error_um)
 
 
 def test_vts_saved_again_by_another_program_is_still_read(tmp_path) -> None:
-    write_vts(draw_scene(load_scene("dvf5000_first"), grid=3), tmp_path / "a.vts")
+    write_vts(evaluate_picture(load_scene("dvf5000_first"), grid=3), tmp_path / "a.vts")
     pv.read(tmp_path / "a.vts").save(tmp_path / "b.vts")
     assert load_stored_field(tmp_path / "b.vts").scene == load_scene("dvf5000_first")
 
 
 def test_vts_with_other_errors_than_its_scene_gives_is_refused(tmp_path) -> None:
-    write_vts(draw_scene(load_scene("dvf5000_first"), grid=3), tmp_path / "a.vts")
+    write_vts(evaluate_picture(load_scene("dvf5000_first"), grid=3), tmp_path / "a.vts")
     mesh = pv.read(tmp_path / "a.vts")
     mesh["error_um"] = mesh["error_um"] * 1.001
     mesh.save(tmp_path / "b.vts")
@@ -198,7 +197,7 @@ def test_vts_with_other_errors_than_its_scene_gives_is_refused(tmp_path) -> None
 
 
 def test_damaged_vts_gives_one_message(tmp_path, capfd) -> None:
-    write_vts(draw_scene(load_scene("dvf5000_first"), grid=5), tmp_path / "a.vts")
+    write_vts(evaluate_picture(load_scene("dvf5000_first"), grid=5), tmp_path / "a.vts")
     good = (tmp_path / "a.vts").read_bytes()
     bad = {
         "half": good[: len(good) // 2],
@@ -223,7 +222,7 @@ def test_damaged_vts_gives_one_message(tmp_path, capfd) -> None:
 @pytest.mark.parametrize("name", SCENES)
 def test_csv_read_by_pandas(name, tmp_path) -> None:
     scene = load_scene(name)
-    write_csv(draw_scene(scene, grid=5), tmp_path / "a.csv")
+    write_csv(evaluate_picture(scene, grid=5), tmp_path / "a.csv")
     table = pd.read_csv(tmp_path / "a.csv")
     field = evaluate(scene, grid=5)
     close(table[["x_mm", "y_mm", "z_mm"]], field.nominal_mm.reshape(-1, 3))
@@ -241,7 +240,9 @@ def test_csv_read_by_pandas(name, tmp_path) -> None:
 def test_files_are_the_same_when_written_again(tmp_path) -> None:
     for write, ending in ((write_glb, "glb"), (write_vts, "vts"), (write_csv, "csv")):
         for name in ("a", "b"):
-            write(draw_scene(load_scene("dvf5000_first"), grid=5), tmp_path / f"{name}.{ending}")
+            write(
+                evaluate_picture(load_scene("dvf5000_first"), grid=5), tmp_path / f"{name}.{ending}"
+            )
         first, second = ((tmp_path / f"{name}.{ending}").read_bytes() for name in ("a", "b"))
         assert first == second
 
@@ -252,7 +253,7 @@ def test_a_flat_volume_is_exported(tmp_path) -> None:
         'title = "flat"\n[machine]\nchain = "wFXYt"\n[workspace]\nX = [0, 100]\nY = [0, 50]\n'
         "[errors]\nEC0Y = 10.0\n"
     )
-    drawing = draw_scene(load_scene(path), grid=4)
+    drawing = evaluate_picture(load_scene(path), grid=4)
     for write, ending in ((write_glb, "glb"), (write_vts, "vts"), (write_csv, "csv")):
         write(drawing, tmp_path / f"a.{ending}")
     assert pv.read(tmp_path / "a.vts").dimensions == (4, 4, 1)
@@ -262,7 +263,7 @@ def test_a_flat_volume_is_exported(tmp_path) -> None:
 @pytest.mark.parametrize("exaggeration", [0.0, -1.0, np.nan, np.inf, 1e9])
 def test_impossible_exaggeration(exaggeration) -> None:
     with pytest.raises(OptionError, match="exaggeration"):
-        draw_scene(load_scene("dvf5000_first"), exaggeration=exaggeration, grid=3)
+        evaluate_picture(load_scene("dvf5000_first"), exaggeration=exaggeration, grid=3)
 
 
 def test_targets_that_must_not_be_written(tmp_path) -> None:

@@ -8,8 +8,8 @@ from warpspace.geometry.colour import ColourScale, colour_table
 from warpspace.geometry.faces import crease_lines
 from warpspace.geometry.surfaces import Surface, triangulate
 from warpspace.outputs.drawing.content import DrawnMap
-from warpspace.outputs.drawing.map3d import map_faces
 from warpspace.outputs.drawing.render import Raster
+from warpspace.picture.topology import map_faces
 from warpspace.units import Array
 
 SLOPE_TOLERANCE = 0.005
@@ -92,7 +92,7 @@ def read_map(
     raster, projection = drawn.raster, drawn.projection
     shape = known.shape
     expected = expected_mm.reshape(-1, 3)
-    faces = map_faces(shape, view)
+    faces = map_faces(shape, cut=view == "iso")
     surface = triangulate(faces)
     facing = np.zeros(len(expected), dtype=bool)
     towards = _normals(expected, surface) @ projection.towards

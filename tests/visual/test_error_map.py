@@ -10,7 +10,7 @@ from warpspace import load_scene
 from warpspace.geometry.colour import component_values
 from warpspace.outputs.drawing.settings import FigureSettings
 from warpspace.outputs.figures.catalogue import draw_figure
-from warpspace.scene.pipeline import ScenePicture, evaluate_picture
+from warpspace.picture.scene_picture import ScenePicture, evaluate_picture
 from warpspace.units import MM_PER_UM, Array
 
 pytestmark = [pytest.mark.render, pytest.mark.usefixtures("renderer")]

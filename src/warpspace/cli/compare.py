@@ -25,12 +25,11 @@ def compare(
     Both must have the same working volume. With -o both and the difference are drawn on one sheet,
     with one colour scale and one exaggeration.
     """
-    from warpspace.analysis.statistics import statistics
     from warpspace.outputs.drawing.style import FIGURE_ENDINGS
     from warpspace.outputs.files import check_target, write_atomically
-    from warpspace.picture.difference import difference_field
+    from warpspace.picture.comparison import subtract_scenes
+    from warpspace.picture.scene_picture import evaluate_picture
     from warpspace.scene.library import load_scene
-    from warpspace.scene.pipeline import evaluate_picture
 
     target = None if output is None else check_target(output, FIGURE_ENDINGS, overwrite=force)
     settings = parse_settings(**options)
@@ -39,7 +38,7 @@ def compare(
     found = {
         "a": pictures[0].statistics,
         "b": pictures[1].statistics,
-        "difference": statistics(difference_field(*pictures)),
+        "difference": subtract_scenes(pictures[1], pictures[0], "B − A").statistics,
     }
     if target is not None:
         from warpspace.outputs.worker import FigureWorker

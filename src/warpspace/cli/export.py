@@ -10,7 +10,7 @@ from warpspace.cli.targets import exaggeration_option, force_option, parse_exagg
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from warpspace.outputs.exports.drawing import Drawing
+    from warpspace.picture.scene_picture import ScenePicture
 
 ENDINGS = (".glb", ".vts", ".csv", ".html")
 
@@ -53,51 +53,51 @@ def export(
     Every format carries the scene, the settings, the display factor and the program's version.
     `warpspace view FILE.vts` shows a stored field again.
     """
-    from warpspace.outputs.exports import draw_scene
     from warpspace.outputs.files import check_target
+    from warpspace.picture.scene_picture import evaluate_picture
     from warpspace.scene.library import load_scene
 
     target = check_target(output, ENDINGS, overwrite=force)
-    drawing = draw_scene(
+    picture = evaluate_picture(
         load_scene(scene),
         exaggeration=parse_exaggeration(exaggeration),
         grid=grid,
         loop=loop,
         component=component,
     )
-    write_export(drawing, target, overwrite=force)
+    write_export(picture, target, overwrite=force)
     click.echo(
-        f"{output}: {drawing.scene.title}, displacement drawn ×{drawing.exaggeration:g},"
+        f"{output}: {picture.scene.title}, displacement drawn ×{picture.exaggeration:g},"
         f" {target.stat().st_size / 1e6:.2f} MB"
     )
 
 
-def write_export(drawing: "Drawing", target: "Path", *, overwrite: bool) -> None:
+def write_export(picture: "ScenePicture", target: "Path", *, overwrite: bool) -> None:
     """Write the format that the ending names."""
     match target.suffix.lower():
         case ".glb":
             from warpspace.outputs.exports import write_glb
 
-            write_glb(drawing, target, overwrite=overwrite)
+            write_glb(picture, target, overwrite=overwrite)
         case ".vts":
             from warpspace.outputs.exports import write_vts
 
-            write_vts(drawing, target, overwrite=overwrite)
+            write_vts(picture, target, overwrite=overwrite)
         case ".csv":
             from warpspace.outputs.exports import write_csv
 
-            write_csv(drawing, target, overwrite=overwrite)
+            write_csv(picture, target, overwrite=overwrite)
         case _:
             from warpspace.app.documents.offline_page import build_offline_html, offline_picture
             from warpspace.outputs.files import write_atomically
 
-            frame = offline_picture(
-                drawing.scene,
-                exaggeration=drawing.exaggeration,
-                nodes=max(drawing.picture.grid.shape),
-                loop=drawing.picture.view.loop,
-                component=drawing.component,
+            live = offline_picture(
+                picture.scene,
+                exaggeration=picture.exaggeration,
+                nodes=max(picture.grid.shape),
+                loop=picture.view.loop,
+                component=picture.component,
             )
-            page = build_offline_html(frame, drawing.provenance)
+            page = build_offline_html(live, picture.provenance)
             with write_atomically(target, overwrite=overwrite) as temporary:
                 temporary.write_text(page, encoding="utf-8")

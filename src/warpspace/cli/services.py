@@ -98,26 +98,25 @@ def write_export(request: Request, ending: str) -> bytes:
         The file's content.
     """
     from warpspace.cli.export import write_export as write
-    from warpspace.outputs.exports import draw_scene, subtract_drawings
+    from warpspace.picture.comparison import subtract_scenes
+    from warpspace.picture.scene_picture import evaluate_picture
 
-    drawing, *subtracted = (
-        replace(
-            draw_scene(
-                part.scene,
-                exaggeration=request.exaggeration,
-                grid=request.nodes,
-                loop=part.loop,
-                component=request.component,
-            ),
-            tilts=request.tilts,
+    picture, *subtracted = (
+        evaluate_picture(
+            part.scene,
+            exaggeration=request.exaggeration,
+            grid=request.nodes,
+            loop=part.loop,
+            component=request.component,
+            quantity="orientation" if request.tilts else "position",
             colours=request.colours,
         )
         for part in (request, request.minus)
         if part is not None
     )
     if subtracted:
-        drawing = subtract_drawings(drawing, subtracted[0])
+        picture = subtract_scenes(picture, subtracted[0], "A − B")
     with tempfile.TemporaryDirectory(prefix="warpspace-") as folder:
         target = Path(folder) / f"export{ending}"
-        write(drawing, target, overwrite=False)
+        write(picture, target, overwrite=False)
         return target.read_bytes()

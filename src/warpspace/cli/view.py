@@ -62,11 +62,11 @@ def _stored_start(path: str) -> "AppState":
     from warpspace.app.state.app_state import start_state
     from warpspace.outputs.exports import load_stored_field
 
-    drawing = load_stored_field(path).drawing
+    picture = load_stored_field(path).picture
     return (
-        start_state(drawing.scene)
-        .with_loop(drawing.picture.view.loop)
-        .with_nodes(max(drawing.picture.grid.shape))
-        .with_component(drawing.component)
-        .with_exaggeration(drawing.exaggeration)
+        start_state(picture.scene)
+        .with_loop(picture.view.loop)
+        .with_nodes(max(picture.grid.shape))
+        .with_component(picture.component)
+        .with_exaggeration(picture.exaggeration)
     )

@@ -1,10 +1,26 @@
-"""Numbers and text as figures spell them."""
+"""Numbers, places, factors and conventions as pictures, pages and files spell them."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import SupportsFloat
+
+from warpspace.kinematics.model import ComponentErrors, Loop
+from warpspace.machine.parameters import LINEAR_AXES
+from warpspace.scene.model import Scene
+from warpspace.units import Array
 
 MINUS = "\N{MINUS SIGN}"
 TIMES = "\N{MULTIPLICATION SIGN}"
+THIN_SPACE = "\N{NARROW NO-BREAK SPACE}"
+LOOP_WORDS = {
+    Loop.TOOL: "tool loop",
+    Loop.WORKPIECE: "workpiece loop",
+    Loop.RELATIVE: "tool relative to workpiece",
+}
+CONVENTION_WORDS = {
+    ComponentErrors.AFTER_MOTION: "component errors after the motion",
+    ComponentErrors.BEFORE_MOTION: "component errors before the motion",
+}
 
 
 def spell(value: float, digits: int = 3) -> str:
@@ -36,14 +52,65 @@ def spell_short(value: float) -> str:
     return f"{value:.6g}".replace("-", MINUS)
 
 
-def spell_point(point: Sequence[float]) -> str:
-    """Spell a point in whole millimetres, tenths below ten."""
+def spell_count(number: int) -> str:
+    """Spell a whole number, its digits in groups of three from 10 000 up."""
+    return f"{number:,}".replace(",", THIN_SPACE) if abs(number) >= 10_000 else str(number)
+
+
+def spell_factor(value: float) -> str:
+    """Spell an exaggeration: ``×1000``, ``×20 000``, at most four digits of it."""
+    if value == 1.0:
+        return f"{TIMES}1, true scale"
+    rounded = float(f"{value:.4g}")
+    if rounded >= 10_000.0:
+        return TIMES + f"{rounded:,.10g}".replace(",", THIN_SPACE)
+    return f"{TIMES}{rounded:.10g}"
+
+
+def spell_point(point: Sequence[float] | Array) -> str:
+    """Spell a point in whole millimetres, tenths below ten: ``(275, −225, −51)``."""
     parts = [f"{v:.0f}" if abs(v) >= 10.0 else f"{round(v, 1) + 0.0:g}" for v in point]
     return "(" + ", ".join(part.replace("-", MINUS) for part in parts) + ")"
 
 
-def spell_factor(value: float) -> str:
-    """Spell an exaggeration, for instance ``×1000``."""
-    if value == 1.0:
-        return f"{TIMES}1, true scale"
-    return f"{TIMES}{value:.6g}" if value < 1e6 else f"{TIMES}{value:,.0f}".replace(",", " ")
+def spell_coordinate(value: SupportsFloat) -> str:
+    """Spell a coordinate to a tenth, with a true minus; zero has no sign."""
+    return f"{round(float(value), 1) + 0.0:g}".replace("-", MINUS)
+
+
+def spell_place(point_mm: Array | Sequence[float]) -> str:
+    """Spell a point of R by its coordinates: ``X 275, Y −225, Z −51 mm``."""
+    pairs = zip("XYZ", point_mm, strict=True)
+    return ", ".join(f"{name} {spell_coordinate(value)}" for name, value in pairs) + " mm"
+
+
+def spell_positions(at: Mapping[str, SupportsFloat]) -> str:
+    """Spell positions of axes.
+
+    Parameters
+    ----------
+    at : mapping of str to float, mm or degrees
+
+    Returns
+    -------
+    str
+        Linear axes first: ``X 275, Y −225, Z −480 mm · B 0°``.
+    """
+    linear = ", ".join(
+        f"{name} {spell_coordinate(q)}" for name, q in at.items() if name in LINEAR_AXES
+    )
+    rotary = [f"{name} {spell_coordinate(q)}°" for name, q in at.items() if name not in LINEAR_AXES]
+    return " · ".join((*([f"{linear} mm"] if linear else ()), *rotary))
+
+
+def reference_words(scene: Scene) -> str:
+    """Say what errors are referred to."""
+    if scene.reference is None:
+        return "absolute errors"
+    at = " ".join(f"{axis} {spell_short(value)}" for axis, value in scene.reference.items())
+    return f"held still at {at}"
+
+
+def quantity_words(component: str, unit: str = "µm") -> str:
+    """Say what the colours of a map of position errors mean."""
+    return f"|E|  [{unit}]" if component == "norm" else f"{component} component of E  [{unit}]"

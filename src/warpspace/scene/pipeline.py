@@ -1,12 +1,11 @@
 """The whole flow in one screenful: scene → coordinates → basis or exact chain → field → numbers."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpspace.analysis.statistics import Statistics, statistics
 from warpspace.exceptions import OptionError
 from warpspace.field.basis import ErrorBasis, ErrorField
 from warpspace.field.evaluate import (
@@ -23,26 +22,6 @@ from warpspace.scene.model import Scene
 from warpspace.scene.schema import MAX_ERROR
 
 FRAMES = ("machine", "workpiece")
-
-
-@dataclass(frozen=True, slots=True)
-class ScenePicture:
-    """A scene evaluated over its grid: all that a picture of it is drawn from.
-
-    Attributes
-    ----------
-    scene : Scene
-    grid : Grid
-    field : ErrorField
-    statistics : Statistics
-    view : View
-    """
-
-    scene: Scene
-    grid: Grid
-    field: ErrorField
-    statistics: Statistics
-    view: View
 
 
 def evaluate(
@@ -145,28 +124,6 @@ def grid_basis(scene: Scene, grid: Grid, view: View | None = None) -> ErrorBasis
         grid.point_mm,
     )
     return replace(basis, nominal_mm=grid.nominal_mm)
-
-
-def evaluate_picture(
-    scene: Scene, *, grid: int = DEFAULT_NODES, loop: Loop | str = Loop.TOOL
-) -> ScenePicture:
-    """Evaluate all that a picture of a scene is drawn from.
-
-    Parameters
-    ----------
-    scene : Scene
-    grid : int, optional
-        Nodes per axis.
-    loop : Loop or str, optional
-
-    Returns
-    -------
-    ScenePicture
-    """
-    view = choose_view(scene, loop)
-    nodes = build_grid(scene.model, scene.workspace, grid)
-    field = evaluate(scene, grid=grid, loop=loop)
-    return ScenePicture(scene, nodes, field, statistics(field), view)
 
 
 def linearisation_error_um(scene: Scene, grid: int = DEFAULT_NODES) -> float:

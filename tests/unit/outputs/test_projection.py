@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from warpspace.outputs.drawing.projection import VIEWS, fit_projection, view_axes
+from warpspace.outputs.drawing.projection import fit_projection, view_axes
+from warpspace.picture.views import VIEWS
 
 RECT = (100.0, 50.0, 900.0, 650.0)
 POINTS = np.array([(x, y, z) for x in (0.0, 550.0) for y in (0.0, 450.0) for z in (0.0, 400.0)])

@@ -7,11 +7,11 @@ from warpspace import evaluate, load_scene
 from warpspace.exceptions import OptionError, UnknownNameError, WarpspaceError
 from warpspace.field.evaluate import amplitudes_of
 from warpspace.field.grid import build_grid
+from warpspace.picture.scene_picture import evaluate_picture
 from warpspace.scene.library import parse_scene, scene_names
 from warpspace.scene.machines import load_machine, machine_names
 from warpspace.scene.pipeline import (
     choose_view,
-    evaluate_picture,
     grid_basis,
     linearisation_error_um,
 )

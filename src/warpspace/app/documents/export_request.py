@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from warpspace.app.documents.received_files import safe_name
 from warpspace.app.documents.services import Beside, Request
-from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.state.app_state import AppState
 from warpspace.scene.model import Scene
@@ -23,7 +23,7 @@ def build_request(picture: LivePicture) -> Request:
         The side that is drawn, or A with B to be subtracted; with the factor that is drawn, and the
         colours that all maps of the comparison share.
     """
-    found, drawn = picture.compared, picture.subject or picture.state
+    found, drawn = picture.compared, picture.drawn_state
     if found is None:
         return _request(picture, drawn, _scene(drawn, picture))
     a, b = (

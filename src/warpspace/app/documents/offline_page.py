@@ -18,10 +18,10 @@ from markupsafe import Markup
 
 from warpspace import __version__
 from warpspace.app.evaluation.budget import active_errors
-from warpspace.app.evaluation.compare import both_words, drawn_title, is_difference
-from warpspace.app.evaluation.evaluate import LiveModel, LivePicture
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.readouts import summary as legend
-from warpspace.app.state.app_state import AppState, start_state
+from warpspace.app.state.app_state import start_state
 from warpspace.app.viewport.camera import fit_camera
 from warpspace.app.viewport.layers import SCENE_PER_MM
 from warpspace.app.viewport.layers.axes import AxesLayer
@@ -29,10 +29,11 @@ from warpspace.app.viewport.layers.box import BoxLayer
 from warpspace.app.viewport.layers.lights import light_scene
 from warpspace.app.viewport.layers.other import OtherLayer
 from warpspace.app.viewport.layers.traces import TracesLayer
-from warpspace.geometry.colour import build_scale
-from warpspace.kinematics.model import ComponentErrors, Loop
+from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import ErrorFunction
 from warpspace.machine.parameters import parameter
+from warpspace.picture.model import choose_scale
+from warpspace.picture.words import CONVENTION_WORDS, reference_words
 from warpspace.scene.model import Scene
 
 POLICY = (
@@ -44,10 +45,6 @@ POLICY = (
 ASPECT = 1.5
 MARGIN = 1.3
 """Room around the box, for the axes beside it."""
-COMPONENT_ERRORS = {
-    ComponentErrors.AFTER_MOTION: "component errors ride on the moving body",
-    ComponentErrors.BEFORE_MOTION: "component errors in fixed directions",
-}
 
 
 def offline_picture(
@@ -82,7 +79,11 @@ def offline_picture(
         start_state(scene), exaggeration=exaggeration, nodes=nodes, loop=loop, component=component
     )
     picture = LiveModel().evaluate(state)
-    return picture if largest is None else replace(picture, scale=build_scale(largest, component))
+    return (
+        picture
+        if largest is None
+        else replace(picture, colours=choose_scale([np.array(largest)], component))
+    )
 
 
 def build_scene_html(picture: LivePicture, aspect: float = ASPECT) -> str:
@@ -143,14 +144,14 @@ def build_offline_html(picture: LivePicture, provenance: Mapping[str, Any] | Non
         loader=PackageLoader("warpspace.app"), autoescape=True, undefined=StrictUndefined
     )
     return templates.get_template("offline.html.j2").render(
-        title=drawn_title(picture),
+        title=picture.title,
         program=f"warpspace {__version__}",
         policy=POLICY,
         heading=Markup(legend.heading(picture)),  # noqa: S704 - escaped where it is built
         summary=Markup(legend.summary(picture)),  # noqa: S704
         scene=Markup(inner),  # noqa: S704
         parameters=parameter_rows(picture),
-        counted="unlike in A and B" if is_difference(picture) else "not zero",
+        counted="unlike in A and B" if picture.is_difference else "not zero",
         remarks=remarks(picture),
         provenance=Markup(stored.replace("<", "\\u003c")),  # noqa: S704
     )
@@ -161,8 +162,8 @@ def parameter_rows(picture: LivePicture) -> list[dict[str, str]]:
 
     Those that are not zero; of a difference those that are unlike on both sides.
     """
-    drawn = picture.subject or picture.state
-    if picture.compared is None or not is_difference(picture):
+    drawn = picture.drawn_state
+    if picture.compared is None or not picture.is_difference:
         return [_row(key, f"{value:+g}") for key, value in drawn.active.items() if value != 0.0]
     a, b = (active_errors(side).functions for side in picture.compared.sides)
     return [
@@ -186,19 +187,11 @@ def _amplitude(function: ErrorFunction | None) -> str:
 def remarks(picture: LivePicture) -> list[str]:
     """Spell how the scene is looked at; of a difference for both sides."""
     return [
-        f"{both_words(picture, lambda state: state.loop.value)} loop",
-        both_words(picture, _reference_words),
-        both_words(picture, lambda state: COMPONENT_ERRORS[state.scene.model.component_errors]),
+        f"{picture.both_words(lambda state: state.loop.value)} loop",
+        picture.both_words(lambda state: reference_words(state.scene)),
+        picture.both_words(lambda state: CONVENTION_WORDS[state.scene.model.component_errors]),
         "first-order model",
         "error = actual − nominal",
         "drag to turn, wheel to zoom",
         f"warpspace {__version__}",
     ]
-
-
-def _reference_words(state: AppState) -> str:
-    """Say what is held still."""
-    held = state.scene.reference
-    if held is None:
-        return "absolute errors"
-    return "held still at " + ", ".join(f"{axis} {at:g}" for axis, at in held.items())

@@ -22,12 +22,12 @@ Write = Callable[[AppState], str]
 Read = Callable[[str], AppState]
 
 
-def comparison_line(comparison: Comparison, write: Write) -> str:
+def comparison_line(comparison: Comparison[AppState], write: Write) -> str:
     """Spell a comparison as a query string.
 
     Parameters
     ----------
-    comparison : Comparison
+    comparison : Comparison[AppState]
     write : callable
         Spells a plain state as a link.
 
@@ -53,7 +53,7 @@ def comparison_line(comparison: Comparison, write: Write) -> str:
     return urlencode([(PREFIX + name, value) for name, value in pairs])
 
 
-def _side_text(side: Side, write: Write) -> str:
+def _side_text(side: Side[AppState], write: Write) -> str:
     """Spell one side; a snapshot is the pinned one."""
     if side.state is None:
         return NOW
@@ -104,7 +104,9 @@ def with_comparison(state: AppState, pairs: Mapping[str, str], read: Read) -> Ap
     return replace(state, comparison=found, notes=notes)
 
 
-def _side(given: Mapping[str, str], name: str, pinned: Side | None, read: Read) -> Side | None:
+def _side(
+    given: Mapping[str, str], name: str, pinned: Side[AppState] | None, read: Read
+) -> Side[AppState] | None:
     """Read one side; None where there is none."""
     text = given.get(name)
     if text is None or text == NOW:

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont, PngImagePlugin
 
 from warpspace import __version__
-from warpspace.app.evaluation.compare import both_words, drawn_title
-from warpspace.app.evaluation.evaluate import LivePicture
-from warpspace.app.readouts.summary import spell_factor
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.picture.words import spell_factor
 
 LIGHT, DARK = ((255, 255, 255), (27, 38, 59)), ((26, 27, 30), (222, 226, 232))
 """Ground and ink."""
@@ -44,7 +43,7 @@ def view_png(pixels: NDArray[np.uint8], picture: LivePicture) -> bytes:
     _colour_bar(page, draw, picture, ink)
     facts = PngImagePlugin.PngInfo()
     facts.add_text("Software", f"warpspace {__version__}")
-    facts.add_itxt("Title", drawn_title(picture))
+    facts.add_itxt("Title", picture.title)
     facts.add_itxt("Description", f"displacement drawn {spell_factor(picture.exaggeration)}")
     written = BytesIO()
     page.convert("RGB").save(written, "PNG", pnginfo=facts)
@@ -65,13 +64,13 @@ def _font(size: int) -> "ImageFont.ImageFont | ImageFont.FreeTypeFont":
 def _heading(draw: ImageDraw.ImageDraw, picture: LivePicture, ink: tuple[int, int, int]) -> None:
     """Write title, factor and numbers."""
     found = picture.statistics
-    title = drawn_title(picture)
+    title = picture.title
     factor = spell_factor(picture.exaggeration).replace("\u202f", " ")
     draw.text((16, 10), title[:110], ink, _font(22))
     draw.text(
         (16, 38),
         f"displacement drawn {factor} · |E| mean {found.mean_um:.2f} µm, max {found.max_um:.2f} µm"
-        f" · {both_words(picture, lambda state: state.loop.value)} loop",
+        f" · {picture.both_words(lambda state: state.loop.value)} loop",
         ink,
         _font(15),
     )

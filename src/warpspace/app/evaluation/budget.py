@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpspace.analysis.explain import Explanation, explain
-from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.edits import axis_span
 from warpspace.app.state.picked import Picked

@@ -4,100 +4,29 @@ A difference is taken node by node, so the nominal volumes must coincide. Where 
 sides are still shown and the reason stands in `Compared.refused`.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
-import numpy as np
-
-from warpspace.analysis.statistics import Statistics, statistics
-from warpspace.app.evaluation.colouring import shown_values
-from warpspace.app.evaluation.slices import SliceMap, draw_slice
+from warpspace.app.evaluation.live_picture import Compared, LivePicture
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.comparison import Comparison, Side
 from warpspace.app.state.look import RotaryLook
-from warpspace.field.basis import ErrorField
-from warpspace.geometry.colour import ColourScale, build_scale
-from warpspace.geometry.deform import deform
+from warpspace.geometry.colour import ColourScale
+from warpspace.picture.model import choose_scale, same_nodes, subtract_pictures
+from warpspace.picture.slices import subtract_slices
+from warpspace.picture.traces import subtract_traces
 from warpspace.scene.model import Scene
-from warpspace.units import Array
 
-if TYPE_CHECKING:
-    from warpspace.app.evaluation.evaluate import LivePicture, TraceLines
-
-SAME_PLACE_MM = 1e-6
+REFUSED = "The working volumes are not the same, so there is no difference node by node."
 
 
-@dataclass(frozen=True, slots=True)
-class Compared:
-    """What is known of a comparison beside the picture drawn.
-
-    Attributes
-    ----------
-    shown : str
-        What is drawn: "a", "b" or "difference".
-    titles : tuple of str, (2,)
-        Names of the two sides.
-    sides : tuple of AppState, (2,)
-        What they are, looked at as now.
-    a, b : Statistics
-    difference : Statistics or None
-        None where there is no difference.
-    other_mm : ndarray, [nx, ny, nz, 3], mm, or None
-        Displaced nodes of the side that is not drawn; None for the difference.
-    refused : str
-        Why there is no difference; empty where there is one.
-    """
-
-    shown: str
-    titles: tuple[str, str]
-    sides: tuple[AppState, AppState]
-    a: Statistics
-    b: Statistics
-    difference: Statistics | None
-    other_mm: Array | None
-    refused: str = ""
-
-    @property
-    def title(self) -> str:
-        """Name of what is drawn."""
-        a, b = self.titles
-        return {"a": f"A: {a}", "b": f"B: {b}", "difference": f"A − B: {a} − {b}"}[self.shown]
-
-
-def drawn_title(picture: "LivePicture") -> str:
-    """Name what is drawn: the scene, or a side of a comparison, or the difference."""
-    return picture.state.scene.title if picture.compared is None else picture.compared.title
-
-
-def is_difference(picture: "LivePicture") -> bool:
-    """Tell whether a difference of two states is drawn."""
-    return picture.compared is not None and picture.compared.shown == "difference"
-
-
-def both_words(picture: "LivePicture", word: Callable[[AppState], str]) -> str:
-    """Say something of what is drawn; of a difference for both sides where they are not alike.
-
-    Parameters
-    ----------
-    picture : LivePicture
-    word : callable
-        Says it of a state.
-    """
-    found = picture.compared
-    if found is None or not is_difference(picture):
-        return word(picture.subject or picture.state)
-    a, b = (word(side) for side in found.sides)
-    return a if a == b else f"{a} − {b}"
-
-
-def side_state(now: AppState, side: Side) -> AppState:
+def side_state(now: AppState, side: Side[AppState]) -> AppState:
     """Give the state of one side, looked at as the present one.
 
     Parameters
     ----------
     now : AppState
-    side : Side
+    side : Side[AppState]
 
     Returns
     -------
@@ -132,12 +61,12 @@ def _turns_alike(one: AppState, other: AppState) -> bool:
     return points and one.positions.keys() == other.positions.keys()
 
 
-def scene_side(scene: Scene) -> Side:
+def scene_side(scene: Scene) -> Side[AppState]:
     """Make a side of a scene as it is opened."""
     return Side(scene.title or scene.name, start_state(scene), is_scene=True)
 
 
-def pinned_side(state: AppState) -> Side:
+def pinned_side(state: AppState) -> Side[AppState]:
     """Make a side of what is shown now; it holds no comparison of its own."""
     edited = len(state.changed_keys)
     title = state.scene.title or state.scene.name
@@ -147,7 +76,7 @@ def pinned_side(state: AppState) -> Side:
     return Side(f"snapshot: {title}", plain)
 
 
-def compare_pictures(single: "Callable[[AppState], LivePicture]", state: AppState) -> "LivePicture":
+def compare_pictures(single: Callable[[AppState], LivePicture], state: AppState) -> LivePicture:
     """Evaluate a state that compares two.
 
     Parameters
@@ -164,20 +93,16 @@ def compare_pictures(single: "Callable[[AppState], LivePicture]", state: AppStat
     """
     chosen = state.comparison
     other_side = chosen.b or Side()
-    first = [single(side_state(state, side)) for side in (chosen.a, other_side)]
-    factor = state.exaggeration or min(picture.exaggeration for picture in first)
-    a, b = (
-        picture
-        if picture.exaggeration == factor
-        else single(replace(picture.state, exaggeration=factor))
-        for picture in first
+    a, b = _with_one_factor(
+        state, [single(side_state(state, side)) for side in (chosen.a, other_side)]
     )
-    refused = _why_not(a, b)
-    difference = None if refused else _difference(a, b, factor)
+    refused = "" if same_nodes(a.grid.nominal_mm, b.grid.nominal_mm) else REFUSED
+    difference = None if refused else _difference(a, b)
     maps = [a, b] if difference is None else [a, b, difference]
     scale = _shared_scale(state, maps)
     shown = "a" if refused and chosen.shown == "difference" else chosen.shown
     drawn, other = {"a": (a, b), "b": (b, a), "difference": (difference or a, None)}[shown]
+    alike = other is not None and other.drawn_mm.shape == drawn.drawn_mm.shape
     compared = Compared(
         shown,
         (_title(state, chosen.a), _title(state, other_side)),
@@ -185,87 +110,54 @@ def compare_pictures(single: "Callable[[AppState], LivePicture]", state: AppStat
         a.statistics,
         b.statistics,
         None if difference is None else difference.statistics,
-        None if other is None else other.drawn_mm,
+        other.drawn_mm if other is not None and alike else None,
         refused,
     )
-    if other is not None and other.drawn_mm.shape != drawn.drawn_mm.shape:
-        compared = replace(compared, other_mm=None)
-    return replace(drawn, state=state, subject=drawn.state, scale=scale, compared=compared)
+    return replace(drawn, state=state, subject=drawn.state, colours=scale, compared=compared)
 
 
-def _title(state: AppState, side: Side) -> str:
+def _with_one_factor(
+    state: AppState, pictures: Sequence[LivePicture]
+) -> tuple[LivePicture, LivePicture]:
+    """Draw both sides with one display factor: the one chosen, or the smaller of theirs."""
+    factor = state.exaggeration or min(picture.exaggeration for picture in pictures)
+    a, b = (
+        replace(
+            picture,
+            exaggeration=factor,
+            slices=tuple(replace(one, exaggeration=factor) for one in picture.slices),
+            traces=tuple(replace(lines, exaggeration=factor) for lines in picture.traces),
+        )
+        for picture in pictures
+    )
+    return a, b
+
+
+def _title(state: AppState, side: Side[AppState]) -> str:
     """Name a side on the page."""
     return side.title if side.state else f"now, {state.scene.title or state.scene.name}"
 
 
-def _why_not(a: "LivePicture", b: "LivePicture") -> str:
-    """Say why there is no difference; empty where there is one."""
-    if not _same_place(a.grid.nominal_mm, b.grid.nominal_mm):
-        return "The working volumes are not the same, so there is no difference node by node."
-    return ""
-
-
-def _difference(a: "LivePicture", b: "LivePicture", factor: float) -> "LivePicture":
+def _difference(a: LivePicture, b: LivePicture) -> LivePicture:
     """Subtract b from a: node by node, slice by slice and trace by trace."""
-    field = _subtract(a.field, b.field)
     return replace(
-        a,
-        field=field,
-        statistics=statistics(field),
-        values=shown_values(a.state, field),
-        drawn_mm=deform(field.nominal_mm, field.error_um, factor),
-        traces=_trace_differences(a, b),
-        slices=_slice_differences(a, b, factor),
+        subtract_pictures(a, b),
+        colours=None,
+        traces=subtract_traces(a.traces, b.traces),
+        slices=subtract_slices(a.slices, b.slices),
     )
 
 
-def _subtract(one: ErrorField, two: ErrorField) -> ErrorField:
-    """Subtract two fields over the same points."""
-    return ErrorField(
-        one.nominal_mm,
-        one.error_um - two.error_um,
-        one.orientation_urad - two.orientation_urad,
-    )
-
-
-def _slice_differences(a: "LivePicture", b: "LivePicture", factor: float) -> tuple[SliceMap, ...]:
-    """Subtract what the model says on the slices themselves, where both lie in one place."""
-    return tuple(
-        draw_slice(
-            a.state, one.axis, one.position_mm, one.grid, _subtract(one.field, two.field), factor
-        )
-        for one, two in zip(a.slices, b.slices, strict=False)
-        if _same_place(one.grid.nominal_mm, two.grid.nominal_mm)
-    )
-
-
-def _same_place(one: Array, two: Array) -> bool:
-    """Tell whether nodes nominally coincide."""
-    return one.shape == two.shape and np.allclose(one, two, rtol=0.0, atol=SAME_PLACE_MM)
-
-
-def _trace_differences(a: "LivePicture", b: "LivePicture") -> "tuple[TraceLines, ...]":
-    """Subtract traces where they are the same ones."""
-    found: list[TraceLines] = []
-    for one, two in zip(a.traces, b.traces, strict=False):
-        if _same_place(one.nominal_mm, two.nominal_mm):
-            found.append(replace(one, actual_mm=one.nominal_mm + one.actual_mm - two.actual_mm))
-    return tuple(found)
-
-
-def _shared_scale(state: AppState, maps: "list[LivePicture]") -> ColourScale:
+def _shared_scale(state: AppState, maps: Sequence[LivePicture]) -> ColourScale:
     """Give one colour scale that holds all maps."""
-    widest = max((picture.scale for picture in maps), key=lambda scale: scale.high)
     if state.look.range_mode == "fixed":
         return maps[0].scale
-    largest = max(float(np.abs(picture.values).max()) for picture in maps)
-    if largest <= widest.high:
-        return widest
-    found = build_scale(largest, state.component)
-    return replace(found, label=widest.label, unit=widest.unit)
+    widest = max((picture.scale for picture in maps), key=lambda scale: scale.high)
+    held = choose_scale([picture.values for picture in maps], state.component, state.look.quantity)
+    return held if held.high > widest.high else widest
 
 
-def with_sides(state: AppState, a: Side, b: Side | None) -> AppState:
+def with_sides(state: AppState, a: Side[AppState], b: Side[AppState] | None) -> AppState:
     """Compare two sides; None for b ends it."""
     if b is None:
         return replace(state, comparison=state.comparison.off())

@@ -1,4 +1,4 @@
-"""From a state to everything a picture of it is drawn from: numpy only, no browser.
+"""From a state to the picture of it: numpy only, no browser.
 
 Grids and first-order responses are kept, since they change only with the scene, the density, the
 rotary positions and the loop; a slider move is then one matrix-vector product.
@@ -8,78 +8,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpspace.analysis.statistics import Statistics, statistics
 from warpspace.app.evaluation.cache import Cache, Identity
-from warpspace.app.evaluation.colouring import choose_scale, shown_values
-from warpspace.app.evaluation.compare import Compared, compare_pictures
-from warpspace.app.evaluation.slices import SliceMap, SliceSource
-from warpspace.app.evaluation.topology import Topology, topology
+from warpspace.app.evaluation.compare import compare_pictures
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.evaluation.slices import SliceSource
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import default_held
 from warpspace.field.basis import ErrorBasis, ErrorField
-from warpspace.field.evaluate import View, build_basis
+from warpspace.field.evaluate import build_basis
 from warpspace.field.grid import Grid, build_grid
 from warpspace.geometry.colour import ColourScale
-from warpspace.geometry.deform import auto_exaggeration, deform
 from warpspace.geometry.traces import TraceGroup, build_traces
+from warpspace.picture.exaggeration import choose_exaggeration
+from warpspace.picture.model import choose_scale, coloured_error, coloured_values
+from warpspace.picture.traces import TraceLines
 from warpspace.scene.pipeline import grid_basis
 from warpspace.units import Array
 
-KEPT_BYTES = 400_000_000
+CACHE_BYTES = 400_000_000
 TRACE_SAMPLES = 73
 """Points along a trace: every five degrees of a turn."""
-
-
-@dataclass(frozen=True, slots=True)
-class LivePicture:
-    """One picture in numbers, mm and µm in R.
-
-    Attributes
-    ----------
-    state : AppState
-    grid : Grid
-    field : ErrorField
-        Over all nodes of the grid.
-    statistics : Statistics
-    exaggeration : float
-        The display factor in force.
-    scale : ColourScale
-    values : ndarray, [nx, ny, nz]
-        What is coloured, in the unit of the scale.
-    drawn_mm : ndarray, [nx, ny, nz, 3], mm
-        Displaced nodes.
-    topology : Topology
-    traces : tuple of TraceLines
-    slices : tuple of SliceMap
-        Drawn in place of the surface where slices are chosen.
-    subject : AppState or None
-        What is drawn, where that is another state than the one steered; else None.
-    compared : Compared or None
-        The comparison it belongs to.
-    """
-
-    state: AppState
-    grid: Grid
-    field: ErrorField
-    statistics: Statistics
-    exaggeration: float
-    scale: ColourScale
-    values: Array
-    drawn_mm: Array
-    topology: Topology
-    traces: "tuple[TraceLines, ...]"
-    slices: tuple[SliceMap, ...] = ()
-    subject: AppState | None = None
-    compared: Compared | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class TraceLines:
-    """Traces of one branch, nominal and displaced, [T, n, 3], mm."""
-
-    group: TraceGroup
-    nominal_mm: Array
-    actual_mm: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,10 +47,10 @@ class Response:
 
 
 class LiveModel:
-    """Turns states into frames; one for all sessions, usable from any thread."""
+    """Turns states into pictures; one for all sessions, usable from any thread."""
 
     def __init__(self) -> None:
-        self._cache: Cache[Response] = Cache(KEPT_BYTES)
+        self._responses: Cache[Response] = Cache(CACHE_BYTES)
         self._slices = SliceSource()
 
     def response(self, state: AppState) -> Response:
@@ -114,7 +62,7 @@ class LiveModel:
             state.loop,
             state.rotary,
         )
-        return self._cache.get(key, lambda: _build(state), lambda response: response.size)
+        return self._responses.get(key, lambda: _build(state), lambda response: response.size)
 
     def evaluate(self, state: AppState) -> LivePicture:
         """Evaluate a state.
@@ -135,36 +83,52 @@ class LiveModel:
     def _single(self, state: AppState) -> LivePicture:
         """Evaluate a state without what it is compared with."""
         response = self.response(state)
-        grid = response.grid
         amplitudes = np.fromiter(state.active.values(), float, len(state.amplitudes))
         field = response.basis.evaluate(amplitudes, orientation=state.look.tilts)
-        found = statistics(field)
-        factor = state.exaggeration or auto_exaggeration(found.max_um, grid.longest_edge_mm)
-        values = shown_values(state, field)
-        return LivePicture(
-            state,
-            grid,
-            field,
-            found,
-            factor,
-            choose_scale(state, values, response.basis, field),
-            values,
-            deform(field.nominal_mm, field.error_um, factor),
-            topology(grid.shape, cut=state.look.surface == "cut"),
-            tuple(
-                TraceLines(
-                    group,
-                    group.nominal_mm,
-                    deform(
-                        basis.nominal_mm,
-                        basis.evaluate(amplitudes, orientation=False).error_um,
-                        factor,
-                    ),
-                )
-                for group, basis in zip(response.groups, response.trace_bases, strict=True)
-            ),
-            self._slices.maps(state, amplitudes, factor),
+        factor = choose_exaggeration(
+            state.exaggeration, None, float(field.norm_um.max()), response.grid.longest_edge_mm
         )
+        traces = tuple(
+            TraceLines(
+                group,
+                basis.nominal_mm,
+                basis.evaluate(amplitudes, orientation=False).error_um,
+                factor,
+            )
+            for group, basis in zip(response.groups, response.trace_bases, strict=True)
+        )
+        colours = _chosen_colours(state, field, response.basis)
+        return LivePicture(
+            view=state.scene.view(state.loop),
+            grid=response.grid,
+            field=field,
+            exaggeration=factor,
+            component=state.component,
+            quantity=state.look.quantity,
+            colours=colours,
+            cut=state.look.surface == "cut",
+            slices=self._slices.slices(state, amplitudes, factor, colours),
+            state=state,
+            traces=traces,
+        )
+
+
+def _chosen_colours(state: AppState, field: ErrorField, basis: ErrorBasis) -> ColourScale | None:
+    """Give the colours that a user has chosen: fixed, or shared; None for round ends."""
+    quantity, component = state.look.quantity, state.component
+    values = coloured_values(field, component, quantity)
+    if state.look.range_mode == "fixed":
+        return choose_scale([values], component, quantity, end=state.look.range_top)
+    if state.look.range_mode == "shared":
+        opened = basis.evaluate(np.array([state.start[key] for key in basis.keys]))
+        both = (coloured_error(field, quantity), coloured_error(opened, quantity))
+        return choose_scale([_length(error) for error in both], component, quantity)
+    return choose_scale([values], component, quantity)
+
+
+def _length(vectors: Array) -> Array:
+    """Length of vectors, [...]."""
+    return np.linalg.norm(vectors, axis=-1)
 
 
 def _build(state: AppState) -> Response:
@@ -186,7 +150,7 @@ def _build(state: AppState) -> Response:
             scene.errors,
             keys,
             group.coordinates,
-            View(loop=group.loop, reference=scene.reference),
+            scene.view(group.loop),
             group.nominal_mm,
         )
         for group in groups

@@ -5,34 +5,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpspace.app.evaluation.colouring import shown_values
-from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import linear_positions
-from warpspace.bodies.placed import Body, load_bodies, place_points, view_motions
 from warpspace.field.evaluate import build_basis
 from warpspace.geometry.deform import deform
 from warpspace.kinematics import transforms
 from warpspace.kinematics.bodies import BodyMotion
 from warpspace.kinematics.model import complete_coordinates
+from warpspace.picture.bodies import PlacedBody, place_bodies, scene_motions
+from warpspace.picture.model import coloured_values
 from warpspace.units import Array
-
-
-@dataclass(frozen=True, slots=True)
-class DrawnBody:
-    """One body where it is drawn.
-
-    Attributes
-    ----------
-    body : Body
-    vertices_mm : ndarray, [V, 3], mm
-        In R.
-    edges_mm : ndarray, [E, 2, 3], mm
-    """
-
-    body: Body
-    vertices_mm: Array
-    edges_mm: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,20 +55,18 @@ def machine_positions(
 def machine_motions(
     state: AppState, turned: Mapping[str, float] | None = None
 ) -> dict[str, BodyMotion]:
-    """Find place and small motion of every body, as the state's loop and reference see it."""
-    scene = state.scene
-    return view_motions(
-        scene.model,
-        scene.errors,
-        state.active,
-        machine_positions(state, turned),
-        scene.view(state.loop),
+    """Find place and small motion of every frame, as the state's loop and reference see it."""
+    return scene_motions(
+        state.scene,
+        state.scene.view(state.loop),
+        amplitudes=state.active,
+        positions=machine_positions(state, turned),
     )
 
 
 def drawn_bodies(
     picture: LivePicture, turned: Mapping[str, float] | None = None
-) -> tuple[DrawnBody, ...]:
+) -> tuple[PlacedBody, ...]:
     """Place the bodies of a picture's machine, bent where that is chosen.
 
     Parameters
@@ -96,20 +77,12 @@ def drawn_bodies(
 
     Returns
     -------
-    tuple of DrawnBody
+    tuple of PlacedBody
         Empty for a machine without bodies.
     """
     state = picture.state
     factor = picture.exaggeration if state.machine.bent else 0.0
-    motions = machine_motions(state, turned)
-    return tuple(
-        DrawnBody(
-            body,
-            place_points(motions[body.frame], body.vertices_mm, factor),
-            place_points(motions[body.frame], body.edges_mm, factor),
-        )
-        for body in load_bodies(state.scene.machine)
-    )
+    return place_bodies(state.scene, machine_motions(state, turned), factor)
 
 
 def tool_point(picture: LivePicture) -> ToolPoint:
@@ -140,16 +113,13 @@ def tool_point(picture: LivePicture) -> ToolPoint:
     return ToolPoint(
         nominal,
         deform(nominal, field.error_um, picture.exaggeration),
-        float(shown_values(state, field)),
+        float(coloured_values(field, state.component, state.look.quantity)),
         field.error_um,
     )
 
 
 def machine_room_mm(picture: LivePicture) -> Array:
     """Give the points of the nominal machine and the corners of the grid, [n, 3], mm."""
-    motions = machine_motions(picture.state)
-    placed = [
-        place_points(motions[body.frame], body.vertices_mm, 0.0)
-        for body in load_bodies(picture.state.scene.machine)
-    ]
-    return np.concatenate([picture.grid.bounds_mm, *placed])
+    state = picture.state
+    placed = place_bodies(state.scene, machine_motions(state), 0.0)
+    return np.concatenate([picture.grid.bounds_mm, *(part.nominal_mm for part in placed)])

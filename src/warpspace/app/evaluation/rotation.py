@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.units import Array
 

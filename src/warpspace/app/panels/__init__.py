@@ -10,7 +10,7 @@ from typing import Protocol, runtime_checkable
 
 from viser import GuiApi
 
-from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.store import StateStore, Update
 

@@ -5,8 +5,7 @@ import numpy as np
 from warpspace.app.browser.clicks import Clicks
 from warpspace.app.browser.handles import Handle
 from warpspace.app.evaluation.budget import answer, with_lever, with_picked
-from warpspace.app.evaluation.compare import is_difference
-from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
 from warpspace.app.readouts.budget import ASK, REFUSED, answer_html
 from warpspace.app.server.tab_context import TabContext
@@ -54,13 +53,13 @@ class WhyPanel:
 
     def show(self, picture: LivePicture) -> None:
         """Explain the point in the state that is drawn."""
-        state = picture.subject or picture.state
+        state = picture.drawn_state
         picked = picture.state.picked
         self._clear.put(visible=picked is not None)
         self._far.put(visible=picked is not None and bool(picture.state.lever))
         if picked is None:
             self._text.put(content=ASK)
-        elif is_difference(picture):
+        elif picture.is_difference:
             self._text.put(content=REFUSED)
         else:
             found = answer(state, picked, picture.exaggeration)
@@ -71,7 +70,7 @@ class WhyPanel:
         picture, camera = self._tab.shown(), self._tab.camera()
         if picture is None or picture.state.picked is None:
             return
-        found = answer(picture.subject or picture.state, picture.state.picked, picture.exaggeration)
+        found = answer(picture.drawn_state, picture.state.picked, picture.exaggeration)
         parts = found.explanation.contributions
         origins = [p.origin_mm + found.shift_mm for p in parts if p.key == picture.state.lever]
         if not origins:

@@ -7,7 +7,7 @@ from typing import Any
 from warpspace.app.browser.handles import Input
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
-from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext, Update
 from warpspace.app.readouts.comparison import MARK, NOTHING, comparison_html, marked
 from warpspace.app.state.app_state import AppState
@@ -79,7 +79,7 @@ class ComparePanel:
             state = replace(state, comparison=replace(state.comparison, ghost=bool(ghost)))
         return state
 
-    def _side(self, state: AppState, title: str) -> Side | None:
+    def _side(self, state: AppState, title: str) -> Side[AppState] | None:
         """Find the side of a title that a browser has sent; None for nothing or nonsense."""
         if title == NOW:
             return Side()

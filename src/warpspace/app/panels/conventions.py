@@ -14,7 +14,7 @@ from warpspace.app.evaluation.conventions import (
     with_own_conventions,
     with_reference,
 )
-from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
 from warpspace.app.readouts.conventions import switchboard_html
 from warpspace.app.state.app_state import AppState, start_loop

@@ -7,7 +7,7 @@ import numpy as np
 from viser import uplot
 
 from warpspace.app.browser.handles import Input, dom_id
-from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState

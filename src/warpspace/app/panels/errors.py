@@ -11,7 +11,7 @@ from typing import Any
 from warpspace.app.browser.clicks import Clicks
 from warpspace.app.browser.handles import Input
 from warpspace.app.evaluation.cache import Identity
-from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
 from warpspace.app.readouts.exclusions import CURVE, STYLE, emphasis_buttons, with_switched
 from warpspace.app.state import edits

@@ -17,7 +17,7 @@ from warpspace.app.documents.export_request import build_request, exported_words
 from warpspace.app.documents.jobs import Jobs, Progress
 from warpspace.app.documents.scene_list import MOST_OPENED
 from warpspace.app.documents.services import CancelledError
-from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
 from warpspace.app.server.tab_context import TabContext
 from warpspace.app.server.tab_memory import CameraMemory

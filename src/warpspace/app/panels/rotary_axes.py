@@ -6,7 +6,7 @@ from typing import Any
 
 from warpspace.app.browser.handles import Input
 from warpspace.app.evaluation.cache import Identity
-from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.rotation import played_axis
 from warpspace.app.panels import PanelContext
 from warpspace.app.readouts.circles import circle_rows, circle_table

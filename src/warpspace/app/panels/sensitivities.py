@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpspace.app.browser.handles import Input
-from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.sensitivities import SHOWN_BARS, Bar, node_coordinates, rank_gains
 from warpspace.app.panels import PanelContext
-from warpspace.app.readouts.positions import spell_point, spell_positions
 from warpspace.app.state.app_state import AppState
 from warpspace.field.evaluate import build_basis
+from warpspace.picture.words import spell_place, spell_positions
 
 WORST, MIDDLE = "worst point", "middle of the volume"
 BY_GAIN, BY_EFFECT = "gain", "effect of the present errors"
@@ -130,7 +130,7 @@ def rank_picture(picture: LivePicture, *, middle: bool = False, by_effect: bool 
     if by_effect:
         bars = tuple(sorted(bars, key=lambda bar: -round(bar.moved_um, 9)))
     return Ranking(
-        bars, by_effect, spell_point(grid.nominal_mm[node]), spell_positions(at), float(norm[node])
+        bars, by_effect, spell_place(grid.nominal_mm[node]), spell_positions(at), float(norm[node])
     )
 
 

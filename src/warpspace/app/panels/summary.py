@@ -1,7 +1,7 @@
 """What is always in view: heading with the display factor, colour bar, statistics, scale bars."""
 
 from warpspace.app.browser.handles import Handle
-from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
 from warpspace.app.state.app_state import AppState
 from warpspace.app.viewport.drafts import TEXTS

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from warpspace.app.browser.handles import Input
 from warpspace.app.evaluation.cache import Cache, Identity
-from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
 from warpspace.app.readouts import probability as odds
 from warpspace.app.state import edits

@@ -7,7 +7,7 @@ from typing import Any
 from warpspace.app.browser.handles import Input, dom_id
 from warpspace.app.documents.scene_list import MOST_OPENED, SceneList
 from warpspace.app.evaluation.cache import Identity
-from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
 from warpspace.app.state.app_state import EXAGGERATION, NODES, TRUE_SCALE, AppState
 from warpspace.kinematics.model import Loop

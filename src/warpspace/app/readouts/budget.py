@@ -7,8 +7,8 @@ import numpy as np
 
 from warpspace.analysis.explain import Contribution
 from warpspace.app.evaluation.budget import Answer
-from warpspace.app.readouts.positions import plain, spell_point, spell_positions
 from warpspace.machine.parameters import parameter
+from warpspace.picture.words import spell_coordinate, spell_place, spell_positions
 from warpspace.units import Array
 
 ASK = (
@@ -96,7 +96,7 @@ def _point(answer: Answer) -> str:
     length = float(np.linalg.norm(found.error_um))
     return (
         f'<div data-value="why at" style="font-size:12px">'
-        f"{spell_point(found.nominal_mm + answer.shift_mm)}</div>"
+        f"{spell_place(found.nominal_mm + answer.shift_mm)}</div>"
         '<div style="font-size:12px;opacity:.75" data-value="why axes">'
         f"axes at {spell_positions(answer.at)}</div>"
         '<div style="font-size:12px;opacity:.75">'
@@ -133,7 +133,7 @@ def _lever_row(part: Contribution) -> str:
         how = f"{value} × {arm:.0f} mm across the axis"
     else:
         how = f"{value} along the direction drawn; a translation needs no lever"
-    place = ", ".join(plain(value) for value in part.origin_mm)
+    place = ", ".join(spell_coordinate(value) for value in part.origin_mm)
     return (
         '<tr style="background:rgba(194,24,91,.12)"><td colspan="6" data-value="lever"'
         f' style="padding:0 2px 5px;font-size:11.5px">{html.escape(row.name)}: {how}.<br>Frame of'

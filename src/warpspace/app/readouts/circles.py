@@ -4,9 +4,9 @@ import html
 from dataclasses import dataclass
 
 from warpspace.analysis.circles import CircleDeviation, circle_deviation
-from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.geometry.traces import Trace
-from warpspace.units import UM_PER_MM
+from warpspace.picture.traces import trace_lines
 
 MOST_ROWS = 40
 _SMALLEST_MM = 1e-3
@@ -40,15 +40,10 @@ def circle_rows(picture: LivePicture) -> list[CircleRow]:
         At most forty.
     """
     rows: list[CircleRow] = []
-    for lines in picture.traces:
-        per_um = picture.exaggeration / UM_PER_MM
-        error_um = (lines.actual_mm - lines.nominal_mm) / per_um
-        for trace, nominal, error in zip(
-            lines.group.traces, lines.nominal_mm, error_um, strict=True
-        ):
-            spread = float((nominal.max(axis=0) - nominal.min(axis=0)).max())
-            found = circle_deviation(nominal, error) if spread > _SMALLEST_MM else None
-            rows.append(CircleRow(trace, found))
+    for line in trace_lines(picture.traces):
+        spread = float((line.nominal_mm.max(axis=0) - line.nominal_mm.min(axis=0)).max())
+        found = circle_deviation(line.nominal_mm, line.error_um) if spread > _SMALLEST_MM else None
+        rows.append(CircleRow(line.trace, found))
     return rows[:MOST_ROWS]
 
 

@@ -3,11 +3,10 @@
 import html
 
 from warpspace.analysis.statistics import Statistics
-from warpspace.app.evaluation.compare import Compared
-from warpspace.app.evaluation.evaluate import LivePicture
-from warpspace.app.readouts.positions import spell_point
+from warpspace.app.evaluation.live_picture import Compared, LivePicture
 from warpspace.app.readouts.summary import gradient
 from warpspace.app.state.comparison import SHOWN
+from warpspace.picture.words import spell_place
 
 NOTHING = (
     '<div style="padding:4px 14px 10px;line-height:1.5;font-size:13px">Choose a scene for B, or pin'
@@ -74,7 +73,7 @@ def _cell(column: str, row: str, value: float | None) -> str:
 
 def _place(name: str, found: Statistics) -> str:
     """Say where the largest is."""
-    where = spell_point(found.max_at_mm)
+    where = spell_place(found.max_at_mm)
     return f'<div style="font-size:11.5px;opacity:.8">max of {name} at {where}</div>'
 
 

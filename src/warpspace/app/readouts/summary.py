@@ -6,23 +6,17 @@ from functools import cache, lru_cache
 
 import numpy as np
 
-from warpspace.app.evaluation.compare import both_words
-from warpspace.app.evaluation.evaluate import LivePicture
-from warpspace.app.readouts.positions import spell_point
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.viewport.layers import palette
 from warpspace.geometry.colour import ColourScale, colour_table
 from warpspace.geometry.deform import round_down
+from warpspace.picture.words import spell_factor, spell_place
 from warpspace.units import MICROMETRE, MM_PER_UM
 
 BAR_HEIGHT = 190
 _BAR_MM = 100.0
 _PX_PER_MM = 0.9
 _STOPS = 32
-
-
-def spell_factor(factor: float) -> str:
-    """Spell a display factor: ``×1000``, at most four digits, never 1e+06."""
-    return f"×{float(f'{factor:.4g}'):,.10g}".replace(",", "\u202f")
 
 
 def _number(value: float) -> str:
@@ -140,7 +134,7 @@ def worst_place(picture: LivePicture) -> str:
     """Spell where the largest error is."""
     return (
         '<div style="font-size:13px;margin-top:2px"><span style="opacity:.7">max at </span>'
-        f'<span data-value="max at">{spell_point(picture.statistics.max_at_mm)}</span></div>'
+        f'<span data-value="max at">{spell_place(picture.statistics.max_at_mm)}</span></div>'
     )
 
 
@@ -190,7 +184,7 @@ def summary(picture: LivePicture) -> str:
         f'<div style="flex:0 0 124px">{colour_bar(picture)}</div>'
         '<div style="flex:1"><div style="font-weight:600">|E| over the grid</div>'
         '<div style="font-size:12px;opacity:.7;margin-bottom:6px">'
-        f"{nodes} nodes, {both_words(picture, lambda state: state.loop.value)} loop</div>"
+        f"{nodes} nodes, {picture.both_words(lambda state: state.loop.value)} loop</div>"
         f"{numbers(picture)}</div></div>"
         f"{worst_place(picture)}"
         '<div style="display:flex;gap:18px;align-items:end;margin:2px 0 8px">'
@@ -201,7 +195,7 @@ def summary(picture: LivePicture) -> str:
 
 def heading(picture: LivePicture) -> str:
     """Spell machine, error set and display factor."""
-    state = picture.subject or picture.state
+    state = picture.drawn_state
     factor = picture.exaggeration
     how = "true scale" if factor == 1.0 else f"displacement drawn {spell_factor(factor)}"
     auto = " (auto)" if picture.state.exaggeration is None else ""

@@ -6,7 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
-from warpspace.app.evaluation.evaluate import LiveModel, LivePicture
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import Deferred, Panel, Selective
 from warpspace.app.panels.errors import ErrorsPanel
 from warpspace.app.panels.summary import HtmlPanel

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from functools import partial
 
 from warpspace.app.browser.handles import dom_id
-from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
 from warpspace.app.panels.appearance import Choose
 from warpspace.app.panels.commands import hint_script

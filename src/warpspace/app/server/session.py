@@ -18,7 +18,8 @@ from warpspace.app.browser.arrivals import Arrival
 from warpspace.app.browser.page import Page, is_passing
 from warpspace.app.documents.scene_list import SceneList
 from warpspace.app.documents.services import Services
-from warpspace.app.evaluation.evaluate import LiveModel, LivePicture
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext, Update
 from warpspace.app.panels.layout import Places, apply_theme
 from warpspace.app.server.followers import TURN, Followers, make_draft

@@ -7,7 +7,7 @@ from viser import ClientHandle
 
 from warpspace.app.documents.scene_list import SceneList
 from warpspace.app.documents.services import Services
-from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.server.tab_memory import CameraMemory
 
 

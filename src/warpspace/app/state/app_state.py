@@ -109,7 +109,7 @@ class AppState:
     rotary: RotaryLook = field(default_factory=RotaryLook)
     picked: Picked | None = None
     lever: str = ""
-    comparison: Comparison = field(default_factory=Comparison)
+    comparison: "Comparison[AppState]" = field(default_factory=Comparison[Any])
     notes: tuple[str, ...] = ()
 
     @property

@@ -1,25 +1,25 @@
 """Which two states are compared, and which of them is drawn."""
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from typing import Generic, TypeVar
 
-if TYPE_CHECKING:
-    from warpspace.app.state.app_state import AppState
+State = TypeVar("State")
+"""What a side holds: the state of the app, which in turn holds a comparison."""
 
 SHOWN = {"a": "A", "b": "B", "difference": "A − B"}
 NOW, NOBODY = "now", "nothing"
 """Names of what is steered, and of no other side."""
 
 
-@dataclass(frozen=True, slots=True)
-class Side:
+@dataclass(frozen=True)
+class Side(Generic[State]):
     """One side of a comparison.
 
     Attributes
     ----------
     title : str
         What it is called on the page.
-    state : AppState or None
+    state : State or None
         What it is; None for what is steered now.
     is_scene : bool
         Whether it is a scene as opened, which is looked at as now (rotary positions, loop), rather
@@ -27,12 +27,12 @@ class Side:
     """
 
     title: str = NOW
-    state: "AppState | None" = None
+    state: State | None = None
     is_scene: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Comparison:
+@dataclass(frozen=True)
+class Comparison(Generic[State]):
     """What is compared.
 
     Attributes
@@ -48,16 +48,16 @@ class Comparison:
         The snapshot that was taken last.
     """
 
-    a: Side = Side()
-    b: Side | None = None
+    a: Side[State] = field(default_factory=Side[State])
+    b: Side[State] | None = None
     shown: str = "a"
     ghost: bool = True
-    pinned: Side | None = None
+    pinned: Side[State] | None = None
 
-    def with_shown(self, shown: str) -> "Comparison":
+    def with_shown(self, shown: str) -> "Comparison[State]":
         """Choose what is drawn; an unknown word changes nothing."""
         return replace(self, shown=shown) if shown in SHOWN else self
 
-    def off(self) -> "Comparison":
+    def off(self) -> "Comparison[State]":
         """End it; the snapshot stays."""
         return Comparison(pinned=self.pinned, ghost=self.ghost)

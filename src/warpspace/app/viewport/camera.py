@@ -4,12 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from warpspace.picture.views import VIEWS, Direction
 from warpspace.units import Array
 
 FOV_DEG = 22.0
 """Vertical field of view: long enough that parallel edges look parallel."""
-OPERATOR = (0.55, -1.0, 0.52)
-"""Direction from the box to the camera: from the front (−Y), slightly from the right and above."""
 MARGIN = 1.06
 HEADING_HEIGHT = 130
 """Room kept free for the heading of the page, CSS pixels."""
@@ -33,7 +32,7 @@ def heading_share(height: float) -> float:
 def fit_camera(
     points: Array,
     aspect: float,
-    direction: tuple[float, float, float] = OPERATOR,
+    direction: Direction = VIEWS["iso"],
     fov_deg: float = FOV_DEG,
     margin: float = MARGIN,
     top: float = 0.0,

@@ -7,20 +7,19 @@ numbers of all nodes. All else waits until the slider rests.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 
-from warpspace.app.evaluation.evaluate import LivePicture
-from warpspace.app.evaluation.map_mesh import (
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.readouts import summary as legend
+from warpspace.app.state.app_state import AppState
+from warpspace.app.viewport.glb import build_glb
+from warpspace.app.viewport.tone_map import vertex_colours
+from warpspace.picture.mesh import (
     Pieces,
-    drafted,
     edge_pieces,
     grid_pieces,
     isoline_pieces,
     line_mesh,
     map_mesh,
 )
-from warpspace.app.readouts import summary as legend
-from warpspace.app.state.app_state import AppState
-from warpspace.app.viewport.glb import build_glb
-from warpspace.app.viewport.tone_map import vertex_colours
 
 TEXTS: Mapping[str, Callable[[LivePicture], str]] = {
     "summary": legend.summary,
@@ -84,7 +83,7 @@ def box_picture(picture: LivePicture) -> BoxPicture:
 def build_draft(picture: LivePicture) -> Draft:
     """Work out the draft of a picture."""
     texts = {name: spell(picture) for name, spell in TEXTS.items()}
-    return Draft(box_picture(drafted(picture)), texts)
+    return Draft(box_picture(picture), texts)
 
 
 def only_moved(old: AppState, new: AppState) -> bool:

@@ -9,23 +9,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpspace.app.viewport.camera import FOV_DEG, OPERATOR, CameraPose, fit_camera
+from warpspace.app.viewport.camera import FOV_DEG, CameraPose, fit_camera
+from warpspace.picture import views
+from warpspace.picture.views import Direction
 from warpspace.units import Array
-
-Direction = tuple[float, float, float]
 
 TELEPHOTO_DEG = 3.0
 NEAR, FAR = 0.01, 1000.0
 """Clipping planes of the usual camera, scene units."""
 STEEPEST = 1e-3
 """How far the view from above leans to the front: exactly above, an orbiting camera has no up."""
-VIEWS: Mapping[str, Direction] = {
-    "iso": OPERATOR,
-    "front": (0.0, -1.0, 0.0),
-    "right": (1.0, 0.0, 0.0),
-    "top": (0.0, -STEEPEST, 1.0),
-}
-"""From what is looked at towards the camera; the operator stands on the −Y side."""
+VIEWS: Mapping[str, Direction] = {**views.VIEWS, "top": (0.0, -STEEPEST, 1.0)}
+"""From what is looked at towards the camera."""
 
 
 @dataclass(frozen=True, slots=True)

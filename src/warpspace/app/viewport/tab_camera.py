@@ -4,7 +4,7 @@ import numpy as np
 from viser import ClientHandle
 
 from warpspace.app.evaluation.cache import Identity
-from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import machine_room_mm
 from warpspace.app.panels.layout import side_widths
 from warpspace.app.server.tab_memory import CameraMemory

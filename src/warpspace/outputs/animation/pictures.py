@@ -1,36 +1,36 @@
 """Single pictures of an animation, each drawn like a figure, all with one camera and one scale."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import evaluate_first_order
-from warpspace.geometry.colour import build_scale, component_values
-from warpspace.geometry.deform import auto_exaggeration, deform
+from warpspace.geometry.deform import deform
 from warpspace.geometry.traces import build_traces
-from warpspace.outputs.drawing.content import Drawing, MapContent
+from warpspace.outputs.drawing.content import Drawing
 from warpspace.outputs.drawing.map3d import draw_map, fit_map
 from warpspace.outputs.drawing.panel import draw_panel
 from warpspace.outputs.drawing.projection import fit_projection
-from warpspace.outputs.drawing.render import render_bodies
 from warpspace.outputs.drawing.settings import (
     FigureSettings,
-    choose_exaggeration,
-    given_exaggeration,
+    evaluate_for,
 )
 from warpspace.outputs.drawing.sheet import map_legend, metadata, scene_facts, start_sheet
 from warpspace.outputs.drawing.style import SIZES
 from warpspace.outputs.figures.error_map import (
     isoline_words,
-    quantity_words,
     statistics_rows,
     value_marks,
 )
-from warpspace.outputs.figures.machine import PlacedBody, draw_body_edges, place_bodies
-from warpspace.picture.words import spell, spell_short
+from warpspace.outputs.figures.machine import bodies_of, draw_body_edges, render_placed
+from warpspace.picture.bodies import PlacedBody
+from warpspace.picture.exaggeration import choose_exaggeration
+from warpspace.picture.model import choose_scale
+from warpspace.picture.scene_picture import evaluate_picture
+from warpspace.picture.words import quantity_words, spell, spell_short
 from warpspace.scene.model import Scene
-from warpspace.scene.pipeline import evaluate_picture
 from warpspace.units import Array
 
 MOTIONS = ("exaggeration", "rotation")
@@ -119,27 +119,23 @@ def sweep_factor(top: float, phase: float) -> float:
 
 def _exaggeration_frame(scene: Scene, figure: FigureSettings, phase: float) -> Drawing:
     """Draw the error map at one display factor."""
-    picture = evaluate_picture(scene, grid=figure.grid, loop=figure.loop)
-    top = choose_exaggeration(figure, picture)
-    factor = sweep_factor(top, phase)
-    nominal, error = picture.grid.nominal_mm, picture.field.error_um
-    values = component_values(error, figure.component)
-    scale = build_scale(float(np.abs(values).max()), figure.component)
+    largest = evaluate_for(figure, scene)
+    factor = sweep_factor(largest.exaggeration, phase)
+    picture = replace(largest, exaggeration=factor)
+    scale = picture.scale
     title = f"Volumetric error: {scene.title}"
     facts = scene_facts(picture, factor)
     legend = map_legend(isoline_words(scale))
     sheet = start_sheet(figure, title, facts, [scene], legend, exact=True)
-    content = MapContent(nominal, error, values, scale, factor)
-    largest = replace(content, exaggeration=top)
-    camera = fit_map(sheet.canvas, [content, largest], sheet.content, figure.view)
-    drawn = draw_map(sheet.canvas, content, sheet.content, figure.view, projection=camera)
+    camera = fit_map(sheet.canvas, [picture, largest], sheet.content, figure.view)
+    drawn = draw_map(sheet.canvas, picture, sheet.content, figure.view, projection=camera)
     draw_panel(
         sheet.canvas,
         sheet.panel,
         scale,
         quantity_words(figure.component),
-        value_marks(picture, values, figure.component),
-        statistics_rows(picture, values, figure.component),
+        value_marks(picture),
+        statistics_rows(picture),
         (camera.px_per_mm, factor),
     )
     about = metadata(title, [scene], figure, factor, "exaggeration")
@@ -212,22 +208,22 @@ def _rotation_frame(scene: Scene, figure: FigureSettings, phase: float) -> Drawi
     at = round(phase * (len(path.turn_deg) - 1))
     angle = float(path.turn_deg[at])
     turned = replace(scene, workspace=scene.workspace.moved({path.axis: angle}))
-    picture = evaluate_picture(turned, grid=3, loop="workpiece")
     factor = _trace_factor(scene, figure, path)
+    picture = evaluate_picture(turned, grid=3, loop="workpiece", exaggeration=factor)
     size = np.linalg.norm(path.error_um, axis=-1)
-    scale = build_scale(float(size.max()), "norm")
+    scale = choose_scale([size], "norm")
     title = f"Rotary traces: {scene.title}"
     facts = scene_facts(picture, factor)
     sheet = start_sheet(figure, title, facts, [scene], [], exact=True)
     canvas = sheet.canvas
     actual = deform(path.nominal_mm, path.error_um, factor)
-    carried = "".join(axis.name for axis in scene.machine.branch("workpiece")) + "w"
-    placed = place_bodies(picture, factor, figure.theme, only=carried)
+    carried = [axis.name for axis in scene.machine.branch("workpiece")]
+    placed = bodies_of(picture, factor, only=[*carried, "w"])
     reach = [path.nominal_mm.reshape(-1, 3), actual.reshape(-1, 3)]
-    reach += _swept(place_bodies(picture, 0.0, figure.theme, only=carried))
+    reach += _swept(placed)
     camera = fit_projection(figure.view, np.concatenate(reach), _room(sheet.content))
-    if placed:
-        raster = render_bodies([part.body for part in placed], camera)
+    raster = render_placed(placed, figure.theme, camera)
+    if raster is not None:
         canvas.image(raster.reduced(), raster.rect)
         draw_body_edges(canvas, placed, camera, raster)
     for nominal, drawn, length in zip(path.nominal_mm, actual, size, strict=True):
@@ -252,11 +248,9 @@ def _rotation_frame(scene: Scene, figure: FigureSettings, phase: float) -> Drawi
 
 def _trace_factor(scene: Scene, figure: FigureSettings, path: Round) -> float:
     """Choose the display factor of traces: what is asked for, or a round one that suits them."""
-    given = given_exaggeration(figure, scene)
-    if given is not None:
-        return given
     reach = float(np.ptp(path.nominal_mm.reshape(-1, 3), axis=0).max())
-    return auto_exaggeration(float(np.linalg.norm(path.error_um, axis=-1).max()), reach)
+    largest = float(np.linalg.norm(path.error_um, axis=-1).max())
+    return choose_exaggeration(figure.exaggeration, scene.exaggeration, largest, reach)
 
 
 def _points(scene: Scene) -> list[str]:
@@ -267,11 +261,11 @@ def _points(scene: Scene) -> list[str]:
     ]
 
 
-def _swept(placed: list[PlacedBody]) -> list[Array]:
+def _swept(placed: Sequence[PlacedBody]) -> list[Array]:
     """Room that bodies need while they turn: the box around each, turned to both diagonals."""
     found: list[Array] = []
     for part in placed:
-        points = part.body.vertices_mm
+        points = part.nominal_mm
         middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
         reach = float(np.linalg.norm((points - middle)[:, :2], axis=1).max())
         height = (points[:, 2].min(), points[:, 2].max())

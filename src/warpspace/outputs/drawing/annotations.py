@@ -6,11 +6,11 @@ import numpy as np
 
 from warpspace.geometry.surfaces import corners
 from warpspace.outputs.drawing.canvas import Canvas
-from warpspace.outputs.drawing.content import MapContent
 from warpspace.outputs.drawing.labels import LEADER_FROM, Occupancy, place_label
 from warpspace.outputs.drawing.projection import Projection, Rect
 from warpspace.outputs.drawing.render import Raster
 from warpspace.outputs.drawing.style import SIZES
+from warpspace.picture.model import Picture
 from warpspace.picture.words import spell, spell_short
 from warpspace.units import MICROMETRE, Array
 
@@ -77,7 +77,7 @@ def _beside(line: Array, share: float, size: tuple[float, float]) -> tuple[float
 
 def draw_corners(
     canvas: Canvas,
-    content: MapContent,
+    picture: Picture,
     projection: Projection,
     raster: Raster | None,
     taken: Occupancy,
@@ -88,7 +88,7 @@ def draw_corners(
     Parameters
     ----------
     canvas : Canvas
-    content : MapContent
+    picture : Picture
     projection : Projection
     raster : Raster or None
     taken : Occupancy
@@ -96,10 +96,10 @@ def draw_corners(
     frame : tuple of float, (4,), px
         Box that labels stay in; None draws no labels.
     """
-    nominal, drawn = content.nominal_mm.reshape(-1, 3), content.drawn_mm.reshape(-1, 3)
-    length = np.linalg.norm(content.error_um.reshape(-1, 3), axis=-1)
+    nominal, drawn = picture.grid.nominal_mm.reshape(-1, 3), picture.drawn_mm.reshape(-1, 3)
+    length = np.linalg.norm(picture.field.error_um.reshape(-1, 3), axis=-1)
     worst = int(np.argmax(length))
-    found = corners(content.shape).tolist()
+    found = corners(picture.shape).tolist()
     depth = projection.depth_mm(nominal[found])
     front = float(depth.min()) + 0.02 * float(np.ptp(depth)) + 1.0
     wanted: list[tuple[str, Array, Array]] = []

@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 
-from warpspace.geometry.colour import nice_step
 from warpspace.outputs.drawing.canvas import Canvas
 from warpspace.outputs.drawing.labels import LINE_COST, Occupancy
 from warpspace.outputs.drawing.projection import Projection
 from warpspace.outputs.drawing.style import SIZES
+from warpspace.picture.ticks import tick_values
 from warpspace.picture.words import spell_short
 from warpspace.units import Array
 
@@ -139,16 +139,6 @@ def _draw_axis(
             va="center_baseline",
             rotation=angle,
         )
-
-
-def tick_values(low: float, high: float, most: float) -> list[float]:
-    """Choose round values within a range, not more than fit."""
-    span = high - low
-    step = nice_step(span)
-    while span / step > max(most, 2.0):
-        step = nice_step(10.0 * step * 1.01)
-    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
-    return [round(step * number, 10) for number in range(first, last + 1)]
 
 
 def _half_extent(size: tuple[float, float], normal: Array) -> float:

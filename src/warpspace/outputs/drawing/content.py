@@ -1,4 +1,4 @@
-"""What a map shows, and what a finished figure holds."""
+"""What a finished figure holds."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,44 +6,9 @@ from dataclasses import dataclass
 from matplotlib.figure import Figure
 
 from warpspace.geometry.colour import ColourScale
-from warpspace.geometry.deform import deform
-from warpspace.geometry.surfaces import Shape
 from warpspace.outputs.drawing.projection import Projection, Rect
 from warpspace.outputs.drawing.render import Raster
 from warpspace.units import Array
-
-
-@dataclass(frozen=True, slots=True)
-class MapContent:
-    """What a map shows.
-
-    Attributes
-    ----------
-    nominal_mm : ndarray, [nx, ny, nz, 3], mm
-    error_um : ndarray, [nx, ny, nz, 3], µm
-        Displaces the nodes.
-    values : ndarray, [nx, ny, nz]
-        Becomes colour.
-    scale : ColourScale
-    exaggeration : float
-    """
-
-    nominal_mm: Array
-    error_um: Array
-    values: Array
-    scale: ColourScale
-    exaggeration: float
-
-    @property
-    def shape(self) -> Shape:
-        """Nodes along the axes."""
-        nx, ny, nz = self.values.shape
-        return nx, ny, nz
-
-    @property
-    def drawn_mm(self) -> Array:
-        """Where the nodes are drawn, [nx, ny, nz, 3], mm."""
-        return deform(self.nominal_mm, self.error_um, self.exaggeration)
 
 
 @dataclass(frozen=True, slots=True)

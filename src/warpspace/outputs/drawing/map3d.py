@@ -4,11 +4,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from warpspace.geometry.faces import crease_lines, cut_faces, face_lines, outer_faces
+from warpspace.geometry.faces import crease_lines, face_lines
 from warpspace.geometry.isolines import isoline_levels, isolines
 from warpspace.geometry.surfaces import (
     Index,
-    Shape,
     box_edges,
     line_spacing,
     triangulate,
@@ -16,31 +15,26 @@ from warpspace.geometry.surfaces import (
 from warpspace.outputs.drawing.annotations import draw_corners, label_isolines
 from warpspace.outputs.drawing.axes3d import draw_axes
 from warpspace.outputs.drawing.canvas import Canvas
-from warpspace.outputs.drawing.content import DrawnMap, MapContent
+from warpspace.outputs.drawing.content import DrawnMap
 from warpspace.outputs.drawing.labels import LINE_COST, Occupancy
 from warpspace.outputs.drawing.lines import split_visible
 from warpspace.outputs.drawing.projection import Projection, Rect, fit_projection
 from warpspace.outputs.drawing.render import Body, Raster, render_bodies
 from warpspace.outputs.drawing.style import SIZES
+from warpspace.picture.model import Picture
+from warpspace.picture.topology import map_faces
 from warpspace.units import Array
 
-CUT_CORNER = (1, 0, 1)
-"""The octant towards the viewer of the iso view."""
 INSETS = (112.0, 92.0, 84.0, 46.0)
 """Room for axes and labels around the body: left, bottom, right, top."""
 SMALL_INSETS = (70.0, 74.0, 40.0, 40.0)
 GHOST_DASHES = (11.0, 7.0)
-Annotate = Callable[[Canvas, MapContent, Projection, Raster | None, Occupancy, Rect | None], None]
-
-
-def map_faces(shape: Shape, view: str) -> list[Index]:
-    """Patches of the surface that a view shows: without the nearest octant in the iso view."""
-    return cut_faces(shape, CUT_CORNER) if view == "iso" else outer_faces(shape)
+Annotate = Callable[[Canvas, Picture, Projection, Raster | None, Occupancy, Rect | None], None]
 
 
 def draw_map(
     canvas: Canvas,
-    content: MapContent,
+    picture: Picture,
     rect: Rect,
     view: str,
     *,
@@ -54,7 +48,7 @@ def draw_map(
     Parameters
     ----------
     canvas : Canvas
-    content : MapContent
+    picture : Picture
     rect : tuple of float, (4,), px
         Box of the figure to stay in.
     view : str
@@ -71,37 +65,37 @@ def draw_map(
     -------
     DrawnMap
     """
-    nodes = content.drawn_mm.reshape(-1, 3)
-    values = content.values.reshape(-1)
-    projection = projection or fit_map(canvas, [content], rect, view, labels=labels)
-    faces = map_faces(content.shape, view)
+    nodes = picture.drawn_mm.reshape(-1, 3)
+    values = picture.values.reshape(-1)
+    projection = projection or fit_map(canvas, [picture], rect, view, labels=labels)
+    faces = map_faces(picture.shape, cut=view == "iso")
     surface = triangulate(faces)
     raster: Raster | None = None
     if len(surface.triangles):
-        body = Body(nodes[surface.nodes], surface.triangles, values[surface.nodes], content.scale)
+        body = Body(nodes[surface.nodes], surface.triangles, values[surface.nodes], picture.scale)
         raster = render_bodies([body], projection)
         canvas.image(raster.reduced() if canvas.exact else raster.rgba, raster.rect, zorder=1.0)
     start = len(canvas.rects)
     taken = Occupancy(canvas.width, canvas.height, 2.0 * canvas.factor)
     if raster is not None:
         taken.add_mask(raster.rgba[..., 3] > 0, raster.rect)
-    _draw_surface_lines(canvas, content, faces, projection, raster, taken)
-    _draw_lone_line(canvas, content, faces, projection)
+    _draw_surface_lines(canvas, picture, faces, projection, raster, taken)
+    _draw_lone_line(canvas, picture, faces, projection)
     if ghost:
-        _draw_ghost(canvas, content, projection, raster, taken)
-    draw_axes(canvas, content.nominal_mm, nodes, projection, taken, titles=labels)
+        _draw_ghost(canvas, picture, projection, raster, taken)
+    draw_axes(canvas, picture.grid.nominal_mm, nodes, projection, taken, titles=labels)
     taken.add_rects(canvas.rects[start:])
     if annotate is not None:
-        annotate(canvas, content, projection, raster, taken, rect if labels else None)
+        annotate(canvas, picture, projection, raster, taken, rect if labels else None)
     return DrawnMap(
-        projection, content.scale, content.values, content.drawn_mm, content.exaggeration,
+        projection, picture.scale, picture.values, picture.drawn_mm, picture.exaggeration,
         raster, tuple(canvas.rects[start:]),
     )  # fmt: skip
 
 
 def fit_map(
     canvas: Canvas,
-    contents: Sequence[MapContent],
+    pictures: Sequence[Picture],
     rect: Rect,
     view: str,
     *,
@@ -113,7 +107,7 @@ def fit_map(
     Parameters
     ----------
     canvas : Canvas
-    contents : sequence of MapContent
+    pictures : sequence of Picture
     rect : tuple of float, (4,), px
     view : str
     labels : bool, optional
@@ -131,14 +125,16 @@ def fit_map(
         min(inset, 0.24 * side) for inset, side in zip(insets, (width, height) * 2, strict=True)
     ]
     inner = (rect[0] + insets[0], rect[1] + insets[1], rect[2] - insets[2], rect[3] - insets[3])
-    points = [part.reshape(-1, 3) for c in contents for part in (c.nominal_mm, c.drawn_mm)]
+    points = [
+        part.reshape(-1, 3) for one in pictures for part in (one.grid.nominal_mm, one.drawn_mm)
+    ]
     points += [] if beside_mm is None else [beside_mm]
     return fit_projection(view, np.concatenate(points), inner)
 
 
 def _draw_surface_lines(
     canvas: Canvas,
-    content: MapContent,
+    picture: Picture,
     faces: list[Index],
     projection: Projection,
     raster: Raster | None,
@@ -147,16 +143,16 @@ def _draw_surface_lines(
     """Draw grid lines, creases and isolines where the surface does not hide them."""
     if not faces:
         return
-    theme, shape = canvas.theme, content.shape
-    nodes, values = content.drawn_mm.reshape(-1, 3), content.values.reshape(-1)
+    theme, shape = canvas.theme, picture.shape
+    nodes, values = picture.drawn_mm.reshape(-1, 3), picture.values.reshape(-1)
     nx, ny, nz = (line_spacing(count) for count in shape)
     grid = _visible(face_lines(faces, shape, (nx, ny, nz)), nodes, projection, raster)
     canvas.lines(grid, width=SIZES.hair, colour=theme.grid, alpha=0.42, zorder=2.0)
     creases = _visible(crease_lines(faces, shape), nodes, projection, raster)
     canvas.lines(creases, width=SIZES.line, colour=theme.grid, zorder=3.0)
     taken.add_lines(creases, LINE_COST)
-    diverging = content.scale.diverging
-    levels = isoline_levels(content.scale)
+    diverging = picture.scale.diverging
+    levels = isoline_levels(picture.scale)
     by_level: dict[float, list[Array]] = {}
     for face in faces:
         for level, line in isolines(face, nodes, values, levels):
@@ -178,19 +174,19 @@ def _visible(
 
 
 def _draw_lone_line(
-    canvas: Canvas, content: MapContent, faces: list[Index], projection: Projection
+    canvas: Canvas, picture: Picture, faces: list[Index], projection: Projection
 ) -> None:
     """Draw a volume without area (one axis, or none that is linear) as a coloured line or point."""
     if faces:
         return
-    spots = projection.project(content.drawn_mm.reshape(-1, 3))
-    values = content.values.reshape(-1)
-    colours = content.scale.colours(values) / 255.0
+    spots = projection.project(picture.drawn_mm.reshape(-1, 3))
+    values = picture.values.reshape(-1)
+    colours = picture.scale.colours(values) / 255.0
     if len(spots) == 1:
         canvas.disc(spots[0], 7.0, colours[0])
         return
     pieces = [spots[i : i + 2] for i in range(len(spots) - 1)]
-    middle = content.scale.colours((values[1:] + values[:-1]) / 2.0) / 255.0
+    middle = picture.scale.colours((values[1:] + values[:-1]) / 2.0) / 255.0
     canvas.lines(pieces, width=7.0, colour=middle, zorder=2.0)
     for spot, colour in zip(spots, colours, strict=True):
         canvas.disc(spot, 4.5, colour)
@@ -198,16 +194,16 @@ def _draw_lone_line(
 
 def _draw_ghost(
     canvas: Canvas,
-    content: MapContent,
+    picture: Picture,
     projection: Projection,
     raster: Raster | None,
     taken: Occupancy,
 ) -> None:
     """Draw the nominal volume dashed, faint where the body hides it."""
-    nodes = content.nominal_mm.reshape(-1, 3)
+    nodes = picture.grid.nominal_mm.reshape(-1, 3)
     seen: list[Array] = []
     hidden: list[Array] = []
-    for edge in box_edges(content.shape):
+    for edge in box_edges(picture.shape):
         visible, behind = split_visible(nodes[edge], projection, raster)
         seen += visible
         hidden += behind

@@ -4,18 +4,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from warpspace.picture.views import UPWARDS, VIEWS
 from warpspace.units import Array
 
 Rect = tuple[float, float, float, float]
 """Left, bottom, right, top, px."""
-
-VIEWS: dict[str, tuple[tuple[float, float, float], tuple[float, float, float]]] = {
-    "iso": ((0.53, -0.85, 0.55), (0.0, 0.0, 1.0)),
-    "front": ((0.0, -1.0, 0.0), (0.0, 0.0, 1.0)),
-    "right": ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
-    "top": ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0)),
-}
-"""Direction towards the viewer, and upwards, in R. The operator stands on the −Y side."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +59,8 @@ class Projection:
 
 def view_axes(view: str) -> tuple[Array, Array, Array]:
     """Give the unit vectors right, up and towards of a named view."""
-    towards, upwards = (np.array(vector) for vector in VIEWS[view])
+    towards = np.array(VIEWS[view])
+    upwards = np.array(UPWARDS.get(view, (0.0, 0.0, 1.0)))
     towards /= np.linalg.norm(towards)
     right = np.cross(upwards, towards)
     right /= np.linalg.norm(right)

@@ -1,19 +1,18 @@
 """What a figure is asked for."""
 
 import math
-from dataclasses import dataclass
-from typing import Any, Literal
-
-import numpy as np
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 from warpspace.exceptions import OptionError
-from warpspace.geometry.colour import COMPONENTS, ColourScale, build_scale
-from warpspace.geometry.deform import MAX_EXAGGERATION, auto_exaggeration
-from warpspace.outputs.drawing.projection import VIEWS
+from warpspace.geometry.colour import COMPONENTS, ColourScale
 from warpspace.outputs.drawing.style import DARK, LIGHT, Theme
+from warpspace.picture.exaggeration import Exaggeration, given_exaggeration
+from warpspace.picture.model import Picture, choose_scale
+from warpspace.picture.scene_picture import ScenePicture, evaluate_picture
+from warpspace.picture.views import VIEWS
 from warpspace.scene.model import Scene
-from warpspace.scene.pipeline import ScenePicture
-from warpspace.units import MICROMETRE, Array
 
 SMALLEST_SIZE = (400, 300)
 LARGEST_SIDE = 12_000
@@ -55,7 +54,7 @@ class FigureSettings:
     """
 
     component: str = "norm"
-    exaggeration: float | Literal["auto"] | None = None
+    exaggeration: Exaggeration = None
     view: str = "iso"
     size: tuple[int, int] = (1600, 1200)
     dark: bool = False
@@ -71,12 +70,7 @@ class FigureSettings:
             raise OptionError(f"component {self.component!r}; expected one of {expected}")
         if self.view not in VIEWS:
             raise OptionError(f"view {self.view!r}; expected one of {', '.join(VIEWS)}")
-        given = self.exaggeration
-        if given is not None and given != "auto" and not 0.0 < given <= MAX_EXAGGERATION:
-            raise OptionError(
-                f"exaggeration {given:g}; expected a number above 0, at most"
-                f" {MAX_EXAGGERATION:g}, or auto"
-            )
+        given_exaggeration(self.exaggeration, None)
         if self.difference not in (B_MINUS_A, A_MINUS_B):
             raise OptionError(f"difference {self.difference!r}; expected B − A or A − B")
         if self.range_top is not None and not 0.0 < self.range_top < math.inf:
@@ -107,53 +101,40 @@ def check_size(size: tuple[int, int]) -> None:
         )
 
 
-def given_exaggeration(settings: FigureSettings, scene: Scene) -> float | None:
-    """Give the display factor asked for, else the scene's; None where one is to be chosen."""
-    if settings.exaggeration == "auto":
-        return None
-    return scene.exaggeration if settings.exaggeration is None else settings.exaggeration
-
-
-def choose_exaggeration(settings: FigureSettings, *pictures: ScenePicture) -> float:
-    """Choose the display factor that pictures share.
+def evaluate_for(
+    settings: FigureSettings, scene: Scene, quantity: str = "position"
+) -> ScenePicture:
+    """Evaluate the picture that a figure of a scene draws.
 
     Parameters
     ----------
     settings : FigureSettings
-    *pictures : ScenePicture
+    scene : Scene
+    quantity : str, optional
+        What is coloured: the "position" or the "orientation" error.
 
     Returns
     -------
-    float
-        The one asked for, else the first scene's, else a round one for the largest displacement.
+    ScenePicture
     """
-    given = given_exaggeration(settings, pictures[0].scene)
-    if given is not None:
-        return given
-    largest = max(picture.statistics.max_um for picture in pictures)
-    return auto_exaggeration(largest, max(picture.grid.longest_edge_mm for picture in pictures))
+    picture = evaluate_picture(
+        scene,
+        grid=settings.grid,
+        loop=settings.loop,
+        exaggeration=settings.exaggeration,
+        component=settings.component,
+        quantity=quantity,
+    )
+    return replace(picture, colours=shared_colours(settings, [picture]))
 
 
-def choose_scale(
-    settings: FigureSettings, *values: Array, quantity: str = "E", unit: str = MICROMETRE
-) -> ColourScale:
-    """Choose the colours of maps that share one bar.
-
-    Parameters
-    ----------
-    settings : FigureSettings
-    *values : ndarray, µm or µrad
-        What each map colours.
-    quantity, unit : str, optional
-        Symbol and unit of what is coloured.
-
-    Returns
-    -------
-    ColourScale
-    """
-    largest = max(float(np.abs(part).max()) for part in values)
-    return build_scale(
-        largest, settings.component, quantity=quantity, unit=unit, end=settings.range_top
+def shared_colours(settings: FigureSettings, pictures: Sequence[Picture]) -> ColourScale:
+    """Choose the colours of pictures that share one bar."""
+    return choose_scale(
+        [picture.values for picture in pictures],
+        settings.component,
+        pictures[0].quantity,
+        settings.range_top,
     )
 
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpspace import __version__
-from warpspace.kinematics.model import ComponentErrors, Loop
 from warpspace.machine.parameters import parameter
 from warpspace.outputs.drawing.canvas import Canvas
 from warpspace.outputs.drawing.legend import (
@@ -19,19 +18,16 @@ from warpspace.outputs.drawing.legend import (
 from warpspace.outputs.drawing.projection import Rect
 from warpspace.outputs.drawing.settings import FigureSettings, spell_settings
 from warpspace.outputs.drawing.style import SIZES
-from warpspace.picture.words import TIMES, spell_factor, spell_short
+from warpspace.picture.scene_picture import ScenePicture
+from warpspace.picture.words import (
+    CONVENTION_WORDS,
+    LOOP_WORDS,
+    TIMES,
+    reference_words,
+    spell_factor,
+    spell_short,
+)
 from warpspace.scene.model import Scene
-from warpspace.scene.pipeline import ScenePicture
-
-LOOP_WORDS = {
-    Loop.TOOL: "tool loop",
-    Loop.WORKPIECE: "workpiece loop",
-    Loop.RELATIVE: "tool relative to workpiece",
-}
-CONVENTION_WORDS = {
-    ComponentErrors.AFTER_MOTION: "component errors after the motion",
-    ComponentErrors.BEFORE_MOTION: "component errors before the motion",
-}
 
 
 def new_canvas(settings: FigureSettings, *, exact: bool) -> Canvas:
@@ -107,14 +103,6 @@ def scene_facts(picture: ScenePicture, exaggeration: float | None) -> list[str]:
     if exaggeration is not None:
         facts += [f"displacement drawn {spell_factor(exaggeration)}", "orthographic"]
     return facts
-
-
-def reference_words(scene: Scene) -> str:
-    """Say what errors are referred to."""
-    if scene.reference is None:
-        return "absolute errors"
-    at = " ".join(f"{axis} {spell_short(value)}" for axis, value in scene.reference.items())
-    return f"held still at {at}"
 
 
 def parameter_words(scene: Scene) -> list[str]:

@@ -12,10 +12,11 @@ from warpspace.geometry.surfaces import (
     outer_surface,
     segments,
 )
-from warpspace.outputs.exports.bodies import drawn_bodies
-from warpspace.outputs.exports.drawing import Drawing, DrawnTrace
 from warpspace.outputs.exports.gltf import GltfBuilder, srgb_to_linear, to_gltf
 from warpspace.outputs.files import write_atomically
+from warpspace.picture.bodies import place_bodies, scene_motions
+from warpspace.picture.scene_picture import ScenePicture
+from warpspace.picture.traces import TraceLine, trace_lines
 from warpspace.units import MM_PER_UM, Array
 
 INK, GHOST, NOMINAL = (30, 36, 48), (140, 147, 160), (150, 158, 172)
@@ -27,12 +28,12 @@ _ATTRIBUTES = {
 }
 
 
-def write_glb(drawing: Drawing, path: str | Path, *, overwrite: bool = True) -> None:
+def write_glb(picture: ScenePicture, path: str | Path, *, overwrite: bool = True) -> None:
     """Write the deformed scene as binary glTF.
 
     Parameters
     ----------
-    drawing : Drawing
+    picture : ScenePicture
     path : str or Path
     overwrite : bool, optional
         Whether an existing file may be replaced.
@@ -42,17 +43,17 @@ def write_glb(drawing: Drawing, path: str | Path, *, overwrite: bool = True) -> 
     OutputError
         If the file cannot be written.
     """
-    data = build_glb(drawing)
+    data = build_glb(picture)
     with write_atomically(path, overwrite=overwrite) as temporary:
         temporary.write_bytes(data)
 
 
-def build_glb(drawing: Drawing) -> bytes:
+def build_glb(picture: ScenePicture) -> bytes:
     """Build the deformed scene as binary glTF.
 
     Parameters
     ----------
-    drawing : Drawing
+    picture : ScenePicture
 
     Returns
     -------
@@ -65,21 +66,21 @@ def build_glb(drawing: Drawing) -> bytes:
     """
     builder = GltfBuilder()
     nodes = [
-        *_surface(builder, drawing),
-        *_lines(builder, drawing),
-        *_traces(builder, drawing.traces, drawing.exaggeration),
-        *_bodies(builder, drawing),
+        *_surface(builder, picture),
+        *_lines(builder, picture),
+        *_traces(builder, trace_lines(picture.traces), picture.exaggeration),
+        *_bodies(builder, picture),
     ]
     root = builder.add_node(
-        f"warpspace {drawing.scene.name} ×{drawing.exaggeration:g}", children=nodes
+        f"warpspace {picture.scene.name} ×{picture.exaggeration:g}", children=nodes
     )
-    extras = {**drawing.provenance, "attributes": _ATTRIBUTES, "colours": _colours(drawing)}
-    return builder.to_bytes(root, drawing.provenance["program"], extras)
+    extras = {**picture.provenance, "attributes": _ATTRIBUTES, "colours": _colours(picture)}
+    return builder.to_bytes(root, picture.provenance["program"], extras)
 
 
-def _colours(drawing: Drawing) -> dict[str, object]:
+def _colours(picture: ScenePicture) -> dict[str, object]:
     """Say what the colours mean."""
-    scale = drawing.scale
+    scale = picture.scale
     return {
         "map": scale.name,
         "low": scale.low,
@@ -98,18 +99,18 @@ def _placed(
     return {"POSITION": position}, {"nominal": back}
 
 
-def _surface(builder: GltfBuilder, drawing: Drawing) -> list[int]:
+def _surface(builder: GltfBuilder, picture: ScenePicture) -> list[int]:
     """Add the outside of the deformed grid, with its errors as attributes."""
-    grid, field = drawing.picture.grid, drawing.picture.field
+    grid, field = picture.grid, picture.field
     surface = outer_surface(grid.shape)
     if not len(surface.triangles):
         return []
     at = surface.nodes
     error = field.error_um.reshape(-1, 3)[at]
-    position, back = _placed(grid.nominal_mm.reshape(-1, 3)[at], error, drawing.exaggeration)
+    position, back = _placed(grid.nominal_mm.reshape(-1, 3)[at], error, picture.exaggeration)
     attributes = {
         **position,
-        "COLOR_0": srgb_to_linear(drawing.scale.colours(drawing.values.reshape(-1)[at])),
+        "COLOR_0": srgb_to_linear(picture.scale.colours(picture.values.reshape(-1)[at])),
         "_ERROR_UM": error,
         "_ORIENTATION_URAD": field.orientation_urad.reshape(-1, 3)[at],
     }
@@ -120,11 +121,11 @@ def _surface(builder: GltfBuilder, drawing: Drawing) -> list[int]:
     return [builder.add_node("deformed_surface", mesh=mesh)]
 
 
-def _lines(builder: GltfBuilder, drawing: Drawing) -> list[int]:
+def _lines(builder: GltfBuilder, picture: ScenePicture) -> list[int]:
     """Add grid lines and edges of the deformed box, and the ghost of the nominal one."""
-    grid = drawing.picture.grid
+    grid = picture.grid
     nominal = grid.nominal_mm.reshape(-1, 3)
-    error = drawing.picture.field.error_um.reshape(-1, 3)
+    error = picture.field.error_um.reshape(-1, 3)
     x, y, z = (line_spacing(count) for count in grid.shape)
     edges = segments(box_edges(grid.shape))
     ink, ghost = builder.add_material("line", INK), builder.add_material("ghost", GHOST)
@@ -138,7 +139,7 @@ def _lines(builder: GltfBuilder, drawing: Drawing) -> list[int]:
             continue
         used, numbered = np.unique(pairs, return_inverse=True)
         shift = np.zeros((len(used), 3)) if displaced is None else displaced[used]
-        position, back = _placed(nominal[used], shift, drawing.exaggeration)
+        position, back = _placed(nominal[used], shift, picture.exaggeration)
         mesh = builder.add_mesh(
             name,
             position,
@@ -150,7 +151,7 @@ def _lines(builder: GltfBuilder, drawing: Drawing) -> list[int]:
     return found
 
 
-def _traces(builder: GltfBuilder, traces: tuple[DrawnTrace, ...], exaggeration: float) -> list[int]:
+def _traces(builder: GltfBuilder, traces: tuple[TraceLine, ...], exaggeration: float) -> list[int]:
     """Add the nominal and the actual traces of the rotary axes."""
     if not traces:
         return []
@@ -175,11 +176,12 @@ def _traces(builder: GltfBuilder, traces: tuple[DrawnTrace, ...], exaggeration: 
     return [builder.add_node("traces", children=children)]
 
 
-def _bodies(builder: GltfBuilder, drawing: Drawing) -> list[int]:
+def _bodies(builder: GltfBuilder, picture: ScenePicture) -> list[int]:
     """Add the bodies of the machine where there are any, bent by the same factor."""
     children: list[int] = []
-    view = drawing.picture.view
-    for body, drawn_mm, nominal_mm in drawn_bodies(drawing.scene, view, drawing.exaggeration):
+    motions = scene_motions(picture.scene, picture.view)
+    for part in place_bodies(picture.scene, motions, picture.exaggeration):
+        body, drawn_mm, nominal_mm = part.body, part.vertices_mm, part.nominal_mm
         material = builder.add_material(f"body {body.name}", body.colour, opacity=BODY_OPACITY)
         mesh = builder.add_mesh(
             body.name,

@@ -9,8 +9,8 @@ import numpy as np
 
 from warpspace.field.basis import ErrorField
 from warpspace.machine.parameters import LINEAR_AXES
-from warpspace.outputs.exports.drawing import Drawing
 from warpspace.outputs.files import write_atomically
+from warpspace.picture.scene_picture import ScenePicture
 from warpspace.units import Array
 
 COLUMNS = (
@@ -20,12 +20,12 @@ COLUMNS = (
 _NUMBER = "%.9g"
 
 
-def write_csv(drawing: Drawing, path: str | Path, *, overwrite: bool = True) -> None:
+def write_csv(picture: ScenePicture, path: str | Path, *, overwrite: bool = True) -> None:
     """Write the field of a scene over its grid.
 
     Parameters
     ----------
-    drawing : Drawing
+    picture : ScenePicture
     path : str or Path
     overwrite : bool, optional
         Whether an existing file may be replaced.
@@ -40,12 +40,12 @@ def write_csv(drawing: Drawing, path: str | Path, *, overwrite: bool = True) -> 
     Behind the numbers every row says what it belongs to (scene, loop, reference, convention,
     program), so that tables of several scenes can be put under each other.
     """
-    grid = drawing.picture.grid
+    grid = picture.grid
     axes = {
         name: np.broadcast_to(value, grid.shape).reshape(-1)
         for name, value in grid.coordinates.items()
     }
-    write_field_csv(path, axes, drawing.picture.field, remarks=drawing.remarks, overwrite=overwrite)
+    write_field_csv(path, axes, picture.field, remarks=picture.remarks, overwrite=overwrite)
 
 
 def write_field_csv(

@@ -9,8 +9,8 @@ import numpy as np
 
 from warpspace.exceptions import SceneError, WarpspaceError
 from warpspace.field.basis import ErrorField
-from warpspace.outputs.exports.drawing import Drawing, draw_scene
 from warpspace.outputs.files import write_atomically
+from warpspace.picture.scene_picture import ScenePicture, evaluate_picture
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import Scene
 from warpspace.units import MM_PER_UM, Array
@@ -29,7 +29,7 @@ class StoredField:
     ----------
     scene : Scene
         The scene it was written from, to the last bit.
-    drawing : Drawing
+    picture : ScenePicture
         The scene evaluated as the file was: loop, grid, component, display factor.
     field : ErrorField
         Nominal points and errors as stored, [nx, ny, nz, 3].
@@ -38,17 +38,17 @@ class StoredField:
     """
 
     scene: Scene
-    drawing: Drawing
+    picture: ScenePicture
     field: ErrorField
     program: str
 
 
-def write_vts(drawing: Drawing, path: str | Path, *, overwrite: bool = True) -> None:
+def write_vts(picture: ScenePicture, path: str | Path, *, overwrite: bool = True) -> None:
     """Write the field as a VTK structured grid.
 
     Parameters
     ----------
-    drawing : Drawing
+    picture : ScenePicture
     path : str or Path
     overwrite : bool, optional
         Whether an existing file may be replaced.
@@ -58,17 +58,17 @@ def write_vts(drawing: Drawing, path: str | Path, *, overwrite: bool = True) -> 
     OutputError
         If the file cannot be written.
     """
-    data = build_vts(drawing)
+    data = build_vts(picture)
     with write_atomically(path, overwrite=overwrite) as temporary:
         temporary.write_bytes(data)
 
 
-def build_vts(drawing: Drawing) -> bytes:
+def build_vts(picture: ScenePicture) -> bytes:
     """Build the field as a VTK structured grid.
 
     Parameters
     ----------
-    drawing : Drawing
+    picture : ScenePicture
 
     Returns
     -------
@@ -83,7 +83,7 @@ def build_vts(drawing: Drawing) -> bytes:
     import pyvista as pv
     from vtkmodules.vtkIOXML import vtkXMLStructuredGridWriter
 
-    grid, field = drawing.picture.grid, drawing.picture.field
+    grid, field = picture.grid, picture.field
     mesh = pv.StructuredGrid()
     mesh.points = _fortran(grid.nominal_mm)
     mesh.dimensions = grid.shape
@@ -91,18 +91,18 @@ def build_vts(drawing: Drawing) -> bytes:
         "error_um": field.error_um,
         "norm_um": field.norm_um,
         "orientation_urad": field.orientation_urad,
-        "deformed_mm": drawing.deformed_mm,
-        "displacement_mm": field.error_um * (drawing.exaggeration * MM_PER_UM),
+        "deformed_mm": picture.drawn_mm,
+        "displacement_mm": field.error_um * (picture.exaggeration * MM_PER_UM),
     }
     for name, values in arrays.items():
         mesh.point_data[name] = _fortran(values)
     mesh.point_data.active_scalars_name = "norm_um"
     mesh.point_data.active_vectors_name = "displacement_mm"
-    mesh.field_data["exaggeration"] = np.array([drawing.exaggeration])
-    for key, row in drawing.provenance["parameters"].items():
+    mesh.field_data["exaggeration"] = np.array([picture.exaggeration])
+    for key, row in picture.provenance["parameters"].items():
         unit = "urad" if row["unit"].endswith("rad") else "um"
         mesh.field_data[f"{key}_{unit}"] = np.array([row["amplitude"]])
-    text = json.dumps(drawing.provenance, ensure_ascii=False, allow_nan=False)
+    text = json.dumps(picture.provenance, ensure_ascii=False, allow_nan=False)
     mesh.field_data[PROVENANCE] = np.frombuffer(text.encode(), dtype=np.uint8)
     writer = vtkXMLStructuredGridWriter()
     writer.SetInputData(mesh)
@@ -141,7 +141,7 @@ def load_stored_field(path: str | Path) -> StoredField:
         head = json.loads(arrays[PROVENANCE].astype(np.uint8).tobytes().decode())
         settings = head["settings"]
         scene = parse_scene(head["scene_toml"], str(head["scene"]), source)
-        drawing = draw_scene(
+        picture = evaluate_picture(
             scene,
             exaggeration=float(settings["exaggeration"]),
             grid=max(int(count) for count in settings["nodes"]),
@@ -160,8 +160,8 @@ def load_stored_field(path: str | Path) -> StoredField:
     except (KeyError, TypeError, ValueError, WarpspaceError) as error:
         what = f"holds no field of warpspace ({type(error).__name__}: {error})"
         raise SceneError(source, [what]) from None
-    _check_agreement(source, stored, drawing.picture.field, program)
-    return StoredField(scene, drawing, stored, program)
+    _check_agreement(source, stored, picture.field, program)
+    return StoredField(scene, picture, stored, program)
 
 
 def _read_arrays(path: Path) -> tuple[dict[str, Array], tuple[int, int, int]]:

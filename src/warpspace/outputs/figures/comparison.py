@@ -1,29 +1,30 @@
 """Two scenes and their difference: one scale, one exaggeration, one projection."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from warpspace.analysis.statistics import Statistics, statistics
-from warpspace.geometry.colour import component_values
+from warpspace.analysis.statistics import Statistics
 from warpspace.outputs.drawing.canvas import Canvas
-from warpspace.outputs.drawing.content import Drawing, DrawnMap, MapContent
+from warpspace.outputs.drawing.content import Drawing, DrawnMap
 from warpspace.outputs.drawing.map3d import draw_map, fit_map
 from warpspace.outputs.drawing.panel import draw_colour_bar, draw_scale_bars
 from warpspace.outputs.drawing.projection import Rect
 from warpspace.outputs.drawing.settings import (
-    B_MINUS_A,
+    A_MINUS_B,
     FigureSettings,
-    choose_exaggeration,
-    choose_scale,
+    evaluate_for,
+    shared_colours,
 )
 from warpspace.outputs.drawing.sheet import map_legend, metadata, scene_facts, start_sheet
 from warpspace.outputs.drawing.style import SIZES
-from warpspace.outputs.figures.error_map import isoline_words, quantity_words, view_words
-from warpspace.picture.difference import difference_field
-from warpspace.picture.words import spell
+from warpspace.outputs.figures.error_map import isoline_words
+from warpspace.picture.comparison import share_exaggeration, subtract_scenes
+from warpspace.picture.scene_picture import ScenePicture
+from warpspace.picture.views import view_words
+from warpspace.picture.words import quantity_words, spell
 from warpspace.scene.model import Scene
-from warpspace.scene.pipeline import evaluate_picture
 
 
 def draw_comparison(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
@@ -40,22 +41,23 @@ def draw_comparison(scenes: Sequence[Scene], settings: FigureSettings, *, exact:
     -------
     Drawing
     """
-    pictures = [evaluate_picture(scene, grid=settings.grid, loop=settings.loop) for scene in scenes]
-    ordered = pictures if settings.difference == B_MINUS_A else pictures[::-1]
-    fields = [*(picture.field for picture in pictures), difference_field(*ordered)]
-    exaggeration = choose_exaggeration(settings, *pictures)
-    values = [component_values(field.error_um, settings.component) for field in fields]
-    scale = choose_scale(settings, *values)
-    contents = [
-        MapContent(field.nominal_mm, field.error_um, part, scale, exaggeration)
-        for field, part in zip(fields, values, strict=True)
-    ]
+    pictures = share_exaggeration(
+        [evaluate_for(settings, scene) for scene in scenes],
+        settings.exaggeration,
+        scenes[0].exaggeration,
+    )
+    ordered = pictures if settings.difference == A_MINUS_B else pictures[::-1]
+    difference = subtract_scenes(ordered[0], ordered[1], settings.difference)
+    contents: list[ScenePicture] = [*pictures, difference]
+    scale = shared_colours(settings, contents)
+    contents = [replace(content, colours=scale) for content in contents]
+    exaggeration = pictures[0].exaggeration
     title = f"Comparison: {scenes[0].title}  –  {scenes[1].title}"
     facts = [
         *scene_facts(pictures[0], exaggeration),
         view_words(settings.view, pictures[0].grid.shape),
     ]
-    legend = map_legend(isoline_words(scale, values[0]), diverging=scale.diverging)
+    legend = map_legend(isoline_words(scale, pictures[0].values), diverging=scale.diverging)
     sheet = start_sheet(settings, title, facts, scenes, legend, exact=exact, panel=False)
     canvas = sheet.canvas
     left, bottom, right, top = sheet.content
@@ -78,7 +80,7 @@ def draw_comparison(scenes: Sequence[Scene], settings: FigureSettings, *, exact:
         canvas.text(
             cell[0] + head, cell[3] - canvas.px(4.0), text, size=size, weight="bold", va="top"
         )
-    found = [statistics(field) for field in fields]
+    found = [content.statistics for content in contents]
     corner = (middle[0] + canvas.px(60.0), bottom, right, middle[1] - canvas.px(6.0))
     _draw_corner(canvas, corner, maps[0], found, settings)
     about = metadata(title, scenes, settings, exaggeration, "comparison")

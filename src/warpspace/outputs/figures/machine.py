@@ -1,13 +1,9 @@
 """Figures with the machine: its bent bodies around the bent volume, and the traces of its table."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from warpspace.bodies import placed as shapes
-from warpspace.geometry.colour import component_values
-from warpspace.geometry.deform import deform
 from warpspace.geometry.faces import crease_lines, face_lines, outer_faces
 from warpspace.geometry.surfaces import box_edges, line_spacing, triangulate
 from warpspace.kinematics.bodies import BASE
@@ -18,12 +14,14 @@ from warpspace.outputs.drawing.map3d import GHOST_DASHES
 from warpspace.outputs.drawing.panel import draw_panel
 from warpspace.outputs.drawing.projection import Projection, Rect, fit_projection
 from warpspace.outputs.drawing.render import Body, Raster, render_bodies
-from warpspace.outputs.drawing.settings import FigureSettings, choose_exaggeration, choose_scale
+from warpspace.outputs.drawing.settings import FigureSettings, evaluate_for
 from warpspace.outputs.drawing.sheet import LegendEntry, metadata, scene_facts, start_sheet
 from warpspace.outputs.drawing.style import SIZES, Theme
-from warpspace.outputs.figures.error_map import quantity_words, statistics_rows, value_marks
+from warpspace.outputs.figures.error_map import statistics_rows, value_marks
+from warpspace.picture.bodies import PlacedBody, place_bodies, scene_motions
+from warpspace.picture.scene_picture import ScenePicture
+from warpspace.picture.words import quantity_words
 from warpspace.scene.model import Scene
-from warpspace.scene.pipeline import ScenePicture, evaluate_picture
 from warpspace.units import Array
 
 VOLUME_ALPHA, BEHIND_ALPHA = 0.72, 0.22
@@ -31,70 +29,20 @@ VOLUME_ALPHA, BEHIND_ALPHA = 0.72, 0.22
 DARKER = 0.62
 
 
-@dataclass(frozen=True, slots=True)
-class PlacedBody:
-    """A machine body as it is drawn.
-
-    Attributes
-    ----------
-    name : str
-        For a label, for instance ``X saddle``.
-    frame : str
-    body : Body
-        Bent.
-    edges_mm, nominal_edges_mm : ndarray, [E, 2, 3], mm
-        Edges, bent and nominal.
-    """
-
-    name: str
-    frame: str
-    body: Body
-    edges_mm: Array
-    nominal_edges_mm: Array
+def drawn_body(part: PlacedBody, theme: Theme) -> Body:
+    """Give what is drawn of a placed body on the ground of a theme."""
+    shade = 1.0 if theme.name == "light" else DARKER
+    red, green, blue = (shade * channel / 255.0 for channel in part.body.colour)
+    triangles = part.body.triangles.astype(np.intp)
+    return Body(part.vertices_mm, triangles, colour=(red, green, blue), shaded=True)
 
 
-def place_bodies(
-    picture: ScenePicture, exaggeration: float, theme: Theme, only: str = ""
-) -> list[PlacedBody]:
-    """Bend the bodies of a scene's machine like its errors say, axes at their place in the scene.
-
-    Parameters
-    ----------
-    picture : ScenePicture
-    exaggeration : float
-    theme : Theme
-    only : str, optional
-        Frames to take; all by default.
-
-    Returns
-    -------
-    list of PlacedBody
-        Empty where the machine has none.
-    """
-    scene = picture.scene
-    amplitudes = {key: scene.errors.amplitude(key) for key in scene.errors}
-    positions = {**dict.fromkeys(scene.machine.axes, 0.0), **scene.workspace.positions}
-    positions = {name: positions[name] for name in scene.machine.axes}
-    motions = shapes.view_motions(scene.model, scene.errors, amplitudes, positions, picture.view)
-    found: list[PlacedBody] = []
-    for shape in shapes.load_bodies(scene.machine):
-        if only and shape.frame not in only:
-            continue
-        motion = motions[shape.frame]
-        shade = 1.0 if theme.name == "light" else DARKER
-        red, green, blue = (shade * channel / 255.0 for channel in shape.colour)
-        body = Body(
-            shapes.place_points(motion, shape.vertices_mm, exaggeration),
-            shape.triangles.astype(np.intp),
-            colour=(red, green, blue),
-            shaded=True,
-        )
-        edges = shapes.place_points(motion, shape.edges_mm, exaggeration)
-        nominal = shapes.place_points(motion, shape.edges_mm, 0.0)
-        frame, _, what = shape.name.partition("_")
-        name = what if frame in ("R", "S", "t") else f"{frame} {what}"
-        found.append(PlacedBody(name.replace("_", " "), frame, body, edges, nominal))
-    return found
+def bodies_of(
+    picture: ScenePicture, exaggeration: float, only: Collection[str] | None = None
+) -> tuple[PlacedBody, ...]:
+    """Place the bodies of a picture's machine, axes at their place in the scene."""
+    motions = scene_motions(picture.scene, picture.view)
+    return place_bodies(picture.scene, motions, exaggeration, only)
 
 
 def draw_machine(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
@@ -111,23 +59,21 @@ def draw_machine(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bo
     -------
     Drawing
     """
-    picture = evaluate_picture(scenes[0], grid=settings.grid, loop=settings.loop)
-    exaggeration = choose_exaggeration(settings, picture)
-    values = component_values(picture.field.error_um, settings.component)
-    scale = choose_scale(settings, values)
+    picture = evaluate_for(settings, scenes[0])
+    exaggeration, scale, values = picture.exaggeration, picture.scale, picture.values
     title = f"Machine and working volume: {picture.scene.title}"
-    placed = place_bodies(picture, exaggeration, settings.theme)
+    placed = bodies_of(picture, exaggeration)
     facts = [
         *scene_facts(picture, exaggeration),
         "bodies schematic, bent and tilted like their frames" if placed else "no bodies known",
     ]
     sheet = start_sheet(settings, title, facts, scenes, _legend(), exact=exact)
     canvas = sheet.canvas
-    drawn_mm = deform(picture.grid.nominal_mm, picture.field.error_um, exaggeration)
+    drawn_mm = picture.drawn_mm
     points = [drawn_mm.reshape(-1, 3), picture.grid.nominal_mm.reshape(-1, 3)]
-    points += [part.body.vertices_mm for part in placed]
+    points += [part.vertices_mm for part in placed]
     projection = fit_projection(settings.view, np.concatenate(points), _room(canvas, sheet.content))
-    machine = render_bodies([part.body for part in placed], projection) if placed else None
+    machine = render_placed(placed, settings.theme, projection)
     if machine is not None:
         canvas.image(machine.reduced() if canvas.exact else machine.rgba, machine.rect)
         draw_body_edges(canvas, placed, projection, machine)
@@ -143,13 +89,22 @@ def draw_machine(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bo
     label_bodies(canvas, placed, projection, machine, sheet.content)
     draw_panel(
         canvas, sheet.panel, scale, quantity_words(settings.component),
-        value_marks(picture, values, settings.component),
-        statistics_rows(picture, values, settings.component),
+        value_marks(picture),
+        statistics_rows(picture),
         (projection.px_per_mm, exaggeration),
     )  # fmt: skip
     about = metadata(title, scenes, settings, exaggeration, "machine")
     maps = (DrawnMap(projection, scale, values, drawn_mm, exaggeration, volume),)
     return Drawing(canvas.figure, title, about, maps, tuple(canvas.rects))
+
+
+def render_placed(
+    placed: Sequence[PlacedBody], theme: Theme, projection: Projection
+) -> Raster | None:
+    """Draw the bodies of a machine; None where it has none."""
+    if not placed:
+        return None
+    return render_bodies([drawn_body(part, theme) for part in placed], projection)
 
 
 def _room(canvas: Canvas, rect: Rect) -> Rect:
@@ -171,7 +126,7 @@ def draw_body_edges(
     canvas.lines(seen, width=SIZES.hair, colour=theme.grid, alpha=0.75, zorder=1.4)
     nominal: list[Array] = []
     for part in placed:
-        if part.frame != BASE:
+        if part.body.frame != BASE:
             for edge in part.nominal_edges_mm:
                 nominal += split_visible(edge, projection, raster)[0]
     canvas.lines(nominal, width=SIZES.hair, colour=theme.ghost, alpha=0.8, zorder=1.3)
@@ -237,7 +192,7 @@ def label_bodies(
     for part in placed:
         spot = _visible_spot(part, projection, raster)
         if spot is not None:
-            wanted.append((spot[1], part.name, spot))
+            wanted.append((spot[1], part.label, spot))
     wanted.sort()
     column = frame[2] - canvas.px(120.0)
     step = canvas.px(30.0)
@@ -256,7 +211,7 @@ def _visible_spot(
     part: PlacedBody, projection: Projection, raster: Raster
 ) -> tuple[float, float] | None:
     """Find the point of a body to lead a label to: visible, well inside what is seen of it."""
-    corners = part.body.vertices_mm[part.body.triangles]
+    corners = part.vertices_mm[part.body.triangles]
     rng = np.random.default_rng(0)
     weights = rng.dirichlet([1.0, 1.0, 1.0], size=(24, len(corners)))
     points = np.einsum("ktc,tcx->ktx", weights, corners).reshape(-1, 3)

@@ -2,23 +2,22 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpspace.geometry.colour import component_values
 from warpspace.geometry.surfaces import Index, corners, triangulate
 from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import TOOL_AXIS
 from warpspace.outputs.drawing.canvas import Canvas
-from warpspace.outputs.drawing.content import Drawing, MapContent
+from warpspace.outputs.drawing.content import Drawing
 from warpspace.outputs.drawing.labels import Occupancy, place_label
 from warpspace.outputs.drawing.lines import split_visible
-from warpspace.outputs.drawing.map3d import draw_map, fit_map, map_faces
+from warpspace.outputs.drawing.map3d import draw_map, fit_map
 from warpspace.outputs.drawing.panel import draw_panel
 from warpspace.outputs.drawing.projection import Projection, Rect
 from warpspace.outputs.drawing.render import Raster
-from warpspace.outputs.drawing.settings import FigureSettings, choose_scale
+from warpspace.outputs.drawing.settings import FigureSettings, evaluate_for
 from warpspace.outputs.drawing.sheet import (
     LegendEntry,
     map_legend,
@@ -27,10 +26,13 @@ from warpspace.outputs.drawing.sheet import (
     start_sheet,
 )
 from warpspace.outputs.drawing.style import SIZES
-from warpspace.outputs.figures.error_map import isoline_words, view_words
+from warpspace.outputs.figures.error_map import isoline_words
+from warpspace.picture.model import Picture
+from warpspace.picture.scene_picture import ScenePicture
+from warpspace.picture.topology import map_faces
+from warpspace.picture.views import view_words
 from warpspace.picture.words import spell, spell_factor, spell_point
 from warpspace.scene.model import Scene
-from warpspace.scene.pipeline import ScenePicture, evaluate_picture
 from warpspace.units import MICRORADIAN, RAD_PER_URAD, Array
 
 LEAN_RAD = 0.45
@@ -84,10 +86,8 @@ def draw_orientation(scenes: Sequence[Scene], settings: FigureSettings, *, exact
     -------
     Drawing
     """
-    picture = evaluate_picture(scenes[0], grid=settings.grid, loop=settings.loop)
-    orientation = picture.field.orientation_urad
-    values = component_values(orientation, settings.component)
-    scale = choose_scale(settings, values, quantity="tilt", unit=MICRORADIAN)
+    picture = evaluate_for(settings, scenes[0], quantity="orientation")
+    orientation, values, scale = picture.field.orientation_urad, picture.values, picture.scale
     given = settings.exaggeration
     automatic = lean_factor(float(np.linalg.norm(orientation, axis=-1).max()))
     factor = automatic if given is None or given == "auto" else given
@@ -105,7 +105,7 @@ def draw_orientation(scenes: Sequence[Scene], settings: FigureSettings, *, exact
 
     def annotate(
         canvas: Canvas,
-        content: MapContent,
+        content: Picture,
         projection: Projection,
         raster: Raster | None,
         taken: Occupancy,
@@ -113,8 +113,8 @@ def draw_orientation(scenes: Sequence[Scene], settings: FigureSettings, *, exact
     ) -> None:
         _draw_needles(canvas, content, needles, projection, raster, taken, frame, settings.view)
 
-    content = MapContent(picture.grid.nominal_mm, np.zeros_like(orientation), values, scale, 1.0)
-    ends = needles.ends_mm(content.nominal_mm.reshape(-1, 3), _feet(content, settings.view))
+    content = replace(picture, exaggeration=0.0)  # the volume itself is drawn undeformed
+    ends = needles.ends_mm(content.grid.nominal_mm.reshape(-1, 3), _feet(content, settings.view))
     drawn = draw_map(
         sheet.canvas,
         content,
@@ -173,7 +173,7 @@ def _needles(picture: ScenePicture, factor: float) -> Needles:
 
 def _draw_needles(
     canvas: Canvas,
-    content: MapContent,
+    content: Picture,
     needles: Needles,
     projection: Projection,
     raster: Raster | None,
@@ -182,7 +182,7 @@ def _draw_needles(
     view: str,
 ) -> None:
     """Draw tool axes on the visible surface and label those at the corners."""
-    nodes = content.nominal_mm.reshape(-1, 3)
+    nodes = content.grid.nominal_mm.reshape(-1, 3)
     nominal, drawn = needles.ends_mm(nodes, _feet(content, view))
     theme = canvas.theme
     for ends, colour, width, dashes in (
@@ -210,10 +210,10 @@ def _draw_needles(
             )  # fmt: skip
 
 
-def _feet(content: MapContent, view: str) -> Index:
+def _feet(content: Picture, view: str) -> Index:
     """Choose nodes of the surface, evenly spread, to stand needles on."""
     shape = content.shape
-    surface = triangulate(map_faces(shape, view)).nodes
+    surface = triangulate(map_faces(shape, cut=view == "iso")).nodes
     surface = surface if len(surface) else np.arange(np.prod(shape))
     at = np.stack(np.unravel_index(surface, shape), -1)
     step = [max(1, (count - 1) // (NEEDLES - 1)) for count in shape]

@@ -1,64 +1,42 @@
 """Three slices through the middle of the working volume, laid out like an engineering drawing."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import evaluate_first_order
-from warpspace.geometry.colour import ColourScale, component_values
 from warpspace.geometry.faces import crease_lines, outer_faces
-from warpspace.geometry.slices import build_slice, slice_ranges
+from warpspace.geometry.slices import PLANES, build_slice, slice_ranges
 from warpspace.geometry.surfaces import box_edges, triangulate
 from warpspace.outputs.drawing.canvas import Canvas
-from warpspace.outputs.drawing.content import Drawing, DrawnMap, MapContent
+from warpspace.outputs.drawing.content import Drawing, DrawnMap
 from warpspace.outputs.drawing.lines import split_visible
 from warpspace.outputs.drawing.map3d import GHOST_DASHES, draw_map, fit_map
 from warpspace.outputs.drawing.panel import draw_panel
 from warpspace.outputs.drawing.projection import Rect, fit_projection
 from warpspace.outputs.drawing.render import Body, render_bodies
-from warpspace.outputs.drawing.settings import FigureSettings, choose_exaggeration, choose_scale
+from warpspace.outputs.drawing.settings import FigureSettings, evaluate_for
 from warpspace.outputs.drawing.sheet import map_legend, metadata, scene_facts, start_sheet
 from warpspace.outputs.drawing.style import SIZES
 from warpspace.outputs.figures.error_map import (
     isoline_words,
-    quantity_words,
     statistics_rows,
     value_marks,
 )
-from warpspace.picture.words import spell_short
+from warpspace.picture.scene_picture import ScenePicture
+from warpspace.picture.slices import Slice
+from warpspace.picture.words import quantity_words, spell_short
 from warpspace.scene.model import Scene
-from warpspace.scene.pipeline import ScenePicture, evaluate_picture
 from warpspace.units import Array
 
 VIEW_OF = {"Z": "top", "Y": "front", "X": "right"}
-PLANE_OF = {"Z": "XY", "Y": "XZ", "X": "YZ"}
 
 
-@dataclass(frozen=True, slots=True)
-class Slice:
-    """One slice.
-
-    Attributes
-    ----------
-    axis : str
-        Axis that stands still.
-    position_mm : float, mm
-        Where, in coordinates of the axis.
-    content : MapContent
-    """
-
-    axis: str
-    position_mm: float
-    content: MapContent
-
-    @property
-    def name(self) -> str:
-        """Heading of its map."""
-        return (
-            f"{PLANE_OF[self.axis]} plane at axis {self.axis} = {spell_short(self.position_mm)} mm"
-        )
+def _name(part: Slice) -> str:
+    """Head the map of a slice."""
+    return f"{PLANES[part.axis]} plane at axis {part.axis} = {spell_short(part.position_mm)} mm"
 
 
 def draw_slices(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
@@ -80,14 +58,12 @@ def draw_slices(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     OptionError
         If the working volume does not extend along three axes.
     """
-    picture = evaluate_picture(scenes[0], grid=settings.grid, loop=settings.loop)
-    exaggeration = choose_exaggeration(settings, picture)
-    values = component_values(picture.field.error_um, settings.component)
-    scale = choose_scale(settings, values)
-    slices = _evaluate_slices(picture, settings, scale, exaggeration)
+    picture = evaluate_for(settings, scenes[0])
+    exaggeration, scale = picture.exaggeration, picture.scale
+    slices = _evaluate_slices(picture, settings.grid)
     title = f"Slices through the working volume: {picture.scene.title}"
     legend = map_legend(
-        isoline_words(scale, values), surface="deformed slice", diverging=scale.diverging
+        isoline_words(scale, picture.values), surface="deformed slice", diverging=scale.diverging
     )
     sheet = start_sheet(
         settings, title, scene_facts(picture, exaggeration), scenes, legend, exact=exact
@@ -95,36 +71,33 @@ def draw_slices(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     canvas = sheet.canvas
     cells = _cells(canvas, sheet.content, slices)
     px_per_mm = min(
-        fit_map(canvas, [part.content], cells[part.axis], VIEW_OF[part.axis]).px_per_mm
-        for part in slices
+        fit_map(canvas, [part], cells[part.axis], VIEW_OF[part.axis]).px_per_mm for part in slices
     )
     maps: list[DrawnMap] = []
     for part in slices:
         cell, view = cells[part.axis], VIEW_OF[part.axis]
-        fitted = fit_map(canvas, [part.content], cell, view)
+        fitted = fit_map(canvas, [part], cell, view)
         middle = np.array([cell[0] + cell[2], cell[1] + cell[3]]) / 2.0
-        nominal = part.content.nominal_mm.reshape(-1, 3)
+        nominal = part.grid.nominal_mm.reshape(-1, 3)
         centre = (nominal.min(axis=0) + nominal.max(axis=0)) / 2.0
         projection = replace(fitted, px_per_mm=px_per_mm, centre_mm=centre, centre_px=middle)
-        maps.append(draw_map(canvas, part.content, cell, view, projection=projection))
+        maps.append(draw_map(canvas, part, cell, view, projection=projection))
         canvas.text(
-            middle[0], cell[3] - canvas.px(12.0), part.name, weight="bold", ha="center", va="top"
+            middle[0], cell[3] - canvas.px(12.0), _name(part), weight="bold", ha="center", va="top"
         )
     _draw_key(canvas, picture, slices, cells["key"])
     draw_panel(
         canvas, sheet.panel, scale, quantity_words(settings.component),
-        value_marks(picture, values, settings.component),
-        [("whole volume", ""), *statistics_rows(picture, values, settings.component)],
+        value_marks(picture),
+        [("whole volume", ""), *statistics_rows(picture)],
         (px_per_mm, exaggeration),
     )  # fmt: skip
     facts = metadata(title, scenes, settings, exaggeration, "slices")
     return Drawing(canvas.figure, title, facts, tuple(maps), tuple(canvas.rects))
 
 
-def _evaluate_slices(
-    picture: ScenePicture, settings: FigureSettings, scale: ColourScale, exaggeration: float
-) -> list[Slice]:
-    """Evaluate the slices where they lie."""
+def _evaluate_slices(picture: ScenePicture, nodes: int) -> list[Slice]:
+    """Evaluate the slices through the middle where they lie, in the colours of the volume."""
     scene = picture.scene
     ranges = slice_ranges(scene.model, scene.workspace)
     if not ranges:
@@ -136,19 +109,27 @@ def _evaluate_slices(
     for axis in ("Z", "Y", "X"):
         low, high = ranges[axis]
         at = (low + high) / 2.0
-        grid = build_slice(scene.model, scene.workspace, axis, at, settings.grid)
-        field = evaluate_first_order(
-            scene.model, scene.errors, grid.coordinates, picture.view, grid.point_mm
+        grid = build_slice(scene.model, scene.workspace, axis, at, nodes)
+        found.append(
+            Slice(
+                view=picture.view,
+                grid=grid,
+                field=evaluate_first_order(
+                    scene.model, scene.errors, grid.coordinates, picture.view, grid.point_mm
+                ),
+                exaggeration=picture.exaggeration,
+                component=picture.component,
+                colours=picture.scale,
+                axis=axis,
+                position_mm=at,
+            )
         )
-        values = component_values(field.error_um, settings.component)
-        content = MapContent(grid.nominal_mm, field.error_um, values, scale, exaggeration)
-        found.append(Slice(axis, at, content))
     return found
 
 
 def _cells(canvas: Canvas, rect: Rect, slices: Sequence[Slice]) -> dict[str, Rect]:
     """Divide the sheet: XY above XZ, YZ to the right of XZ, the key in the corner left."""
-    spans = {part.axis: np.ptp(part.content.nominal_mm.reshape(-1, 3), axis=0) for part in slices}
+    spans = {part.axis: np.ptp(part.grid.nominal_mm.reshape(-1, 3), axis=0) for part in slices}
     x, y, z = float(spans["Z"][0]), float(spans["Z"][1]), float(spans["Y"][2])
     left, bottom, right, top = rect
     # axes and labels take the same room in every cell, the rest follows the lengths
@@ -172,16 +153,14 @@ def _draw_key(canvas: Canvas, picture: ScenePicture, slices: Sequence[Slice], re
     bodies: list[Body] = []
     creases: list[Array] = []
     for part in slices:
-        faces = outer_faces(part.content.shape)
+        faces = outer_faces(part.shape)
         surface = triangulate(faces)
-        points = part.content.nominal_mm.reshape(-1, 3)
-        values = part.content.values.reshape(-1)
+        points = part.grid.nominal_mm.reshape(-1, 3)
+        values = part.values.reshape(-1)
         bodies.append(
-            Body(
-                points[surface.nodes], surface.triangles, values[surface.nodes], part.content.scale
-            )
+            Body(points[surface.nodes], surface.triangles, values[surface.nodes], part.scale)
         )
-        creases += [points[line] for line in crease_lines(faces, part.content.shape)]
+        creases += [points[line] for line in crease_lines(faces, part.shape)]
     raster = render_bodies(bodies, projection)
     canvas.image(raster.reduced() if canvas.exact else raster.rgba, raster.rect)
     theme = canvas.theme

@@ -1,15 +1,12 @@
 """Traces of the rotary axes: the circles that points of the workpiece should and do run through."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
 from warpspace.exceptions import OptionError
-from warpspace.field.evaluate import View, evaluate_first_order
 from warpspace.geometry.colour import ColourScale, component_values
-from warpspace.geometry.deform import auto_exaggeration, deform
-from warpspace.geometry.traces import Trace, build_traces
 from warpspace.machine.description import Vector
 from warpspace.outputs.drawing.canvas import Canvas
 from warpspace.outputs.drawing.content import Drawing
@@ -17,45 +14,24 @@ from warpspace.outputs.drawing.labels import Occupancy, place_label
 from warpspace.outputs.drawing.lines import split_visible
 from warpspace.outputs.drawing.panel import Row, draw_panel
 from warpspace.outputs.drawing.projection import Projection, Rect, fit_projection
-from warpspace.outputs.drawing.render import Raster, render_bodies
-from warpspace.outputs.drawing.settings import FigureSettings, choose_scale, given_exaggeration
+from warpspace.outputs.drawing.render import Raster
+from warpspace.outputs.drawing.settings import FigureSettings
 from warpspace.outputs.drawing.sheet import LegendEntry, metadata, scene_facts, start_sheet
 from warpspace.outputs.drawing.style import SIZES
-from warpspace.outputs.figures.error_map import quantity_words
-from warpspace.outputs.figures.machine import draw_body_edges, place_bodies
-from warpspace.picture.words import MINUS, spell, spell_point
+from warpspace.outputs.figures.machine import bodies_of, draw_body_edges, render_placed
+from warpspace.picture.exaggeration import choose_exaggeration
+from warpspace.picture.model import choose_scale
+from warpspace.picture.scene_picture import evaluate_picture
+from warpspace.picture.traces import TraceLine, evaluate_traces, trace_lines
+from warpspace.picture.words import MINUS, quantity_words, spell, spell_point
 from warpspace.scene.model import Scene
-from warpspace.scene.pipeline import evaluate_picture
 from warpspace.units import MICROMETRE, Array
 
 PIECE = 2
 """Samples of a trace in one piece of one colour."""
-BODIES = "BCAw"
-"""Frames whose bodies stand around the traces; the other bodies would hide them."""
+ROTARY_AXES_AROUND = ("A", "B", "C")
+"""Axes whose bodies stand around the traces; the other bodies would hide them."""
 FADED = 0.55
-
-
-@dataclass(frozen=True, slots=True)
-class DrawnTrace:
-    """One trace with its errors.
-
-    Attributes
-    ----------
-    trace : Trace
-    nominal_mm, error_um : ndarray, [n, 3]
-    values : ndarray, [n]
-        What the colour shows.
-    """
-
-    trace: Trace
-    nominal_mm: Array
-    error_um: Array
-    values: Array
-
-    @property
-    def largest_um(self) -> float:
-        """Largest error along it, µm."""
-        return float(np.linalg.norm(self.error_um, axis=-1).max())
 
 
 def draw_traces(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
@@ -78,21 +54,28 @@ def draw_traces(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
         If the machine has no rotary axis, or the scene no points to trace.
     """
     scene = scenes[0]
-    traces = _evaluate(scene, settings.component)
-    if not traces:
+    groups = evaluate_traces(scene, 1.0)
+    lines = trace_lines(groups)
+    if not lines:
         raise OptionError(
             f"figure 'traces': {scene.name} has no traces; expected a machine with a rotary axis"
             " and points in [points_mm] traces"
         )
-    largest = max(trace.largest_um for trace in traces)
-    nominal = np.concatenate([trace.nominal_mm for trace in traces])
-    factor = given_exaggeration(settings, scene)
-    if factor is None:
-        factor = auto_exaggeration(2.0 * largest, float(np.ptp(nominal, axis=0).max()))
-    values = np.concatenate([trace.values for trace in traces])
-    scale = choose_scale(settings, values)
-    picture = evaluate_picture(scene, grid=2, loop="workpiece")
-    placed = place_bodies(picture, factor, settings.theme, BODIES)
+    largest = max(line.largest_um for line in lines)
+    nominal = np.concatenate([line.nominal_mm for line in lines])
+    # twice: traces are seen edge-on, a tenth of their reach is plenty
+    factor = choose_exaggeration(
+        settings.exaggeration,
+        scene.exaggeration,
+        2.0 * largest,
+        float(np.ptp(nominal, axis=0).max()),
+    )
+    traces = trace_lines([replace(group, exaggeration=factor) for group in groups])
+    coloured = [component_values(line.error_um, settings.component) for line in traces]
+    values = np.concatenate(coloured)
+    scale = choose_scale([values], settings.component, end=settings.range_top)
+    picture = evaluate_picture(scene, grid=2, loop="workpiece", exaggeration=factor)
+    placed = bodies_of(picture, factor, only=(*ROTARY_AXES_AROUND, "w"))
     title = f"Traces of the rotary axes: {scene.title}"
     facts = [
         fact for fact in scene_facts(picture, factor) if not fact.startswith(("working", "2 "))
@@ -102,21 +85,20 @@ def draw_traces(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
         settings, title, [fact for fact in facts if fact], scenes, _legend(), exact=exact
     )
     canvas = sheet.canvas
-    drawn = [deform(trace.nominal_mm, trace.error_um, factor) for trace in traces]
-    points = [nominal, *drawn, *(part.body.vertices_mm for part in placed)]
+    points = [nominal, *(line.actual_mm for line in traces)]
+    points += [part.vertices_mm for part in placed]
     inset = canvas.px(70.0)
     left, bottom, right, top = sheet.content
     room = (left + inset, bottom + inset / 2, right - inset, top - inset / 2)
     projection = fit_projection(settings.view, np.concatenate(points), room)
-    raster: Raster | None = None
-    if placed:
-        raster = render_bodies([part.body for part in placed], projection)
+    raster = render_placed(placed, settings.theme, projection)
+    if raster is not None:
         rgba = (raster.reduced() if canvas.exact else raster.rgba).copy()
         rgba[..., 3] = (rgba[..., 3] * FADED).astype(np.uint8)
         canvas.image(rgba, raster.rect)
         draw_body_edges(canvas, placed, projection, raster)
-    _draw_lines(canvas, traces, drawn, scale, projection, raster)
-    _label(canvas, traces, drawn, projection, sheet.content)
+    _draw_lines(canvas, traces, coloured, scale, projection, raster)
+    _label(canvas, traces, projection, sheet.content)
     bars = (projection.px_per_mm, factor)
     norms = np.concatenate([np.linalg.norm(trace.error_um, axis=-1) for trace in traces])
     rows: list[Row] = [
@@ -132,34 +114,18 @@ def draw_traces(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     return Drawing(canvas.figure, title, about, (), tuple(canvas.rects))
 
 
-def _evaluate(scene: Scene, component: str) -> list[DrawnTrace]:
-    """Evaluate the errors along all traces of a scene."""
-    found: list[DrawnTrace] = []
-    groups = build_traces(scene.model, scene.trace_points_mm, scene.workspace.positions)
-    for group in groups:
-        view = View(group.loop)
-        field = evaluate_first_order(
-            scene.model, scene.errors, group.coordinates, view, group.nominal_mm
-        )
-        values = component_values(field.error_um, component)
-        found += [
-            DrawnTrace(trace, group.nominal_mm[i], field.error_um[i], values[i])
-            for i, trace in enumerate(group.traces)
-        ]
-    return found
-
-
 def _draw_lines(
     canvas: Canvas,
-    traces: Sequence[DrawnTrace],
-    drawn: Sequence[Array],
+    traces: Sequence[TraceLine],
+    coloured: Sequence[Array],
     scale: ColourScale,
     projection: Projection,
     raster: Raster | None,
 ) -> None:
     """Draw nominal traces grey, actual ones coloured; faint where the table hides them."""
     theme = canvas.theme
-    for trace, actual in zip(traces, drawn, strict=True):
+    for trace, values in zip(traces, coloured, strict=True):
+        actual = trace.actual_mm
         seen, hidden = split_visible(trace.nominal_mm, projection, raster)
         canvas.lines(seen, width=SIZES.thin, colour=theme.muted, dashes=(7.0, 5.0), zorder=3.0)
         canvas.lines(
@@ -167,7 +133,7 @@ def _draw_lines(
         )
         for start in range(0, len(actual) - 1, PIECE):
             piece = actual[start : start + PIECE + 1]
-            middle = trace.values[start : start + PIECE + 1].mean()
+            middle = values[start : start + PIECE + 1].mean()
             colour = scale.colours(np.asarray(middle)) / 255.0
             seen, hidden = split_visible(piece, projection, raster)
             canvas.lines(seen, width=4.6, colour=theme.ink, zorder=3.4)
@@ -177,15 +143,14 @@ def _draw_lines(
 
 def _label(
     canvas: Canvas,
-    traces: Sequence[DrawnTrace],
-    drawn: Sequence[Array],
+    traces: Sequence[TraceLine],
     projection: Projection,
     frame: Rect,
 ) -> None:
     """Name each trace beside its outermost point."""
     taken = Occupancy(canvas.width, canvas.height, 2.0 * canvas.factor)
     taken.add_rects(canvas.rects)
-    spots = [projection.project(line) for line in drawn]
+    spots = [projection.project(trace.actual_mm) for trace in traces]
     taken.add_lines(spots)
     taken.add_lines([projection.project(trace.nominal_mm) for trace in traces])
     middle = np.concatenate(spots).mean(axis=0)
@@ -209,7 +174,7 @@ def _label(
         canvas.line([(x, y), placed.anchor], width=SIZES.hair, colour=canvas.theme.muted)
 
 
-def _points(traces: Sequence[DrawnTrace]) -> dict[Vector, str]:
+def _points(traces: Sequence[TraceLine]) -> dict[Vector, str]:
     """Give numbers to the points that run through the traces."""
     points = dict.fromkeys(trace.trace.point_mm for trace in traces)
     return {point: f"P{number}" for number, point in enumerate(points, 1)}

@@ -170,7 +170,7 @@ def _where(review: Review, painter: Painter, embed: Embed | None) -> Section:
             page = embed(
                 reviewed.scene,
                 exaggeration=review.exaggeration,
-                nodes=min(max(reviewed.drawing.picture.grid.shape), 21),
+                nodes=min(max(reviewed.picture.grid.shape), 21),
                 loop=review.settings.loop,
                 largest=review.largest_um,
             )

@@ -11,6 +11,7 @@ from warpspace.exceptions import WarpspaceError
 from warpspace.outputs.report.blocks import Block, Picture, Text
 from warpspace.outputs.report.review import Review, Reviewed
 from warpspace.outputs.report.wording import factor_words
+from warpspace.picture.traces import trace_lines
 from warpspace.scene.model import Scene
 
 if TYPE_CHECKING:
@@ -89,7 +90,7 @@ class Painter:
     def _left_out(self, reviewed: Reviewed) -> set[str]:
         """Name the figures that would tell nothing: no trace displaced, the same machine again."""
         left_out: set[str] = set()
-        if not any(trace.error_um.any() for trace in reviewed.drawing.traces):
+        if not any(trace.error_um.any() for trace in trace_lines(reviewed.picture.traces)):
             left_out.add("traces")
         if reviewed is not self._review.scenes[0]:
             left_out.add("machine")

@@ -1,5 +1,6 @@
 """The numbers of a design review: everything is evaluated here, nothing is worded."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,17 +13,13 @@ from warpspace.analysis.montecarlo import MonteCarlo, Plan, montecarlo
 from warpspace.analysis.nodes import Over
 from warpspace.analysis.statistics import Statistics, statistics
 from warpspace.exceptions import OptionError, WarpspaceError
-from warpspace.field.basis import ErrorField
 from warpspace.kinematics.model import Loop
-from warpspace.outputs.exports.drawing import (
-    Drawing,
-    Exaggeration,
-    choose_exaggeration,
-    draw_scene,
-)
+from warpspace.picture.comparison import share_exaggeration
+from warpspace.picture.exaggeration import Exaggeration
+from warpspace.picture.model import same_nodes, subtract_fields
+from warpspace.picture.scene_picture import ScenePicture, evaluate_picture
 from warpspace.scene.model import Scene
 from warpspace.scene.pipeline import linearisation_error_um
-from warpspace.units import Array
 
 WORST_SAMPLES = 20_000
 """Machines of which the worst point is looked for; one random point is taken of many more."""
@@ -82,7 +79,7 @@ class Reviewed:
 
     Attributes
     ----------
-    drawing : Drawing
+    picture : ScenePicture
         Evaluated scene with the display factor all scenes of the report share.
     worst_at : dict of str to float, mm or degrees
         Axis positions of the worst node.
@@ -96,7 +93,7 @@ class Reviewed:
         Largest difference between the exact chain and the first order.
     """
 
-    drawing: Drawing
+    picture: ScenePicture
     worst_at: dict[str, float]
     explanation: Explanation
     gains: tuple[Gain, ...]
@@ -107,12 +104,12 @@ class Reviewed:
     @property
     def scene(self) -> Scene:
         """The scene."""
-        return self.drawing.scene
+        return self.picture.scene
 
     @property
     def statistics(self) -> Statistics:
         """Statistics of its field."""
-        return self.drawing.picture.statistics
+        return self.picture.statistics
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,21 +155,23 @@ def build_review(scenes: tuple[Scene, ...], settings: ReportSettings) -> Review:
     if not 1 <= len(scenes) <= 2:
         raise OptionError(f"a report is about one scene or two; given {len(scenes)}")
     Plan(settings.samples, settings.seed, spec_um=settings.spec_um).check()
-    drawings = [draw_scene(scene, grid=settings.grid, loop=settings.loop) for scene in scenes]
-    worst = max(drawings, key=lambda drawing: drawing.picture.statistics.max_um)
-    given = scenes[0].exaggeration if settings.exaggeration is None else settings.exaggeration
-    factor = choose_exaggeration(worst.picture, "auto" if given is None else given)
-    reviewed = tuple(
-        _review_scene(Drawing(drawing.picture, factor), settings) for drawing in drawings
+    pictures = share_exaggeration(
+        [evaluate_picture(scene, grid=settings.grid, loop=settings.loop) for scene in scenes],
+        settings.exaggeration,
+        scenes[0].exaggeration,
     )
     return Review(
-        settings, reviewed, factor, worst.picture.statistics.max_um, _difference(drawings)
+        settings,
+        tuple(_review_scene(picture, settings) for picture in pictures),
+        pictures[0].exaggeration,
+        max(picture.statistics.max_um for picture in pictures),
+        _difference(pictures),
     )
 
 
-def _review_scene(drawing: Drawing, settings: ReportSettings) -> Reviewed:
+def _review_scene(picture: ScenePicture, settings: ReportSettings) -> Reviewed:
     """Evaluate all that is told of one scene."""
-    scene, picture = drawing.scene, drawing.picture
+    scene = picture.scene
     index = np.unravel_index(int(np.argmax(picture.field.norm_um)), picture.grid.shape)
     at = {
         name: np.broadcast_to(values, picture.grid.shape)[index]
@@ -181,7 +180,7 @@ def _review_scene(drawing: Drawing, settings: ReportSettings) -> Reviewed:
     explanation = explain(scene.model, scene.errors, at, picture.view, picture.grid.point_mm[index])
     chance, why = _chance(scene, settings)
     return Reviewed(
-        drawing,
+        picture,
         {name: float(value) for name, value in at.items()},
         explanation,
         _gains(scene, picture.view.loop),
@@ -231,22 +230,11 @@ def _chance(scene: Scene, settings: ReportSettings) -> tuple[Chance | None, str]
         return None, str(error)
 
 
-def _difference(drawings: list[Drawing]) -> Statistics | None:
+def _difference(pictures: Sequence[ScenePicture]) -> Statistics | None:
     """Statistics of second minus first where the nodes are the same."""
-    if len(drawings) != 2:
+    if len(pictures) != 2:
         return None
-    first, second = (drawing.picture.field for drawing in drawings)
-    if not _same_nodes(first.nominal_mm, second.nominal_mm):
+    first, second = (picture.field for picture in pictures)
+    if not same_nodes(first.nominal_mm, second.nominal_mm):
         return None
-    return statistics(
-        ErrorField(
-            first.nominal_mm,
-            second.error_um - first.error_um,
-            second.orientation_urad - first.orientation_urad,
-        )
-    )
-
-
-def _same_nodes(first_mm: Array, second_mm: Array) -> bool:
-    """Tell whether two grids have the same nominal nodes."""
-    return first_mm.shape == second_mm.shape and bool(np.allclose(first_mm, second_mm, atol=1e-6))
+    return statistics(subtract_fields(second, first))

@@ -1,13 +1,13 @@
 """Sentences and numbers of a report, in the words a reader needs."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from warpspace.analysis.explain import Contribution
 from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import ErrorFunction, Harmonics, Poly, Ramp, Table
-from warpspace.machine.parameters import LINEAR_AXES, parameter
+from warpspace.machine.parameters import parameter
 from warpspace.outputs.report.review import Chance, Review, Reviewed
-from warpspace.picture.words import MINUS, TIMES, spell, spell_factor, spell_short
+from warpspace.picture.words import MINUS, TIMES, spell, spell_factor, spell_positions, spell_short
 from warpspace.scene.model import Scene
 from warpspace.units import MICROMETRE
 
@@ -52,24 +52,18 @@ def percent(share: float, digits: int = 1) -> str:
     return f"{100.0 * share:.{digits}f}{NBSP}%".replace("-", MINUS)
 
 
-def place(at: Mapping[str, float]) -> str:
-    """Spell axis positions, for instance ``X 275, Y −225, Z −480 mm, B 0°``."""
-    spelt = {name: f"{name}{NBSP}{value:.6g}".replace("-", MINUS) for name, value in at.items()}
-    linear = [text for name, text in spelt.items() if name in LINEAR_AXES]
-    rotary = [f"{text}°" for name, text in spelt.items() if name not in LINEAR_AXES]
-    return ", ".join([", ".join(linear) + f"{NBSP}mm" if linear else "", *rotary]).strip(", ")
-
-
 def worst_place(reviewed: Reviewed) -> str:
     """Spell the axis positions of the worst point, those that matter in the loop."""
-    tool = reviewed.drawing.picture.view.loop is Loop.TOOL
+    tool = reviewed.picture.view.loop is Loop.TOOL
     axes = reviewed.scene.machine.chain.tool if tool else reviewed.worst_at
-    return place({name: value for name, value in reviewed.worst_at.items() if name in axes})
+    return spell_positions(
+        {name: value for name, value in reviewed.worst_at.items() if name in axes}
+    )
 
 
 def volume(reviewed: Reviewed) -> str:
     """Spell the size of the working volume."""
-    extent = reviewed.drawing.picture.grid.extent_mm
+    extent = reviewed.picture.grid.extent_mm
     return f" {TIMES} ".join(f"{edge:.6g}" for edge in extent) + " mm"
 
 
@@ -221,7 +215,7 @@ def reference_words(scene: Scene) -> str:
     """Say what errors are referred to."""
     if scene.reference is None:
         return "Absolute: errors include the part that is the same everywhere."
-    return f"Relative to {place(scene.reference)}, which is held still."
+    return f"Relative to {spell_positions(scene.reference)}, which is held still."
 
 
 def factor_words(factor: float) -> str:

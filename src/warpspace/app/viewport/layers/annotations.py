@@ -8,9 +8,8 @@ from viser import SceneApi
 
 from warpspace.app.browser.handles import Handle
 from warpspace.app.evaluation.cache import Identity
-from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import machine_room_mm
-from warpspace.app.readouts.summary import spell_factor
 from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes, palette
 from warpspace.app.viewport.layers.adding import add_ball, add_lines
 from warpspace.app.viewport.layers.axes import AWAY
@@ -24,6 +23,7 @@ from warpspace.picture.marks import (
     spell_micrometres,
     worst_point,
 )
+from warpspace.picture.words import spell_factor
 from warpspace.units import MICROMETRE, Array
 
 RADIUS, HEAD, BALL = 0.0032, 0.034, 0.009

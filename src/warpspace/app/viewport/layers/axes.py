@@ -5,10 +5,10 @@ from numpy.typing import NDArray
 from viser import SceneApi
 
 from warpspace.app.browser.handles import Handle
-from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes, palette
 from warpspace.app.viewport.layers.adding import add_lines
-from warpspace.geometry.colour import nice_step
+from warpspace.picture.ticks import tick_values
 from warpspace.units import Array
 
 AWAY = 0.13
@@ -16,15 +16,6 @@ AWAY = 0.13
 TICK = 0.022
 LABEL_ROOM = 0.05
 MAX_TICKS = 6
-
-
-def tick_values(low: float, high: float) -> list[float]:
-    """Choose up to seven round coordinates within a range, mm."""
-    if not high > low:
-        return [low]
-    step = nice_step((high - low) * 10.0 / MAX_TICKS)
-    first, last = int(np.ceil(low / step - 1e-9)), int(np.floor(high / step + 1e-9))
-    return [round(step * number, 9) for number in range(first, last + 1)]
 
 
 def axis_frames(low: Array, high: Array, away: float) -> list[tuple[Array, Array]]:
@@ -86,7 +77,7 @@ class AxesLayer:
         for index, (foot, out) in enumerate(axis_frames(low, high, AWAY * longest)):
             along = np.eye(3)[index]
             lines.append(np.stack([foot + low[index] * along, foot + high[index] * along]))
-            ticks = tick_values(low[index], high[index])
+            ticks = tick_values(low[index], high[index], MAX_TICKS)
             for value in ticks:
                 at = foot + value * along
                 lines.append(np.stack([at, at + TICK * longest * out]))

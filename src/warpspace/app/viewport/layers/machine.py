@@ -7,11 +7,12 @@ import numpy as np
 from viser import SceneApi
 
 from warpspace.app.browser.handles import Handle
-from warpspace.app.evaluation.evaluate import LivePicture
-from warpspace.app.evaluation.machine import DrawnBody, drawn_bodies, tool_point
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.evaluation.machine import drawn_bodies, tool_point
 from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes, palette
 from warpspace.app.viewport.layers.adding import add_ball
 from warpspace.app.viewport.tone_map import Rgb
+from warpspace.picture.bodies import PlacedBody
 from warpspace.picture.marks import spell_micrometres
 
 EDGE: Rgb = (70, 78, 90)
@@ -72,7 +73,7 @@ class MachineLayer:
             self._draw_body(part, edge)
         self._draw_tool_point(picture)
 
-    def _draw_body(self, part: DrawnBody, edge: Any) -> None:
+    def _draw_body(self, part: PlacedBody, edge: Any) -> None:
         """Add a body, or move its vertices where they have changed."""
         name = part.body.name
         vertices = part.vertices_mm.astype(np.float32)

@@ -2,7 +2,7 @@
 
 from viser import SceneApi
 
-from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.viewport.layers import colour_bytes, palette, pieces
 from warpspace.app.viewport.layers.adding import add_lines
 

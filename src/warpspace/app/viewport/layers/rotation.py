@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from viser import SceneApi
 
-from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.rotation import points_on_traces
 from warpspace.app.viewport.layers import SCENE_PER_MM, palette
 from warpspace.units import Array

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from viser import ClientHandle, SceneApi
 
-from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.rotation import played_position
 from warpspace.app.viewport.layers import Layer
 from warpspace.app.viewport.layers.annotations import AnnotationsLayer

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 from viser import SceneApi
 
 from warpspace.app.evaluation.cache import Identity
-from warpspace.app.evaluation.evaluate import LivePicture, TraceLines
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.viewport.layers import NOTHING, colour_bytes, palette, polyline_pieces
 from warpspace.app.viewport.layers.adding import add_lines
 from warpspace.app.viewport.tone_map import line_vertex_colours
 from warpspace.geometry.traces import TraceGroup
+from warpspace.picture.traces import TraceLines
 
 APART = 0.002
 """Distance from which nominal and actual are both drawn, as a part of the longest edge."""

@@ -7,7 +7,7 @@ from viser import SceneApi
 from warpspace.analysis.explain import Contribution
 from warpspace.app.browser.handles import Handle
 from warpspace.app.evaluation.budget import Answer, answer
-from warpspace.app.evaluation.evaluate import LivePicture
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.viewport.layers import NOTHING, SCENE_PER_MM
 from warpspace.app.viewport.layers.adding import add_lines
 from warpspace.app.viewport.layers.box import dashes
@@ -65,7 +65,7 @@ class WhyLayer:
         if picked is None or different:
             self._hide(self._marker, *self._lines.values(), *self._labels.values())
             return
-        found = answer(picture.subject or picture.state, picked, picture.exaggeration)
+        found = answer(picture.drawn_state, picked, picture.exaggeration)
         size = picture.grid.longest_edge_mm
         self._marker.put(
             position=found.drawn_mm * SCENE_PER_MM,

@@ -16,6 +16,11 @@ CUT_CORNER = (1, 0, 1)
 """The octant that is cut away: the one nearest to the operator, right in front and above."""
 
 
+def map_faces(shape: surfaces.Shape, *, cut: bool = False) -> list[surfaces.Index]:
+    """List the patches of the surface that is drawn, whole or without the octant cut away."""
+    return cut_faces(shape, CUT_CORNER) if cut else outer_faces(shape)
+
+
 @dataclass(frozen=True, slots=True)
 class Topology:
     """Indices of what is drawn of a grid; they do not change when it is bent.
@@ -57,7 +62,7 @@ def topology(shape: surfaces.Shape, *, cut: bool = False) -> Topology:
     -------
     Topology
     """
-    faces = cut_faces(shape, CUT_CORNER) if cut else outer_faces(shape)
+    faces = map_faces(shape, cut=cut)
     normals = np.array([_normal(face, shape) for face in faces]).reshape(-1, 3)
     outwards = np.zeros((int(np.prod(shape)), 3))
     for axis in range(3):

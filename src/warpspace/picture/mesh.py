@@ -1,14 +1,14 @@
 """The coloured map of a picture as triangles and pieces of line: whole, cut open, or in slices."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.app.evaluation.evaluate import LivePicture
-from warpspace.app.evaluation.topology import Topology, topology
 from warpspace.geometry.isolines import isoline_levels, isoline_segments
-from warpspace.geometry.surfaces import Index, line_spacing
+from warpspace.geometry.surfaces import Index
+from warpspace.picture.model import Picture
+from warpspace.picture.topology import Topology
 from warpspace.units import Array
 
 LIFT = 0.0012
@@ -54,59 +54,25 @@ class Part:
         ]
 
 
-def map_parts(picture: LivePicture) -> list[Part]:
-    """List the grids that a map consists of; a slice is seen from both sides."""
+def map_parts(picture: Picture) -> list[Part]:
+    """List the grids that the map of a picture consists of; a slice is seen from both sides."""
     lift = LIFT * picture.grid.longest_edge_mm
     if not picture.slices:
-        return [
-            Part(picture.drawn_mm, picture.values, picture.topology, (lift,), picture.grid.ways)
-        ]
-    return [
-        Part(
-            part.drawn_mm,
-            part.values,
-            topology(part.grid.shape),
-            (lift, -lift),
-            part.grid.ways,
-        )
-        for part in picture.slices
-    ]
+        return [_part(picture, (lift,))]
+    return [_part(one, (lift, -lift)) for one in picture.slices]
 
 
-def drafted(picture: LivePicture) -> LivePicture:
-    """Thin out a map to every second node along each axis, a third of the bytes.
-
-    Parameters
-    ----------
-    picture : LivePicture
-
-    Returns
-    -------
-    LivePicture
-        The same one where thinning would move its grid lines or its cut, and where slices are
-        drawn. Statistics, scale and everything else in it stay those of all nodes.
-    """
-    shape = tuple(nodes // 2 + 1 for nodes in picture.grid.shape)
-    fits = all(
-        nodes % 4 == 1 and line_spacing(nodes) == 2 * line_spacing(thin)
-        for nodes, thin in zip(picture.grid.shape, shape, strict=True)
-    )
-    if picture.slices or not fits:
-        return picture
-    return replace(
-        picture,
-        drawn_mm=np.ascontiguousarray(picture.drawn_mm[::2, ::2, ::2]),
-        values=np.ascontiguousarray(picture.values[::2, ::2, ::2]),
-        topology=topology((shape[0], shape[1], shape[2]), cut=picture.state.look.surface == "cut"),
-    )
+def _part(picture: Picture, lifts: tuple[float, ...]) -> Part:
+    """Take what is drawn of one grid."""
+    return Part(picture.drawn_mm, picture.values, picture.topology, lifts, picture.grid.ways)
 
 
-def map_mesh(picture: LivePicture) -> MapMesh:
+def map_mesh(picture: Picture) -> MapMesh:
     """Collect the triangles of a map.
 
     Parameters
     ----------
-    picture : LivePicture
+    picture : Picture
 
     Returns
     -------
@@ -133,7 +99,7 @@ def map_mesh(picture: LivePicture) -> MapMesh:
     return MapMesh(np.concatenate(vertices), np.concatenate(triangles), np.concatenate(values))
 
 
-def grid_pieces(picture: LivePicture) -> Pieces:
+def grid_pieces(picture: Picture) -> Pieces:
     """Collect the grid lines on a map, [S, 2, 3], mm."""
     return _joined(
         [
@@ -144,7 +110,7 @@ def grid_pieces(picture: LivePicture) -> Pieces:
     )
 
 
-def line_mesh(picture: LivePicture) -> MapMesh:
+def line_mesh(picture: Picture) -> MapMesh:
     """Collect grid lines and edges of a map as pieces of line between nodes, [S, 2]."""
     vertices: list[Array] = []
     segments: list[NDArray[np.intp]] = []
@@ -162,7 +128,7 @@ def line_mesh(picture: LivePicture) -> MapMesh:
     return MapMesh(np.concatenate(vertices), np.concatenate(segments), np.concatenate(values))
 
 
-def edge_pieces(picture: LivePicture) -> Pieces:
+def edge_pieces(picture: Picture) -> Pieces:
     """Collect the edges of a map, [S, 2, 3], mm."""
     return _joined(
         [
@@ -172,7 +138,7 @@ def edge_pieces(picture: LivePicture) -> Pieces:
     )
 
 
-def isoline_pieces(picture: LivePicture) -> Pieces:
+def isoline_pieces(picture: Picture) -> Pieces:
     """Collect the lines of equal value on a map, at the ticks of its scale, [S, 2, 3], mm."""
     levels = isoline_levels(picture.scale)
     found: list[Pieces] = []

@@ -1,0 +1,53 @@
+"""Which display factor a picture is drawn with: what is asked for, the scene's, or a round one."""
+
+import math
+from typing import Literal
+
+from warpspace.exceptions import OptionError
+from warpspace.geometry.deform import MAX_EXAGGERATION, auto_exaggeration
+
+Exaggeration = float | Literal["auto"] | None
+"""A display factor, "auto" for a round one that suits the errors, None for what the scene says."""
+
+
+def given_exaggeration(wanted: Exaggeration, own: float | None) -> float | None:
+    """Give the factor that is asked for, else the scene's own; None where one is to be chosen.
+
+    Raises
+    ------
+    OptionError
+        If it is no number above 0 and at most a million.
+    """
+    factor = own if wanted is None else wanted
+    if factor is None or factor == "auto":
+        return None
+    if not math.isfinite(factor) or not 0.0 < factor <= MAX_EXAGGERATION:
+        raise OptionError(
+            f"exaggeration {factor:g}; expected auto or a number above 0, at most"
+            f" {MAX_EXAGGERATION:,.0f}"
+        )
+    return float(factor)
+
+
+def choose_exaggeration(
+    wanted: Exaggeration, own: float | None, largest_um: float, longest_edge_mm: float
+) -> float:
+    """Choose the display factor of a picture, or of several that share one.
+
+    Parameters
+    ----------
+    wanted : float, "auto" or None
+        What is asked for.
+    own : float or None
+        What the scene says; None for a round one.
+    largest_um : float, µm
+        Largest displacement of all pictures.
+    longest_edge_mm : float, mm
+        Longest edge of their volumes.
+
+    Returns
+    -------
+    float
+    """
+    given = given_exaggeration(wanted, own)
+    return auto_exaggeration(largest_um, longest_edge_mm) if given is None else given

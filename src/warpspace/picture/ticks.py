@@ -1,0 +1,29 @@
+"""Round values along an axis."""
+
+import math
+
+from warpspace.geometry.colour import nice_step
+
+
+def tick_values(low: float, high: float, most: float) -> list[float]:
+    """Choose round values within a range.
+
+    Parameters
+    ----------
+    low, high : float
+    most : float
+        Steps the range is divided into at most, two at least.
+
+    Returns
+    -------
+    list of float
+        The low end alone where the range is empty.
+    """
+    span = high - low
+    if not span > 0.0:
+        return [low]
+    step = nice_step(span)
+    while span / step > max(most, 2.0):
+        step = nice_step(10.0 * step * 1.01)
+    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    return [round(step * number, 10) for number in range(first, last + 1)]
