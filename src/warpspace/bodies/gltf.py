@@ -160,7 +160,7 @@ def _geometry(part: Part) -> Any:
     indices = part.indices
     if indices.shape[1] == 2:
         indices = np.concatenate([indices, indices[-1:].repeat(-len(indices) % 3, axis=0)])
-    values: dict[str, Array] = dict(part.attributes)
+    values: dict[str, NDArray[np.floating[Any]]] = dict(part.attributes)
     if part.colours is not None:
         values[_COLOUR] = part.colours
     for name, shift in part.targets.items():
