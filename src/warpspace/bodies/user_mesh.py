@@ -104,9 +104,10 @@ def _read(
         mesh.apply_transform([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
     if unit is None:
         _check_size(path, float(np.ptp(mesh.vertices, axis=0).max()), standard_unit)
-    open_edges = _clean(mesh)
+    mesh.update_faces(mesh.nondegenerate_faces())
     if not len(mesh.faces):
         raise OptionError(f"{path}: all of its triangles are points or lines")
+    open_edges = _clean(mesh)
     body = build_body(mesh, path.stem, frame, colour)
     if not open_edges:
         return LoadedMesh(body)
@@ -131,7 +132,6 @@ def _clean(mesh: Any) -> int:
     """Join vertices where triangles do not share any, turn the outside out, count open edges."""
     from trimesh.grouping import group_rows
 
-    mesh.update_faces(mesh.nondegenerate_faces())
     if not mesh.is_watertight:
         mesh.merge_vertices(merge_tex=True, merge_norm=True)
     if mesh.is_watertight:
