@@ -214,7 +214,7 @@ def test_pixels_have_the_colours_of_the_bar(tab: Tab) -> None:
     assert np.median(np.abs(pixels - wanted).max(axis=-1)) <= 2
     # between the nodes too, every pixel of the face is a colour of the bar
     low, high = (row[free].min(), row[free].max()), (column[free].min(), column[free].max())
-    face = picture[low[0] : low[1], high[0] : high[1]].reshape(-1, 3)[::7]
+    face = screen[low[0] : low[1], high[0] : high[1]].reshape(-1, 3)[::7]
     apart = np.abs(face[:, None, :] - table[None]).max(axis=-1).min(axis=-1)
     assert apart.max() <= 3
 
