@@ -2,6 +2,7 @@
 
 import csv
 import io
+import json
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -209,7 +210,8 @@ def test_exports_show_the_difference_that_is_drawn(tab: Tab) -> None:
     largest = max(float(row["norm_um"]) for row in rows)
     assert largest == pytest.approx(picture.statistics.max_um, abs=1e-6)
     assert picture.compared.title in contents["html"].decode()
-    assert b"A \xe2\x88\x92 B" in contents["glb"]
+    length = int.from_bytes(contents["glb"][12:16], "little")
+    assert "A − B" in str(json.loads(contents["glb"][20 : 20 + length]))
     tab.panel("Compare")
     tab.choose("B", "nothing")
     tab.panel("Files")

@@ -1,8 +1,6 @@
 """Colours, files and camera that reach the browser."""
 
-import json
 import re
-import struct
 from dataclasses import replace
 
 import numpy as np
@@ -14,15 +12,13 @@ from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.readouts import summary as legend
 from warpspace.app.state.app_state import start_state
 from warpspace.app.viewport.camera import fit_camera
-from warpspace.app.viewport.glb import build_glb
 from warpspace.app.viewport.tone_map import (
     inverse_tone_map,
     line_colour,
-    linear_to_srgb,
-    srgb_to_linear,
     tone_map,
 )
 from warpspace.geometry.colour import colour_table
+from warpspace.geometry.srgb import linear_to_srgb, srgb_to_linear
 from warpspace.picture.ticks import tick_values
 from warpspace.scene.library import load_scene, parse_scene
 
@@ -40,23 +36,6 @@ def test_grey_and_dark_line_colours_arrive(rgb: tuple[int, int, int]) -> None:
     sent = srgb_to_linear(np.array(line_colour(grey)) / 255.0)
     arrived = linear_to_srgb(tone_map(sent)) * 255.0
     assert np.abs(arrived - np.array(grey)).max() < 4.0
-
-
-def test_glb_holds_what_was_given() -> None:
-    points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.5]])
-    colours = np.array([[0.0, 0.1, -0.2], [2.5, 0.0, 0.0], [0.0, 1.0, 0.0]], np.float32)
-    data = build_glb(points, np.array([[0, 1, 2]]), colours)
-    magic, version, length = struct.unpack_from("<4sII", data)
-    assert (magic, version, length) == (b"glTF", 2, len(data))
-    json_length = struct.unpack_from("<I", data, 12)[0]
-    document = json.loads(data[20 : 20 + json_length])
-    body = data[28 + json_length :]
-    assert len(body) % 4 == 0
-    np.testing.assert_array_equal(np.frombuffer(body, "<f4", 9).reshape(3, 3), points)
-    np.testing.assert_array_equal(np.frombuffer(body, "<f4", 9, 36).reshape(3, 3), colours)
-    assert list(np.frombuffer(body, "<u2", 3, 72)) == [0, 1, 2]
-    assert document["accessors"][0]["max"] == [1.0, 2.0, 0.5]
-    assert "KHR_materials_unlit" in document["extensionsUsed"]
 
 
 @given(

@@ -29,6 +29,7 @@ from warpspace.outputs.exports.glb import build_glb
 from warpspace.outputs.files import check_target
 from warpspace.picture.bodies import place_bodies, scene_motions
 from warpspace.picture.scene_picture import evaluate_picture
+from warpspace.picture.traces import trace_lines
 
 SCENES = ("dvf5000_first", "teach_wobbling_table", "dvf5000_nominal")
 
@@ -91,7 +92,7 @@ def test_glb_surface_faces_outwards_and_names_its_nodes() -> None:
     names = {node["name"] for node in gltf_document(build_glb(drawing))["nodes"]}
     assert {"deformed_surface", "deformed_grid", "deformed_edges", "ghost", "traces"} <= names
     assert f"warpspace dvf5000_first ×{drawing.exaggeration:g}" in names
-    assert sum(name.startswith("trace actual") for name in names) == len(drawing.traces)
+    assert sum(name.startswith("trace actual") for name in names) == len(trace_lines(drawing.traces))
     assert {body.name for body in load_bodies(drawing.scene.machine)} <= names
 
 

@@ -1,15 +1,12 @@
 """Schematic bodies of a machine: read from its folder, placed and bent like its errors say."""
 
-import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpspace.exceptions import OptionError
+from warpspace.bodies.body_file import BODY_FILE, read_bodies
+from warpspace.bodies.mesh import Body
 from warpspace.field.evaluate import View
 from warpspace.kinematics import transforms
 from warpspace.kinematics.bodies import BASE, BodyMotion, body_motions
@@ -18,37 +15,6 @@ from warpspace.machine.description import Machine
 from warpspace.machine.errors import ErrorSet
 from warpspace.machine.parameters import parameter
 from warpspace.units import Array
-
-BODY_FILE = "bodies.npz"
-
-
-@dataclass(frozen=True, slots=True)
-class Body:
-    """One body of a machine, in the frame it rides on.
-
-    Attributes
-    ----------
-    name : str
-        Frame and what it is, for instance ``X_saddle``.
-    colour : tuple of int, (3,)
-        sRGB; greys, since colour means error.
-    vertices_mm : ndarray, [V, 3], mm
-    triangles : ndarray, [T, 3]
-        Counter-clockwise seen from outside.
-    edges_mm : ndarray, [E, 2, 3], mm
-        Ends of the edges worth drawing.
-    """
-
-    name: str
-    colour: tuple[int, int, int]
-    vertices_mm: Array
-    triangles: NDArray[np.int32]
-    edges_mm: Array
-
-    @property
-    def frame(self) -> str:
-        """Frame it rides on: R, an axis, S, t or w."""
-        return self.name.split("_")[0]
 
 
 def load_bodies(machine: Machine) -> tuple[Body, ...]:
@@ -72,33 +38,8 @@ def load_bodies(machine: Machine) -> tuple[Body, ...]:
     if not machine.body_dir:
         return ()
     frames = {BASE, "S", "t", "w", *machine.axes}
-    return tuple(b for b in _read(Path(machine.body_dir) / BODY_FILE) if b.frame in frames)
-
-
-@lru_cache(maxsize=8)
-def _read(path: Path) -> tuple[Body, ...]:
-    """Read a file of bodies; kept, since every session draws the same."""
-    if not path.is_file():
-        return ()
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            held = {name: np.asarray(file[name]) for name in file.files}
-        split = {
-            name: np.split(held[name], held[f"{ends}_ends"][:-1])
-            for name, ends in (("vertices", "vertex"), ("triangles", "triangle"), ("edges", "edge"))
-        }
-        return tuple(
-            Body(
-                str(name),
-                (int(colour[0]), int(colour[1]), int(colour[2])),
-                split["vertices"][at].astype(float),
-                split["triangles"][at].astype(np.int32),
-                split["edges"][at].astype(float),
-            )
-            for at, (name, colour) in enumerate(zip(held["names"], held["colours"], strict=True))
-        )
-    except (OSError, KeyError, ValueError, IndexError, EOFError, zipfile.BadZipFile) as error:
-        raise OptionError(f"{path}: no file of machine bodies ({error})") from None
+    bodies = read_bodies(Path(machine.body_dir) / BODY_FILE)
+    return tuple(body for body in bodies if body.frame in frames)
 
 
 def error_values_of(

@@ -25,6 +25,7 @@ from warpspace.app.server.session import Session
 from warpspace.app.server.tab_memory import TabMemory, TabRecord, is_token, new_token
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.store import StateStore
+from warpspace.app.viewport.drafts import surface_glb
 from warpspace.app.viewport.layers.lights import light_scene
 from warpspace.app.viewport.painter import PAINTER
 from warpspace.exceptions import OptionError
@@ -121,7 +122,7 @@ class Viewer:
 
     def _warm(self) -> None:
         """Do before the first tab what it would have to wait for."""
-        self._live.evaluate(self._start)
+        surface_glb(self._live.evaluate(self._start))
         importlib.import_module("warpspace.app.evaluation.probability")
 
     def _connect(self, client: viser.ClientHandle) -> None:

@@ -10,8 +10,8 @@ from dataclasses import dataclass, fields
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.readouts import summary as legend
 from warpspace.app.state.app_state import AppState
-from warpspace.app.viewport.glb import build_glb
 from warpspace.app.viewport.tone_map import vertex_colours
+from warpspace.bodies.gltf import Part, build_gltf
 from warpspace.picture.mesh import (
     Pieces,
     edge_pieces,
@@ -65,7 +65,8 @@ class Draft:
 def surface_glb(picture: LivePicture) -> bytes:
     """Write the coloured map of a picture, or its lines alone, vertices in mm."""
     mesh = line_mesh(picture) if picture.state.look.surface == "grid" else map_mesh(picture)
-    return build_glb(mesh.vertices_mm, mesh.triangles, vertex_colours(picture.scale, mesh.values))
+    colours = vertex_colours(picture.scale, mesh.values)
+    return build_gltf([Part("surface", mesh.vertices_mm, mesh.triangles, colours=colours)])
 
 
 def box_picture(picture: LivePicture) -> BoxPicture:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.geometry.colour import LEVELS, ColourScale, colour_table
+from warpspace.geometry.srgb import linear_to_srgb, srgb_to_linear
 from warpspace.units import Array
 
 Floats = NDArray[np.float32]
@@ -26,17 +27,6 @@ _OUT = np.array(
 _EXPOSURE = 1.0 / 0.6
 _A, _B = 0.0245786, 0.000090537
 _C, _D, _E = 0.983729, 0.4329510, 0.238081
-
-
-def srgb_to_linear(srgb: Array) -> Array:
-    """Undo the sRGB transfer curve, [..., 3] of 0 … 1."""
-    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
-
-
-def linear_to_srgb(linear: Array) -> Array:
-    """Apply the sRGB transfer curve, [..., 3] of 0 … 1."""
-    positive = np.maximum(linear, 0.0)
-    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * positive ** (1 / 2.4) - 0.055)
 
 
 def tone_map(linear: Array) -> Array:

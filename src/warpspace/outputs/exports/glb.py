@@ -4,7 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
+from warpspace.bodies.gltf import Material, Part, build_gltf, to_gltf
 from warpspace.geometry.deform import deform
+from warpspace.geometry.srgb import srgb_to_linear
 from warpspace.geometry.surfaces import (
     box_edges,
     grid_lines,
@@ -12,7 +14,6 @@ from warpspace.geometry.surfaces import (
     outer_surface,
     segments,
 )
-from warpspace.outputs.exports.gltf import GltfBuilder, srgb_to_linear, to_gltf
 from warpspace.outputs.files import write_atomically
 from warpspace.picture.bodies import place_bodies, scene_motions
 from warpspace.picture.scene_picture import ScenePicture
@@ -64,18 +65,18 @@ def build_glb(picture: ScenePicture) -> bytes:
         takes it back to where it nominally is. Display factor, scene, settings and program are in
         the extras of the asset, the factor also in the name of the root.
     """
-    builder = GltfBuilder()
-    nodes = [
-        *_surface(builder, picture),
-        *_lines(builder, picture),
-        *_traces(builder, trace_lines(picture.traces), picture.exaggeration),
-        *_bodies(builder, picture),
+    parts = [
+        *_surface(picture),
+        *_lines(picture),
+        *_traces(trace_lines(picture.traces), picture.exaggeration),
+        *_bodies(picture),
     ]
-    root = builder.add_node(
-        f"warpspace {picture.scene.name} ×{picture.exaggeration:g}", children=nodes
+    return build_gltf(
+        parts,
+        root=f"warpspace {picture.scene.name} ×{picture.exaggeration:g}",
+        generator=picture.provenance["program"],
+        extras={**picture.provenance, "attributes": _ATTRIBUTES, "colours": _colours(picture)},
     )
-    extras = {**picture.provenance, "attributes": _ATTRIBUTES, "colours": _colours(picture)}
-    return builder.to_bytes(root, picture.provenance["program"], extras)
 
 
 def _colours(picture: ScenePicture) -> dict[str, object]:
@@ -92,15 +93,14 @@ def _colours(picture: ScenePicture) -> dict[str, object]:
 
 def _placed(
     nominal_mm: Array, error_um: Array, exaggeration: float
-) -> tuple[dict[str, Array], dict[str, Array]]:
+) -> tuple[Array, dict[str, Array]]:
     """Positions where they are drawn, and the morph target that takes them back."""
     position = to_gltf(deform(nominal_mm, error_um, exaggeration))
-    back = to_gltf(error_um * (-exaggeration * MM_PER_UM))
-    return {"POSITION": position}, {"nominal": back}
+    return position, {"nominal": to_gltf(error_um * (-exaggeration * MM_PER_UM))}
 
 
-def _surface(builder: GltfBuilder, picture: ScenePicture) -> list[int]:
-    """Add the outside of the deformed grid, with its errors as attributes."""
+def _surface(picture: ScenePicture) -> list[Part]:
+    """Build the outside of the deformed grid, with its errors as attributes."""
     grid, field = picture.grid, picture.field
     surface = outer_surface(grid.shape)
     if not len(surface.triangles):
@@ -108,28 +108,32 @@ def _surface(builder: GltfBuilder, picture: ScenePicture) -> list[int]:
     at = surface.nodes
     error = field.error_um.reshape(-1, 3)[at]
     position, back = _placed(grid.nominal_mm.reshape(-1, 3)[at], error, picture.exaggeration)
-    attributes = {
-        **position,
-        "COLOR_0": srgb_to_linear(picture.scale.colours(picture.values.reshape(-1)[at])),
-        "_ERROR_UM": error,
-        "_ORIENTATION_URAD": field.orientation_urad.reshape(-1, 3)[at],
-    }
-    material = builder.add_material("error")
-    mesh = builder.add_mesh(
-        "deformed_surface", attributes, surface.triangles, material, targets=back
-    )
-    return [builder.add_node("deformed_surface", mesh=mesh)]
+    colours = picture.scale.colours(picture.values.reshape(-1)[at])
+    return [
+        Part(
+            "deformed_surface",
+            position,
+            surface.triangles,
+            Material("error"),
+            colours=srgb_to_linear(colours / 255.0),
+            attributes={
+                "_ERROR_UM": error,
+                "_ORIENTATION_URAD": field.orientation_urad.reshape(-1, 3)[at],
+            },
+            targets=back,
+        )
+    ]
 
 
-def _lines(builder: GltfBuilder, picture: ScenePicture) -> list[int]:
-    """Add grid lines and edges of the deformed box, and the ghost of the nominal one."""
+def _lines(picture: ScenePicture) -> list[Part]:
+    """Build grid lines and edges of the deformed box, and the ghost of the nominal one."""
     grid = picture.grid
     nominal = grid.nominal_mm.reshape(-1, 3)
     error = picture.field.error_um.reshape(-1, 3)
     x, y, z = (line_spacing(count) for count in grid.shape)
     edges = segments(box_edges(grid.shape))
-    ink, ghost = builder.add_material("line", INK), builder.add_material("ghost", GHOST)
-    found: list[int] = []
+    ink, ghost = Material("line", INK), Material("ghost", GHOST)
+    found: list[Part] = []
     for name, pairs, material, displaced in (
         ("deformed_grid", segments(grid_lines(grid.shape, (x, y, z))), ink, error),
         ("deformed_edges", edges, ink, error),
@@ -140,55 +144,40 @@ def _lines(builder: GltfBuilder, picture: ScenePicture) -> list[int]:
         used, numbered = np.unique(pairs, return_inverse=True)
         shift = np.zeros((len(used), 3)) if displaced is None else displaced[used]
         position, back = _placed(nominal[used], shift, picture.exaggeration)
-        mesh = builder.add_mesh(
-            name,
-            position,
-            numbered.reshape(-1, 2),
-            material,
-            targets=None if displaced is None else back,
-        )
-        found.append(builder.add_node(name, mesh=mesh))
+        targets = {} if displaced is None else back
+        found.append(Part(name, position, numbered.reshape(-1, 2), material, targets=targets))
     return found
 
 
-def _traces(builder: GltfBuilder, traces: tuple[TraceLine, ...], exaggeration: float) -> list[int]:
-    """Add the nominal and the actual traces of the rotary axes."""
-    if not traces:
-        return []
-    nominal = builder.add_material("trace nominal", NOMINAL)
-    actual = builder.add_material("trace actual", TRACE)
-    children: list[int] = []
+def _traces(traces: tuple[TraceLine, ...], exaggeration: float) -> list[Part]:
+    """Build the nominal and the actual traces of the rotary axes."""
+    nominal, actual = Material("trace nominal", NOMINAL), Material("trace actual", TRACE)
+    found: list[Part] = []
     for drawn in traces:
         point = ", ".join(f"{value:g}" for value in drawn.trace.point_mm)
         label = f"({point}) {drawn.trace.label}"
         count = len(drawn.nominal_mm)
         pairs = np.stack([np.arange(count - 1), np.arange(1, count)], -1)
-        still = {"POSITION": to_gltf(drawn.nominal_mm)}
+        still = to_gltf(drawn.nominal_mm)
         moved, back = _placed(drawn.nominal_mm, drawn.error_um, exaggeration)
-        for kind, position, material, targets in (
-            ("nominal", still, nominal, None),
-            ("actual", moved, actual, back),
-        ):
-            mesh = builder.add_mesh(
-                f"trace {kind} {label}", position, pairs, material, targets=targets
-            )
-            children.append(builder.add_node(f"trace {kind} {label}", mesh=mesh))
-    return [builder.add_node("traces", children=children)]
+        found += [
+            Part(f"trace nominal {label}", still, pairs, nominal, group="traces"),
+            Part(f"trace actual {label}", moved, pairs, actual, targets=back, group="traces"),
+        ]
+    return found
 
 
-def _bodies(builder: GltfBuilder, picture: ScenePicture) -> list[int]:
-    """Add the bodies of the machine where there are any, bent by the same factor."""
-    children: list[int] = []
+def _bodies(picture: ScenePicture) -> list[Part]:
+    """Build the bodies of the machine where there are any, bent by the same factor."""
     motions = scene_motions(picture.scene, picture.view)
-    for part in place_bodies(picture.scene, motions, picture.exaggeration):
-        body, drawn_mm, nominal_mm = part.body, part.vertices_mm, part.nominal_mm
-        material = builder.add_material(f"body {body.name}", body.colour, opacity=BODY_OPACITY)
-        mesh = builder.add_mesh(
-            body.name,
-            {"POSITION": to_gltf(drawn_mm)},
-            body.triangles,
-            material,
-            targets={"nominal": to_gltf(nominal_mm - drawn_mm)},
+    return [
+        Part(
+            part.body.name,
+            to_gltf(part.vertices_mm),
+            part.body.triangles,
+            Material(f"body {part.body.name}", part.body.colour, BODY_OPACITY),
+            targets={"nominal": to_gltf(part.nominal_mm - part.vertices_mm)},
+            group="bodies",
         )
-        children.append(builder.add_node(body.name, mesh=mesh))
-    return [builder.add_node("bodies", children=children)] if children else []
+        for part in place_bodies(picture.scene, motions, picture.exaggeration)
+    ]

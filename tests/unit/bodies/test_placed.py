@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 import warpspace
-from warpspace.bodies.placed import BODY_FILE, load_bodies, place_points, view_motions
+from warpspace.bodies.body_file import BODY_FILE
+from warpspace.bodies.placed import load_bodies, place_points, view_motions
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import View, build_basis
 from warpspace.kinematics.model import Loop, complete_coordinates

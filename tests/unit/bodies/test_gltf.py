@@ -1,0 +1,145 @@
+import json
+import struct
+
+import numpy as np
+import pytest
+import pyvista as pv
+import trimesh
+
+from warpspace.bodies.gltf import Material, Part, build_gltf, to_gltf
+from warpspace.geometry.srgb import linear_to_srgb
+
+POINTS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.5]])
+COLOURS = np.array([[0.0, 0.1, -0.2], [2.5, 0.0, 0.0], [0.0, 1.0, 0.0]], np.float32)
+TRIANGLE = Part("surface", POINTS, np.array([[0, 1, 2]]), colours=COLOURS)
+
+
+def opened(data: bytes) -> tuple[dict, bytes]:
+    """Document and body of a GLB."""
+    magic, version, length = struct.unpack_from("<4sII", data)
+    assert (magic, version, length) == (b"glTF", 2, len(data))
+    json_length = struct.unpack_from("<I", data, 12)[0]
+    return json.loads(data[20 : 20 + json_length]), data[28 + json_length :]
+
+
+def values(data: bytes, accessor: int) -> np.ndarray:
+    document, body = opened(data)
+    found = document["accessors"][accessor]
+    kind = {5123: "<u2", 5125: "<u4", 5126: "<f4"}[found["componentType"]]
+    width = {"SCALAR": 1, "VEC3": 3}[found["type"]]
+    view = document["bufferViews"][found["bufferView"]]
+    assert view["byteLength"] >= found["count"] * width * np.dtype(kind).itemsize
+    start = view["byteOffset"] + found.get("byteOffset", 0)
+    read = np.frombuffer(body, kind, found["count"] * width, start)
+    return read if width == 1 else read.reshape(-1, width)
+
+
+def only_primitive(data: bytes) -> dict:
+    (mesh,) = opened(data)[0]["meshes"]
+    (primitive,) = mesh["primitives"]
+    return primitive
+
+
+def test_file_holds_what_was_given() -> None:
+    data = build_gltf([TRIANGLE])
+    document, body = opened(data)
+    assert len(body) % 4 == 0
+    primitive = only_primitive(data)
+    assert set(primitive["attributes"]) == {"POSITION", "COLOR_0"}
+    np.testing.assert_array_equal(values(data, primitive["attributes"]["POSITION"]), POINTS)
+    np.testing.assert_array_equal(values(data, primitive["attributes"]["COLOR_0"]), COLOURS)
+    assert list(values(data, primitive["indices"])) == [0, 1, 2]
+    assert primitive["mode"] == 4
+    bounds = document["accessors"][primitive["attributes"]["POSITION"]]
+    assert (bounds["min"], bounds["max"]) == ([0.0, 0.0, 0.0], [1.0, 2.0, 0.5])
+    assert document["extensionsUsed"] == ["KHR_materials_unlit"]
+    assert all("KHR_materials_unlit" in m["extensions"] for m in document["materials"])
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 5])
+def test_lines_come_out_as_the_given_pairs(count: int) -> None:
+    pairs = np.stack([np.arange(count - 1), np.arange(1, count)], -1)
+    points = np.random.default_rng(count).normal(size=(count, 3)).astype(np.float32)
+    data = build_gltf([Part("lines", points, pairs, targets={"nominal": -points})])
+    primitive = only_primitive(data)
+    assert primitive["mode"] == 1
+    np.testing.assert_array_equal(values(data, primitive["indices"]).reshape(-1, 2), pairs)
+    np.testing.assert_array_equal(values(data, primitive["targets"][0]["POSITION"]), -points)
+    assert set(primitive["attributes"]) == {"POSITION"}
+    path = trimesh.load_scene(trimesh.util.wrap_as_stream(data), file_type="glb")
+    read = path.geometry["lines"]
+    assert sum(len(entity.points) - 1 for entity in read.entities) == len(pairs)
+
+
+@pytest.mark.parametrize(("points", "kind"), [(65535, 5123), (65536, 5125)])
+def test_numbers_of_points_take_16_bits_where_they_fit(points: int, kind: int) -> None:
+    many = np.zeros((points, 3))
+    many[:, 0] = np.arange(points)
+    data = build_gltf([Part("many", many, np.array([[0, 1, points - 1], [2, 3, 4], [5, 6, 7]]))])
+    accessor = only_primitive(data)["indices"]
+    assert opened(data)[0]["accessors"][accessor]["componentType"] == kind
+    assert list(values(data, accessor)) == [0, 1, points - 1, 2, 3, 4, 5, 6, 7]
+
+
+def test_targets_attributes_and_bounds() -> None:
+    shift = np.array([[0.0, 0.0, 1.0], [0.0, -2.0, 0.0], [0.5, 0.0, 0.0]])
+    part = Part(
+        "a", POINTS, np.array([[0, 1, 2]]), attributes={"_ERROR_UM": shift},
+        targets={"nominal": shift, "other": 2 * shift},
+    )  # fmt: skip
+    data = build_gltf([part])
+    document, primitive = opened(data)[0], only_primitive(data)
+    assert document["meshes"][0]["extras"]["targetNames"] == ["nominal", "other"]
+    assert document["meshes"][0]["weights"] == [0.0, 0.0]
+    assert set(primitive["attributes"]) == {"POSITION", "_ERROR_UM"}
+    at = primitive["targets"][1]["POSITION"]
+    np.testing.assert_array_equal(values(data, at), 2 * shift)
+    assert document["accessors"][at]["max"] == [1.0, 0.0, 2.0]
+    assert document["accessors"][at]["min"] == [0.0, -4.0, 0.0]
+
+
+def test_nodes_hang_under_root_and_groups_and_empty_parts_are_left_out() -> None:
+    glass = Material("glass", (10, 20, 30), 0.25)
+    triangle = np.array([[0, 1, 2]])
+    parts = [
+        Part("a", POINTS, triangle),
+        Part("b", POINTS, triangle, glass, group="bodies"),
+        Part("b", POINTS + 1.0, triangle, glass, group="bodies"),
+        Part("none", POINTS, np.empty((0, 2), int)),
+    ]
+    document, _ = opened(build_gltf(parts, root="all ×2", generator="w 1", extras={"é": 1}))
+    nodes = document["nodes"]
+    (root,) = document["scenes"][document["scene"]]["nodes"]
+    assert nodes[root]["name"] == "all ×2"
+    children = {nodes[at]["name"]: nodes[at] for at in nodes[root]["children"]}
+    assert set(children) == {"a", "bodies"}
+    below = [nodes[at] for at in children["bodies"]["children"]]
+    assert len(below) == 2
+    assert all("mesh" in node and "matrix" not in node for node in below)
+    assert document["asset"] == {"version": "2.0", "generator": "w 1", "extras": {"é": 1}}
+    assert [m["name"] for m in document["materials"]] == ["unlit", "glass"]
+    assert document["materials"][1]["alphaMode"] == "BLEND"
+    factor = document["materials"][1]["pbrMetallicRoughness"]["baseColorFactor"]
+    np.testing.assert_allclose(linear_to_srgb(np.array(factor[:3])) * 255.0, (10, 20, 30), atol=0.1)
+    assert factor[3] == 0.25
+
+
+def test_nan_in_the_extras_is_refused() -> None:
+    with pytest.raises(ValueError, match="JSON"):
+        build_gltf([TRIANGLE], extras={"a": float("nan")})
+
+
+@pytest.mark.render
+def test_other_libraries_read_the_same_points_and_colours(tmp_path) -> None:
+    inside = np.clip(COLOURS, 0.0, 1.0)
+    (tmp_path / "a.glb").write_bytes(
+        build_gltf([Part("surface", to_gltf(POINTS * 1e3), np.array([[0, 1, 2]]), colours=inside)])
+    )
+    mesh = trimesh.load_scene(tmp_path / "a.glb", process=False).geometry["surface"]
+    x, y, z = POINTS.T
+    np.testing.assert_allclose(mesh.vertices, np.stack([x, z, -y], -1), atol=1e-6)
+    blocks = pv.read(tmp_path / "a.glb")
+    (found,) = [b for b in blocks.recursive_iterator() if b.n_points]
+    np.testing.assert_allclose(found.points, mesh.vertices, atol=1e-6)
+    (name,) = [key for key in found.point_data if "COLOR" in key.upper()]
+    np.testing.assert_allclose(found.point_data[name][:, :3], inside, atol=1e-6)
