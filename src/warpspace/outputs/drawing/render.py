@@ -1,7 +1,4 @@
-"""Bodies drawn by VTK off screen: colours exact, background transparent, depth in millimetres.
-
-VTK itself is used, without PyVista's plotter: its import takes a second less.
-"""
+"""Bodies drawn off screen: colours exact, background transparent, depth in millimetres."""
 
 import os
 import sys
@@ -12,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.colors import ListedColormap
 from numpy.typing import NDArray
+from PIL import Image
+from scipy.ndimage import maximum_filter
 
 from warpspace.exceptions import RenderError
 from warpspace.geometry.colour import LEVELS, ColourScale, colour_table
@@ -87,16 +86,10 @@ class Raster:
         step = round(self.sampling)
         if step == 1:
             return self.rgba
-        total = np.zeros((self.rgba.shape[0] // step, self.rgba.shape[1] // step, 4), np.uint16)
-        for row in range(step):
-            for column in range(step):
-                total += self.rgba[row::step, column::step]
-        # the background is black and clear, so that sums are weighted with alpha already
-        result = (total + np.uint16(step**2 // 2)) // np.uint16(step**2)
-        edge = (result[..., 3] > 0) & (result[..., 3] < 255)
-        scaled = result[edge, :3] * np.uint32(255) // result[edge, 3:]
-        result[edge, :3] = np.minimum(scaled, 255)
-        return result.astype(np.uint8)
+        # the background is black and clear, so that colours are multiplied with alpha already
+        size = (self.rgba.shape[1], self.rgba.shape[0])
+        image = Image.frombuffer("RGBa", size, self.rgba).reduce(step)
+        return np.asarray(image.convert("RGBA"))
 
     def depth_at(self, points_px: Array, *, spread: bool = False) -> Array:
         """Read the depth at pixels of the figure.
@@ -151,20 +144,8 @@ def render_bodies(bodies: Sequence[Body], projection: Projection, margin_px: int
     step = SUPERSAMPLING if small else 1
     middle = np.array([(left + right) / 2.0, (bottom + top) / 2.0])
     rgba, depth = _draw(bodies, projection, middle, (width * step, height * step), step)
-    farthest = _spread(depth, step)
+    farthest = maximum_filter(depth, size=2 * step + 1, mode="nearest")
     return Raster(rgba, depth, farthest, (float(left), float(bottom), float(right), float(top)))
-
-
-def _spread(depth: NDArray[np.float32], reach: int) -> NDArray[np.float32]:
-    """Give the largest value within so many pixels to each side."""
-    for _ in range(reach):
-        for axis in (0, 1):
-            moved = np.moveaxis(depth, axis, 0)
-            wide = moved.copy()
-            np.maximum(wide[1:], moved[:-1], out=wide[1:])
-            np.maximum(wide[:-1], moved[1:], out=wide[:-1])
-            depth = np.moveaxis(wide, 0, axis)
-    return depth
 
 
 def _draw(
