@@ -144,7 +144,7 @@ def render_bodies(bodies: Sequence[Body], projection: Projection, margin_px: int
     step = SUPERSAMPLING if small else 1
     middle = np.array([(left + right) / 2.0, (bottom + top) / 2.0])
     rgba, depth = _draw(bodies, projection, middle, (width * step, height * step), step)
-    farthest = maximum_filter(depth, size=2 * step + 1, mode="nearest")
+    farthest = np.asarray(maximum_filter(depth, size=2 * step + 1, mode="nearest"), np.float32)
     return Raster(rgba, depth, farthest, (float(left), float(bottom), float(right), float(top)))
 
 
@@ -167,12 +167,11 @@ def _draw(
     near, far = float(depths.min()) - room, float(depths.max()) + room
 
     # a theme of its own: what users set for their plotters does not reach the figures
-    plotter = pv.Plotter(
-        off_screen=True, window_size=list(size), lighting="none", theme=pv.themes.Theme()
-    )
+    theme = pv.themes.Theme()
+    theme.background = "black"
+    plotter = pv.Plotter(off_screen=True, window_size=list(size), lighting="none", theme=theme)
     try:
         plotter.disable_anti_aliasing()
-        plotter.set_background("black")
         for body in bodies:
             _add_body(plotter, body)
         if any(body.shaded for body in bodies):
