@@ -97,15 +97,15 @@ def _mark(axes: Axes, marks: Sequence[tuple[str, float, str, str]]) -> None:
         if (name == "mode" and value - width >= low) or value + width > high:
             label.set(x=value - gap, ha="right")
         for row in range(ROWS):
-            height = 1.02 + 0.058 * row
-            label.set_y(height)
-            box = label.get_window_extent(renderer).padded(1.0)
+            label.set_y(1.02 + 0.058 * row)
+            # with the gap to its own line, and as much on the other side
+            box = label.get_window_extent(renderer).padded(0.006 * axes.bbox.width, 1.0)
             if not box.count_overlaps(taken):
                 break
         taken.append(box)
         axes.plot(
             [value, value],
-            [0.0, height + 0.04],
+            [0.0, label.get_position()[1] + 0.04],
             color=colour,
             linestyle=dash,
             linewidth=1.4,
