@@ -11,6 +11,7 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from warpspace.exceptions import SceneError, WarpspaceError
     from warpspace.field.basis import ErrorField
+    from warpspace.outputs.exports.multiblock import to_pyvista
     from warpspace.scene.library import load_scene, scene_names
     from warpspace.scene.model import Scene
     from warpspace.scene.pipeline import evaluate
@@ -35,6 +36,7 @@ _HOME = {
     "measured": "warpspace.scene.verbs",
     "montecarlo": "warpspace.scene.verbs",
     "thesis": "warpspace.scene.verbs",
+    "to_pyvista": "warpspace.outputs.exports.multiblock",
     "load_scene": "warpspace.scene.library",
     "scene_names": "warpspace.scene.library",
 }
@@ -54,6 +56,7 @@ __all__ = [
     "montecarlo",
     "scene_names",
     "thesis",
+    "to_pyvista",
 ]
 
 

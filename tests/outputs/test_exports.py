@@ -92,7 +92,8 @@ def test_glb_surface_faces_outwards_and_names_its_nodes() -> None:
     names = {node["name"] for node in gltf_document(build_glb(drawing))["nodes"]}
     assert {"deformed_surface", "deformed_grid", "deformed_edges", "ghost", "traces"} <= names
     assert f"warpspace dvf5000_first ×{drawing.exaggeration:g}" in names
-    assert sum(name.startswith("trace actual") for name in names) == len(trace_lines(drawing.traces))
+    traces = trace_lines(drawing.traces)
+    assert sum(name.startswith("trace actual") for name in names) == len(traces)
     assert {body.name for body in load_bodies(drawing.scene.machine)} <= names
 
 

@@ -1,16 +1,12 @@
-"""Figures to bytes: PNG, SVG and PDF, the same every time."""
+"""Figures by name to bytes and files."""
 
-import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import matplotlib as mpl
-import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from PIL import Image
-from PIL.PngImagePlugin import PngInfo
 
 from warpspace.outputs.drawing.content import Drawing
+from warpspace.outputs.drawing.encoding import encode_figure
 from warpspace.outputs.drawing.settings import FigureSettings
 from warpspace.outputs.drawing.style import FIGURE_ENDINGS, SAVE_RC
 from warpspace.outputs.figures.catalogue import draw_figure
@@ -34,56 +30,20 @@ def figure_bytes(drawing: Drawing, form: str) -> bytes:
     """
     facts = drawing.facts
     about = f"{facts['settings']}; scene={facts['scene']}"
-    metadata: dict[str, str | None]
+    said = {"Title": drawing.title}
     if form == "png":
-        return _png_bytes(
-            drawing,
-            {
-                "Title": drawing.title,
-                "Software": facts["version"],
-                "Description": about,
-                "Exaggeration": facts["exaggeration"],
-                "Scene": facts["scene"],
-            },
-        )
-    if form == "svg":
-        metadata = {
-            "Title": drawing.title,
-            "Creator": facts["version"],
+        said |= {
+            "Software": facts["version"],
             "Description": about,
-            "Date": None,
+            "Exaggeration": facts["exaggeration"],
+            "Scene": facts["scene"],
         }
+    elif form == "svg":
+        said |= {"Creator": facts["version"], "Description": about}
     else:
-        metadata = {
-            "Title": drawing.title,
-            "Creator": facts["version"],
-            "Subject": about,
-            "Keywords": f"scene={facts['scene']}, exaggeration={facts['exaggeration']}",
-            "CreationDate": None,
-        }
-    buffer = io.BytesIO()
-    with mpl.rc_context(SAVE_RC):
-        drawing.figure.savefig(
-            buffer, format=form, dpi="figure", metadata=metadata,
-            facecolor=drawing.figure.get_facecolor(),
-        )  # fmt: skip
-    return buffer.getvalue()
-
-
-def _png_bytes(drawing: Drawing, facts: Mapping[str, str]) -> bytes:
-    """Draw the pixels and pack them without transparency."""
-    text = PngInfo()
-    for key, value in facts.items():
-        text.add_itxt(key, value)
-    with mpl.rc_context(SAVE_RC):
-        canvas = FigureCanvasAgg(drawing.figure)
-        canvas.draw()
-    pixels = np.asarray(canvas.buffer_rgba())[..., :3]
-    buffer = io.BytesIO()
-    Image.fromarray(np.ascontiguousarray(pixels)).save(
-        buffer, format="png", pnginfo=text, compress_level=6
-    )
-    return buffer.getvalue()
+        keywords = f"scene={facts['scene']}, exaggeration={facts['exaggeration']}"
+        said |= {"Creator": facts["version"], "Subject": about, "Keywords": keywords}
+    return encode_figure(drawing.figure, form, said)
 
 
 def render_figure(

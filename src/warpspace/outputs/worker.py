@@ -21,13 +21,10 @@ _PROBE = """
 import os, sys
 if sys.platform == "linux":
     os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-import vtkmodules.vtkRenderingOpenGL2
-from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
-window = vtkRenderWindow()
-window.SetOffScreenRendering(True)
-window.AddRenderer(vtkRenderer())
-window.Render()
-sys.exit(0 if window.SupportsOpenGL() else 3)
+import pyvista
+plotter = pyvista.Plotter(off_screen=True)
+plotter.screenshot(return_img=True)
+sys.exit(0 if plotter.render_window.SupportsOpenGL() else 3)
 """
 
 

@@ -1,11 +1,13 @@
 """Histogram of sampled machines like figures 4-8 and 4-9 of the thesis."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
 
 from warpspace.analysis.distribution import Probability
 from warpspace.analysis.montecarlo import MonteCarlo
@@ -13,6 +15,8 @@ from warpspace.outputs.charts.paper import SMALL, TEXT, ground, key_colour, quie
 from warpspace.outputs.drawing.style import LIGHT
 
 WIDTH_IN, HEIGHT_IN = 9.0, 5.4
+ROWS = 4
+"""Rows of labels above the bars, at most."""
 
 
 def montecarlo_chart(
@@ -72,45 +76,42 @@ def montecarlo_chart(
 def _mark(axes: Axes, marks: Sequence[tuple[str, float, str, str]]) -> None:
     """Draw vertical lines; labels start at their line, on as many rows above as they need."""
     low, high = axes.get_xlim()
-    span = high - low
-    taken: list[list[tuple[float, float]]] = [[], [], [], []]
+    gap = 0.006 * (high - low)
+    renderer = FigureCanvasAgg(cast("Figure", axes.figure)).get_renderer()
+    taken: list[Bbox] = []
     for name, value, colour, dash in sorted(marks, key=lambda mark: mark[1]):
-        text = f"{name} {value:.1f} µm"
-        width = 0.0115 * span * len(text) + 0.01 * span
-        leftwards = (name == "mode" and value - width >= low) or value + width > high
-        start = value - width if leftwards else value
-        row = next(
-            (
-                index
-                for index, boxes in enumerate(taken)
-                if all(start >= right or start + width <= left for left, right in boxes)
-            ),
-            len(taken) - 1,
+        label = axes.text(
+            value + gap,
+            0.0,
+            f"{name} {value:.1f} µm",
+            color=colour,
+            size=TEXT,
+            weight="bold",
+            va="bottom",
+            transform=axes.get_xaxis_transform(),
+            zorder=5,
+            bbox=_paper(0.4),
         )
-        taken[row].append((start, start + width))
-        height = 1.02 + 0.058 * row
+        box = label.get_window_extent(renderer).transformed(axes.transData.inverted())
+        width = box.width + 2.0 * gap
+        if (name == "mode" and value - width >= low) or value + width > high:
+            label.set(x=value - gap, ha="right")
+        for row in range(ROWS):
+            label.set_y(1.02 + 0.058 * row)
+            # with the gap to its own line, and as much on the other side
+            box = label.get_window_extent(renderer).padded(0.006 * axes.bbox.width, 1.0)
+            if not box.count_overlaps(taken):
+                break
+        taken.append(box)
         axes.plot(
             [value, value],
-            [0.0, height + 0.04],
+            [0.0, label.get_position()[1] + 0.04],
             color=colour,
             linestyle=dash,
             linewidth=1.4,
             transform=axes.get_xaxis_transform(),
             clip_on=False,
             zorder=4,
-        )
-        axes.text(
-            value + (-0.006 if leftwards else 0.006) * span,
-            height,
-            text,
-            color=colour,
-            size=TEXT,
-            weight="bold",
-            ha="right" if leftwards else "left",
-            va="bottom",
-            transform=axes.get_xaxis_transform(),
-            zorder=5,
-            bbox=_paper(0.4),
         )
 
 

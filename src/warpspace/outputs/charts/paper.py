@@ -1,4 +1,4 @@
-"""The sheet charts are drawn on, and writing them so that the same chart is the same file."""
+"""The sheet charts are drawn on, and writing them."""
 
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -10,19 +10,14 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from warpspace.outputs.drawing.style import FONT, LIGHT, Theme
+from warpspace.outputs.drawing.encoding import encode_figure
+from warpspace.outputs.drawing.style import FIGURE_ENDINGS, FONT, LIGHT, SAVE_RC, Theme
 from warpspace.outputs.files import check_target, write_atomically
 
-CHART_ENDINGS = (".png", ".svg", ".pdf")
+CHART_ENDINGS = FIGURE_ENDINGS
 DPI = 160.0
 TITLE, SUBTITLE, TEXT, SMALL = 13.0, 9.5, 9.5, 8.5
 _THEME: ContextVar[Theme] = ContextVar("theme of the charts", default=LIGHT)
-# Dates and versions would make every run a new file.
-_METADATA: dict[str, dict[str, Any]] = {
-    ".png": {"Software": None},
-    ".svg": {"Date": None, "Creator": None},
-    ".pdf": {"CreationDate": None, "Creator": None, "Producer": None},
-}
 
 
 @contextmanager
@@ -51,15 +46,13 @@ def bar_colour() -> str:
 
 
 def style() -> Any:
-    """Give the context that charts are drawn and written in."""
+    """Give the context that charts are drawn in."""
     theme = ground()
     return mpl.rc_context(
         {
+            **SAVE_RC,
             "font.family": [FONT],
             "font.size": TEXT,
-            "svg.hashsalt": "warpspace",
-            "svg.fonttype": "path",
-            "pdf.fonttype": 42,
             "axes.facecolor": theme.paper,
             "axes.edgecolor": theme.muted,
             "axes.labelcolor": theme.ink,
@@ -130,7 +123,7 @@ def write_chart(figure: Figure, path: str | Path, *, overwrite: bool = True) -> 
         If it cannot be written.
     """
     target = check_target(path, CHART_ENDINGS, overwrite=overwrite)
-    with style(), write_atomically(target, overwrite=overwrite) as temporary:
-        ending = target.suffix.lower()
-        figure.savefig(temporary, format=ending[1:], metadata=_METADATA[ending])
+    content = encode_figure(figure, target.suffix.lower().lstrip("."))
+    with write_atomically(target, overwrite=overwrite) as temporary:
+        temporary.write_bytes(content)
     return target

@@ -1,21 +1,24 @@
-"""Bodies drawn by VTK off screen: colours exact, background transparent, depth in millimetres.
-
-VTK itself is used, without PyVista's plotter: its import takes a second less.
-"""
+"""Bodies drawn off screen: colours exact, background transparent, depth in millimetres."""
 
 import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.colors import ListedColormap
 from numpy.typing import NDArray
+from PIL import Image
+from scipy.ndimage import maximum_filter
 
 from warpspace.exceptions import RenderError
 from warpspace.geometry.colour import LEVELS, ColourScale, colour_table
 from warpspace.outputs.drawing.projection import Projection
 from warpspace.units import Array
+
+if TYPE_CHECKING:
+    import pyvista as pv
 
 Bytes = NDArray[np.uint8]
 _LARGEST_SIDE_PX = 8192
@@ -83,16 +86,10 @@ class Raster:
         step = round(self.sampling)
         if step == 1:
             return self.rgba
-        total = np.zeros((self.rgba.shape[0] // step, self.rgba.shape[1] // step, 4), np.uint16)
-        for row in range(step):
-            for column in range(step):
-                total += self.rgba[row::step, column::step]
-        # the background is black and clear, so that sums are weighted with alpha already
-        result = (total + np.uint16(step**2 // 2)) // np.uint16(step**2)
-        edge = (result[..., 3] > 0) & (result[..., 3] < 255)
-        scaled = result[edge, :3] * np.uint32(255) // result[edge, 3:]
-        result[edge, :3] = np.minimum(scaled, 255)
-        return result.astype(np.uint8)
+        # the background is black and clear, so that colours are multiplied with alpha already
+        size = (self.rgba.shape[1], self.rgba.shape[0])
+        image = Image.frombuffer("RGBa", size, self.rgba).reduce(step)
+        return np.asarray(image.convert("RGBA"))
 
     def depth_at(self, points_px: Array, *, spread: bool = False) -> Array:
         """Read the depth at pixels of the figure.
@@ -147,20 +144,8 @@ def render_bodies(bodies: Sequence[Body], projection: Projection, margin_px: int
     step = SUPERSAMPLING if small else 1
     middle = np.array([(left + right) / 2.0, (bottom + top) / 2.0])
     rgba, depth = _draw(bodies, projection, middle, (width * step, height * step), step)
-    farthest = _spread(depth, step)
+    farthest = np.asarray(maximum_filter(depth, size=2 * step + 1, mode="nearest"), np.float32)
     return Raster(rgba, depth, farthest, (float(left), float(bottom), float(right), float(top)))
-
-
-def _spread(depth: NDArray[np.float32], reach: int) -> NDArray[np.float32]:
-    """Give the largest value within so many pixels to each side."""
-    for _ in range(reach):
-        for axis in (0, 1):
-            moved = np.moveaxis(depth, axis, 0)
-            wide = moved.copy()
-            np.maximum(wide[1:], moved[:-1], out=wide[1:])
-            np.maximum(wide[:-1], moved[1:], out=wide[:-1])
-            depth = np.moveaxis(wide, 0, axis)
-    return depth
 
 
 def _draw(
@@ -170,13 +155,10 @@ def _draw(
     size: tuple[int, int],
     step: int,
 ) -> tuple[Bytes, NDArray[np.float32]]:
-    """Let VTK draw; colours and depth, first row at the top."""
+    """Let PyVista draw; colours and depth, first row at the top."""
     if sys.platform == "linux":
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-    import vtkmodules.vtkRenderingOpenGL2  # noqa: F401  # pyright: ignore[reportUnusedImport]
-    from vtkmodules.util.numpy_support import vtk_to_numpy
-    from vtkmodules.vtkCommonCore import vtkFloatArray, vtkUnsignedCharArray
-    from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
+    import pyvista as pv
 
     offset = (middle_px - projection.centre_px) / projection.px_per_mm
     focus = projection.centre_mm + offset[0] * projection.right + offset[1] * projection.up
@@ -184,111 +166,64 @@ def _draw(
     room = 1.0 + 0.02 * float(np.ptp(depths))
     near, far = float(depths.min()) - room, float(depths.max()) + room
 
-    window = vtkRenderWindow()
+    # a theme of its own: what users set for their plotters does not reach the figures
+    theme = pv.themes.Theme()
+    theme.background = "black"
+    plotter = pv.Plotter(off_screen=True, window_size=list(size), lighting="none", theme=theme)
     try:
-        window.SetOffScreenRendering(True)
-        window.SetMultiSamples(0)
-        window.SetAlphaBitPlanes(1)
-        window.SetSize(*size)
-        renderer = vtkRenderer()
-        renderer.SetBackground(0.0, 0.0, 0.0)
-        renderer.SetBackgroundAlpha(0.0)
-        window.AddRenderer(renderer)
+        plotter.disable_anti_aliasing()
         for body in bodies:
-            renderer.AddActor(_actor(body))
+            _add_body(plotter, body)
         if any(body.shaded for body in bodies):
-            _add_lights(renderer, projection)
-        camera = renderer.GetActiveCamera()
-        camera.ParallelProjectionOn()
-        eye = focus + (1.0 - near) * projection.towards
-        camera.SetPosition(*eye)
-        camera.SetFocalPoint(*(eye - projection.towards))
-        camera.SetViewUp(*projection.up)
-        camera.SetParallelScale(size[1] / step / 2.0 / projection.px_per_mm)
-        camera.SetClippingRange(1.0, 1.0 + far - near)
-        window.Render()
-        corner = (size[0] - 1, size[1] - 1)
-        colours: Any = vtkUnsignedCharArray()
-        buffer = vtkFloatArray()
-        window.GetRGBACharPixelData(0, 0, *corner, 0, colours)
-        window.GetZbufferData(0, 0, *corner, buffer)
-        rgba = vtk_to_numpy(colours).reshape(size[1], size[0], 4)[::-1].copy()
-        raw = vtk_to_numpy(buffer).reshape(size[1], size[0])[::-1]
-    except (ValueError, AttributeError) as error:
+            _add_light(plotter, projection)
+        camera = plotter.camera
+        camera.parallel_projection = True
+        camera.position = focus + (1.0 - near) * projection.towards
+        camera.focal_point = focus - near * projection.towards
+        camera.up = projection.up
+        camera.parallel_scale = size[1] / step / 2.0 / projection.px_per_mm
+        camera.clipping_range = (1.0, 1.0 + far - near)
+        rgba = plotter.screenshot(transparent_background=True, return_img=True)
+        behind = plotter.get_image_depth(fill_value=-np.inf, reset_camera_clipping_range=False)
+    except (ValueError, AttributeError, RuntimeError) as error:
         raise RenderError(
             f"the picture could not be drawn: VTK gave no pixels ({error})"
         ) from error
     finally:
-        window.Finalize()
-    depth = np.where(raw < 1.0, near + raw * np.float32(far - near), np.float32(np.inf))
-    return rgba, depth.astype(np.float32)
+        plotter.close()
+    depth = (near - 1.0) - np.asarray(behind)
+    return np.array(rgba), depth.astype(np.float32)
 
 
-def _actor(body: Body) -> Any:
-    """Build what VTK draws of a body."""
-    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
-    from vtkmodules.vtkCommonCore import vtkPoints
-    from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
-    from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
+def _add_body(plotter: "pv.Plotter", body: Body) -> None:
+    """Put a body on the stage."""
+    import pyvista as pv
 
-    points = vtkPoints()
-    points.SetData(numpy_to_vtk(np.ascontiguousarray(body.vertices_mm, dtype=float), deep=True))
-    cells = vtkCellArray()
-    flat = np.ascontiguousarray(body.triangles.ravel(), dtype=np.int64)
-    cells.SetData(3, numpy_to_vtkIdTypeArray(flat, deep=True))
-    mesh = vtkPolyData()
-    mesh.SetPoints(points)
-    mesh.SetPolys(cells)
-    mapper = vtkPolyDataMapper()
-    mapper.SetInputData(mesh)
-    actor = vtkActor()
-    actor.SetMapper(mapper)
-    style = actor.GetProperty()
-    style.SetColor(*body.colour)
-    style.SetOpacity(body.opacity)
+    mesh = pv.PolyData.from_regular_faces(
+        np.ascontiguousarray(body.vertices_mm, dtype=float), body.triangles
+    )
+    look: dict[str, Any] = {"color": body.colour, "opacity": body.opacity, "lighting": body.shaded}
     if body.shaded:
-        style.SetInterpolationToFlat()
-        style.SetAmbient(0.45)
-        style.SetDiffuse(0.6)
-    else:
-        style.LightingOff()
+        look |= {"interpolation": "flat", "ambient": 0.45, "diffuse": 0.6}
     if body.values is not None and body.scale is not None:
-        values = numpy_to_vtk(np.ascontiguousarray(body.values, dtype=float), deep=True)
-        mesh.GetPointData().SetScalars(values)
-        mapper.SetLookupTable(_lookup(body.scale))
         # VTK lays the first and the last colour half a colour inside the ends of its range
         half = 0.5 * (body.scale.high - body.scale.low) / (LEVELS - 1)
-        mapper.SetScalarRange(body.scale.low - half, body.scale.high + half)
-        mapper.InterpolateScalarsBeforeMappingOn()
-    else:
-        mapper.ScalarVisibilityOff()
-    return actor
+        look |= {
+            "scalars": body.values,
+            "cmap": ListedColormap(colour_table(diverging=body.scale.diverging) / 255.0),
+            "n_colors": LEVELS,
+            "clim": (body.scale.low - half, body.scale.high + half),
+            "interpolate_before_map": True,
+            "show_scalar_bar": False,
+        }
+    plotter.add_mesh(mesh, copy_mesh=False, reset_camera=False, render=False, **look)
 
 
-def _lookup(scale: ColourScale) -> Any:
-    """Give VTK the colours of a scale."""
-    from vtkmodules.util.numpy_support import numpy_to_vtk
-    from vtkmodules.vtkCommonCore import vtkLookupTable
-
-    colours = colour_table(diverging=scale.diverging)
-    opaque = np.column_stack([colours, np.full(len(colours), 255, dtype=np.uint8)])
-    table = vtkLookupTable()
-    table.SetNumberOfTableValues(len(colours))
-    levels: Any = numpy_to_vtk(np.ascontiguousarray(opaque), deep=True)
-    table.SetTable(levels)
-    return table
-
-
-def _add_lights(renderer: Any, projection: Projection) -> None:
+def _add_light(plotter: "pv.Plotter", projection: Projection) -> None:
     """Light machine bodies from above on the left of the viewer."""
-    from vtkmodules.vtkRenderingCore import vtkLight
+    import pyvista as pv
 
-    renderer.AutomaticLightCreationOff()
     direction = projection.towards + 1.1 * projection.up - 0.7 * projection.right
-    light = vtkLight()
-    light.SetLightTypeToSceneLight()
-    light.PositionalOff()
-    light.SetFocalPoint(0.0, 0.0, 0.0)
-    light.SetPosition(*direction)
-    light.SetIntensity(1.0)
-    renderer.AddLight(light)
+    plotter.add_light(
+        pv.Light(position=tuple(direction), focal_point=(0.0, 0.0, 0.0), light_type="scene light")
+    )

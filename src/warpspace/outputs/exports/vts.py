@@ -80,13 +80,11 @@ def build_vts(picture: ScenePicture) -> bytes:
         ``warpspace_json``, UTF-8 text as bytes, with everything else: text arrays are what some
         readers stumble over.
     """
-    import pyvista as pv
     from vtkmodules.vtkIOXML import vtkXMLStructuredGridWriter
 
+    from warpspace.outputs.exports.multiblock import structured_grid
+
     grid, field = picture.grid, picture.field
-    mesh = pv.StructuredGrid()
-    mesh.points = _fortran(grid.nominal_mm)
-    mesh.dimensions = grid.shape
     arrays = {
         "error_um": field.error_um,
         "norm_um": field.norm_um,
@@ -94,9 +92,7 @@ def build_vts(picture: ScenePicture) -> bytes:
         "deformed_mm": picture.drawn_mm,
         "displacement_mm": field.error_um * (picture.exaggeration * MM_PER_UM),
     }
-    for name, values in arrays.items():
-        mesh.point_data[name] = _fortran(values)
-    mesh.point_data.active_scalars_name = "norm_um"
+    mesh = structured_grid(grid.nominal_mm, arrays)
     mesh.point_data.active_vectors_name = "displacement_mm"
     mesh.field_data["exaggeration"] = np.array([picture.exaggeration])
     for key, row in picture.provenance["parameters"].items():
@@ -110,12 +106,6 @@ def build_vts(picture: ScenePicture) -> bytes:
     writer.SetWriteToOutputString(True)
     writer.Write()
     return str(writer.GetOutputString()).encode()
-
-
-def _fortran(values: Array) -> Array:
-    """Order node values as VTK does, the first axis fastest: [n] or [n, 3]."""
-    tail = values.shape[3:]
-    return np.ascontiguousarray(np.swapaxes(values, 0, 2)).reshape(-1, *tail)
 
 
 def load_stored_field(path: str | Path) -> StoredField:

@@ -1,6 +1,5 @@
 """The figures of a report, drawn by name; one that cannot be drawn leaves a note in its place."""
 
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
@@ -159,14 +158,6 @@ class Painter:
 
     def _chart(self, name: str, figure: "Figure", caption: str) -> Picture:
         """Spell a chart as a file."""
-        from warpspace.outputs.charts.paper import style
+        from warpspace.outputs.drawing.encoding import encode_figure
 
-        metadata = (
-            {"Date": None, "Creator": None}
-            if self._form == "svg"
-            else {"CreationDate": None, "Creator": None, "Producer": None}
-        )
-        buffer = io.BytesIO()
-        with style():
-            figure.savefig(buffer, format=self._form, metadata=metadata)  # pyright: ignore[reportArgumentType]
-        return Picture(name, caption, buffer.getvalue(), self._form)
+        return Picture(name, caption, encode_figure(figure, self._form), self._form)

@@ -1,0 +1,152 @@
+"""A scene as PyVista blocks: the numbers of the model, and all that is drawn."""
+
+import re
+import runpy
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista as pv
+
+import warpspace
+from warpspace.bodies.placed import load_bodies
+from warpspace.exceptions import OptionError
+from warpspace.geometry.deform import deform
+from warpspace.outputs.exports import draw_scene
+
+ROOT = Path(__file__).parents[2]
+SCENES = ("dvf5000_first", "teach_wobbling_table", "dvf5000_nominal")
+
+
+def nodes(mesh: pv.StructuredGrid, values: np.ndarray) -> np.ndarray:
+    """Order point values by the axes of the machine, [nx, ny, nz, ...]."""
+    return np.swapaxes(
+        np.asarray(values).reshape(*reversed(mesh.dimensions), *values.shape[1:]), 0, 2
+    )
+
+
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("loop", ["tool", "relative"])
+def test_numbers_are_those_of_evaluate(name: str, loop: str) -> None:
+    scene = warpspace.load_scene(name)
+    field = warpspace.evaluate(scene, grid=5, loop=loop)
+    blocks = warpspace.to_pyvista(scene, grid=5, loop=loop, exaggeration=700)
+    nominal, deformed = blocks["nominal"], blocks["deformed"]
+    assert np.array_equal(nodes(nominal, nominal.points), field.nominal_mm)
+    expected = deform(field.nominal_mm, field.error_um, 700.0)
+    assert nodes(deformed, deformed.points) == pytest.approx(expected, abs=1e-9)
+    for mesh in (nominal, deformed):
+        found = mesh.point_data
+        assert np.array_equal(nodes(mesh, found["error_um"]), field.error_um)
+        assert np.array_equal(nodes(mesh, found["norm_um"]), field.norm_um)
+        assert np.array_equal(nodes(mesh, found["orientation_urad"]), field.orientation_urad)
+        tilt = np.linalg.norm(field.orientation_urad, axis=-1)
+        assert nodes(mesh, found["tilt_urad"]) == pytest.approx(tilt, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("loop", ["tool", "workpiece", "relative"])
+def test_the_parts_add_up_to_the_error(name: str, loop: str) -> None:
+    scene = warpspace.load_scene(name)
+    blocks = warpspace.to_pyvista(scene, grid=4, loop=loop, parts=True)
+    keys = [key for key in scene.errors if scene.errors.amplitude(key) != 0.0]
+    for block in ("deformed", "nominal", "surface"):
+        found = blocks[block].point_data
+        parts = {key: found[key] for key in found if key.startswith("part_")}
+        assert sorted(parts) == sorted(f"part_{key}_um" for key in keys)
+        total = np.sum(list(parts.values()), axis=0)
+        assert np.abs(total - found["error_um"]).max() < 1e-9
+
+
+def test_parts_are_given_on_request_only() -> None:
+    blocks = warpspace.to_pyvista(warpspace.load_scene("dvf5000_first"), grid=3)
+    assert [key for key in blocks["deformed"].point_data if key.startswith("part_")] == []
+
+
+def test_the_surface_is_the_outside_of_the_deformed_volume() -> None:
+    blocks = warpspace.to_pyvista(warpspace.load_scene("dvf5000_first"), grid=5)
+    surface, volume = blocks["surface"], blocks["deformed"]
+    assert surface.n_points == 5**3 - 3**3
+    assert surface.volume == pytest.approx(volume.volume, rel=1e-3)
+    at = [volume.find_closest_point(point) for point in surface.points]
+    assert np.array_equal(surface.points, volume.points[at])
+    assert np.array_equal(surface.point_data["error_um"], volume.point_data["error_um"][at])
+
+
+def test_traces_and_bodies_are_there() -> None:
+    scene = warpspace.load_scene("dvf5000_first")
+    drawing = draw_scene(scene, exaggeration="auto")
+    blocks = warpspace.to_pyvista(scene, grid=3)
+    traces = blocks["traces"]
+    assert len(traces) == 2 * len(drawing.traces) > 0
+    for number, drawn in enumerate(drawing.traces):
+        nominal, actual = traces[2 * number], traces[2 * number + 1]
+        names = traces.keys()[2 * number : 2 * number + 2]
+        assert [name.split()[0] for name in names] == ["nominal", "actual"]
+        assert all(name.endswith(drawn.trace.label) for name in names)
+        assert np.allclose(nominal.points, drawn.nominal_mm)
+        assert np.array_equal(actual.point_data["error_um"], drawn.error_um)
+        shift = deform(drawn.nominal_mm, drawn.error_um, drawing.exaggeration)
+        assert np.allclose(actual.points, shift)
+    bodies = load_bodies(scene.machine)
+    assert blocks["bodies"].keys() == [body.name for body in bodies]
+    for body, mesh in zip(bodies, blocks["bodies"], strict=True):
+        assert mesh.n_cells == len(body.triangles)
+        assert (mesh.cell_data["colour"] == body.colour).all()
+
+
+def test_the_field_data_say_what_it_is() -> None:
+    scene = warpspace.load_scene("dvf5000_first")
+    said = warpspace.to_pyvista(scene, grid=3).field_data
+    assert said["exaggeration"][0] == draw_scene(scene, exaggeration="auto").exaggeration
+    assert said["scene"][0] == "dvf5000_first"
+    assert said["program"][0] == f"warpspace {warpspace.__version__}"
+
+
+def test_impossible_choices_are_refused() -> None:
+    scene = warpspace.load_scene("dvf5000_first")
+    with pytest.raises(OptionError, match="loop 'tol'"):
+        warpspace.to_pyvista(scene, loop="tol")
+    with pytest.raises(OptionError, match="exaggeration -1"):
+        warpspace.to_pyvista(scene, exaggeration=-1.0)
+
+
+@pytest.mark.render
+@pytest.mark.usefixtures("renderer")
+def test_every_block_can_be_drawn() -> None:
+    blocks = warpspace.to_pyvista(warpspace.load_scene("dvf5000_first"), grid=5)
+    for name in blocks.keys():  # noqa: SIM118 - iterating gives the blocks
+        plotter = pv.Plotter(off_screen=True, window_size=[200, 150])
+        look = {"scalars": "colour", "rgb": True} if name == "bodies" else {}
+        plotter.add_mesh(blocks[name], **look)
+        picture = plotter.screenshot(return_img=True)
+        plotter.close()
+        assert np.ptp(picture) > 50, name
+
+
+@pytest.mark.render
+@pytest.mark.usefixtures("renderer")
+def test_the_example_draws(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    target = tmp_path / "own.png"
+    monkeypatch.setattr(sys, "argv", ["own_plotter", str(target)])
+    runpy.run_path(str(ROOT / "examples" / "own_plotter.py"), run_name="__main__")
+    assert target.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.render
+@pytest.mark.usefixtures("renderer")
+def test_the_documented_lines_draw(monkeypatch: pytest.MonkeyPatch) -> None:
+    pictures: list[np.ndarray] = []
+
+    def show(plotter: pv.Plotter) -> None:
+        pictures.append(plotter.screenshot(return_img=True))
+        plotter.close()
+
+    monkeypatch.setattr(pv, "OFF_SCREEN", True)
+    monkeypatch.setattr(pv.Plotter, "show", show)
+    page = (ROOT / "docs" / "pyvista.md").read_text("utf-8")
+    lines = re.findall(r"```python\n(.*?)```", page, re.DOTALL)[0]
+    exec(lines, {})
+    (picture,) = pictures
+    assert np.ptp(picture) > 50
