@@ -113,7 +113,7 @@ def test_the_page_of_a_difference_names_what_is_unlike_on_both_sides() -> None:
     other = with_choice(with_pin(START), "component_errors=before_motion").with_loop("relative")
     page = build_offline_html(picture_of("difference", other))
     assert "relative − tool loop" in page
-    assert "component errors in fixed directions − component errors ride" in page
+    assert "component errors before the motion − component errors after the motion" in page
 
 
 def test_pictures_of_the_view_carry_the_title_of_what_is_drawn() -> None:
@@ -162,7 +162,9 @@ def test_glb_has_the_tilts_and_the_range_that_are_coloured(top: float | None) ->
     }
     request = build_request(picture)
     drawing = evaluate_picture(request.scene, grid=request.nodes, loop=request.loop)
-    np.testing.assert_allclose(replace(drawing, tilts=True).values, picture.values, atol=1e-9)
+    np.testing.assert_allclose(
+        replace(drawing, quantity="orientation").values, picture.values, atol=1e-9
+    )
     assert exported_words(picture).startswith("The figure shows the tilts")
 
 

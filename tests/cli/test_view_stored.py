@@ -17,5 +17,5 @@ def test_stored_field_is_shown_with_its_settings_and_its_errors(tmp_path):
     assert (state.loop, state.nodes, state.notes) == ("relative", 11, ())
     stored = load_stored_field(path)
     assert state.exaggeration == stored.picture.exaggeration
-    shown = LiveModel().frame(state).field.error_um
+    shown = LiveModel().evaluate(state).field.error_um
     np.testing.assert_allclose(shown, stored.field.error_um, atol=1e-12)

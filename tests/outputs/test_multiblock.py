@@ -13,7 +13,8 @@ import warpspace
 from warpspace.bodies.placed import load_bodies
 from warpspace.exceptions import OptionError
 from warpspace.geometry.deform import deform
-from warpspace.outputs.exports import draw_scene
+from warpspace.picture.scene_picture import evaluate_picture
+from warpspace.picture.traces import trace_lines
 
 ROOT = Path(__file__).parents[2]
 SCENES = ("dvf5000_first", "teach_wobbling_table", "dvf5000_nominal")
@@ -76,11 +77,11 @@ def test_the_surface_is_the_outside_of_the_deformed_volume() -> None:
 
 def test_traces_and_bodies_are_there() -> None:
     scene = warpspace.load_scene("dvf5000_first")
-    drawing = draw_scene(scene, exaggeration="auto")
+    drawing = evaluate_picture(scene, exaggeration="auto")
     blocks = warpspace.to_pyvista(scene, grid=3)
-    traces = blocks["traces"]
-    assert len(traces) == 2 * len(drawing.traces) > 0
-    for number, drawn in enumerate(drawing.traces):
+    traces, lines = blocks["traces"], trace_lines(drawing.traces)
+    assert len(traces) == 2 * len(lines) > 0
+    for number, drawn in enumerate(lines):
         nominal, actual = traces[2 * number], traces[2 * number + 1]
         names = traces.keys()[2 * number : 2 * number + 2]
         assert [name.split()[0] for name in names] == ["nominal", "actual"]
@@ -99,7 +100,7 @@ def test_traces_and_bodies_are_there() -> None:
 def test_the_field_data_say_what_it_is() -> None:
     scene = warpspace.load_scene("dvf5000_first")
     said = warpspace.to_pyvista(scene, grid=3).field_data
-    assert said["exaggeration"][0] == draw_scene(scene, exaggeration="auto").exaggeration
+    assert said["exaggeration"][0] == evaluate_picture(scene, exaggeration="auto").exaggeration
     assert said["scene"][0] == "dvf5000_first"
     assert said["program"][0] == f"warpspace {warpspace.__version__}"
 
