@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from warpspace.outputs.figures.catalogue import FIGURES
+from warpspace.outputs.figures.catalogue import figure_kinds
 
+FIGURES = tuple(kind.name for kind in figure_kinds())
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SCRIPTS = sorted(p.stem for p in EXAMPLES.glob("*.py") if "write_figure(" in p.read_text("utf-8"))
 

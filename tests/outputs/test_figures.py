@@ -13,10 +13,12 @@ from warpspace import load_scene, scene_names
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.outputs.drawing.content import Drawing
 from warpspace.outputs.drawing.settings import FigureSettings
-from warpspace.outputs.figures.catalogue import FIGURES, draw_figure
+from warpspace.outputs.figures.catalogue import draw_figure, figure_kinds
 from warpspace.outputs.save import figure_bytes, render_figure, write_figure
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import Scene
+
+FIGURES = tuple(kind.name for kind in figure_kinds())
 
 pytestmark = [pytest.mark.render, pytest.mark.usefixtures("renderer")]
 

@@ -1,48 +1,145 @@
-"""The figures there are, by name."""
+"""The figures there are: one entry here, and one module that draws it."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from importlib import import_module
-from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from warpspace.exceptions import OptionError, UnknownNameError
-from warpspace.outputs.drawing.content import Drawing
-from warpspace.outputs.drawing.settings import FigureSettings
-from warpspace.scene.model import Scene
+from warpspace.plugins import load_plugins
 
-Builder = Callable[..., Drawing]
-_HOMES = MappingProxyType(
-    {
-        "error-map": ("warpspace.outputs.figures.error_map", "draw_error_map"),
-        "slices": ("warpspace.outputs.figures.slices", "draw_slices"),
-        "orientation-map": ("warpspace.outputs.figures.orientation", "draw_orientation"),
-        "machine": ("warpspace.outputs.figures.machine", "draw_machine"),
-        "traces": ("warpspace.outputs.figures.traces", "draw_traces"),
-        "error-curves": ("warpspace.outputs.figures.curves", "draw_curves"),
-        "gains": ("warpspace.outputs.figures.charts", "draw_gains"),
-        "montecarlo": ("warpspace.outputs.figures.charts", "draw_montecarlo"),
-        "ballbar": ("warpspace.outputs.figures.charts", "draw_ballbar"),
-        "comparison": ("warpspace.outputs.figures.comparison", "draw_comparison"),
-    }
-)
-FIGURES = tuple(_HOMES)
-"""Names of the figures."""
-PAIRS = ("comparison",)
-"""Figures of two scenes."""
+if TYPE_CHECKING:
+    from warpspace.outputs.drawing.content import Drawing
+    from warpspace.outputs.drawing.settings import FigureSettings
+    from warpspace.scene.model import Scene
+
+Draw = Callable[..., "Drawing"]
+"""Takes scenes, settings and the keyword `exact`; gives the drawing."""
+
+
+@dataclass(frozen=True, slots=True)
+class FigureKind:
+    """A kind of figure.
+
+    Attributes
+    ----------
+    name : str
+        As it is asked for.
+    caption : str
+        What it shows, one sentence: help of the command line, list of the app, report.
+    draw : str or callable
+        ``"module:function"``, imported when it is drawn, or the function itself.
+    scenes : int
+        How many scenes it is drawn from.
+    evidence : bool
+        Whether a report shows it after the error map of a scene.
+    """
+
+    name: str
+    caption: str
+    draw: str | Draw
+    scenes: int = 1
+    evidence: bool = False
+
+    def load(self) -> Draw:
+        """Give the function that draws it."""
+        if callable(self.draw):
+            return self.draw
+        module, _, function = self.draw.partition(":")
+        return getattr(import_module(module), function)
+
+
+_HERE = "warpspace.outputs.figures"
+_KINDS: dict[str, FigureKind] = {}
+
+
+def register_figure(kind: FigureKind) -> None:
+    """Add a kind of figure; it then appears on the command line, in the app and in reports."""
+    if kind.name in _KINDS:
+        raise OptionError(f"figure {kind.name!r} is there already")
+    _KINDS[kind.name] = kind
+
+
+def unregister_figure(name: str) -> None:
+    """Take a kind of figure away again."""
+    del _KINDS[name]
+
+
+def figure_kinds() -> tuple[FigureKind, ...]:
+    """List the kinds of figures."""
+    load_plugins()
+    return tuple(_KINDS.values())
+
+
+def figure_names(scenes: int = 1) -> tuple[str, ...]:
+    """List the names of the figures that are drawn from so many scenes."""
+    return tuple(kind.name for kind in figure_kinds() if kind.scenes == scenes)
+
+
+for _kind in (
+    FigureKind(
+        "error-map", "The bent working volume, coloured.", f"{_HERE}.error_map:draw_error_map"
+    ),
+    FigureKind(
+        "slices",
+        "Three slices through the working volume.",
+        f"{_HERE}.slices:draw_slices",
+        evidence=True,
+    ),
+    FigureKind(
+        "orientation-map",
+        "Orientation error of the tool axis.",
+        f"{_HERE}.orientation:draw_orientation",
+        evidence=True,
+    ),
+    FigureKind(
+        "error-curves",
+        "Errors along each axis, with their tolerance bands.",
+        f"{_HERE}.curves:draw_curves",
+        evidence=True,
+    ),
+    FigureKind(
+        "traces",
+        "Traces of the rotary table, nominal and actual.",
+        f"{_HERE}.traces:draw_traces",
+        evidence=True,
+    ),
+    FigureKind(
+        "machine",
+        "The machine with its bent bodies.",
+        f"{_HERE}.machine:draw_machine",
+        evidence=True,
+    ),
+    FigureKind("gains", "Largest error gains over the travel.", f"{_HERE}.charts:draw_gains"),
+    FigureKind(
+        "montecarlo",
+        "Volumetric error of machines within tolerance.",
+        f"{_HERE}.charts:draw_montecarlo",
+    ),
+    FigureKind("ballbar", "Circular test, ISO 230-4.", f"{_HERE}.charts:draw_ballbar"),
+    FigureKind(
+        "comparison",
+        "Two scenes and their difference.",
+        f"{_HERE}.comparison:draw_comparison",
+        scenes=2,
+    ),
+):
+    register_figure(_kind)
 
 
 def draw_figure(
     name: str,
-    scenes: Sequence[Scene],
-    settings: FigureSettings | None = None,
+    scenes: "Sequence[Scene]",
+    settings: "FigureSettings | None" = None,
     *,
     exact: bool = True,
-) -> Drawing:
+) -> "Drawing":
     """Draw a figure by its name.
 
     Parameters
     ----------
     name : str
-        One of `FIGURES`.
+        One of `figure_kinds`.
     scenes : sequence of Scene
         One; two for a comparison.
     settings : FigureSettings, optional
@@ -58,12 +155,13 @@ def draw_figure(
     UnknownNameError, OptionError
         If there is no such figure, or it needs another number of scenes.
     """
-    if name not in _HOMES:
-        raise UnknownNameError("figure", name, FIGURES)
-    needed = 2 if name in PAIRS else 1
-    if len(scenes) != needed:
-        words = "one scene" if needed == 1 else "two scenes"
+    from warpspace.outputs.drawing.settings import FigureSettings
+
+    load_plugins()
+    kind = _KINDS.get(name)
+    if kind is None:
+        raise UnknownNameError("figure", name, tuple(_KINDS))
+    if len(scenes) != kind.scenes:
+        words = "one scene" if kind.scenes == 1 else "two scenes"
         raise OptionError(f"figure {name!r} is drawn from {words}; given {len(scenes)}")
-    module, function = _HOMES[name]
-    builder: Builder = getattr(import_module(module), function)
-    return builder(scenes, settings or FigureSettings(), exact=exact)
+    return kind.load()(scenes, settings or FigureSettings(), exact=exact)

@@ -1,12 +1,12 @@
 """The figures of a report, drawn by name; one that cannot be drawn leaves a note in its place."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from warpspace.analysis.gains import DEFAULT_SHARE
 from warpspace.exceptions import WarpspaceError
+from warpspace.outputs.figures.catalogue import figure_kinds
 from warpspace.outputs.report.blocks import Block, Picture, Text
 from warpspace.outputs.report.review import Review, Reviewed
 from warpspace.outputs.report.wording import factor_words
@@ -18,16 +18,6 @@ if TYPE_CHECKING:
 
     from warpspace.outputs.worker import FigureWorker
 
-MAPS: Mapping[str, str] = MappingProxyType(
-    {
-        "slices": "Three slices through the working volume.",
-        "orientation-map": "Orientation error of the tool axis.",
-        "error-curves": "Errors along each axis, with their tolerance bands.",
-        "traces": "Traces of the rotary table, nominal and actual.",
-        "machine": "The machine with its bent bodies.",
-    }
-)
-"""Figures of one scene that follow its error map, where the catalogue has them."""
 MOST_GAINS = 20
 PAPER_SHARE = 0.87
 """Width of a map among the evidence: two of them then stand on a page."""
@@ -65,16 +55,16 @@ class Painter:
     @property
     def _compares(self) -> bool:
         """Whether two scenes are drawn beside each other on the page read first."""
-        return len(self._review.scenes) == 2 and self._has("comparison")
+        return len(self._review.scenes) == 2
 
     def evidence(self, reviewed: Reviewed) -> list[Block]:
         """Draw the maps of one scene: its error map and whatever else the catalogue has."""
         scene = reviewed.scene
         left_out = self._left_out(reviewed)
         wanted = [
-            (name, caption)
-            for name, caption in MAPS.items()
-            if name not in left_out and self._has(name)
+            (kind.name, kind.caption)
+            for kind in figure_kinds()
+            if kind.evidence and kind.name not in left_out
         ]
         found: list[Block] = []
         if reviewed is not self._review.scenes[0] or self._compares:
@@ -136,13 +126,6 @@ class Painter:
         """Caption of an error map."""
         own = "; colour scale of its own" if len(self._review.scenes) == 2 else ""
         return f"Error map of {scene.title}; {factor_words(self._review.exaggeration)}{own}."
-
-    @staticmethod
-    def _has(name: str) -> bool:
-        """Tell whether the catalogue has a figure."""
-        from warpspace.outputs.figures.catalogue import FIGURES
-
-        return name in FIGURES
 
     def _map(self, name: str, scenes: Sequence[Scene], caption: str, width: float = 1.0) -> Picture:
         """Draw a figure of the catalogue."""

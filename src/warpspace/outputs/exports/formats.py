@@ -1,0 +1,101 @@
+"""The formats there are for exports: one entry here, and one module that writes it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from warpspace.exceptions import OptionError
+from warpspace.plugins import load_plugins
+
+if TYPE_CHECKING:
+    from warpspace.picture.scene_picture import ScenePicture
+
+Write = Callable[..., None]
+"""Takes a picture, a path and the keyword `overwrite`."""
+
+
+@dataclass(frozen=True, slots=True)
+class ExportFormat:
+    """A format of exports.
+
+    Attributes
+    ----------
+    ending : str
+        Of its files, for instance ".glb".
+    about : str
+        What it is for, a few words: help of the command line, buttons of the app.
+    write : str or callable
+        ``"module:function"``, imported when it is written, or the function itself.
+    in_app : bool
+        Whether the app offers it.
+    """
+
+    ending: str
+    about: str
+    write: str | Write
+    in_app: bool = True
+
+    def load(self) -> Write:
+        """Give the function that writes it."""
+        if callable(self.write):
+            return self.write
+        module, _, function = self.write.partition(":")
+        return getattr(import_module(module), function)
+
+
+_FORMATS: dict[str, ExportFormat] = {}
+
+
+def register_format(form: ExportFormat) -> None:
+    """Add a format; it then appears on the command line and in the app."""
+    if form.ending in _FORMATS:
+        raise OptionError(f"export format {form.ending!r} is there already")
+    _FORMATS[form.ending] = form
+
+
+def unregister_format(ending: str) -> None:
+    """Take a format away again."""
+    del _FORMATS[ending]
+
+
+def export_formats() -> tuple[ExportFormat, ...]:
+    """List the formats."""
+    load_plugins()
+    return tuple(_FORMATS.values())
+
+
+_HERE = "warpspace.outputs.exports"
+for _form in (
+    ExportFormat(".glb", "3-D viewers, CAD", f"{_HERE}.glb:write_glb"),
+    ExportFormat(".vts", "ParaView", f"{_HERE}.vts:write_vts"),
+    ExportFormat(".csv", "the field", f"{_HERE}.table:write_csv"),
+):
+    register_format(_form)
+
+
+def write_export(picture: "ScenePicture", path: Path, *, overwrite: bool = True) -> None:
+    """Write a picture in the format that the ending of a path names.
+
+    Parameters
+    ----------
+    picture : ScenePicture
+    path : Path
+    overwrite : bool, optional
+        Whether an existing file may be replaced.
+
+    Raises
+    ------
+    OptionError
+        If there is no such format.
+    OutputError
+        If the file cannot be written.
+    """
+    load_plugins()
+    form = _FORMATS.get(path.suffix.lower())
+    if form is None:
+        raise OptionError(
+            f"{path.name}: no export format {path.suffix!r}; expected one of {', '.join(_FORMATS)}"
+        )
+    form.load()(picture, path, overwrite=overwrite)
