@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from cli.conftest import Command
-from warpspace.cli.snapshot import FIGURES
+from warpspace.cli.commands.snapshot import FIGURES
 from warpspace.outputs.figures import catalogue
 
 SMALL = ("--size", "400x300", "--grid", "3")
