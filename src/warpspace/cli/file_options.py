@@ -1,10 +1,13 @@
 """Options of the commands that write files, and the checks before the work begins."""
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
+
+from warpspace.cli.options import Decorator
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 force_option = click.option("--force", is_flag=True, help="Replace FILE where it exists.")
 csv_option = click.option(
@@ -12,14 +15,14 @@ csv_option = click.option(
 )
 
 
-def output_option(help_text: str, *, required: bool = True) -> Callable[..., Any]:
+def output_option(help_text: str, *, required: bool = True) -> Decorator:
     """Add the option --output."""
     return click.option(
         "-o", "--output", metavar="FILE", required=required, type=click.Path(), help=help_text
     )
 
 
-def plot_option(what: str) -> Callable[..., Any]:
+def plot_option(what: str) -> Decorator:
     """Add the option --plot: a chart beside the numbers."""
     return click.option(
         "--plot", type=click.Path(), help=f"Draw the {what} into this file: .png, .svg or .pdf."
@@ -44,6 +47,6 @@ def check_targets(*, plot: str | None = None, csv_path: str | None = None) -> No
         check_target(csv_path, (".csv",))
 
 
-def size_text(path: Path) -> str:
+def size_text(path: "Path") -> str:
     """Spell the size of a file."""
     return f"{path.stat().st_size / 1e6:.2f} MB"

@@ -4,7 +4,7 @@ Nothing is shown where stderr is no terminal, or where a program reads the outpu
 """
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from threading import Lock, Timer
 from typing import TYPE_CHECKING
@@ -82,7 +82,7 @@ class ProgressBar:
 @contextmanager
 def progress(
     doing: str, total: float | None = None, unit: str = "", *, silent: bool = False
-) -> Iterator[ProgressBar]:
+) -> Generator[ProgressBar]:
     """Show how far some work is.
 
     Parameters

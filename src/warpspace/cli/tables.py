@@ -6,11 +6,9 @@ its first columns repeated, so that no number is cut and nothing is left out.
 """
 
 import io
-import shutil
 import sys
-import textwrap
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import click
 
@@ -21,8 +19,7 @@ READABLE = 20
 Row = Sequence[str]
 
 
-@dataclass(frozen=True)
-class Column:
+class Column(NamedTuple):
     """One column of a table.
 
     Parameters
@@ -64,6 +61,8 @@ def number_columns(headings: Iterable[str], unit: str = "") -> list[Column]:
 
 def output_width() -> int:
     """Give the width to print in, in characters."""
+    import shutil
+
     return shutil.get_terminal_size((WIDTH_ELSEWHERE, 24)).columns
 
 
@@ -75,6 +74,8 @@ def print_text(text: str) -> None:
     text : str
         The blanks it begins with stand before every line; lines after the first get two more.
     """
+    import textwrap
+
     indent = text[: len(text) - len(text.lstrip(" "))]
     lines = textwrap.wrap(
         text.strip(),
@@ -99,6 +100,8 @@ def print_table(columns: Sequence[Column], rows: Sequence[Row], indent: int = 2)
     indent : int, optional
         Blanks before each line.
     """
+    from textwrap import indent as indented
+
     room = output_width() - indent
     sizes = [_measure(column, [row[i] for row in rows]) for i, column in enumerate(columns)]
     for number, part in enumerate(_split(columns, [size.readable for size in sizes], room)):
@@ -112,11 +115,10 @@ def print_table(columns: Sequence[Column], rows: Sequence[Row], indent: int = 2)
         gap = 2 if sum(sizes[index].natural for index in part) + 2 * gaps <= room else 1
         width = max(room, sum(sizes[index].least for index in part) + gap * gaps)
         drawn = _draw([columns[index] for index in part], cells, gap, width)
-        click.echo(textwrap.indent(drawn, " " * indent))
+        click.echo(indented(drawn, " " * indent))
 
 
-@dataclass(frozen=True)
-class _Size:
+class _Size(NamedTuple):
     """Widths of a column, in characters: none of its words cut, pleasant to read, none wrapped."""
 
     least: int

@@ -26,8 +26,8 @@ def compare(
 ) -> None:
     """Compare the errors of two scenes; the difference is B − A.
 
-    They are compared node by node, so that both must have the same working volume. With -o both and the difference are drawn on one sheet,
-    with one colour scale and one exaggeration.
+    They are compared node by node, so that both must have the same working volume. With -o both and
+    the difference are drawn on one sheet, with one colour scale and one exaggeration.
     """
     from warpspace.outputs.drawing.style import FIGURE_ENDINGS
     from warpspace.outputs.files import check_target

@@ -94,7 +94,7 @@ def contributions(
 def _print(rows: "Sequence[Contribution]") -> None:
     """Print the shares, and the Sobol indices where they were asked for."""
     with_sobol = any(row.sobol_total is not None for row in rows)
-    sobol = number_columns(("Sobol first", "total", "±")) if with_sobol else []
+    sobol = number_columns(("Sobol first", "total", "± (95 %)")) if with_sobol else ()
     columns = (
         Column("key", leads=True),
         Column("half width", is_number=True),

@@ -39,8 +39,8 @@ def export(
 ) -> None:
     """Write SCENE into a file for other programs.
 
-    The ending of FILE chooses the format. Every format carries the scene, the settings, the display factor and the program's version.
-    `warpspace view FILE.vts` shows a stored field again.
+    The ending of FILE chooses the format. Every format carries the scene, the settings, the display
+    factor and the program's version. `warpspace view FILE.vts` shows a stored field again.
     """
     from warpspace.cli.exports import write_export
     from warpspace.outputs.files import check_target

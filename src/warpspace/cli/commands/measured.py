@@ -33,9 +33,9 @@ def measured(
 ) -> None:
     """Set the errors of each SCENE against its tolerances.
 
-    O marks an error that keeps its tolerance, X one that does not. Beside the
-    predicted error stands what the LaserTRACER gave, for the machines of the thesis. The shear is
-    that of the best affine fit to the predicted map: which plane became a rhombus.
+    O marks an error that keeps its tolerance, X one that does not. Beside the predicted error
+    stands what the LaserTRACER gave, for the machines of the thesis. The shear is that of the best
+    affine fit to the predicted map: which plane became a rhombus.
     """
     from warpspace.scene import verbs
     from warpspace.scene.library import load_scene

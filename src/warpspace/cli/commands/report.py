@@ -45,8 +45,9 @@ def report(
 ) -> None:
     """Write the design review of one SCENE or two.
 
-    Two stand side by side. First a page with the verdict, then the evidence: maps, contributions at the worst point, errors
-    and tolerances, gains, Monte Carlo, conventions and provenance. The file needs no network.
+    Two stand side by side. First a page with the verdict, then the evidence: maps, contributions at
+    the worst point, errors and tolerances, gains, Monte Carlo, conventions and provenance. The file
+    needs no network.
     """
     from warpspace.cli.exports import embed_view
     from warpspace.exceptions import OptionError

@@ -6,7 +6,7 @@ import click
 
 from warpspace.cli.options import json_option, print_json
 from warpspace.cli.progress import progress
-from warpspace.cli.tables import Column, number_columns, print_table, print_text
+from warpspace.cli.tables import Column, print_table, print_text
 
 if TYPE_CHECKING:
     from warpspace.analysis.thesis import Hypothesis, Row
@@ -74,7 +74,8 @@ def _print(rows: "tuple[Row, ...]") -> None:
     columns = (
         Column(leads=True),
         Column("quantity", wraps=True, leads=True),
-        *number_columns(("printed", "ours")),
+        Column("printed", is_number=True, wraps=True),
+        Column("ours", is_number=True, wraps=True, joins=True),
         Column("unit"),
     )
     for source in dict.fromkeys(row.source for row in rows):
