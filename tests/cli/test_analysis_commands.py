@@ -34,7 +34,8 @@ def test_gains_json_has_the_keys_of_the_contract(warpspace) -> None:
     assert len(rows) == 21
 
 
-def test_gains_text_explains_the_lever_and_marks_key_errors(warpspace) -> None:
+def test_gains_text_explains_the_lever_and_marks_key_errors(warpspace, monkeypatch) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
     out = warpspace("gains", "dvf5000_general", "--at", "Y=-225,Z=-480").out
     line = next(line for line in out.splitlines() if "EA0Z" in line)
     assert line.startswith("  *")

@@ -6,10 +6,13 @@ import re
 import subprocess
 import sys
 from collections import Counter
+from functools import cache
 
 import pytest
 
+from warpspace.analysis import thesis as analysis_thesis
 from warpspace.cli.tables import Column, number_columns, print_table, print_text
+from warpspace.scene import verbs
 
 AT = ("--at", "X=0,Y=-225,Z=-480", "--at", "X=10.5,B=-30.123456")
 COMMANDS = {
@@ -37,6 +40,8 @@ def numbers(text: str) -> Counter[str]:
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_output_fits_and_has_every_number(warpspace, monkeypatch, name: str) -> None:
+    for function in ((verbs, "thesis"), (analysis_thesis, "thesis_hypotheses")):
+        monkeypatch.setattr(*function, cache(getattr(*function)))  # computed once for all widths
     monkeypatch.setenv("COLUMNS", "1000")
     whole = warpspace(*COMMANDS[name]).out
     for width in (60, 80):
