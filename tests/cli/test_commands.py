@@ -147,7 +147,8 @@ def test_check_remarks_on_a_volume_beyond_the_travel(tmp_path: Path, warpspace) 
     assert "workspace.Z -600 … 0 mm reaches beyond the travel -480 … 0 mm" in result.out
 
 
-def test_scenes_lists_every_bundled_scene_with_its_title(warpspace) -> None:
+def test_scenes_lists_every_bundled_scene_with_its_title(warpspace, monkeypatch) -> None:
+    monkeypatch.setenv("COLUMNS", "120")
     found = only_object(warpspace("scenes", "--json").out)
     assert [row["name"] for row in found["scenes"]] == list(scene_names())
     text = warpspace("scenes").out

@@ -140,6 +140,14 @@ def test_sentences_wrap_below_their_beginning(capsys, monkeypatch) -> None:
     assert out.splitlines() == ["  mean 31.27, RMS 32.15,", "    max 51.72 µm"]
 
 
+def test_a_number_stays_with_its_unit_and_an_axis_with_its_position(capsys, monkeypatch) -> None:
+    monkeypatch.setenv("COLUMNS", "21")
+    print_text("largest error 51.72 µm at X 100, Y -20")
+    assert capsys.readouterr().out.splitlines() == [
+        *("largest error", "  51.72 µm at X 100,", "  Y -20")
+    ]
+
+
 def in_terminal(width: int, *arguments: str, **environment: str) -> tuple[int, str]:
     """Run the command in a pseudo-terminal of a width; its status and what the terminal gets."""
     fcntl, pty, struct, termios = map(pytest.importorskip, ("fcntl", "pty", "struct", "termios"))

@@ -6,6 +6,7 @@ its first columns repeated, so that no number is cut and nothing is left out.
 """
 
 import io
+import re
 import sys
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
@@ -17,6 +18,8 @@ WIDTH_ELSEWHERE = 80
 READABLE = 20
 """Characters in a line that a column of words has before others go on below."""
 Row = Sequence[str]
+_TOGETHER = re.compile(r"(?<=\d) (?=[µm°%])|(?<= [A-Z]) (?=[-+\d])")
+"""Blanks that no line ends with: between a number and its unit, an axis and its position."""
 
 
 class Column(NamedTuple):
@@ -78,14 +81,14 @@ def print_text(text: str) -> None:
 
     indent = text[: len(text) - len(text.lstrip(" "))]
     lines = textwrap.wrap(
-        text.strip(),
+        _TOGETHER.sub("\N{NO-BREAK SPACE}", text.strip()),
         max(output_width(), 20),
         initial_indent=indent,
         subsequent_indent=f"{indent}  ",
         break_long_words=False,
         break_on_hyphens=False,
     )
-    click.echo("\n".join(lines))
+    click.echo("\n".join(lines).replace("\N{NO-BREAK SPACE}", " "))
 
 
 def print_table(columns: Sequence[Column], rows: Sequence[Row], indent: int = 2) -> None:
