@@ -34,12 +34,13 @@ def test_gains_json_has_the_keys_of_the_contract(warpspace) -> None:
     assert len(rows) == 21
 
 
-def test_gains_text_explains_the_lever_and_marks_key_errors(warpspace) -> None:
+def test_gains_text_explains_the_lever_and_marks_key_errors(warpspace, monkeypatch) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
     out = warpspace("gains", "dvf5000_general", "--at", "Y=-225,Z=-480").out
     line = next(line for line in out.splitlines() if "EA0Z" in line)
     assert line.startswith("  *")
     assert "-1440 mm = -480 Z motion -810 S -150 t" in line
-    assert sum(" key " in line for line in out.splitlines()[2:-1]) == 7
+    assert sum(" key " in line for line in out.splitlines()[3:-1]) == 7
 
 
 def test_gains_csv(warpspace, tmp_path: Path) -> None:
@@ -104,7 +105,8 @@ def test_ballbar_json_has_the_keys_of_the_contract(warpspace) -> None:
     assert len(found["radial_um"]) == 360
 
 
-def test_ballbar_takes_a_centre(warpspace) -> None:
+def test_ballbar_takes_a_centre(warpspace, monkeypatch) -> None:
+    monkeypatch.setenv("COLUMNS", "120")
     result = warpspace(
         *("ballbar", "dvf5000_first", "--plane", "XZ", "--radius", "50", "--center", "X=100,Z=-200")
     )

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -79,7 +80,10 @@ def test_field_options_mean_what_the_python_function_means(
 def test_field_lists_points_with_units_and_says_when_there_are_more(warpspace) -> None:
     points = [option for x in range(25) for option in ("--at", f"X={x}")]
     result = warpspace("field", "dvf5000_first", *points)
-    assert result.out.count("|E|") == 20
+    first = result.out.partition("tilt")[0]
+    rows = re.findall(r"^ +(\d+) +(\d+) +.*\+\d+\.\d{3}", first, re.MULTILINE)
+    assert rows == [(str(x + 1), str(x)) for x in range(20)]
+    assert "|E|" in result.out
     assert "µm" in result.out
     assert "µrad" in result.out
     assert "5 more" in result.out
@@ -143,7 +147,8 @@ def test_check_remarks_on_a_volume_beyond_the_travel(tmp_path: Path, warpspace) 
     assert "workspace.Z -600 … 0 mm reaches beyond the travel -480 … 0 mm" in result.out
 
 
-def test_scenes_lists_every_bundled_scene_with_its_title(warpspace) -> None:
+def test_scenes_lists_every_bundled_scene_with_its_title(warpspace, monkeypatch) -> None:
+    monkeypatch.setenv("COLUMNS", "120")
     found = only_object(warpspace("scenes", "--json").out)
     assert [row["name"] for row in found["scenes"]] == list(scene_names())
     text = warpspace("scenes").out

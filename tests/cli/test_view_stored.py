@@ -4,8 +4,8 @@ import numpy as np
 from click.testing import CliRunner
 
 from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.cli.commands.view import _stored_start
 from warpspace.cli.main import cli
-from warpspace.cli.view import _stored_start
 from warpspace.outputs.exports import load_stored_field
 
 

@@ -265,7 +265,7 @@ def test_full_disk_gives_one_message(ending: str, renderer: str, tmp_path: Path)
 @pytest.mark.browser
 @pytest.mark.render
 def test_page_opens_without_network_and_draws(browser: "Browser", renderer, tmp_path) -> None:
-    from warpspace.cli.report import embed_view
+    from warpspace.cli.exports import embed_view
 
     path = tmp_path / "report.html"
     scene = replace(load_scene("dvf5000_first"), title=EVIL)

@@ -1,5 +1,6 @@
-"""The command line. Each command imports what it needs when it runs, so that help is instant."""
+"""The command line: the commands, and the options, tables and progress bars they share."""
 
 from warpspace.cli.main import main
+from warpspace.cli.registry import register_command
 
-__all__ = ["main"]
+__all__ = ["main", "register_command"]

@@ -1,43 +1,62 @@
 """Options of the commands that draw maps."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from warpspace.cli.options import COMPONENTS, loop_option
-from warpspace.cli.targets import exaggeration_option, force_option, parse_exaggeration
+from warpspace.cli.file_options import force_option
+from warpspace.cli.options import (
+    Decorator,
+    component_option,
+    exaggeration_option,
+    grid_option,
+    loop_option,
+    parse_exaggeration,
+)
+from warpspace.cli.progress import progress
 from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from warpspace.outputs.drawing.settings import FigureSettings
+    from warpspace.scene.model import Scene
 
 VIEWS = ("iso", "front", "right", "top")
-_OPTIONS = (
-    click.option(
-        "--component",
-        type=click.Choice(COMPONENTS),
-        default="norm",
-        show_default=True,
-        help="Length of the error, or one signed component.",
-    ),
-    exaggeration_option,
-    click.option("--view", type=click.Choice(VIEWS), default="iso", show_default=True),
-    click.option("--size", default="1600x1200", show_default=True, metavar="WxH", help="In px."),
-    loop_option,
-    click.option(
-        "--grid", type=int, default=21, show_default=True, help="Nodes per axis, 2 to 101."
-    ),
-    click.option("--dark", is_flag=True, help="Light ink on a dark ground."),
-    force_option,
-)
 
 
-def figure_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options of a map."""
-    for option in reversed(_OPTIONS):
-        command = option(command)
-    return command
+def figure_options(size: str = "1600x1200") -> Decorator:
+    """Add the options of a map, of a size in px unless a user says otherwise."""
+    options = (
+        component_option,
+        exaggeration_option,
+        click.option(
+            "--view",
+            type=click.Choice(VIEWS),
+            default="iso",
+            show_default=True,
+            help="Where the camera stands.",
+        ),
+        click.option(
+            "--size",
+            default=size,
+            show_default=True,
+            metavar="WxH",
+            help="Width and height of the picture in px.",
+        ),
+        loop_option,
+        grid_option(),
+        click.option("--dark", is_flag=True, help="Light ink on a dark ground."),
+        force_option,
+    )
+
+    def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return decorate
 
 
 def parse_size(text: str) -> tuple[int, int]:
@@ -80,3 +99,22 @@ def parse_settings(
     node_counts(grid)
     factor = parse_exaggeration(exaggeration)
     return FigureSettings(component, factor, view, parse_size(size), dark, loop, grid)
+
+
+def draw_figure_file(
+    name: str,
+    scenes: "Sequence[Scene]",
+    settings: "FigureSettings",
+    target: "Path",
+    *,
+    force: bool,
+    silent: bool = False,
+) -> None:
+    """Draw a figure in a process of its own and write it; the ending chooses the format."""
+    from warpspace.outputs.files import write_atomically
+    from warpspace.outputs.worker import FigureWorker
+
+    with progress("drawing", silent=silent), FigureWorker() as worker:
+        content = worker.render(name, scenes, settings, target.suffix.lower()[1:])
+    with write_atomically(target, overwrite=force) as temporary:
+        temporary.write_bytes(content)

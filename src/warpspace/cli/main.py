@@ -6,20 +6,7 @@ import sys
 import click
 
 from warpspace import __version__
-from warpspace.cli.animate import animate
-from warpspace.cli.ballbar import ballbar
-from warpspace.cli.check import check, scenes
-from warpspace.cli.compare import compare
-from warpspace.cli.contributions import contributions
-from warpspace.cli.export import export
-from warpspace.cli.field import field
-from warpspace.cli.gains import gains
-from warpspace.cli.measured import measured
-from warpspace.cli.montecarlo import montecarlo
-from warpspace.cli.report import report
-from warpspace.cli.snapshot import snapshot
-from warpspace.cli.thesis import thesis
-from warpspace.cli.view import view
+from warpspace.cli.registry import COMMANDS
 from warpspace.exceptions import WarpspaceError
 
 BAD_INPUT = 2
@@ -33,6 +20,7 @@ Shell completion (bash; zsh and fish likewise):
 
 
 @click.group(
+    commands=COMMANDS,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog=COMPLETION_HELP,
 )
@@ -43,26 +31,6 @@ def cli() -> None:
     SCENE is a bundled name (see `warpspace scenes`) or the path of a TOML file. Lengths are mm,
     errors µm, small angles µrad, rotary positions degrees.
     """
-
-
-for command in (
-    view,
-    snapshot,
-    compare,
-    field,
-    export,
-    report,
-    animate,
-    check,
-    scenes,
-    gains,
-    montecarlo,
-    contributions,
-    ballbar,
-    measured,
-    thesis,
-):
-    cli.add_command(command)
 
 
 def main() -> None:

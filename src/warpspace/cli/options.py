@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Callable, Collection, Mapping
-from typing import Any
+from typing import Any, Literal
 
 import click
 from click.shell_completion import CompletionItem
@@ -48,6 +48,19 @@ loop_option = click.option(
     show_default=True,
     help="Structural loop: tool point, workpiece point, or tool relative to workpiece.",
 )
+component_option = click.option(
+    "--component",
+    type=click.Choice(COMPONENTS),
+    default="norm",
+    show_default=True,
+    help="What the colours show: the length |E| of the error, or one signed component, in µm.",
+)
+exaggeration_option = click.option(
+    "--exaggeration",
+    metavar="auto|N",
+    help="Display factor of displacements: a number, or auto for a round one that suits the scene."
+    "  [what the scene says]",
+)
 at_option = click.option(
     "--at",
     "points",
@@ -56,6 +69,18 @@ at_option = click.option(
     help="Axis positions in mm and degrees, for instance X=0,Y=-225,Z=-480. Repeatable. Axes left"
     " out stand at their place in the scene (the middle of a range).",
 )
+
+
+def grid_option(default: int | None = 21, of: str = "of the working volume") -> Decorator:
+    """Add the option --grid: nodes per axis of what is named."""
+    unsaid = "" if default else "  [21]"
+    return click.option(
+        "--grid",
+        type=int,
+        default=default,
+        show_default=default is not None,
+        help=f"Nodes per axis {of}, 2 to 101.{unsaid}",
+    )
 
 
 def parse_point(text: str, axes: Collection[str], option: str = "--at") -> dict[str, float]:
@@ -101,6 +126,36 @@ def parse_point(text: str, axes: Collection[str], option: str = "--at") -> dict[
             )
         found[name] = value
     return found
+
+
+def parse_exaggeration(text: str | None) -> float | Literal["auto"] | None:
+    """Read a display factor as a user types it.
+
+    Parameters
+    ----------
+    text : str or None
+        A number or "auto"; None where the option is absent.
+
+    Returns
+    -------
+    float, "auto" or None
+
+    Raises
+    ------
+    OptionError
+        If it is neither.
+    """
+    if text is None:
+        return None
+    if text.strip().lower() == "auto":
+        return "auto"
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise OptionError(f"--exaggeration {text!r}; expected auto or a number above 0")
+    return value
 
 
 def print_json(value: Mapping[str, object]) -> None:

@@ -97,7 +97,7 @@ def write_export(request: Request, ending: str) -> bytes:
     bytes
         The file's content.
     """
-    from warpspace.cli.export import write_export as write
+    from warpspace.cli.exports import write_export as write
     from warpspace.picture.comparison import subtract_scenes
     from warpspace.picture.scene_picture import evaluate_picture
 

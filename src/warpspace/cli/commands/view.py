@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 )
 @click.option("--no-browser", is_flag=True, help="Only print the address of the page.")
 def view(scene: str, host: str, port: int | None, *, shared: bool, no_browser: bool) -> None:
-    """Open SCENE in the browser, with a live slider per error parameter.
+    """Open SCENE in the browser, with a slider per error.
 
     SCENE is dvf5000_first where it is left out. A field that `warpspace export` wrote as .vts is
     shown as it was stored: its scene, loop, grid, component and factor.

@@ -1,17 +1,22 @@
 """Command `field`: errors at points, or over the grid of the working volume."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import click
 
+from warpspace.cli.file_options import csv_option
 from warpspace.cli.options import (
     at_option,
+    grid_option,
     json_option,
     loop_option,
     parse_point,
     print_json,
     scene_argument,
 )
+from warpspace.cli.progress import progress
+from warpspace.cli.tables import Column, number_columns, print_table, print_text
 from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
@@ -25,7 +30,7 @@ MAX_LISTED = 20
 @click.command()
 @scene_argument()
 @at_option
-@click.option("--grid", type=int, help="Nodes per axis of the working volume, 2 to 101.  [21]")
+@grid_option(None)
 @loop_option
 @click.option("--exact", is_flag=True, help="Full rotations and all products, not the first order.")
 @click.option(
@@ -35,7 +40,7 @@ MAX_LISTED = 20
     show_default=True,
     help="Frame of the resulting vectors.",
 )
-@click.option("--csv", "csv_path", type=click.Path(), help="Write the points to this CSV file.")
+@csv_option
 @json_option
 def field(
     scene: str,
@@ -61,7 +66,8 @@ def field(
     if points and grid is not None:
         raise OptionError("--at and --grid exclude each other; give one of them")
     loaded = load_scene(scene)
-    axes, result = _evaluate(loaded, points, grid, loop=loop, frame=frame, exact=exact)
+    with progress("evaluating", silent=as_json):
+        axes, result = _evaluate(loaded, points, grid, loop=loop, frame=frame, exact=exact)
     summary = statistics(result)
     if csv_path is not None:
         from warpspace.outputs.exports.table import write_field_csv
@@ -70,11 +76,11 @@ def field(
     if as_json:
         print_json({"points": _rows(axes, result), "statistics": asdict(summary)})
         return
-    click.echo(f"{loaded.title} · {loop} loop · {'exact' if exact else 'first order'}")
+    print_text(f"{loaded.title} · {loop} loop · {'exact' if exact else 'first order'}")
     if points:
-        _list_points(axes, result)
+        _list_points(axes, result, [loaded.machine.axes[name].unit for name in axes])
     worst = ", ".join(f"{value:g}" for value in summary.max_at_mm)
-    click.echo(
+    print_text(
         f"  {result.norm_um.size} points: mean {summary.mean_um:.2f}, RMS {summary.rms_um:.2f},"
         f" P95 {summary.p95_um:.2f}, max {summary.max_um:.2f} µm at ({worst}) mm"
     )
@@ -143,13 +149,26 @@ def _rows(axes: "dict[str, Array]", result: "ErrorField") -> list[dict[str, obje
     ]
 
 
-def _list_points(axes: "dict[str, Array]", result: "ErrorField") -> None:
+def _list_points(axes: "dict[str, Array]", result: "ErrorField", units: "Sequence[str]") -> None:
     """Print the first points, one line each."""
-    norm = result.norm_um
-    for index in range(min(norm.size, MAX_LISTED)):
-        at = " ".join(f"{name}={values[index]:g}" for name, values in axes.items())
-        error = ", ".join(f"{value:+.3f}" for value in result.error_um[index])
-        tilt = ", ".join(f"{value:+.3f}" for value in result.orientation_urad[index])
-        click.echo(f"  {at}: ({error}) µm, |E| {norm[index]:.3f} µm, tilt ({tilt}) µrad")
-    if norm.size > MAX_LISTED:
-        click.echo(f"  … {norm.size - MAX_LISTED} more; --csv or --json has all")
+    listed = min(result.norm_um.size, MAX_LISTED)
+    errors, tilts = result.error_um.tolist(), result.orientation_urad.tolist()
+    columns = (
+        Column("point", is_number=True, leads=True),
+        *(Column(name, unit, is_number=True) for name, unit in zip(axes, units, strict=True)),
+        *number_columns(("error x", "y", "z", "|E|"), "µm"),
+        *number_columns(("tilt x", "y", "z"), "µrad"),
+    )
+    rows = [
+        (
+            str(index + 1),
+            *(f"{values[index]:g}" for values in axes.values()),
+            *(f"{value:+.3f}" for value in errors[index]),
+            f"{result.norm_um[index]:.3f}",
+            *(f"{value:+.3f}" for value in tilts[index]),
+        )
+        for index in range(listed)
+    ]
+    print_table(columns, rows)
+    if result.norm_um.size > MAX_LISTED:
+        print_text(f"  … {result.norm_um.size - MAX_LISTED} more; --csv or --json has all")

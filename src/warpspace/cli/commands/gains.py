@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from warpspace.cli.file_options import check_targets, csv_option, plot_option
 from warpspace.cli.options import (
     at_option,
     json_option,
@@ -13,6 +14,8 @@ from warpspace.cli.options import (
     print_json,
     scene_argument,
 )
+from warpspace.cli.progress import progress
+from warpspace.cli.tables import Column, number_columns, print_table, print_text
 from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
@@ -44,8 +47,8 @@ if TYPE_CHECKING:
     show_default=True,
     help="Key errors: the largest that together make up this share of the sum of squares.",
 )
-@click.option("--csv", "csv_path", type=click.Path(), help="Write the table to this CSV file.")
-@click.option("--plot", type=click.Path(), help="Draw the chart: .png, .svg or .pdf.")
+@csv_option
+@plot_option("chart")
 @json_option
 def gains(
     scene: str,
@@ -65,8 +68,6 @@ def gains(
     µrad, signed at a point (--at, by default the middle of the scene's ranges). The lever from the
     origin of the frame an error sits in to the point explains it: 1 m gives 1 µm per µrad.
     """
-    from warpspace.outputs.charts.paper import CHART_ENDINGS
-    from warpspace.outputs.files import check_target
     from warpspace.scene import verbs
     from warpspace.scene.library import load_scene
 
@@ -74,18 +75,17 @@ def gains(
         raise OptionError("--at: expected one point, and none with --max")
     if step_deg is not None and not over_travel:
         raise OptionError("--step belongs to --max")
-    for path, endings in ((plot, CHART_ENDINGS), (csv_path, (".csv",))):
-        if path is not None:
-            check_target(path, endings)
+    check_targets(plot=plot, csv_path=csv_path)
     loaded = load_scene(scene)
-    found = verbs.gains(
-        loaded,
-        at=parse_point(points[0], loaded.machine.axes) if points else None,
-        loop=loop,
-        over_travel=over_travel,
-        step_deg=step_deg,
-        share=share,
-    )
+    with progress("computing", silent=as_json):
+        found = verbs.gains(
+            loaded,
+            at=parse_point(points[0], loaded.machine.axes) if points else None,
+            loop=loop,
+            over_travel=over_travel,
+            step_deg=step_deg,
+            share=share,
+        )
     where = _where(found, loop, over_travel=over_travel)
     if csv_path is not None:
         _write_csv(csv_path, loaded, found)
@@ -94,10 +94,10 @@ def gains(
     if as_json:
         print_json({"gains": [_json_row(gain) for gain in found]})
         return
-    click.echo(f"{loaded.machine.title} · {where}")
+    print_text(f"{loaded.machine.title} · {where}")
     _print_table(loaded, found, over_travel=over_travel)
     keys = sum(gain.is_key for gain in found)
-    click.echo(
+    print_text(
         f"  * key errors: the largest {keys} make up {share:.0%} of the sum of squares, one µm and"
         " one µrad counted alike"
     )
@@ -152,29 +152,45 @@ def _explain(gain: "Gain") -> str:
 
 def _print_table(scene: "Scene", found: "Sequence[Gain]", *, over_travel: bool) -> None:
     """Print the ranked table."""
+    marked = thesis_keys(scene)
+    columns = (
+        Column(leads=True),
+        Column("key", leads=True),
+        Column("symbol"),
+        *number_columns(("|E|", "x", "y", "z")),
+        Column("unit"),
+        *((Column("thesis"),) if marked else ()),
+        Column("name", wraps=True),
+        *number_columns(("lever x", "y", "z"), "mm"),
+        Column(
+            "lever of |E| at" if over_travel else "largest component read off the lever", wraps=True
+        ),
+    )
+    rows = [
+        (
+            *("*" if gain.is_key else "", gain.key, gain.parameter.symbol),
+            *(f"{value:.3f}" for value in (gain.norm, gain.x, gain.y, gain.z)),
+            gain.unit,
+            *(("key" if gain.key in marked else "",) if marked else ()),
+            gain.parameter.name,
+            *(f"{value:.6g}" if gain.parameter.is_rotation else "" for value in gain.lever_mm),
+            _place(gain) if over_travel else _explain(gain),
+        )
+        for gain in found
+    ]
+    print_table(columns, rows)
+
+
+def _place(gain: "Gain") -> str:
+    """Say where on the travel a gain is largest: the axes of its kind, linear or rotary."""
     from warpspace.machine.parameters import ROTARY_AXES
 
-    last = "lever of |E| at" if over_travel else "largest component read off the lever"
-    marked = thesis_keys(scene)
-    beside = " thesis" if marked else ""
-    click.echo(
-        f"    {'key':<5} {'symbol':<6} {'name':<27} {'|E|':>6} {'x':>7} {'y':>7} {'z':>7}"
-        f" {'unit':<8}{beside}  {'lever x, y, z [mm]':<24}  {last}"
+    if not gain.parameter.is_rotation:
+        return ""
+    rotary = gain.parameter.axis in ROTARY_AXES
+    return ", ".join(
+        f"{name} {value:g}" for name, value in gain.at.items() if (name in ROTARY_AXES) == rotary
     )
-    for gain in found:
-        row = gain.parameter
-        thesis = f" {'key' if gain.key in marked else '':<6}" if marked else ""
-        lever = ", ".join(f"{value:.6g}" for value in gain.lever_mm)
-        lever = lever if row.is_rotation else ""
-        at = [f"{name} {value:g}" for name, value in gain.at.items() if name in ROTARY_AXES]
-        if row.axis not in ROTARY_AXES:
-            at = [f"{name} {value:g}" for name, value in gain.at.items() if name not in ROTARY_AXES]
-        place = ", ".join(at) if row.is_rotation else ""
-        click.echo(
-            f"  {'*' if gain.is_key else ' '} {gain.key:<5} {row.symbol:<6} {row.name:<27}"
-            f" {gain.norm:6.3f} {gain.x:7.3f} {gain.y:7.3f} {gain.z:7.3f} {gain.unit:<8}"
-            f"{thesis}  {lever:<24}  {place if over_travel else _explain(gain)}".rstrip()
-        )
 
 
 def _write_csv(path: str, scene: "Scene", found: "Sequence[Gain]") -> None:

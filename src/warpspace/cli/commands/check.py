@@ -1,8 +1,9 @@
-"""Commands `check` and `scenes`: validate a scene, list the bundled ones."""
+"""Command `check`: validate a scene and say what it holds."""
 
 import click
 
 from warpspace.cli.options import json_option, print_json, scene_argument
+from warpspace.cli.tables import Column, print_table, print_text
 
 
 @click.command()
@@ -33,31 +34,13 @@ def check(scene: str, *, as_json: bool) -> None:
             }
         )
         return
-    click.echo(f"{loaded.name}: valid. {loaded.title}")
-    click.echo(f"  machine    {loaded.machine.title}, chain {loaded.machine.chain}")
+    print_text(f"{loaded.name}: valid. {loaded.title}")
+    facts = [("machine", f"{loaded.machine.title}, chain {loaded.machine.chain}")]
     for name, (low, high) in loaded.workspace.ranges.items():
         span = f"{low:g}" if low == high else f"{low:g} … {high:g}"
-        click.echo(f"  {name:<10} {span} {loaded.machine.axes[name].unit}")
-    click.echo(
-        f"  errors     {len(non_zero)} of {len(loaded.parameter_keys)} parameters not zero"
-        + (f": {', '.join(non_zero)}" if non_zero else "")
-    )
-    click.echo(f"  first order differs from the exact chain by at most {difference:.2g} µm")
-    for note in loaded.notes:
-        click.echo(f"  note       {note}")
-
-
-@click.command()
-@json_option
-def scenes(*, as_json: bool) -> None:
-    """List the bundled scenes."""
-    from warpspace.scene.library import load_scene, scene_names
-
-    titles = {name: load_scene(name).title for name in scene_names()}
-    if as_json:
-        rows = [{"name": name, "title": title} for name, title in titles.items()]
-        print_json({"scenes": rows})
-        return
-    width = max(map(len, titles))
-    for name, title in titles.items():
-        click.echo(f"{name:<{width}}  {title}")
+        facts.append((name, f"{span} {loaded.machine.axes[name].unit}"))
+    count = f"{len(non_zero)} of {len(loaded.parameter_keys)} parameters not zero"
+    facts.append(("errors", count + (f": {', '.join(non_zero)}" if non_zero else "")))
+    facts.append(("first order", f"differs from the exact chain by at most {difference:.2g} µm"))
+    facts.extend(("note", note) for note in loaded.notes)
+    print_table((Column(leads=True), Column(wraps=True)), facts)

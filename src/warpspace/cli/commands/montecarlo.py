@@ -5,73 +5,39 @@ from typing import TYPE_CHECKING
 
 import click
 
-from warpspace.cli.options import json_option, loop_option, print_json, scene_argument
-from warpspace.exceptions import OptionError
+from warpspace.cli.file_options import check_targets, plot_option
+from warpspace.cli.options import (
+    grid_option,
+    json_option,
+    loop_option,
+    print_json,
+    scene_argument,
+)
+from warpspace.cli.progress import progress
+from warpspace.cli.sampling_options import (
+    clip_option,
+    cylinder_option,
+    distribution_option,
+    parse_cylinder,
+    samples_option,
+    seed_option,
+    specification_option,
+)
+from warpspace.cli.tables import print_text
 
 if TYPE_CHECKING:
     from warpspace.analysis.montecarlo import MonteCarlo
-    from warpspace.analysis.points import Cylinder
     from warpspace.scene.model import Scene
 
-DISTRIBUTIONS = ("uniform", "normal")
 OVER = ("sampled", "max", "mean")
-
-seed_option = click.option(
-    "--seed", type=int, default=0, show_default=True, help="The same seed gives the same numbers."
-)
-distribution_option = click.option(
-    "--distribution",
-    type=click.Choice(DISTRIBUTIONS),
-    default="uniform",
-    show_default=True,
-    help="uniform over the tolerance, or normal with 3σ = half width.",
-)
-clip_option = click.option(
-    "--clip/--no-clip",
-    default=False,
-    show_default=True,
-    help="Whether the normal distribution ends at the tolerance limits.",
-)
-cylinder_option = click.option(
-    "--cylinder",
-    metavar="DIAMETERxHEIGHT",
-    help="Workpiece loop: largest workpiece in mm, over whose volume the points are spread.  [the"
-    " one whose top rim the scene's workpiece point lies on: 550x450 on the DVF5000]",
-)
-
-
-def parse_cylinder(text: str | None) -> "Cylinder | None":
-    """Read the size of a workpiece as a user types it.
-
-    Raises
-    ------
-    OptionError
-        If it cannot be read.
-    """
-    from warpspace.analysis.points import Cylinder
-
-    if text is None:
-        return None
-    first, _, second = text.lower().replace("×", "x").partition("x")
-    try:
-        size = float(first), float(second)
-    except ValueError:
-        size = math.nan, math.nan
-    if not (math.isfinite(size[0]) and math.isfinite(size[1])):
-        raise OptionError(f"--cylinder {text!r}; expected diameter x height in mm, as in 550x450")
-    return Cylinder(*size)
 
 
 @click.command()
 @scene_argument()
-@click.option("--samples", type=int, default=100_000, show_default=True, help="Machines drawn.")
+@samples_option
 @seed_option
-@click.option(
-    "--grid", type=int, default=11, show_default=True, help="Nodes per axis for --over max|mean."
-)
-@click.option(
-    "--spec-um", type=float, help="Specification in µm: how likely does a machine keep it?"
-)
+@grid_option(11, "for --over max|mean")
+@specification_option
 @distribution_option
 @clip_option
 @loop_option
@@ -86,7 +52,7 @@ def parse_cylinder(text: str | None) -> "Cylinder | None":
 @click.option(
     "--workers", type=int, help="Threads; the result does not depend on it.  [one per core]"
 )
-@click.option("--plot", type=click.Path(), help="Draw the histogram: .png, .svg or .pdf.")
+@plot_option("histogram")
 @json_option
 def montecarlo(
     scene: str,
@@ -104,8 +70,9 @@ def montecarlo(
     clip: bool,
     as_json: bool,
 ) -> None:
-    """Sample machines from the tolerances of SCENE and show how large |E| gets.
+    """Show how large |E| gets on machines within tolerance.
 
+    Machines are sampled from the tolerances of SCENE; |E| is the length of the error in µm.
     Each parameter is drawn once per machine and holds everywhere; a component error is the value it
     has at the point looked at. Tool and relative loop: points uniform in the working volume, rotary
     axes at their place in the scene. Workpiece loop: points uniform in the volume of the largest
@@ -113,16 +80,13 @@ def montecarlo(
 
     Quantiles are exact up to a million samples; beyond, from a histogram with steps of 0.002 %.
     """
-    from warpspace.outputs.charts.paper import CHART_ENDINGS
-    from warpspace.outputs.files import check_target
     from warpspace.scene import verbs
     from warpspace.scene.library import load_scene
 
-    if plot is not None:
-        check_target(plot, CHART_ENDINGS)
+    check_targets(plot=plot)
     loaded = load_scene(scene)
     size = parse_cylinder(cylinder)
-    with _progress(samples) as bar:
+    with progress("sampling", max(samples, 0), "machines", silent=as_json) as bar:
         result = verbs.montecarlo(
             loaded,
             samples=samples,
@@ -135,7 +99,7 @@ def montecarlo(
             spec_um=spec_um,
             cylinder=size,
             workers=workers,
-            progress=bar.update,
+            progress=bar.advance,
         )
     if plot is not None:
         _plot(plot, loaded, result)
@@ -143,23 +107,6 @@ def montecarlo(
         print_json(result_json(result))
         return
     _print(loaded, result)
-
-
-def _progress(samples: int):  # noqa: ANN202 - tqdm's own type
-    """Build a progress bar on stderr that shows after a second, on a terminal only."""
-    import sys
-
-    from tqdm import tqdm
-
-    return tqdm(
-        total=max(samples, 0),
-        unit=" machines",
-        unit_scale=True,
-        delay=1.0,
-        disable=None,
-        leave=False,
-        file=sys.stderr,
-    )
 
 
 def result_json(result: "MonteCarlo") -> dict[str, object]:
@@ -229,8 +176,8 @@ def _print(scene: "Scene", result: "MonteCarlo") -> None:
     """Print the numbers."""
     from warpspace.analysis.contributions import expected_square
 
-    click.echo(f"{scene.title} · {describe(result)}")
-    click.echo(
+    print_text(f"{scene.title} · {describe(result)}")
+    print_text(
         f"  mean {result.mean_um:.2f}, mode {result.mode_um:.1f}, median {result.median_um:.2f},"
         f" P95 {result.p95_um:.2f}, P99 {result.p99_um:.2f}, max {result.max_um:.2f} µm"
     )
@@ -238,14 +185,14 @@ def _print(scene: "Scene", result: "MonteCarlo") -> None:
         variance, offset = expected_square(
             scene.model, result.draws, scene.workspace, result.view, result.plan
         )
-        click.echo(
+        print_text(
             f"  RMS  {result.rms_um:.2f} µm sampled, {math.sqrt(variance.sum() + offset):.2f} µm"
             " from trace(J Σ Jᵀ) without sampling"
         )
     if (value := printed_value(scene, result)) is not None:
-        click.echo(f"  the thesis prints {value:g} µm (table 4-8; see `warpspace thesis`)")
+        print_text(f"  the thesis prints {value:g} µm (table 4-8; see `warpspace thesis`)")
     if (chance := result.probability) is not None:
-        click.echo(
+        print_text(
             f"  |E| ≤ {chance.spec_um:g} µm: {100.0 * chance.probability:.2f} % of the machines,"
             f" 95 % interval {100.0 * chance.low:.2f} … {100.0 * chance.high:.2f} %"
         )
@@ -255,6 +202,6 @@ def _print(scene: "Scene", result: "MonteCarlo") -> None:
         if width == 0.0
     ]
     note = f"; held at their centre: {', '.join(held)}" if held else ""
-    click.echo(f"  {len(result.draws.keys) - len(held)} parameters drawn{note}")
+    print_text(f"  {len(result.draws.keys) - len(held)} parameters drawn{note}")
     if not result.exact_quantiles:
-        click.echo("  quantiles to 0.002 % of their value")
+        print_text("  quantiles to 0.002 % of their value")

@@ -4,10 +4,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from warpspace.cli.options import json_option, loop_option, print_json, scene_argument
+from warpspace.cli.options import (
+    grid_option,
+    json_option,
+    loop_option,
+    print_json,
+    scene_argument,
+)
+from warpspace.cli.tables import Column, print_table, print_text
 
 if TYPE_CHECKING:
-    from warpspace.analysis.measured import Measured
+    from warpspace.analysis.measured import Check, Measured
     from warpspace.scene.model import Scene
 
 
@@ -19,18 +26,16 @@ if TYPE_CHECKING:
     help="Take the tolerances of this scene, for instance dvf5000_proposed.  [each scene's own]",
 )
 @loop_option
-@click.option(
-    "--grid", type=int, default=11, show_default=True, help="Nodes per axis of the predicted map."
-)
+@grid_option(11, "of the predicted map")
 @json_option
 def measured(
     scenes: tuple[str, ...], tolerances: str | None, loop: str, grid: int, *, as_json: bool
 ) -> None:
-    """Judge the errors of each SCENE and predict its volumetric error.
+    """Set the errors of each SCENE against its tolerances.
 
-    Every error that a scene gives is set against its tolerance: O keeps it, X does not. Beside the
-    predicted error stands what the LaserTRACER gave, for the machines of the thesis. The shear is
-    that of the best affine fit to the predicted map: which plane became a rhombus.
+    O marks an error that keeps its tolerance, X one that does not. Beside the predicted error
+    stands what the LaserTRACER gave, for the machines of the thesis. The shear is that of the best
+    affine fit to the predicted map: which plane became a rhombus.
     """
     from warpspace.scene import verbs
     from warpspace.scene.library import load_scene
@@ -72,19 +77,28 @@ def _json(scene: "Scene", result: "Measured") -> dict[str, object]:
 
 def _print(scene: "Scene", result: "Measured") -> None:
     """Print a machine."""
-    click.echo(scene.title)
-    for check in result.checks:
-        limits = (
-            "no tolerance"
-            if check.centre is None or check.half_width is None
-            else f"{check.centre:g} ± {check.half_width:g}"
-        )
-        click.echo(f"  {check.mark}  {check.key:<5} {check.value:8.1f} {check.unit:<4}  {limits}")
+    print_text(scene.title)
+    columns = (
+        *(Column("keeps"), Column("key")),
+        *(Column("value", is_number=True), Column("unit"), Column("tolerance")),
+    )
+    rows = [
+        (check.mark, check.key, f"{check.value:.1f}", check.unit, _limits(check))
+        for check in result.checks
+    ]
+    print_table(columns, rows)
     measured_um = laser_tracer_um(scene)
     beside = "" if measured_um is None else f"; LaserTRACER {measured_um:g} µm"
-    click.echo(
+    print_text(
         f"  predicted |E|: mean {result.predicted.mean_um:.2f}, RMS {result.predicted.rms_um:.2f},"
         f" max {result.predicted.max_um:.2f} µm{beside}"
     )
     shears = ", ".join(f"{plane} {value:+.1f}" for plane, value in result.shear_urad.items())
-    click.echo(f"  shear of the volume: {shears} µrad")
+    print_text(f"  shear of the volume: {shears} µrad")
+
+
+def _limits(check: "Check") -> str:
+    """Spell a tolerance."""
+    if check.centre is None or check.half_width is None:
+        return "no tolerance"
+    return f"{check.centre:g} ± {check.half_width:g}"

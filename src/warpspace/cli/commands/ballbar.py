@@ -2,7 +2,9 @@
 
 import click
 
+from warpspace.cli.file_options import check_targets, plot_option
 from warpspace.cli.options import json_option, parse_point, print_json, scene_argument
+from warpspace.cli.tables import print_text
 
 
 @click.command()
@@ -16,10 +18,10 @@ from warpspace.cli.options import json_option, parse_point, print_json, scene_ar
     "--centre",
     "centre",
     metavar="X=..,Y=..",
-    help="Axis positions of the centre.  [middle of the working volume]",
+    help="Axis positions of the centre in mm and degrees.  [middle of the working volume]",
 )
 @click.option("--points", type=int, default=360, show_default=True, help="Points of the circle.")
-@click.option("--plot", type=click.Path(), help="Draw the polar plot: .png, .svg or .pdf.")
+@plot_option("polar plot")
 @json_option
 def ballbar(
     scene: str,
@@ -31,8 +33,9 @@ def ballbar(
     *,
     as_json: bool,
 ) -> None:
-    """Run a ball bar on SCENE: circular deviation, and the squareness it would report.
+    """Run the circular test of ISO 230-4 on SCENE.
 
+    It prints the circular deviation in µm, and the squareness in µrad that a ball bar would report.
     Radial deviations are taken between tool and workpiece, about the least-squares centre, from +
     first axis of the plane counter-clockwise. The model has neither backlash nor following errors:
     clockwise and counter-clockwise runs trace the same.
@@ -40,13 +43,10 @@ def ballbar(
     The squareness comes out of the sin 2φ part, in the sign of EC0Y, EB0Z or EA0Z. Angular errors
     along the way look like squareness to a ball bar, and count.
     """
-    from warpspace.outputs.charts.paper import CHART_ENDINGS
-    from warpspace.outputs.files import check_target
     from warpspace.scene import verbs
     from warpspace.scene.library import load_scene
 
-    if plot is not None:
-        check_target(plot, CHART_ENDINGS)
+    check_targets(plot=plot)
     loaded = load_scene(scene)
     result = verbs.ballbar(
         loaded,
@@ -71,18 +71,18 @@ def ballbar(
         )
         return
     first, second = plane
-    click.echo(f"{loaded.title} · {where}")
-    click.echo(
+    print_text(f"{loaded.title} · {where}")
+    print_text(
         f"  circular deviation G {result.circular_deviation_um:.2f} µm, clockwise and"
         " counter-clockwise alike (no backlash or following error in the model)"
     )
-    click.echo(
+    print_text(
         f"  squareness {result.squareness_key} {result.squareness_urad:+.2f} µrad;"
         f" put in {result.given_urad:+.2f} µrad"
     )
     if abs(result.squareness_urad - result.given_urad) > 0.05:
-        click.echo("    the difference: angular errors along the circle that look like squareness")
-    click.echo(
+        print_text("    the difference: angular errors along the circle that look like squareness")
+    print_text(
         f"  mean radius {result.radius_um:+.2f} µm, {first} against {second}"
         f" {result.scale_difference_um:+.2f} µm, centre"
         f" ({result.centre_um[0]:+.2f}, {result.centre_um[1]:+.2f}) µm"

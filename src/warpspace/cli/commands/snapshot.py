@@ -4,7 +4,8 @@ from typing import Any
 
 import click
 
-from warpspace.cli.figure_options import figure_options, parse_settings
+from warpspace.cli.figure_options import draw_figure_file, figure_options, parse_settings
+from warpspace.cli.file_options import output_option
 from warpspace.cli.options import scene_argument
 from warpspace.exceptions import OptionError, UnknownNameError
 
@@ -16,7 +17,7 @@ FIGURES = (
 
 @click.command()
 @scene_argument()
-@click.option("-o", "--output", required=True, type=click.Path(), help="A .png, .svg or .pdf file.")
+@output_option("File to write: .png, .svg or .pdf.")
 @click.option(
     "--figure",
     default="error-map",
@@ -24,16 +25,15 @@ FIGURES = (
     metavar="NAME",
     help=f"What to draw: {', '.join(FIGURES)}.",
 )
-@figure_options
+@figure_options()
 def snapshot(scene: str, output: str, figure: str, *, force: bool, **options: Any) -> None:
-    """Draw an error-map picture (or another figure) of SCENE into a file.
+    """Draw an error map, or another figure, of SCENE.
 
     The picture carries its exaggeration, scale bars, statistics and provenance. It is the same,
     byte for byte, whenever it is repeated. Charts keep their own height to the width given.
     """
     from warpspace.outputs.drawing.style import FIGURE_ENDINGS
-    from warpspace.outputs.files import check_target, write_atomically
-    from warpspace.outputs.worker import FigureWorker
+    from warpspace.outputs.files import check_target
     from warpspace.scene.library import load_scene
 
     if figure == "comparison":
@@ -43,8 +43,5 @@ def snapshot(scene: str, output: str, figure: str, *, force: bool, **options: An
     target = check_target(output, FIGURE_ENDINGS, overwrite=force)
     settings = parse_settings(**options)
     loaded = load_scene(scene)
-    with FigureWorker() as worker:
-        content = worker.render(figure, [loaded], settings, target.suffix.lower()[1:])
-    with write_atomically(output, overwrite=force) as temporary:
-        temporary.write_bytes(content)
+    draw_figure_file(figure, [loaded], settings, target, force=force)
     click.echo(f"wrote {output}")

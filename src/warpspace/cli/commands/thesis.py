@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING
 import click
 
 from warpspace.cli.options import json_option, print_json
+from warpspace.cli.progress import progress
+from warpspace.cli.tables import Column, print_table, print_text
 
 if TYPE_CHECKING:
     from warpspace.analysis.thesis import Hypothesis, Row
@@ -14,8 +16,9 @@ if TYPE_CHECKING:
 @click.option("--markdown", type=click.Path(), help="Write the comparison to this .md file.")
 @json_option
 def thesis(markdown: str | None, *, as_json: bool) -> None:
-    """Recompute every number of the thesis's tables 4-1 to 4-8 and 5-3 to 5-5.
+    """Recompute every number that the thesis prints.
 
+    That is its tables 4-1 to 4-8 and 5-3 to 5-5; each number comes with its unit.
     A number agrees where it lies within half of the last printed digit. Rows that do not agree say
     why; what was tried is listed below them. Nothing is tuned to agree.
     """
@@ -26,9 +29,10 @@ def thesis(markdown: str | None, *, as_json: bool) -> None:
 
     if markdown is not None:
         check_target(markdown, (".md",))
-    rows = verbs.thesis()
     needed = markdown is not None or not as_json
-    tried = thesis_hypotheses(verbs.thesis_case()) if needed else ()
+    with progress("computing", silent=as_json):
+        rows = verbs.thesis()
+        tried = thesis_hypotheses(verbs.thesis_case()) if needed else ()
     if markdown is not None:
         with write_atomically(markdown) as temporary:
             temporary.write_text(thesis_markdown(rows, tried), encoding="utf-8")
@@ -41,13 +45,14 @@ def thesis(markdown: str | None, *, as_json: bool) -> None:
 
 def _print_tried(tried: "tuple[Hypothesis, ...]") -> None:
     """Print the readings that were tried, grouped by question."""
-    click.echo("\nWhat was tried where the thesis is open (> is what the model uses):")
+    click.echo()
+    print_text("What was tried where the thesis is open (> is what the model uses):")
     question = ""
     for each in tried:
         if each.question != question:
             question = each.question
-            click.echo(f"  {question}")
-        click.echo(f"    {'>' if each.used else ' '} {each.reading}: {each.result}")
+            print_text(f"  {question}")
+        print_text(f"    {'>' if each.used else ' '} {each.reading}: {each.result}")
 
 
 def _json_row(row: "Row") -> dict[str, object]:
@@ -63,21 +68,31 @@ def _json_row(row: "Row") -> dict[str, object]:
 
 
 def _print(rows: "tuple[Row, ...]") -> None:
-    """Print all rows, then those that do not agree with their reasons."""
+    """Print a table of each source, then the rows that do not agree with their reasons."""
     from warpspace.outputs.thesis_page import spell
 
-    source = ""
-    for row in rows:
-        if row.source != source:
-            source = row.source
-            same = [other.agrees for other in rows if other.source == source]
-            click.echo(f"{source}: {sum(same)} of {len(same)} agree")
-        mark = " " if row.agrees else "≠"
-        printed, computed = spell(row, row.printed), spell(row, row.computed, more=1)
-        click.echo(f"  {mark} {row.key:<48} {printed:>12}  {computed:>12} {row.unit}")
+    columns = (
+        Column(leads=True),
+        Column("quantity", wraps=True, leads=True),
+        Column("printed", is_number=True, wraps=True),
+        Column("ours", is_number=True, wraps=True, joins=True),
+        Column("unit"),
+    )
+    for source in dict.fromkeys(row.source for row in rows):
+        here = [row for row in rows if row.source == source]
+        print_text(f"{source}: {sum(row.agrees for row in here)} of {len(here)} agree")
+        cells = [
+            (
+                *("" if row.agrees else "≠", row.key),
+                *(spell(row, row.printed), spell(row, row.computed, more=1), row.unit),
+            )
+            for row in here
+        ]
+        print_table(columns, cells)
+        click.echo()
     different = [row for row in rows if not row.agrees]
-    click.echo(f"\n{len(rows) - len(different)} of {len(rows)} agree. The others:")
+    print_text(f"{len(rows) - len(different)} of {len(rows)} agree. The others:")
     for row in different:
         printed, computed = spell(row, row.printed), spell(row, row.computed, more=1)
-        click.echo(f"  {row.source}: {row.key}: printed {printed}, ours {computed} {row.unit}")
-        click.echo(f"      {row.note}")
+        print_text(f"  {row.source}: {row.key}: printed {printed}, ours {computed} {row.unit}")
+        print_text(f"      {row.note}")

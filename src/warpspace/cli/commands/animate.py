@@ -1,34 +1,18 @@
 """Command `animate`: a moving picture of a scene."""
 
-from collections.abc import Callable
 from typing import Any
 
 import click
 
 from warpspace.cli.figure_options import figure_options, parse_settings
+from warpspace.cli.file_options import output_option
 from warpspace.cli.options import scene_argument
-
-SIZE = "960x720"
-
-
-def _smaller(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Let the pictures of an animation be smaller than a figure, unless a user says otherwise."""
-    options: list[click.Parameter] = command.__click_params__  # type: ignore[attr-defined]
-    for option in options:
-        if option.name == "size":
-            option.default = SIZE
-    return command
+from warpspace.cli.progress import progress
 
 
 @click.command()
 @scene_argument()
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    type=click.Path(),
-    help="File to write: .gif, .webp or .mp4.",
-)
+@output_option("File to write: .gif, .webp or .mp4.")
 @click.option(
     "--motion",
     type=click.Choice(("exaggeration", "rotation")),
@@ -38,8 +22,7 @@ def _smaller(command: Callable[..., Any]) -> Callable[..., Any]:
 )
 @click.option("--frames", type=int, default=48, show_default=True, help="Pictures of one round.")
 @click.option("--fps", type=float, default=15.0, show_default=True, help="Pictures a second.")
-@_smaller
-@figure_options
+@figure_options(size="960x720")
 def animate(
     scene: str,
     output: str,
@@ -54,10 +37,6 @@ def animate(
 
     Every picture carries its display factor; camera and colour scale stay the same.
     """
-    import sys
-
-    from tqdm import tqdm
-
     from warpspace.outputs.animation.pictures import AnimationSettings
     from warpspace.outputs.animation.write import ENDINGS, write_animation
     from warpspace.outputs.files import check_target
@@ -66,6 +45,6 @@ def animate(
     check_target(output, ENDINGS, overwrite=force)
     settings = AnimationSettings(motion, frames, fps, parse_settings(**options))
     loaded = load_scene(scene)
-    with tqdm(total=frames, unit="picture", delay=1.0, disable=not sys.stderr.isatty()) as bar:
-        write_animation(loaded, output, settings, overwrite=force, progress=bar.update)
+    with progress("drawing", frames, "pictures") as bar:
+        write_animation(loaded, output, settings, overwrite=force, progress=bar.advance)
     click.echo(f"{output}: {frames} pictures, {frames / fps:.1f} s")

@@ -1,0 +1,63 @@
+"""Command `export`: the deformed scene or its field, for other programs and for a browser."""
+
+import click
+
+from warpspace.cli.file_options import force_option, output_option, size_text
+from warpspace.cli.options import (
+    component_option,
+    exaggeration_option,
+    grid_option,
+    loop_option,
+    parse_exaggeration,
+    scene_argument,
+)
+from warpspace.cli.progress import progress
+
+ENDINGS = (".glb", ".vts", ".csv", ".html")
+
+
+@click.command()
+@scene_argument()
+@output_option(
+    "File to write: .glb (3-D viewers, CAD), .vts (ParaView), .csv (the field), .html (the"
+    " interactive scene in one file that needs no network)."
+)
+@exaggeration_option
+@grid_option()
+@component_option
+@loop_option
+@force_option
+def export(
+    scene: str,
+    output: str,
+    exaggeration: str | None,
+    grid: int,
+    component: str,
+    loop: str,
+    *,
+    force: bool,
+) -> None:
+    """Write SCENE into a file for other programs.
+
+    The ending of FILE chooses the format. Every format carries the scene, the settings, the display
+    factor and the program's version. `warpspace view FILE.vts` shows a stored field again.
+    """
+    from warpspace.cli.exports import write_export
+    from warpspace.outputs.files import check_target
+    from warpspace.picture.scene_picture import evaluate_picture
+    from warpspace.scene.library import load_scene
+
+    target = check_target(output, ENDINGS, overwrite=force)
+    with progress("writing"):
+        picture = evaluate_picture(
+            load_scene(scene),
+            exaggeration=parse_exaggeration(exaggeration),
+            grid=grid,
+            loop=loop,
+            component=component,
+        )
+        write_export(picture, target, overwrite=force)
+    click.echo(
+        f"{output}: {picture.scene.title}, displacement drawn ×{picture.exaggeration:g},"
+        f" {size_text(target)}"
+    )
