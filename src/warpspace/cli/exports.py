@@ -1,6 +1,15 @@
-"""Exports for the commands and the app: outputs write files, the app writes its offline page."""
+"""The export format that the app writes, its offline page; outputs know nothing of the app."""
 
 from typing import TYPE_CHECKING
+
+from warpspace.outputs.exports.formats import (
+    ExportFormat,
+    export_formats,
+    register_format,
+    write_export,
+)
+
+__all__ = ["embed_view", "export_formats", "write_export", "write_page"]
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -9,41 +18,34 @@ if TYPE_CHECKING:
     from warpspace.scene.model import Scene
 
 
-def write_export(picture: "ScenePicture", target: "Path", *, overwrite: bool) -> None:
-    """Write the format that the ending names."""
-    match target.suffix.lower():
-        case ".glb":
-            from warpspace.outputs.exports import write_glb
+def write_page(picture: "ScenePicture", target: "Path", *, overwrite: bool) -> None:
+    """Write the interactive scene as one page that needs no network."""
+    from warpspace.app.documents.offline_page import build_offline_html, offline_picture
+    from warpspace.outputs.files import write_atomically
 
-            write_glb(picture, target, overwrite=overwrite)
-        case ".vts":
-            from warpspace.outputs.exports import write_vts
+    live = offline_picture(
+        picture.scene,
+        exaggeration=picture.exaggeration,
+        nodes=max(picture.grid.shape),
+        loop=picture.view.loop,
+        component=picture.component,
+    )
+    page = build_offline_html(live, picture.provenance)
+    with write_atomically(target, overwrite=overwrite) as temporary:
+        temporary.write_text(page, encoding="utf-8")
 
-            write_vts(picture, target, overwrite=overwrite)
-        case ".csv":
-            from warpspace.outputs.exports import write_csv
 
-            write_csv(picture, target, overwrite=overwrite)
-        case _:
-            from warpspace.app.documents.offline_page import build_offline_html, offline_picture
-            from warpspace.outputs.files import write_atomically
-
-            live = offline_picture(
-                picture.scene,
-                exaggeration=picture.exaggeration,
-                nodes=max(picture.grid.shape),
-                loop=picture.view.loop,
-                component=picture.component,
-            )
-            page = build_offline_html(live, picture.provenance)
-            with write_atomically(target, overwrite=overwrite) as temporary:
-                temporary.write_text(page, encoding="utf-8")
+register_format(
+    ExportFormat(
+        ".html", "the interactive scene, one file that needs no network", write_page, in_app=False
+    )
+)
 
 
 def embed_view(
     scene: "Scene", *, exaggeration: float, nodes: int, loop: str, largest: float
 ) -> str:
-    """Build the page with the interactive scene; outputs know nothing of the app."""
+    """Build the page with the interactive scene."""
     from warpspace.app.documents.offline_page import build_offline_html, offline_picture
     from warpspace.kinematics.model import Loop
 

@@ -8,6 +8,9 @@ from pathlib import Path
 
 from warpspace.app.documents.services import CancelledError, Request, Services
 from warpspace.exceptions import OptionError
+from warpspace.outputs.exports.formats import export_formats
+from warpspace.outputs.exports.formats import write_export as write
+from warpspace.outputs.figures.catalogue import figure_kinds
 
 MOST_RENDERERS = 2
 """Figures drawn at the same time for all tabs together."""
@@ -17,7 +20,12 @@ _renderers = threading.Semaphore(MOST_RENDERERS)
 
 def build_services() -> Services:
     """Give the app its figures and exports."""
-    return Services(draw_figure, write_export)
+    return Services(
+        draw_figure,
+        write_export,
+        figures=tuple((kind.name, kind.caption) for kind in figure_kinds() if kind.scenes == 1),
+        exports=tuple((form.ending, form.about) for form in export_formats() if form.in_app),
+    )
 
 
 def draw_figure(request: Request, cancelled: threading.Event) -> bytes:
@@ -54,8 +62,10 @@ def draw_figure(request: Request, cancelled: threading.Event) -> bytes:
         difference=A_MINUS_B,
         range_top=None if request.colours is None else request.colours.high,
     )
-    name, scenes = "error-map", [request.scene]
-    if request.pair is not None:
+    name, scenes = request.figure or "error-map", [request.scene]
+    if request.figure and request.minus is not None:
+        raise OptionError(f"figure {name!r} is of one machine; show A or B in the tab Compare")
+    if not request.figure and request.pair is not None:
         if request.tilts:
             settings = replace(settings, range_top=None)
         name, scenes = "comparison", list(request.pair)
@@ -64,9 +74,11 @@ def draw_figure(request: Request, cancelled: threading.Event) -> bytes:
             f"A is seen through the {request.loop} loop, B through the {request.minus.loop} loop; a"
             " figure of both needs one loop. GLB, CSV and HTML show their difference."
         )
-    elif request.tilts:
+    elif request.tilts and not request.figure:
+        name = "orientation-map"
+    if name == "orientation-map":
         # the lean of the needles has a factor of its own
-        name, settings = "orientation-map", replace(settings, exaggeration="auto")
+        settings = replace(settings, exaggeration="auto")
     while not _renderers.acquire(timeout=POLL_S):
         if cancelled.is_set():
             raise CancelledError("cancelled while waiting for a renderer")
@@ -97,7 +109,6 @@ def write_export(request: Request, ending: str) -> bytes:
     bytes
         The file's content.
     """
-    from warpspace.cli.exports import write_export as write
     from warpspace.picture.comparison import subtract_scenes
     from warpspace.picture.scene_picture import evaluate_picture
 

@@ -51,6 +51,8 @@ class Request:
         What is subtracted, where a difference is wanted.
     pair : tuple of Scene, (2,), or None
         Both sides of a comparison where they can be drawn on one sheet, with their difference.
+    figure : str
+        Name of the figure; empty for the one that suits what is coloured.
     """
 
     scene: Scene
@@ -63,6 +65,7 @@ class Request:
     colours: ColourScale | None = None
     minus: Beside | None = None
     pair: tuple[Scene, Scene] | None = None
+    figure: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +79,13 @@ class Services:
         cancelled, another `WarpspaceError` where it cannot be drawn.
     write_export : callable or None
         Takes a request and an ending (".glb", ".csv"); gives the file's content.
+    figures : tuple of (str, str)
+        Names of the figures of one scene, and what each shows.
+    exports : tuple of (str, str)
+        Endings of the formats, and what each is for.
     """
 
     draw_figure: Callable[[Request, threading.Event], bytes] | None = None
     write_export: Callable[[Request, str], bytes] | None = None
+    figures: tuple[tuple[str, str], ...] = ()
+    exports: tuple[tuple[str, str], ...] = ()

@@ -2,6 +2,7 @@
 
 import click
 
+from warpspace.cli.exports import export_formats, write_export
 from warpspace.cli.file_options import force_option, output_option, size_text
 from warpspace.cli.options import (
     component_option,
@@ -13,15 +14,15 @@ from warpspace.cli.options import (
 )
 from warpspace.cli.progress import progress
 
-ENDINGS = (".glb", ".vts", ".csv", ".html")
+
+def _formats_help() -> str:
+    """Say which endings there are, and what each is for."""
+    return ", ".join(f"{form.ending} ({form.about})" for form in export_formats())
 
 
 @click.command()
 @scene_argument()
-@output_option(
-    "File to write: .glb (3-D viewers, CAD), .vts (ParaView), .csv (the field), .html (the"
-    " interactive scene in one file that needs no network)."
-)
+@output_option(f"File to write: {_formats_help()}.")
 @exaggeration_option
 @grid_option()
 @component_option
@@ -42,12 +43,11 @@ def export(
     The ending of FILE chooses the format. Every format carries the scene, the settings, the display
     factor and the program's version. `warpspace view FILE.vts` shows a stored field again.
     """
-    from warpspace.cli.exports import write_export
     from warpspace.outputs.files import check_target
     from warpspace.picture.scene_picture import evaluate_picture
     from warpspace.scene.library import load_scene
 
-    target = check_target(output, ENDINGS, overwrite=force)
+    target = check_target(output, [form.ending for form in export_formats()], overwrite=force)
     with progress("writing"):
         picture = evaluate_picture(
             load_scene(scene),

@@ -8,11 +8,7 @@ from warpspace.cli.figure_options import draw_figure_file, figure_options, parse
 from warpspace.cli.file_options import output_option
 from warpspace.cli.options import scene_argument
 from warpspace.exceptions import OptionError, UnknownNameError
-
-FIGURES = (
-    *("error-map", "slices", "orientation-map", "machine", "traces", "error-curves"),
-    *("gains", "montecarlo", "ballbar"),
-)
+from warpspace.outputs.figures.catalogue import figure_names
 
 
 @click.command()
@@ -23,7 +19,7 @@ FIGURES = (
     default="error-map",
     show_default=True,
     metavar="NAME",
-    help=f"What to draw: {', '.join(FIGURES)}.",
+    help=f"What to draw: {', '.join(figure_names())}.",
 )
 @figure_options()
 def snapshot(scene: str, output: str, figure: str, *, force: bool, **options: Any) -> None:
@@ -36,10 +32,10 @@ def snapshot(scene: str, output: str, figure: str, *, force: bool, **options: An
     from warpspace.outputs.files import check_target
     from warpspace.scene.library import load_scene
 
-    if figure == "comparison":
-        raise OptionError("figure 'comparison' takes two scenes: warpspace compare A B -o FILE")
-    if figure not in FIGURES:
-        raise UnknownNameError("figure", figure, FIGURES)
+    if figure in figure_names(scenes=2):
+        raise OptionError(f"figure {figure!r} takes two scenes: warpspace compare A B -o FILE")
+    if figure not in figure_names():
+        raise UnknownNameError("figure", figure, figure_names())
     target = check_target(output, FIGURE_ENDINGS, overwrite=force)
     settings = parse_settings(**options)
     loaded = load_scene(scene)
