@@ -2,7 +2,7 @@
 
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.readouts.html import message, render
-from warpspace.app.readouts.summary import gradient
+from warpspace.app.readouts.summary import colour_stops
 from warpspace.app.state.comparison import SHOWN
 from warpspace.picture.words import spell_place
 
@@ -41,7 +41,7 @@ def comparison_html(picture: LivePicture) -> str:
         refused=found.refused,
         spell_place=spell_place,
         scale=picture.scale,
-        gradient=gradient(diverging=picture.scale.diverging),
+        colours=colour_stops(diverging=picture.scale.diverging),
     )
 
 

@@ -24,13 +24,12 @@ _STOPS = 32
 
 
 @cache
-def gradient(*, diverging: bool) -> str:
-    """Spell the colours of a scale from the bottom up as a CSS gradient."""
+def colour_stops(*, diverging: bool) -> str:
+    """Spell the colours of a scale from the bottom up as the stops of a CSS gradient."""
     table = colour_table(diverging=diverging)
     last = len(table) - 1
     stops = [table[round(i * last / _STOPS)] for i in range(_STOPS + 1)]
-    spelt = ",".join(f"rgb({r},{g},{b})" for r, g, b in stops)
-    return f"linear-gradient(to top,{spelt})"
+    return ",".join(f"rgb({r},{g},{b})" for r, g, b in stops)
 
 
 def colour_bar(picture: LivePicture) -> str:
@@ -40,7 +39,7 @@ def colour_bar(picture: LivePicture) -> str:
         "colour_bar",
         label=scale.label.partition("_"),
         unit=scale.unit,
-        gradient=gradient(diverging=scale.diverging),
+        colours=colour_stops(diverging=scale.diverging),
         ticks=[(_height(scale, tick), spell_short(tick)) for tick in scale.ticks],
         marks=_marks(picture),
     )
