@@ -6,9 +6,9 @@ import numpy as np
 from markupsafe import Markup
 
 from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.evaluation.palette import palette
 from warpspace.app.readouts.html import render
 from warpspace.app.readouts.numbers import thousands
-from warpspace.app.viewport.layers import palette
 from warpspace.geometry.colour import ColourScale, colour_table
 from warpspace.geometry.deform import round_down
 from warpspace.picture.words import spell_factor, spell_place, spell_short
