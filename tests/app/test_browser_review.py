@@ -26,6 +26,16 @@ START = start_state(load_scene("dvf5000_first"))
 PAUSE = 100
 """Milliseconds between two widgets: the client's throttle is one for all of them."""
 
+HISTOGRAM = """() => Object.values(window.__viserTestpoints.uplots)
+  .map(plot => [...plot.chart.data].map(line => [...line])).filter(data => data.length === 4)
+  .map(([at, within, beyond, limit]) => {
+    let area = 0;
+    for (let i = 1; i < at.length; ++i)
+      area += (at[i] - at[i - 1]) * (within[i] + within[i - 1] + beyond[i] + beyond[i - 1]) / 2;
+    return [Math.round(area / (at[1] - at[0])), at.filter((_, i) => !Number.isNaN(limit[i]))];
+  })"""
+"""Machines in all bars, and where the line of the limit is drawn."""
+
 
 def model(state: AppState) -> LivePicture:
     return LIVE.evaluate(state)
@@ -180,6 +190,11 @@ def test_tolerances_are_traded_by_hand(tab: Tab) -> None:
     before = float(tab.text("chance").split()[0])
     assert 60.0 < before < 80.0
     assert tab.page.locator("[data-value='histogram']").is_visible()
+    assert "limit 50 µm" in tab.text("histogram")
+    tab.until(lambda: len(tab.page.evaluate(HISTOGRAM)) == 1)
+    machines, limits = tab.page.evaluate(HISTOGRAM)[0]
+    assert machines == 20_000
+    assert limits == [50.0, 50.0]
     tab.page.get_by_text("Tolerances of Z").click()
     tab.page.wait_for_timeout(PAUSE)
     start = time.perf_counter()
@@ -198,6 +213,12 @@ def test_tolerances_are_traded_by_hand(tab: Tab) -> None:
     tab.until(lambda: float(tab.box("EA0Z · squareness of Z to Y ±").input_value()) == 25.0)
 
 
+def test_readouts_keep_their_style_sheet_when_a_panel_is_collapsed(tab: Tab) -> None:
+    rules = "document.head.querySelector('#warpspace-readouts').sheet.cssRules.length"
+    assert tab.page.evaluate(rules) > 40
+    assert tab.page.evaluate("document.querySelectorAll('#warpspace-readouts').length") == 1
+
+
 def test_a_tolerance_change_is_answered_within_300_ms_on_the_server(
     tab: Tab,
 ) -> None:
@@ -207,10 +228,10 @@ def test_a_tolerance_change_is_answered_within_300_ms_on_the_server(
     panel = next(p for p in session._parts.panels if type(p).__name__ == "ChancePanel")
     times = []
     for half_width in (3.0, 9.0, 15.0, 21.0, 5.0):
-        before = panel._picture.content
+        before = panel._words.content
         start = time.perf_counter()
         session.post(lambda state, h=half_width: edits.with_half_width(state, "EA0Z", h))
-        while panel._picture.content == before:
+        while panel._words.content == before:
             time.sleep(0.002)
         times.append(time.perf_counter() - start)
         time.sleep(0.2)

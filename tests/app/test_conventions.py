@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from markupsafe import Markup
 
 from warpspace.app.documents.scene_file import open_text, state_to_toml
 from warpspace.app.evaluation.conventions import (
@@ -17,7 +18,7 @@ from warpspace.app.evaluation.conventions import (
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.panels import conventions as panel_module
 from warpspace.app.panels.conventions import ConventionsPanel
-from warpspace.app.readouts.conventions import switchboard_html
+from warpspace.app.readouts.conventions import conventions_html
 from warpspace.app.server.followers import Followers
 from warpspace.app.state.app_state import start_state
 from warpspace.picture.mesh import edge_pieces
@@ -70,13 +71,13 @@ def test_the_effect_of_all_choices_is_that_of_the_state() -> None:
 
 def test_the_switchboard_marks_what_is_in_force() -> None:
     state = with_choice(START, "loop=relative")
-    text = switchboard_html(state, {}, lambda word, role: f'role="{role}"')
+    text = conventions_html(state, {}, lambda word, role: Markup(f'role="{role}"'))
     assert 'data-choice="loop=relative" aria-checked="true"' in text
     assert 'data-choice="loop=tool" aria-checked="false"' in text
 
 
 def test_linear_axes_have_a_direction_like_rotary_ones() -> None:
-    text = switchboard_html(START, {}, lambda word, role: "")
+    text = conventions_html(START, {}, lambda word, role: Markup())
     table, linear = text.index("Table direction"), text.index("Direction of linear axes")
     for axis, begin, end in (
         ("B", table, linear),
@@ -112,7 +113,7 @@ def test_the_panel_does_nothing_while_a_slider_moves(monkeypatch: pytest.MonkeyP
     calls: list[str] = []
     monkeypatch.setattr(
         panel_module,
-        "switchboard_html",
+        "conventions_html",
         lambda *_: calls.append("written") or f"text {len(calls)}",
     )
     panel = object.__new__(ConventionsPanel)

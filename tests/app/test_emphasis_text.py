@@ -4,12 +4,13 @@ import re
 from html.parser import HTMLParser
 
 import pytest
+from markupsafe import Markup
 
 from warpspace import load_scene
 from warpspace.app.browser.clicks import LONGEST_WORD, MOST_CLICKS, SCRIPT, read_clicks
 from warpspace.app.panels.layout import split_script
 from warpspace.app.panels.view import COMPONENT_NAMES, component_of
-from warpspace.app.readouts.exclusions import emphasis_buttons, with_switched
+from warpspace.app.readouts.exclusions import exclusion_buttons, with_switched
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.exclusions import Exclusions
@@ -38,8 +39,8 @@ class _Buttons(HTMLParser):
 
 def buttons(exclusions: Exclusions, key: str = "EAX") -> _Buttons:
     return _Buttons(
-        emphasis_buttons(
-            parameter(key), exclusions, lambda word: f'type="button" data-word="{word}"'
+        exclusion_buttons(
+            parameter(key), exclusions, lambda word: Markup(f'type="button" data-word="{word}"')
         )
     )
 

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.panels.sensitivities import rank_picture
-from warpspace.app.readouts.summary import worst_place
+from warpspace.app.evaluation.sensitivities import rank_picture
+from warpspace.app.readouts.gains import spell_ranking
+from warpspace.app.readouts.summary import summary
 from warpspace.app.state.app_state import start_state
 from warpspace.picture.words import spell_coordinate, spell_place, spell_positions
 from warpspace.scene.library import load_scene
@@ -27,8 +28,9 @@ def test_points_and_positions_carry_their_units() -> None:
 def test_result_and_gains_name_the_worst_point_alike() -> None:
     picture = LiveModel().evaluate(start_state(load_scene("dvf5000_first")))
     ranking = rank_picture(picture)
-    assert ranking.place == spell_place(picture.statistics.max_at_mm)
-    assert ranking.place in worst_place(picture)
+    place = spell_place(picture.statistics.max_at_mm)
+    assert f'data-value="gain at">{place}<' in spell_ranking(ranking)
+    assert f'data-value="max at">{place}<' in summary(picture)
     # Z of the drawing counts from the table, that of the axis from its upper end
-    assert ranking.positions.startswith("X 275, Y −225, Z −480 mm")
+    assert spell_positions(ranking.at).startswith("X 275, Y −225, Z −480 mm")
     assert np.isclose(picture.statistics.max_at_mm[2], -51.0)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from markupsafe import Markup
 
 from warpspace.app.evaluation.budget import answer, pick, with_lever, with_picked
 from warpspace.app.evaluation.evaluate import LiveModel
@@ -92,7 +93,7 @@ def test_the_text_lists_every_contribution_and_closes() -> None:
     picture = LIVE.evaluate(START)
     picked = pick(picture, *look_at(picture, picture.drawn_mm[7, 0, 11]))
     assert picked is not None
-    text = answer_html(answer(START, picked, 1.0), "EC0Y", lambda key: f'id="{key}"')
+    text = answer_html(answer(START, picked, 1.0), "EC0Y", lambda key: Markup(f'id="{key}"'))
     for key in ("EC0Y", "EA0Z", "EAZ"):
         assert f'data-contribution="{key}"' in text
     for words in ("2nd-order rest", "error, exact chain", "lever", "across the axis"):

@@ -1,8 +1,8 @@
 """HTML whose parts can be clicked: one invisible text widget carries the words of the parts."""
 
-import html
 from collections.abc import Callable
 
+from markupsafe import Markup
 from viser import GuiApi
 
 from warpspace.app.browser.handles import dom_id
@@ -31,6 +31,12 @@ SCRIPT = f"""(() => {{
   }};
 }})();"""
 """Has to run in the page before anything is clicked."""
+KEYS = Markup(
+    'role="{}" tabindex="0" onkeydown="'
+    "if(event.key==='Enter'||event.key===' '){{event.preventDefault();this.click()}}\" "
+)
+SENDS = Markup('data-word="{}" onclick="warpspaceClick(this,\'{}\')"')
+"""Attributes of what is reached with Tab and Enter, and of what sends a word when clicked."""
 
 
 class Clicks:
@@ -63,7 +69,7 @@ class Clicks:
                 self._count = number
                 self._clicked(word)
 
-    def attributes(self, word: str, role: str = "button") -> str:
+    def attributes(self, word: str, role: str = "button") -> Markup:
         """Spell the attributes of an element that is clicked, or reached with Tab and Enter.
 
         Parameters
@@ -73,17 +79,15 @@ class Clicks:
         role : str, optional
             ARIA role.
         """
-        keys = "if(event.key==='Enter'||event.key===' '){event.preventDefault();this.click()}"
-        return f'role="{role}" tabindex="0" onkeydown="{keys}" {self._sends(word)}'
+        return KEYS.format(role) + self._sends(word)
 
-    def button(self, word: str) -> str:
+    def button(self, word: str) -> Markup:
         """Spell the attributes of a real button, which needs no more to be reached by key."""
-        return f'type="button" {self._sends(word)}'
+        return Markup('type="button" ') + self._sends(word)
 
-    def _sends(self, word: str) -> str:
+    def _sends(self, word: str) -> Markup:
         """Spell the attributes of what sends a word when it is clicked."""
-        spelt = html.escape(word, quote=True)
-        return f'data-word="{spelt}" onclick="warpspaceClick(this,\'{dom_id(self._carrier)}\')"'
+        return SENDS.format(word, dom_id(self._carrier))
 
 
 def read_clicks(text: str) -> tuple[tuple[int, str], ...]:

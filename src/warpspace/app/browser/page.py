@@ -68,6 +68,32 @@ class Page:
         self.notify("That did not work", text, "red")
 
 
+def style_script(name: str, css: str) -> str:
+    """Write the script that gives a page a style sheet.
+
+    It goes into the page's head: what `add_html` puts into a panel is gone while the panel is
+    collapsed.
+
+    Parameters
+    ----------
+    name : str
+        Of the style sheet; one of the same name is replaced.
+    css : str
+
+    Returns
+    -------
+    str
+        JavaScript.
+    """
+    return f"""(() => {{
+  const id = {json.dumps(f"warpspace-{name}")};
+  const sheet = document.getElementById(id) ?? document.createElement("style");
+  sheet.id = id;
+  sheet.textContent = {json.dumps(css)};
+  document.head.append(sheet);
+}})();"""
+
+
 def _set_on_loop(event: Any) -> Callable[[], None]:
     """Give the setter of an event of asyncio that does nothing on other threads."""
     original: Callable[[], None] = event.set

@@ -21,6 +21,7 @@ from warpspace.app.evaluation.budget import active_errors
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.readouts import summary as legend
+from warpspace.app.readouts.html import style_sheet
 from warpspace.app.state.app_state import start_state
 from warpspace.app.viewport.camera import fit_camera
 from warpspace.app.viewport.layers import SCENE_PER_MM
@@ -147,6 +148,7 @@ def build_offline_html(picture: LivePicture, provenance: Mapping[str, Any] | Non
         title=picture.title,
         program=f"warpspace {__version__}",
         policy=POLICY,
+        style=Markup(style_sheet()),  # noqa: S704 - ours
         heading=Markup(legend.heading(picture)),  # noqa: S704 - escaped where it is built
         summary=Markup(legend.summary(picture)),  # noqa: S704
         scene=Markup(inner),  # noqa: S704

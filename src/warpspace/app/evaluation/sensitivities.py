@@ -5,7 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.field.basis import ErrorBasis
+from warpspace.field.evaluate import build_basis
 from warpspace.kinematics.chain import nominal_point
 from warpspace.kinematics.firstorder import columns
 from warpspace.kinematics.model import Coordinates, Loop, Model
@@ -45,6 +47,67 @@ class Bar:
     def parameter(self) -> Parameter:
         """The row of the parameter table."""
         return parameter(self.key)
+
+
+@dataclass(frozen=True, slots=True)
+class Ranking:
+    """The errors of a machine ranked for one point.
+
+    Attributes
+    ----------
+    bars : tuple of Bar
+        Largest first.
+    by_effect : bool
+        Ranked by what the present errors do, not by gain.
+    point_mm : ndarray, [3], mm
+        Where the point is drawn.
+    at : mapping of str to ndarray, [], mm or degrees
+        Where the axes stand.
+    error_um : float, µm
+        |E| there.
+    """
+
+    bars: tuple[Bar, ...]
+    by_effect: bool
+    point_mm: Array
+    at: Mapping[str, Array]
+    error_um: float
+
+
+def rank_picture(picture: LivePicture, *, middle: bool = False, by_effect: bool = False) -> Ranking:
+    """Rank the errors for a point of a picture.
+
+    Parameters
+    ----------
+    picture : LivePicture
+    middle : bool, optional
+        The middle of the volume instead of its worst point.
+    by_effect : bool, optional
+        Rank by what the present errors do.
+
+    Returns
+    -------
+    Ranking
+    """
+    state, grid = picture.state, picture.grid
+    norm = np.broadcast_to(picture.field.norm_um, grid.shape)
+    worst = np.unravel_index(int(np.argmax(norm)), grid.shape)
+    chosen = tuple(n // 2 for n in grid.shape) if middle else worst
+    node = tuple(int(index) for index in chosen)
+    at = node_coordinates(grid.coordinates, node, grid.shape)
+    scene = state.scene
+    basis = build_basis(
+        scene.model,
+        scene.errors,
+        tuple(state.amplitudes),
+        at,
+        scene.view(state.loop),
+        grid.nominal_mm[node],
+    )
+    bars = rank_gains(scene.model, state.loop, basis, state.active, (), at)
+    if by_effect:
+        bars = tuple(sorted(bars, key=lambda bar: -round(bar.moved_um, 9)))
+    return Ranking(bars, by_effect, grid.nominal_mm[node], at, float(norm[node]))
 
 
 def rank_gains(

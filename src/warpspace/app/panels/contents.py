@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 
 from warpspace.app.browser.clicks import SCRIPT
+from warpspace.app.browser.page import style_script
 from warpspace.app.panels import Panel, PanelContext
 from warpspace.app.panels.appearance import CameraPanel, Choose, LooksPanel
 from warpspace.app.panels.budget import WhyPanel
@@ -19,6 +20,7 @@ from warpspace.app.panels.sensitivities import GainsPanel
 from warpspace.app.panels.summary import heading_panel, summary_panel
 from warpspace.app.panels.tolerances import ChancePanel
 from warpspace.app.panels.view import ViewPanel
+from warpspace.app.readouts.html import style_sheet
 from warpspace.app.server.pointing import Pointing
 from warpspace.app.server.tab_context import TabContext
 from warpspace.app.state.app_state import AppState
@@ -54,6 +56,7 @@ class PanelBuilder:
     def build_first(self, state: AppState) -> Sequence[Panel]:
         """Build what a page cannot be without: sliders, numbers, heading."""
         self._tab.run_script(SCRIPT)
+        self._tab.run_script(style_script("readouts", style_sheet()))
         commands = CommandsPanel(self._context, lambda: self._fit_view(None, None))
         self._errors = errors = ErrorsPanel(self._context, state, self._choose, self._open_curve)
         with self._places.at("Result"):

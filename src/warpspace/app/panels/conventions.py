@@ -16,7 +16,7 @@ from warpspace.app.evaluation.conventions import (
 )
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
-from warpspace.app.readouts.conventions import switchboard_html
+from warpspace.app.readouts.conventions import conventions_html
 from warpspace.app.state.app_state import AppState, start_loop
 from warpspace.scene.model import Scene
 
@@ -114,8 +114,8 @@ class ConventionsPanel:
             self._write(picture.state)
 
     def _write(self, state: AppState) -> None:
-        """Write the switchboard."""
-        content = switchboard_html(state, self._known, self._clicks.attributes)
+        """Write the table."""
+        content = conventions_html(state, self._known, self._clicks.attributes)
         if content != self._text.content:
             self._text.content = content
 

@@ -1,6 +1,5 @@
 """The panel of one error: its curve along the travel, edited as rows of numbers."""
 
-import html
 from typing import Any
 
 import numpy as np
@@ -9,6 +8,8 @@ from viser import uplot
 from warpspace.app.browser.handles import Input, dom_id
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
+from warpspace.app.readouts.charts import add_chart, chart_axis
+from warpspace.app.readouts.html import message
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.curve_text import (
@@ -55,17 +56,14 @@ class ShapePanel:
             ),
             context.changed,
         )
-        self._chart: Any = gui.add_uplot(
+        self._chart: Any = add_chart(
+            gui,
             _chart_data(None, (0.0, 1.0)),
             (
-                uplot.Series(label="q"),
                 uplot.Series(label="error", stroke=CURVE_COLOUR, width=2),
                 uplot.Series(label="zero", stroke=ZERO_COLOUR, width=1),
             ),
-            scales={"x": uplot.Scale(time=False)},
-            legend=uplot.Legend(show=False),
-            height=CHART_HEIGHT,
-            padding=(8, 14, 0, 0),
+            CHART_HEIGHT,
         )
         self._kind: Input[str] = Input(
             gui.add_dropdown(
@@ -116,7 +114,7 @@ class ShapePanel:
             else:
                 return state
         except OptionError as error:
-            self._problem.content = _problem(str(error))
+            self._problem.content = message(str(error), "curve problem", small=True)
             return state
         self._problem.content = ""
         if rows is not None:
@@ -167,14 +165,8 @@ class ShapePanel:
         unit = state.scene.machine.axes[row.axis].unit
         self._chart.data = _chart_data(function, edits.axis_span(state, row.key))
         self._chart.axes = (
-            uplot.Axis(label=f"{row.axis} [{unit}]", size=34, labelSize=16, font="11px sans-serif"),
-            uplot.Axis(
-                label=f"{row.key} [{row.unit}]",
-                size=44,
-                labelSize=16,
-                font="11px sans-serif",
-                space=18,
-            ),
+            chart_axis(f"{row.axis} [{unit}]", 34),
+            chart_axis(f"{row.key} [{row.unit}]", 44),
         )
 
 
@@ -212,11 +204,3 @@ def _chart_data(
     """Give position, value and zero for the chart."""
     at, value = sample_curve(function, span)
     return at, value, np.zeros(at.shape)
-
-
-def _problem(text: str) -> str:
-    """Spell why numbers were refused; what a user has written is escaped."""
-    return (
-        '<div data-value="curve problem" style="margin:0 10px 8px;font-size:12px;color:#c2410c">'
-        f"{html.escape(text)}</div>"
-    )

@@ -13,7 +13,7 @@ from warpspace.app.browser.handles import Input
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
-from warpspace.app.readouts.exclusions import CURVE, STYLE, emphasis_buttons, with_switched
+from warpspace.app.readouts.exclusions import CURVE, exclusion_buttons, with_switched
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.ranges import Span
@@ -75,7 +75,6 @@ class ErrorsPanel:
         self._buttons: dict[str, Any] = {}
         self._parts: list[Any] = []
         self._clicks = Clicks(context.gui, self._clicked)
-        context.gui.add_html(STYLE)
         buttons = context.gui.add_button_group(
             "All errors",
             ("Reset", "All zero", "Hear all"),
@@ -128,7 +127,7 @@ class ErrorsPanel:
         with folder:
             for row in own:
                 self._buttons[row.key] = gui.add_html(
-                    emphasis_buttons(row, state.exclusions, self._clicks.button)
+                    exclusion_buttons(row, state.exclusions, self._clicks.button)
                 )
                 self._bound[row.key] = Input(self._slider(state, row), self._context.changed)
             button = gui.add_button(
@@ -188,7 +187,7 @@ class ErrorsPanel:
             for key, bound in self._bound.items():
                 _refresh(bound.handle, state.spans[key])
             for key, handle in self._buttons.items():
-                text = emphasis_buttons(parameter(key), state.exclusions, self._clicks.button)
+                text = exclusion_buttons(parameter(key), state.exclusions, self._clicks.button)
                 if handle.content != text:
                     handle.content = text
         for key, bound in self._bound.items():

@@ -1,6 +1,5 @@
 """The panel "Files": open, save, link; pictures and exports, made beside the session."""
 
-import html
 import logging
 import threading
 from collections.abc import Callable, Mapping
@@ -19,6 +18,7 @@ from warpspace.app.documents.scene_list import MOST_OPENED
 from warpspace.app.documents.services import CancelledError
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
+from warpspace.app.readouts.html import message
 from warpspace.app.server.tab_context import TabContext
 from warpspace.app.server.tab_memory import CameraMemory
 from warpspace.app.state.app_state import AppState
@@ -29,10 +29,6 @@ logger = logging.getLogger(__name__)
 FIGURE_S, VIEW_S, PAGE_S, EXPORT_S = 5.0, 1.5, 1.0, 1.0
 RENDER_TIMEOUT_S = 30.0
 LARGEST_VIEW_PX = 4096
-SHOWS = (
-    '<div data-value="exported" style="padding:2px 14px 8px;font-size:12px;line-height:1.4">'
-    "{}</div>"
-)
 Make = Callable[[threading.Event], bytes]
 
 
@@ -281,11 +277,11 @@ class FilesPanel:
     def show(self, picture: LivePicture) -> None:
         """Remember what is drawn, and say so where it is not what is steered."""
         self._picture = picture
-        self._tell(exported_words(picture))
+        self._say_what_is_exported(exported_words(picture))
 
-    def _tell(self, words: str) -> None:
+    def _say_what_is_exported(self, words: str) -> None:
         """Say what pictures and exports show."""
-        content = SHOWS.format(html.escape(words)) if words else ""
+        content = message(words, "exported", small=True) if words else ""
         if content != self._shows.content:
             self._shows.content = content
             self._shows.visible = bool(words)

@@ -10,6 +10,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.rotation import played_axis
 from warpspace.app.panels import PanelContext
 from warpspace.app.readouts.circles import circle_rows, circle_table
+from warpspace.app.readouts.html import message
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import parse_positions, quarters
 from warpspace.machine.description import Vector
@@ -64,11 +65,7 @@ class RotaryPanel:
 
     def _tell(self, position: str) -> None:
         """Write where the played axis is; without a position the play is over."""
-        self._angle.content = (
-            f'<div data-value="turning" style="padding:2px 16px">{position}</div>'
-            if position
-            else ""
-        )
+        self._angle.content = message(position, "turning") if position else ""
         if not position and self._playing:
             self._playing = False
             self._name_button()

@@ -3,11 +3,16 @@
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from viser import uplot
+
 from warpspace.app.browser.handles import Input
 from warpspace.app.evaluation.cache import Cache, Identity
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
-from warpspace.app.readouts import probability as odds
+from warpspace.app.readouts.charts import WHOLE, add_chart, chart_axis
+from warpspace.app.readouts.html import message
+from warpspace.app.readouts.probability import histogram_lines, spell_chance, spell_scatter
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.specification import LIMIT_UM, MAX, NORMAL, SAMPLED, UNIFORM
@@ -21,6 +26,9 @@ if TYPE_CHECKING:
 OVER_NAMES = {SAMPLED: "a random point (thesis)", MAX: "the worst point of each machine"}
 SPREAD_NAMES = {UNIFORM: "uniform", NORMAL: "normal, 3σ at the limits"}
 KEPT_BYTES = 100_000_000
+WITHIN, BEYOND, LIMIT = "#4a7ab5", "#c9863a", "#d6336c"
+"""Colours of the histogram; its key in the style sheet has the same."""
+CHART_HEIGHT = 150
 
 
 def _new_store() -> "Cache[Ensemble]":
@@ -74,7 +82,20 @@ class ChancePanel:
             ),
             context.changed,
         )
-        self._picture = gui.add_html("")
+        self._words = gui.add_html("")
+        self._histogram = add_chart(
+            gui,
+            (np.array([0.0, 1.0]),) + (np.zeros(2),) * 3,
+            (
+                uplot.Series(label="within", fill=WITHIN, width=0),
+                uplot.Series(label="beyond", fill=BEYOND, width=0),
+                uplot.Series(label="limit", scale=WHOLE, stroke=LIMIT, width=2, dash=(5.0, 3.0)),
+            ),
+            CHART_HEIGHT,
+            axes=(chart_axis("|E| [µm]", 34), chart_axis("machines", 50)),
+            visible=False,
+        )
+        self._numbers = gui.add_html("")
         reset = gui.add_button(
             "Tolerances of the scene", color="gray", hint="Give all tolerances the scene's values."
         )
@@ -115,7 +136,7 @@ class ChancePanel:
         self._over.show(OVER_NAMES[state.specification.over])
         self._spread.show(SPREAD_NAMES[state.specification.distribution])
         if self._built_for[:1] != (Identity(state.origin),):
-            return  # other sliders are on their way: a page must not hear of these any more
+            return  # these sliders are about to be replaced: nothing is sent to them any more
         for key, slider in self._sliders.items():
             slider.show(edits.half_width_of(state, key))
 
@@ -138,15 +159,28 @@ class ChancePanel:
             return
         self._shown = shown
         try:
-            ensemble = ENSEMBLES.get(sampled, lambda: _draw(state), lambda found: found.size)
+            ensemble = ENSEMBLES.get(sampled, lambda: _sample(state), lambda found: found.size)
         except WarpspaceError as error:
-            self._picture.content = odds.spell_refusal(str(error))
+            self._words.content = message(str(error), "refusal", small=True)
+            self._numbers.content = ""
+            self._histogram.visible = False
             return
-        self._picture.content = _picture(ensemble, state)
+        self._draw(ensemble, state)
         wanted = (Identity(state.origin), ensemble.keys)
         if wanted != self._built_for:
             self._built_for = wanted
             self._build(state, ensemble.keys)
+
+    def _draw(self, ensemble: "Ensemble", state: AppState) -> None:
+        """Work out and draw what the tolerances of a state give."""
+        from warpspace.app.evaluation.probability import estimate, tolerance_shares
+
+        chance = estimate(ensemble, state.tolerances, state.specification.limit_um)
+        shares = tolerance_shares(ensemble, state.tolerances, ensemble.keys)
+        self._words.content = spell_chance(chance)
+        self._histogram.data = histogram_lines(chance)
+        self._histogram.visible = True
+        self._numbers.content = spell_scatter(chance, shares)
 
     def _build(self, state: AppState, keys: tuple[str, ...]) -> None:
         """Lay out the sliders of the parameters of a loop."""
@@ -180,8 +214,8 @@ def _value(names: dict[str, str], text: str) -> str:
     return next((value for value, name in names.items() if name == text), "")
 
 
-def _draw(state: AppState) -> "Ensemble":
-    """Draw the machines for a state."""
+def _sample(state: AppState) -> "Ensemble":
+    """Sample machines for a state."""
     # scipy's distributions take half a second to import: not before the first picture
     from warpspace.analysis.draws import Distribution
     from warpspace.analysis.montecarlo import Over
@@ -194,12 +228,3 @@ def _draw(state: AppState) -> "Ensemble":
         distribution=Distribution(state.specification.distribution),
         positions=state.positions,
     )
-
-
-def _picture(ensemble: "Ensemble", state: AppState) -> str:
-    """Work out and draw what the tolerances of a state give."""
-    from warpspace.app.evaluation.probability import estimate, tolerance_shares
-
-    chance = estimate(ensemble, state.tolerances, state.specification.limit_um)
-    shares = tolerance_shares(ensemble, state.tolerances, ensemble.keys)
-    return odds.spell_chance(chance, shares)

@@ -1,8 +1,12 @@
-"""The switchboard of conventions as HTML: every choice with what it changes."""
+"""The table of conventions as HTML: every choice with what it changes."""
 
 from collections.abc import Callable, Mapping
+from itertools import groupby
+
+from markupsafe import Markup
 
 from warpspace.app.evaluation.conventions import Effect, choices, chosen, own_state
+from warpspace.app.readouts.html import render
 from warpspace.app.state.app_state import AppState
 from warpspace.machine.parameters import LINEAR_AXES
 
@@ -22,8 +26,7 @@ WORDS = {
     "reference=absolute": "absolute",
     "reference=point": "a point is held still",
 }
-Attributes = Callable[[str, str], str]
-_CELL = 'style="text-align:right;padding:3px 0 3px 6px;font-variant-numeric:tabular-nums"'
+Attributes = Callable[[str, str], Markup]
 
 
 def spell_choice(choice: str) -> str:
@@ -40,8 +43,8 @@ def _group(choice: str) -> str:
     return what if not axis else "linear" if axis in LINEAR_AXES else "rotary"
 
 
-def switchboard_html(state: AppState, effects: Mapping[str, Effect], attributes: Attributes) -> str:
-    """Spell the switchboard.
+def conventions_html(state: AppState, effects: Mapping[str, Effect], attributes: Attributes) -> str:
+    """Spell the table of all choices.
 
     Parameters
     ----------
@@ -54,49 +57,14 @@ def switchboard_html(state: AppState, effects: Mapping[str, Effect], attributes:
     Returns
     -------
     str
-        HTML without any word of a user's.
+        HTML.
     """
-    in_force, own = chosen(state), chosen(own_state(state))
-    rows: list[str] = []
-    group = ""
-    for choice in choices(state):
-        name = _group(choice)
-        if name != group:
-            group = name
-            title, meaning = GROUPS[name]
-            rows.append(
-                f'<tr><td colspan="4" style="padding:8px 0 1px"><b>{title}</b>'
-                f' <span style="opacity:.65">{meaning}</span></td></tr>'
-            )
-        on = choice in in_force
-        dot = "●" if on else "○"
-        weight = "font-weight:600;" if on else ""
-        mark = ' <span style="opacity:.6;font-weight:400">scene</span>' if choice in own else ""
-        rows.append(
-            f'<tr data-choice="{choice}" aria-checked="{str(on).lower()}"'
-            f' style="cursor:pointer;{weight}" {attributes(choice, "radio")}>'
-            f'<td style="width:16px">{dot}</td><td>{spell_choice(choice)}{mark}</td>'
-            f"{_numbers(effects.get(choice), is_own=choice in own)}</tr>"
-        )
-    total = effects.get("all")
-    rows.append(
-        '<tr data-choice="all" style="border-top:1px solid rgba(128,128,128,.6)"><td></td>'
-        f"<td>all choices together</td>{_numbers(total, is_own=False)}</tr>"
+    return render(
+        "conventions",
+        groups=[(*GROUPS[name], list(own)) for name, own in groupby(choices(state), _group)],
+        in_force=chosen(state),
+        own=chosen(own_state(state)),
+        effects=effects,
+        spell_choice=spell_choice,
+        attributes=attributes,
     )
-    return (
-        '<div style="padding:0 12px 8px;line-height:1.35;font-size:12px">'
-        '<table style="width:100%;border-collapse:collapse">'
-        f'<tr style="opacity:.65"><td colspan="2">changes the map by [µm]</td>'
-        f"<td {_CELL}>mean</td><td {_CELL}>max</td></tr>{''.join(rows)}</table>"
-        '<div style="opacity:.65;margin-top:4px">Length of the change at the same axis positions,'
-        " each choice alone against the scene's own conventions, over 7×7×7 nodes.</div></div>"
-    )
-
-
-def _numbers(effect: Effect | None, *, is_own: bool) -> str:
-    """Spell what a choice changes."""
-    if is_own:
-        return f"<td {_CELL}>–</td><td {_CELL}>–</td>"
-    if effect is None:
-        return f"<td {_CELL}>…</td><td {_CELL}>…</td>"
-    return f"<td {_CELL}>{effect.mean_um:.2f}</td><td {_CELL}>{effect.max_um:.2f}</td>"

@@ -1,43 +1,25 @@
 """Solo, mute and curve of one error as three small buttons: HTML, and what a click of them does."""
 
-import html
 from collections.abc import Callable
 
+from markupsafe import Markup
+
+from warpspace.app.readouts.html import render
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.exclusions import Exclusions
 from warpspace.machine.parameters import Parameter
 
 SOLO, MUTE, CURVE = "solo", "mute", "curve"
-Attributes = Callable[[str], str]
-_WAVE = (
-    '<svg width="12" height="10" viewBox="0 0 12 10" aria-hidden="true"><path d="M1 5c1.7-5.5'
-    ' 3.3-5.5 5 0s3.3 5.5 5 0" fill="none" stroke="currentColor" stroke-width="1.5"/></svg>'
+Attributes = Callable[[str], Markup]
+SWITCHES = (
+    (SOLO, "S", "Solo", "Solo: show the effect of this error alone, or with others on solo"),
+    (MUTE, "M", "Mute", "Mute: leave this error out; its value is kept"),
 )
-STYLE = """<style>
-.ws-error { position: relative; height: 0; z-index: 1; }
-.ws-error > span { position: absolute; right: 10px; top: -1px; display: flex; gap: 2px; }
-.ws-error button { width: 20px; height: 20px; padding: 0; border-radius: 4px; cursor: pointer;
-  display: flex; align-items: center; justify-content: center; background: none; color: inherit;
-  border: 1px solid rgba(128, 128, 128, .4); font: 600 11px/1 system-ui, sans-serif; opacity: .7; }
-.ws-error button:hover { opacity: 1; border-color: currentColor; }
-.ws-error button:focus-visible { opacity: 1; outline: 2px solid
-  var(--mantine-primary-color-filled); outline-offset: 1px; }
-.ws-error button[aria-pressed="true"] { opacity: 1; color: var(--mantine-color-body);
-  background: var(--mantine-primary-color-filled); border-color: transparent; }
-.ws-error button[aria-pressed="true"][data-word^="mute"] {
-  background: var(--mantine-color-text); }
-div:has(> .ws-error) + div p { white-space: nowrap; overflow: hidden; text-overflow: ellipsis;
-  padding-right: 65px; box-sizing: border-box !important; font-size: .83em !important;
-  letter-spacing: -.3px !important; }
-div:has(> .ws-error) + div label wbr { display: none; }
-/* what is silent stands back, and can still be moved */
-div:has(> .ws-silent) + div { opacity: .45; }
-</style>"""
-"""Put the buttons at the end of the line with the slider's label, which follows them."""
+"""Word, letter, name and explanation of the switches."""
 
 
-def emphasis_buttons(row: Parameter, exclusions: Exclusions, button: Attributes) -> str:
+def exclusion_buttons(row: Parameter, exclusions: Exclusions, button: Attributes) -> str:
     """Draw the buttons of one error in their present state.
 
     Parameters
@@ -50,26 +32,18 @@ def emphasis_buttons(row: Parameter, exclusions: Exclusions, button: Attributes)
     Returns
     -------
     str
-        HTML to stand directly before the error's slider, see `STYLE`.
+        HTML to stand directly before the error's slider: the style sheet puts the buttons
+        at the end of the line with the slider's label.
     """
-    name = html.escape(f"{row.key}, {row.name}", quote=True)
-    active = exclusions.active(row.key)
-    silent = "" if active else " ws-silent"
-    group = name if active else f"{name}, silent"
-    solo, mute = row.key in exclusions.soloed, row.key in exclusions.muted
-    switches = (
-        (SOLO, "S", "Solo", solo, "Solo: hear this error alone, or with others on solo"),
-        (MUTE, "M", "Mute", mute, "Mute: leave this error out; its value is kept"),
-    )
-    spelt = "".join(
-        f'<button {button(f"{word} {row.key}")} aria-pressed="{str(on).lower()}" '
-        f'aria-label="{label} {name}" title="{hint}">{letter}</button>'
-        for word, letter, label, on, hint in switches
-    )
-    return (
-        f'<div class="ws-error{silent}" role="group" aria-label="{group}"><span>{spelt}'
-        f'<button {button(f"{CURVE} {row.key}")} aria-label="Curve of {name}" '
-        f'title="Curve along {row.axis}, below">{_WAVE}</button></span></div>'
+    excluded = {SOLO: exclusions.soloed, MUTE: exclusions.muted}
+    return render(
+        "exclusions",
+        row=row,
+        name=f"{row.key}, {row.name}",
+        active=exclusions.active(row.key),
+        switches=[(*switch, row.key in excluded[switch[0]]) for switch in SWITCHES],
+        curve=CURVE,
+        button=button,
     )
 
 

@@ -1,43 +1,48 @@
-"""Colour bar, numbers and headings as HTML: pure text, every foreign word escaped."""
+"""What is always in view, as HTML: the heading, and colour bar, numbers and key of the map."""
 
-import html
-from collections.abc import Mapping
-from functools import cache, lru_cache
+from functools import cache
 
 import numpy as np
+from markupsafe import Markup
 
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.viewport.layers import palette
+from warpspace.app.evaluation.palette import palette
+from warpspace.app.readouts.html import render
+from warpspace.app.readouts.numbers import thousands
 from warpspace.geometry.colour import ColourScale, colour_table
 from warpspace.geometry.deform import round_down
-from warpspace.picture.words import spell_factor, spell_place
+from warpspace.picture.words import spell_factor, spell_place, spell_short
 from warpspace.units import MICROMETRE, MM_PER_UM
 
-BAR_HEIGHT = 190
+BAR_PX = 190
+"""Height of the colour bar, CSS pixels; the style sheet has it too."""
+LINE_PX = 12
+"""Least distance of two names beside the colour bar."""
 _BAR_MM = 100.0
 _PX_PER_MM = 0.9
 _STOPS = 32
 
 
-def _number(value: float) -> str:
-    """Spell a value of a scale with a proper minus sign."""
-    return f"{value:g}".replace("-", "−")
-
-
 @cache
-def gradient(*, diverging: bool) -> str:
-    """Spell the colours of a scale from the bottom up as a CSS gradient."""
+def colour_stops(*, diverging: bool) -> str:
+    """Spell the colours of a scale from the bottom up as the stops of a CSS gradient."""
     table = colour_table(diverging=diverging)
     last = len(table) - 1
     stops = [table[round(i * last / _STOPS)] for i in range(_STOPS + 1)]
-    spelt = ",".join(f"rgb({r},{g},{b})" for r, g, b in stops)
-    return f"linear-gradient(to top,{spelt})"
+    return ",".join(f"rgb({r},{g},{b})" for r, g, b in stops)
 
 
 def colour_bar(picture: LivePicture) -> str:
     """Draw the colour bar with ticks, unit, and marks at mean, P95 and max of what is coloured."""
-    heading, bar = _empty_bar(picture.scale)
-    return heading + bar + "".join(_marks(picture.scale, _marked(picture))) + "</div>"
+    scale = picture.scale
+    return render(
+        "colour_bar",
+        label=scale.label.partition("_"),
+        unit=scale.unit,
+        colours=colour_stops(diverging=scale.diverging),
+        ticks=[(_height(scale, tick), spell_short(tick)) for tick in scale.ticks],
+        marks=_marks(picture),
+    )
 
 
 def _marked(picture: LivePicture) -> dict[str, float]:
@@ -59,87 +64,28 @@ def _marked(picture: LivePicture) -> dict[str, float]:
     }
 
 
-@lru_cache(maxsize=32)
-def _empty_bar(scale: ColourScale) -> tuple[str, str]:
-    """Draw heading and bar of a scale with its ticks, without marks; the bar is still open."""
-    parts = [
-        (
-            f'<div style="position:relative;height:{BAR_HEIGHT}px;margin:10px 0 8px 58px;'
-            f'width:62px">'
-            f'<div style="position:absolute;left:0;top:0;bottom:0;width:22px;'
-            f"outline:1px solid rgba(128,128,128,.5);"
-            f'background:{gradient(diverging=scale.diverging)}"></div>'
-        )
-    ]
-    for tick in scale.ticks:
-        at = _height(scale, tick)
-        parts.append(
-            f'<div style="position:absolute;left:22px;bottom:{at:.1f}px;width:5px;'
-            f'border-top:1px solid currentColor"></div>'
-            f'<div style="position:absolute;left:31px;bottom:{at - 7:.1f}px;line-height:14px;'
-            f'font-size:12px">{_number(tick)}</div>'
-        )
-    label = html.escape(scale.label).replace("_", "<sub>", 1) + (
-        "</sub>" if "_" in scale.label else ""
-    )
-    heading = (
-        f'<div style="margin-left:44px;font-weight:600">{label} [{html.escape(scale.unit)}]</div>'
-    )
-    return heading, "".join(parts)
-
-
 def _height(scale: ColourScale, value: float) -> float:
     """Place a value on the bar, pixels above its foot."""
     part = (value - scale.low) / (scale.high - scale.low)
-    return min(max(part, 0.0), 1.0) * BAR_HEIGHT
+    return min(max(part, 0.0), 1.0) * BAR_PX
 
 
-def _marks(scale: ColourScale, values: Mapping[str, float]) -> list[str]:
-    """Draw names and arrows left of the bar, the names moved apart where they would overlap."""
-    placed: list[str] = []
+def _marks(picture: LivePicture) -> list[tuple[str, str, float, float]]:
+    """Place what is marked: name, value, height of its arrow and of its name, pixels.
+
+    Names are moved up where they would overlap.
+    """
+    placed: list[tuple[str, str, float, float]] = []
     lowest = -100.0
-    for name, value in values.items():
-        at = _height(scale, value)
-        text = max(at, lowest + 12.0)
-        lowest = text
-        placed.append(
-            f'<div data-mark="{name}" title="{_number(round(value, 2))} {scale.unit}"'
-            f' style="position:absolute;left:-58px;width:42px;text-align:right;'
-            f'bottom:{text - 7:.1f}px;line-height:14px;font-size:11px">{name}</div>'
-            f'<div style="position:absolute;left:-12px;bottom:{at - 5:.1f}px;border:5px solid '
-            f'transparent;border-left:8px solid currentColor;border-right:0"></div>'
-        )
+    for name, value in _marked(picture).items():
+        arrow = _height(picture.scale, value)
+        lowest = max(arrow, lowest + LINE_PX)
+        placed.append((name, spell_short(round(value, 2)), arrow, lowest))
     return placed
 
 
-def numbers(picture: LivePicture) -> str:
-    """Spell the statistics of the field as a table."""
-    found = picture.statistics
-    rows = [
-        ("mean", f"{found.mean_um:.2f} µm", True),
-        ("RMS", f"{found.rms_um:.2f} µm", False),
-        ("P95", f"{found.p95_um:.2f} µm", False),
-        ("max", f"{found.max_um:.2f} µm", True),
-    ]
-    cells = "".join(
-        f'<tr><td style="opacity:.7;padding:1px 0">{name}</td>'
-        f'<td data-value="{name}" style="text-align:right;font-variant-numeric:tabular-nums;'
-        f'font-weight:{600 if strong else 400}">{value}</td></tr>'
-        for name, value, strong in rows
-    )
-    return f'<table style="width:100%;border-collapse:collapse;font-size:14px">{cells}</table>'
-
-
-def worst_place(picture: LivePicture) -> str:
-    """Spell where the largest error is."""
-    return (
-        '<div style="font-size:13px;margin-top:2px"><span style="opacity:.7">max at </span>'
-        f'<span data-value="max at">{spell_place(picture.statistics.max_at_mm)}</span></div>'
-    )
-
-
-def key_to_lines(picture: LivePicture) -> str:
-    """Explain the lines that are drawn."""
+def _key_to_lines(picture: LivePicture) -> list[tuple[str, str, str]]:
+    """List the lines that are drawn: dashing, colour and meaning."""
     colours, shown = palette(picture), picture.state.shown
     rows = [("solid", colours.edge, "bent working volume")]
     if shown.ghost:
@@ -149,73 +95,79 @@ def key_to_lines(picture: LivePicture) -> str:
             ("solid", colours.trace_actual, "rotary traces, actual (paler: at other tilts)"),
             ("solid", colours.trace_nominal, "rotary traces, nominal, where apart"),
         ]
-    return "".join(
-        '<div style="display:flex;align-items:center;gap:8px;font-size:12px">'
-        f'<span style="flex:0 0 26px;border-top:2px {style} rgb{rgb}"></span>{text}</div>'
-        for style, rgb, text in rows
-    )
+    return [(style, f"rgb{rgb}", text) for style, rgb, text in rows]
 
 
-def scale_bars(picture: LivePicture) -> str:
-    """Draw the two lengths side by side: geometry in mm, displacement in µm."""
+def _scale_bars(picture: LivePicture) -> list[tuple[float, str]]:
+    """Give the length of two bars, pixels, and their words: geometry in mm, displacement in µm."""
     factor = picture.exaggeration
-    error = round_down(_BAR_MM / (factor * MM_PER_UM))
-    width = error * MM_PER_UM * factor * _PX_PER_MM
-    unit = f"{_number(error)} µm" if error < 1e4 else f"{_number(error * MM_PER_UM)} mm"
-
-    def bar(pixels: float, text: str) -> str:
-        return (
-            f'<div><div style="font-size:12px;margin-top:6px">{text}</div>'
-            f'<div style="width:{pixels:.1f}px;height:5px;border:2px solid currentColor;'
-            f'border-top:0"></div></div>'
-        )
-
-    return bar(_BAR_MM * _PX_PER_MM, f"{_BAR_MM:g} mm geometry") + bar(
-        width, f"{unit} error, {spell_factor(factor)}"
+    error_um = round_down(_BAR_MM / (factor * MM_PER_UM))
+    drawn_mm = error_um * MM_PER_UM * factor
+    error = (
+        f"{spell_short(error_um)} µm"
+        if error_um < 1e4
+        else f"{spell_short(error_um * MM_PER_UM)} mm"
     )
+    return [
+        (_BAR_MM * _PX_PER_MM, f"{_BAR_MM:g} mm geometry"),
+        (drawn_mm * _PX_PER_MM, f"{error} error, {spell_factor(factor)}"),
+    ]
 
 
 def summary(picture: LivePicture) -> str:
-    """Put colour bar, numbers, scale bars and key into one block."""
-    nodes = f"{picture.field.norm_um.size:,}".replace(",", "\u202f")
-    return (
-        '<div style="padding:2px 14px 10px;line-height:1.4">'
-        '<div style="display:flex;gap:14px">'
-        f'<div style="flex:0 0 124px">{colour_bar(picture)}</div>'
-        '<div style="flex:1"><div style="font-weight:600">|E| over the grid</div>'
-        '<div style="font-size:12px;opacity:.7;margin-bottom:6px">'
-        f"{nodes} nodes, {picture.both_words(lambda state: state.loop.value)} loop</div>"
-        f"{numbers(picture)}</div></div>"
-        f"{worst_place(picture)}"
-        '<div style="display:flex;gap:18px;align-items:end;margin:2px 0 8px">'
-        f"{scale_bars(picture)}</div>"
-        f"{key_to_lines(picture)}</div>"
+    """Put colour bar, numbers, scale bars and key into one block.
+
+    Parameters
+    ----------
+    picture : LivePicture
+
+    Returns
+    -------
+    str
+        HTML.
+    """
+    found = picture.statistics
+    return render(
+        "summary",
+        colour_bar=Markup(colour_bar(picture)),  # noqa: S704 - escaped by its template
+        nodes=thousands(picture.field.norm_um.size),
+        loop=picture.both_words(lambda state: state.loop.value),
+        numbers={
+            "mean": found.mean_um,
+            "RMS": found.rms_um,
+            "P95": found.p95_um,
+            "max": found.max_um,
+        },
+        worst_place=spell_place(found.max_at_mm),
+        scale_bars=_scale_bars(picture),
+        lines=_key_to_lines(picture),
     )
 
 
 def heading(picture: LivePicture) -> str:
-    """Spell machine, error set and display factor."""
+    """Spell machine, error set and display factor.
+
+    Parameters
+    ----------
+    picture : LivePicture
+
+    Returns
+    -------
+    str
+        HTML.
+    """
     state = picture.drawn_state
     factor = picture.exaggeration
-    how = "true scale" if factor == 1.0 else f"displacement drawn {spell_factor(factor)}"
-    auto = " (auto)" if picture.state.exaggeration is None else ""
-    edited = len(state.changed_keys)
-    note = f" · {edited} error{'s' if edited > 1 else ''} changed" if edited else ""
-    active = state.active
-    silent = sum(1 for key, value in state.amplitudes.items() if value != active[key])
-    note += f" · {silent} silent" if silent else ""
-    nodes = "×".join(str(count) for count in picture.grid.shape)
-    size = " × ".join(f"{edge:.0f}" for edge in picture.grid.extent_mm)
-    machine = f"{state.scene.machine.title}, chain {state.scene.machine.chain}"
-    title = html.escape(state.scene.title)
-    if picture.compared is not None:
-        title = f'<span data-value="compared">{html.escape(picture.compared.title)}</span>'
-    return (
-        '<div style="padding:2px 14px 10px;line-height:1.4">'
-        f'<div style="font-size:17px;font-weight:650">{title}'
-        f'<span style="font-weight:400;opacity:.7">{note}</span></div>'
-        f'<div style="font-size:12.5px;opacity:.75">'
-        f"{html.escape(machine)} · {size} mm · {nodes} nodes</div>"
-        f'<div style="font-size:14px;margin-top:3px"><b data-value="factor">{how}</b>{auto}'
-        "</div></div>"
+    active, machine = state.active, state.scene.machine
+    return render(
+        "heading",
+        title=state.scene.title,
+        compared=picture.compared.title if picture.compared is not None else "",
+        edited=len(state.changed_keys),
+        silent=sum(1 for key, value in state.amplitudes.items() if value != active[key]),
+        machine=f"{machine.title}, chain {machine.chain}",
+        size=" × ".join(f"{edge:.0f}" for edge in picture.grid.extent_mm),
+        nodes="×".join(str(count) for count in picture.grid.shape),
+        factor="true scale" if factor == 1.0 else f"displacement drawn {spell_factor(factor)}",
+        auto=picture.state.exaggeration is None,
     )

@@ -5,7 +5,6 @@ with a node scale of `SCENE_PER_MM`: one scene unit is 100 mm, since viser clips
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Protocol
 
@@ -19,44 +18,6 @@ from warpspace.units import Array
 SCENE_PER_MM = 0.01
 NOTHING = np.zeros((1, 2, 3), np.float32)
 """A piece of line without length, for handles that have nothing to show: viser wants some."""
-
-
-@dataclass(frozen=True, slots=True)
-class Palette:
-    """Quiet colours around the map, sRGB."""
-
-    edge: Rgb
-    grid: Rgb
-    ghost: Rgb
-    trace_nominal: Rgb
-    trace_actual: Rgb
-    trace_elsewhere: Rgb
-    axis: Rgb
-
-
-LIGHT = Palette(
-    edge=(24, 32, 46),
-    grid=(24, 32, 46),
-    ghost=(140, 150, 165),
-    trace_nominal=(196, 202, 211),
-    trace_actual=(45, 55, 72),
-    trace_elsewhere=(150, 158, 171),
-    axis=(110, 120, 135),
-)
-DARK = Palette(
-    edge=(215, 220, 228),
-    grid=(20, 24, 32),
-    ghost=(130, 138, 150),
-    trace_nominal=(90, 98, 110),
-    trace_actual=(205, 212, 222),
-    trace_elsewhere=(118, 126, 138),
-    axis=(150, 158, 170),
-)
-
-
-def palette(picture: LivePicture) -> Palette:
-    """Choose the colours for the ground a picture is drawn on."""
-    return DARK if picture.state.shown.dark else LIGHT
 
 
 @lru_cache(maxsize=64)

@@ -10,7 +10,8 @@ from warpspace.app.browser.handles import Handle
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import machine_room_mm
-from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes, palette
+from warpspace.app.evaluation.palette import palette
+from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes
 from warpspace.app.viewport.layers.adding import add_ball, add_lines
 from warpspace.app.viewport.layers.axes import AWAY
 from warpspace.geometry.arrows import build_arrows

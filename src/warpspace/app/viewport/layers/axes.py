@@ -6,7 +6,8 @@ from viser import SceneApi
 
 from warpspace.app.browser.handles import Handle
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes, palette
+from warpspace.app.evaluation.palette import palette
+from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes
 from warpspace.app.viewport.layers.adding import add_lines
 from warpspace.picture.ticks import tick_values
 from warpspace.units import Array

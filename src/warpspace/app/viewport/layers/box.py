@@ -6,8 +6,9 @@ from viser import SceneApi
 
 from warpspace.app.browser.handles import Handle
 from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.evaluation.palette import palette
 from warpspace.app.viewport.drafts import BoxPicture, box_picture, surface_glb
-from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes, palette
+from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes
 from warpspace.app.viewport.layers.adding import add_lines
 from warpspace.app.viewport.tone_map import Rgb
 from warpspace.geometry.surfaces import box_edges

@@ -9,7 +9,8 @@ from viser import SceneApi
 from warpspace.app.browser.handles import Handle
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import drawn_bodies, tool_point
-from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes, palette
+from warpspace.app.evaluation.palette import palette
+from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes
 from warpspace.app.viewport.layers.adding import add_ball
 from warpspace.app.viewport.tone_map import Rgb
 from warpspace.picture.bodies import PlacedBody

@@ -3,7 +3,8 @@
 from viser import SceneApi
 
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.viewport.layers import colour_bytes, palette, pieces
+from warpspace.app.evaluation.palette import palette
+from warpspace.app.viewport.layers import colour_bytes, pieces
 from warpspace.app.viewport.layers.adding import add_lines
 
 

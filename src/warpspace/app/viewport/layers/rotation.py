@@ -6,8 +6,9 @@ import numpy as np
 from viser import SceneApi
 
 from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.evaluation.palette import palette
 from warpspace.app.evaluation.rotation import points_on_traces
-from warpspace.app.viewport.layers import SCENE_PER_MM, palette
+from warpspace.app.viewport.layers import SCENE_PER_MM
 from warpspace.units import Array
 
 SIZE = 0.014

@@ -10,7 +10,8 @@ from viser import SceneApi
 
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.viewport.layers import NOTHING, colour_bytes, palette, polyline_pieces
+from warpspace.app.evaluation.palette import palette
+from warpspace.app.viewport.layers import NOTHING, colour_bytes, polyline_pieces
 from warpspace.app.viewport.layers.adding import add_lines
 from warpspace.app.viewport.tone_map import line_vertex_colours
 from warpspace.geometry.traces import TraceGroup
