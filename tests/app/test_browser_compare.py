@@ -150,7 +150,7 @@ def test_a_point_of_a_trace_and_its_lever_come_with_a_link(
         picked=Picked(at, Loop.WORKPIECE, (275.0, 0.0, 0.0)),
         lever="EC0B",
     )
-    tab.session.post(lambda _: asked)
+    tab.session.context.post(lambda _: asked)
     tab.panel("Why")
     tab.until(lambda: tab.page.locator("[data-value='why norm']").count() == 1)
     norm = tab.text("why norm")
@@ -179,7 +179,7 @@ def test_what_is_too_large_for_a_link_is_left_out_and_named(tab: Tab) -> None:
         curve = Table((-275.0, 275.0), tuple(zip(rows.tolist(), values.tolist(), strict=True)))
         big = edits.with_curve(big, key, curve)
     state = replace(START, comparison=with_pin(big).comparison)
-    tab.session.post(lambda _: state)
+    tab.session.context.post(lambda _: state)
     tab.until(lambda: tab.page.locator("[data-value='compared']").count() == 1)
     link = press_link(tab)
     tab.until(lambda: tab.page.get_by_text("Without the comparison").count() == 1)

@@ -8,9 +8,10 @@ import pytest
 from warpspace import load_scene
 from warpspace.analysis.distribution import Histogram, Probability
 from warpspace.analysis.montecarlo import Over
+from warpspace.app.browser.opening import hint_script
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.probability import Chance
-from warpspace.app.panels.commands import Command, help_text, hint_script, spell_change
+from warpspace.app.panels.commands import Command, help_text, spell_change
 from warpspace.app.panels.sensitivities import rank_picture, spell_ranking
 from warpspace.app.readouts.probability import spell_chance, spell_refusal
 from warpspace.app.state.app_state import start_state

@@ -20,11 +20,11 @@ from warpspace.app.documents.spelling import (
     spell,
     spell_numbers,
 )
-from warpspace.app.server.tab_memory import CameraMemory
 from warpspace.app.state.app_state import AppState, Shown, start_state
 from warpspace.app.state.exclusions import Exclusions
 from warpspace.app.state.look import linear_spans, slice_spans
 from warpspace.app.state.picked import Picked, read_trace, spell_trace
+from warpspace.app.viewport.camera import CameraMemory
 from warpspace.kinematics.model import Loop
 
 MAX_LENGTH = 16_000
