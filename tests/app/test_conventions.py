@@ -120,8 +120,7 @@ def test_the_panel_does_nothing_while_a_slider_moves(monkeypatch: pytest.MonkeyP
     panel._effects, panel._text = Effects(), SimpleNamespace(content="")
     panel._clicks = SimpleNamespace(attributes=None)
     parts = Display()
-    parts.panels = (panel,)
-    parts.show(LIVE.evaluate(START))
+    parts.add(LIVE.evaluate(START), panels=[panel])
     assert calls == ["written"]
     moved = START
     for value in (1.0, 2.0, 3.0):

@@ -23,7 +23,10 @@ class Display:
         self.panels: tuple[Panel, ...] = ()
         self._state: AppState | None = None
         self._unsettled_since: float | None = None
-        self._concerned: dict[object, tuple[object, ...]] = {}
+        # isinstance of a protocol is slow: asked once, not on every slider move
+        self._selective: dict[Layer | Panel, Selective] = {}
+        self._deferred: list[Deferred] = []
+        self._concerned: dict[Layer | Panel, tuple[object, ...]] = {}
 
     @property
     def state(self) -> AppState | None:
@@ -46,6 +49,11 @@ class Display:
         for panel in panels:
             panel.show(picture)
         self.layers, self.panels = (*self.layers, *layers), (*self.panels, *panels)
+        for part in (*layers, *panels):
+            if isinstance(part, Selective):
+                self._selective[part] = part
+                self._concerned[part] = part.concerns(picture)
+        self._deferred += [panel for panel in panels if isinstance(panel, Deferred)]
         self._state = picture.state
         self._unsettle()
 
@@ -60,10 +68,11 @@ class Display:
         """
         self._state = picture.state
         for part in (*self.layers, *self.panels):
-            if not isinstance(part, Selective):
+            selective = self._selective.get(part)
+            if selective is None:
                 part.show(picture)
                 continue
-            concerned = part.concerns(picture)
+            concerned = selective.concerns(picture)
             if anew or self._concerned.get(part) != concerned:
                 self._concerned.pop(part, None)
                 part.show(picture)
@@ -95,6 +104,5 @@ class Display:
             Runs a step and reports what it raises.
         """
         self._unsettled_since = None
-        for panel in self.panels:
-            if isinstance(panel, Deferred):
-                guarded(partial(panel.settle, picture))
+        for panel in self._deferred:
+            guarded(partial(panel.settle, picture))
