@@ -38,11 +38,11 @@ from viser.infra import WebsockClientConnection
 from websockets.asyncio.server import ServerConnection
 
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.panels.layout import side_widths
 from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.viewport.layers.lights import light_scene
+from warpspace.app.viewport.tab_camera import LEFT_WIDTH, RIGHT_WIDTH
 from warpspace.scene.library import load_scene
 
 LIMITS = {
@@ -146,7 +146,7 @@ class Recorder:
         self.step_ms: list[float] = []
         self.recording = True
         send, queue = ServerConnection.send, WebsockClientConnection.queue_message
-        step = Session._step  # noqa: SLF001
+        step = Session._follow  # noqa: SLF001
 
         async def count(connection: Any, message: Any, *args: Any, **kwargs: Any) -> None:
             self.bytes_sent += 0 if isinstance(message, str) else len(message)
@@ -164,7 +164,7 @@ class Recorder:
 
         ServerConnection.send = count
         WebsockClientConnection.queue_message = note
-        Session._step = timed  # noqa: SLF001
+        Session._follow = timed  # noqa: SLF001
 
     @contextlib.contextmanager
     def into(self) -> Iterator[list[Any]]:
@@ -198,13 +198,13 @@ class BarePage:
         """Lay out the page and replay the first picture."""
         gui = client.gui
         gui.main_panel.dock_left()
-        gui.main_panel.set_width(side_widths()[0])
+        gui.main_panel.set_width(LEFT_WIDTH)
         slider = gui.add_slider("EXX", -10.0, 10.0, 0.1, 0.0)
         panel = gui.add_panel()
         with panel.add_tab("Result"):
             texts = {m.uuid: gui.add_html("") for move in moves for m in move if is_text(m)}
         panel.dock_right()
-        panel.set_width(side_widths()[1])
+        panel.set_width(RIGHT_WIDTH)
 
         def replay(messages: list[Any]) -> None:
             with client.atomic():

@@ -64,7 +64,7 @@ class Tab:
         page.goto(f"{viewer.url}/?fixedDpr=1{query}")
         wait_until_open(page)
         self.until(lambda: self.vertices() is not None)
-        self._camera = self.session._eye.remember()
+        self._camera = self.session.context.camera.remember()
 
     @property
     def session(self) -> Session:
@@ -82,18 +82,16 @@ class Tab:
         start, session = start_state(SCENES[0]), self.session
 
         def forget() -> None:
-            session.store.unsubscribe(session.changed)
-            session.store = StateStore(start)
-            session.store.subscribe(session.changed)
-            session._eye._stand = CameraSetup()
+            session.use(StateStore(start))
+            session.context.camera._stand = CameraSetup()
 
         self.page.wait_for_selector("html[data-warpspace=open]")
         self.page.keyboard.press("Escape")
         self.written("Find an error").fill("")
         self.panel("Result")
         self.panel("View")
-        session.act(forget)
-        session._look_from(self._camera)
+        session.context.act(forget)
+        session.context.look_from(self._camera)
         self.until(lambda: self.page.evaluate(TIDY) == 0)
         wanted = drawn_nodes(session._live.evaluate(start))
         self.until(lambda: session.state == start and self.shows(wanted))

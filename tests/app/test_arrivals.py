@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from viser import _messages as messages
 
-from warpspace.app.browser.arrivals import CARRIER, MOST_HEARD, Arrivals
+from warpspace.app.browser.arrivals import CARRIER, MOST_KNOWN, Arrivals
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import start_state
 from warpspace.app.viewport.tab_camera import TabCamera
@@ -41,7 +41,7 @@ def arrivals(connections: Connections) -> Arrivals:
     return Arrivals(SimpleNamespace(_websock_server=connections))  # pyright: ignore[reportArgumentType]
 
 
-def test_a_token_is_heard_before_and_after_a_page_is_expected(
+def test_a_token_is_known_before_and_after_a_page_is_expected(
     arrivals: Arrivals, connections: Connections
 ) -> None:
     assert CARRIER in connections.sent[0].source
@@ -59,7 +59,7 @@ def test_a_token_is_heard_before_and_after_a_page_is_expected(
 
 
 @pytest.mark.parametrize("value", [None, 1, ["a"], {"a": 1}])
-def test_what_is_no_text_is_not_heard(
+def test_what_is_no_text_is_not_taken(
     arrivals: Arrivals, connections: Connections, value: object
 ) -> None:
     connections.say(1, CARRIER, value)
@@ -84,7 +84,7 @@ def test_pages_that_never_show_anything_are_forgotten(
     arrivals: Arrivals, connections: Connections
 ) -> None:
     first = arrivals.expect(0)
-    for client in range(1, MOST_HEARD + 1):
+    for client in range(1, MOST_KNOWN + 1):
         connections.say(client, CARRIER, "x")
     assert arrivals.expect(0) is not first
     arrivals.forget(5)

@@ -159,7 +159,7 @@ def test_exception_in_the_session_is_shown_and_the_session_goes_on(
     def broken(state: AppState) -> AppState:
         raise RuntimeError("a wheel came off")
 
-    tab.session.post(broken)
+    tab.session.context.post(broken)
     tab.until(lambda: tab.page.get_by_text("a wheel came off").count() > 0)
     assert "a wheel came off" in caplog.text
     tab.send("EXX", "4")

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from app.conftest import SCENES, Tab, drawn_nodes
+from warpspace.app.browser.address import PARAMETER
 from warpspace.app.documents import links
 from warpspace.app.documents.scene_file import open_text, state_to_toml
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
@@ -50,7 +51,7 @@ def follow(viewer: Viewer, browser: "Browser") -> Iterator[Callable[[str], Tab]]
     def open_link(link: str) -> Tab:
         context = browser.new_context(viewport={"width": 1280, "height": 720})
         context.add_init_script(LISTEN)
-        query = f"&{links.PARAMETER}={links.pack(link)}#"
+        query = f"&{PARAMETER}={links.pack(link)}#"
         opened.append((context, Tab(context.new_page(), viewer, query)))
         return opened[-1][1]
 
@@ -93,8 +94,8 @@ def press_link(tab: Tab) -> str:
     """Press Link; give what stands in the address bar."""
     tab.panel("Files")
     tab.page.get_by_role("button", name="Link", exact=True).click()
-    tab.until(lambda: f"{links.PARAMETER}=" in tab.page.url)
-    return links.unpack(tab.page.url.partition(f"{links.PARAMETER}=")[2].split("&")[0])
+    tab.until(lambda: f"{PARAMETER}=" in tab.page.url)
+    return links.unpack(tab.page.url.partition(f"{PARAMETER}=")[2].split("&")[0])
 
 
 def test_a_link_brings_the_comparison_with_its_snapshot(
@@ -150,7 +151,7 @@ def test_a_point_of_a_trace_and_its_lever_come_with_a_link(
         picked=Picked(at, Loop.WORKPIECE, (275.0, 0.0, 0.0)),
         lever="EC0B",
     )
-    tab.session.post(lambda _: asked)
+    tab.session.context.post(lambda _: asked)
     tab.panel("Why")
     tab.until(lambda: tab.page.locator("[data-value='why norm']").count() == 1)
     norm = tab.text("why norm")
@@ -179,7 +180,7 @@ def test_what_is_too_large_for_a_link_is_left_out_and_named(tab: Tab) -> None:
         curve = Table((-275.0, 275.0), tuple(zip(rows.tolist(), values.tolist(), strict=True)))
         big = edits.with_curve(big, key, curve)
     state = replace(START, comparison=with_pin(big).comparison)
-    tab.session.post(lambda _: state)
+    tab.session.context.post(lambda _: state)
     tab.until(lambda: tab.page.locator("[data-value='compared']").count() == 1)
     link = press_link(tab)
     tab.until(lambda: tab.page.get_by_text("Without the comparison").count() == 1)

@@ -189,13 +189,15 @@ def test_a_link_brings_camera_and_settings(tab: Tab, open_tab: Callable[..., Tab
     tab.page.get_by_role("button", name="Link", exact=True).click()
     tab.until(lambda: "view=" in tab.page.url)
     query = urlsplit(tab.page.url).query
-    camera = tab.session._eye.remember()
+    camera = tab.session.context.camera.remember()
     other = open_tab(query=f"&{query}")
     other.until(lambda: other.text("factor") == "true scale")
     other.page.wait_for_timeout(800)
     assert other.session.state.amplitudes["EXX"] == 4.0
     assert other.session.state.exaggeration == 1.0
-    np.testing.assert_allclose(other.session._eye.remember().position, camera.position, rtol=1e-3)
+    np.testing.assert_allclose(
+        other.session.context.camera.remember().position, camera.position, rtol=1e-3
+    )
 
 
 @pytest.mark.parametrize(("name", "ending"), [("View", "png"), ("HTML", "html"), ("GLB", "glb")])

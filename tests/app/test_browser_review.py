@@ -225,12 +225,12 @@ def test_a_tolerance_change_is_answered_within_300_ms_on_the_server(
     tab.page.get_by_role("tab", name="Chance").click()
     tab.page.wait_for_selector("[data-value='chance']")
     session = tab.session
-    panel = next(p for p in session._parts.panels if type(p).__name__ == "ChancePanel")
+    panel = next(p for p in session.display.panels if type(p).__name__ == "ChancePanel")
     times = []
     for half_width in (3.0, 9.0, 15.0, 21.0, 5.0):
         before = panel._words.content
         start = time.perf_counter()
-        session.post(lambda state, h=half_width: edits.with_half_width(state, "EA0Z", h))
+        session.context.post(lambda state, h=half_width: edits.with_half_width(state, "EA0Z", h))
         while panel._words.content == before:
             time.sleep(0.002)
         times.append(time.perf_counter() - start)
@@ -408,8 +408,10 @@ def test_a_broken_update_takes_nothing_else_with_it(
         raise RuntimeError("a wheel came off")
 
     session = tab.session
-    session.post(broken)
-    session.post(lambda state: edits.with_curve(state, "EXX", Constant((-275.0, 275.0), 4.0)))
+    session.context.post(broken)
+    session.context.post(
+        lambda state: edits.with_curve(state, "EXX", Constant((-275.0, 275.0), 4.0))
+    )
     tab.until(lambda: tab.page.get_by_text("a wheel came off").count() > 0)
     shows(tab, START.with_amplitude("EXX", 4.0))
     assert "a wheel came off" in caplog.text

@@ -19,7 +19,7 @@ from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.panels import conventions as panel_module
 from warpspace.app.panels.conventions import ConventionsPanel
 from warpspace.app.readouts.conventions import conventions_html
-from warpspace.app.server.followers import Followers
+from warpspace.app.server.display import Display
 from warpspace.app.state.app_state import start_state
 from warpspace.picture.mesh import edge_pieces
 from warpspace.scene.library import load_scene
@@ -120,8 +120,8 @@ def test_the_panel_does_nothing_while_a_slider_moves(monkeypatch: pytest.MonkeyP
     panel._scene, panel._known, panel._at = START.origin, {}, {}
     panel._effects, panel._text = Effects(), SimpleNamespace(content="")
     panel._clicks = SimpleNamespace(attributes=None)
-    parts = Followers((), [panel])
-    parts.show(LIVE.evaluate(START))
+    parts = Display()
+    parts.add(LIVE.evaluate(START), panels=[panel])
     assert calls == ["written"]
     moved = START
     for value in (1.0, 2.0, 3.0):

@@ -17,11 +17,11 @@ from warpspace.app.documents.scene_file import (
 from warpspace.app.documents.view_settings import camera_of, settings_line, with_settings
 from warpspace.app.evaluation.budget import Picked
 from warpspace.app.evaluation.conventions import with_choice, with_reference
-from warpspace.app.server.tab_memory import CameraMemory
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, Shown, start_state
 from warpspace.app.state.look import Look, MachineLook, RotaryLook
 from warpspace.app.state.specification import Specification
+from warpspace.app.viewport.camera import CameraMemory
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.machine.errors import Ramp
 from warpspace.scene.library import load_scene, scene_names

@@ -7,8 +7,8 @@ import pytest
 from markupsafe import Markup
 
 from warpspace import load_scene
+from warpspace.app.browser.arrangement import split_script
 from warpspace.app.browser.clicks import LONGEST_WORD, MOST_CLICKS, SCRIPT, read_clicks
-from warpspace.app.panels.layout import split_script
 from warpspace.app.panels.view import COMPONENT_NAMES, component_of
 from warpspace.app.readouts.exclusions import exclusion_buttons, with_switched
 from warpspace.app.state import edits

@@ -101,7 +101,6 @@ def test_run_warns_of_a_public_address_and_ends_on_ctrl_c(monkeypatch: pytest.Mo
             return self
 
         def __exit__(self, *_: object) -> None: ...
-        def settle(self) -> None: ...
 
     said: list[str] = []
     warned: list[str] = []

@@ -9,10 +9,11 @@ import pytest
 from warpspace import load_scene
 from warpspace.analysis.distribution import Histogram, Probability
 from warpspace.analysis.montecarlo import Over
+from warpspace.app.browser.opening import hint_script
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.probability import Chance
 from warpspace.app.evaluation.sensitivities import rank_picture
-from warpspace.app.panels.commands import Command, help_text, hint_script, spell_change
+from warpspace.app.panels.commands import Command, help_text, spell_change
 from warpspace.app.readouts.gains import spell_ranking
 from warpspace.app.readouts.html import message
 from warpspace.app.readouts.probability import histogram_lines, spell_chance, spell_scatter

@@ -65,8 +65,8 @@ def test_pictures_are_small():
 
 
 def test_there_is_one_picture_of_every_tab():
-    panels = ROOT / "src/warpspace/app/panels"
-    layout = "".join((panels / name).read_text("utf-8") for name in ("layout.py", "contents.py"))
+    server = ROOT / "src/warpspace/app/server"
+    layout = "".join((server / name).read_text("utf-8") for name in ("layout.py", "contents.py"))
     tabs = re.findall(r'(?:add_tab|set_panel_label)\("([^"]+)"\)', layout)
     script = (ROOT / "examples/screenshots.py").read_text("utf-8")
     visits = re.findall(r'"tab_(\w+)": Visit\(\w+, "([^"]+)"', script)

@@ -1,1 +1,1 @@
-"""Scripts of our own and private parts of viser: what its public interface does not offer."""
+"""What viser's public interface does not offer: scripts, the page's style, private parts."""

@@ -1,29 +1,30 @@
-"""Hearing which tab a page is, and how wide, as soon as it is connected.
+"""Learning which tab a page is, and how wide, as soon as it is connected.
 
 A page says so while it is still being put together; a session that asked for itself would have to
 wait for an answer until the page has drawn what it got so far.
 """
 
+import json
 import threading
 from collections import OrderedDict
 from collections.abc import Callable
 from typing import Any
 
 import viser
-from viser import _messages as messages
 
-from warpspace.app.server.tab_memory import ask_script
+from warpspace.app.browser.viser_private import listen_to_all, send_script_to_all
 
+STORAGE_KEY = "warpspace-tab"
 CARRIER = "warpspace-tab-token"
 """Stands for a widget in the message of a page; viser knows none of this name."""
 LEAST_WIDTH, MOST_WIDTH = 200, 20_000
 """Widths of pages that are believed, CSS pixels."""
-MOST_HEARD = 256
+MOST_KNOWN = 256
 """Pages that are remembered: one that says its token and never shows anything is forgotten."""
 
 
 class Arrival:
-    """Token and width of one page, once they are heard.
+    """Token and width of one page, once they are known.
 
     Attributes
     ----------
@@ -34,39 +35,39 @@ class Arrival:
 
     def __init__(self) -> None:
         self._there = threading.Event()
-        self._told: Callable[[], None] | None = None
+        self._called: Callable[[], None] | None = None
         self.token = ""
         self.width: float | None = None
 
-    def hear(self, token: str, width: float | None = None) -> None:
+    def note(self, token: str, width: float | None = None) -> None:
         """Take note of a page; only the first time counts."""
         if self._there.is_set():
             return
         self.token, self.width = token, width
         self._there.set()
-        if self._told is not None:
-            self._told()
+        if self._called is not None:
+            self._called()
 
     @property
     def is_there(self) -> bool:
-        """Whether the token is heard."""
+        """Whether the token is known."""
         return self._there.is_set()
 
-    def wait(self, seconds: float, told: Callable[[], None]) -> bool:
+    def wait(self, seconds: float, called: Callable[[], None]) -> bool:
         """Wait for the token.
 
         Parameters
         ----------
         seconds : float
-        told : callable
+        called : callable
             Called when it comes later.
 
         Returns
         -------
         bool
-            Whether it is heard.
+            Whether it is known by then.
         """
-        self._told = told
+        self._called = called
         return self._there.wait(seconds)
 
 
@@ -81,16 +82,14 @@ class Arrivals:
     def __init__(self, server: viser.ViserServer) -> None:
         self._known: OrderedDict[int, Arrival] = OrderedDict()
         self._lock = threading.Lock()
-        # viser hands on what widgets say only once the page has told of its camera
-        connections: Any = server._websock_server  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
-        connections.register_handler(messages.GuiUpdateMessage, self._hear)
-        connections.queue_message(messages.RunJavascriptMessage(source=ask_script(CARRIER)))
+        listen_to_all(server, self._take)
+        send_script_to_all(server, ask_script(CARRIER))
 
     def expect(self, client_id: int) -> Arrival:
         """Give what is, or will be, known of a connection."""
         with self._lock:
             arrival = self._known.setdefault(client_id, Arrival())
-            while len(self._known) > MOST_HEARD:
+            while len(self._known) > MOST_KNOWN:
                 self._known.popitem(last=False)
         return arrival
 
@@ -99,15 +98,54 @@ class Arrivals:
         with self._lock:
             self._known.pop(client_id, None)
 
-    def _hear(self, client_id: int, message: messages.GuiUpdateMessage) -> None:
+    def _take(self, client_id: int, widget: str, said: Any) -> None:
         """Take the token out of a message, if it is one of these; a browser may send anything."""
-        if message.uuid != CARRIER:
-            return
-        said: Any = message.updates
-        if not isinstance(said, dict):
+        if widget != CARRIER or not isinstance(said, dict):
             return
         token, width = said.get("value"), said.get("width")
         if isinstance(token, str):
             if not isinstance(width, int | float) or not LEAST_WIDTH <= width <= MOST_WIDTH:
                 width = None
-            self.expect(client_id).hear(token, width)
+            self.expect(client_id).note(token, width)
+
+
+def ask_script(carrier: str) -> str:
+    """Write the script that makes a page hand over its token, and its width in CSS pixels.
+
+    Parameters
+    ----------
+    carrier : str
+        What stands for a widget in the message.
+
+    Returns
+    -------
+    str
+        JavaScript. A page without a token makes one; where the browser forbids `sessionStorage` it
+        has it until it is reloaded.
+    """
+    return f"""(() => {{
+  const key = {json.dumps(STORAGE_KEY)};
+  let token = window.__warpspaceTab;
+  try {{ token = sessionStorage.getItem(key) || token; }} catch {{}}
+  token = token || [...crypto.getRandomValues(new Uint8Array(16))]
+    .map(byte => byte.toString(16).padStart(2, "0")).join("");
+  window.__warpspaceTab = token;
+  try {{ sessionStorage.setItem(key, token); }} catch {{}}
+  let tries = 0;
+  const hand = () => {{
+    const viewer = window.__viserMutable;
+    if (!viewer) {{ if (tries++ < 200) setTimeout(hand, 25); return; }}
+    viewer.sendMessage({{
+      type: "GuiUpdateMessage", uuid: {json.dumps(carrier)},
+      updates: {{ value: token, width: innerWidth }}
+    }});
+  }};
+  hand();
+}})();"""
+
+
+def rename_script(token: str) -> str:
+    """Write the script that gives a page another token (a duplicated tab comes with a copy)."""
+    key, value = json.dumps(STORAGE_KEY), json.dumps(token)
+    store = f"sessionStorage.setItem({key}, {value});"
+    return f"window.__warpspaceTab = {value}; try {{ {store} }} catch {{}}"

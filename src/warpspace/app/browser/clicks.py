@@ -5,7 +5,7 @@ from collections.abc import Callable
 from markupsafe import Markup
 from viser import GuiApi
 
-from warpspace.app.browser.handles import dom_id
+from warpspace.app.browser.viser_private import dom_id
 
 LONGEST_WORD = 100
 MOST_CLICKS = 8

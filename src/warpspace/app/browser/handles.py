@@ -1,4 +1,4 @@
-"""Handles of viser: inputs bound to a value of the state, and what is only told of changes."""
+"""Handles of viser: inputs bound to a value of the state, and outputs that are only assigned to."""
 
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar
@@ -27,8 +27,6 @@ class Input(Generic[T]):
         self.handle = handle
         self._seen: T = handle.value
         self._touched = False
-        # each tab has widgets of its own: there are no other clients to send the value on to
-        handle._impl.sync_cb = None  # noqa: SLF001 - viser builds a message for nobody otherwise
 
         async def note(event: Any) -> None:  # a plain function would take a thread of a pool
             if event.client is not None:
@@ -56,7 +54,7 @@ class Input(Generic[T]):
 
 
 class Handle:
-    """A handle that is only told what has changed.
+    """A handle that is assigned only what has changed.
 
     Every assignment to a handle costs viser's checks even where nothing is sent; a picture consists
     of some sixty values of which a slider move changes ten. Arrays count as the same only where
@@ -67,24 +65,19 @@ class Handle:
     handle : viser.SceneNodeHandle or viser.GuiHandle
     """
 
-    __slots__ = ("_told", "handle")
+    __slots__ = ("_assigned", "handle")
 
     def __init__(self, handle: Any) -> None:
         self.handle = handle
-        self._told: dict[str, object] = {}
+        self._assigned: dict[str, object] = {}
 
     def put(self, **values: Any) -> None:
         """Assign what differs from what was assigned last."""
         for name, value in values.items():
-            told = self._told.get(name, _UNSET)
-            if value is told:
+            known = self._assigned.get(name, _UNSET)
+            if value is known:
                 continue
-            if not isinstance(value, np.ndarray) and told is not _UNSET and value == told:
+            if not isinstance(value, np.ndarray) and known is not _UNSET and value == known:
                 continue
             setattr(self.handle, name, value)
-            self._told[name] = value
-
-
-def dom_id(handle: Any) -> str:
-    """Give the id of a widget in the page, for style sheets."""
-    return str(handle._impl.uuid)  # noqa: SLF001 - viser has no public name for it
+            self._assigned[name] = value

@@ -2,6 +2,7 @@
 
 import re
 
+from warpspace.app.browser.uploads import size_message
 from warpspace.exceptions import OptionError
 from warpspace.scene.files import MAX_SCENE_BYTES
 
@@ -39,16 +40,10 @@ def upload_text(content: bytes, source: str) -> str:
         If it is too large or no UTF-8 text.
     """
     if len(content) > MAX_SCENE_BYTES:
-        raise OptionError(size_message(source, len(content)))
+        raise OptionError(size_message(source, len(content), MAX_SCENE_BYTES))
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise OptionError(
             f"{source} is not UTF-8 text (byte {error.start}); expected a scene file"
         ) from None
-
-
-def size_message(source: str, size: float) -> str:
-    """Say that a file is too large."""
-    limit = MAX_SCENE_BYTES / 2**20
-    return f"{source} is {size / 2**20:.1f} MB large; expected a scene file of at most {limit:g} MB"

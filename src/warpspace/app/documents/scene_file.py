@@ -24,8 +24,8 @@ from warpspace.app.documents.view_settings import (
     with_settings,
 )
 from warpspace.app.evaluation.resulting_scene import scene_of
-from warpspace.app.server.tab_memory import CameraMemory
 from warpspace.app.state.app_state import AppState, start_state
+from warpspace.app.viewport.camera import CameraMemory
 from warpspace.exceptions import OptionError
 from warpspace.scene.library import load_scene, parse_scene, scene_names
 from warpspace.scene.machines import load_machine, machine_names

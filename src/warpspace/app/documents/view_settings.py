@@ -10,7 +10,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import fields, replace
 from urllib.parse import parse_qsl, urlencode
 
-from warpspace.app.documents.spelling import (
+from warpspace.app.state.app_state import AppState, Shown, start_state
+from warpspace.app.state.exclusions import Exclusions
+from warpspace.app.state.look import linear_spans, slice_spans
+from warpspace.app.state.picked import Picked, read_trace, spell_trace
+from warpspace.app.state.spelling import (
     Unreadable,
     read_number,
     read_numbers,
@@ -20,11 +24,7 @@ from warpspace.app.documents.spelling import (
     spell,
     spell_numbers,
 )
-from warpspace.app.server.tab_memory import CameraMemory
-from warpspace.app.state.app_state import AppState, Shown, start_state
-from warpspace.app.state.exclusions import Exclusions
-from warpspace.app.state.look import linear_spans, slice_spans
-from warpspace.app.state.picked import Picked, read_trace, spell_trace
+from warpspace.app.viewport.camera import CameraMemory
 from warpspace.kinematics.model import Loop
 
 MAX_LENGTH = 16_000

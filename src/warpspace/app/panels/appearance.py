@@ -1,6 +1,6 @@
 """More of the view tab: surface, slices, colour range, what is written on the map, camera."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -25,7 +25,6 @@ SWITCHES = {
     "worst": ("Worst point", "Where the coloured value is largest."),
     "bars": ("Scale bars", "Two lengths in the picture: geometry in mm, error in µm."),
 }
-Choose = Callable[[str | None, bool | None], None]
 
 
 class CameraPanel:
@@ -34,11 +33,9 @@ class CameraPanel:
     Parameters
     ----------
     context : PanelContext
-    choose : callable
-        Takes a named view or None, and whether to be orthographic or None.
     """
 
-    def __init__(self, context: PanelContext, choose: Choose) -> None:
+    def __init__(self, context: PanelContext) -> None:
         keys = {name: key for key, name in VIEW_NAMES.items()}
         assert set(keys.values()) == set(VIEWS)  # noqa: S101 - names and views belong together
         buttons = context.gui.add_button_group(
@@ -49,10 +46,10 @@ class CameraPanel:
 
         def look_from(event: Any) -> None:
             view = keys[event.target.value]
-            context.act(lambda: choose(view, None))
+            context.act(lambda: context.fit_view(view))
 
         buttons.on_click(look_from)
-        self._choose, self._context = choose, context
+        self._context = context
         self._lens: Input[bool] = Input(
             context.gui.add_checkbox(
                 "Orthographic (telephoto)",
@@ -66,7 +63,7 @@ class CameraPanel:
         """Pass a change of the lens on; it is no part of the state."""
         on = self._lens.poll()
         if on is not None:
-            self._context.act(lambda: self._choose(None, on))
+            self._context.act(lambda: self._context.fit_view(lens=on))
         return state
 
     def show(self, picture: LivePicture) -> None:

@@ -8,10 +8,8 @@ from warpspace.app.evaluation.budget import answer, with_lever, with_picked
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
 from warpspace.app.readouts.budget import ASK, REFUSED, answer_html
-from warpspace.app.server.tab_context import TabContext
-from warpspace.app.server.tab_memory import CameraMemory
 from warpspace.app.state.app_state import AppState
-from warpspace.app.viewport.camera import fit_camera, heading_share
+from warpspace.app.viewport.camera import CameraMemory, fit_camera, heading_share
 from warpspace.app.viewport.layers import SCENE_PER_MM
 
 
@@ -21,12 +19,11 @@ class WhyPanel:
     Parameters
     ----------
     context : PanelContext
-    tab : TabContext
     """
 
-    def __init__(self, context: PanelContext, tab: TabContext) -> None:
+    def __init__(self, context: PanelContext) -> None:
         gui = context.gui
-        self._context, self._tab = context, tab
+        self._context = context
         self._clicks = Clicks(gui, lambda key: context.post(lambda s: with_lever(s, key)))
         self._text = Handle(gui.add_html(ASK))
         far = gui.add_button(
@@ -67,7 +64,7 @@ class WhyPanel:
 
     def _stand_back(self) -> None:
         """Move the camera back until the frame of the chosen contribution is in view."""
-        picture, camera = self._tab.shown(), self._tab.camera()
+        picture, camera = self._context.shown, self._context.camera.remember()
         if picture is None or picture.state.picked is None:
             return
         found = answer(picture.drawn_state, picture.state.picked, picture.exaggeration)
@@ -76,7 +73,7 @@ class WhyPanel:
         if not origins:
             return
         points = np.concatenate([picture.drawn_mm.reshape(-1, 3), np.stack(origins)])
-        size = self._tab.client.camera
+        size = self._context.client.camera
         width, height = max(size.image_width, 200), max(size.image_height, 200)
         pose = fit_camera(
             points,
@@ -87,7 +84,7 @@ class WhyPanel:
         )
         x, y, z = (float(value) * SCENE_PER_MM for value in pose.position)
         at = tuple(float(value) * SCENE_PER_MM for value in pose.look_at)
-        self._tab.look_from(
+        self._context.look_from(
             CameraMemory((x, y, z), (at[0], at[1], at[2]), (0.0, 0.0, 1.0), camera.fov_rad)
         )
 

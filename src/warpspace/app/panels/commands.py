@@ -1,6 +1,5 @@
-"""What can be done by key, palette and button: undo, reset, view, help; and the first hint."""
+"""What can be done by key, palette and button: undo, reset, view, help."""
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -11,8 +10,6 @@ from warpspace.app.state import edits
 from warpspace.app.state.app_state import TRUE_SCALE, AppState
 from warpspace.machine.parameters import PARAMETERS
 
-HINT_SECONDS = 12
-HINT = "Drag a slider on the left: the box bends at once.   Ctrl+Z undoes   ·   H shows all keys"
 # W A S D Q E belong to viser's camera.
 WORDS = {
     "amplitudes": "errors",
@@ -70,11 +67,9 @@ class CommandsPanel:
     Parameters
     ----------
     context : PanelContext
-    fit_view : callable
-        Puts the camera back.
     """
 
-    def __init__(self, context: PanelContext, fit_view: Callable[[], None]) -> None:
+    def __init__(self, context: PanelContext) -> None:
         self._context = context
         self._help: Any = None
         buttons = context.gui.add_button_group(
@@ -85,7 +80,7 @@ class CommandsPanel:
         )
         actions = {"Undo": self._undo, "Redo": self._redo, "Help": self._toggle_help}
         buttons.on_click(lambda event: context.act(actions[event.target.value]))
-        self.commands = self._commands(fit_view)
+        self.commands = self._commands()
         for command in self.commands:
             handle = context.gui.add_command(
                 command.label,
@@ -95,7 +90,7 @@ class CommandsPanel:
             )
             handle.on_trigger(lambda _, run=command.run: context.act(run))
 
-    def _commands(self, fit_view: Callable[[], None]) -> tuple[Command, ...]:
+    def _commands(self) -> tuple[Command, ...]:
         """List what there is."""
 
         def does(update: Update) -> Callable[[], None]:
@@ -107,7 +102,7 @@ class CommandsPanel:
         return (
             Command("Undo", "Take the latest change back", "Z", "cmd/ctrl", self._undo),
             Command("Redo", "Do it again", "Z", "cmd/ctrl+shift", self._redo),
-            Command("Fit view", "Camera to the operator's side", "F", None, fit_view),
+            Command("Fit view", "Camera to the operator's side", "F", None, self._context.fit_view),
             Command("Reset errors", "Values of the scene", "R", None, does(AppState.reset)),
             Command("All errors zero", "The nominal machine", "0", None, does(AppState.zeroed)),
             Command("Hear all errors", "End solo and mute", "L", None, does(edits.include_all)),
@@ -146,11 +141,11 @@ class CommandsPanel:
 
     def _undo(self) -> None:
         """Take the latest change back and say what it was."""
-        self._say("Undone", self._context.store().undo())
+        self._say("Undone", self._context.store.undo())
 
     def _redo(self) -> None:
         """Do again what was undone and say what it is."""
-        self._say("Done again", self._context.store().redo())
+        self._say("Done again", self._context.store.redo())
 
     def _say(self, done: str, what: str) -> None:
         """Tell the user what was changed, or that there is nothing."""
@@ -232,35 +227,3 @@ def help_text(commands: tuple[Command, ...]) -> str:
         "Keys act when no text box has the focus. After a dropped connection the tab finds its"
         " state again for ten minutes."
     )
-
-
-def hint_script(text: str = HINT, seconds: float = HINT_SECONDS) -> str:
-    """Write the script of the hint a browser shows on its first visit, and only then.
-
-    Returns
-    -------
-    str
-        JavaScript: a line at the bottom of the page that takes no clicks and leaves by itself,
-        at the latest with the first thing done.
-    """
-    style = (
-        "position:fixed;left:50%;bottom:28px;transform:translateX(-50%);z-index:50;"
-        "padding:9px 18px;border-radius:8px;background:rgba(24,32,46,.9);color:#fff;"
-        "font:14px/1.4 system-ui,sans-serif;pointer-events:none;transition:opacity .8s;"
-        "white-space:pre;max-width:90vw"
-    )
-    return f"""(() => {{
-  const key = "warpspace-visited";
-  try {{ if (localStorage.getItem(key)) return; localStorage.setItem(key, "1"); }} catch {{}}
-  const hint = document.createElement("div");
-  hint.id = "warpspace-hint";
-  hint.setAttribute("role", "status");
-  hint.style.cssText = {json.dumps(style)};
-  hint.textContent = {json.dumps(text)};
-  document.body.append(hint);
-  const leave = () => {{ hint.style.opacity = 0; setTimeout(() => hint.remove(), 900); }};
-  setTimeout(leave, {1000 * seconds:g});
-  for (const what of ["pointerdown", "keydown"])
-    // what scripts of our own do is not the user's first deed
-    addEventListener(what, event => event.isTrusted && leave(), {{ capture: true }});
-}})();"""

@@ -21,13 +21,11 @@ class ComparePanel:
     Parameters
     ----------
     context : PanelContext
-    scenes : mapping of str to Scene
-        Scenes to choose from, by the title shown; it may grow.
     """
 
-    def __init__(self, context: PanelContext, scenes: Mapping[str, Scene]) -> None:
-        gui = context.gui
-        self._scenes = scenes
+    def __init__(self, context: PanelContext) -> None:
+        gui, scenes = context.gui, context.scenes
+        self._scenes: Mapping[str, Scene] = scenes
         self._options: tuple[str, ...] = tuple(scenes)
         pin = gui.add_button(
             "Pin now and compare",

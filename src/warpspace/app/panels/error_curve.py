@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 from viser import uplot
 
-from warpspace.app.browser.handles import Input, dom_id
+from warpspace.app.browser.handles import Input
+from warpspace.app.browser.viser_private import dom_id
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
 from warpspace.app.readouts.charts import add_chart, chart_axis
@@ -32,7 +33,7 @@ LABEL_WIDTH = 76
 
 
 class ShapePanel:
-    """The error that was touched last, or chosen.
+    """The curve of the error that was moved last, or chosen.
 
     Parameters
     ----------
@@ -42,7 +43,9 @@ class ShapePanel:
 
     def __init__(self, context: PanelContext, state: AppState) -> None:
         self._context, gui = context, context.gui
-        self._key = _first(state)
+        self._key = ""
+        self._key = self._chosen(state)
+        self._follows_at_once = False
         self._keys = tuple(state.amplitudes)
         # what the numbers stand for, and what is drawn
         self._written: ErrorFunction | None = None
@@ -82,28 +85,18 @@ class ShapePanel:
         gui.add_html(_style(self._which.handle, self._kind.handle, self._rows.handle))
         self._show(state)
 
-    def choose(self, key: str) -> None:
-        """Show another error; for the session's worker."""
-        if key != self._key and key in self._keys:
-            self._key = key
-            self._written = self._drawn = None
-            # after the state has been dealt with; the widgets still show the error before
-            self._context.act(lambda: self._show(self._context.store().state))
-
     def read(self, state: AppState) -> AppState:
         """Take over what a browser has chosen or written."""
-        label = self._which.poll()
+        label, kind, rows = self._which.poll(), self._kind.poll(), self._rows.poll()
         if label is not None:
-            self.choose(label.split(" ", 1)[0])
-        kind, rows = self._kind.poll(), self._rows.poll()
+            state = state.with_chosen_error(label.split(" ", 1)[0])
+        return self._edited(state, self._chosen(state), kind, rows)
+
+    def _edited(self, state: AppState, key: str, kind: str | None, rows: str | None) -> AppState:
+        """Apply an edited curve; what cannot be read is said and changes nothing."""
         if kind is None and rows is None:
             return state
-        return self._edited(state, kind, rows)
-
-    def _edited(self, state: AppState, kind: str | None, rows: str | None) -> AppState:
-        """Apply an edited curve; what cannot be read is said and changes nothing."""
-        span = edits.axis_span(state, self._key)
-        present = edits.curve_of(state, self._key)
+        span, present = edits.axis_span(state, key), edits.curve_of(state, key)
         try:
             if kind is not None and kind != shape_kind(present):
                 function = convert_shape(present, kind, span)
@@ -120,16 +113,22 @@ class ShapePanel:
         if rows is not None:
             # what is being written stays as it was written
             self._written = function
-        state = edits.with_curve(state, self._key, function)
-        self._context.act(lambda: self._show(self._context.store().state))
-        return state
+        self._follows_at_once = True
+        return edits.with_curve(state, key, function)
 
     def show(self, picture: LivePicture) -> None:
-        """Nothing that must follow at once."""
+        """Follow another choice or an edit at once, all else when changes pause."""
+        if self._follows_at_once or self._chosen(picture.state) != self._key:
+            self._show(picture.state)
 
     def settle(self, picture: LivePicture) -> None:
         """Follow the state."""
         self._show(picture.state)
+
+    def _chosen(self, state: AppState) -> str:
+        """Give the error to be shown: the chosen one, else that shown before, else the largest."""
+        keys = (state.chosen_error, self._key)
+        return next((key for key in keys if key in state.amplitudes), "") or _first(state)
 
     def _show(self, state: AppState) -> None:
         """Show the chosen error of a state."""
@@ -137,8 +136,11 @@ class ShapePanel:
             self._keys = tuple(state.amplitudes)
             self._which.handle.options = _options(self._keys)
             self._written = self._drawn = None
-        if self._key not in state.amplitudes:
-            self._key = _first(state)
+        self._follows_at_once = False
+        key = self._chosen(state)
+        if key != self._key:
+            self._key = key
+            self._written = self._drawn = None
         row = parameter(self._key)
         self._which.show(row.label)
         function = edits.curve_of(state, self._key)

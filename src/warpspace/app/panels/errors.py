@@ -46,20 +46,14 @@ class ErrorsPanel:
     ----------
     context : PanelContext
     state : AppState
-    touched : callable
-        Called, by the session's worker, with the key of a slider that was moved or found alone.
-    opened : callable
-        Called, by the session's worker, with the key of an error whose curve is asked for.
+    show_curve : callable
+        Shows the panel of the chosen error, should it be minimized; called by the session.
     """
 
     def __init__(
-        self,
-        context: PanelContext,
-        state: AppState,
-        touched: Callable[[str], None],
-        opened: Callable[[str], None],
+        self, context: PanelContext, state: AppState, show_curve: Callable[[], None]
     ) -> None:
-        self._context, self._touched, self._opened = context, touched, opened
+        self._context, self._show_curve = context, show_curve
         self._found: tuple[str, ...] = ()
         self._looks: tuple[Identity, ...] = ()
         self._search: Input[str] = Input(
@@ -154,7 +148,8 @@ class ErrorsPanel:
         """Take note of a click of solo, mute or curve."""
         what, _, key = word.partition(" ")
         if what == CURVE:
-            self._context.act(lambda: self._opened(key))
+            self._context.post(lambda state: state.with_chosen_error(key))
+            self._context.act(self._show_curve)
         else:
             self._context.post(lambda state: with_switched(state, word))
 
@@ -163,16 +158,15 @@ class ErrorsPanel:
         for key, bound in self._bound.items():
             value = bound.poll()
             if value is not None:
-                state = state.with_amplitude(key, value)
-                self._touched(key)
+                state = state.with_amplitude(key, value).with_chosen_error(key)
         query = self._search.poll()
         if query is not None:
             found = find_parameters(query, tuple(state.amplitudes))
             if len(found) == 1:
-                self._touched(found[0])
+                state = state.with_chosen_error(found[0])
             if found != self._found:
                 # after the state has been dealt with, since widgets come and go
-                self._context.act(lambda: self._build(self._context.store().state, found))
+                self._context.act(lambda: self._build(self._context.store.state, found))
         return state
 
     def show(self, picture: LivePicture) -> None:

@@ -7,8 +7,9 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from warpspace.app.browser.handles import dom_id
-from warpspace.app.browser.uploads import Uploads, size_script
+from warpspace.app.browser.address import listen_script, show_script
+from warpspace.app.browser.uploads import Uploads, size_message, size_script
+from warpspace.app.browser.viser_private import dom_id
 from warpspace.app.documents import links
 from warpspace.app.documents import received_files as incoming
 from warpspace.app.documents import scene_file as document
@@ -19,11 +20,11 @@ from warpspace.app.documents.services import CancelledError
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
 from warpspace.app.readouts.html import message
-from warpspace.app.server.tab_context import TabContext
-from warpspace.app.server.tab_memory import CameraMemory
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.comparison import Comparison
+from warpspace.app.viewport.camera import CameraMemory
 from warpspace.exceptions import OptionError, WarpspaceError
+from warpspace.scene.files import MAX_SCENE_BYTES
 
 logger = logging.getLogger(__name__)
 FIGURE_S, VIEW_S, PAGE_S, EXPORT_S = 5.0, 1.5, 1.0, 1.0
@@ -38,11 +39,10 @@ class FilesPanel:
     Parameters
     ----------
     context : PanelContext
-    tab : TabContext
     """
 
-    def __init__(self, context: PanelContext, tab: TabContext) -> None:
-        self._context, self._tab = context, tab
+    def __init__(self, context: PanelContext) -> None:
+        self._context = context
         self._picture: LivePicture | None = None
         self._jobs = Jobs(self._report, self._failed)
         self._add_scene_files()
@@ -58,20 +58,22 @@ class FilesPanel:
 
     def _add_scene_files(self) -> None:
         """Add opening, saving and the link."""
-        gui, tab = self._context.gui, self._tab
+        context, gui = self._context, self._context.gui
         upload = gui.add_upload_button(
             "Open a scene …",
             mime_type=".toml",
             hint="A scene file (TOML, at most 4 MB). All its problems are listed; undo goes back.",
         )
         Uploads(
-            tab.client,
+            context.client,
+            upload,
+            MAX_SCENE_BYTES,
             lambda name, content: self._context.act(partial(self._open, name, content)),
             lambda text: self._context.notify("Not opened", text, "red"),
         )
         refused = gui.add_text("", "", visible=False)
         refused.on_update(lambda _: self._context.act(lambda: self._refuse(str(refused.value))))
-        tab.run_script(size_script(upload, refused))
+        context.page.run_script(size_script(upload, refused, MAX_SCENE_BYTES))
         self._group(
             "Keep scene, settings and camera",
             {"Save scene": self._save, "Link": self._link},
@@ -80,11 +82,11 @@ class FilesPanel:
         )
         link = gui.add_text("", "", visible=False)
         link.on_update(lambda _: self._context.act(lambda: self._follow(str(link.value))))
-        tab.run_script(links.listen_script(dom_id(link)))
+        context.page.run_script(listen_script(dom_id(link)))
 
     def _add_outputs(self) -> None:
         """Add pictures and exports."""
-        services = self._tab.services
+        services = self._context.services
         pictures = {} if services.draw_figure is None else {"Figure": self._figure}
         self._group(
             "Picture (PNG)",
@@ -132,19 +134,19 @@ class FilesPanel:
     def _refuse(self, message: str) -> None:
         """Say that a file was too large to be sent, from what the page tells."""
         _, size, name = (*message.split(":", 2), "", "")[:3]
-        megabytes = float(size) if size.isdigit() and len(size) < 16 else 0.0
-        text = incoming.size_message(f"{incoming.safe_name(name)}.toml", megabytes)
+        size_bytes = float(size) if size.isdigit() and len(size) < 16 else 0.0
+        text = size_message(f"{incoming.safe_name(name)}.toml", size_bytes, MAX_SCENE_BYTES)
         self._context.notify("Not opened", text, "red")
 
     def _follow(self, message: str) -> None:
         """Show what a link describes."""
-        word, scenes = message.partition(":")[2], self._tab.scenes.fixed
+        word, scenes = message.partition(":")[2], self._context.scenes.fixed
         self._try("Link", lambda: self._show(*document.open_link(links.unpack(word), scenes)))
 
     def _show(self, opened: AppState, camera: CameraMemory | None, *, whole: bool = True) -> None:
         """Show an opened state from its camera; beside a plain scene the comparison stays."""
         # here, since not every opened scene is drawn where many follow each other
-        _, dropped = self._tab.scenes.add(opened.origin)
+        _, dropped = self._context.scenes.add(opened.origin)
         if dropped:
             text = f"The newest {MOST_OPENED} opened scenes are kept; {dropped} left the list."
             self._context.notify("Scenes", text, "gray")
@@ -152,30 +154,30 @@ class FilesPanel:
         def update(now: AppState) -> AppState:
             if camera is not None:
                 # with this change, not before it: another scene places the camera anew
-                self._tab.look_from(camera)
+                self._context.look_from(camera)
             return opened if whole else replace(opened, comparison=now.comparison)
 
         self._context.post(update)
 
     def _save(self) -> None:
         """Send the state as a scene file."""
-        state, camera = self._context.store().state, self._tab.camera()
+        state, camera = self._context.store.state, self._context.camera.remember()
         text = self._alone_if_large(lambda s: document.state_to_toml(s, camera))
         self._send(incoming.safe_name(state.scene.name), ".toml", text.encode())
 
     def _link(self) -> None:
         """Put a link into the address bar."""
-        scenes, camera = self._tab.scenes.fixed, self._tab.camera()
+        scenes, camera = self._context.scenes.fixed, self._context.camera.remember()
         link = self._alone_if_large(lambda s: document.state_to_link(s, camera, scenes))
-        self._tab.run_script(links.show_script(link))
-        self._tab.client.flush()
+        self._context.page.run_script(show_script(links.pack(link)))
+        self._context.client.flush()
         self._context.notify(
             "Link", "It stands in the address bar, and in the clipboard where allowed.", "green"
         )
 
     def _alone_if_large(self, write: Callable[[AppState], str]) -> str:
         """Write the state; without what it is compared with where both are too large."""
-        state = self._context.store().state
+        state = self._context.store.state
         try:
             return write(state)
         except OptionError as error:
@@ -187,7 +189,7 @@ class FilesPanel:
 
     def _figure(self) -> None:
         """Draw the figure in a process of its own."""
-        draw, picture = self._tab.services.draw_figure, self._picture
+        draw, picture = self._context.services.draw_figure, self._picture
         if draw is not None and picture is not None:
             request = build_request(picture)
             self._make("Figure", ".png", FIGURE_S, lambda cancelled: draw(request, cancelled))
@@ -196,7 +198,7 @@ class FilesPanel:
         """Have the browser render the view, and put title, factor and colour bar around it."""
         from warpspace.app.documents.view_image import view_png
 
-        client, picture = self._tab.client, self._picture
+        client, picture = self._context.client, self._picture
         if picture is None:
             return
         width = min(max(client.camera.image_width, 64), LARGEST_VIEW_PX)
@@ -223,7 +225,7 @@ class FilesPanel:
 
     def _export(self, name: str, ending: str) -> None:
         """Write an export."""
-        write, picture = self._tab.services.write_export, self._picture
+        write, picture = self._context.services.write_export, self._picture
         if write is not None and picture is not None:
             request = build_request(picture)
             self._make(name, ending, EXPORT_S, lambda _: write(request, ending))
@@ -244,7 +246,7 @@ class FilesPanel:
 
     def _send(self, stem: str, ending: str, content: bytes) -> None:
         """Have the browser save a file."""
-        client = self._tab.client
+        client = self._context.client
         client.send_file_download(f"{stem}{ending}", content, save_immediately=True)
         client.flush()
 
@@ -257,7 +259,7 @@ class FilesPanel:
         for handle in (self._status, self._bar, self._cancel):
             if handle.visible != busy:
                 handle.visible = busy
-        self._tab.client.flush()
+        self._context.client.flush()
 
     def _failed(self, name: str, error: Exception) -> None:
         """Show what went wrong, log what nobody foresaw."""

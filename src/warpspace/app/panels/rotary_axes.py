@@ -1,6 +1,5 @@
 """The table tab: traced points, where the other axes stand, the circles in numbers, play."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -13,10 +12,9 @@ from warpspace.app.readouts.circles import circle_rows, circle_table
 from warpspace.app.readouts.html import message
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import parse_positions, quarters
+from warpspace.app.viewport.layers.stage import StageLayer
 from warpspace.machine.description import Vector
 from warpspace.scene.model import Scene
-
-Play = Callable[[bool | None, Callable[[str], None]], None]
 
 
 class RotaryPanel:
@@ -26,13 +24,12 @@ class RotaryPanel:
     ----------
     context : PanelContext
     state : AppState
-    play : callable
-        Starts or pauses the rotation (True, False) or takes it back (None); is also given whom to
-        tell the position.
+    stage : StageLayer or None
+        What turns.
     """
 
-    def __init__(self, context: PanelContext, state: AppState, play: Play) -> None:
-        self._context, self._play = context, play
+    def __init__(self, context: PanelContext, state: AppState, stage: StageLayer | None) -> None:
+        self._context, self._stage = context, stage
         self._playing = False
         gui = context.gui
         self._button = gui.add_button(
@@ -54,16 +51,21 @@ class RotaryPanel:
     def _toggle(self) -> None:
         """Play or pause."""
         self._playing = not self._playing
-        self._play(self._playing, self._tell)
+        self._play(on=self._playing)
         self._name_button()
 
     def _stop(self) -> None:
         """Take the rotation back."""
         self._playing = False
-        self._play(None, self._tell)
+        self._play(on=None)
         self._name_button()
 
-    def _tell(self, position: str) -> None:
+    def _play(self, *, on: bool | None) -> None:
+        """Play, pause or take back the rotation."""
+        if self._stage is not None:
+            self._stage.play(on, self._write_position)
+
+    def _write_position(self, position: str) -> None:
         """Write where the played axis is; without a position the play is over."""
         self._angle.content = message(position, "turning") if position else ""
         if not position and self._playing:

@@ -1,10 +1,12 @@
 """What is always in view: heading with the display factor, colour bar, statistics, scale bars."""
 
+from collections.abc import Callable
+
 from warpspace.app.browser.handles import Handle
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
+from warpspace.app.readouts.summary import heading, summary
 from warpspace.app.state.app_state import AppState
-from warpspace.app.viewport.drafts import TEXTS
 
 
 class HtmlPanel:
@@ -13,12 +15,12 @@ class HtmlPanel:
     Parameters
     ----------
     context : PanelContext
-    name : str
-        A key of `TEXTS`.
+    spell : callable
+        Writes the HTML of a picture.
     """
 
-    def __init__(self, context: PanelContext, name: str) -> None:
-        self.name = name
+    def __init__(self, context: PanelContext, spell: Callable[[LivePicture], str]) -> None:
+        self._spell = spell
         self._handle = Handle(context.gui.add_html(""))
 
     def read(self, state: AppState) -> AppState:
@@ -27,18 +29,14 @@ class HtmlPanel:
 
     def show(self, picture: LivePicture) -> None:
         """Write the picture's text."""
-        self.write(TEXTS[self.name](picture))
-
-    def write(self, text: str) -> None:
-        """Write HTML."""
-        self._handle.put(content=text)
+        self._handle.put(content=self._spell(picture))
 
 
 def summary_panel(context: PanelContext) -> HtmlPanel:
     """Colour bar, numbers and scale bars."""
-    return HtmlPanel(context, "summary")
+    return HtmlPanel(context, summary)
 
 
 def heading_panel(context: PanelContext) -> HtmlPanel:
     """Machine, error set and display factor."""
-    return HtmlPanel(context, "heading")
+    return HtmlPanel(context, heading)

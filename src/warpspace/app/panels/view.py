@@ -4,8 +4,9 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from warpspace.app.browser.handles import Input, dom_id
-from warpspace.app.documents.scene_list import MOST_OPENED, SceneList
+from warpspace.app.browser.handles import Input
+from warpspace.app.browser.viser_private import dom_id
+from warpspace.app.documents.scene_list import MOST_OPENED
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
@@ -71,18 +72,16 @@ class ViewPanel:
     ----------
     context : PanelContext
     state : AppState
-    scenes : SceneList
-        Scenes to choose from; what is opened is added.
     """
 
-    def __init__(self, context: PanelContext, state: AppState, scenes: SceneList) -> None:
-        self._context, self._scenes = context, scenes
+    def __init__(self, context: PanelContext, state: AppState) -> None:
+        self._context, self._scenes = context, context.scenes
         gui, changed = context.gui, context.changed
-        self._known, self._title = state.origin, scenes.add(state.origin)[0]
+        self._known, self._title = state.origin, self._scenes.add(state.origin)[0]
         self._scene: Input[str] = Input(
             gui.add_dropdown(
                 "Scene",
-                tuple(scenes),
+                tuple(self._scenes),
                 initial_value=self._title,
                 hint="Machine and error set. Changes made to the errors are lost.",
             ),

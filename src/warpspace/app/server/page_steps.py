@@ -5,27 +5,20 @@ nearly a second. The map and the first sliders are sent first; every further ste
 drawn the one before, so that a hand at a slider is not kept waiting for long.
 """
 
-import json
 import time
 from collections import deque
-from collections.abc import Callable
-from functools import partial
+from typing import Any
 
-from warpspace.app.browser.handles import dom_id
+from warpspace.app.browser.opening import drawn_script, hint_script, stage_script
+from warpspace.app.browser.viser_private import dom_id
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
-from warpspace.app.panels.appearance import Choose
-from warpspace.app.panels.commands import hint_script
-from warpspace.app.panels.contents import Build, PanelBuilder
-from warpspace.app.panels.layout import Places
-from warpspace.app.server.followers import Followers
-from warpspace.app.server.tab_context import TabContext
-from warpspace.app.viewport.layers.box import BoxLayer
-from warpspace.app.viewport.layers.stage import StageLayer, draw_around
+from warpspace.app.server.contents import Build, PageContents
+from warpspace.app.server.display import Display
+from warpspace.app.server.layout import Places
 
 ANSWER_S = 1.0
 """How long a page may take for one step; one that does not answer gets the rest at once."""
-Step = Callable[[LivePicture], None]
 
 
 class PageSteps:
@@ -34,63 +27,35 @@ class PageSteps:
     Parameters
     ----------
     context : PanelContext
-    tab : TabContext
     places : Places
-    fit_view : callable
-        Puts the camera to a named view, or changes its lens.
-    told : callable
-        Called when a step may be due; it must only take note.
+    display : Display
+        Gets what is built.
     """
 
-    def __init__(
-        self,
-        context: PanelContext,
-        tab: TabContext,
-        places: Places,
-        fit_view: Choose,
-        told: Callable[[], None],
-    ) -> None:
-        self._context, self._tab = context, tab
-        self._contents = PanelBuilder(context, tab, places, fit_view, self._play)
-        self._answer = context.gui.add_text("", "", visible=False)
+    def __init__(self, context: PanelContext, places: Places, display: Display) -> None:
+        self._context, self._display = context, display
+        self.contents = PageContents(context, places)
+        self._steps: deque[Build] = deque()
+        self._answer: Any = None
+        self._asked, self._patient, self._asked_at = 0, True, 0.0
+
+    def begin(self, picture: LivePicture) -> None:
+        """Draw the map, its sliders and numbers; the session has begun an atomic change."""
+        self._answer = self._context.gui.add_text("", "", visible=False)
 
         @self._answer.on_update
         async def _(_: object) -> None:  # a plain function would take a thread of a pool
-            told()
+            self._context.wake()
 
-        self._steps: deque[Step] = deque()
-        self._asked, self._patient, self._asked_at = 0, True, 0.0
-        self._parts = Followers()
-        self._stage: StageLayer | None = None
-
-    def begin(self, picture: LivePicture) -> Followers:
-        """Draw the map, its sliders and numbers.
-
-        Parameters
-        ----------
-        picture : LivePicture
-
-        Returns
-        -------
-        Parts
-            To which the further steps add.
-        """
-        box = BoxLayer(self._tab.client.scene, picture)
-        panels = self._contents.build_first(picture.state)
-        for panel in panels:
-            panel.show(picture)
-        self._parts = Followers([box], panels, picture)
-        self._steps.append(self._draw_around)
-        self._steps.extend(partial(self._add_panels, build) for build in self._contents.others())
-        self._tab.run_script(stage_script("opening"))
-        self._ask()
-        return self._parts
+        self._steps.extend(self.contents.steps)
+        self._context.page.run_script(stage_script("opening"))
+        self._build(picture)
 
     def stop(self) -> None:
         """Take no further step, and let nothing move by itself."""
         self._steps.clear()
-        if self._stage is not None:
-            self._stage.stop()
+        if self.contents.stage is not None:
+            self.contents.stage.stop()
 
     def remaining_s(self) -> float | None:
         """Give how long to wait for the page at most; None where nothing is left to be done."""
@@ -115,75 +80,20 @@ class PageSteps:
             What is shown.
         """
         self._patient = self._patient and self.remaining_s() != 0.0
-        step = self._steps.popleft()
-        with self._tab.client.atomic():
-            step(picture)
-            if self._steps:
-                self._ask()
-            else:
-                self._end()
-        self._tab.client.flush()
+        with self._context.client.atomic():
+            self._build(picture)
+        self._context.client.flush()
 
-    def _ask(self) -> None:
-        """Have the page say when it has drawn what it gets now."""
-        self._asked += 1
-        self._asked_at = time.monotonic()
-        self._tab.run_script(drawn_script(dom_id(self._answer), self._asked))
-
-    def _draw_around(self, picture: LivePicture) -> None:
-        """Draw what lies on and around the map."""
-        client = self._tab.client
-        self._stage = StageLayer(client, picture, self._context.act)
-        self._parts.add(picture, layers=[*draw_around(client.scene, picture), self._stage])
-
-    def _add_panels(self, build: Build, picture: LivePicture) -> None:
-        """Build some panels."""
-        panels = build(picture.state)
-        for panel in panels:
-            panel.show(picture)
-        self._parts.add(picture, panels=panels)
-
-    def _end(self) -> None:
-        """Say how to begin."""
-        self._answer.remove()
-        self._tab.run_script(hint_script())
-        self._tab.run_script(stage_script("open"))
-
-    def _play(self, on: bool | None, tell: Callable[[str], None]) -> None:
-        """Play, pause or take back the rotation."""
-        if self._stage is not None:
-            self._stage.play(on, tell)
-
-
-def stage_script(word: str) -> str:
-    """Write the script that marks how far a page is, for whoever drives it from outside.
-
-    Parameters
-    ----------
-    word : str
-        "opening", or "open" once everything is there: what `data-warpspace` of the page's root is.
-    """
-    return f"document.documentElement.dataset.warpspace = {json.dumps(word)};"
-
-
-def drawn_script(widget: str, number: int) -> str:
-    """Write the script that makes a page say when it has drawn all before it.
-
-    Parameters
-    ----------
-    widget : str
-        Identifier of the widget that takes the number.
-    number : int
-
-    Returns
-    -------
-    str
-        JavaScript. A page that is not in view draws nothing, and answers at once.
-    """
-    return f"""(() => {{
-  const tell = () => window.__viserMutable?.sendMessage({{
-    type: "GuiUpdateMessage", uuid: {json.dumps(widget)}, updates: {{ value: "{number:d}" }}
-  }});
-  if (document.hidden) setTimeout(tell, 0);
-  else requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(tell, 0)));
-}})();"""
+    def _build(self, picture: LivePicture) -> None:
+        """Build what is next, and have the page say when it has drawn that."""
+        layers, panels = self._steps.popleft()(picture)
+        self._display.add(picture, layers, panels)
+        page = self._context.page
+        if self._steps:
+            self._asked += 1
+            self._asked_at = time.monotonic()
+            page.run_script(drawn_script(dom_id(self._answer), self._asked))
+        else:
+            self._answer.remove()
+            page.run_script(hint_script())
+            page.run_script(stage_script("open"))

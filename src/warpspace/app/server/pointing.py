@@ -4,23 +4,12 @@ from typing import Any
 
 import numpy as np
 
+from warpspace.app.browser.arrangement import front_script
 from warpspace.app.evaluation.budget import pick, with_picked
 from warpspace.app.evaluation.conventions import with_reference
 from warpspace.app.panels import PanelContext
 from warpspace.app.panels.conventions import ConventionsPanel
-from warpspace.app.server.tab_context import TabContext
 from warpspace.app.viewport.layers import SCENE_PER_MM
-
-FORWARD = """(() => {
-  const tab = [...document.querySelectorAll('[role="tab"]')]
-    .find(tab => tab.textContent.trim() === "Why");
-  if (!tab || tab.getAttribute("aria-selected") === "true") return;
-  const { x, y } = tab.getBoundingClientRect();
-  for (const what of ["pointerdown", "pointerup"])
-    tab.dispatchEvent(new PointerEvent(what, { bubbles: true, cancelable: true, button: 0,
-      clientX: x + 4, clientY: y + 4, pointerId: 1, isPrimary: true }));
-})();"""
-"""Brings the panel "Why" to the front: viser has no call for it, its tabs follow the pointer."""
 
 
 class Pointing:
@@ -28,25 +17,22 @@ class Pointing:
 
     Parameters
     ----------
-    tab : TabContext
     context : PanelContext
     conventions : ConventionsPanel
         May be waiting for a reference point.
     """
 
-    def __init__(
-        self, tab: TabContext, context: PanelContext, conventions: ConventionsPanel
-    ) -> None:
-        self._tab, self._context, self._conventions = tab, context, conventions
+    def __init__(self, context: PanelContext, conventions: ConventionsPanel) -> None:
+        self._context, self._conventions = context, conventions
 
-        @tab.client.scene.on_click()
+        @context.client.scene.on_click()
         def _(event: Any) -> None:
             origin, direction = event.ray_origin, event.ray_direction
             context.act(lambda: self._clicked(origin, direction))
 
     def _clicked(self, origin: Any, direction: Any) -> None:
         """Find what was clicked and note it in the state; by the session's worker."""
-        picture = self._tab.shown()
+        picture = self._context.shown
         if picture is None:
             return
         try:
@@ -62,5 +48,5 @@ class Pointing:
             self._conventions.wait(picking=False)
             self._context.post(lambda state: with_reference(state, picked.at))
             return
-        self._tab.run_script(FORWARD)
+        self._context.page.run_script(front_script("Why"))
         self._context.post(lambda state: with_picked(state, picked))

@@ -10,7 +10,6 @@ start afresh; after `KEPT_SECONDS`, or when more than `KEPT_TABS` tabs have left
 forgotten; a restarted server knows no one.
 """
 
-import json
 import re
 import secrets
 import threading
@@ -20,28 +19,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from warpspace.app.state.store import StateStore
+from warpspace.app.viewport.camera import CameraMemory
 
 KEPT_SECONDS = 600.0
 KEPT_TABS = 64
-STORAGE_KEY = "warpspace-tab"
 _TOKEN = re.compile(r"[0-9a-f]{32}")
-Vector = tuple[float, float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class CameraMemory:
-    """Where a tab's camera stood, in units of the drawing.
-
-    Attributes
-    ----------
-    position, look_at, up : tuple of float, (3,)
-    fov_rad : float
-    """
-
-    position: Vector
-    look_at: Vector
-    up: Vector
-    fov_rad: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,45 +94,3 @@ def new_token() -> str:
 def is_token(text: str) -> bool:
     """Tell whether a text that a browser has sent may be a token."""
     return _TOKEN.fullmatch(text) is not None
-
-
-def ask_script(carrier: str) -> str:
-    """Write the script that makes a page hand over its token, and its width in CSS pixels.
-
-    Parameters
-    ----------
-    carrier : str
-        What stands for a widget in the message.
-
-    Returns
-    -------
-    str
-        JavaScript. A page without a token makes one; where the browser forbids `sessionStorage` it
-        has it until it is reloaded.
-    """
-    return f"""(() => {{
-  const key = {json.dumps(STORAGE_KEY)};
-  let token = window.__warpspaceTab;
-  try {{ token = sessionStorage.getItem(key) || token; }} catch {{}}
-  token = token || [...crypto.getRandomValues(new Uint8Array(16))]
-    .map(byte => byte.toString(16).padStart(2, "0")).join("");
-  window.__warpspaceTab = token;
-  try {{ sessionStorage.setItem(key, token); }} catch {{}}
-  let tries = 0;
-  const hand = () => {{
-    const viewer = window.__viserMutable;
-    if (!viewer) {{ if (tries++ < 200) setTimeout(hand, 25); return; }}
-    viewer.sendMessage({{
-      type: "GuiUpdateMessage", uuid: {json.dumps(carrier)},
-      updates: {{ value: token, width: innerWidth }}
-    }});
-  }};
-  hand();
-}})();"""
-
-
-def rename_script(token: str) -> str:
-    """Write the script that gives a page another token (a duplicated tab comes with a copy)."""
-    key, value = json.dumps(STORAGE_KEY), json.dumps(token)
-    store = f"sessionStorage.setItem({key}, {value});"
-    return f"window.__warpspaceTab = {value}; try {{ {store} }} catch {{}}"

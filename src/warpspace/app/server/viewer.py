@@ -4,7 +4,6 @@ import contextlib
 import importlib
 import io
 import logging
-import sys
 import threading
 import warnings
 import webbrowser
@@ -18,23 +17,19 @@ from warpspace.app.browser.arrivals import Arrivals
 from warpspace.app.documents.scene_list import SceneList
 from warpspace.app.documents.services import Services
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.panels.layout import lay_out
-from warpspace.app.server.memory import Tidier, limit_arenas, settle_memory
+from warpspace.app.server.layout import lay_out
 from warpspace.app.server.network import free_port, is_local, page_url, resolve_host
 from warpspace.app.server.session import Session
 from warpspace.app.server.tab_memory import TabMemory, TabRecord, is_token, new_token
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.store import StateStore
-from warpspace.app.viewport.drafts import surface_glb
+from warpspace.app.viewport.layers.box import surface_glb
 from warpspace.app.viewport.layers.lights import light_scene
-from warpspace.app.viewport.painter import PAINTER
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 
 logger = logging.getLogger(__name__)
 Say = Callable[[str], None]
-SWITCH_S = 0.001
-"""How long a thread keeps the interpreter while others wait for it: an answer passes four."""
 NO_AUTHENTICATION = (
     "warning: {host} can be reached from other machines, and the app asks nobody for a password;"
     " whoever reaches it can use it"
@@ -86,7 +81,6 @@ class Viewer:
         self._sessions: dict[int, Session] = {}
         self._lock = threading.Lock()
         self._memory = TabMemory()
-        self._tidier = Tidier()
         self._shared = StateStore(self._start) if shared else None
         self._server = _serve(self.address, self.port)
         light_scene(self._server.scene)
@@ -114,12 +108,6 @@ class Viewer:
         with self._lock:
             return tuple(self._sessions.values())
 
-    def settle(self) -> None:
-        """Wait until the app is warm, then have searches for cycles leave out what is there."""
-        self._warming.join()
-        if not self.sessions:
-            settle_memory()
-
     def _warm(self) -> None:
         """Do before the first tab what it would have to wait for."""
         surface_glb(self._live.evaluate(self._start))
@@ -129,6 +117,7 @@ class Viewer:
         """Give a new tab its session."""
         store = self._shared or StateStore(self._start)
         session = Session(
+            self._server,
             client,
             self._live,
             SceneList(self._scenes),
@@ -157,8 +146,8 @@ class Viewer:
                 session.token = token
         if twins:
             # a duplicated tab, or one whose old connection is not yet known to be dead
-            left = TabRecord(twins[0].store.copy(), None)
-            session.renamed(new_token())
+            left = TabRecord(twins[0].context.store.copy(), None)
+            session.rename(new_token())
         if left is not None and self._shared is not None:
             return TabRecord(self._shared, left.camera)
         return left
@@ -169,17 +158,14 @@ class Viewer:
         with self._lock:
             session = self._sessions.pop(client.client_id, None)
             if session is not None:
-                self._memory.keep(session.token, session.left())
+                self._memory.keep(session.token, session.record())
         if session is not None:
             session.stop()
-            self._tidier.soon()
 
     def stop(self) -> None:
         """End all sessions and the server."""
-        self._tidier.stop()
         for session in self.sessions:
             session.stop()
-        PAINTER.close()
         with contextlib.redirect_stdout(io.StringIO()):
             self._server.stop()
 
@@ -266,11 +252,8 @@ def run_viewer(
     say, warn : callable
         Print a line for the user.
     """
-    sys.setswitchinterval(SWITCH_S)
     # a tab may close while something is on its way to it
     warnings.filterwarnings("ignore", message="Queued an? .* on a closed connection")
-    limit_arenas()
-    settle_memory()
     with Viewer(
         scene, scenes, start=start, host=host, port=port, shared=shared, services=services
     ) as viewer:
@@ -280,7 +263,6 @@ def run_viewer(
                 warn(NO_AUTHENTICATION.format(host=host))
             if browser and not open_browser(viewer.url):
                 say(f"no browser could be opened; open {viewer.url} yourself")
-            viewer.settle()
             threading.Event().wait()
         except KeyboardInterrupt:
             say("\nended")

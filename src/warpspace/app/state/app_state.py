@@ -85,6 +85,9 @@ class AppState:
         Key of the contribution whose axis and lever are drawn; empty for none.
     comparison : Comparison
         What is compared.
+    chosen_error : str
+        Key of the error whose curve is shown: chosen, or the one moved last; empty for none yet. It
+        counts in no comparison of states, and undo leaves it.
     notes : tuple of str
         What the latest change had to clamp.
     """
@@ -110,6 +113,7 @@ class AppState:
     picked: Picked | None = None
     lever: str = ""
     comparison: "Comparison[AppState]" = field(default_factory=Comparison[Any])
+    chosen_error: str = field(default="", compare=False)
     notes: tuple[str, ...] = ()
 
     @property
@@ -165,6 +169,12 @@ class AppState:
             return self._noted(f"loop: expected one of {', '.join(Loop)}")
         return replace(self, loop=Loop(loop))
 
+    def with_chosen_error(self, key: str) -> "AppState":
+        """Choose the error whose curve is shown; what is no key of this machine changes nothing."""
+        if key not in self.amplitudes or key == self.chosen_error:
+            return self
+        return replace(self, chosen_error=key)
+
     def with_shown(self, **changes: bool) -> "AppState":
         """Switch what is drawn beside the box."""
         return replace(self, shown=replace(self.shown, **changes))
@@ -182,6 +192,7 @@ class AppState:
             look=self.look,
             machine=self.machine,
             rotary=replace(self.rotary, off=frozenset()),
+            chosen_error=self.chosen_error,
         )
 
     def reset(self, axis: str | None = None) -> "AppState":

@@ -68,7 +68,8 @@ class History(Generic[S]):
         """
         what = describe_change(self.present, state)
         if not what:
-            return self
+            kept = _with_choices(self.present, state)
+            return self if kept is self.present else replace(self, present=kept)
         same = (
             bool(self.past)
             and not self.future
@@ -84,7 +85,8 @@ class History(Generic[S]):
             return self
         *past, last = self.past
         future = (*self.future, Step(self.present, last.what))
-        return History(last.state, tuple(past), future, limit=self.limit)
+        state = _with_choices(last.state, self.present)
+        return History(state, tuple(past), future, limit=self.limit)
 
     def redo(self) -> "History[S]":
         """Go forward again one step; the same one where there is none."""
@@ -92,7 +94,8 @@ class History(Generic[S]):
             return self
         *future, coming = self.future
         past = (*self.past, Step(self.present, coming.what))
-        return History(coming.state, past, tuple(future), limit=self.limit)
+        state = _with_choices(coming.state, self.present)
+        return History(state, past, tuple(future), limit=self.limit)
 
     @property
     def undoes(self) -> str:
@@ -105,13 +108,23 @@ class History(Generic[S]):
         return self.future[-1].what if self.future else ""
 
 
+def _with_choices(state: S, other: S) -> S:
+    """Give a state those fields of another one that count in no comparison; undo leaves them."""
+    if not is_dataclass(state) or isinstance(state, type) or type(state) is not type(other):
+        return state
+    names = [field.name for field in fields(state) if not field.compare]
+    changes = {n: getattr(other, n) for n in names if getattr(other, n) != getattr(state, n)}
+    return cast("S", replace(state, **changes)) if changes else state
+
+
 def describe_change(old: object, new: object) -> str:
     """Name the fields in which two values differ.
 
     Parameters
     ----------
     old, new : object
-        Frozen dataclasses of one type; nested ones, mappings and sets are looked into.
+        Frozen dataclasses of one type; nested ones, mappings and sets are looked into. Fields that
+        count in no comparison (`compare=False`) are left out.
 
     Returns
     -------
@@ -131,6 +144,7 @@ def _differences(old: object, new: object) -> list[str]:
         parts: list[tuple[str, Any, Any]] = [
             (field.name, getattr(old, field.name), getattr(new, field.name))
             for field in fields(old)
+            if field.compare
         ]
     elif isinstance(old, Mapping) and isinstance(new, Mapping):
         before, after = cast("Mapping[str, Any]", old), cast("Mapping[str, Any]", new)

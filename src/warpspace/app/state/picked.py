@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from warpspace.app.documents.spelling import read_point, refuse, spell_numbers
+from warpspace.app.state.spelling import read_point, refuse, spell_numbers
 from warpspace.kinematics.model import Loop
 from warpspace.machine.description import Vector
 

@@ -1,7 +1,7 @@
 """The state that one tab, or all tabs of a shared review, look at and steer; with its history.
 
-Sessions read their widgets and apply what has changed to the present state of the board, under its
-lock: nobody overwrites what somebody else has just done with an older state of the whole.
+Sessions read their widgets and apply what has changed to the present state, under a lock: nobody
+overwrites what somebody else has just done with an older state of the whole.
 """
 
 import threading
@@ -49,7 +49,7 @@ class StateStore:
         ----------
         update : callable
         by : callable, optional
-            The listener of who does it: it is not told.
+            The listener of who does it: it is not called.
         at : float, optional
             When the user did it on the monotonic clock, s; now by default. A busy server is late,
             and must not make two steps of one drag.
@@ -68,7 +68,7 @@ class StateStore:
             )
             changed = self._history is not before
         if changed:
-            self._tell(by)
+            self._notify(by)
         return notes
 
     def undo(self) -> str:
@@ -80,18 +80,18 @@ class StateStore:
         return self._travel(lambda history: (history.redo(), history.redoes))
 
     def copy(self) -> "StateStore":
-        """Give a board of its own with the same state and history."""
+        """Give a store of its own with the same state and history."""
         store = StateStore(self.state)
         store._history = self._history
         return store
 
     def subscribe(self, listener: Listener) -> None:
-        """Have a callable told (from any thread; it must return at once) of every change."""
+        """Have a callable called (from any thread; it must return at once) after every change."""
         with self._lock:
             self._listeners.append(listener)
 
     def unsubscribe(self, listener: Listener) -> None:
-        """Tell a callable no more."""
+        """Call a callable no more."""
         with self._lock:
             self._listeners = [known for known in self._listeners if known != listener]
 
@@ -100,11 +100,11 @@ class StateStore:
         with self._lock:
             self._history, what = move(self._history)
         if what:
-            self._tell(None)
+            self._notify(None)
         return what
 
-    def _tell(self, by: Listener | None) -> None:
-        """Tell all listeners but one."""
+    def _notify(self, by: Listener | None) -> None:
+        """Call all listeners but one."""
         with self._lock:
             listeners = [listener for listener in self._listeners if listener != by]
         for listener in listeners:

@@ -13,6 +13,23 @@ MARGIN = 1.06
 HEADING_HEIGHT = 130
 """Room kept free for the heading of the page, CSS pixels."""
 _ROUNDS = 4
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class CameraMemory:
+    """Where a tab's camera stood, in units of the drawing.
+
+    Attributes
+    ----------
+    position, look_at, up : tuple of float, (3,)
+    fov_rad : float
+    """
+
+    position: Vector
+    look_at: Vector
+    up: Vector
+    fov_rad: float
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,10 +6,8 @@ from viser import ClientHandle
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import machine_room_mm
-from warpspace.app.panels.layout import side_widths
-from warpspace.app.server.tab_memory import CameraMemory
 from warpspace.app.state.app_state import AppState
-from warpspace.app.viewport.camera import heading_share
+from warpspace.app.viewport.camera import CameraMemory, heading_share
 from warpspace.app.viewport.layers import SCENE_PER_MM
 from warpspace.app.viewport.layers.annotations import bar_lines
 from warpspace.app.viewport.layers.axes import axes_room_mm
@@ -23,6 +21,8 @@ from warpspace.app.viewport.named_views import (
 )
 from warpspace.units import Array
 
+LEFT_WIDTH, RIGHT_WIDTH = 350, 320
+"""Widths of the docked panels, which leave the rest to the drawing, CSS pixels."""
 LEAST_SIZE = 200
 """CSS pixels of a picture that is taken to be one."""
 
@@ -38,10 +38,19 @@ class TabCamera:
     Parameters
     ----------
     client : viser.ClientHandle
+
+    Attributes
+    ----------
+    wanted : CameraMemory or None
+        Where it goes with the next picture, instead of where all of the box is seen.
+    page_width : float or None
+        Of the whole page, CSS pixels, where the page has said so.
     """
 
     def __init__(self, client: ClientHandle) -> None:
         self._camera = client.camera
+        self.wanted: CameraMemory | None = None
+        self.page_width: float | None = None
         self._stand = CameraSetup()
 
     @property
@@ -96,6 +105,21 @@ class TabCamera:
         bars = [bar_lines(picture)[1].reshape(-1, 3)] if picture.state.look.bars else []
         return np.concatenate([room, picture.drawn_mm.reshape(-1, 3), *bars])
 
+    def place(self, picture: LivePicture, *, docked: bool) -> None:
+        """Put it where it is wanted, else where all of the box is seen.
+
+        Parameters
+        ----------
+        picture : LivePicture
+        docked : bool
+            Whether the panels have taken their room already.
+        """
+        memory, self.wanted = self.wanted, None
+        if memory is not None:
+            self.restore(memory)
+        else:
+            self.fit(picture, docked=docked, page_width=self.page_width)
+
     def fit(self, picture: LivePicture, *, docked: bool, page_width: float | None = None) -> None:
         """Fill the room between the panels with the box, its traces and axes.
 
@@ -112,7 +136,7 @@ class TabCamera:
         if docked:
             width = camera.image_width
         else:
-            width = (page_width or camera.image_width) - sum(side_widths())
+            width = (page_width or camera.image_width) - LEFT_WIDTH - RIGHT_WIDTH
         width = max(width, LEAST_SIZE)
         height = max(camera.image_height, LEAST_SIZE)
         points = self._room_mm(picture)

@@ -1,5 +1,7 @@
 """The bent box: coloured surface, grid lines and edges on it, and the nominal box around it."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 from viser import SceneApi
@@ -7,11 +9,19 @@ from viser import SceneApi
 from warpspace.app.browser.handles import Handle
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.palette import palette
-from warpspace.app.viewport.drafts import BoxPicture, box_picture, surface_glb
 from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes
 from warpspace.app.viewport.layers.adding import add_lines
-from warpspace.app.viewport.tone_map import Rgb
+from warpspace.app.viewport.tone_map import Rgb, vertex_colours
+from warpspace.bodies.gltf import Part, build_gltf
 from warpspace.geometry.surfaces import box_edges
+from warpspace.picture.mesh import (
+    Pieces,
+    edge_pieces,
+    grid_pieces,
+    isoline_pieces,
+    line_mesh,
+    map_mesh,
+)
 from warpspace.units import Array
 
 SURFACE = "/box/surface"
@@ -59,6 +69,13 @@ def ghost_dashes(picture: LivePicture) -> NDArray[np.float32]:
     return dashes(edges.reshape(-1, 2, 3), DASH * longest, GAP * longest)
 
 
+def surface_glb(picture: LivePicture) -> bytes:
+    """Write the coloured map of a picture, or its lines alone, vertices in mm."""
+    mesh = line_mesh(picture) if picture.state.look.surface == "grid" else map_mesh(picture)
+    colours = vertex_colours(picture.scale, mesh.values)
+    return build_gltf([Part("surface", mesh.vertices_mm, mesh.triangles, colours=colours)])
+
+
 class BoxLayer:
     """Surface, lines and ghost.
 
@@ -92,27 +109,22 @@ class BoxLayer:
 
     def show(self, picture: LivePicture) -> None:
         """Move vertices, colours and lines."""
-        colours = palette(picture)
-        self.move(box_picture(picture))
-        self._grid.put(colors=colour_bytes(colours.grid))
-        self._edges.put(colors=colour_bytes(colours.edge))
-        self._isolines.put(colors=colour_bytes(isoline_colour(picture)))
+        colours, look = palette(picture), picture.state.look
+        on_map = look.surface != "grid"
+        self._surface.put(glb_data=surface_glb(picture))
+        lines: tuple[tuple[Handle, Rgb, bool, Callable[[LivePicture], Pieces]], ...] = (
+            (self._grid, colours.grid, picture.state.shown.grid_lines, grid_pieces),
+            (self._edges, colours.edge, True, edge_pieces),
+            (self._isolines, isoline_colour(picture), look.isolines, isoline_pieces),
+        )
+        for handle, colour, wanted, pieces in lines:
+            if on_map and wanted:
+                handle.put(points=pieces(picture))
+            handle.put(colors=colour_bytes(colour), visible=on_map and wanted)
         if picture.grid.nominal_mm is not self._nominal:
             self._nominal = picture.grid.nominal_mm
             self._ghost.put(points=ghost_dashes(picture))
         self._ghost.put(colors=colour_bytes(colours.ghost), visible=picture.state.shown.ghost)
-
-    def move(self, picture: BoxPicture) -> None:
-        """Move the map and the lines on it; their colours stay."""
-        self._surface.put(glb_data=picture.surface)
-        for lines, points in (
-            (self._grid, picture.grid),
-            (self._edges, picture.edges),
-            (self._isolines, picture.isolines),
-        ):
-            if points is not None:
-                lines.put(points=points)
-            lines.put(visible=points is not None)
 
 
 def isoline_colour(picture: LivePicture) -> Rgb:

@@ -1,20 +1,10 @@
-"""Boards and tabs: shared states, undo, what a dropped tab leaves behind."""
+"""A state that one tab or several steer: nothing is lost, undo, copies."""
 
 import threading
 
 import pytest
 
 from warpspace import load_scene
-from warpspace.app.server.tab_memory import (
-    KEPT_SECONDS,
-    KEPT_TABS,
-    TabMemory,
-    TabRecord,
-    ask_script,
-    is_token,
-    new_token,
-    rename_script,
-)
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.history import STEPS
 from warpspace.app.state.store import StateStore
@@ -80,7 +70,7 @@ def test_what_raises_changes_nothing_and_blocks_nobody():
     assert store.state.amplitudes["EAX"] == 1.0
 
 
-def test_many_steer_one_board_and_nothing_is_lost():
+def test_many_steer_one_store_and_nothing_is_lost():
     store = StateStore(STATE)
     keys = ("EXX", "EYX", "EZX", "EAX", "EBX", "ECX")
 
@@ -105,41 +95,3 @@ def test_a_copy_goes_its_own_way():
     assert copy.state.amplitudes["EAX"] == 1.0
     copy.undo()
     assert copy.state == STATE
-
-
-def test_what_is_kept_is_given_back_once():
-    keeper, token = TabMemory(), new_token()
-    left = TabRecord(StateStore(STATE), None)
-    keeper.keep(token, left)
-    assert keeper.take(token) is left
-    assert keeper.take(token) is None
-
-
-def test_what_is_kept_is_bounded_in_time_and_number():
-    now = [0.0]
-    keeper = TabMemory(clock=lambda: now[0])
-    tokens = [new_token() for _ in range(KEPT_TABS + 10)]
-    for token in tokens:
-        keeper.keep(token, TabRecord(StateStore(STATE), None))
-    assert len(keeper) == KEPT_TABS
-    assert keeper.take(tokens[0]) is None
-    now[0] = KEPT_SECONDS + 1.0
-    assert keeper.take(tokens[-1]) is None
-    assert len(keeper) == 0
-
-
-@pytest.mark.parametrize(
-    "text", ["", "abc", "x" * 32, "0" * 33, "A" * 32, "../" * 10, "<script>", "0" * 31 + "\n"]
-)
-def test_what_is_no_token_is_refused(text):
-    assert not is_token(text)
-    keeper = TabMemory()
-    keeper.keep(text, TabRecord(StateStore(STATE), None))
-    assert len(keeper) == 0
-
-
-def test_a_page_is_asked_by_name_and_may_be_renamed():
-    token = new_token()
-    assert is_token(token)
-    assert '"some-widget"' in ask_script("some-widget")
-    assert token in rename_script(token)

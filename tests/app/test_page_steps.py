@@ -16,12 +16,13 @@ from websockets.sync.client import connect
 from websockets.sync.connection import Connection
 
 from warpspace.app.browser.arrivals import CARRIER
-from warpspace.app.panels.contents import PanelBuilder
-from warpspace.app.server import page_steps as opening
-from warpspace.app.server.page_steps import drawn_script, stage_script
+from warpspace.app.browser.opening import drawn_script, stage_script
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.server import page_steps
+from warpspace.app.server.contents import PageContents
 from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
-from warpspace.app.state.app_state import AppState, start_state
+from warpspace.app.state.app_state import start_state
 from warpspace.machine.parameters import PARAMETERS
 from warpspace.scene.library import load_scene
 
@@ -84,6 +85,8 @@ class Wire:
             self.widgets.setdefault(label.split(" ")[0], message["uuid"])
         if isinstance(value := message.get("updates", {}).get("value"), str):
             self.chosen.append(value)
+        if isinstance(value := message.get("value"), str):
+            self.chosen.append(value)
         if message["type"] == "RunJavascriptMessage":
             self.scripts.append(message["source"])
 
@@ -130,7 +133,7 @@ def wire(viewer: Viewer) -> Iterator[Wire]:
 def test_the_map_and_its_first_sliders_come_before_all_else(
     wire: Wire, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(opening, "ANSWER_S", 1e6)
+    monkeypatch.setattr(page_steps, "ANSWER_S", 1e6)
     assert wire.read_until(lambda: any("opening" in script for script in wire.scripts))
     assert "GlbMessage" in wire.kinds
     assert wire.keys == {"EXX", "EYX", "EZX", "EAX", "EBX", "ECX"}
@@ -155,7 +158,7 @@ def test_the_map_and_its_first_sliders_come_before_all_else(
 def test_a_slider_that_is_moved_early_has_its_curve_shown(
     wire: Wire, viewer: Viewer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(opening, "ANSWER_S", 1e6)
+    monkeypatch.setattr(page_steps, "ANSWER_S", 1e6)
     assert wire.read_until(lambda: "EBX" in wire.keys)
     wire.update(wire.widgets["EBX"], 3.0)
     (session,) = viewer.sessions
@@ -171,7 +174,7 @@ def test_a_slider_that_is_moved_early_has_its_curve_shown(
 def test_a_page_that_does_not_answer_gets_all_of_it(
     wire: Wire, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(opening, "ANSWER_S", 0.05)
+    monkeypatch.setattr(page_steps, "ANSWER_S", 0.05)
     assert wire.read_until(lambda: OPEN in wire.scripts)
     assert wire.keys == KEYS
 
@@ -179,7 +182,7 @@ def test_a_page_that_does_not_answer_gets_all_of_it(
 def test_pages_that_open_at_once_get_all_of_it(
     viewer: Viewer, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(opening, "ANSWER_S", 0.0)
+    monkeypatch.setattr(page_steps, "ANSWER_S", 0.0)
     with ExitStack() as stack:
         wires = [Wire(stack.enter_context(dial(viewer))) for _ in range(8)]
         for wire in wires:
@@ -194,15 +197,15 @@ def test_pages_that_open_at_once_get_all_of_it(
 def test_a_page_that_leaves_while_it_is_built_leaves_nothing_behind(
     viewer: Viewer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    reached, left, build = threading.Event(), threading.Event(), PanelBuilder._build_behind
+    reached, left, build = threading.Event(), threading.Event(), PageContents._build_behind
 
-    def build_late(contents: PanelBuilder, state: AppState) -> Any:
+    def build_late(contents: PageContents, picture: LivePicture) -> Any:
         reached.set()
         assert left.wait(20.0)
-        return build(contents, state)
+        return build(contents, picture)
 
-    monkeypatch.setattr(PanelBuilder, "_build_behind", build_late)
-    monkeypatch.setattr(opening, "ANSWER_S", 0.0)
+    monkeypatch.setattr(PageContents, "_build_behind", build_late)
+    monkeypatch.setattr(page_steps, "ANSWER_S", 0.0)
     places = viewer._places._tabs
     with dial(viewer) as socket:
         Wire(socket)
@@ -230,15 +233,17 @@ def test_what_comes_just_as_a_wait_ends_is_not_lost(
         def wait(self, timeout: float | None = None) -> bool:
             if super().wait(0.0):
                 return True
-            session.act(lambda: done.append("upload"))
+            session.context.act(lambda: done.append("upload"))
             return False
 
-    session._wake, session._stopped = Late(), threading.Event()
+    session.context._wake, session._stopped = Late(), threading.Event()
 
-    def step() -> None:
-        session._actions.popleft()()
+    def follow() -> None:
+        action = session.context.take_action()
+        assert action is not None
+        action()
 
-    monkeypatch.setattr(session, "_step", step)
+    monkeypatch.setattr(session, "_follow", follow)
     session._turn()
     assert done == []
     session._turn()

@@ -1,0 +1,143 @@
+"""Every private part of viser that the app uses: why, and which public thing would replace it.
+
+Nothing else in the app touches a private part of viser. A test names each of them, so that a new
+version of viser that lacks one fails there with a clear message and not somewhere in a page.
+"""
+
+import asyncio
+from collections.abc import Callable
+from typing import Any, TypeAlias
+
+from viser import ClientHandle, ViserServer
+from viser import _messages as messages
+
+StartUpload: TypeAlias = messages.FileTransferStartUpload
+UploadPart: TypeAlias = messages.FileTransferPart
+Take: TypeAlias = Callable[[int, str, Any], None]
+"""Takes the number of a client, the id of a widget and what a page says its properties are."""
+
+
+def dom_id(handle: Any) -> str:
+    """Give the id of a widget in the page.
+
+    Style sheets and scripts find a widget by it. A public `handle.uuid` would replace this.
+    """
+    return str(handle._impl.uuid)  # noqa: SLF001
+
+
+def send_script(client: ClientHandle, source: str) -> None:
+    """Run JavaScript in the page of one tab.
+
+    viser has a message for it and no method; a public `client.run_javascript` would replace this.
+    """
+    connection: Any = client._websock_connection  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
+    connection.queue_message(messages.RunJavascriptMessage(source=source))
+
+
+def send_script_to_all(server: ViserServer, source: str) -> None:
+    """Run JavaScript in every page as soon as it connects.
+
+    As for one tab; a public `server.run_javascript` would replace this.
+    """
+    connections: Any = server._websock_server  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
+    connections.queue_message(messages.RunJavascriptMessage(source=source))
+
+
+def listen_to_all(server: ViserServer, take: Take) -> None:
+    """Have what pages say of their widgets passed on from the moment they connect.
+
+    `on_update` of a widget is called only once a page has sent its camera, by when a session has
+    begun to build. Callbacks that are called before, or a way to give a page's address or cookie to
+    `on_client_connect`, would replace this.
+    """
+
+    def pass_on(client_id: int, message: messages.GuiUpdateMessage) -> None:
+        take(client_id, message.uuid, message.updates)
+
+    connections: Any = server._websock_server  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
+    connections.register_handler(messages.GuiUpdateMessage, pass_on)
+
+
+def wake_sender_on_its_thread(client: ClientHandle) -> None:
+    """Have the sender of a connection woken by its own thread only.
+
+    viser also sets an event of asyncio from the thread that assigns to a handle. That is not
+    allowed, and once in ten thousand assignments it raises "deque mutated during iteration". What
+    viser then asks of the event loop is enough. A viser that leaves this to the event loop would
+    replace it.
+    """
+    connection: Any = client._websock_connection  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
+    event = connection.get_message_buffer().message_event
+    original: Callable[[], None] = event.set
+
+    def set_on_loop() -> None:
+        try:
+            asyncio.get_running_loop()
+        except RuntimeError:
+            return
+        original()
+
+    event.set = set_on_loop
+
+
+def release_tabs(client: ClientHandle) -> None:
+    """Take out of the server's tabs what a client has built there since its connection ended.
+
+    viser does so when the connection ends, when a step of the page may still be on its way. A
+    public call that drops the widgets of a client that has left would replace this.
+    """
+    client.gui._release_cross_scope_nesting()  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
+
+
+class UploadMessages:
+    """The messages of one client's uploads, which checks of our own see before viser does.
+
+    `on_upload` is called when all of a file is in memory. A limit of size for uploads, checked
+    while they arrive, would replace this.
+
+    Parameters
+    ----------
+    client : viser.ClientHandle
+    """
+
+    def __init__(self, client: ClientHandle) -> None:
+        self._gui: Any = client.gui
+        self._connection: Any = client._websock_connection  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
+        self._start = self._gui._handle_file_transfer_start  # noqa: SLF001
+        self._part = self._gui._handle_file_transfer_part  # noqa: SLF001
+
+    def check(
+        self, may_start: Callable[[StartUpload], bool], may_keep: Callable[[UploadPart], bool]
+    ) -> None:
+        """Pass on to viser only what is allowed to start, and to be kept."""
+
+        def start(client_id: int, message: StartUpload) -> None:
+            if may_start(message):
+                self._start(client_id, message)
+
+        def part(client_id: int, message: UploadPart) -> None:
+            if may_keep(message):
+                self._part(client_id, message)
+
+        for kind, theirs, ours in (
+            (StartUpload, self._start, start),
+            (UploadPart, self._part, part),
+        ):
+            self._connection.unregister_handler(kind, theirs)
+            self._connection.register_handler(kind, ours)
+
+    @property
+    def under_way(self) -> dict[str, Any]:
+        """Uploads that have started, by their identifier."""
+        return self._gui._current_file_upload_states  # noqa: SLF001
+
+    def acknowledge(self, message: StartUpload) -> None:
+        """Let the page's progress bar of an upload end."""
+        self._connection.queue_message(
+            messages.FileTransferPartAck(
+                source_component_uuid=message.source_component_uuid,
+                transfer_uuid=message.transfer_uuid,
+                transferred_bytes=message.size_bytes,
+                total_bytes=message.size_bytes,
+            )
+        )

@@ -1,0 +1,122 @@
+"""What the panels of one tab share: its page, camera and state, and a queue for their callbacks.
+
+A widget's callback runs on a thread of viser's. It only takes note (`changed`, `post`, `act`); the
+one thread of the tab's session takes everything in.
+"""
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+
+from viser import ClientHandle, GuiApi, ViserServer
+
+from warpspace.app.browser.page import Page
+from warpspace.app.documents.scene_list import SceneList
+from warpspace.app.documents.services import Services
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.state.store import StateStore, Update
+from warpspace.app.viewport.camera import CameraMemory
+from warpspace.app.viewport.tab_camera import TabCamera
+
+
+class PanelContext:
+    """What a panel may use of its tab.
+
+    Parameters
+    ----------
+    server : viser.ViserServer
+    client : viser.ClientHandle
+    store : StateStore
+    scenes : SceneList
+    services : Services
+
+    Attributes
+    ----------
+    client : viser.ClientHandle
+    page : Page
+    camera : TabCamera
+    store : StateStore
+        State and history: the tab's own, or those of a shared review.
+    scenes : SceneList
+        Scenes this tab can choose from.
+    services : Services
+        Draw figures and write exports.
+    shown : LivePicture or None
+        The picture that is drawn; None before the first.
+    changed_at : float
+        When a browser has last changed something, on the monotonic clock, s.
+    """
+
+    def __init__(
+        self,
+        server: ViserServer,
+        client: ClientHandle,
+        store: StateStore,
+        scenes: SceneList,
+        services: Services,
+    ) -> None:
+        self.client, self.page, self.camera = client, Page(server, client), TabCamera(client)
+        self.store, self.scenes, self.services = store, scenes, services
+        self.shown: LivePicture | None = None
+        self.changed_at = time.monotonic()
+        self._wake = threading.Event()
+        self._updates: deque[Update] = deque()
+        self._actions: deque[Callable[[], None]] = deque()
+
+    @property
+    def gui(self) -> GuiApi:
+        """Widgets, private to this tab."""
+        return self.client.gui
+
+    def wake(self) -> None:
+        """Have the session look what there is to be done; returns at once."""
+        self._wake.set()
+
+    def changed(self) -> None:
+        """Take note that a widget has changed; returns at once."""
+        self.changed_at = time.monotonic()
+        self._wake.set()
+
+    def post(self, update: Update) -> None:
+        """Queue a pure update of the state; returns at once."""
+        self._updates.append(update)
+        self.changed()
+
+    def act(self, action: Callable[[], None]) -> None:
+        """Queue something to be done beside the state (undo, a modal); returns at once.
+
+        The session does it, and shows and logs what it raises.
+        """
+        self._actions.append(action)
+        self._wake.set()
+
+    def wait(self, seconds: float | None) -> bool:
+        """Wait for a change, at most so long; tell whether there was one. For the session."""
+        woken = self._wake.wait(seconds)
+        if woken:  # else what has come since the wait ended would be lost
+            self._wake.clear()
+        return woken
+
+    def take_updates(self) -> list[Update]:
+        """Take the updates that were queued. For the session."""
+        return [self._updates.popleft() for _ in range(len(self._updates))]
+
+    def take_action(self) -> Callable[[], None] | None:
+        """Take the next action that was queued; None where there is none. For the session."""
+        return self._actions.popleft() if self._actions else None
+
+    def notify(self, title: str, text: str, colour: str) -> None:
+        """Show a message in this tab."""
+        self.page.notify(title, text, colour)
+
+    def look_from(self, memory: CameraMemory) -> None:
+        """Put the camera somewhere with what is shown next."""
+        self.camera.wanted = memory
+        self._wake.set()
+
+    def fit_view(self, view: str | None = None, lens: bool | None = None) -> None:
+        """Put the camera to a named view (the last one by default), or change its lens."""
+        if self.shown is not None:
+            self.camera.choose(self.shown, view, lens)
+            self.client.flush()

@@ -1,0 +1,108 @@
+"""Everything of a tab that shows the picture: the layers of its drawing and its panels."""
+
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.panels import Deferred, Panel, Selective
+from warpspace.app.state.app_state import AppState
+from warpspace.app.viewport.layers import Layer
+
+SETTLE_S = 0.1
+"""Pause in the changes after which charts follow: longer than between two moves of a drag."""
+LONGEST_SETTLE_S = 0.25
+"""Charts lag no longer than this behind while a slider is being dragged."""
+
+
+class Display:
+    """Layers and panels of one tab; none at first."""
+
+    def __init__(self) -> None:
+        self.layers: tuple[Layer, ...] = ()
+        self.panels: tuple[Panel, ...] = ()
+        self._state: AppState | None = None
+        self._unsettled_since: float | None = None
+        # isinstance of a protocol is slow: asked once, not on every slider move
+        self._selective: dict[Layer | Panel, Selective] = {}
+        self._deferred: list[Deferred] = []
+        self._concerned: dict[Layer | Panel, tuple[object, ...]] = {}
+
+    @property
+    def state(self) -> AppState | None:
+        """The state whose picture is shown; None before the first."""
+        return self._state
+
+    def add(
+        self, picture: LivePicture, layers: Sequence[Layer] = (), panels: Sequence[Panel] = ()
+    ) -> None:
+        """Add parts that have just been built.
+
+        Parameters
+        ----------
+        picture : LivePicture
+            What is shown.
+        layers : sequence of Layer
+            They show it already.
+        panels : sequence of Panel
+        """
+        for panel in panels:
+            panel.show(picture)
+        self.layers, self.panels = (*self.layers, *layers), (*self.panels, *panels)
+        for part in (*layers, *panels):
+            if isinstance(part, Selective):
+                self._selective[part] = part
+                self._concerned[part] = part.concerns(picture)
+        self._deferred += [panel for panel in panels if isinstance(panel, Deferred)]
+        self._state = picture.state
+        self._unsettle()
+
+    def show(self, picture: LivePicture, *, anew: bool = False) -> None:
+        """Show a picture; charts follow when changes pause.
+
+        Parameters
+        ----------
+        picture : LivePicture
+        anew : bool, optional
+            Also in parts that show the same as before: a widget may show what was refused.
+        """
+        self._state = picture.state
+        for part in (*self.layers, *self.panels):
+            selective = self._selective.get(part)
+            if selective is None:
+                part.show(picture)
+                continue
+            concerned = selective.concerns(picture)
+            if anew or self._concerned.get(part) != concerned:
+                self._concerned.pop(part, None)
+                part.show(picture)
+                self._concerned[part] = concerned
+        self._unsettle()
+
+    def _unsettle(self) -> None:
+        """Have charts follow soon."""
+        if self._unsettled_since is None:
+            self._unsettled_since = time.monotonic()
+
+    @property
+    def pause_s(self) -> float | None:
+        """How long to wait for further changes before charts follow; None where none has to."""
+        return None if self._unsettled_since is None else SETTLE_S
+
+    def is_due(self, *, paused: bool) -> bool:
+        """Tell whether charts are to follow now."""
+        since = self._unsettled_since
+        return since is not None and (paused or time.monotonic() - since > LONGEST_SETTLE_S)
+
+    def settle(self, picture: LivePicture, guarded: Callable[[Callable[[], object]], None]) -> None:
+        """Bring charts up to date.
+
+        Parameters
+        ----------
+        picture : LivePicture
+        guarded : callable
+            Runs a step and reports what it raises.
+        """
+        self._unsettled_since = None
+        for panel in self._deferred:
+            guarded(partial(panel.settle, picture))

@@ -1,0 +1,97 @@
+"""Where the panels stand: errors on the left, colour bar and view on the right, heading on top.
+
+The places are the server's, the same for every tab, and on their way as soon as a page connects;
+what stands in them belongs to each tab.
+"""
+
+import threading
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
+
+from viser import GuiApi, GuiTabHandle
+
+from warpspace.app.browser.arrangement import page_style
+from warpspace.app.viewport.tab_camera import LEFT_WIDTH, RIGHT_WIDTH
+
+BRAND = (38, 70, 112)
+BRAND_ON_DARK = (122, 162, 214)
+
+
+def apply_theme(gui: GuiApi, *, dark: bool) -> None:
+    """Set the colours of the page."""
+    gui.configure_theme(
+        dark_mode=dark,
+        show_logo=False,
+        show_share_button=False,
+        brand_color=BRAND_ON_DARK if dark else BRAND,
+    )
+
+
+class Places:
+    """Where a tab puts its panels.
+
+    Parameters
+    ----------
+    tabs : mapping of str to viser.GuiTabHandle
+        By the word on them. What has no tab stands in the main panel.
+    dark : bool
+        Whether a page starts dark.
+    """
+
+    def __init__(self, tabs: Mapping[str, GuiTabHandle], *, dark: bool) -> None:
+        self._tabs = dict(tabs)
+        self.dark = dark
+        self._lock = threading.Lock()
+
+    @contextmanager
+    def at(self, name: str) -> Generator[None]:
+        """Build within a tab; pages that open at once take turns, as viser's handles want it."""
+        with self._lock, self._tabs[name]:
+            yield
+
+
+def lay_out(gui: GuiApi, *, dark: bool) -> Places:
+    """Divide the page, for all tabs of a server.
+
+    Parameters
+    ----------
+    gui : viser.GuiApi
+        Of the server.
+    dark : bool
+        Whether pages start dark.
+
+    Returns
+    -------
+    Places
+    """
+    apply_theme(gui, dark=dark)
+    gui.set_panel_label("Errors")
+    gui.main_panel.dock_left()
+    gui.main_panel.set_width(LEFT_WIDTH)
+    gui.add_html(page_style())
+
+    results = gui.add_panel()
+    tabs = {
+        "Result": results.add_tab("Result"),
+        "Why": results.add_tab("Why"),
+        "Gains": results.add_tab("Gains"),
+        "Compare": results.add_tab("Compare"),
+        "Files": results.add_tab("Files"),
+    }
+    results.dock_right()
+    results.set_width(RIGHT_WIDTH)
+
+    settings = gui.add_panel()
+    tabs |= {
+        "View": settings.add_tab("View"),
+        "Machine": settings.add_tab("Machine"),
+        "Table": settings.add_tab("Table"),
+        "Chance": settings.add_tab("Chance"),
+        "Conventions": settings.add_tab("Conventions"),
+    }
+    settings.dock_below(results)
+
+    top = gui.add_panel()
+    tabs["heading"] = top.add_tab("warpspace")
+    top.float(x=12, y=12, width=520)
+    return Places(tabs, dark=dark)

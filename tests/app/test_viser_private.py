@@ -1,0 +1,170 @@
+"""Private parts of viser: each is still there, and only one module of the app touches them."""
+
+import ast
+import asyncio
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+import viser
+from viser import _messages as messages
+from websockets.sync.client import connect
+
+from warpspace.app import browser
+from warpspace.app.browser.viser_private import dom_id, wake_sender_on_its_thread
+from warpspace.app.server.viewer import Viewer
+from warpspace.scene.library import load_scene
+
+APP = Path(browser.__file__).parents[1]
+ONLY = APP / "browser" / "viser_private.py"
+CAMERA = {
+    "type": "ViewerCameraMessage",
+    "wxyz": (1.0, 0.0, 0.0, 0.0),
+    "position": (30.0, -30.0, 30.0),
+    "fov": 0.4,
+    "near": 0.01,
+    "far": 1000.0,
+    "image_height": 900,
+    "image_width": 1600,
+    "look_at": (0.0, 0.0, 0.0),
+    "up_direction": (0.0, 0.0, 1.0),
+}
+SERVER = ("_websock_server.register_handler", "_websock_server.queue_message")
+CLIENT = (
+    "_websock_connection.queue_message",
+    "_websock_connection.register_handler",
+    "_websock_connection.unregister_handler",
+    "_websock_connection.get_message_buffer",
+    "gui._release_cross_scope_nesting",
+    "gui._handle_file_transfer_start",
+    "gui._handle_file_transfer_part",
+    "gui._current_file_upload_states",
+)
+MESSAGES = {
+    "RunJavascriptMessage": {"source"},
+    "GuiUpdateMessage": {"uuid", "updates"},
+    "FileTransferStartUpload": {
+        "source_component_uuid",
+        "transfer_uuid",
+        "filename",
+        "part_count",
+        "size_bytes",
+    },
+    "FileTransferPart": {"transfer_uuid", "content"},
+    "FileTransferPartAck": {
+        "source_component_uuid",
+        "transfer_uuid",
+        "transferred_bytes",
+        "total_bytes",
+    },
+}
+
+
+def look_up(owner: Any, path: str) -> Any:
+    """Follow a dotted name; say what is missing and what to do about it."""
+    found = owner
+    for name in path.split("."):
+        assert hasattr(found, name), (
+            f"viser {viser.__version__} lacks {type(owner).__name__}.{path}, which"
+            f" warpspace.app.browser.viser_private uses: read there what it is for, and replace it"
+        )
+        found = getattr(found, name)
+    return found
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[tuple[viser.ViserServer, viser.ClientHandle]]:
+    import msgspec.msgpack
+
+    with (
+        Viewer(load_scene("dvf5000_nominal")) as running,
+        connect(
+            running.url.replace("http", "ws", 1),
+            subprotocols=[f"viser-v{viser.__version__}"],  # pyright: ignore[reportArgumentType]
+            max_size=None,
+            compression=None,
+        ) as socket,
+    ):
+        socket.send(msgspec.msgpack.encode(CAMERA))
+        while not running._server.get_clients():
+            socket.recv(timeout=20.0)
+        (handle,) = running._server.get_clients().values()
+        yield running._server, handle
+
+
+@pytest.mark.parametrize("path", SERVER)
+def test_a_server_has_what_is_used_of_it(client: Any, path: str) -> None:
+    look_up(client[0], path)
+
+
+@pytest.mark.parametrize("path", CLIENT)
+def test_a_client_has_what_is_used_of_it(client: Any, path: str) -> None:
+    look_up(client[1], path)
+
+
+def test_a_widget_has_an_id_in_the_page(client: Any) -> None:
+    widget = client[1].gui.add_text("", "")
+    assert look_up(widget, "_impl.uuid") == dom_id(widget)
+
+
+def test_a_connection_has_an_event_that_wakes_its_sender(client: Any) -> None:
+    buffer = look_up(client[1], "_websock_connection.get_message_buffer")()
+    look_up(buffer, "message_event.set")
+
+
+@pytest.mark.parametrize(("name", "fields"), MESSAGES.items())
+def test_messages_have_the_fields_that_are_used(name: str, fields: set[str]) -> None:
+    look_up(messages, name)
+    missing = fields - set(getattr(messages, name).__annotations__)
+    assert not missing, f"viser {viser.__version__}: {name} lacks {sorted(missing)}"
+
+
+def test_only_its_own_thread_wakes_a_sender() -> None:
+    """viser does it from ours, too, where it may meet the sender itself."""
+
+    async def run() -> list[bool]:
+        event = asyncio.Event()
+        buffer = SimpleNamespace(message_event=event)
+        connection = SimpleNamespace(get_message_buffer=lambda: buffer)
+        wake_sender_on_its_thread(SimpleNamespace(_websock_connection=connection))  # pyright: ignore[reportArgumentType]
+        other = threading.Thread(target=event.set)
+        other.start()
+        other.join()
+        found = [event.is_set()]
+        event.set()
+        return [*found, event.is_set()]
+
+    assert asyncio.run(run()) == [False, True]
+
+
+def private_uses(path: Path) -> list[str]:
+    """List what a module takes of others' private parts: attributes, and modules of viser."""
+    found: list[str] = []
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        if isinstance(node, ast.Attribute) and node.attr.startswith("_"):
+            own = isinstance(node.value, ast.Name) and node.value.id in {"self", "cls"}
+            if not own and not node.attr.startswith("__"):
+                found.append(f"{path.name}:{node.lineno} .{node.attr}")
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("viser"):
+            names = [*(node.module or "").split("."), *(alias.name for alias in node.names)]
+            if any(name.startswith("_") for name in names):
+                found.append(f"{path.name}:{node.lineno} from {node.module}")
+        elif isinstance(node, ast.Import) and any("viser._" in alias.name for alias in node.names):
+            found.append(f"{path.name}:{node.lineno} import viser._…")
+    return found
+
+
+def test_private_parts_of_viser_are_used_in_one_module_only() -> None:
+    assert private_uses(ONLY), "the search finds nothing any more"
+    elsewhere = [
+        use
+        for path in sorted(APP.rglob("*.py"))
+        if path != ONLY
+        for use in private_uses(path)
+        # a store copies its own history
+        if "store.py" not in use
+    ]
+    assert elsewhere == []
