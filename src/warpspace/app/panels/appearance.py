@@ -35,7 +35,7 @@ class CameraPanel:
     context : PanelContext
     """
 
-    def __init__(self, context: PanelContext) -> None:
+    def __init__(self, context: PanelContext, _state: AppState) -> None:
         keys = {name: key for key, name in VIEW_NAMES.items()}
         assert set(keys.values()) == set(VIEWS)  # noqa: S101 - names and views belong together
         buttons = context.gui.add_button_group(

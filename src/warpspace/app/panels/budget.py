@@ -21,7 +21,7 @@ class WhyPanel:
     context : PanelContext
     """
 
-    def __init__(self, context: PanelContext) -> None:
+    def __init__(self, context: PanelContext, _state: AppState) -> None:
         gui = context.gui
         self._context = context
         self._clicks = Clicks(gui, lambda key: context.post(lambda s: with_lever(s, key)))

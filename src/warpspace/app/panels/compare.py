@@ -23,7 +23,7 @@ class ComparePanel:
     context : PanelContext
     """
 
-    def __init__(self, context: PanelContext) -> None:
+    def __init__(self, context: PanelContext, _state: AppState) -> None:
         gui, scenes = context.gui, context.scenes
         self._scenes: Mapping[str, Scene] = scenes
         self._options: tuple[str, ...] = tuple(scenes)

@@ -1,5 +1,6 @@
 """The panel "Conventions": what the map is drawn with, and what each choice changes."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -18,7 +19,10 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
 from warpspace.app.readouts.conventions import conventions_html
 from warpspace.app.state.app_state import AppState, start_loop
+from warpspace.app.state.picked import Picked
 from warpspace.scene.model import Scene
+
+PICKING = "Click a point of the box …"
 
 
 class ConventionsPanel:
@@ -36,7 +40,6 @@ class ConventionsPanel:
         self._known: dict[str, Effect] = {}
         self._clicks = Clicks(gui, lambda word: context.post(lambda s: with_choice(s, word)))
         self._text: Any = gui.add_html("")
-        self.picking = False
         self._pick: Any = gui.add_button(
             "Pick the reference in 3-D",
             color="gray",
@@ -71,13 +74,18 @@ class ConventionsPanel:
                 self._at[axis] = Input(box, self._context.changed)
 
     def _toggle_picking(self) -> None:
-        """Wait for a click on the box, or do not any more."""
-        self.wait(picking=not self.picking)
+        """Take the next click on the box for the reference, or do not any more."""
+        self._wait(self._choose if self._context.next_click is None else None)
 
-    def wait(self, *, picking: bool) -> None:
-        """Wait for a click on the box that chooses the reference, or end that."""
-        self.picking = picking
-        self._pick.label = "Click a point of the box …" if picking else "Pick the reference in 3-D"
+    def _choose(self, picked: Picked) -> None:
+        """Hold a point still that was clicked."""
+        self._wait(None)
+        self._context.post(lambda state: with_reference(state, picked.at))
+
+    def _wait(self, choose: Callable[[Picked], None] | None) -> None:
+        """Say on the button whether a click is waited for."""
+        self._context.next_click = choose
+        self._pick.label = "Pick the reference in 3-D" if choose is None else PICKING
 
     def read(self, state: AppState) -> AppState:
         """Take over a reference point that was typed."""

@@ -41,7 +41,7 @@ class FilesPanel:
     context : PanelContext
     """
 
-    def __init__(self, context: PanelContext) -> None:
+    def __init__(self, context: PanelContext, _state: AppState) -> None:
         self._context = context
         self._picture: LivePicture | None = None
         self._jobs = Jobs(self._report, self._failed)

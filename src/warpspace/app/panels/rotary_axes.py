@@ -12,7 +12,6 @@ from warpspace.app.readouts.circles import circle_rows, circle_table
 from warpspace.app.readouts.html import message
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import parse_positions, quarters
-from warpspace.app.viewport.layers.stage import StageLayer
 from warpspace.machine.description import Vector
 from warpspace.scene.model import Scene
 
@@ -24,12 +23,10 @@ class RotaryPanel:
     ----------
     context : PanelContext
     state : AppState
-    stage : StageLayer or None
-        What turns.
     """
 
-    def __init__(self, context: PanelContext, state: AppState, stage: StageLayer | None) -> None:
-        self._context, self._stage = context, stage
+    def __init__(self, context: PanelContext, state: AppState) -> None:
+        self._context, self._stage = context, context.stage
         self._playing = False
         gui = context.gui
         self._button = gui.add_button(

@@ -19,7 +19,7 @@ class GainsPanel:
     context : PanelContext
     """
 
-    def __init__(self, context: PanelContext) -> None:
+    def __init__(self, context: PanelContext, _state: AppState) -> None:
         gui = context.gui
         self._context = context
         self._where: Input[str] = Input(

@@ -32,7 +32,7 @@ class HtmlPanel:
         self._handle.put(content=self._spell(picture))
 
 
-def summary_panel(context: PanelContext) -> HtmlPanel:
+def summary_panel(context: PanelContext, _state: AppState) -> HtmlPanel:
     """Colour bar, numbers and scale bars."""
     return HtmlPanel(context, summary)
 

@@ -8,23 +8,15 @@ from warpspace.app.browser.clicks import SCRIPT
 from warpspace.app.browser.page import style_script
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import Panel, PanelContext
-from warpspace.app.panels.appearance import CameraPanel, LooksPanel
-from warpspace.app.panels.budget import WhyPanel
 from warpspace.app.panels.commands import CommandsPanel
-from warpspace.app.panels.compare import ComparePanel
-from warpspace.app.panels.conventions import ConventionsPanel
 from warpspace.app.panels.error_curve import ShapePanel
 from warpspace.app.panels.errors import ErrorsPanel
-from warpspace.app.panels.files import FilesPanel
-from warpspace.app.panels.machine import MachinePanel
-from warpspace.app.panels.rotary_axes import RotaryPanel
-from warpspace.app.panels.sensitivities import GainsPanel
-from warpspace.app.panels.summary import heading_panel, summary_panel
-from warpspace.app.panels.tolerances import ChancePanel
-from warpspace.app.panels.view import ViewPanel
+from warpspace.app.panels.summary import heading_panel
+from warpspace.app.panels.tabs import Step, tabs
 from warpspace.app.readouts.html import style_sheet
-from warpspace.app.server.layout import Places
+from warpspace.app.server.layout import HEADING, Places
 from warpspace.app.server.pointing import Pointing
+from warpspace.app.state.app_state import AppState
 from warpspace.app.viewport.layers import Layer
 from warpspace.app.viewport.layers.box import BoxLayer
 from warpspace.app.viewport.layers.stage import StageLayer, draw_around
@@ -46,7 +38,6 @@ class PageContents:
         self._context, self._places = context, places
         self._errors: ErrorsPanel | None = None
         self._expand: Callable[[], None] | None = None
-        self.stage: StageLayer | None = None
 
     @property
     def steps(self) -> tuple[Build, ...]:
@@ -61,17 +52,15 @@ class PageContents:
         context.page.run_script(style_script("readouts", style_sheet()))
         commands = CommandsPanel(context)
         self._errors = errors = ErrorsPanel(context, picture.state, self._expand_curve)
-        with self._places.at("Result"):
-            summary = summary_panel(context)
-        with self._places.at("heading"):
+        with self._places.at(HEADING):
             heading = heading_panel(context)
-        return [box], [errors, commands, summary, heading]
+        return [box], [errors, commands, *self._build_tabs("first", picture.state), heading]
 
     def _draw_around(self, picture: LivePicture) -> Built:
         """Draw what lies on and around the map."""
         client = self._context.client
-        self.stage = StageLayer(client, picture, self._context.act)
-        return [*draw_around(client.scene, picture), self.stage], []
+        stage = self._context.stage = StageLayer(client, picture, self._context.act)
+        return [*draw_around(client.scene, picture), stage], []
 
     def _build_front(self, picture: LivePicture) -> Built:
         """Build the panels that are in front, and the other sliders."""
@@ -84,33 +73,22 @@ class PageContents:
         below.dock_below(context.gui.main_panel)
         self._expand = below.expand
         context.page.run_script(split_script())
-        with self._places.at("View"):
-            view = ViewPanel(context, state)
-            looks = LooksPanel(context, state)
-            camera = CameraPanel(context)
-        return [], [curve, view, looks, camera]
+        return [], [curve, *self._build_tabs("front", state)]
 
     def _build_behind(self, picture: LivePicture) -> Built:
         """Build the tabs behind the numbers and behind the view."""
-        context, state = self._context, picture.state
-        with self._places.at("Why"):
-            why = WhyPanel(context)
-        with self._places.at("Gains"):
-            gains = GainsPanel(context)
-        with self._places.at("Compare"):
-            compare = ComparePanel(context)
-        with self._places.at("Files"):
-            files = FilesPanel(context)
-        with self._places.at("Machine"):
-            machine = MachinePanel(context, state)
-        with self._places.at("Table"):
-            rotary = RotaryPanel(context, state, self.stage)
-        with self._places.at("Chance"):
-            chance = ChancePanel(context, state)
-        with self._places.at("Conventions"):
-            conventions = ConventionsPanel(context, state)
-        Pointing(context, conventions)
-        return [], [why, gains, compare, files, machine, rotary, chance, conventions]
+        panels = self._build_tabs("behind", picture.state)
+        Pointing(self._context)
+        return [], panels
+
+    def _build_tabs(self, step: Step, state: AppState) -> list[Panel]:
+        """Build what stands in the tabs of a step."""
+        panels: list[Panel] = []
+        for tab in tabs():
+            if tab.step == step and tab.name in self._places:
+                with self._places.at(tab.name):
+                    panels += [build(self._context, state) for build in tab.load()]
+        return panels
 
     def _expand_curve(self) -> None:
         """Show the panel of one error, should it be minimized."""

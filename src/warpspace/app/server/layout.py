@@ -11,8 +11,11 @@ from contextlib import contextmanager
 from viser import GuiApi, GuiTabHandle
 
 from warpspace.app.browser.arrangement import page_style
+from warpspace.app.panels.tabs import tabs
 from warpspace.app.viewport.tab_camera import LEFT_WIDTH, RIGHT_WIDTH
 
+HEADING = "heading"
+"""Where the heading stands; no tab goes by this name."""
 BRAND = (38, 70, 112)
 BRAND_ON_DARK = (122, 162, 214)
 
@@ -43,6 +46,10 @@ class Places:
         self.dark = dark
         self._lock = threading.Lock()
 
+    def __contains__(self, name: str) -> bool:
+        """Tell whether there is a tab of a name."""
+        return name in self._tabs
+
     @contextmanager
     def at(self, name: str) -> Generator[None]:
         """Build within a tab; pages that open at once take turns, as viser's handles want it."""
@@ -70,28 +77,13 @@ def lay_out(gui: GuiApi, *, dark: bool) -> Places:
     gui.main_panel.set_width(LEFT_WIDTH)
     gui.add_html(page_style())
 
-    results = gui.add_panel()
-    tabs = {
-        "Result": results.add_tab("Result"),
-        "Why": results.add_tab("Why"),
-        "Gains": results.add_tab("Gains"),
-        "Compare": results.add_tab("Compare"),
-        "Files": results.add_tab("Files"),
-    }
+    results, settings = gui.add_panel(), gui.add_panel()
+    groups = {"results": results, "settings": settings}
+    handles = {tab.name: groups[tab.place].add_tab(tab.name) for tab in tabs()}
     results.dock_right()
     results.set_width(RIGHT_WIDTH)
-
-    settings = gui.add_panel()
-    tabs |= {
-        "View": settings.add_tab("View"),
-        "Machine": settings.add_tab("Machine"),
-        "Table": settings.add_tab("Table"),
-        "Chance": settings.add_tab("Chance"),
-        "Conventions": settings.add_tab("Conventions"),
-    }
     settings.dock_below(results)
-
     top = gui.add_panel()
-    tabs["heading"] = top.add_tab("warpspace")
+    handles[HEADING] = top.add_tab("warpspace")
     top.float(x=12, y=12, width=520)
-    return Places(tabs, dark=dark)
+    return Places(handles, dark=dark)

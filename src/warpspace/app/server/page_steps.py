@@ -54,8 +54,8 @@ class PageSteps:
     def stop(self) -> None:
         """Take no further step, and let nothing move by itself."""
         self._steps.clear()
-        if self.contents.stage is not None:
-            self.contents.stage.stop()
+        if self._context.stage is not None:
+            self._context.stage.stop()
 
     def remaining_s(self) -> float | None:
         """Give how long to wait for the page at most; None where nothing is left to be done."""

@@ -6,9 +6,7 @@ import numpy as np
 
 from warpspace.app.browser.arrangement import front_script
 from warpspace.app.evaluation.budget import pick, with_picked
-from warpspace.app.evaluation.conventions import with_reference
 from warpspace.app.panels import PanelContext
-from warpspace.app.panels.conventions import ConventionsPanel
 from warpspace.app.viewport.layers import SCENE_PER_MM
 
 
@@ -18,12 +16,10 @@ class Pointing:
     Parameters
     ----------
     context : PanelContext
-    conventions : ConventionsPanel
-        May be waiting for a reference point.
     """
 
-    def __init__(self, context: PanelContext, conventions: ConventionsPanel) -> None:
-        self._context, self._conventions = context, conventions
+    def __init__(self, context: PanelContext) -> None:
+        self._context = context
 
         @context.client.scene.on_click()
         def _(event: Any) -> None:
@@ -44,9 +40,8 @@ class Pointing:
         picked = pick(picture, ray[0] / SCENE_PER_MM, ray[1])
         if picked is None:
             return
-        if self._conventions.picking and picked.point_mm is None:
-            self._conventions.wait(picking=False)
-            self._context.post(lambda state: with_reference(state, picked.at))
+        if self._context.next_click is not None and picked.point_mm is None:
+            self._context.next_click(picked)
             return
         self._context.page.run_script(front_script("Why"))
         self._context.post(lambda state: with_picked(state, picked))

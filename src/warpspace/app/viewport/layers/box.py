@@ -1,18 +1,21 @@
 """The bent box: coloured surface, grid lines and edges on it, and the nominal box around it."""
 
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from viser import SceneApi
 
 from warpspace.app.browser.handles import Handle
+from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.palette import palette
 from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes
 from warpspace.app.viewport.layers.adding import add_lines
 from warpspace.app.viewport.tone_map import Rgb, vertex_colours
-from warpspace.bodies.gltf import Part, build_gltf
+from warpspace.bodies.gltf import Part
+from warpspace.bodies.gltf_template import GltfTemplate
 from warpspace.geometry.surfaces import box_edges
 from warpspace.picture.mesh import (
     Pieces,
@@ -73,7 +76,16 @@ def surface_glb(picture: LivePicture) -> bytes:
     """Write the coloured map of a picture, or its lines alone, vertices in mm."""
     mesh = line_mesh(picture) if picture.state.look.surface == "grid" else map_mesh(picture)
     colours = vertex_colours(picture.scale, mesh.values)
-    return build_gltf([Part("surface", mesh.vertices_mm, mesh.triangles, colours=colours)])
+    return _template(Identity(mesh.triangles), len(mesh.vertices_mm)).fill(
+        mesh.vertices_mm, colours
+    )
+
+
+@lru_cache(maxsize=32)
+def _template(triangles: Identity, count: int) -> GltfTemplate:
+    """Lay out the file of a map; that of one topology once."""
+    blank = np.zeros((count, 3))
+    return GltfTemplate(Part("surface", blank, triangles.thing, colours=blank))
 
 
 class BoxLayer:
