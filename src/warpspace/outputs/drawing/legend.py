@@ -1,4 +1,8 @@
-"""The legend at the bottom of a figure."""
+"""The legend at the bottom of a figure.
+
+Its symbols are drawn with the strokes of the picture itself, and entries for which there is no room
+are left out; matplotlib's legend does neither.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,9 @@
-"""What the font can draw, and how much room it takes."""
+"""What the font can draw, and how much room it takes.
+
+Labels are measured before they are drawn, at sizes still to be chosen, and placed by the box of
+their ink: matplotlib's text paths give both, while `Text.get_window_extent` measures only drawn
+text and gives the height of a whole line, up to 8 px more.
+"""
 
 from functools import lru_cache
 
