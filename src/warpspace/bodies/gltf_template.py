@@ -23,12 +23,17 @@ class GltfTemplate:
 
     Parameters
     ----------
-    part : Part
-        With colours; its points and colours are replaced later on.
+    name : str
+        Of the part.
+    indices : ndarray of int, [T, 3] or [S, 2]
+    count : int
+        Number of points.
     """
 
-    def __init__(self, part: Part) -> None:
-        data = build_gltf([part])
+    def __init__(self, name: str, indices: NDArray[np.integer[Any]], count: int) -> None:
+        # trimesh stores equal arrays once: points and colours must differ
+        numbers = np.arange(3.0 * count).reshape(-1, 3)
+        data = build_gltf([Part(name, numbers, indices, colours=-1.0 - numbers)])
         (length,) = struct.unpack("<I", data[12:16])
         self._document: dict[str, Any] = json.loads(data[_HEAD : _HEAD + length])
         self._body = data[_HEAD + length + 8 :]

@@ -22,7 +22,7 @@ def read(data: bytes) -> trimesh.Trimesh:
 
 
 def test_a_filled_template_is_the_file_written_anew() -> None:
-    template = GltfTemplate(part(np.zeros((4, 3)), np.zeros((4, 3))))
+    template = GltfTemplate("surface", TRIANGLES, 4)
     for _ in range(3):
         points, colours = RNG.normal(size=(4, 3)), RNG.normal(size=(4, 3))
         filled, anew = template.fill(points, colours), build_gltf([part(points, colours)])
@@ -36,7 +36,7 @@ def test_a_filled_template_is_the_file_written_anew() -> None:
 
 
 def test_an_earlier_file_keeps_its_bytes() -> None:
-    template = GltfTemplate(part(np.zeros((4, 3)), np.zeros((4, 3))))
+    template = GltfTemplate("surface", TRIANGLES, 4)
     first = template.fill(np.ones((4, 3)), np.ones((4, 3)))
     before = bytes(first)
     template.fill(np.full((4, 3), 2.0), np.zeros((4, 3)))

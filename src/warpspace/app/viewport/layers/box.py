@@ -14,7 +14,6 @@ from warpspace.app.evaluation.palette import palette
 from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes
 from warpspace.app.viewport.layers.adding import add_lines
 from warpspace.app.viewport.tone_map import Rgb, vertex_colours
-from warpspace.bodies.gltf import Part
 from warpspace.bodies.gltf_template import GltfTemplate
 from warpspace.geometry.surfaces import box_edges
 from warpspace.picture.mesh import (
@@ -84,8 +83,7 @@ def surface_glb(picture: LivePicture) -> bytes:
 @lru_cache(maxsize=32)
 def _template(triangles: Identity, count: int) -> GltfTemplate:
     """Lay out the file of a map; that of one topology once."""
-    blank = np.zeros((count, 3))
-    return GltfTemplate(Part("surface", blank, triangles.thing, colours=blank))
+    return GltfTemplate("surface", triangles.thing, count)
 
 
 class BoxLayer:
