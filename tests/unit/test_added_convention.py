@@ -13,7 +13,7 @@ from warpspace.app.documents.scene_file import open_text, state_to_toml
 from warpspace.app.evaluation.conventions import Effects, choices, chosen, with_choice
 from warpspace.app.readouts.conventions import switchboard_html
 from warpspace.app.state.app_state import start_state
-from warpspace.exceptions import SceneError, UnknownNameError
+from warpspace.exceptions import OptionError, SceneError, UnknownNameError
 from warpspace.kinematics.chain import nominal_point
 from warpspace.kinematics.conventions.convention import AxisFrames, Convention
 from warpspace.kinematics.conventions.registry import (
@@ -113,7 +113,7 @@ def test_an_unknown_one_is_refused_with_all_names() -> None:
     model = Model(load_scene("dvf5000_first").machine, "splt")
     with pytest.raises(UnknownNameError, match="did you mean 'split'"):
         model.convention("X")
-    with pytest.raises(ValueError, match="'split' cannot be added"):
+    with pytest.raises(OptionError, match="'split' is there already"):
         register_convention(Split())
 
 

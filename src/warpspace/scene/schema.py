@@ -40,8 +40,8 @@ def _entries(spelling: str) -> BeforeValidator:
 
 def _registered_convention(value: object) -> object:
     """Refuse what is no name of a convention."""
-    names = [f'"{name}"' for name in convention_names()]
     if value not in convention_names():
+        names = [f'"{name}"' for name in convention_names()]
         expected = " or ".join([", ".join(names[:-1]), names[-1]])
         raise PydanticCustomError("convention", "expected {names}", {"names": expected})
     return value

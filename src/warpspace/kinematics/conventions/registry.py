@@ -1,9 +1,10 @@
 """The conventions there are. A new one is a module beside this and a line below."""
 
-from warpspace.exceptions import UnknownNameError
+from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.kinematics.conventions.after_motion import AfterMotion
 from warpspace.kinematics.conventions.before_motion import BeforeMotion
 from warpspace.kinematics.conventions.convention import Convention
+from warpspace.plugins import load_plugins
 
 _CONVENTIONS: dict[str, Convention] = {
     convention.name: convention for convention in (AfterMotion(), BeforeMotion())
@@ -12,6 +13,7 @@ _CONVENTIONS: dict[str, Convention] = {
 
 def convention_names() -> tuple[str, ...]:
     """List the names of all conventions."""
+    load_plugins()
     return tuple(_CONVENTIONS)
 
 
@@ -23,7 +25,8 @@ def find_convention(name: str) -> Convention:
     UnknownNameError
         If there is none.
     """
-    if name not in _CONVENTIONS:
+    # Asked for each parameter of a Jacobian: plug-ins are looked for only where they may matter.
+    if name not in _CONVENTIONS and name not in convention_names():
         raise UnknownNameError("convention", name, _CONVENTIONS)
     return _CONVENTIONS[name]
 
@@ -38,16 +41,14 @@ def register_convention(convention: Convention) -> None:
 
     Raises
     ------
-    ValueError
+    OptionError
         If the name is taken.
     """
     if convention.name in _CONVENTIONS:
-        raise ValueError(
-            f"a convention {convention.name!r} cannot be added: expected a name of its own"
-        )
+        raise OptionError(f"convention {convention.name!r} is there already")
     _CONVENTIONS[convention.name] = convention
 
 
 def unregister_convention(name: str) -> None:
-    """Take away a convention that was added."""
+    """Take a convention away again."""
     del _CONVENTIONS[name]

@@ -2,25 +2,29 @@
 
 from collections.abc import Mapping
 
-from warpspace.exceptions import UnknownNameError
+from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.machine.curves.constant import Constant
 from warpspace.machine.curves.curve import ErrorFunction
 from warpspace.machine.curves.harmonics import Harmonics
 from warpspace.machine.curves.poly import Poly
 from warpspace.machine.curves.ramp import Ramp
 from warpspace.machine.curves.table import Table
+from warpspace.plugins import load_plugins
 
 CurveKind = type[ErrorFunction]
 Form = tuple[str, ...]
 """Keys of the table that spells a curve in a scene file."""
 
-_KINDS: list[CurveKind] = [Constant, Ramp, Poly, Harmonics, Table]
-"""In the order of lists: simplest first."""
+_KINDS: dict[str, CurveKind] = {
+    kind.name: kind for kind in (Constant, Ramp, Poly, Harmonics, Table)
+}
+"""By name, in the order of lists: simplest first."""
 
 
 def curve_kinds() -> tuple[CurveKind, ...]:
     """List all kinds of curve, simplest first."""
-    return tuple(_KINDS)
+    load_plugins()
+    return tuple(_KINDS.values())
 
 
 def curve_kind(title: str) -> CurveKind:
@@ -31,7 +35,7 @@ def curve_kind(title: str) -> CurveKind:
     UnknownNameError
         If there is none.
     """
-    kinds = {kind.title: kind for kind in _KINDS}
+    kinds = {kind.title: kind for kind in curve_kinds()}
     if title not in kinds:
         raise UnknownNameError("kind of curve", title, kinds)
     return kinds[title]
@@ -47,29 +51,28 @@ def register_curve(kind: CurveKind) -> None:
 
     Raises
     ------
-    ValueError
+    OptionError
         If another kind has one of them.
     """
-    for other in _KINDS:
+    for other in _KINDS.values():
         keys = {form[0] for form in kind.forms} & {form[0] for form in other.forms}
         if keys or kind.name == other.name or kind.title == other.title:
-            raise ValueError(
-                f"the kind of curve {kind.name!r} cannot be added: {other.name!r} has the same"
-                " name, title or key; expected ones of its own"
+            raise OptionError(
+                f"kind of curve {kind.name!r}: {other.name!r} is there already with the same name,"
+                " title or key"
             )
-    _KINDS.append(kind)
+    _KINDS[kind.name] = kind
 
 
-def unregister_curve(kind: CurveKind) -> None:
-    """Take away a kind of curve that was added."""
-    _KINDS.remove(kind)
+def unregister_curve(name: str) -> None:
+    """Take a kind of curve away again."""
+    del _KINDS[name]
 
 
 def find_form(raw: Mapping[str, object]) -> tuple[CurveKind, Form] | None:
     """Find the kind of curve, and its form, that a table of a scene file spells."""
     return next(
-        ((kind, form) for kind in _KINDS for form in kind.forms if form[0] in raw),
-        None,
+        ((kind, form) for kind in curve_kinds() for form in kind.forms if form[0] in raw), None
     )
 
 
@@ -77,7 +80,7 @@ def spell_forms() -> str:
     """Spell all that a scene file may give for an error."""
     tables = (
         "{ " + ", ".join(f"{key} =" for key in form).replace("=,", "= ,") + " }"
-        for kind in _KINDS
+        for kind in curve_kinds()
         for form in kind.forms
     )
     return f"a number or one of {', '.join(tables)}"
