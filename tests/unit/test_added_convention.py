@@ -7,11 +7,12 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from markupsafe import Markup
 
 from chains import central_differences
 from warpspace.app.documents.scene_file import open_text, state_to_toml
 from warpspace.app.evaluation.conventions import Effects, choices, chosen, with_choice
-from warpspace.app.readouts.conventions import switchboard_html
+from warpspace.app.readouts.conventions import conventions_html
 from warpspace.app.state.app_state import start_state
 from warpspace.exceptions import OptionError, SceneError, UnknownNameError
 from warpspace.kinematics.chain import nominal_point
@@ -124,7 +125,7 @@ def test_the_app_offers_it_says_what_it_changes_and_stores_it() -> None:
     state = with_choice(start, "component_errors=split")
     assert "component_errors=split" in chosen(state)
     assert Effects().of(state)["component_errors=split"].max_um > 0.0
-    text = switchboard_html(state, {}, lambda word, role: "")
+    text = conventions_html(state, {}, lambda word, role: Markup())
     assert 'data-choice="component_errors=split" aria-checked="true"' in text
     assert "shifts before, turns after motion" in text
     back, _ = open_text(state_to_toml(state), "dvf5000_first", "x.toml")
