@@ -6,7 +6,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 from warpspace.kinematics.chain import exact_error
-from warpspace.kinematics.model import ComponentErrors, Loop, Model
+from warpspace.kinematics.conventions.registry import convention_names
+from warpspace.kinematics.model import Loop, Model
 from warpspace.machine.description import FIXED_FRAMES, Chain, build_machine
 from warpspace.machine.parameters import AXES, LINEAR_AXES
 
@@ -36,7 +37,7 @@ def chains(draw: st.DrawFn) -> Chain:
 
 
 @st.composite
-def models(draw: st.DrawFn, component_errors: ComponentErrors | None = None) -> Model:
+def models(draw: st.DrawFn, component_errors: str | None = None) -> Model:
     """Machines with any chain, offsets and directions, their points and a convention."""
     chain = draw(chains())
     frames = (*chain.axes, *FIXED_FRAMES)
@@ -45,7 +46,7 @@ def models(draw: st.DrawFn, component_errors: ComponentErrors | None = None) -> 
         offset_mm={frame: draw(vectors()) for frame in frames},
         direction={axis: draw(st.sampled_from((1, -1))) for axis in chain.axes},
     )
-    convention = component_errors or draw(st.sampled_from(ComponentErrors))
+    convention = component_errors or draw(st.sampled_from(convention_names()))
     return Model(machine, convention, draw(vectors(300.0)), draw(vectors(300.0)))
 
 

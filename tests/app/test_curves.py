@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from warpspace.app.state.curve_text import (
-    KINDS,
     convert_shape,
+    kind_titles,
     parse_shape,
     sample_curve,
     shape_kind,
@@ -71,7 +71,7 @@ def test_refused_with_a_message(kind, text, message):
         parse_shape(kind, text, SPAN)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", kind_titles())
 @pytest.mark.parametrize("function", [*EXAMPLES, None], ids=shape_kind)
 def test_another_kind_starts_from_the_present_curve(function, kind):
     converted = convert_shape(function, kind, SPAN)

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from warpspace.kinematics.conventions.registry import convention_names
+from warpspace.machine.curves.registry import curve_kinds
 from warpspace.scene.library import load_scene
 from warpspace.scene.schema import (
     ConventionSection,
@@ -77,3 +79,13 @@ def test_there_is_one_picture_of_every_tab():
     for name, tab in visits:
         assert name == tab.lower().replace(" ", "_")
         assert f"](images/tab_{name}.png)" in page
+
+
+def test_every_kind_of_curve_and_every_convention_is_documented():
+    for page in ("docs/scenes.md", "CONVENTIONS.md"):
+        text = (ROOT / page).read_text("utf-8")
+        for kind in curve_kinds():
+            for form in kind.forms:
+                assert f"{{ {form[0]}" in text, (page, form)
+        for name in convention_names():
+            assert f'"{name}"' in text, (page, name)

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from warpspace.kinematics.chain import branch_frames, branch_pose
-from warpspace.kinematics.model import ComponentErrors, Loop, Model, complete_coordinates
+from warpspace.kinematics.model import Loop, Model, complete_coordinates
 from warpspace.machine.parameters import parameter
 from warpspace.units import Array
 
@@ -36,7 +36,6 @@ def lever_parts(model: Model, loop: Loop, key: str, at: Mapping[str, float]) -> 
         return ()
     side = "tool" if on_tool else "workpiece"
     coordinates = complete_coordinates(model.machine, at)
-    before = row.is_constant or model.component_errors is ComponentErrors.BEFORE_MOTION
     stops: list[tuple[str, Array]] = []
     started = False
     for frames in branch_frames(model, side, coordinates):
@@ -45,9 +44,8 @@ def lever_parts(model: Model, loop: Loop, key: str, at: Mapping[str, float]) -> 
             stops.append((f"{name} offset", frames.before[:3, 3]))
         if name == row.axis:
             started = True
-            stops.append(("", (frames.before if before else frames.after)[:3, 3]))
-            if not before:
-                continue
+            # Where the error acts behind the motion, the motion is no part of its lever: zero.
+            stops.append(("", model.convention(name).frame(frames, row)[:3, 3]))
         if started:
             stops.append((f"{name} motion", frames.after[:3, 3]))
     stops += _end_stops(model, side, coordinates, stops[-1][1])

@@ -1,19 +1,18 @@
 """The exact chain: every transformation in full, multiplied out.
 
-Per axis ``T = Trans(offset) · E0 · Motion(direction·q) · E(q)``; E0 and E(q) are
-``Trans(δ) · Rot(ε)`` with the full rotation of the vector ε.
+Per axis ``T = Trans(offset) · E0 · Motion(direction·q) · E(q)``, or what another convention makes
+of these factors; E0 and E(q) are ``Trans(δ) · Rot(ε)`` with the full rotation of the vector ε.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from warpspace.kinematics import transforms
+from warpspace.kinematics.conventions.convention import AxisFrames
 from warpspace.kinematics.model import (
     TOOL_AXIS,
-    ComponentErrors,
     Coordinates,
     Loop,
     Model,
@@ -24,24 +23,6 @@ from warpspace.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM, URAD_PER_RAD, Ar
 
 ErrorValues = Mapping[str, Array]
 """Parameter key to values at the coordinates, [...], µm or µrad."""
-
-
-@dataclass(frozen=True, slots=True)
-class AxisFrames:
-    """Nominal frames of one axis in R: where its constant and its component errors act.
-
-    Attributes
-    ----------
-    axis : Axis
-    before : ndarray, [..., 4, 4]
-        After the offset, before the motion.
-    after : ndarray, [..., 4, 4]
-        After the motion.
-    """
-
-    axis: Axis
-    before: Array
-    after: Array
 
 
 def motion(axis: Axis, position: Array) -> Array:
@@ -133,13 +114,8 @@ def branch_pose(
         move = motion(axis, coordinates[axis.name])
         constant = error_transform(axis.name, errors, constant=True)
         component = error_transform(axis.name, errors, constant=False)
-        pose = pose if constant is None else pose @ constant
-        if component is None:
-            pose = pose @ move
-        elif model.component_errors is ComponentErrors.AFTER_MOTION:
-            pose = pose @ move @ component
-        else:
-            pose = pose @ component @ move
+        for factor in model.convention(axis.name).factors(constant, move, component):
+            pose = pose if factor is None else pose @ factor
     for offset in model.machine.end_offsets_mm(side):
         pose = pose @ transforms.translation(offset)
     return pose

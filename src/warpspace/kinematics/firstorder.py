@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpspace.kinematics.chain import AxisFrames, branch_frames, tool_axis
-from warpspace.kinematics.model import ComponentErrors, Coordinates, Loop, Model, batch_shape
+from warpspace.kinematics.chain import branch_frames, tool_axis
+from warpspace.kinematics.conventions.convention import AxisFrames
+from warpspace.kinematics.model import Coordinates, Loop, Model, batch_shape
 from warpspace.machine.parameters import Parameter, parameter
 from warpspace.units import UM_PER_MM_URAD, Array
 
@@ -84,8 +85,7 @@ def column(
     -------
     Column
     """
-    before = row.is_constant or model.component_errors is ComponentErrors.BEFORE_MOTION
-    pose = frames.before if before else frames.after
+    pose = model.convention(row.axis).frame(frames, row)
     direction = pose[..., :3, row.direction]
     lever = np.asarray(point_mm, dtype=float) - pose[..., :3, 3]
     gain = rotation_gain(lever, direction) if row.is_rotation else direction

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warpspace.exceptions import OptionError, UnknownNameError
+from warpspace.kinematics.conventions.convention import Convention
+from warpspace.kinematics.conventions.registry import find_convention
 from warpspace.machine.description import ORIGIN, Machine, Vector
 from warpspace.units import Array
 
@@ -24,7 +26,7 @@ class Loop(StrEnum):
 
 
 class ComponentErrors(StrEnum):
-    """Where component errors sit: on the moving body, or in fixed directions before it."""
+    """Names of the conventions for component errors that come with warpspace."""
 
     AFTER_MOTION = "after_motion"
     BEFORE_MOTION = "before_motion"
@@ -41,8 +43,9 @@ class Model:
     Attributes
     ----------
     machine : Machine
-    component_errors : ComponentErrors
-        Order of motion and component errors.
+    component_errors : str
+        Name of the convention for component errors: one of `ComponentErrors`, or one that was
+        registered.
     tool_point_mm : tuple of float, (3,), mm
         Functional point in the tool frame.
     workpiece_point_mm : tuple of float, (3,), mm
@@ -50,9 +53,20 @@ class Model:
     """
 
     machine: Machine
-    component_errors: ComponentErrors = ComponentErrors.AFTER_MOTION
+    component_errors: str = ComponentErrors.AFTER_MOTION
     tool_point_mm: Vector = ORIGIN
     workpiece_point_mm: Vector = ORIGIN
+
+    def convention(self, axis: str) -> Convention:
+        """Give the convention for the component errors of an axis.
+
+        Raises
+        ------
+        UnknownNameError
+            If no convention has the name.
+        """
+        del axis  # one convention holds for all axes
+        return find_convention(self.component_errors)
 
 
 def batch_shape(coordinates: Coordinates) -> tuple[int, ...]:

@@ -4,7 +4,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import SupportsFloat
 
-from warpspace.kinematics.model import ComponentErrors, Loop
+from warpspace.kinematics.conventions.registry import find_convention
+from warpspace.kinematics.model import Loop
 from warpspace.machine.parameters import LINEAR_AXES
 from warpspace.scene.model import Scene
 from warpspace.units import Array
@@ -16,10 +17,6 @@ LOOP_WORDS = {
     Loop.TOOL: "tool loop",
     Loop.WORKPIECE: "workpiece loop",
     Loop.RELATIVE: "tool relative to workpiece",
-}
-CONVENTION_WORDS = {
-    ComponentErrors.AFTER_MOTION: "component errors after the motion",
-    ComponentErrors.BEFORE_MOTION: "component errors before the motion",
 }
 
 
@@ -109,6 +106,11 @@ def reference_words(scene: Scene) -> str:
         return "absolute errors"
     at = " ".join(f"{axis} {spell_short(value)}" for axis, value in scene.reference.items())
     return f"held still at {at}"
+
+
+def convention_words(scene: Scene) -> str:
+    """Say where component errors act."""
+    return find_convention(scene.model.component_errors).short_words
 
 
 def quantity_words(component: str, unit: str = "µm") -> str:

@@ -6,13 +6,13 @@ from typing import Any
 
 from warpspace.exceptions import SceneError, near_miss
 from warpspace.field.grid import Workspace
-from warpspace.kinematics.model import ComponentErrors, Model
-from warpspace.machine import errors as functions
+from warpspace.kinematics.model import Model
 from warpspace.machine.description import Machine, build_machine
+from warpspace.machine.errors import ErrorFunction, ErrorSet
+from warpspace.machine.limits import MAX_ERROR
 from warpspace.machine.parameters import AXES, LINEAR_AXES, PARAMETERS, ErrorKind
 from warpspace.machine.tolerances import TOLERANCE_CLASSES, Tolerance, ToleranceSet
-from warpspace.scene import schema
-from warpspace.scene.files import read_csv_column
+from warpspace.scene.curves import read_curve
 from warpspace.scene.model import Scene
 from warpspace.scene.sections import Problems
 
@@ -86,9 +86,7 @@ def build_scene(
     reference = _reference(view, workspace, problems)
     if problems.lines:
         raise SceneError(source, problems.lines)
-    model = Model(
-        machine, ComponentErrors(convention.component_errors), points.tool, points.workpiece
-    )
+    model = Model(machine, convention.component_errors, points.tool, points.workpiece)
     return Scene(
         name=name,
         title=texts.get("title") or name,
@@ -157,77 +155,25 @@ def _errors(
     workspace: Workspace,
     folder: Path | None,
     problems: Problems,
-) -> functions.ErrorSet:
+) -> ErrorSet:
     """Read the error functions, each over the range of its axis."""
-    found: dict[str, functions.ErrorFunction] = {}
+    found: dict[str, ErrorFunction] = {}
     for key, value in _known_parameters(raw, "errors", machine, refused, problems).items():
-        where = f"errors.{key}"
-        spec = problems.validate("error", where, value)
-        if spec is None:
-            continue
-        row = PARAMETERS[key]
-        if row.is_constant and not isinstance(spec, float | int):
-            problems.add(where, "is constant along its axis; expected a number", value)
-            continue
+        where, row = f"errors.{key}", PARAMETERS[key]
         low, high = workspace.ranges[row.axis]
         span = (low, high) if low < high else machine.axes[row.axis].travel
-        function = _function(spec, span, where, folder, problems)
+        function = read_curve(value, span, where, folder, problems, constant=row.is_constant)
         if function is None:
             continue
         peak = function.amplitude
-        if machine is not STAND_IN and not abs(peak) <= schema.MAX_ERROR:
+        if machine is not STAND_IN and not abs(peak) <= MAX_ERROR:
             problems.add(
                 where,
                 f"reaches {peak:g} {row.unit} within {span[0]:g} … {span[1]:g};"
-                f" expected at most ±{schema.MAX_ERROR:g}",
+                f" expected at most ±{MAX_ERROR:g}",
             )
         found[key] = function
-    return functions.ErrorSet(found)
-
-
-def _function(
-    spec: Any,
-    span: tuple[float, float],
-    where: str,
-    folder: Path | None,
-    problems: Problems,
-) -> functions.ErrorFunction | None:
-    """Build one error function from its validated spelling."""
-    match spec:
-        case float() | int():
-            return functions.Constant(span, float(spec))
-        case schema.RampSpec():
-            return functions.Ramp(span, spec.ramp)
-        case schema.PolySpec():
-            return functions.Poly(span, tuple(spec.poly))
-        case schema.HarmonicsSpec():
-            return functions.Harmonics(span, tuple(spec.harmonics))
-        case schema.TableSpec():
-            return functions.Table(span, tuple(spec.table))
-        case _:
-            return _csv_table(spec, span, where, folder, problems)
-
-
-def _csv_table(
-    spec: schema.CsvSpec,
-    span: tuple[float, float],
-    where: str,
-    folder: Path | None,
-    problems: Problems,
-) -> functions.ErrorFunction | None:
-    """Read the CSV column an error follows."""
-    if folder is None:
-        problems.add(where, "CSV files are not read here; expected the values as { table = }")
-        return None
-    try:
-        points = read_csv_column(
-            folder / spec.csv, spec.column, schema.MAX_ERROR, schema.MAX_POINTS
-        )
-    except SceneError as error:
-        for problem in error.problems:
-            problems.add(where, f"{error.source}: {problem}")
-        return None
-    return functions.Table(span, tuple(points))
+    return ErrorSet(found)
 
 
 def _tolerances(
@@ -279,7 +225,7 @@ def _travel_notes(machine: Machine, workspace: Workspace) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _carried_notes(machine: Machine, errors: functions.ErrorSet) -> tuple[str, ...]:
+def _carried_notes(machine: Machine, errors: ErrorSet) -> tuple[str, ...]:
     """Remark on squareness errors of an axis that carries the axis it is measured against."""
     notes: list[str] = []
     for key in errors:

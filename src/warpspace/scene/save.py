@@ -7,7 +7,6 @@ import tomli_w
 
 from warpspace.exceptions import SceneError
 from warpspace.machine.description import DEFAULT_TRAVEL, ORIGIN, Machine
-from warpspace.machine.errors import Poly, Ramp
 from warpspace.machine.parameters import PARAMETERS, Parameter
 from warpspace.machine.tolerances import Tolerance
 from warpspace.scene.machines import load_machine, machine_names
@@ -45,7 +44,7 @@ def scene_to_toml(scene: Scene) -> str:
     parts = [tomli_w.dumps(head, multiline_strings="\r" not in scene.description)]
     if not bundled:
         parts += _machine_sections(scene.machine)
-    convention = {"component_errors": str(scene.model.component_errors.value)}
+    convention = {"component_errors": str(scene.model.component_errors)}
     if {*scene.machine.reference_keys} & {*scene.errors, *scene.tolerances.own}:
         convention["reference_axis"] = "free"
     parts.append(_section("convention", convention))
@@ -104,12 +103,7 @@ def _errors_section(scene: Scene) -> str:
 
 def _function(scene: Scene, key: str) -> object:
     """Spell one error function."""
-    function = scene.errors.functions[key]
-    if isinstance(function, Ramp) and function.span != _span(scene, key):
-        low, high = function.span
-        slope = function.value / (high - low)
-        function = Poly(function.span, (-slope * low, slope))
-    return function.to_toml()
+    return scene.errors.functions[key].for_span(_span(scene, key)).to_toml()
 
 
 def _span(scene: Scene, key: str) -> tuple[float, float]:

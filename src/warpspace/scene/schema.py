@@ -3,7 +3,6 @@
 Each section is validated on its own, so that every problem of a file is found in one reading.
 """
 
-from itertools import pairwise
 from typing import Annotated, Literal
 
 from pydantic import (
@@ -17,13 +16,11 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-MAX_ERROR = 1e5
-"""100 mm in µm and 0.1 rad in µrad: no rigid-body model of small errors holds beyond."""
-MAX_LENGTH_MM = 1e5
+from warpspace.kinematics.conventions.registry import convention_names
+from warpspace.machine.limits import MAX_ERROR, MAX_LENGTH_MM
+
 MAX_EXAGGERATION = 1e7
-MAX_POINTS = 100_000
 MAX_TRACES = 64
-MAX_ORDER = 1000
 MIN_SPAN = 1e-6
 """Millimetres or degrees: a range narrower than a nanometre is empty."""
 MAX_TEXT = 4000
@@ -41,6 +38,15 @@ def _entries(spelling: str) -> BeforeValidator:
     return BeforeValidator(check)
 
 
+def _registered_convention(value: object) -> object:
+    """Refuse what is no name of a convention."""
+    if value not in convention_names():
+        names = [f'"{name}"' for name in convention_names()]
+        expected = " or ".join([", ".join(names[:-1]), names[-1]])
+        raise PydanticCustomError("convention", "expected {names}", {"names": expected})
+    return value
+
+
 def _whole_number(value: object) -> object:
     """Refuse what only equals 1 or -1."""
     if type(value) is not int:
@@ -54,11 +60,6 @@ ErrorValue = Annotated[Finite, Field(ge=-MAX_ERROR, le=MAX_ERROR)]
 HalfWidth = Annotated[Finite, Field(ge=0, le=MAX_ERROR)]
 Point = Annotated[tuple[Length, Length, Length], _entries("[x, y, z]")]
 Text = Annotated[str, Field(strict=True, max_length=MAX_TEXT)]
-TableRow = Annotated[tuple[Length, ErrorValue], _entries("[position, value]")]
-HarmonicTerm = Annotated[
-    tuple[Annotated[Finite, Field(ge=0, le=MAX_ORDER)], ErrorValue, Length],
-    _entries("[order, amplitude, phase]"),
-]
 
 
 def _ascending_range(value: tuple[float, float]) -> tuple[float, float]:
@@ -66,18 +67,6 @@ def _ascending_range(value: tuple[float, float]) -> tuple[float, float]:
     if value[1] - value[0] < MIN_SPAN:
         raise PydanticCustomError("empty_range", "expected [lower, upper] with lower < upper")
     return value
-
-
-def _sorted_rows(rows: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Refuse table rows whose positions do not ascend."""
-    for number, (low, high) in enumerate(pairwise(rows), start=2):
-        if not low[0] < high[0]:
-            raise PydanticCustomError(
-                "unsorted",
-                "row {number} has position {high} after {low}; expected ascending positions",
-                {"number": number, "low": low[0], "high": high[0]},
-            )
-    return rows
 
 
 Span = Annotated[
@@ -89,67 +78,6 @@ class Section(BaseModel):
     """Base of all sections: unknown keys are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class RampSpec(Section):
-    """Zero at the lower end of the axis range, the value at the upper one."""
-
-    ramp: ErrorValue
-
-
-class PolySpec(Section):
-    """Polynomial coefficients, lowest power first."""
-
-    poly: Annotated[list[Finite], Field(min_length=1, max_length=16)]
-
-
-class HarmonicsSpec(Section):
-    """Terms n, amplitude, phase in degrees."""
-
-    harmonics: Annotated[list[HarmonicTerm], Field(min_length=1, max_length=64)]
-
-
-class TableSpec(Section):
-    """Measured points, positions ascending."""
-
-    table: Annotated[
-        list[TableRow], Field(min_length=1, max_length=MAX_POINTS), AfterValidator(_sorted_rows)
-    ]
-
-
-class CsvSpec(Section):
-    """A column of a CSV file; its first column is the axis position."""
-
-    csv: Annotated[str, Field(strict=True, min_length=1, max_length=1024)]
-    column: Annotated[str, Field(strict=True, min_length=1, max_length=256)]
-
-
-FUNCTION_KEYS = ("ramp", "poly", "harmonics", "table", "csv")
-ERROR_FORMS = (
-    "a number or one of { ramp = }, { poly = }, { harmonics = }, { table = }, { csv = , column = }"
-)
-
-
-def _which_function(value: object) -> str | None:
-    """Tell which kind of error function a raw value spells."""
-    if isinstance(value, dict):
-        return next((key for key in FUNCTION_KEYS if key in value), None)
-    return "number"
-
-
-ErrorSpec = Annotated[
-    Annotated[ErrorValue, Tag("number")]
-    | Annotated[RampSpec, Tag("ramp")]
-    | Annotated[PolySpec, Tag("poly")]
-    | Annotated[HarmonicsSpec, Tag("harmonics")]
-    | Annotated[TableSpec, Tag("table")]
-    | Annotated[CsvSpec, Tag("csv")],
-    Discriminator(
-        _which_function,
-        custom_error_type="error_function",
-        custom_error_message=f"expected {ERROR_FORMS}",
-    ),
-]
 
 
 class MachineSection(Section):
@@ -166,7 +94,7 @@ class MachineSection(Section):
 class ConventionSection(Section):
     """Where component errors sit, and whether the reference axis itself may be out of direction."""
 
-    component_errors: Literal["after_motion", "before_motion"] = "after_motion"
+    component_errors: Annotated[str, BeforeValidator(_registered_convention)] = "after_motion"
     reference_axis: Literal["fixed", "free"] = "fixed"
 
 
@@ -215,10 +143,9 @@ ToleranceValue = Annotated[
     Annotated[HalfWidth, Tag("number")] | Annotated[ToleranceSpec, Tag("range")],
     Discriminator(lambda value: "range" if isinstance(value, dict) else "number"),
 ]
-TAG_AT = {"error": 0, "range": 0, "tolerance": 0, "view": 1}
+TAG_AT = {"range": 0, "tolerance": 0, "view": 1}
 """Which part of a pydantic location is the tag of a union and no key, per kind of value."""
 ALTERNATIVES = {
-    "error": ERROR_FORMS,
     "range": "a number or [lower, upper]",
     "tolerance": "a half width or { centre = , half_width = }",
     "exaggeration": '"auto" or a number above 0',

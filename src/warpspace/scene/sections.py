@@ -10,16 +10,10 @@ from warpspace.scene.schema import (
     ALTERNATIVES,
     TAG_AT,
     ConventionSection,
-    CsvSpec,
     DefaultTolerances,
-    ErrorSpec,
-    HarmonicsSpec,
     MachineSection,
     PointsSection,
-    PolySpec,
-    RampSpec,
     RangeSpec,
-    TableSpec,
     Text,
     ToleranceSpec,
     ToleranceValue,
@@ -33,7 +27,6 @@ _ADAPTERS: dict[str, TypeAdapter[Any]] = {
     "convention": TypeAdapter(ConventionSection),
     "range": TypeAdapter(RangeSpec),
     "points_mm": TypeAdapter(PointsSection),
-    "error": TypeAdapter(ErrorSpec),
     "tolerance": TypeAdapter(ToleranceValue),
     "default": TypeAdapter(DefaultTolerances),
     "view": TypeAdapter(ViewSection),
@@ -45,9 +38,7 @@ _EXPECTED = {
     "model_attributes_type": "expected a table",
     "list_type": "expected a list",
     "finite_number": "expected a finite number",
-    "too_short": "expected at least {min_length}, not {actual_length} entries",
     "too_long": "expected at most {max_length} entries",
-    "string_too_short": "expected at least {min_length} character",
     "string_too_long": "expected at most {max_length} characters",
     "less_than_equal": "expected at most {le:g}",
     "greater_than_equal": "expected at least {ge:g}",
@@ -57,11 +48,6 @@ _WRONG_TYPE = frozenset({"float_type", "literal_error"})
 _FIELDS = {
     name: tuple(model.model_fields)
     for name, model in (
-        ("ramp", RampSpec),
-        ("poly", PolySpec),
-        ("harmonics", HarmonicsSpec),
-        ("table", TableSpec),
-        ("csv", CsvSpec),
         ("machine", MachineSection),
         ("convention", ConventionSection),
         ("points_mm", PointsSection),
@@ -121,7 +107,7 @@ class Problems:
         tag_at = TAG_AT.get(adapter)
         where = location(key, parts, tag_at)
         if kind == "extra_forbidden":
-            known = _FIELDS.get(str(parts[0]) if adapter == "error" else adapter, ())
+            known = _FIELDS.get(adapter, ())
             self.unknown(location(key, parts[:-1], tag_at), str(parts[-1]), map(str, known), "key")
         elif kind == "missing":
             self.add(where, "is missing")

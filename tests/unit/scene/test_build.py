@@ -21,7 +21,7 @@ def test_everything_but_the_machine_has_a_default() -> None:
     assert scene.workspace.ranges["X"] == (-275.0, 275.0)
     assert scene.workspace.ranges["Z"] == (-480.0, 0.0)
     assert scene.workspace.ranges["B"] == scene.workspace.ranges["C"] == (0.0, 0.0)
-    assert scene.model.component_errors is ComponentErrors.AFTER_MOTION
+    assert scene.model.component_errors == ComponentErrors.AFTER_MOTION
     assert (scene.exaggeration, scene.reference) == (None, None)
     assert list(scene.errors) == []
     assert not scene.tolerances

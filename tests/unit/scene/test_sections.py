@@ -2,6 +2,7 @@
 
 import pytest
 
+from warpspace.scene.curves import read_curve
 from warpspace.scene.sections import Problems
 
 FINDINGS = [
@@ -54,17 +55,24 @@ FINDINGS = [
 ]
 
 
+def validate(problems: Problems, adapter: str, key: str, value: object) -> object:
+    """Validate a value of any kind; errors are read by their kinds of curve."""
+    if adapter == "error":
+        return read_curve(value, (-275.0, 275.0), key, None, problems)
+    return problems.validate(adapter, key, value)
+
+
 @pytest.mark.parametrize(("adapter", "key", "value", "line"), FINDINGS)
 def test_finding_names_key_value_and_expectation(adapter, key, value, line) -> None:
     problems = Problems()
-    assert problems.validate(adapter, key, value) is None
+    assert validate(problems, adapter, key, value) is None
     assert any(line in found for found in problems.lines), problems.lines
 
 
 @pytest.mark.parametrize(("adapter", "key", "value", "line"), FINDINGS)
 def test_no_word_of_the_library_is_left(adapter, key, value, line) -> None:
     problems = Problems()
-    problems.validate(adapter, key, value)
+    validate(problems, adapter, key, value)
     for word in ("input should", "Input", "valid", "tuple", "dictionary", "string", "instance"):
         assert word not in "".join(problems.lines)
 
@@ -86,7 +94,7 @@ def test_no_word_of_the_library_is_left(adapter, key, value, line) -> None:
 )
 def test_what_the_format_allows_is_taken(adapter: str, value: object) -> None:
     problems = Problems()
-    assert problems.validate(adapter, "k", value) is not None
+    assert validate(problems, adapter, "k", value) is not None
     assert problems.lines == []
 
 

@@ -67,7 +67,7 @@ def _rotary(case: ThesisCase) -> Iterator[Hypothesis]:
     )
     for component_errors in ComponentErrors:
         model = replace(case.model, component_errors=component_errors)
-        used = component_errors is case.model.component_errors
+        used = component_errors == case.model.component_errors
         yield Hypothesis(
             question, component_errors.replace("_", " "), _agreeing("table_4_4", model), used
         )

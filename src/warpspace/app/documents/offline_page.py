@@ -34,7 +34,7 @@ from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import ErrorFunction
 from warpspace.machine.parameters import parameter
 from warpspace.picture.model import choose_scale
-from warpspace.picture.words import CONVENTION_WORDS, reference_words
+from warpspace.picture.words import convention_words, reference_words
 from warpspace.scene.model import Scene
 
 POLICY = (
@@ -191,7 +191,7 @@ def remarks(picture: LivePicture) -> list[str]:
     return [
         f"{picture.both_words(lambda state: state.loop.value)} loop",
         picture.both_words(lambda state: reference_words(state.scene)),
-        picture.both_words(lambda state: CONVENTION_WORDS[state.scene.model.component_errors]),
+        picture.both_words(lambda state: convention_words(state.scene)),
         "first-order model",
         "error = actual − nominal",
         "drag to turn, wheel to zoom",

@@ -13,7 +13,8 @@ from warpspace.app.state.app_state import AppState, start_loop
 from warpspace.app.state.ranges import Span
 from warpspace.field.evaluate import View, build_basis
 from warpspace.field.grid import build_grid
-from warpspace.kinematics.model import ComponentErrors, Loop
+from warpspace.kinematics.conventions.registry import convention_names
+from warpspace.kinematics.model import Loop
 from warpspace.machine.parameters import LINEAR_AXES
 from warpspace.scene.model import Scene
 from warpspace.units import Array
@@ -51,10 +52,10 @@ def reference_spans(scene: Scene) -> dict[str, Span]:
 
 
 def with_component_errors(state: AppState, order: str) -> AppState:
-    """Let component errors act before or after the motion; an unknown word changes nothing."""
-    if order not in [*ComponentErrors]:
+    """Take another convention for component errors; an unknown name changes nothing."""
+    if order not in convention_names():
         return state
-    model = replace(state.scene.model, component_errors=ComponentErrors(order))
+    model = replace(state.scene.model, component_errors=order)
     return _with_scene(state, replace(state.scene, model=model))
 
 
@@ -137,7 +138,7 @@ def choices(state: AppState) -> list[str]:
     """List what can be chosen, as `with_choice` takes it, in the order shown."""
     axes = sorted(state.scene.machine.axes.values(), key=lambda axis: (axis.is_linear, axis.name))
     return [
-        *(f"component_errors={order}" for order in ComponentErrors),
+        *(f"component_errors={order}" for order in convention_names()),
         *(f"loop={loop}" for loop in Loop),
         "reference=absolute",
         "reference=point",

@@ -14,15 +14,16 @@ from warpspace.app.readouts.html import message
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.curve_text import (
-    KINDS,
     convert_shape,
+    kind_titles,
     parse_shape,
     sample_curve,
     shape_kind,
     spell_rows,
 )
 from warpspace.exceptions import OptionError
-from warpspace.machine.errors import ErrorFunction
+from warpspace.machine.curves.registry import curve_kind
+from warpspace.machine.errors import Constant, ErrorFunction
 from warpspace.machine.parameters import Parameter, parameter
 
 CURVE_COLOUR = "#4a7ab5"
@@ -71,14 +72,13 @@ class ShapePanel:
         self._kind: Input[str] = Input(
             gui.add_dropdown(
                 "Curve",
-                tuple(KINDS),
-                hint="Along the axis: constant, ramp from the lower end, polynomial, harmonics or"
-                " table.",
+                kind_titles(),
+                hint=f"Along the axis: {', '.join(kind_titles())}.",
             ),
             context.changed,
         )
         self._rows: Input[str] = Input(
-            gui.add_text("Numbers", "0", multiline=True, hint=_rows_hint("constant")),
+            gui.add_text("Numbers", "0", multiline=True, hint=_rows_hint(Constant.title)),
             context.changed,
         )
         self._problem: Any = gui.add_html("")
@@ -153,7 +153,7 @@ class ShapePanel:
         """Write kind and numbers of a curve."""
         self._written = function
         kind = shape_kind(function)
-        kinds = ("constant",) if row.is_constant else tuple(KINDS)
+        kinds = (Constant.title,) if row.is_constant else kind_titles()
         if self._kind.handle.options != kinds:
             self._kind.handle.options = kinds
         self._kind.show(kind)
@@ -196,7 +196,7 @@ def _options(keys: tuple[str, ...]) -> tuple[str, ...]:
 
 def _rows_hint(kind: str) -> str:
     """Say how the numbers of a kind of curve are written."""
-    text = KINDS[kind].rows
+    text = curve_kind(kind).row_words
     return f"{text[0].upper()}{text[1:]}. Blanks between numbers; q in mm or degrees."
 
 

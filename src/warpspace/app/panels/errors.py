@@ -18,6 +18,7 @@ from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.ranges import Span
 from warpspace.app.state.search import find_parameters
+from warpspace.machine.errors import Constant
 from warpspace.machine.parameters import Parameter, parameter
 from warpspace.scene.model import Scene
 
@@ -25,11 +26,7 @@ from warpspace.scene.model import Scene
 def _hint(state: AppState, row: Parameter) -> str:
     """Say what a slider moves."""
     function = state.scene.errors.functions.get(row.key)
-    curve = "constant" if row.is_constant or function is None else type(function).__name__.lower()
-    meaning = {
-        "constant": "the same everywhere",
-        "ramp": f"rises along {row.axis}; this is the value at its upper end",
-    }.get(curve, f"{curve} along {row.axis}; this is its largest value")
+    meaning = (function or Constant((0.0, 0.0))).slider_words(row.axis)
     span = state.spans[row.key]
     return (
         f"{row.name}, {row.kind.value}: {meaning}. "

@@ -8,6 +8,7 @@ from markupsafe import Markup
 from warpspace.app.evaluation.conventions import Effect, choices, chosen, own_state
 from warpspace.app.readouts.html import render
 from warpspace.app.state.app_state import AppState
+from warpspace.kinematics.conventions.registry import find_convention
 from warpspace.machine.parameters import LINEAR_AXES
 
 GROUPS = {
@@ -18,8 +19,6 @@ GROUPS = {
     "linear": ("Direction of linear axes", "likewise"),
 }
 WORDS = {
-    "component_errors=after_motion": "after motion (moving body)",
-    "component_errors=before_motion": "before motion (fixed directions)",
     "loop=tool": "tool point",
     "loop=workpiece": "workpiece point",
     "loop=relative": "tool relative to workpiece",
@@ -33,7 +32,10 @@ def spell_choice(choice: str) -> str:
     """Spell a choice for people."""
     if choice in WORDS:
         return WORDS[choice]
-    axis, _, sign = choice.removeprefix("direction ").partition("=")
+    what, _, value = choice.partition("=")
+    if what == "component_errors":
+        return find_convention(value).title
+    axis, sign = what.removeprefix("direction "), value
     return f"{axis} {'+1' if sign == '1' else '−1'}"
 
 

@@ -20,9 +20,9 @@ from warpspace.outputs.drawing.settings import FigureSettings, spell_settings
 from warpspace.outputs.drawing.style import SIZES
 from warpspace.picture.scene_picture import ScenePicture
 from warpspace.picture.words import (
-    CONVENTION_WORDS,
     LOOP_WORDS,
     TIMES,
+    convention_words,
     reference_words,
     spell_factor,
     spell_short,
@@ -112,7 +112,7 @@ def parameter_words(scene: Scene) -> list[str]:
         value = scene.errors.amplitude(key)
         if value == 0.0 or parameter(key).axis not in scene.machine.axes:
             continue
-        kind = type(scene.errors.functions[key]).__name__.lower()
+        kind = scene.errors.functions[key].name
         tail = "" if kind == "constant" else f" {kind}"
         row = parameter(key)
         found.append(
@@ -143,7 +143,7 @@ def draw_footer(
     canvas.text(canvas.width - margin, y, source, size=size, colour=theme.muted, ha="right")
     left = room - canvas.text_size(source, size)[0] - canvas.px(24.0)
     words = [
-        CONVENTION_WORDS[scenes[0].model.component_errors],
+        convention_words(scenes[0]),
         "error = actual − nominal",
         "coordinates in the machine frame R",
         *notes,

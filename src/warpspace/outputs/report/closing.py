@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from warpspace import __version__
+from warpspace.kinematics.conventions.registry import find_convention
 from warpspace.outputs.report import sections as parts
 from warpspace.outputs.report.blocks import Block, Code, Column, Items, Section, Text, table
 from warpspace.outputs.report.clock import report_time
@@ -15,11 +16,6 @@ from warpspace.outputs.report.review import Review
 from warpspace.outputs.report.wording import factor_words, reference_words
 from warpspace.picture.words import spell
 from warpspace.scene.save import scene_to_toml
-
-CONVENTION_WORDS = {
-    "after_motion": "Component errors ride on the moving body (after the motion).",
-    "before_motion": "Component errors act in fixed directions (before the motion).",
-}
 
 
 def conventions(review: Review) -> Section:
@@ -41,7 +37,7 @@ def conventions(review: Review) -> Section:
             parts.prefixed(letter, reference_words(reviewed.scene))
             for letter, reviewed in parts.letters(review)
         ),
-        CONVENTION_WORDS[str(first.model.component_errors)],
+        find_convention(first.model.component_errors).sentence,
         f"In all pictures: {factor_words(review.exaggeration)}; the dashed box is nominal.",
         "First order in the errors; over a 5 × 5 × 5 grid the exact chain (full rotations, all"
         " products) differs by at most "

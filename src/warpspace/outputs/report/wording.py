@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from warpspace.analysis.explain import Contribution
 from warpspace.kinematics.model import Loop
-from warpspace.machine.errors import ErrorFunction, Harmonics, Poly, Ramp, Table
+from warpspace.machine.errors import ErrorFunction
 from warpspace.machine.parameters import parameter
 from warpspace.outputs.report.review import Chance, Review, Reviewed
 from warpspace.picture.words import MINUS, TIMES, spell, spell_factor, spell_positions, spell_short
@@ -196,19 +196,7 @@ def spell_function(function: ErrorFunction | None, unit: str) -> str:
     """Describe the curve of an error along its axis."""
     if function is None:
         return ""
-    low, high = (spell_short(end) for end in function.span)
-    match function:
-        case Ramp():
-            return f"ramp, 0 at {low} to the value at {high}"
-        case Poly():
-            return f"polynomial of degree {len(function.coefficients) - 1}"
-        case Harmonics():
-            terms = ", ".join(f"{spell(a)} {unit} × {n:g}" for n, a, _ in function.terms[:3])
-            return f"harmonics: {terms}" + (" …" if len(function.terms) > 3 else "")
-        case Table():
-            return f"table of {len(function.points)} points"
-        case _:
-            return "constant"
+    return function.describe(unit, spell, spell_short)
 
 
 def reference_words(scene: Scene) -> str:

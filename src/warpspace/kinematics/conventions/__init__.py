@@ -1,0 +1,1 @@
+"""The conventions for the component errors of an axis, one module each."""

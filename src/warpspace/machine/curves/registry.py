@@ -1,0 +1,86 @@
+"""The kinds of error curve there are. A new one is a module beside this and a line below."""
+
+from collections.abc import Mapping
+
+from warpspace.exceptions import OptionError, UnknownNameError
+from warpspace.machine.curves.constant import Constant
+from warpspace.machine.curves.curve import ErrorFunction
+from warpspace.machine.curves.harmonics import Harmonics
+from warpspace.machine.curves.poly import Poly
+from warpspace.machine.curves.ramp import Ramp
+from warpspace.machine.curves.table import Table
+from warpspace.plugins import load_plugins
+
+CurveKind = type[ErrorFunction]
+Form = tuple[str, ...]
+"""Keys of the table that spells a curve in a scene file."""
+
+_KINDS: dict[str, CurveKind] = {
+    kind.name: kind for kind in (Constant, Ramp, Poly, Harmonics, Table)
+}
+"""By name, in the order of lists: simplest first."""
+
+
+def curve_kinds() -> tuple[CurveKind, ...]:
+    """List all kinds of curve, simplest first."""
+    load_plugins()
+    return tuple(_KINDS.values())
+
+
+def curve_kind(title: str) -> CurveKind:
+    """Find a kind of curve by its title.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is none.
+    """
+    kinds = {kind.title: kind for kind in curve_kinds()}
+    if title not in kinds:
+        raise UnknownNameError("kind of curve", title, kinds)
+    return kinds[title]
+
+
+def register_curve(kind: CurveKind) -> None:
+    """Add a kind of curve; it appears in scene files, the app, reports and figures.
+
+    Parameters
+    ----------
+    kind : type
+        A subclass of `ErrorFunction` with a name, a title and keys in scene files of its own.
+
+    Raises
+    ------
+    OptionError
+        If another kind has one of them.
+    """
+    for other in _KINDS.values():
+        keys = {form[0] for form in kind.forms} & {form[0] for form in other.forms}
+        if keys or kind.name == other.name or kind.title == other.title:
+            raise OptionError(
+                f"kind of curve {kind.name!r}: {other.name!r} is there already with the same name,"
+                " title or key"
+            )
+    _KINDS[kind.name] = kind
+
+
+def unregister_curve(name: str) -> None:
+    """Take a kind of curve away again."""
+    del _KINDS[name]
+
+
+def find_form(raw: Mapping[str, object]) -> tuple[CurveKind, Form] | None:
+    """Find the kind of curve, and its form, that a table of a scene file spells."""
+    return next(
+        ((kind, form) for kind in curve_kinds() for form in kind.forms if form[0] in raw), None
+    )
+
+
+def spell_forms() -> str:
+    """Spell all that a scene file may give for an error."""
+    tables = (
+        "{ " + ", ".join(f"{key} =" for key in form).replace("=,", "= ,") + " }"
+        for kind in curve_kinds()
+        for form in kind.forms
+    )
+    return f"a number or one of {', '.join(tables)}"
