@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from markupsafe import Markup
+from markupsafe import Markup, escape
 from viser import GuiApi
 
 from warpspace.app.browser.viser_private import dom_id
@@ -31,11 +31,11 @@ SCRIPT = f"""(() => {{
   }};
 }})();"""
 """Has to run in the page before anything is clicked."""
-KEYS = Markup(
-    'role="{}" tabindex="0" onkeydown="'
-    "if(event.key==='Enter'||event.key===' '){{event.preventDefault();this.click()}}\" "
+KEYS = (
+    'role="%s" tabindex="0" onkeydown="'
+    "if(event.key==='Enter'||event.key===' '){event.preventDefault();this.click()}\" "
 )
-SENDS = Markup('data-word="{}" onclick="warpspaceClick(this,\'{}\')"')
+SENDS = 'data-word="%s" onclick="warpspaceClick(this,\'%s\')"'
 """Attributes of what is reached with Tab and Enter, and of what sends a word when clicked."""
 
 
@@ -79,7 +79,7 @@ class Clicks:
         role : str, optional
             ARIA role.
         """
-        return KEYS.format(role) + self._sends(word)
+        return Markup(KEYS % escape(role)) + self._sends(word)  # noqa: S704 - escaped here
 
     def button(self, word: str) -> Markup:
         """Spell the attributes of a real button, which needs no more to be reached by key."""
@@ -87,7 +87,7 @@ class Clicks:
 
     def _sends(self, word: str) -> Markup:
         """Spell the attributes of what sends a word when it is clicked."""
-        return SENDS.format(word, dom_id(self._carrier))
+        return Markup(SENDS % (escape(word), dom_id(self._carrier)))  # noqa: S704 - escaped here
 
 
 def read_clicks(text: str) -> tuple[tuple[int, str], ...]:

@@ -1,6 +1,7 @@
 """Everything of a tab that shows the picture: the layers of its drawing and its panels."""
 
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from functools import partial
 
@@ -26,6 +27,7 @@ class Display:
         # isinstance of a protocol is slow: asked once, not on every slider move
         self._selective: dict[Layer | Panel, Selective] = {}
         self._deferred: list[Deferred] = []
+        self._waiting: deque[Deferred] = deque()
         self._concerned: dict[Layer | Panel, tuple[object, ...]] = {}
 
     @property
@@ -87,15 +89,19 @@ class Display:
     @property
     def pause_s(self) -> float | None:
         """How long to wait for further changes before charts follow; None where none has to."""
+        if self._waiting:
+            return 0.0
         return None if self._unsettled_since is None else SETTLE_S
 
     def is_due(self, *, paused: bool) -> bool:
-        """Tell whether charts are to follow now."""
+        """Tell whether a chart is to follow now."""
+        if self._waiting:
+            return True
         since = self._unsettled_since
         return since is not None and (paused or time.monotonic() - since > LONGEST_SETTLE_S)
 
     def settle(self, picture: LivePicture, guarded: Callable[[Callable[[], object]], None]) -> None:
-        """Bring charts up to date.
+        """Bring the next chart up to date; one at a time, so that a slider never waits for all.
 
         Parameters
         ----------
@@ -103,6 +109,8 @@ class Display:
         guarded : callable
             Runs a step and reports what it raises.
         """
-        self._unsettled_since = None
-        for panel in self._deferred:
-            guarded(partial(panel.settle, picture))
+        if not self._waiting:
+            self._unsettled_since = None
+            self._waiting.extend(self._deferred)
+        if self._waiting:
+            guarded(partial(self._waiting.popleft().settle, picture))

@@ -37,6 +37,8 @@ from warpspace.app.viewport.tab_camera import focus
 logger = logging.getLogger(__name__)
 TOKEN_WAIT_S = 0.25
 """How long the first picture waits for a tab that may have been here before."""
+ONE_AT_A_TIME = threading.Lock()
+"""Pictures of all tabs are made one after the other: made at once, all of them would be late."""
 
 
 class Session:
@@ -190,7 +192,8 @@ class Session:
         if context.camera.wanted and shown is not None and focus(shown.state) == focus(state):
             context.camera.place(shown, docked=True)
         if notes or state is not self.display.state:
-            self._show(self._live.evaluate(state), notes)
+            with ONE_AT_A_TIME:
+                self._show(self._live.evaluate(state), notes)
 
     def _show(self, picture: LivePicture, notes: tuple[str, ...]) -> None:
         """Make page and drawing show a picture."""
@@ -208,6 +211,6 @@ class Session:
 
     def _settle(self, picture: LivePicture) -> None:
         """Let charts follow."""
-        with self._client.atomic():
+        with ONE_AT_A_TIME, self._client.atomic():
             self.display.settle(picture, self._guarded)
         self._client.flush()
