@@ -225,7 +225,7 @@ def test_a_tolerance_change_is_answered_within_300_ms_on_the_server(
     tab.page.get_by_role("tab", name="Chance").click()
     tab.page.wait_for_selector("[data-value='chance']")
     session = tab.session
-    panel = next(p for p in session.display.panels if type(p).__name__ == "ChancePanel")
+    panel = next(p for p in session.display.panels if type(p).__name__ == "TolerancesPanel")
     times = []
     for half_width in (3.0, 9.0, 15.0, 21.0, 5.0):
         before = panel._words.content

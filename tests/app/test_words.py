@@ -16,7 +16,7 @@ from warpspace.app.evaluation.sensitivities import rank_picture
 from warpspace.app.panels.commands import Command, help_text, spell_change
 from warpspace.app.readouts.gains import spell_ranking
 from warpspace.app.readouts.html import message
-from warpspace.app.readouts.probability import histogram_lines, spell_chance, spell_scatter
+from warpspace.app.readouts.probability import histogram_lines, spell_probability, spell_scatter
 from warpspace.app.state.app_state import start_state
 
 LIVE = LiveModel()
@@ -37,7 +37,7 @@ def chance(probability, low, high, counts=(5, 10, 5)):
 
 def test_the_probability_is_said_with_its_interval():
     found = chance(0.7131, 0.707, 0.7193)
-    text = spell_chance(found)
+    text = spell_probability(found)
     assert "71.3 %" in text
     assert "70.7 … 71.9 %" in text
     assert "20\u202f000 machines" in text
@@ -51,7 +51,7 @@ def test_the_probability_is_said_with_its_interval():
     ("share", "said"), [(0.0, "0.0 %"), (1.0, "100.0 %"), (0.99999, "99.9 %"), (1e-5, "0.1 %")]
 )
 def test_only_what_is_certain_reads_as_certain(share, said):
-    assert f">{said}<" in spell_chance(chance(share, share, share))
+    assert f">{said}<" in spell_probability(chance(share, share, share))
 
 
 def test_bars_change_colour_at_the_limit():
@@ -83,7 +83,7 @@ def test_the_outline_encloses_all_machines_wherever_the_limit_is(limit_um):
 
 def test_no_error_at_all_can_be_drawn():
     found = chance(1.0, 0.99, 1.0, counts=(20_000,))
-    assert "100.0 %" in spell_chance(found)
+    assert "100.0 %" in spell_probability(found)
     assert "scatter" not in spell_scatter(found, {"EAX": 0.0}).split(">", 1)[1]
     assert np.max(histogram_lines(found)[1]) == 20_000
 

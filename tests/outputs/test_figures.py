@@ -15,6 +15,9 @@ from warpspace.outputs.drawing.content import Drawing
 from warpspace.outputs.drawing.settings import FigureSettings
 from warpspace.outputs.figures.catalogue import draw_figure, figure_kinds
 from warpspace.outputs.save import figure_bytes, render_figure, write_figure
+from warpspace.picture.scene_picture import evaluate_picture
+from warpspace.picture.traces import trace_lines
+from warpspace.picture.words import spell
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import Scene
 
@@ -227,3 +230,16 @@ def test_charts_stand_on_a_dark_ground_with_light_ink(name: str) -> None:
     assert (levels > 200).mean() > 0.002
     light = render_figure(name, [scene], FigureSettings(size=(900, 700)), "png")
     assert np.median(np.asarray(Image.open(io.BytesIO(light)).convert("L"))) > 240
+
+
+def test_traces_of_the_figure_hold_the_reference_point_still_like_the_export() -> None:
+    """Without the reference the figure showed 4.53 µm where the export had 2.23 µm."""
+    scene = replace(load_scene("teach_wobbling_table"), reference={"X": 0.0, "Y": 0.0, "Z": -280.0})
+    drawing = draw_figure("traces", [scene], FigureSettings(size=(800, 600)))
+    words = " ".join(text.get_text() for axes in drawing.figure.axes for text in axes.texts)
+    lines = trace_lines(evaluate_picture(scene, grid=3).traces)
+    found = {line.trace.label: spell(line.largest_um) for line in lines}
+    over_b = [spell(line.largest_um) for line in lines if line.trace.axis == "B"]
+    assert "2.23" in over_b
+    assert "4.53" not in words
+    assert all(f"{value} µm" in words for value in found.values())

@@ -40,7 +40,7 @@ def build_request(picture: LivePicture) -> Request:
 
 
 def _scene(state: AppState, picture: LivePicture) -> Scene:
-    """Give the scene of a state as it is heard, drawn with the factor of the picture."""
+    """Give the scene of a state, its active errors only, with the factor of the picture."""
     return replace(active_scene(state), exaggeration=picture.exaggeration)
 
 

@@ -28,7 +28,7 @@ from warpspace.app.viewport.layers import SCENE_PER_MM
 from warpspace.app.viewport.layers.axes import AxesLayer
 from warpspace.app.viewport.layers.box import BoxLayer
 from warpspace.app.viewport.layers.lights import light_scene
-from warpspace.app.viewport.layers.other import OtherLayer
+from warpspace.app.viewport.layers.other_side import OtherSideLayer
 from warpspace.app.viewport.layers.traces import TracesLayer
 from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import ErrorFunction
@@ -105,7 +105,7 @@ def build_scene_html(picture: LivePicture, aspect: float = ASPECT) -> str:
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         try:
             light_scene(server.scene)
-            for layer in (BoxLayer, TracesLayer, AxesLayer, OtherLayer):
+            for layer in (BoxLayer, TracesLayer, AxesLayer, OtherSideLayer):
                 layer(server.scene, picture)
             _place_camera(server, picture, aspect)
             return server.scene.as_html(dark_mode=picture.state.shown.dark)

@@ -70,7 +70,7 @@ class CameraPanel:
         """Nothing follows the picture."""
 
 
-class LooksPanel:
+class AppearancePanel:
     """What is drawn of the field.
 
     Parameters

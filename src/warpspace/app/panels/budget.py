@@ -13,7 +13,7 @@ from warpspace.app.viewport.camera import CameraMemory, fit_camera, heading_shar
 from warpspace.app.viewport.layers import SCENE_PER_MM
 
 
-class WhyPanel:
+class BudgetPanel:
     """Numbers of the picked point, one row per contribution, and a button that ends it.
 
     Parameters

@@ -18,7 +18,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.picked import Picked
 from warpspace.app.state.store import StateStore, Update
 from warpspace.app.viewport.camera import CameraMemory
-from warpspace.app.viewport.layers.stage import StageLayer
+from warpspace.app.viewport.layers.moving import MovingLayer
 from warpspace.app.viewport.tab_camera import TabCamera
 
 
@@ -46,7 +46,7 @@ class PanelContext:
         Draw figures and write exports.
     shown : LivePicture or None
         The picture that is drawn; None before the first.
-    stage : StageLayer or None
+    stage : MovingLayer or None
         What moves by itself around the map; None before it is drawn.
     next_click : callable or None
         Takes the point of the next click on the map in place of asking about it.
@@ -65,7 +65,7 @@ class PanelContext:
         self.client, self.page, self.camera = client, Page(server, client), TabCamera(client)
         self.store, self.scenes, self.services = store, scenes, services
         self.shown: LivePicture | None = None
-        self.stage: StageLayer | None = None
+        self.stage: MovingLayer | None = None
         self.next_click: Callable[[Picked], None] | None = None
         self.changed_at = time.monotonic()
         self._wake = threading.Event()

@@ -33,7 +33,7 @@ LABEL_WIDTH = 76
 """Room for the labels, which stand beside their controls here, CSS pixels."""
 
 
-class ShapePanel:
+class ErrorCurvePanel:
     """The curve of the error that was moved last, or chosen.
 
     Parameters

@@ -30,6 +30,8 @@ logger = logging.getLogger(__name__)
 FIGURE_S, VIEW_S, PAGE_S, EXPORT_S = 5.0, 1.5, 1.0, 1.0
 RENDER_TIMEOUT_S = 30.0
 LARGEST_VIEW_PX = 4096
+AS_COLOURED = "what is coloured"
+"""The figure that suits the picture on the screen."""
 Make = Callable[[threading.Event], bytes]
 
 
@@ -88,18 +90,25 @@ class FilesPanel:
         """Add pictures and exports."""
         services = self._context.services
         pictures = {} if services.draw_figure is None else {"Figure": self._figure}
+        self._figures = {AS_COLOURED: ""} | {name: name for name, _ in services.figures}
+        self._kind: Any = self._context.gui.add_dropdown(
+            "Figure shows",
+            tuple(self._figures),
+            visible=bool(pictures),
+            hint=" ".join(f"{name}: {caption}" for name, caption in services.figures),
+        )
         self._group(
             "Picture (PNG)",
             {**pictures, "View": self._view},
-            "Figure: the error map drawn for a report. View: what is on the screen now.",
+            "Figure: drawn for a report, as chosen above. View: what is on the screen now.",
         )
-        exports = {} if services.write_export is None else {"GLB": ".glb", "CSV": ".csv"}
+        exports = {end[1:].upper(): end for end, _ in services.exports}
+        about = (f"{end[1:].upper()}: {words}." for end, words in services.exports)
         self._group(
             "Export",
             {"HTML": self._page}
             | {name: partial(self._export, name, end) for name, end in exports.items()},
-            "HTML: the interactive scene in one file that needs no network. GLB: the bent box for"
-            " 3-D viewers and CAD. CSV: position and error of every node.",
+            " ".join(("HTML: the interactive scene, one file that needs no network.", *about)),
         )
 
     def _group(self, label: str, actions: Mapping[str, Callable[[], None]], hint: str) -> None:
@@ -191,7 +200,8 @@ class FilesPanel:
         """Draw the figure in a process of its own."""
         draw, picture = self._context.services.draw_figure, self._picture
         if draw is not None and picture is not None:
-            request = build_request(picture)
+            kind = self._figures.get(self._kind.value, "")
+            request = replace(build_request(picture), figure=kind)
             self._make("Figure", ".png", FIGURE_S, lambda cancelled: draw(request, cancelled))
 
     def _view(self) -> None:

@@ -16,7 +16,7 @@ from warpspace.machine.description import Vector
 from warpspace.scene.model import Scene
 
 
-class RotaryPanel:
+class RotaryAxesPanel:
     """Points, positions, play and the table of deviations.
 
     Parameters

@@ -11,7 +11,7 @@ WORST, MIDDLE = "worst point", "middle of the volume"
 BY_GAIN, BY_EFFECT = "gain", "effect of the present errors"
 
 
-class GainsPanel:
+class SensitivitiesPanel:
     """Ranked bars for one point of the volume.
 
     Parameters

@@ -73,8 +73,8 @@ def tabs() -> tuple[Tab, ...]:
 
 for _tab in (
     Tab("Result", "results", [f"{_HERE}.summary:summary_panel"], "first"),
-    Tab("Why", "results", [f"{_HERE}.budget:WhyPanel"]),
-    Tab("Gains", "results", [f"{_HERE}.sensitivities:GainsPanel"]),
+    Tab("Why", "results", [f"{_HERE}.budget:BudgetPanel"]),
+    Tab("Gains", "results", [f"{_HERE}.sensitivities:SensitivitiesPanel"]),
     Tab("Compare", "results", [f"{_HERE}.compare:ComparePanel"]),
     Tab("Files", "results", [f"{_HERE}.files:FilesPanel"]),
     Tab(
@@ -82,14 +82,14 @@ for _tab in (
         "settings",
         [
             f"{_HERE}.view:ViewPanel",
-            f"{_HERE}.appearance:LooksPanel",
+            f"{_HERE}.appearance:AppearancePanel",
             f"{_HERE}.appearance:CameraPanel",
         ],
         "front",
     ),
     Tab("Machine", "settings", [f"{_HERE}.machine:MachinePanel"]),
-    Tab("Table", "settings", [f"{_HERE}.rotary_axes:RotaryPanel"]),
-    Tab("Chance", "settings", [f"{_HERE}.tolerances:ChancePanel"]),
+    Tab("Table", "settings", [f"{_HERE}.rotary_axes:RotaryAxesPanel"]),
+    Tab("Chance", "settings", [f"{_HERE}.tolerances:TolerancesPanel"]),
     Tab("Conventions", "settings", [f"{_HERE}.conventions:ConventionsPanel"]),
 ):
     register_tab(_tab)

@@ -12,7 +12,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
 from warpspace.app.readouts.charts import WHOLE, add_chart, chart_axis
 from warpspace.app.readouts.html import message
-from warpspace.app.readouts.probability import histogram_lines, spell_chance, spell_scatter
+from warpspace.app.readouts.probability import histogram_lines, spell_probability, spell_scatter
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.specification import LIMIT_UM, MAX, NORMAL, SAMPLED, UNIFORM
@@ -40,7 +40,7 @@ ENSEMBLES = _new_store()
 """Sampled machines before their tolerances are known, for all sessions together."""
 
 
-class ChancePanel:
+class TolerancesPanel:
     """Specification, histogram and tolerance sliders; all of it follows when changes pause.
 
     Parameters
@@ -177,7 +177,7 @@ class ChancePanel:
 
         chance = estimate(ensemble, state.tolerances, state.specification.limit_um)
         shares = tolerance_shares(ensemble, state.tolerances, ensemble.keys)
-        self._words.content = spell_chance(chance)
+        self._words.content = spell_probability(chance)
         self._histogram.data = histogram_lines(chance)
         self._histogram.visible = True
         self._numbers.content = spell_scatter(chance, shares)

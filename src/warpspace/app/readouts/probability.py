@@ -18,7 +18,7 @@ MARGIN = 1.02
 """Length of the chart's axis by the largest value on it."""
 
 
-def spell_chance(chance: "Chance") -> str:
+def spell_probability(chance: "Chance") -> str:
     """Spell the probability with its confidence interval, and the key to the histogram.
 
     Parameters

@@ -9,7 +9,7 @@ from warpspace.app.browser.page import style_script
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import Panel, PanelContext
 from warpspace.app.panels.commands import CommandsPanel
-from warpspace.app.panels.error_curve import ShapePanel
+from warpspace.app.panels.error_curve import ErrorCurvePanel
 from warpspace.app.panels.errors import ErrorsPanel
 from warpspace.app.panels.summary import heading_panel
 from warpspace.app.panels.tabs import Step, tabs
@@ -19,7 +19,7 @@ from warpspace.app.server.pointing import Pointing
 from warpspace.app.state.app_state import AppState
 from warpspace.app.viewport.layers import Layer
 from warpspace.app.viewport.layers.box import BoxLayer
-from warpspace.app.viewport.layers.stage import StageLayer, draw_around
+from warpspace.app.viewport.layers.moving import MovingLayer, draw_around
 
 Built: TypeAlias = tuple[Sequence[Layer], Sequence[Panel]]
 Build: TypeAlias = Callable[[LivePicture], Built]
@@ -59,7 +59,7 @@ class PageContents:
     def _draw_around(self, picture: LivePicture) -> Built:
         """Draw what lies on and around the map."""
         client = self._context.client
-        stage = self._context.stage = StageLayer(client, picture, self._context.act)
+        stage = self._context.stage = MovingLayer(client, picture, self._context.act)
         return [*draw_around(client.scene, picture), stage], []
 
     def _build_front(self, picture: LivePicture) -> Built:
@@ -69,7 +69,7 @@ class PageContents:
             self._errors.add_axes(state)
         below = context.gui.add_panel()
         with below.add_tab("One error"):
-            curve = ShapePanel(context, state)
+            curve = ErrorCurvePanel(context, state)
         below.dock_below(context.gui.main_panel)
         self._expand = below.expand
         context.page.run_script(split_script())

@@ -15,10 +15,10 @@ from warpspace.outputs.report.blocks import (
     Section,
     Text,
 )
-from warpspace.outputs.report.chances import chance_blocks
 from warpspace.outputs.report.clock import report_time
 from warpspace.outputs.report.closing import conventions, provenance
-from warpspace.outputs.report.pictures import Painter
+from warpspace.outputs.report.figures import ReportFigures
+from warpspace.outputs.report.promises import chance_blocks
 from warpspace.outputs.report.review import ReportSettings, Review, Reviewed, build_review
 from warpspace.outputs.report.wording import volume
 from warpspace.scene.model import Scene
@@ -123,7 +123,7 @@ def build_report(
         raise OptionError(f"figures of a report as {form!r}; expected svg or pdf")
     review = build_review(tuple(scenes), settings or ReportSettings())
     with FigureWorker() as worker:
-        painter = Painter(worker, review, form)
+        painter = ReportFigures(worker, review, form)
         found = [
             parts.section("", [*parts.summary_blocks(review), painter.first()]),
             _where(review, painter, embed),
@@ -162,7 +162,7 @@ def _facts(review: Review) -> tuple[str, ...]:
     )
 
 
-def _where(review: Review, painter: Painter, embed: Embed | None) -> Section:
+def _where(review: Review, painter: ReportFigures, embed: Embed | None) -> Section:
     """Where the error is: interactive view, statistics, maps."""
     blocks: list[Block] = [parts.statistics_table(review)]
     for letter, reviewed in parts.letters(review):
@@ -215,7 +215,7 @@ def _once(review: Review) -> list[tuple[str, Reviewed]]:
     return found if len(found) > 1 else [("", found[0][1])]
 
 
-def _gains(review: Review, painter: Painter) -> Section:
+def _gains(review: Review, painter: ReportFigures) -> Section:
     """Gains of each machine."""
     blocks: list[Block | None] = []
     for letter, reviewed in _once(review):
@@ -229,7 +229,7 @@ def _gains(review: Review, painter: Painter) -> Section:
     return parts.section("How errors arrive at the point", blocks)
 
 
-def _chances(review: Review, painter: Painter) -> Section:
+def _chances(review: Review, painter: ReportFigures) -> Section:
     """Tell what the tolerances promise; once where they are the same."""
     blocks: list[Block] = []
     shown: list[Scene] = []

@@ -8,7 +8,7 @@ from warpspace.app.viewport.layers import colour_bytes, pieces
 from warpspace.app.viewport.layers.adding import add_lines
 
 
-class OtherLayer:
+class OtherSideLayer:
     """Edges and grid lines of the other bent box, every second piece, so that it reads as dotted.
 
     Parameters

@@ -23,7 +23,7 @@ PAPER_SHARE = 0.87
 """Width of a map among the evidence: two of them then stand on a page."""
 
 
-class Painter:
+class ReportFigures:
     """Draws the figures of one report.
 
     Parameters

@@ -8,12 +8,12 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.rotation import played_position
 from warpspace.app.viewport.layers import Layer
 from warpspace.app.viewport.layers.annotations import AnnotationsLayer
+from warpspace.app.viewport.layers.asked_point import AskedPointLayer
 from warpspace.app.viewport.layers.axes import AxesLayer
 from warpspace.app.viewport.layers.machine import MachineLayer
-from warpspace.app.viewport.layers.other import OtherLayer
+from warpspace.app.viewport.layers.other_side import OtherSideLayer
 from warpspace.app.viewport.layers.rotation import RotationLayer
 from warpspace.app.viewport.layers.traces import TracesLayer
-from warpspace.app.viewport.layers.why import WhyLayer
 from warpspace.app.viewport.rotation_player import Player
 
 Tell = Callable[[str], None]
@@ -21,11 +21,11 @@ Tell = Callable[[str], None]
 
 def draw_around(scene: SceneApi, picture: LivePicture) -> list[Layer]:
     """Draw what lies on and around the map."""
-    kinds = (TracesLayer, AxesLayer, OtherLayer, WhyLayer)
+    kinds = (TracesLayer, AxesLayer, OtherSideLayer, AskedPointLayer)
     return [kind(scene, picture) for kind in kinds]
 
 
-class StageLayer:
+class MovingLayer:
     """Everything around the map that may also move by itself.
 
     The player only asks for a picture; the session's worker draws it, as it draws all else.

@@ -25,7 +25,7 @@ LABEL_AT = 0.25
 """Place of the lever's label between point and frame: it is seen where the picture is not."""
 
 
-class WhyLayer:
+class AskedPointLayer:
     """Marker, displacement, axis, lever and their labels.
 
     Parameters
