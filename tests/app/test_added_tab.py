@@ -3,7 +3,7 @@
 from app.test_page_steps import OPEN, Wire, dial
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.context import PanelContext
-from warpspace.app.panels.tabs import Tab, register_tab, tabs, unregister_tab
+from warpspace.app.server.tabs import Tab, register_tab, tabs, unregister_tab
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import AppState
 from warpspace.scene.library import load_scene

@@ -6,7 +6,7 @@ from pathlib import Path
 import matplotlib as mpl
 
 from warpspace.outputs.drawing.content import Drawing
-from warpspace.outputs.drawing.encoding import encode_figure
+from warpspace.outputs.encoding import encode_figure
 from warpspace.outputs.drawing.settings import FigureSettings
 from warpspace.outputs.drawing.style import FIGURE_ENDINGS, SAVE_RC
 from warpspace.outputs.figures.catalogue import draw_figure

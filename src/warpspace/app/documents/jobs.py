@@ -34,9 +34,9 @@ class Jobs:
     Parameters
     ----------
     report : callable
-        Told of progress, and of None when nothing runs any more; from other threads.
+        Called with the progress, and with None when nothing runs any more; from other threads.
     failed : callable
-        Told what a job has raised, `CancelledError` included.
+        Called with what a job has raised, `CancelledError` included.
     """
 
     def __init__(

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from viser import GuiApi, GuiTabHandle
 
 from warpspace.app.browser.arrangement import page_style
-from warpspace.app.panels.tabs import tabs
+from warpspace.app.server.tabs import tabs
 from warpspace.app.viewport.tab_camera import LEFT_WIDTH, RIGHT_WIDTH
 
 HEADING = "heading"

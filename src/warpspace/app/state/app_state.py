@@ -66,7 +66,7 @@ class AppState:
         Grid nodes per axis.
     shown : Shown
     exclusions : Exclusions
-        Parameters that are silenced or heard alone.
+        Parameters that do not take part, or alone do.
     tolerances : ToleranceSet
         What machines are sampled from: the scene's, as far as they have not been moved.
     specification : Specification

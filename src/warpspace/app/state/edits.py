@@ -97,14 +97,14 @@ def with_scene_tolerances(state: AppState) -> AppState:
 
 
 def with_muted(state: AppState, key: str, muted: bool) -> AppState:
-    """Silence one parameter, or let it be heard again."""
+    """Exclude one parameter from the picture, or include it again."""
     if key not in state.amplitudes:
         return state
     return replace(state, exclusions=state.exclusions.with_muted(key, muted))
 
 
 def with_soloed(state: AppState, key: str, soloed: bool) -> AppState:
-    """Add one parameter to those heard alone, or take it away."""
+    """Add one parameter to those that alone take part, or take it away."""
     if key not in state.amplitudes:
         return state
     return replace(state, exclusions=state.exclusions.with_soloed(key, soloed))

@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 
 @dataclass(frozen=True, slots=True)
 class Exclusions:
-    """Parameters that are silenced, and those heard alone.
+    """Parameters that do not take part, and those that alone do.
 
     Attributes
     ----------
     muted : frozenset of str
         Keys that do not take part.
     soloed : frozenset of str
-        Where there are any, only these take part; a muted one among them stays silent.
+        Where there are any, only these take part; a muted one among them still does not.
     """
 
     muted: frozenset[str] = frozenset()
@@ -28,17 +28,17 @@ class Exclusions:
         return key not in self.muted and (not self.soloed or key in self.soloed)
 
     def effective(self, amplitudes: Mapping[str, float]) -> Mapping[str, float]:
-        """Give the amplitudes that count, µm or µrad: zero for what is not heard."""
+        """Give the amplitudes that count, µm or µrad: zero for what does not take part."""
         if not self:
             return amplitudes
         return {key: value if self.active(key) else 0.0 for key, value in amplitudes.items()}
 
     def with_muted(self, key: str, muted: bool) -> "Exclusions":
-        """Silence one parameter, or let it be heard again."""
+        """Exclude one parameter, or include it again."""
         return replace(self, muted=_with(self.muted, key, muted))
 
     def with_soloed(self, key: str, soloed: bool) -> "Exclusions":
-        """Add one parameter to those heard alone, or take it away."""
+        """Add one parameter to those that alone take part, or take it away."""
         return replace(self, soloed=_with(self.soloed, key, soloed))
 
     def within(self, keys: Collection[str]) -> "Exclusions":

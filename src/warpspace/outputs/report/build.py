@@ -58,7 +58,7 @@ def write_report(
     embed : callable, optional
         Builds the interactive view of a scene; without it the page has none.
     files : sequence of Path, optional
-        Files the scenes were read from; their hashes are told.
+        Files the scenes were read from; their hashes are printed.
     overwrite : bool, optional
         Whether an existing file may be replaced.
 
@@ -207,7 +207,7 @@ def _errors(review: Review) -> Section:
 
 
 def _once(review: Review) -> list[tuple[str, Reviewed]]:
-    """Scenes whose machines differ: gains and tolerances of the same machine are told once."""
+    """Scenes whose machines differ: gains and tolerances of the same machine are printed once."""
     found: list[tuple[str, Reviewed]] = []
     for letter, reviewed in parts.letters(review):
         if not any(reviewed.gains == other.gains for _, other in found):

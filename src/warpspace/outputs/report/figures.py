@@ -141,6 +141,6 @@ class ReportFigures:
 
     def _chart(self, name: str, figure: "Figure", caption: str) -> Picture:
         """Spell a chart as a file."""
-        from warpspace.outputs.drawing.encoding import encode_figure
+        from warpspace.outputs.encoding import encode_figure
 
         return Picture(name, caption, encode_figure(figure, self._form), self._form)

@@ -170,7 +170,7 @@ def build_review(scenes: tuple[Scene, ...], settings: ReportSettings) -> Review:
 
 
 def _review_scene(picture: ScenePicture, settings: ReportSettings) -> Reviewed:
-    """Evaluate all that is told of one scene."""
+    """Evaluate all that a report says of one scene."""
     scene = picture.scene
     index = np.unravel_index(int(np.argmax(picture.field.norm_um)), picture.grid.shape)
     at = {

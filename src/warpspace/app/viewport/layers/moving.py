@@ -112,4 +112,4 @@ class MovingLayer:
 
 
 def _nobody(_text: str) -> None:
-    """Nobody is told yet."""
+    """Do nothing: no panel shows the position yet."""
