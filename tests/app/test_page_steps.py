@@ -225,6 +225,7 @@ def test_what_comes_just_as_a_wait_ends_is_not_lost(
 ) -> None:
     assert wire.read_until(lambda: bool(viewer.sessions))
     session = viewer.sessions[-1]
+    assert wire.read_until(lambda: "GlbMessage" in wire.kinds)  # its worker runs
     session.stop()
     session._worker.join(20.0)
     done: list[str] = []

@@ -86,7 +86,7 @@ def test_an_error_ends_the_bar_and_gives_the_cursor_back() -> None:
         assert shown.getvalue() == ended
 
 
-LONG = ("contributions", "dvf5000_proposed", "--sobol", "512")
+LONG = ("contributions", "dvf5000_proposed", "--sobol", "4096")
 
 
 @pytest.mark.slow

@@ -6,9 +6,9 @@ from pathlib import Path
 import matplotlib as mpl
 
 from warpspace.outputs.drawing.content import Drawing
-from warpspace.outputs.encoding import encode_figure
 from warpspace.outputs.drawing.settings import FigureSettings
 from warpspace.outputs.drawing.style import FIGURE_ENDINGS, SAVE_RC
+from warpspace.outputs.encoding import encode_figure
 from warpspace.outputs.figures.catalogue import draw_figure
 from warpspace.outputs.files import check_target, write_atomically
 from warpspace.scene.model import Scene

@@ -12,10 +12,10 @@ from warpspace.app.panels.commands import CommandsPanel
 from warpspace.app.panels.error_curve import ErrorCurvePanel
 from warpspace.app.panels.errors import ErrorsPanel
 from warpspace.app.panels.summary import heading_panel
-from warpspace.app.server.tabs import Step, tabs
 from warpspace.app.readouts.html import style_sheet
 from warpspace.app.server.layout import HEADING, Places
 from warpspace.app.server.pointing import Pointing
+from warpspace.app.server.tabs import Step, tabs
 from warpspace.app.state.app_state import AppState
 from warpspace.app.viewport.layers import Layer
 from warpspace.app.viewport.layers.box import BoxLayer

@@ -10,8 +10,8 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from warpspace.outputs.encoding import encode_figure
 from warpspace.outputs.drawing.style import FIGURE_ENDINGS, FONT, LIGHT, SAVE_RC, Theme
+from warpspace.outputs.encoding import encode_figure
 from warpspace.outputs.files import check_target, write_atomically
 
 CHART_ENDINGS = FIGURE_ENDINGS
