@@ -33,7 +33,7 @@ class Theme:
         Tolerance bands.
     series : tuple of str
         Curves and bars.
-    body, body_dark, body_light : str
+    body : str
         Machine bodies.
     """
 
@@ -49,8 +49,6 @@ class Theme:
     band: str
     series: tuple[str, ...]
     body: str
-    body_dark: str
-    body_light: str
 
 
 LIGHT = Theme(
@@ -66,8 +64,6 @@ LIGHT = Theme(
     band="#dfe6ee",
     series=("#1f6fb2", "#c8283c", "#2f8f5b", "#8a5fb0", "#c77f1a", "#4c5b6b"),
     body="#b9bdc4",
-    body_dark="#3a4350",
-    body_light="#d3d6db",
 )
 DARK = Theme(
     name="dark",
@@ -82,10 +78,7 @@ DARK = Theme(
     band="#263140",
     series=("#62b0ee", "#ff6b78", "#63c590", "#bb95dd", "#e8ab55", "#a9b5c3"),
     body="#848b95",
-    body_dark="#3f4854",
-    body_light="#a5abb4",
 )
-THEMES = {theme.name: theme for theme in (LIGHT, DARK)}
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,14 +34,6 @@ BAR_BELOW, BAR_GAP, BAR_TICK = 0.15, 0.055, 0.012
 CORNERS = 8
 
 
-def worst_text(picture: LivePicture) -> str:
-    """Spell the largest value of what is coloured."""
-    return _spell_value(
-        worst_point(picture.values, picture.grid.nominal_mm, picture.drawn_mm).value,
-        picture.scale.unit,
-    )
-
-
 def _spell_value(value: float, unit: str) -> str:
     """Spell a largest value with its unit."""
     if unit == MICROMETRE:
