@@ -8,7 +8,7 @@ from warpspace.geometry.surfaces import Shape
 Direction = tuple[float, float, float]
 
 VIEWS: Mapping[str, Direction] = {
-    "iso": (0.55, -1.0, 0.52),
+    "iso": (0.53, -0.85, 0.55),
     "front": (0.0, -1.0, 0.0),
     "right": (1.0, 0.0, 0.0),
     "top": (0.0, 0.0, 1.0),

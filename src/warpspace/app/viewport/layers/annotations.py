@@ -29,7 +29,7 @@ from warpspace.units import MICROMETRE, Array
 
 RADIUS, HEAD, BALL = 0.0032, 0.034, 0.009
 """Shaft and head of an arrow, and the marker of the worst point, as parts of the longest edge."""
-BAR_BELOW, BAR_GAP, BAR_TICK = 0.15, 0.055, 0.012
+BAR_BELOW, BAR_GAP, BAR_TICK = 0.2, 0.055, 0.012
 """Where scale bars lie below what they belong to and each other, and their end ticks, likewise."""
 CORNERS = 8
 
