@@ -116,6 +116,15 @@ class Tab:
         points, colours = (np.frombuffer(base64.b64decode(part), "<f4") for part in found)
         return points.reshape(-1, 3).astype(float), colours.reshape(-1, 3).astype(float)
 
+    def shows_colours(self, wanted: np.ndarray) -> bool:
+        """Whether the surface drawn has these colours; not while the page loads another one."""
+        found = self.surface()
+        return (
+            found is not None
+            and found[1].shape == wanted.shape
+            and np.allclose(found[1], wanted, atol=1e-5)
+        )
+
     def vertices(self) -> np.ndarray | None:
         """Vertices of the drawn surface, [M, 3], mm."""
         found = self.surface()

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from app.conftest import Tab
@@ -68,7 +67,7 @@ def test_the_colours_of_tilts_are_called_tilts(tab: Tab) -> None:
     wanted = vertex_colours(
         picture.scale, picture.values.reshape(-1)[picture.topology.surface.nodes]
     )
-    tab.until(lambda: np.allclose(tab.surface()[1], wanted, atol=1e-5))
+    tab.until(lambda: tab.shows_colours(wanted))
     worst = tab.page.locator("[data-mark='max']").get_attribute("title")
     assert worst.endswith("µrad")
     assert float(worst.split()[0].replace("−", "-")) == pytest.approx(

@@ -324,7 +324,7 @@ def test_keys_do_the_main_actions(tab: Tab) -> None:
     press(tab, "t")
     tab.until(lambda: tab.text("factor") == "true scale")
     press(tab, "x")
-    tab.until(lambda: "1\u202f000" in tab.text("factor"))
+    tab.until(lambda: "1000" in tab.text("factor"))
     press(tab, "2")
     tab.until(lambda: "E_x" in tab.page.get_by_label("Colour", exact=True).input_value())
     press(tab, "0")
@@ -335,7 +335,7 @@ def test_keys_do_the_main_actions(tab: Tab) -> None:
     # in a text box they are letters
     tab.written("Find an error").press_sequentially("t0")
     tab.page.wait_for_timeout(300)
-    assert "1\u202f000" in tab.text("factor")
+    assert "1000" in tab.text("factor")
 
 
 def test_dark_mode(tab: Tab) -> None:

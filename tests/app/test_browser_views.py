@@ -316,7 +316,7 @@ def test_rotation_plays_pauses_and_stops_with_its_session(tab: Tab) -> None:
     tab.until(lambda: np.allclose(drawn(tab, "/machine/C_table"), still, atol=1e-3))
     tab.until(lambda: drawn(tab, "/rotation/actual") is None)
     tab.page.get_by_role("button", name="Play rotation").click()
-    stage = tab.session.steps.contents.stage
+    stage = tab.session.context.stage
     tab.until(lambda: stage.playing)
     tab.page.goto("about:blank")
     tab.until(lambda: not stage.playing)
