@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from warpspace.app.server import network, viewer
+from warpspace.app.server import network, run, viewer
 from warpspace.app.server.network import free_port, is_local, page_url, resolve_host
 from warpspace.app.server.tab_memory import TabRecord, new_token
 from warpspace.app.state.app_state import start_state
@@ -94,7 +94,8 @@ def test_run_warns_of_a_public_address_and_ends_on_ctrl_c(monkeypatch: pytest.Mo
             raise KeyboardInterrupt
 
     class Shown:
-        url, is_local = "http://x", False
+        link = network_link = "http://x"
+        is_local, token = False, None
 
         def __init__(self, *_: object, **__: object) -> None: ...
         def __enter__(self) -> "Shown":
@@ -104,10 +105,10 @@ def test_run_warns_of_a_public_address_and_ends_on_ctrl_c(monkeypatch: pytest.Mo
 
     said: list[str] = []
     warned: list[str] = []
-    monkeypatch.setattr(viewer, "Viewer", Shown)
-    monkeypatch.setattr(viewer, "open_browser", lambda _: False)
-    monkeypatch.setattr(viewer.threading, "Event", Interrupted)
-    viewer.run_viewer(
+    monkeypatch.setattr(run, "Viewer", Shown)
+    monkeypatch.setattr(run, "open_browser", lambda _: False)
+    monkeypatch.setattr(run.threading, "Event", Interrupted)
+    run.run_viewer(
         load_scene("dvf5000_nominal"),
         {},
         host="0.0.0.0",
@@ -117,5 +118,5 @@ def test_run_warns_of_a_public_address_and_ends_on_ctrl_c(monkeypatch: pytest.Mo
         warn=warned.append,
     )
     assert "http://x" in said[0]
-    assert "open http://x yourself" in said[1]
+    assert "open http://x yourself" in said[-2]
     assert "password" in warned[0]

@@ -14,7 +14,7 @@ from viser import _messages as messages
 from websockets.sync.client import connect
 
 from warpspace.app import browser
-from warpspace.app.browser.viser_private import dom_id, wake_sender_on_its_thread
+from warpspace.app.browser.viser_private import dom_id, serve_with, wake_sender_on_its_thread
 from warpspace.app.server.viewer import Viewer
 from warpspace.scene.library import load_scene
 
@@ -98,6 +98,25 @@ def client() -> Iterator[tuple[viser.ViserServer, viser.ClientHandle]]:
 @pytest.mark.parametrize("path", SERVER)
 def test_a_server_has_what_is_used_of_it(client: Any, path: str) -> None:
     look_up(client[0], path)
+
+
+def test_a_server_starts_with_the_options_that_are_changed() -> None:
+    """test_doors.py asks a running app with foreign names and pages, and is refused."""
+    seen: list[dict[str, Any]] = []
+
+    def change(options: dict[str, Any]) -> dict[str, Any]:
+        seen.append(options)
+        return options
+
+    with serve_with(change) as used:
+        server = viser.ViserServer(host="127.0.0.1", verbose=False)
+    server.stop()
+    assert used, (
+        f"viser {viser.__version__} does not start its server by websockets.asyncio.server.serve,"
+        " which warpspace.app.browser.viser_private.serve_with relies on"
+    )
+    assert callable(seen[0]["process_request"])
+    assert seen[0].keys().isdisjoint({"process_response", "create_connection", "origins"})
 
 
 @pytest.mark.parametrize("path", CLIENT)

@@ -5,9 +5,12 @@ version of viser that lacks one fails there with a clear message and not somewhe
 """
 
 import asyncio
-from collections.abc import Callable
+import contextlib
+import threading
+from collections.abc import Callable, Generator
 from typing import Any, TypeAlias
 
+import websockets.asyncio.server
 from viser import ClientHandle, ViserServer
 from viser import _messages as messages
 
@@ -56,6 +59,43 @@ def listen_to_all(server: ViserServer, take: Take) -> None:
 
     connections: Any = server._websock_server  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
     connections.register_handler(messages.GuiUpdateMessage, pass_on)
+
+
+_STARTING = threading.Lock()
+
+
+@contextlib.contextmanager
+def serve_with(change: Callable[[dict[str, Any]], dict[str, Any]]) -> Generator[list[bool]]:
+    """Have a server of viser that is created meanwhile started with other options.
+
+    viser starts a server of the package `websockets` with options of its own: it checks no request,
+    and takes messages of any rate. A parameter of `ViserServer` for these options would replace
+    this.
+
+    Parameters
+    ----------
+    change : callable
+        Gets viser's keyword arguments of `websockets.asyncio.server.serve`, and gives those to use.
+
+    Yields
+    ------
+    list of bool
+        Empty as long as no server was started with them. A server that goes another way has to be
+        stopped by who created it.
+    """
+    library: Any = websockets.asyncio.server
+    with _STARTING:
+        original, used = library.serve, list[bool]()
+
+        def serve(*args: Any, **options: Any) -> Any:
+            used.append(True)
+            return original(*args, **change(options))
+
+        library.serve = serve
+        try:
+            yield used
+        finally:
+            library.serve = original
 
 
 def wake_sender_on_its_thread(client: ClientHandle) -> None:

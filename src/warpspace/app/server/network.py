@@ -1,16 +1,20 @@
 """Which address and port the app can serve on, checked before the server starts."""
 
+import contextlib
 import errno
+import io
 import ipaddress
 import os
 import socket
 
+from warpspace.app.server.doors import plain_address
 from warpspace.exceptions import OptionError
 
 DEFAULT_HOST = "127.0.0.1"
 DEFAULT_PORT = 8080
 PORTS_TRIED = 100
 MAX_PORT = 65535
+LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
 
 
 def resolve_host(host: str) -> str:
@@ -44,6 +48,58 @@ def resolve_host(host: str) -> str:
 def is_local(address: str) -> bool:
     """Tell whether an address can be reached from this machine only."""
     return ipaddress.ip_address(address.partition("%")[0]).is_loopback
+
+
+def is_everywhere(address: str) -> bool:
+    """Tell whether an address stands for all those of this machine."""
+    return ipaddress.ip_address(address.partition("%")[0]).is_unspecified
+
+
+def served_names(host: str, address: str) -> frozenset[str]:
+    """List the names and addresses under which a page may ask for the app.
+
+    Parameters
+    ----------
+    host : str
+        Name or address to serve on, as it was given.
+    address : str
+        What it was resolved to.
+
+    Returns
+    -------
+    frozenset of str
+        In lower case.
+    """
+    names = {host.lower(), plain_address(address)}
+    if is_local(address):
+        return frozenset(names | LOOPBACK_NAMES)
+    own = socket.gethostname()
+    if is_everywhere(address):
+        return frozenset(names | LOOPBACK_NAMES | {own.lower()})
+    with contextlib.suppress(OSError, UnicodeError):
+        if address in {str(found[4][0]) for found in socket.getaddrinfo(own, None)}:
+            names.add(own.lower())
+    return frozenset(names)
+
+
+def reachable_address(address: str) -> str:
+    """Give the address by which other machines most likely reach one that stands for all."""
+    if not is_everywhere(address):
+        return address
+    # no packet is sent: connecting a datagram socket only chooses the way out
+    with contextlib.suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.connect(("192.0.2.1", 9))
+        return str(probe.getsockname()[0])
+    return address
+
+
+def draw_code(link: str) -> str:
+    """Draw a link as a QR code for a terminal."""
+    import segno
+
+    drawn = io.StringIO()
+    segno.make_qr(link).terminal(drawn, compact=True)
+    return drawn.getvalue().rstrip("\n")
 
 
 def _bind_error(address: str, port: int) -> OSError | None:

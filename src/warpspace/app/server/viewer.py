@@ -5,20 +5,29 @@ import importlib
 import io
 import logging
 import threading
-import warnings
-import webbrowser
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from types import TracebackType
 from typing import Self
 
 import viser
 
 from warpspace.app.browser.arrivals import Arrivals
+from warpspace.app.browser.viser_private import serve_with
 from warpspace.app.documents.scene_list import SceneList
 from warpspace.app.documents.services import Services
 from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.server.doors import Access, Doors
+from warpspace.app.server.guard import Guard
 from warpspace.app.server.layout import lay_out
-from warpspace.app.server.network import free_port, is_local, page_url, resolve_host
+from warpspace.app.server.network import (
+    free_port,
+    is_everywhere,
+    is_local,
+    page_url,
+    reachable_address,
+    resolve_host,
+    served_names,
+)
 from warpspace.app.server.session import Session
 from warpspace.app.server.tab_memory import TabMemory, TabRecord, is_token, new_token
 from warpspace.app.state.app_state import AppState, start_state
@@ -29,11 +38,6 @@ from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 
 logger = logging.getLogger(__name__)
-Say = Callable[[str], None]
-NO_AUTHENTICATION = (
-    "warning: {host} can be reached from other machines, and the app asks nobody for a password;"
-    " whoever reaches it can use it"
-)
 
 
 class Viewer:
@@ -54,6 +58,8 @@ class Viewer:
         Draw figures and write exports.
     shared : bool, optional
         Whether all tabs see and steer one state; by default each has its own.
+    access : Access, optional
+        Hosts allowed besides those served, and the token asked for.
 
     Raises
     ------
@@ -71,10 +77,19 @@ class Viewer:
         port: int | None = None,
         shared: bool = False,
         services: Services | None = None,
+        access: Access | None = None,
     ) -> None:
         self._services = services
         self.address = resolve_host(host)
+        self.token = (access := access or Access()).choose_token(local=self.is_local)
         self.port = free_port(self.address, port)
+        doors = Doors(
+            served_names(host, self.address),
+            self.port,
+            everywhere=is_everywhere(self.address),
+            allow_hosts=access.allow_hosts,
+            token=self.token,
+        )
         self._start = start or start_state(scene)
         self._scenes = _with(scene, scenes or {})
         self._live = LiveModel()
@@ -82,7 +97,7 @@ class Viewer:
         self._lock = threading.Lock()
         self._memory = TabMemory()
         self._shared = StateStore(self._start) if shared else None
-        self._server = _serve(self.address, self.port)
+        self._server = _serve(self.address, self.port, Guard(doors))
         light_scene(self._server.scene)
         self._arrivals = Arrivals(self._server)
         self._places = lay_out(self._server.gui, dark=self._start.shown.dark)
@@ -94,8 +109,22 @@ class Viewer:
 
     @property
     def url(self) -> str:
-        """Address to open in a browser."""
+        """Address of the page, without the token."""
         return page_url(self.address, self.port)
+
+    @property
+    def link(self) -> str:
+        """What to open in a browser of this machine: the address with the token."""
+        return self._with_token(self.url)
+
+    @property
+    def network_link(self) -> str:
+        """What to open in a browser of another machine."""
+        return self._with_token(page_url(reachable_address(self.address), self.port))
+
+    def _with_token(self, url: str) -> str:
+        """Have an address carry the token, if one is asked for."""
+        return url if self.token is None else f"{url}/?token={self.token}"
 
     @property
     def is_local(self) -> bool:
@@ -191,78 +220,19 @@ def _with(scene: Scene, scenes: Mapping[str, Scene]) -> dict[str, Scene]:
     return {title: scene, **{name: known for name, known in scenes.items() if name != title}}
 
 
-def _serve(address: str, port: int) -> viser.ViserServer:
-    """Start viser's server without its banner and without its public tunnel."""
-    with contextlib.redirect_stdout(io.StringIO()):
+def _serve(address: str, port: int, guard: Guard) -> viser.ViserServer:
+    """Start viser's server behind the guard, without its banner and without its public tunnel."""
+    with contextlib.redirect_stdout(io.StringIO()), serve_with(guard.options) as guarded:
         server = viser.ViserServer(host=address, port=port, verbose=False)
+    if not guarded:
+        server.stop()
+        raise OptionError(
+            f"viser {viser.__version__} starts its server in a way that cannot be guarded;"
+            " install the version that the constraints file names"
+        )
     if server.get_port() != port:
         server.stop()
         raise OptionError(f"--port {port} has just been taken by another program; try again")
     # any tab could ask for a tunnel through a public relay
     server.request_share_url = lambda *_args, **_kwargs: None
     return server
-
-
-def open_browser(url: str) -> bool:
-    """Open a page in a graphical browser.
-
-    Returns
-    -------
-    bool
-        False where there is none.
-    """
-    try:
-        browser = webbrowser.get()
-    except webbrowser.Error:
-        return False
-    if type(browser) is webbrowser.GenericBrowser:  # one that takes over the terminal
-        return False
-    return browser.open(url)
-
-
-def run_viewer(
-    scene: Scene,
-    scenes: Mapping[str, Scene],
-    *,
-    start: AppState | None = None,
-    host: str,
-    port: int | None,
-    shared: bool = False,
-    services: Services | None = None,
-    browser: bool,
-    say: Say,
-    warn: Say,
-) -> None:
-    """Serve the app until it is interrupted.
-
-    Parameters
-    ----------
-    scene : Scene
-    scenes : mapping of str to Scene
-    start : AppState, optional
-        How the scene is first shown.
-    host : str
-    port : int or None
-    services : Services, optional
-        Draw figures and write exports.
-    shared : bool, optional
-        Whether all tabs see and steer one state.
-    browser : bool
-        Whether to open the page.
-    say, warn : callable
-        Print a line for the user.
-    """
-    # a tab may close while something is on its way to it
-    warnings.filterwarnings("ignore", message="Queued an? .* on a closed connection")
-    with Viewer(
-        scene, scenes, start=start, host=host, port=port, shared=shared, services=services
-    ) as viewer:
-        try:
-            say(f"{scene.title} is shown at {viewer.url} (Ctrl-C ends it)")
-            if not viewer.is_local:
-                warn(NO_AUTHENTICATION.format(host=host))
-            if browser and not open_browser(viewer.url):
-                say(f"no browser could be opened; open {viewer.url} yourself")
-            threading.Event().wait()
-        except KeyboardInterrupt:
-            say("\nended")

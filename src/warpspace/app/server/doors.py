@@ -1,0 +1,253 @@
+"""Which requests the app answers: its own pages on the hosts it serves, with the right token."""
+
+import hmac
+import ipaddress
+import re
+import secrets
+from collections.abc import Iterable
+from dataclasses import dataclass
+from http import HTTPStatus
+from urllib.parse import parse_qsl
+
+from websockets.datastructures import Headers
+
+from warpspace.exceptions import OptionError
+
+TOKEN = re.compile(r"[A-Za-z0-9._~-]{12,200}")
+TOKEN_BYTES = 16
+_AUTHORITY = re.compile(r"(?:\[([0-9A-Fa-f:.]+)\]|([A-Za-z0-9._-]+))(?::(\d{1,5}))?")
+_ORIGIN = re.compile(r"(https?)://(.+)", re.IGNORECASE)
+_DEFAULT_PORTS = {"http": 80, "https": 443}
+_ELSEWHERE = ("websocket", "playbackPath")
+"""Words of an address that make viser's page talk to another server, whose scripts it runs."""
+
+
+@dataclass(frozen=True)
+class Access:
+    """Who may use the app, as the command line says it.
+
+    Parameters
+    ----------
+    allow_hosts : tuple of str
+        Further names, with a port where it is not the usual one, that a proxy serves the app under.
+    token : str, optional
+        Asked for; by default a random one where other machines can reach the app, else none.
+    no_token : bool
+        Whether nothing is asked for, whoever can reach the app.
+    """
+
+    allow_hosts: tuple[str, ...] = ()
+    token: str | None = None
+    no_token: bool = False
+
+    def choose_token(self, *, local: bool) -> str | None:
+        """Choose what is asked for.
+
+        Parameters
+        ----------
+        local : bool
+            Whether only this machine can reach the app.
+
+        Returns
+        -------
+        str or None
+
+        Raises
+        ------
+        OptionError
+            If the token given cannot be used.
+        """
+        if self.token is None:
+            return None if local or self.no_token else secrets.token_urlsafe(TOKEN_BYTES)
+        if self.no_token:
+            raise OptionError("--token and --no-token exclude each other; expected one of them")
+        if not TOKEN.fullmatch(self.token):
+            raise OptionError("--token: expected 12 to 200 letters, digits and . _ ~ -")
+        return self.token
+
+
+@dataclass(frozen=True)
+class Place:
+    """A host and a port; None is the usual port of the scheme."""
+
+    host: str
+    port: int | None
+
+    def usual(self, scheme: str) -> "Place":
+        """Leave out the port where the scheme has it by itself."""
+        return Place(self.host, None if self.port == _DEFAULT_PORTS[scheme] else self.port)
+
+
+def read_place(text: str) -> Place | None:
+    """Read `host`, `host:port` or `[address]:port`; None where it is none of them."""
+    found = _AUTHORITY.fullmatch(text)
+    if found is None:
+        return None
+    literal, name, port = found.groups()
+    try:
+        host = plain_address(literal) if literal else plain_address(name)
+    except ValueError:
+        if literal:
+            return None
+        host = name.lower()
+    return Place(host, int(port) if port else None)
+
+
+def plain_address(text: str) -> str:
+    """Spell an address in the one way it is compared in.
+
+    Raises
+    ------
+    ValueError
+        If it is a name.
+    """
+    address = ipaddress.ip_address(text.partition("%")[0])
+    mapped = getattr(address, "ipv4_mapped", None)
+    return str(mapped or address)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A request: its path with the query, its headers, and the address it came in by."""
+
+    path: str
+    headers: Headers
+    arrived_at: str
+
+    def words(self, name: str) -> list[str]:
+        """Give what the query says of a name."""
+        query = self.path.partition("?")[2]
+        return [value for key, value in parse_qsl(query, keep_blank_values=True) if key == name]
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Why a request is refused: `kind` is logged once, `text` is what the page says."""
+
+    kind: str
+    text: str
+    status: HTTPStatus = HTTPStatus.FORBIDDEN
+
+
+class Doors:
+    """Tells which requests for a page or a websocket are answered.
+
+    Any page of the web can send requests to a server on this machine. Its browser names the page in
+    `Origin`, and in `Host` the name the server was asked under, which is a foreign one where a
+    name was made to point here (DNS rebinding). Programs other than browsers send no `Origin`.
+
+    Parameters
+    ----------
+    names : iterable of str
+        Hosts that are served, without a port.
+    port : int
+        The app's own, which its cookie is named after: cookies are common to all ports of a host.
+    everywhere : bool
+        Whether each address of the machine is served: the one a request came in by is right too.
+    allow_hosts : iterable of str
+        As in `Access`.
+    token : str, optional
+        What is asked for.
+
+    Raises
+    ------
+    OptionError
+        If an allowed host is none.
+    """
+
+    def __init__(
+        self,
+        names: Iterable[str],
+        port: int,
+        *,
+        everywhere: bool = False,
+        allow_hosts: Iterable[str] = (),
+        token: str | None = None,
+    ) -> None:
+        self._allowed = frozenset(_allowed(text) for text in allow_hosts)
+        self._hosts = frozenset(names) | {place.host for place in self._allowed}
+        self._everywhere, self._token = everywhere, token
+        self._cookie = f"warpspace_token_{port}"
+
+    def check(self, asked: Asked) -> Refusal | None:
+        """Tell why a request is refused, or give None where it is answered."""
+        place = self._place(asked)
+        if place is None:
+            found = ", ".join(asked.headers.get_all("Host")) or "none"
+            return Refusal(
+                "host",
+                f"This app does not serve the host {found[:200]!r}. If a proxy does,"
+                " start the app with --allow-host NAME.",
+            )
+        origins = asked.headers.get_all("Origin")
+        if origins and not (len(origins) == 1 and self._is_own(origins[0], place)):
+            return Refusal(
+                "origin",
+                f"Only the app's own page may use it, not one of {origins[0][:200]!r}. If a"
+                " proxy serves the app there, start it with --allow-host NAME.",
+            )
+        if any(not self._is_own(url, place) for name in _ELSEWHERE for url in asked.words(name)):
+            return Refusal(
+                "elsewhere", "The link leads the page to another server; leave that out."
+            )
+        if not (self.has_token(asked) or self._has_cookie(asked)):
+            return Refusal(
+                "token",
+                "This app asks for a token: open the link that was printed where it was started"
+                " (…/?token=…), and allow its cookie.",
+            )
+        return None
+
+    def has_token(self, asked: Asked) -> bool:
+        """Tell whether the address of a request carries the token, or none is asked for."""
+        return self._token is None or any(map(self._is_token, asked.words("token")))
+
+    def cookie(self, asked: Asked) -> str | None:
+        """Give the cookie that spares a page the token from now on; its websocket has no other."""
+        if self._token is None or not self.has_token(asked):
+            return None
+        return f"{self._cookie}={self._token}; Path=/; HttpOnly; SameSite=Strict"
+
+    def _has_cookie(self, asked: Asked) -> bool:
+        """Tell whether a request brings the cookie of a page that had the token."""
+        pairs = (
+            pair.strip().partition("=")
+            for header in asked.headers.get_all("Cookie")
+            for pair in header.split(";")
+        )
+        return any(self._is_token(value) for name, _, value in pairs if name == self._cookie)
+
+    def _is_token(self, text: str) -> bool:
+        """Compare with the token in a time that tells nothing about it."""
+        token = self._token or ""
+        return hmac.compare_digest(text.encode("utf-8", "replace"), token.encode())
+
+    def _place(self, asked: Asked) -> Place | None:
+        """Give the host that a request asks for, where it is served."""
+        hosts = asked.headers.get_all("Host")
+        place = read_place(hosts[0]) if len(hosts) == 1 else None
+        if place is None or place.host in self._hosts:
+            return place
+        return place if self._everywhere and place.host == asked.arrived_at else None
+
+    def _is_own(self, url: str, place: Place) -> bool:
+        """Tell whether an address belongs to the host asked for, or to one that is allowed."""
+        found = _ORIGIN.fullmatch(re.sub(r"\Aws", "http", url))
+        if found is None:
+            return False
+        scheme, own = found[1].lower(), read_place(found[2].partition("/")[0])
+        if own is None:
+            return False
+        own = own.usual(scheme)
+        return own == place.usual(scheme) or own in {at.usual(scheme) for at in self._allowed}
+
+
+def _allowed(text: str) -> Place:
+    """Read a host that the command line allows."""
+    place = read_place(text)
+    if place is None:
+        raise OptionError(
+            f"--allow-host {text!r}: expected a name, with a port where it is not the usual one,"
+            " for instance review.example or review.example:8443"
+        )
+    return place

@@ -1,0 +1,355 @@
+"""Requests of foreign pages, under foreign names and without the token are refused, raw."""
+
+import logging
+import socket
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, nullcontext
+
+import msgspec.msgpack
+import pytest
+import viser
+from websockets.datastructures import Headers
+from websockets.exceptions import ConnectionClosedError
+from websockets.protocol import State
+from websockets.sync.client import ClientConnection, connect
+
+from warpspace.app.server import guard, network, viewer
+from warpspace.app.server.doors import Access, Asked, Doors, Place, read_place
+from warpspace.app.server.guard import Limits, Rate
+from warpspace.app.server.network import draw_code, reachable_address, served_names
+from warpspace.app.server.viewer import Viewer
+from warpspace.exceptions import OptionError
+from warpspace.scene.library import load_scene
+
+TOKEN = "a-token-of-a-test"
+UPGRADE = {
+    "Upgrade": "websocket",
+    "Connection": "Upgrade",
+    "Sec-WebSocket-Version": "13",
+    "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==",
+    "Sec-WebSocket-Protocol": f"viser-v{viser.__version__}",
+}
+KINDS = pytest.mark.parametrize("upgrade", [{}, UPGRADE], ids=["page", "websocket"])
+SCENE = load_scene("dvf5000_nominal")
+
+
+@pytest.fixture(scope="module", params=[False, True], ids=["own", "shared"])
+def running(request: pytest.FixtureRequest) -> Iterator[Viewer]:
+    with Viewer(SCENE, shared=request.param) as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def guarded() -> Iterator[Viewer]:
+    """An app that asks for a token and stands behind a proxy."""
+    with Viewer(SCENE, access=Access(("review.example",), TOKEN)) as found:
+        yield found
+
+
+def ask(
+    running: Viewer,
+    path: str = "/",
+    /,
+    upgrade: dict[str, str] | None = None,
+    **headers: str | None,
+) -> tuple[int, dict[str, str], str]:
+    """Send a request as it stands; give status, headers (in lower case) and the text after them."""
+    sent = {"Host": f"127.0.0.1:{running.port}", **(upgrade or {}), **headers}
+    lines = [f"{name}: {value}" for name, value in sent.items() if value is not None]
+    with closing(socket.create_connection(("127.0.0.1", running.port), timeout=20.0)) as raw:
+        raw.sendall("\r\n".join([f"GET {path} HTTP/1.1", *lines, "", ""]).encode("latin-1"))
+        answer = b""
+        while b"\r\n\r\n" not in answer or (b" 101 " not in answer and len(answer) < 5000):
+            part = raw.recv(65536)
+            if not part:
+                break
+            answer += part
+    head, _, text = answer.partition(b"\r\n\r\n")
+    first, *rest = head.decode("latin-1").split("\r\n")
+    pairs = (line.partition(": ") for line in rest)
+    return (
+        int(first.split()[1]),
+        {name.lower(): value for name, _, value in pairs},
+        text.decode("utf-8", "replace"),
+    )
+
+
+def good(upgrade: dict[str, str]) -> int:
+    return 101 if upgrade else 200
+
+
+@KINDS
+@pytest.mark.parametrize("name", ["127.0.0.1", "localhost", "LOCALHOST", "[::1]"])
+def test_the_page_itself_is_answered(running: Viewer, upgrade: dict[str, str], name: str) -> None:
+    host = f"{name}:{running.port}"
+    assert ask(running, upgrade=upgrade, Host=host)[0] == good(upgrade)
+    assert ask(running, upgrade=upgrade, Host=host, Origin=f"http://{host}")[0] == good(upgrade)
+
+
+@KINDS
+@pytest.mark.parametrize(
+    "origin",
+    [
+        "http://evil.example",
+        "null",
+        "",
+        "file://",
+        "http://127.0.0.1:1",
+        "http://127.0.0.1",
+        "http://localhost:{port}",
+        "https://127.0.0.1:1@127.0.0.1:{port}",
+        "http://127.0.0.1:{port}.evil.example",
+        "chrome-extension://abcdef",
+    ],
+)
+def test_a_foreign_page_is_refused(running: Viewer, upgrade: dict[str, str], origin: str) -> None:
+    status, headers, text = ask(running, upgrade=upgrade, Origin=origin.format(port=running.port))
+    assert status == 403
+    assert "own page" in text
+    assert headers["x-frame-options"] == "DENY"
+
+
+@KINDS
+@pytest.mark.parametrize(
+    "host",
+    [
+        "evil.example",
+        "evil.example:{port}",
+        "127.0.0.1.evil.example",
+        "2130706433",
+        "",
+        None,
+        "192.0.2.7:{port}",
+        "evil@127.0.0.1",
+        "[::1",
+        "127.0.0.1:port",
+        "review.example",
+    ],
+)
+def test_a_foreign_name_is_refused(
+    running: Viewer, upgrade: dict[str, str], host: str | None
+) -> None:
+    """A name of a foreign page that has been made to point here, with the Origin to it."""
+    host = host and host.format(port=running.port)
+    assert ask(running, upgrade=upgrade, Host=host)[0] == 403
+    status, _, text = ask(running, upgrade=upgrade, Host=host, Origin=f"http://{host}")
+    assert status == 403
+    assert "--allow-host" in text
+
+
+def test_no_answer_can_be_framed(running: Viewer) -> None:
+    for path in ("/", "/nothing", "/?token=x"):
+        _, headers, _ = ask(running, path)
+        assert headers["x-frame-options"] == "DENY"
+        assert "frame-ancestors 'none'" in headers["content-security-policy"]
+
+
+@pytest.mark.parametrize(
+    "query",
+    [
+        "websocket=ws://evil.example",
+        "%77ebsocket=wss://evil.example",
+        "websocket=",
+        "websocket=ws://127.0.0.1:1",
+        "view=x&playbackPath=https://evil.example/x",
+        "playbackPath=data:x",
+    ],
+)
+def test_a_link_leads_the_page_to_no_other_server(running: Viewer, query: str) -> None:
+    assert ask(running, f"/?{query}")[0] == 403
+    own = f"websocket=ws://127.0.0.1:{running.port}/"
+    assert ask(running, f"/?{own}")[0] == 200
+
+
+def test_each_kind_is_logged_once(caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.WARNING), Viewer(SCENE) as running:
+        for number in range(5):
+            ask(running, Host=f"evil{number}.example\xe9")
+            ask(running, upgrade=UPGRADE, Origin=f"http://evil{number}.example")
+    assert [record.name for record in caplog.records] == [guard.__name__] * 2
+    assert caplog.text.isascii()
+
+
+@KINDS
+def test_a_token_is_asked_for(guarded: Viewer, upgrade: dict[str, str]) -> None:
+    for path in ("/", "/?token=", "/?token=wrong", f"/?token={TOKEN}x", "/?token=%ff", "/assets"):
+        status, headers, text = ask(guarded, path, upgrade=upgrade)
+        assert status == 403
+        assert "token" in text
+        assert TOKEN not in text
+        assert "set-cookie" not in headers
+    assert ask(guarded, f"/?view=x&token={TOKEN}", upgrade=upgrade)[0] == good(upgrade)
+
+
+def test_the_cookie_of_the_page_is_enough_for_its_websocket(guarded: Viewer) -> None:
+    _, headers, _ = ask(guarded, f"/?token={TOKEN}")
+    cookie, *attributes = headers["set-cookie"].split("; ")
+    assert set(attributes) == {"Path=/", "HttpOnly", "SameSite=Strict"}
+    for upgrade in ({}, UPGRADE):
+        assert ask(guarded, upgrade=upgrade, Cookie=f"x=y; {cookie}")[0] == good(upgrade)
+        assert ask(guarded, upgrade=upgrade, Cookie=f"{cookie}x")[0] == 403
+        foreign = ask(guarded, upgrade=upgrade, Cookie=cookie, Origin="http://evil.example")
+        assert foreign[0] == 403
+    assert guarded.link == f"{guarded.url}/?token={TOKEN}"
+
+
+def test_a_proxy_is_allowed(guarded: Viewer) -> None:
+    path, proxy = f"/?token={TOKEN}", "https://review.example"
+    kept = ask(guarded, path, UPGRADE, Host="review.example", Origin=proxy)
+    changed = ask(guarded, path, UPGRADE, Origin=proxy)  # a proxy that puts its own Host there
+    assert kept[0] == changed[0] == 101
+    assert ask(guarded, path, UPGRADE, Origin="https://review.example:1")[0] == 403
+
+
+def asked(host: str, arrived_at: str = "127.0.0.1", **headers: str) -> Asked:
+    return Asked("/", Headers(Host=host, **headers), arrived_at)
+
+
+def test_all_addresses_of_a_machine_are_served_but_not_all_names() -> None:
+    doors = Doors(served_names("0.0.0.0", "0.0.0.0"), 8080, everywhere=True)
+    for host in ("localhost:8080", "192.0.2.7", f"{socket.gethostname()}:8080"):
+        assert doors.check(asked(host, "192.0.2.7")) is None
+    for host in ("evil.example", "192.0.2.8"):
+        assert doors.check(asked(host, "192.0.2.7")) is not None
+
+
+def test_one_address_of_a_machine_is_served_under_its_name(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(network.socket, "gethostname", lambda: "Lathe")
+    found = [(0, 0, 0, "", ("192.0.2.7", 0))]
+    monkeypatch.setattr(network.socket, "getaddrinfo", lambda *_: found)
+    assert served_names("192.0.2.7", "192.0.2.7") == {"192.0.2.7", "lathe"}
+    assert served_names("192.0.2.8", "192.0.2.8") == {"192.0.2.8"}
+
+
+def test_places() -> None:
+    assert read_place("[::ffff:127.0.0.1]:80") == Place("127.0.0.1", 80)
+    assert read_place("Review.Example:8443") == Place("review.example", 8443)
+    for text in ("", "a b", "a/b", "[zz]", "a:", "a:b", "x@y", "a\0"):
+        assert read_place(text) is None
+
+
+def test_a_token_is_made_where_others_reach_the_app() -> None:
+    assert Access().choose_token(local=True) is None
+    first, second = (Access().choose_token(local=False) for _ in range(2))
+    assert first is not None
+    assert len(first) >= 20
+    assert first != second
+    assert Access(token=TOKEN).choose_token(local=True) == TOKEN
+    assert Access(no_token=True).choose_token(local=False) is None
+
+
+@pytest.mark.parametrize(
+    ("access", "problem"),
+    [
+        (Access(token="short"), "12 to 200"),
+        (Access(token="with a blank in it"), "12 to 200"),
+        (Access(token=TOKEN, no_token=True), "exclude"),
+        (Access(allow_hosts=("http://review.example",)), "--allow-host 'http"),
+    ],
+)
+def test_access_that_cannot_be_given(access: Access, problem: str) -> None:
+    with pytest.raises(OptionError, match=problem):
+        Viewer(SCENE, access=access)
+
+
+def test_the_code_holds_the_link() -> None:
+    assert len(draw_code("http://192.0.2.7:8080/?token=" + TOKEN).splitlines()) > 10
+    assert reachable_address("192.0.2.7") == "192.0.2.7"
+
+
+def test_an_app_that_cannot_be_guarded_does_not_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(viewer, "serve_with", lambda _: nullcontext(list[bool]()))
+    with pytest.raises(OptionError, match="cannot be guarded"):
+        Viewer(SCENE)
+
+
+# --- limits ------------------------------------------------------------------------------------
+
+
+@contextmanager
+def limited(monkeypatch: pytest.MonkeyPatch, limits: Limits) -> Iterator[Viewer]:
+    monkeypatch.setattr(viewer, "Guard", lambda doors: guard.Guard(doors, limits))
+    with Viewer(SCENE) as running:
+        yield running
+
+
+def dial(running: Viewer) -> ClientConnection:
+    return connect(
+        running.url.replace("http", "ws", 1),
+        subprotocols=[f"viser-v{viser.__version__}"],  # pyright: ignore[reportArgumentType]
+        max_size=None,
+        compression=None,
+    )
+
+
+def drain(wire: ClientConnection) -> ConnectionClosedError:
+    """Read until the other side has closed the connection."""
+    try:
+        while True:
+            wire.recv(timeout=20.0)
+    except ConnectionClosedError as closed:
+        return closed
+
+
+def test_sessions_are_limited(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    with limited(monkeypatch, Limits(sessions=1)) as running:
+        with dial(running):
+            for upgrade in ({}, UPGRADE):
+                status, _, text = ask(running, upgrade=upgrade)
+                assert status == 503
+                assert "close one" in text
+        for _ in range(100):
+            if ask(running)[0] == 200:
+                break
+        else:
+            pytest.fail("a tab that was closed still counts")
+    assert caplog.text.count("1 tabs") == 1
+
+
+def test_the_rate_of_messages_is_limited(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    message = msgspec.msgpack.encode(
+        {"type": "GuiUpdateMessage", "uuid": "none", "updates": {"value": 1}}
+    )
+    limits = Limits(messages_per_second=0.001, burst=20)
+    with limited(monkeypatch, limits) as running, dial(running) as honest, dial(running) as flood:
+        for _ in range(20):
+            honest.send(message)
+        for _ in range(50):
+            flood.send(message)
+        closed = drain(flood)
+        assert closed.rcvd is not None
+        assert closed.rcvd.code == 1008
+        assert closed.rcvd.reason == "more than 0.001 messages a second"
+        honest.ping().wait(20.0)
+        assert honest.protocol.state is State.OPEN
+    assert caplog.text.count("messages a second") == 1
+
+
+def test_the_size_of_messages_is_limited(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    with (
+        limited(monkeypatch, Limits(message_bytes=1000)) as running,
+        dial(running) as wire,
+    ):
+        wire.send(b"x" * 1001)
+        closed = drain(wire)
+        assert closed.rcvd is not None
+        assert closed.rcvd.code == 1009
+    assert caplog.text.count("too large") == 1
+
+
+def test_a_rate_may_be_exceeded_for_a_moment() -> None:
+    now = [0.0]
+    rate = Rate(10.0, 5, lambda: now[0])
+    assert [rate.take() for _ in range(6)] == [True] * 5 + [False]
+    now[0] = 0.25
+    assert [rate.take() for _ in range(3)] == [True, True, False]
+    now[0] = 1000.0
+    assert [rate.take() for _ in range(6)] == [True] * 5 + [False]

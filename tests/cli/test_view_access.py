@@ -1,0 +1,88 @@
+"""Options of `view` that say who may use the app."""
+
+import signal
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+from warpspace.app.server import run
+from warpspace.app.server.doors import Access
+
+Command = Callable[..., Any]
+
+
+@pytest.mark.parametrize(
+    ("words", "fragment"),
+    [
+        (("--token", "short"), "--token: expected 12 to 200"),
+        (("--token", "x" * 12, "--no-token"), "exclude each other"),
+        (("--allow-host", "http://a b"), "--allow-host 'http://a b'"),
+    ],
+)
+def test_access_that_cannot_be_given(
+    warpspace: Command, words: tuple[str, ...], fragment: str
+) -> None:
+    warpspace("view", "teach_tilted_c", "--no-browser", *words).refused(fragment)
+
+
+def test_options_reach_the_app(warpspace: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[dict[str, Any]] = []
+    monkeypatch.setattr(run, "run_viewer", lambda *_, **words: given.append(words))
+    hosts = ("--allow-host", "a.example", "--allow-host", "b.example:1")
+    assert warpspace("view", *hosts, "--token", "x" * 12).status == 0
+    assert warpspace("view", "--host", "0.0.0.0", "--no-token").status == 0
+    assert given[0]["access"] == Access(("a.example", "b.example:1"), "x" * 12)
+    assert given[1]["access"] == Access(no_token=True)
+    assert not given[0]["code"]  # nobody scans what goes into a file
+
+
+@contextmanager
+def app(*words: str) -> Iterator[subprocess.Popen[str]]:
+    """Run the command; it ends as by Ctrl-C."""
+    command = [sys.executable, "-m", "warpspace", "view", "teach_tilted_c", "--no-browser", *words]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.send_signal(signal.SIGINT)
+            process.wait(20)
+
+
+def status(link: str) -> int:
+    try:
+        with urllib.request.urlopen(link, timeout=20) as answer:
+            return answer.status
+    except urllib.error.HTTPError as error:
+        return error.code
+
+
+def test_beyond_this_machine_the_printed_link_carries_a_token() -> None:
+    with app("--host", "0.0.0.0") as process:
+        assert process.stdout is not None
+        first, second = (process.stdout.readline() for _ in range(2))
+        link = first.partition(" is shown at ")[2].split()[0]
+        assert "/?token=" in link
+        assert second.startswith("from other machines: http://")
+        assert second.strip().endswith(link.partition("/?")[2])
+        assert status(link) == status(second.split()[-1]) == 200
+        assert status(link.partition("?")[0]) == status(link + "x") == 403
+
+
+def test_without_a_token_the_command_says_what_it_means() -> None:
+    with app("--host", "0.0.0.0", "--no-token") as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        link = process.stdout.readline().partition(" is shown at ")[2].split()[0]
+        assert "token" not in link
+        assert status(link) == 200
+        said = process.stderr.readline()
+        assert "WARNING" in said
+        assert "whoever reaches it" in said
