@@ -141,6 +141,6 @@ def share_exaggeration(
         wanted,
         own,
         max(picture.statistics.max_um for picture in pictures),
-        max(picture.grid.longest_edge_mm for picture in pictures),
+        max(picture.size_mm for picture in pictures),
     )
     return tuple(cast("P", replace(cast("Picture", one), exaggeration=factor)) for one in pictures)

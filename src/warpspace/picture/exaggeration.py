@@ -30,7 +30,7 @@ def given_exaggeration(wanted: Exaggeration, own: float | None) -> float | None:
 
 
 def choose_exaggeration(
-    wanted: Exaggeration, own: float | None, largest_um: float, longest_edge_mm: float
+    wanted: Exaggeration, own: float | None, largest_um: float, size_mm: float
 ) -> float:
     """Choose the display factor of a picture, or of several that share one.
 
@@ -42,12 +42,12 @@ def choose_exaggeration(
         What the scene says; None for a round one.
     largest_um : float, µm
         Largest displacement of all pictures.
-    longest_edge_mm : float, mm
-        Longest edge of their volumes.
+    size_mm : float, mm
+        Length that the largest of them is sized by.
 
     Returns
     -------
     float
     """
     given = given_exaggeration(wanted, own)
-    return auto_exaggeration(largest_um, longest_edge_mm) if given is None else given
+    return auto_exaggeration(largest_um, size_mm) if given is None else given

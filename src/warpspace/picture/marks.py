@@ -85,7 +85,11 @@ def spell_micrometres(value_um: float) -> str:
 
 
 def corner_arrows(
-    shape: Shape, nominal_mm: Array, error_um: Array, exaggeration: float
+    shape: Shape,
+    nominal_mm: Array,
+    error_um: Array,
+    exaggeration: float,
+    size_mm: float | None = None,
 ) -> CornerArrows:
     """Find the arrows from the nominal to the displaced corners.
 
@@ -96,6 +100,8 @@ def corner_arrows(
     nominal_mm : ndarray, [nx, ny, nz, 3], mm
     error_um : ndarray, [nx, ny, nz, 3], µm
     exaggeration : float
+    size_mm : float, mm, optional
+        Length that the gap before a number is a part of; by default the longest edge.
 
     Returns
     -------
@@ -108,7 +114,7 @@ def corner_arrows(
     start = nominal[chosen]
     end = deform(start, error, exaggeration)
     middle = (nominal.min(axis=0) + nominal.max(axis=0)) / 2.0
-    longest = float(np.ptp(nominal, axis=0).max())
+    size = float(np.ptp(nominal, axis=0).max()) if size_mm is None else size_mm
     # outside both ends of the arrow, away from the middle of the volume
     tip = np.where(
         (np.linalg.norm(end - middle, axis=-1) > np.linalg.norm(start - middle, axis=-1))[:, None],
@@ -116,7 +122,7 @@ def corner_arrows(
         start,
     )
     outwards = np.sign(start - middle)
-    return CornerArrows(start, end, tip + LABEL_GAP * longest * outwards, _norm(error))
+    return CornerArrows(start, end, tip + LABEL_GAP * size * outwards, _norm(error))
 
 
 def _norm(vectors: Array) -> Array:

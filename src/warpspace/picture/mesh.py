@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from warpspace.geometry.isolines import isoline_levels, isoline_segments
 from warpspace.geometry.surfaces import Index
+from warpspace.geometry.thicken import THICKNESS, is_thin, spread, spread_nodes, thicken
 from warpspace.picture.model import Picture
-from warpspace.picture.topology import Topology
+from warpspace.picture.topology import Topology, topology
 from warpspace.units import Array
 
 LIFT = 0.0012
@@ -56,15 +57,48 @@ class Part:
 
 def map_parts(picture: Picture) -> list[Part]:
     """List the grids that the map of a picture consists of; a slice is seen from both sides."""
-    lift = LIFT * picture.grid.longest_edge_mm
+    lift = LIFT * picture.size_mm
     if not picture.slices:
         return [_part(picture, (lift,))]
     return [_part(one, (lift, -lift)) for one in picture.slices]
 
 
 def _part(picture: Picture, lifts: tuple[float, ...]) -> Part:
-    """Take what is drawn of one grid."""
+    """Take what is drawn of one grid; a line or a point is given a thickness."""
+    if is_thin(picture.shape):
+        drawn_mm = thick_nodes(picture, picture.drawn_mm)
+        values = spread(picture.values)
+        return Part(drawn_mm, values, topology(values.shape), lifts, picture.grid.ways)
     return Part(picture.drawn_mm, picture.values, picture.topology, lifts, picture.grid.ways)
+
+
+def thick_nodes(picture: Picture, nodes_mm: Array) -> Array:
+    """Give nodes of a picture's grid as they are drawn, [mx, my, mz, 3], mm: a line as a bar."""
+    thin = is_thin(picture.shape)
+    return thicken(nodes_mm, THICKNESS * picture.size_mm) if thin else nodes_mm
+
+
+def thick_map(picture: Picture) -> tuple[Array, Index, Index]:
+    """Give what a ray can meet of a line or a point that is drawn thick.
+
+    Returns
+    -------
+    vertices_mm : ndarray, [M, 3], mm
+    triangles : ndarray, [T, 3]
+    nodes : ndarray, [M]
+        Flat index of the grid node that each vertex belongs to.
+    """
+    thick = thick_nodes(picture, picture.drawn_mm)
+    surface = topology(thick.shape[:3]).surface
+    nodes = spread_nodes(picture.shape)[surface.nodes]
+    return thick.reshape(-1, 3)[surface.nodes], surface.triangles, nodes
+
+
+def outline_pieces(picture: Picture, nodes_mm: Array) -> Pieces:
+    """Look up the edges of a picture's grid with its nodes elsewhere, [S, 2, 3], mm."""
+    thick = thick_nodes(picture, nodes_mm)
+    of = topology(thick.shape[:3], cut=picture.cut)
+    return thick.reshape(-1, 3)[of.edge_segments].astype(np.float32)
 
 
 def map_mesh(picture: Picture) -> MapMesh:

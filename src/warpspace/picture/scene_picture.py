@@ -11,6 +11,7 @@ from warpspace.kinematics.model import Loop
 from warpspace.machine.parameters import parameter
 from warpspace.picture.exaggeration import Exaggeration, choose_exaggeration
 from warpspace.picture.model import Picture, coloured_values
+from warpspace.picture.size import picture_size_mm
 from warpspace.picture.traces import TraceLines, evaluate_traces
 from warpspace.scene.model import Scene
 from warpspace.scene.pipeline import choose_view, evaluate
@@ -27,6 +28,11 @@ class ScenePicture(Picture):
     """
 
     scene: Scene
+
+    @cached_property
+    def size_mm(self) -> float:
+        """Length that marks are sized by, mm, for a single point too."""
+        return picture_size_mm(self.scene, self.grid)
 
     @cached_property
     def traces(self) -> tuple[TraceLines, ...]:
@@ -133,7 +139,7 @@ def evaluate_picture(
         grid=nodes,
         field=field,
         exaggeration=choose_exaggeration(
-            exaggeration, scene.exaggeration, largest, nodes.longest_edge_mm
+            exaggeration, scene.exaggeration, largest, picture_size_mm(scene, nodes)
         ),
         component=component,
         quantity=quantity,

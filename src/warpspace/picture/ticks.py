@@ -5,6 +5,10 @@ import math
 from warpspace.geometry.colour import nice_step
 
 
+NO_SPAN = 1e-12
+"""A range below this part of its ends is rounding, mm a part of 1 mm."""
+
+
 def tick_values(low: float, high: float, most: float) -> list[float]:
     """Choose round values within a range.
 
@@ -20,7 +24,7 @@ def tick_values(low: float, high: float, most: float) -> list[float]:
         The low end alone where the range is empty.
     """
     span = high - low
-    if not span > 0.0:
+    if not span > NO_SPAN * max(1.0, abs(low), abs(high)):
         return [low]
     step = nice_step(span)
     while span / step > max(most, 2.0):

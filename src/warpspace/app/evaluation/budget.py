@@ -14,11 +14,13 @@ from warpspace.field.grid import Grid
 from warpspace.geometry.deform import deform
 from warpspace.geometry.pick import pick_point, pick_surface
 from warpspace.geometry.surfaces import Index, outer_surface
+from warpspace.geometry.thicken import is_thin
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, nominal_point
 from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import Constant, ErrorSet
 from warpspace.machine.parameters import LINEAR_AXES
+from warpspace.picture.mesh import thick_map
 from warpspace.units import Array
 
 TOLERANCE_RAD = 0.0032
@@ -85,12 +87,17 @@ def _on_surface(picture: LivePicture, origin: Array, unit: Array) -> tuple[Picke
     drawn = [(picture.grid, picture.drawn_mm, picture.topology.surface)]
     if picture.slices:
         drawn = [(cut.grid, cut.drawn_mm, outer_surface(cut.grid.shape)) for cut in picture.slices]
+    solids = [
+        (grid, drawn_mm.reshape(-1, 3)[surface.nodes], surface.triangles, surface.nodes)
+        for grid, drawn_mm, surface in drawn
+    ]
+    if is_thin(picture.shape):
+        solids = [(picture.grid, *thick_map(picture))]
     best: tuple[Picked, float] | None = None
-    for grid, drawn_mm, surface in drawn:
-        points = drawn_mm.reshape(-1, 3)[surface.nodes]
-        hit = pick_surface(origin, unit, points, surface.triangles)
+    for grid, points, triangles, numbers in solids:
+        hit = pick_surface(origin, unit, points, triangles)
         if hit is not None and (best is None or hit.distance < best[1]):
-            nodes = surface.nodes[hit.vertices]
+            nodes = numbers[hit.vertices]
             best = _between_nodes(grid, nodes, hit.weights), hit.distance
     return best
 

@@ -21,6 +21,7 @@ from warpspace.geometry.colour import ColourScale
 from warpspace.geometry.traces import TraceGroup, build_traces
 from warpspace.picture.exaggeration import choose_exaggeration
 from warpspace.picture.model import choose_scale, coloured_error, coloured_values
+from warpspace.picture.size import picture_size_mm
 from warpspace.picture.traces import TraceLines
 from warpspace.scene.pipeline import grid_basis
 from warpspace.units import Array
@@ -85,9 +86,8 @@ class LiveModel:
         response = self.response(state)
         amplitudes = np.fromiter(state.active.values(), float, len(state.amplitudes))
         field = response.basis.evaluate(amplitudes, orientation=state.look.tilts)
-        factor = choose_exaggeration(
-            state.exaggeration, None, float(field.norm_um.max()), response.grid.longest_edge_mm
-        )
+        size = picture_size_mm(state.scene, response.grid)
+        factor = choose_exaggeration(state.exaggeration, None, float(field.norm_um.max()), size)
         traces = tuple(
             TraceLines(
                 group,

@@ -2,10 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 from warpspace.analysis.statistics import Statistics
 from warpspace.app.state.app_state import AppState
 from warpspace.picture.model import Picture
+from warpspace.picture.size import picture_size_mm
 from warpspace.picture.traces import TraceLines
 from warpspace.units import Array
 
@@ -66,6 +68,11 @@ class LivePicture(Picture):
     traces: tuple[TraceLines, ...]
     subject: AppState | None = None
     compared: Compared | None = None
+
+    @cached_property
+    def size_mm(self) -> float:
+        """Length that marks are sized by, mm, for a single point too."""
+        return picture_size_mm(self.state.scene, self.grid)
 
     @property
     def drawn_state(self) -> AppState:

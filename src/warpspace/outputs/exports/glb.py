@@ -14,8 +14,10 @@ from warpspace.geometry.surfaces import (
     outer_surface,
     segments,
 )
+from warpspace.geometry.thicken import is_thin, spread_nodes
 from warpspace.outputs.files import write_atomically
 from warpspace.picture.bodies import place_bodies, scene_motions
+from warpspace.picture.mesh import thick_nodes
 from warpspace.picture.scene_picture import ScenePicture
 from warpspace.picture.traces import TraceLine, trace_lines
 from warpspace.units import MM_PER_UM, Array
@@ -100,14 +102,17 @@ def _placed(
 
 
 def _surface(picture: ScenePicture) -> list[Part]:
-    """Build the outside of the deformed grid, with its errors as attributes."""
-    grid, field = picture.grid, picture.field
-    surface = outer_surface(grid.shape)
-    if not len(surface.triangles):
-        return []
-    at = surface.nodes
+    """Build the outside of the deformed grid, with its errors as attributes.
+
+    A line or a point of a grid is given a thickness, so that viewers show it.
+    """
+    field = picture.field
+    nominal = thick_nodes(picture, picture.grid.nominal_mm)
+    surface = outer_surface(nominal.shape[:3])
+    thin = is_thin(picture.shape)
+    at = spread_nodes(picture.shape)[surface.nodes] if thin else surface.nodes
     error = field.error_um.reshape(-1, 3)[at]
-    position, back = _placed(grid.nominal_mm.reshape(-1, 3)[at], error, picture.exaggeration)
+    position, back = _placed(nominal.reshape(-1, 3)[surface.nodes], error, picture.exaggeration)
     colours = picture.scale.colours(picture.values.reshape(-1)[at])
     return [
         Part(

@@ -7,6 +7,7 @@ import pyvista as pv
 
 from warpspace.field.grid import DEFAULT_NODES
 from warpspace.geometry.surfaces import outer_surface
+from warpspace.geometry.thicken import is_thin
 from warpspace.kinematics.model import Loop
 from warpspace.picture.bodies import place_bodies, scene_motions
 from warpspace.picture.exaggeration import Exaggeration
@@ -51,7 +52,8 @@ def to_pyvista(
             one array [n, 3] for each parameter that is not zero, for instance ``part_EAX_um``,
             which add up to ``error_um``.
         ``surface``
-            PolyData: the outside of the deformed volume, with the same arrays.
+            PolyData: the outside of the deformed volume, with the same arrays; a line or a vertex
+            where no more than one linear axis moves.
         ``traces``
             MultiBlock of polylines, two for each trace of a rotary axis, named
             ``nominal (275, 0, 0) over C`` and ``actual (275, 0, 0) over C``; the actual ones carry
@@ -141,12 +143,17 @@ def _parts(picture: ScenePicture) -> dict[str, Array]:
 def _surface(picture: ScenePicture, arrays: Mapping[str, Array]) -> pv.PolyData:
     """Build the outside of the deformed volume."""
     surface = outer_surface(picture.grid.shape)
-    points = picture.drawn_mm.reshape(-1, 3)[surface.nodes]
-    mesh = pv.PolyData.from_regular_faces(points, surface.triangles)
+    drawn = picture.drawn_mm.reshape(-1, 3)
+    if is_thin(picture.shape):
+        nodes = np.arange(len(drawn))
+        # PyVista makes one vertex of a single point
+        mesh = pv.PolyData(drawn) if len(nodes) == 1 else pv.MultipleLines(drawn)
+    else:
+        nodes = surface.nodes
+        mesh = pv.PolyData.from_regular_faces(drawn[nodes], surface.triangles)
     for name, values in arrays.items():
-        mesh.point_data[name] = values.reshape(-1, *values.shape[3:])[surface.nodes]
-    if len(surface.nodes):
-        mesh.point_data.active_scalars_name = "norm_um"
+        mesh.point_data[name] = values.reshape(-1, *values.shape[3:])[nodes]
+    mesh.point_data.active_scalars_name = "norm_um"
     return mesh
 
 

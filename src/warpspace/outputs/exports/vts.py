@@ -9,6 +9,7 @@ import numpy as np
 
 from warpspace.exceptions import SceneError, WarpspaceError
 from warpspace.field.basis import ErrorField
+from warpspace.field.grid import MIN_NODES
 from warpspace.outputs.files import write_atomically
 from warpspace.picture.scene_picture import ScenePicture, evaluate_picture
 from warpspace.scene.library import parse_scene
@@ -134,7 +135,7 @@ def load_stored_field(path: str | Path) -> StoredField:
         picture = evaluate_picture(
             scene,
             exaggeration=float(settings["exaggeration"]),
-            grid=max(int(count) for count in settings["nodes"]),
+            grid=max(MIN_NODES, *(int(count) for count in settings["nodes"])),
             loop=str(settings["loop"]),
             component=str(settings["component"]),
         )

@@ -167,7 +167,7 @@ def _needles(picture: ScenePicture, factor: float) -> Needles:
     axis = np.broadcast_to(axis, picture.grid.nominal_mm.shape).reshape(-1, 3)
     turn = picture.field.orientation_urad.reshape(-1, 3)
     lean = factor * RAD_PER_URAD * np.cross(turn, axis)
-    longest = max(picture.grid.longest_edge_mm, 1.0)
+    longest = picture.size_mm
     return Needles(axis, lean, NEEDLE_SHARE * longest, np.linalg.norm(turn, axis=-1))
 
 

@@ -46,7 +46,7 @@ def bar_room_mm(picture: LivePicture) -> tuple[Array, float]:
     if picture.state.machine.shown:
         points = machine_room_mm(picture)
         return points.min(axis=0), float(np.ptp(points, axis=0).max())
-    longest = picture.grid.longest_edge_mm
+    longest = picture.size_mm
     return picture.grid.bounds_mm[0] - AWAY * longest * np.array([1.0, 1.0, 0.0]), longest
 
 
@@ -130,10 +130,11 @@ class AnnotationsLayer:
             picture.grid.nominal_mm,
             picture.field.error_um,
             picture.exaggeration,
+            picture.size_mm,
         )
         for label in self._corner_labels[len(arrows.norm_um) :]:
             label.put(visible=False)
-        longest = picture.grid.longest_edge_mm
+        longest = picture.size_mm
         vertices, triangles = build_arrows(
             arrows.start_mm, arrows.end_mm, RADIUS * longest, HEAD * longest
         )
@@ -166,7 +167,7 @@ class AnnotationsLayer:
             self._ball.put(visible=on)
         if not on:
             return
-        longest = picture.grid.longest_edge_mm
+        longest = picture.size_mm
         if self._ball is None:
             self._ball = add_ball(self._scene, "/marks/ball", BALL * longest, palette(picture).edge)
         self._ball.put(position=found.drawn_mm * SCENE_PER_MM, color=palette(picture).edge)

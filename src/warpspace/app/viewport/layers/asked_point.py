@@ -66,7 +66,7 @@ class AskedPointLayer:
             self._hide(self._marker, *self._lines.values(), *self._labels.values())
             return
         found = answer(picture.drawn_state, picked, picture.exaggeration)
-        size = picture.grid.longest_edge_mm
+        size = picture.size_mm
         self._marker.put(
             position=found.drawn_mm * SCENE_PER_MM,
             scale=RADIUS * size * SCENE_PER_MM,

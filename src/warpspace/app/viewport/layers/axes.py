@@ -34,7 +34,7 @@ def axis_frames(low: Array, high: Array, away: float) -> list[tuple[Array, Array
 def axes_room_mm(picture: LivePicture) -> Array:
     """Give points around the nominal box that leave room for axes and their numbers, [8, 3], mm."""
     low, high = picture.grid.bounds_mm
-    away = (AWAY + LABEL_ROOM) * picture.grid.longest_edge_mm
+    away = (AWAY + LABEL_ROOM) * picture.size_mm
     x, y, z = (low[0] - away, high[0] + away), (low[1] - away, high[1]), (low[2], high[2])
     return np.stack(np.meshgrid(x, y, z), axis=-1).reshape(-1, 3)
 
@@ -62,7 +62,7 @@ class AxesLayer:
         visible = picture.state.shown.axes and not picture.state.machine.shown
         if box is not self._box:
             if self._box is None or not np.array_equal(box, self._box):
-                self._lay_out(box, picture.grid.longest_edge_mm)
+                self._lay_out(box, picture.size_mm)
             self._box = box
         self._lines.put(visible=visible, colors=colour_bytes(palette(picture).axis))
         for label in self._labels:

@@ -67,7 +67,7 @@ def ghost_dashes(picture: LivePicture) -> NDArray[np.float32]:
     edges = np.array(
         [(nominal[edge[0]], nominal[edge[-1]]) for edge in box_edges(picture.grid.shape)]
     )
-    longest = picture.grid.longest_edge_mm
+    longest = picture.size_mm
     return dashes(edges.reshape(-1, 2, 3), DASH * longest, GAP * longest)
 
 

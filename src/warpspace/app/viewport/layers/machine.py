@@ -110,7 +110,7 @@ class MachineLayer:
     def _draw_tool_point(self, picture: LivePicture) -> None:
         """Mark the tool point where the deformed grid has it."""
         found = tool_point(picture)
-        longest = picture.grid.longest_edge_mm
+        longest = picture.size_mm
         if self._ball is None:
             self._ball = add_ball(
                 self._scene, "/machine/tool_point", BALL * longest, palette(picture).edge

@@ -4,8 +4,9 @@ from viser import SceneApi
 
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.palette import palette
-from warpspace.app.viewport.layers import colour_bytes, pieces
+from warpspace.app.viewport.layers import colour_bytes
 from warpspace.app.viewport.layers.adding import add_lines
+from warpspace.picture.mesh import outline_pieces
 
 
 class OtherSideLayer:
@@ -28,7 +29,7 @@ class OtherSideLayer:
             self._edges.put(visible=False)
             return
         self._edges.put(
-            points=pieces(other, picture.topology.edge_segments)[::2],
+            points=outline_pieces(picture, other)[::2],
             colors=colour_bytes(palette(picture).edge),
             visible=True,
         )

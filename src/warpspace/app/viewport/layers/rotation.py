@@ -70,7 +70,7 @@ class RotationLayer:
                     f"/rotation/{name}",
                     at.astype(np.float32),
                     np.array(rgb, dtype=np.uint8),
-                    point_size=SIZE * self._picture.grid.longest_edge_mm,
+                    point_size=SIZE * self._picture.size_mm,
                     point_shape="circle",
                     point_shading="flat",
                     precision="float32",

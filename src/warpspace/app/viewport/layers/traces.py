@@ -75,7 +75,7 @@ class TracesLayer:
         self._actual.put(visible=visible)
         if not visible:
             return
-        distance = APART * picture.grid.longest_edge_mm
+        distance = APART * picture.size_mm
         nominal = np.concatenate([apart(lines, distance) for lines in picture.traces])
         self._nominal.put(
             points=nominal if len(nominal) else NOTHING,
