@@ -25,11 +25,12 @@ from warpspace.app.readouts.html import style_sheet
 from warpspace.app.state.app_state import start_state
 from warpspace.app.viewport.camera import fit_camera
 from warpspace.app.viewport.layers import SCENE_PER_MM
-from warpspace.app.viewport.layers.axes import AxesLayer
+from warpspace.app.viewport.layers.axes import AxesLayer, axes_room_mm
 from warpspace.app.viewport.layers.box import BoxLayer
 from warpspace.app.viewport.layers.lights import light_scene
 from warpspace.app.viewport.layers.other_side import OtherSideLayer
 from warpspace.app.viewport.layers.traces import TracesLayer
+from warpspace.geometry.thicken import is_thin
 from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import ErrorFunction
 from warpspace.machine.parameters import parameter
@@ -115,7 +116,9 @@ def build_scene_html(picture: LivePicture, aspect: float = ASPECT) -> str:
 
 def _place_camera(server: viser.ViserServer, picture: LivePicture, aspect: float) -> None:
     """Let the page open with the whole box in view, from the operator's side."""
-    drawn = np.concatenate([picture.grid.nominal_mm, picture.drawn_mm])
+    drawn = np.concatenate([picture.grid.nominal_mm, picture.drawn_mm]).reshape(-1, 3)
+    if is_thin(picture.shape):
+        drawn = np.concatenate([drawn, axes_room_mm(picture)])
     pose = fit_camera(drawn, aspect, margin=MARGIN)
     camera = server.initial_camera
     camera.up = (0.0, 0.0, 1.0)

@@ -29,6 +29,8 @@ INSETS = (112.0, 92.0, 84.0, 46.0)
 """Room for axes and labels around the body: left, bottom, right, top."""
 SMALL_INSETS = (70.0, 74.0, 40.0, 40.0)
 GHOST_DASHES = (11.0, 7.0)
+LONE_LINE_COST = 8.0
+"""Labels keep off the line that is all there is of a volume."""
 Annotate = Callable[[Canvas, Picture, Projection, Raster | None, Occupancy, Rect | None], None]
 
 
@@ -80,7 +82,7 @@ def draw_map(
     if raster is not None:
         taken.add_mask(raster.rgba[..., 3] > 0, raster.rect)
     _draw_surface_lines(canvas, picture, faces, projection, raster, taken)
-    _draw_lone_line(canvas, picture, faces, projection)
+    _draw_lone_line(canvas, picture, faces, projection, taken)
     if ghost:
         _draw_ghost(canvas, picture, projection, raster, taken)
     draw_axes(canvas, picture.grid.nominal_mm, nodes, projection, taken, titles=labels)
@@ -128,6 +130,12 @@ def fit_map(
     points = [
         part.reshape(-1, 3) for one in pictures for part in (one.grid.nominal_mm, one.drawn_mm)
     ]
+    # a point shall not be looked at from nearer than its displacement is chosen for
+    points += [
+        one.grid.bounds_mm + 0.5 * one.size_mm * np.array([[-1.0], [1.0]])
+        for one in pictures
+        if not one.grid.longest_edge_mm > 0.0
+    ]
     points += [] if beside_mm is None else [beside_mm]
     return fit_projection(view, np.concatenate(points), inner)
 
@@ -174,7 +182,11 @@ def _visible(
 
 
 def _draw_lone_line(
-    canvas: Canvas, picture: Picture, faces: list[Index], projection: Projection
+    canvas: Canvas,
+    picture: Picture,
+    faces: list[Index],
+    projection: Projection,
+    taken: Occupancy,
 ) -> None:
     """Draw a volume without area (one axis, or none that is linear) as a coloured line or point."""
     if faces:
@@ -188,6 +200,7 @@ def _draw_lone_line(
     pieces = [spots[i : i + 2] for i in range(len(spots) - 1)]
     middle = picture.scale.colours((values[1:] + values[:-1]) / 2.0) / 255.0
     canvas.lines(pieces, width=7.0, colour=middle, zorder=2.0)
+    taken.add_lines([spots], LONE_LINE_COST)
     for spot, colour in zip(spots, colours, strict=True):
         canvas.disc(spot, 4.5, colour)
 

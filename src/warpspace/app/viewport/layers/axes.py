@@ -9,6 +9,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.palette import palette
 from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes
 from warpspace.app.viewport.layers.adding import add_lines
+from warpspace.geometry.thicken import is_thin
 from warpspace.picture.ticks import tick_values
 from warpspace.units import Array
 
@@ -32,11 +33,16 @@ def axis_frames(low: Array, high: Array, away: float) -> list[tuple[Array, Array
 
 
 def axes_room_mm(picture: LivePicture) -> Array:
-    """Give points around the nominal box that leave room for axes and their numbers, [8, 3], mm."""
+    """Give points around the nominal box that leave room for axes and their numbers, [n, 3], mm."""
     low, high = picture.grid.bounds_mm
     away = (AWAY + LABEL_ROOM) * picture.size_mm
     x, y, z = (low[0] - away, high[0] + away), (low[1] - away, high[1]), (low[2], high[2])
-    return np.stack(np.meshgrid(x, y, z), axis=-1).reshape(-1, 3)
+    box = np.stack(np.meshgrid(x, y, z), axis=-1).reshape(-1, 3)
+    if not is_thin(picture.shape):
+        return box
+    # what there is to see of a machine with one linear axis or none are its traces
+    traces = [line.reshape(-1, 3) for of in picture.traces for line in (of.nominal_mm, of.actual_mm)]
+    return np.concatenate([box, *traces])
 
 
 class AxesLayer:

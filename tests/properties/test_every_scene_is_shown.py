@@ -1,0 +1,182 @@
+"""Whatever scene `check` accepts: it is evaluated, laid out, described and exported, all finite."""
+
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+import viser
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from random_scenes import scenes
+from warpspace import to_pyvista
+from warpspace.app.documents.offline_page import build_offline_html, offline_picture
+from warpspace.app.evaluation.budget import answer, pick, with_picked
+from warpspace.app.evaluation.compare import with_pin
+from warpspace.app.evaluation.conventions import Effects
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.evaluation.sensitivities import rank_picture
+from warpspace.app.readouts.budget import answer_html
+from warpspace.app.readouts.circles import circle_rows, circle_table
+from warpspace.app.readouts.comparison import comparison_html
+from warpspace.app.readouts.conventions import conventions_html
+from warpspace.app.readouts.gains import spell_ranking
+from warpspace.app.readouts.summary import heading, summary
+from warpspace.app.state.app_state import AppState, start_state
+from warpspace.app.state.look import QUANTITIES, SURFACES
+from warpspace.app.state.picked import Picked
+from warpspace.app.viewport.layers.annotations import AnnotationsLayer, bar_lines
+from warpspace.app.viewport.layers.axes import AxesLayer, axes_room_mm
+from warpspace.app.viewport.layers.box import BoxLayer, ghost_dashes
+from warpspace.app.viewport.layers.machine import MachineLayer
+from warpspace.app.viewport.layers.other import OtherLayer
+from warpspace.app.viewport.layers.traces import TracesLayer
+from warpspace.app.viewport.layers.why import WhyLayer
+from warpspace.app.viewport.named_views import VIEWS, CameraSetup, view_pose
+from warpspace.kinematics.model import Loop
+from warpspace.machine.parameters import LINEAR_AXES
+from warpspace.outputs.exports.glb import build_glb
+from warpspace.outputs.exports.vts import build_vts
+from warpspace.picture.mesh import edge_pieces, grid_pieces, isoline_pieces, line_mesh, map_mesh
+from warpspace.picture.scene_picture import evaluate_picture
+from warpspace.scene.model import Scene
+
+LAYERS = (
+    BoxLayer,
+    TracesLayer,
+    AxesLayer,
+    AnnotationsLayer,
+    OtherLayer,
+    MachineLayer,
+    WhyLayer,
+)  # fmt: skip
+SLOW = settings(
+    derandomize=True,
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
+)
+SIDE_NODES = 3
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[viser.ViserServer]:
+    """A server that nobody looks at; what is drawn replaces what was drawn before."""
+    running = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    yield running
+    running.stop()
+
+
+@st.composite
+def states(draw: st.DrawFn) -> AppState:
+    """Ways to look at a scene."""
+    opened = replace(start_state(draw(scenes())), nodes=SIDE_NODES)
+    look = replace(
+        opened.look,
+        surface=draw(st.sampled_from(list(SURFACES))),
+        quantity=draw(st.sampled_from(QUANTITIES)),
+        isolines=True,
+        arrows=True,
+    )
+    state = replace(
+        opened,
+        look=look,
+        loop=draw(st.sampled_from(Loop)),
+        component=draw(st.sampled_from(("norm", "z"))),
+        machine=replace(opened.machine, shown=draw(st.booleans())),
+    )
+    if draw(st.booleans()):
+        pinned = with_pin(state)
+        shown = draw(st.sampled_from(("a", "b", "difference")))
+        state = replace(pinned, comparison=replace(pinned.comparison, shown=shown, ghost=True))
+    return state
+
+
+@settings(SLOW, max_examples=60)
+@given(state=states())
+def test_every_state_has_a_finite_picture(server: viser.ViserServer, state: AppState) -> None:
+    picture = LiveModel().evaluate(state)
+    _check_finite(picture)
+    for layer in LAYERS:
+        layer(server.scene, picture)
+    for view in VIEWS:
+        pose = view_pose(axes_room_mm(picture), 1.6, CameraSetup(view))
+        assert np.isfinite(pose.position).all()
+        assert math.dist(pose.position, pose.look_at) > 0.0
+
+
+def _check_finite(picture: LivePicture) -> None:
+    """Look at all numbers that are drawn."""
+    assert math.isfinite(picture.exaggeration)
+    assert picture.size_mm > 0.0
+    for field in fields(picture.statistics):
+        assert np.isfinite(getattr(picture.statistics, field.name)).all(), field.name
+    for mesh in (map_mesh(picture), line_mesh(picture)):
+        assert len(mesh.vertices_mm) > 1
+        assert len(mesh.triangles) > 0
+        assert np.isfinite(mesh.vertices_mm).all()
+        assert np.isfinite(mesh.values).all()
+    for pieces in (
+        grid_pieces(picture),
+        edge_pieces(picture),
+        isoline_pieces(picture),
+        ghost_dashes(picture),
+        bar_lines(picture)[1],
+    ):
+        assert pieces.shape[1:] == (2, 3)
+        assert np.isfinite(pieces).all()
+
+
+@settings(SLOW, max_examples=25)
+@given(state=states())
+def test_every_panel_has_words_for_it(state: AppState) -> None:
+    picture = LiveModel().evaluate(state)
+    at = {name: 0.0 for name in state.scene.machine.axes if name in LINEAR_AXES}
+    said = [
+        summary(picture),
+        heading(picture),
+        circle_table(circle_rows(picture)),
+        comparison_html(picture),
+        conventions_html(state, Effects().of(state), lambda *_: {}),
+        spell_ranking(rank_picture(picture)),
+        spell_ranking(rank_picture(picture, middle=True, by_effect=True)),
+        answer_html(answer(state, Picked(at), picture.exaggeration), "", lambda *_: {}),
+    ]
+    for html in said:
+        assert not {"nan", "inf"} & set(html.replace("<", " ").replace(">", " ").split())
+
+
+@settings(SLOW, max_examples=25)
+@given(scene=scenes())
+def test_what_is_drawn_can_be_picked(scene: Scene) -> None:
+    state = replace(start_state(scene), nodes=SIDE_NODES)
+    picture = LiveModel().evaluate(state)
+    mesh = map_mesh(picture)
+    middle = mesh.vertices_mm[mesh.triangles[0]].mean(axis=0)
+    eye = middle + 20.0 * picture.size_mm * np.array([0.3, -0.8, 0.5])
+    found = pick(picture, eye, middle - eye)
+    assert found is not None
+    assert LiveModel().evaluate(with_picked(state, found)).state.picked == found
+
+
+@settings(SLOW, max_examples=15)
+@given(scene=scenes())
+def test_every_scene_is_exported(scene: Scene) -> None:
+    picture = evaluate_picture(scene, grid=SIDE_NODES)
+    data = build_glb(picture)
+    length = int.from_bytes(data[12:16], "little")
+    assert json.loads(data[20 : 20 + length])["meshes"]
+    assert build_vts(picture)
+    blocks = to_pyvista(scene, grid=SIDE_NODES)
+    assert np.isfinite(blocks["surface"].points).all()
+    assert blocks["surface"].n_cells > 0
+
+
+@settings(SLOW, max_examples=3)
+@given(scene=scenes())
+def test_every_scene_has_an_offline_page(scene: Scene) -> None:
+    page = build_offline_html(offline_picture(scene, exaggeration=100.0, nodes=SIDE_NODES))
+    assert "×100" in page

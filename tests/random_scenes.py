@@ -1,0 +1,78 @@
+"""A hypothesis strategy for scene files: any chain, any axes standing still, any errors."""
+
+from hypothesis import reject
+from hypothesis import strategies as st
+
+from chains import chains
+from warpspace.exceptions import SceneError
+from warpspace.machine.description import Chain, build_machine
+from warpspace.machine.parameters import LINEAR_AXES, parameter
+from warpspace.scene.library import parse_scene
+from warpspace.scene.model import Scene
+
+HALF_TRAVEL = st.sampled_from([1e-3, 0.5, 40.0, 275.0, 3000.0])
+PLACES = st.sampled_from([-300.0, -0.25, 0.0, 12.5, 1000.0])
+POINTS = st.lists(PLACES, min_size=3, max_size=3)
+SIZES = st.sampled_from([-8000.0, -12.5, -1e-6, 0.0, 3.0, 40.0])
+
+
+@st.composite
+def scenes(draw: st.DrawFn) -> Scene:
+    """Scenes that `check` accepts."""
+    text = draw(scene_texts())
+    try:
+        return parse_scene(text, "random")
+    except SceneError:
+        reject()
+
+
+@st.composite
+def scene_texts(draw: st.DrawFn) -> str:
+    """Texts of scene files, nearly all of them valid."""
+    chain = draw(chains())
+    offsets = {frame: draw(POINTS) for frame in chain.axes if draw(st.booleans())}
+    directions = {axis: -1 for axis in chain.axes if draw(st.booleans())}
+    parts = ['title = "random"', "[machine]", f'chain = "{chain}"']
+    parts += ["[machine.offset_mm]", *_rows(offsets), "[machine.direction]", *_rows(directions)]
+    middles = {axis: draw(PLACES) for axis in chain.axes}
+    ranges: dict[str, object] = {}
+    for axis in chain.axes:
+        half = draw(HALF_TRAVEL) if axis in LINEAR_AXES and draw(st.booleans()) else 0.0
+        at = middles[axis]
+        ranges[axis] = [at - half, at + half] if half else at
+    traced = draw(st.lists(POINTS, max_size=2))
+    points = {"tool": draw(POINTS), "workpiece": draw(POINTS), "traces": traced}
+    parts += ["[workspace]", *_rows(ranges), "[points_mm]", *_rows(points)]
+    parts += ["[errors]", *(f"{key} = {draw(curves(key))}" for key in draw(_some_keys(chain)))]
+    if draw(st.booleans()):
+        widths = "{ translation = 10, rotation = 20, squareness = 25 }"
+        parts += ["[tolerances]", f"default = {widths}"]
+    if draw(st.booleans()):
+        parts += ["[view]", f"reference = {{ {', '.join(_rows(middles))} }}"]
+    return "\n".join(parts)
+
+
+def curves(key: str) -> st.SearchStrategy[str]:
+    """Spelt errors of all kinds; a constant where nothing else is possible."""
+    constant = SIZES.map(str)
+    if parameter(key).is_constant:
+        return constant
+    forms = [
+        SIZES.map(lambda value: f"{{ ramp = {value} }}"),
+        SIZES.map(lambda value: f"{{ poly = [{value}, 0.001] }}"),
+        SIZES.map(lambda value: f"{{ table = [[-100, 0.0], [80, {value}]] }}"),
+    ]
+    if parameter(key).axis not in LINEAR_AXES:
+        forms.append(SIZES.map(lambda value: f"{{ harmonics = [[2, {abs(value)}, 30.0]] }}"))
+    return st.one_of(constant, *forms)
+
+
+def _some_keys(chain: Chain) -> st.SearchStrategy[list[str]]:
+    """Some of the errors that a chain can have."""
+    keys = build_machine(chain).allowed_keys
+    return st.lists(st.sampled_from(keys), max_size=5, unique=True)
+
+
+def _rows(table: dict[str, object]) -> list[str]:
+    """Spell the entries of a table."""
+    return [f"{key} = {value}" for key, value in table.items()]
