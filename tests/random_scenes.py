@@ -13,6 +13,7 @@ from warpspace.scene.model import Scene
 HALF_TRAVEL = st.sampled_from([1e-3, 0.5, 40.0, 275.0, 3000.0])
 PLACES = st.sampled_from([-300.0, -0.25, 0.0, 12.5, 1000.0])
 POINTS = st.lists(PLACES, min_size=3, max_size=3)
+MOVES = st.sampled_from([True, True, False])
 SIZES = st.sampled_from([-8000.0, -12.5, -1e-6, 0.0, 3.0, 40.0])
 
 
@@ -37,7 +38,7 @@ def scene_texts(draw: st.DrawFn) -> str:
     middles = {axis: draw(PLACES) for axis in chain.axes}
     ranges: dict[str, object] = {}
     for axis in chain.axes:
-        half = draw(HALF_TRAVEL) if axis in LINEAR_AXES and draw(st.booleans()) else 0.0
+        half = draw(HALF_TRAVEL) if axis in LINEAR_AXES and draw(MOVES) else 0.0
         at = middles[axis]
         ranges[axis] = [at - half, at + half] if half else at
     traced = draw(st.lists(POINTS, max_size=2))

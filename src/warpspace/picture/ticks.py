@@ -4,7 +4,6 @@ import math
 
 from warpspace.geometry.colour import nice_step
 
-
 NO_SPAN = 1e-12
 """A range below this part of its ends is rounding, mm a part of 1 mm."""
 

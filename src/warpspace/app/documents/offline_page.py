@@ -30,6 +30,7 @@ from warpspace.app.viewport.layers.box import BoxLayer
 from warpspace.app.viewport.layers.lights import light_scene
 from warpspace.app.viewport.layers.other_side import OtherSideLayer
 from warpspace.app.viewport.layers.traces import TracesLayer
+from warpspace.field.grid import MIN_NODES
 from warpspace.geometry.thicken import is_thin
 from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import ErrorFunction
@@ -78,7 +79,11 @@ def offline_picture(
     LivePicture
     """
     state = replace(
-        start_state(scene), exaggeration=exaggeration, nodes=nodes, loop=loop, component=component
+        start_state(scene),
+        exaggeration=exaggeration,
+        nodes=max(nodes, MIN_NODES),  # callers count those of a grid, and a point has one
+        loop=loop,
+        component=component,
     )
     picture = LiveModel().evaluate(state)
     return (

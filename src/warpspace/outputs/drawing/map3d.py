@@ -12,6 +12,7 @@ from warpspace.geometry.surfaces import (
     line_spacing,
     triangulate,
 )
+from warpspace.geometry.thicken import is_thin
 from warpspace.outputs.drawing.annotations import draw_corners, label_isolines
 from warpspace.outputs.drawing.axes3d import draw_axes
 from warpspace.outputs.drawing.canvas import Canvas
@@ -82,7 +83,7 @@ def draw_map(
     if raster is not None:
         taken.add_mask(raster.rgba[..., 3] > 0, raster.rect)
     _draw_surface_lines(canvas, picture, faces, projection, raster, taken)
-    _draw_lone_line(canvas, picture, faces, projection, taken)
+    draw_lone_line(canvas, picture, projection, taken)
     if ghost:
         _draw_ghost(canvas, picture, projection, raster, taken)
     draw_axes(canvas, picture.grid.nominal_mm, nodes, projection, taken, titles=labels)
@@ -127,17 +128,21 @@ def fit_map(
         min(inset, 0.24 * side) for inset, side in zip(insets, (width, height) * 2, strict=True)
     ]
     inner = (rect[0] + insets[0], rect[1] + insets[1], rect[2] - insets[2], rect[3] - insets[3])
-    points = [
-        part.reshape(-1, 3) for one in pictures for part in (one.grid.nominal_mm, one.drawn_mm)
-    ]
-    # a point shall not be looked at from nearer than its displacement is chosen for
-    points += [
-        one.grid.bounds_mm + 0.5 * one.size_mm * np.array([[-1.0], [1.0]])
-        for one in pictures
-        if not one.grid.longest_edge_mm > 0.0
-    ]
+    points = [map_room_mm(picture) for picture in pictures]
     points += [] if beside_mm is None else [beside_mm]
     return fit_projection(view, np.concatenate(points), inner)
+
+
+def map_room_mm(picture: Picture) -> Array:
+    """Give what of a volume is to be seen, [n, 3], mm: where it is, where it is drawn.
+
+    Around a point also half the length it is sized by: its displacement is chosen for that.
+    """
+    points = [picture.grid.nominal_mm.reshape(-1, 3), picture.drawn_mm.reshape(-1, 3)]
+    if not picture.grid.longest_edge_mm > 0.0:
+        around = 0.5 * picture.size_mm * np.array([[-1.0], [1.0]])
+        points.append(picture.grid.bounds_mm + around)
+    return np.concatenate(points)
 
 
 def _draw_surface_lines(
@@ -181,15 +186,21 @@ def _visible(
     return [part for line in lines for part in split_visible(nodes[line], projection, raster)[0]]
 
 
-def _draw_lone_line(
-    canvas: Canvas,
-    picture: Picture,
-    faces: list[Index],
-    projection: Projection,
-    taken: Occupancy,
+def draw_lone_line(
+    canvas: Canvas, picture: Picture, projection: Projection, taken: Occupancy | None = None
 ) -> None:
-    """Draw a volume without area (one axis, or none that is linear) as a coloured line or point."""
-    if faces:
+    """Draw a volume without area (one axis, or none that is linear) as a coloured line or point.
+
+    Parameters
+    ----------
+    canvas : Canvas
+    picture : Picture
+        Nothing is drawn of a volume with area.
+    projection : Projection
+    taken : Occupancy, optional
+        Is marked with the line.
+    """
+    if not is_thin(picture.shape):
         return
     spots = projection.project(picture.drawn_mm.reshape(-1, 3))
     values = picture.values.reshape(-1)
@@ -200,7 +211,8 @@ def _draw_lone_line(
     pieces = [spots[i : i + 2] for i in range(len(spots) - 1)]
     middle = picture.scale.colours((values[1:] + values[:-1]) / 2.0) / 255.0
     canvas.lines(pieces, width=7.0, colour=middle, zorder=2.0)
-    taken.add_lines([spots], LONE_LINE_COST)
+    if taken is not None:
+        taken.add_lines([spots], LONE_LINE_COST)
     for spot, colour in zip(spots, colours, strict=True):
         canvas.disc(spot, 4.5, colour)
 

@@ -10,7 +10,7 @@ from warpspace.kinematics.bodies import BASE
 from warpspace.outputs.drawing.canvas import Canvas
 from warpspace.outputs.drawing.content import Drawing, DrawnMap
 from warpspace.outputs.drawing.lines import split_visible
-from warpspace.outputs.drawing.map3d import GHOST_DASHES
+from warpspace.outputs.drawing.map3d import GHOST_DASHES, draw_lone_line, map_room_mm
 from warpspace.outputs.drawing.panel import draw_panel
 from warpspace.outputs.drawing.projection import Projection, Rect, fit_projection
 from warpspace.outputs.drawing.render import Body, Raster, render_bodies
@@ -70,8 +70,7 @@ def draw_machine(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bo
     sheet = start_sheet(settings, title, facts, scenes, _legend(), exact=exact)
     canvas = sheet.canvas
     drawn_mm = picture.drawn_mm
-    points = [drawn_mm.reshape(-1, 3), picture.grid.nominal_mm.reshape(-1, 3)]
-    points += [part.vertices_mm for part in placed]
+    points = [map_room_mm(picture), *(part.vertices_mm for part in placed)]
     projection = fit_projection(settings.view, np.concatenate(points), _room(canvas, sheet.content))
     machine = render_placed(placed, settings.theme, projection)
     if machine is not None:
@@ -86,6 +85,7 @@ def draw_machine(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bo
         volume = render_bodies([body], projection)
         _overlay(canvas, volume, machine)
     _draw_volume_lines(canvas, picture, drawn_mm, projection, volume, machine)
+    draw_lone_line(canvas, picture, projection)
     label_bodies(canvas, placed, projection, machine, sheet.content)
     draw_panel(
         canvas, sheet.panel, scale, quantity_words(settings.component),

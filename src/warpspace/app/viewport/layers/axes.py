@@ -41,7 +41,9 @@ def axes_room_mm(picture: LivePicture) -> Array:
     if not is_thin(picture.shape):
         return box
     # what there is to see of a machine with one linear axis or none are its traces
-    traces = [line.reshape(-1, 3) for of in picture.traces for line in (of.nominal_mm, of.actual_mm)]
+    traces = [
+        line.reshape(-1, 3) for of in picture.traces for line in (of.nominal_mm, of.actual_mm)
+    ]
     return np.concatenate([box, *traces])
 
 

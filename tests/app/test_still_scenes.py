@@ -1,0 +1,112 @@
+"""The app opens machines whose volume is a line or a point."""
+
+import secrets
+from dataclasses import replace
+
+import msgspec.msgpack
+import numpy as np
+import pytest
+import viser
+import zstandard
+from websockets.sync.client import connect
+
+from still_scenes import TEXTS, still_scene
+from warpspace.app.browser.arrivals import CARRIER
+from warpspace.app.browser.opening import stage_script
+from warpspace.app.evaluation.budget import pick
+from warpspace.app.evaluation.compare import with_pin
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.server import page_steps
+from warpspace.app.server.viewer import Viewer
+from warpspace.app.state.app_state import start_state
+from warpspace.app.viewport.layers.axes import axes_room_mm
+from warpspace.picture.mesh import map_mesh, outline_pieces
+
+CAMERA = {
+    "type": "ViewerCameraMessage",
+    "wxyz": (1.0, 0.0, 0.0, 0.0),
+    "position": (30.0, -30.0, 30.0),
+    "fov": 0.4,
+    "near": 0.01,
+    "far": 1000.0,
+    "image_height": 900,
+    "image_width": 1600,
+    "look_at": (0.0, 0.0, 0.0),
+    "up_direction": (0.0, 0.0, 1.0),
+}
+
+
+def messages_until_open(viewer: Viewer) -> list[dict]:
+    """Open a page that draws nothing and read what it is sent until all of it is there."""
+    found: list[dict] = []
+    opened = stage_script("open")
+    token = {"type": "GuiUpdateMessage", "uuid": CARRIER, "updates": {"value": ""}}
+    token["updates"] = {"value": secrets.token_hex(16)}
+    with connect(
+        viewer.url.replace("http", "ws", 1),
+        subprotocols=[f"viser-v{viser.__version__}"],  # pyright: ignore[reportArgumentType]
+        max_size=None,
+        compression=None,
+    ) as socket:
+        for message in (token, CAMERA):
+            socket.send(msgspec.msgpack.encode(message))
+        while not any(message.get("source") == opened for message in found):
+            raw = socket.recv(timeout=30.0)
+            assert isinstance(raw, bytes)
+            size, packed = (int.from_bytes(raw[at : at + 8], "little") for at in (0, 8))
+            text = zstandard.ZstdDecompressor().decompress(
+                raw[16 : 16 + packed], max_output_size=size
+            )
+            found += msgspec.msgpack.decode(text)["messages"]
+    return found
+
+
+@pytest.mark.filterwarnings("ignore:Queued an? .* on a closed connection")  # as `run_viewer` does
+@pytest.mark.parametrize("name", TEXTS)
+def test_a_page_opens_with_its_map_and_without_a_problem(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(page_steps, "ANSWER_S", 0.0)
+    with Viewer(still_scene(name)) as viewer:
+        found = messages_until_open(viewer)
+    kinds = [message["type"] for message in found]
+    assert "GlbMessage" in kinds
+    assert "NotificationShowMessage" not in kinds
+
+
+@pytest.mark.parametrize("name", [name for name in TEXTS if name != "only X stands still"])
+def test_the_map_is_solid_coloured_by_its_nodes_and_can_be_picked(name: str) -> None:
+    scene = still_scene(name)
+    picture = LiveModel().evaluate(start_state(scene))
+    mesh = map_mesh(picture)
+    assert len(mesh.triangles) >= 12
+    assert set(np.unique(mesh.values)) <= set(np.unique(picture.values))
+    worst = picture.drawn_mm.reshape(-1, 3)[int(np.argmax(picture.field.norm_um))]
+    eye = worst + picture.size_mm * np.array([3.0, -4.0, 2.0])
+    found = pick(picture, eye, worst - eye)
+    assert found is not None
+    for axis, value in found.at.items():
+        moves = scene.workspace.ranges[axis][0] != scene.workspace.ranges[axis][1]
+        nodes = picture.grid.coordinates[axis].reshape(-1)
+        step = abs(nodes[1] - nodes[0]) if moves else 1e-9
+        assert np.abs(nodes - value).min() <= step
+
+
+def test_the_room_of_a_point_holds_its_traces() -> None:
+    picture = LiveModel().evaluate(start_state(still_scene("wCFt, traces")))
+    room = axes_room_mm(picture)
+    low, high = room.min(axis=0), room.max(axis=0)
+    for lines in picture.traces:
+        assert (lines.actual_mm >= low - 1e-9).all()
+        assert (lines.actual_mm <= high + 1e-9).all()
+
+
+@pytest.mark.parametrize("name", ["wFXt", "wCFt", "nothing moves"])
+def test_two_states_of_a_line_and_of_a_point_are_compared(name: str) -> None:
+    pinned = with_pin(start_state(still_scene(name)))
+    state = replace(pinned, amplitudes=dict.fromkeys(pinned.amplitudes, 0.0))
+    picture = LiveModel().evaluate(state)
+    assert picture.compared is not None
+    assert picture.compared.difference is not None
+    assert picture.compared.other_mm is not None
+    assert len(outline_pieces(picture, picture.compared.other_mm)) >= 12

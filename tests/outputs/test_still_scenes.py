@@ -1,0 +1,106 @@
+"""Machines whose volume is a line or a point: figures, exports and reports of them."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+from still_scenes import TEXTS, still_scene
+from warpspace import to_pyvista
+from warpspace.cli.exports import write_page
+from warpspace.exceptions import WarpspaceError
+from warpspace.outputs.exports.formats import write_export
+from warpspace.outputs.exports.vts import load_stored_field
+from warpspace.outputs.figures.catalogue import draw_figure, figure_names
+from warpspace.outputs.report.build import write_report
+from warpspace.picture.scene_picture import evaluate_picture
+
+REFUSED = {
+    "slices": "does not extend along X, Y and Z; draw the error-map",
+    "traces": "has no traces; expected a machine with a rotary axis",
+    "gains": "has no axis in it",
+    "montecarlo": r"has no tolerances to sample machines from|has no axis in it",
+    "ballbar": r"has no axis [XY]|the circle leaves the working volume",
+}
+"""What a figure may say instead: what it shows is not there."""
+DRAWN = ("wFXt", "wXFt", "wCFt, traces", "only X moves", "nothing moves")
+"""Drawing takes a second each: a line and a point carried by either side, with traces."""
+ALWAYS = {"error-map", "orientation-map", "error-curves", "machine"}
+
+
+def test_every_kind_of_figure_is_looked_at() -> None:
+    assert set(figure_names()) == ALWAYS | set(REFUSED)
+
+
+@pytest.mark.render
+@pytest.mark.parametrize("figure", figure_names())
+@pytest.mark.parametrize("name", DRAWN)
+def test_figures_are_drawn_or_say_why_not(name: str, figure: str, renderer: str) -> None:
+    try:
+        drawing = draw_figure(figure, [still_scene(name)])
+    except WarpspaceError as refused:
+        said = str(refused)
+    else:
+        said = ""
+        assert drawing.maps or figure not in {"error-map", "orientation-map", "machine"}
+    if said:
+        assert re.search(REFUSED.get(figure, "never"), said), said
+        assert "\n" not in said
+
+
+@pytest.mark.render
+@pytest.mark.parametrize("name", ["wFXt", "wCFt, traces", "nothing moves"])
+def test_a_comparison_with_itself(name: str, renderer: str) -> None:
+    scene = still_scene(name)
+    assert len(draw_figure("comparison", [scene, scene]).maps) == 3
+
+
+@pytest.mark.render
+@pytest.mark.parametrize("figure", ["error-map", "machine"])
+@pytest.mark.parametrize("name", ["wFXt", "wCFt, traces", "nothing moves"])
+def test_maps_have_their_colours(name: str, figure: str, renderer: str) -> None:
+    drawing = draw_figure(figure, [still_scene(name)])
+    (drawn,) = drawing.maps
+    canvas = FigureCanvasAgg(drawing.figure)
+    canvas.draw()
+    pixels = np.asarray(canvas.buffer_rgba())[..., :3]
+    worst = np.unravel_index(int(np.argmax(np.abs(drawn.values))), drawn.values.shape)
+    wanted = drawn.scale.colours(np.array([drawn.values[worst]]))[0]
+    # the bar beside the map has them too
+    map_only = pixels[:, : int(0.78 * pixels.shape[1])].astype(int)
+    assert (np.abs(map_only - wanted).max(axis=-1) < 25).sum() > 50
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_every_export(name: str, tmp_path: Path) -> None:
+    picture = evaluate_picture(still_scene(name), grid=5)
+    for ending in ("glb", "vts", "csv"):
+        write_export(picture, tmp_path / f"out.{ending}")
+    write_page(picture, tmp_path / "out.html", overwrite=False)
+    stored = load_stored_field(tmp_path / "out.vts")
+    np.testing.assert_allclose(stored.field.error_um, picture.field.error_um, atol=1e-9)
+    rows = (tmp_path / "out.csv").read_text().splitlines()
+    assert sum(not row.startswith("#") for row in rows) == 1 + picture.values.size
+
+
+@pytest.mark.parametrize(("name", "cells"), [("wFXt", 1), ("wCFt", 1), ("only X stands still", 32)])
+def test_the_surface_in_pyvista_is_a_line_or_a_vertex(name: str, cells: int) -> None:
+    scene = still_scene(name)
+    blocks = to_pyvista(scene, grid=5, parts=True)
+    assert blocks["surface"].n_cells == cells
+    picture = evaluate_picture(scene, grid=5)
+    np.testing.assert_allclose(
+        np.sort(blocks["surface"].point_data["norm_um"]), np.sort(picture.values.reshape(-1))
+    )
+
+
+@pytest.mark.render
+@pytest.mark.parametrize(
+    ("name", "ending"), [("wFXt", "html"), ("wCFt, traces", "pdf"), ("nothing moves", "html")]
+)
+def test_reports(name: str, ending: str, renderer: str, tmp_path: Path) -> None:
+    path = tmp_path / f"report.{ending}"
+    write_report([still_scene(name)], path)
+    assert path.stat().st_size > 10_000
