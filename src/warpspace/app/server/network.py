@@ -86,9 +86,12 @@ def reachable_address(address: str) -> str:
     """Give the address by which other machines most likely reach one that stands for all."""
     if not is_everywhere(address):
         return address
+    family, far = (
+        (socket.AF_INET6, "2001:db8::1") if ":" in address else (socket.AF_INET, "192.0.2.1")
+    )
     # no packet is sent: connecting a datagram socket only chooses the way out
-    with contextlib.suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.connect(("192.0.2.1", 9))
+    with contextlib.suppress(OSError), socket.socket(family, socket.SOCK_DGRAM) as probe:
+        probe.connect((far, 9))
         return str(probe.getsockname()[0])
     return address
 
