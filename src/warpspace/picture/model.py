@@ -72,7 +72,7 @@ class Picture:
         """What is drawn of the grid, as indices into its nodes."""
         return topology(self.grid.shape, cut=self.cut)
 
-    @property
+    @cached_property
     def size_mm(self) -> float:
         """Length that marks are sized by, mm: the longest edge of the volume."""
         return self.grid.longest_edge_mm
