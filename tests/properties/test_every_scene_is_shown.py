@@ -10,8 +10,6 @@ import pytest
 import viser
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from warpspace.app.viewport.layers.other import OtherLayer
-from warpspace.app.viewport.layers.why import WhyLayer
 
 from random_scenes import scenes
 from warpspace import to_pyvista
@@ -32,9 +30,11 @@ from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.look import QUANTITIES, SURFACES
 from warpspace.app.state.picked import Picked
 from warpspace.app.viewport.layers.annotations import AnnotationsLayer, bar_lines
+from warpspace.app.viewport.layers.asked_point import AskedPointLayer
 from warpspace.app.viewport.layers.axes import AxesLayer, axes_room_mm
 from warpspace.app.viewport.layers.box import BoxLayer, ghost_dashes
 from warpspace.app.viewport.layers.machine import MachineLayer
+from warpspace.app.viewport.layers.other_side import OtherSideLayer
 from warpspace.app.viewport.layers.traces import TracesLayer
 from warpspace.app.viewport.named_views import VIEWS, CameraSetup, view_pose
 from warpspace.kinematics.model import Loop
@@ -50,9 +50,9 @@ LAYERS = (
     TracesLayer,
     AxesLayer,
     AnnotationsLayer,
-    OtherLayer,
+    OtherSideLayer,
     MachineLayer,
-    WhyLayer,
+    AskedPointLayer,
 )  # fmt: skip
 SLOW = settings(
     derandomize=True,
