@@ -8,6 +8,8 @@ import asyncio
 import contextlib
 import threading
 from collections.abc import Callable, Generator
+from concurrent.futures import Future
+from importlib import import_module
 from typing import Any, TypeAlias
 
 import websockets.asyncio.server
@@ -181,3 +183,69 @@ class UploadMessages:
                 total_bytes=message.size_bytes,
             )
         )
+
+
+def check_messages(may_pass: Callable[[bytes], bool]) -> None:
+    """Have every message of every client checked before viser makes anything of it.
+
+    viser makes an object of whatever kind a message names, and what it cannot read ends the
+    connection with a traceback. A check of incoming messages, given to the server, would replace
+    this; it has to be there before the server is, which answers from its first moment.
+    """
+    read: Any = super(messages.Message, messages.Message).deserialize
+
+    def deserialize(_: type[messages.Message], raw: bytes) -> Any:
+        # nobody listens to a client that says it has replayed all
+        return read(raw) if may_pass(raw) else messages.ReplayDoneMessage()
+
+    messages.Message.deserialize = classmethod(deserialize)  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def check_updates(
+    owner: ViserServer | ClientHandle,
+    may_set: Callable[[object, dict[str, Any], tuple[str, ...] | None], bool],
+) -> None:
+    """Have what a page sets of a widget checked against the value the widget has.
+
+    viser sets any attribute that a message names, its own bookkeeping included, and fails later
+    where it relies on it. A viser that sets nothing but `value` would replace this.
+
+    Parameters
+    ----------
+    owner : viser.ViserServer or viser.ClientHandle
+        Before it has widgets.
+    may_set : callable
+        Takes the present value, the updates and the options, where there are some.
+    """
+    gui: Any = owner.gui
+    connection: Any = gui._websock_interface  # noqa: SLF001
+    theirs = gui._handle_gui_updates  # noqa: SLF001
+
+    async def ours(client_id: int, message: messages.GuiUpdateMessage) -> None:
+        handle = gui._gui_input_handle_from_uuid.get(message.uuid)  # noqa: SLF001
+        if handle is None:
+            return
+        if may_set(handle.value, message.updates, getattr(handle, "options", None)):
+            await theirs(client_id, message)
+
+    connection.unregister_handler(messages.GuiUpdateMessage, theirs)
+    connection.register_handler(messages.GuiUpdateMessage, ours)
+
+
+def log_failures(log: Callable[[BaseException], object]) -> None:
+    """Have what a callback raises logged, where viser prints its traceback every time.
+
+    A logger of viser's own would replace this.
+    """
+
+    def of_future(future: Future[Any]) -> None:
+        if not future.cancelled() and (error := future.exception()) is not None:
+            log(error)
+
+    for module in map(import_module, ("viser._gui_api", "viser._scene_api", "viser._viser")):
+        for name, replaced in (
+            ("print_threadpool_errors", of_future),
+            ("print_awaited_callback_error", log),
+        ):
+            if hasattr(module, name):
+                setattr(module, name, replaced)

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from warpspace.app.documents.services import Services
 from warpspace.app.server.doors import Access
 from warpspace.app.server.network import draw_code
+from warpspace.app.server.repeated_lines import limit_log
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import AppState
 from warpspace.scene.model import Scene
@@ -76,6 +77,7 @@ def run_viewer(
     """
     # a tab may close while something is on its way to it
     warnings.filterwarnings("ignore", message="Queued an? .* on a closed connection")
+    limit_log()
     with Viewer(
         scene,
         scenes,

@@ -12,6 +12,7 @@ from typing import Self
 import viser
 
 from warpspace.app.browser.arrivals import Arrivals
+from warpspace.app.browser.incoming import guard_server, guard_widgets
 from warpspace.app.browser.viser_private import serve_with
 from warpspace.app.documents.scene_list import SceneList
 from warpspace.app.documents.services import Services
@@ -38,6 +39,8 @@ from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 
 logger = logging.getLogger(__name__)
+WATCH_S = 2.0
+"""How often sessions are looked for whose connection is gone."""
 
 
 class Viewer:
@@ -106,6 +109,9 @@ class Viewer:
         # the first tab need not wait for it
         self._warming = threading.Thread(target=self._warm, name="warpspace-warm", daemon=True)
         self._warming.start()
+        self._ended = threading.Event()
+        self._watch = threading.Thread(target=self._end_left, name="warpspace-watch", daemon=True)
+        self._watch.start()
 
     @property
     def url(self) -> str:
@@ -144,6 +150,7 @@ class Viewer:
 
     def _connect(self, client: viser.ClientHandle) -> None:
         """Give a new tab its session."""
+        guard_widgets(client)
         store = self._shared or StateStore(self._start)
         session = Session(
             self._server,
@@ -160,7 +167,7 @@ class Viewer:
             self._sessions[client.client_id] = session
         session.start()
         if client.client_id not in self._server.get_clients():
-            self._disconnect(client)
+            self._end(client.client_id)
 
     def _claim(self, session: Session, token: str) -> TabRecord | None:
         """Find what the tab whose page hands over a token has left behind."""
@@ -182,17 +189,33 @@ class Viewer:
         return left
 
     def _disconnect(self, client: viser.ClientHandle) -> None:
-        """End the session of a tab that is gone, and keep what it leaves for a while."""
-        self._arrivals.forget(client.client_id)
+        """End the session of a tab that is gone."""
+        self._end(client.client_id)
+
+    def _end_left(self) -> None:
+        """End the sessions whose connection is gone, should viser fail to say so."""
+        while not self._ended.wait(WATCH_S):
+            connected = self._server.get_clients()
+            with self._lock:
+                left = self._sessions.keys() - connected.keys()
+            for client_id in left:
+                self._end(client_id)
+
+    def _end(self, client_id: int) -> None:
+        """End a session, and keep what its tab leaves for a while."""
+        self._arrivals.forget(client_id)
         with self._lock:
-            session = self._sessions.pop(client.client_id, None)
-            if session is not None:
+            session = self._sessions.pop(client_id, None)
+            if session is None:
+                return
+            try:
                 self._memory.keep(session.token, session.record())
-        if session is not None:
-            session.stop()
+            finally:
+                session.stop()
 
     def stop(self) -> None:
         """End all sessions and the server."""
+        self._ended.set()
         for session in self.sessions:
             session.stop()
         with contextlib.redirect_stdout(io.StringIO()):
@@ -222,6 +245,7 @@ def _with(scene: Scene, scenes: Mapping[str, Scene]) -> dict[str, Scene]:
 
 def _serve(address: str, port: int, guard: Guard) -> viser.ViserServer:
     """Start viser's server behind the guard, without its banner and without its public tunnel."""
+    guard_server()
     with contextlib.redirect_stdout(io.StringIO()), serve_with(guard.options) as guarded:
         server = viser.ViserServer(host=address, port=port, verbose=False)
     if not guarded:
@@ -233,6 +257,7 @@ def _serve(address: str, port: int, guard: Guard) -> viser.ViserServer:
     if server.get_port() != port:
         server.stop()
         raise OptionError(f"--port {port} has just been taken by another program; try again")
+    guard_widgets(server)
     # any tab could ask for a tunnel through a public relay
     server.request_share_url = lambda *_args, **_kwargs: None
     return server

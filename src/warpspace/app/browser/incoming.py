@@ -1,0 +1,202 @@
+"""What a page may say: every message of a client is checked here before viser acts on it.
+
+viser builds an object of whatever kind a message names and sets whatever attribute of a widget it
+names. Here only the kinds the app has a use for pass, with fields of the right type and size and
+with finite numbers; of a widget a page sets nothing but `value`, to something of the kind it shows.
+What is refused is left out and the connection stays open, since a new one would cost the server
+more than a message that is dropped.
+"""
+
+import logging
+import struct
+from typing import Annotated, Any
+
+import msgspec
+from msgspec import Meta, Struct
+from viser import ClientHandle, ViserServer
+
+from warpspace.app.browser.viser_private import check_messages, check_updates, log_failures
+
+logger = logging.getLogger(__name__)
+LARGEST_NUMBER = 1e9
+LONGEST_NAME = 1_000
+LONGEST_TEXT = 1_000_000
+"""Of the value of a text field, characters."""
+MOST_NUMBERS = 16
+"""In the value of a widget that shows several."""
+LARGEST_SIDE_PX = 16_384
+"""Of the page's picture, and of a picture that it renders."""
+PNG_START = b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR"
+
+Number = Annotated[float, Meta(ge=-LARGEST_NUMBER, le=LARGEST_NUMBER)]  # NaN is neither
+Side = Annotated[float, Meta(ge=0, le=LARGEST_SIDE_PX)]
+Count = Annotated[int, Meta(ge=0, le=2**40)]
+Name = Annotated[str, Meta(max_length=LONGEST_NAME)]
+Text = Annotated[str, Meta(max_length=LONGEST_TEXT)]
+Numbers = Annotated[tuple[Number, ...], Meta(max_length=MOST_NUMBERS)]
+Vector = tuple[Number, Number, Number]
+Value = bool | Number | Text | Numbers
+
+
+class Update(Struct, forbid_unknown_fields=True):
+    """What is set: the value and, where a page says who it is, its width."""
+
+    value: Value
+    width: Number | None = None
+
+
+class WidgetChanged(Struct, tag_field="type", tag="GuiUpdateMessage", forbid_unknown_fields=True):
+    """A widget was moved, clicked or written into, or a script of ours answers."""
+
+    uuid: Name
+    updates: Update
+
+
+class CameraMoved(Struct, tag_field="type", tag="ViewerCameraMessage", forbid_unknown_fields=True):
+    """The page's camera; the first one opens the session."""
+
+    wxyz: tuple[Number, Number, Number, Number]
+    position: Vector
+    fov: Annotated[float, Meta(gt=0, lt=3.1416)]
+    near: Number
+    far: Number
+    image_height: Side
+    image_width: Side
+    look_at: Vector
+    up_direction: Vector
+
+
+class DrawingClicked(
+    Struct, tag_field="type", tag="ScenePointerMessage", forbid_unknown_fields=True
+):
+    """A click in the drawing."""
+
+    event_type: Annotated[str, Meta(pattern="^click$")]
+    ray_origin: Vector
+    ray_direction: Vector
+    screen_pos: tuple[tuple[Number, Number]]
+    modifier: Annotated[str, Meta(max_length=40)] | None
+
+
+class CommandChosen(
+    Struct, tag_field="type", tag="CommandTriggerMessage", forbid_unknown_fields=True
+):
+    """A command of the palette, or its key."""
+
+    uuid: Name
+
+
+class UploadStarted(
+    Struct, tag_field="type", tag="FileTransferStartUpload", forbid_unknown_fields=True
+):
+    """A file is about to be sent; `uploads.py` bounds its size."""
+
+    source_component_uuid: Name
+    transfer_uuid: Name
+    filename: Name
+    mime_type: Name
+    part_count: Count
+    size_bytes: Count
+
+
+class UploadContinued(Struct, tag_field="type", tag="FileTransferPart", forbid_unknown_fields=True):
+    """A part of a file."""
+
+    source_component_uuid: Name | None
+    transfer_uuid: Name
+    part_index: Count
+    content: bytes
+
+
+class PictureRendered(
+    Struct, tag_field="type", tag="GetRenderResponseMessage", forbid_unknown_fields=True
+):
+    """The picture that the app has asked for, a PNG."""
+
+    payload: bytes
+    render_uuid: Name
+
+
+_READER = msgspec.msgpack.Decoder(
+    WidgetChanged
+    | CameraMoved
+    | DrawingClicked
+    | CommandChosen
+    | UploadStarted
+    | UploadContinued
+    | PictureRendered
+)
+
+
+def guard_server() -> None:
+    """Have all that servers are sent from now on checked, and what fails logged, not printed."""
+    check_messages(may_pass)
+    log_failures(lambda error: logger.error("a callback failed", exc_info=error))
+
+
+def guard_widgets(owner: ViserServer | ClientHandle) -> None:
+    """Have what a page sets of widgets checked; before there are any."""
+    check_updates(owner, may_set)
+
+
+def may_pass(raw: bytes) -> bool:
+    """Tell whether a message of a page may reach viser.
+
+    Parameters
+    ----------
+    raw : bytes
+        As it has come over the socket.
+    """
+    try:
+        message = _READER.decode(raw)
+    except ValueError:  # not msgpack, another kind, other fields, other types, not finite
+        fine = False
+    else:
+        fine = not isinstance(message, PictureRendered) or _is_picture(message.payload)
+    if not fine:
+        logger.warning("a page has sent a message that the app has no use for; it is left out")
+    return fine
+
+
+def may_set(
+    present: object, updates: dict[str, Any], options: tuple[str, ...] | None = None
+) -> bool:
+    """Tell whether a page may update a widget.
+
+    Parameters
+    ----------
+    present : object
+        The value that the widget has.
+    updates : dict
+        What the page wants to set, by name.
+    options : tuple of str, optional
+        What there is to choose from.
+    """
+    fine = updates.keys() == {"value"} and _is_alike(present, updates["value"])
+    if fine and options is not None:
+        fine = updates["value"] in options
+    if not fine:
+        logger.warning("a page has sent a value that its widget cannot have; it is left out")
+    return fine
+
+
+def _is_alike(present: object, value: object) -> bool:
+    """Tell whether a value is of the kind of another: flag, text, number or numbers."""
+    if isinstance(present, tuple):
+        return (
+            isinstance(value, list | tuple)
+            and len(value) == len(present)
+            and all(map(_is_alike, present, value))
+        )
+    if isinstance(present, bool | str):
+        return type(value) is type(present)
+    if isinstance(present, int | float):
+        return isinstance(value, int | float) and not isinstance(value, bool)
+    return False
+
+
+def _is_picture(payload: bytes) -> bool:
+    """Tell whether a payload is a PNG that can be unpacked without taking all memory."""
+    if not payload.startswith(PNG_START) or len(payload) < len(PNG_START) + 8:
+        return False
+    return max(struct.unpack_from(">II", payload, len(PNG_START))) <= LARGEST_SIDE_PX
