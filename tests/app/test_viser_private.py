@@ -2,12 +2,14 @@
 
 import ast
 import asyncio
+import importlib
 import threading
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import msgspec.msgpack
 import pytest
 import viser
 from viser import _messages as messages
@@ -42,6 +44,10 @@ CLIENT = (
     "gui._handle_file_transfer_start",
     "gui._handle_file_transfer_part",
     "gui._current_file_upload_states",
+    "gui._websock_interface.register_handler",
+    "gui._websock_interface.unregister_handler",
+    "gui._handle_gui_updates",
+    "gui._gui_input_handle_from_uuid",
 )
 MESSAGES = {
     "RunJavascriptMessage": {"source"},
@@ -60,6 +66,12 @@ MESSAGES = {
         "transferred_bytes",
         "total_bytes",
     },
+    "ReplayDoneMessage": set(),
+}
+PRINTS = {
+    "_gui_api": {"print_threadpool_errors"},
+    "_scene_api": {"print_threadpool_errors", "print_awaited_callback_error"},
+    "_viser": {"print_threadpool_errors"},
 }
 
 
@@ -77,8 +89,6 @@ def look_up(owner: Any, path: str) -> Any:
 
 @pytest.fixture(scope="module")
 def client() -> Iterator[tuple[viser.ViserServer, viser.ClientHandle]]:
-    import msgspec.msgpack
-
     with (
         Viewer(load_scene("dvf5000_nominal")) as running,
         connect(
@@ -139,6 +149,29 @@ def test_messages_have_the_fields_that_are_used(name: str, fields: set[str]) -> 
     look_up(messages, name)
     missing = fields - set(getattr(messages, name).__annotations__)
     assert not missing, f"viser {viser.__version__}: {name} lacks {sorted(missing)}"
+
+
+@pytest.mark.parametrize(("name", "functions"), PRINTS.items())
+def test_modules_have_the_functions_that_print_what_fails(name: str, functions: set[str]) -> None:
+    for function in functions:
+        look_up(importlib.import_module(f"viser.{name}"), function)
+
+
+def test_messages_of_a_page_are_checked_before_they_are_read(client: Any) -> None:
+    assert look_up(client[0], "_websock_server._message_class") is messages.Message
+    raw = msgspec.msgpack.encode({"type": "GuiFormDirtyMessage", "uuid": "a"})
+    assert type(messages.Message.deserialize(raw)) is messages.ReplayDoneMessage
+    assert type(messages.Message.deserialize(msgspec.msgpack.encode(CAMERA))) is (
+        messages.ViewerCameraMessage
+    )
+    handlers = look_up(client[0], "_websock_server._incoming_handlers")
+    assert messages.ReplayDoneMessage not in handlers
+
+
+def test_updates_of_widgets_are_checked_on_server_and_client(client: Any) -> None:
+    for owner in client:
+        handlers = owner.gui._websock_interface._incoming_handlers[messages.GuiUpdateMessage]
+        assert owner.gui._handle_gui_updates not in handlers
 
 
 def test_only_its_own_thread_wakes_a_sender() -> None:

@@ -9,10 +9,11 @@ import contextlib
 import threading
 from collections.abc import Callable, Generator
 from concurrent.futures import Future
+from importlib import import_module
 from typing import Any, TypeAlias
 
 import websockets.asyncio.server
-from viser import ClientHandle, ViserServer, _gui_api, _scene_api, _viser  # pyright: ignore[reportPrivateUsage]
+from viser import ClientHandle, ViserServer
 from viser import _messages as messages
 
 StartUpload: TypeAlias = messages.FileTransferStartUpload
@@ -241,7 +242,7 @@ def log_failures(log: Callable[[BaseException], object]) -> None:
         if not future.cancelled() and (error := future.exception()) is not None:
             log(error)
 
-    for module in (_gui_api, _scene_api, _viser):
+    for module in map(import_module, ("viser._gui_api", "viser._scene_api", "viser._viser")):
         for name, replaced in (
             ("print_threadpool_errors", of_future),
             ("print_awaited_callback_error", log),
