@@ -129,11 +129,11 @@ MALFORMED = {
     ),
     "factor too large": (
         DVF + "view.exaggeration = 1e7",
-        "view.exaggeration = 10000000.0: expected 0.001 to 1,000,000",
+        "view.exaggeration = 10000000.0: expected at most 1,000,000",
     ),
     "factor too small": (
         DVF + "view.exaggeration = 5e-324",
-        "view.exaggeration = 5e-324: expected 0, or at least",
+        "view.exaggeration = 5e-324: expected at least 0.001",
     ),
     "tolerance too small": (
         DVF + "tolerances.EXX = 5e-324",

@@ -28,6 +28,8 @@ MAX_ORDER = 1000
 MAX_POINTS = 100_000
 """Points of a table, rows of a CSV file."""
 MAX_CSV_COLUMNS = 256
+MAX_CSV_LINES = 500_000
+"""Blank ones included."""
 MAX_CSV_LINE = 16_384
 """Characters of one line."""
 

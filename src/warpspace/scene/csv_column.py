@@ -2,12 +2,13 @@
 
 import csv
 import math
+from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO
 
 from warpspace.exceptions import SceneError, near_miss
-from warpspace.machine.limits import MAX_CSV_BYTES, MAX_CSV_COLUMNS, MAX_CSV_LINE
+from warpspace.machine.limits import MAX_CSV_BYTES, MAX_CSV_COLUMNS, MAX_CSV_LINE, MAX_CSV_LINES
 from warpspace.scene.files import check_file, read_text
 from warpspace.scene.words import spell_value
 
@@ -73,6 +74,9 @@ class _Lines:
             if len(line) > MAX_CSV_LINE:
                 found = f"is longer than {MAX_CSV_LINE:,} characters; expected at most so many"
                 raise SceneError(self._source, [f"line {self.number} {found}"])
+            if self.number > MAX_CSV_LINES:
+                found = f"has more than {MAX_CSV_LINES:,} lines; expected at most so many"
+                raise SceneError(self._source, [found])
             if self.since_row > _MAX_LINES_OF_ROW:
                 raise csv.Error(f"line {self.number}: a quoted text does not end")
             yield line
@@ -99,13 +103,17 @@ def _rows(file: TextIO, source: str, max_rows: int) -> Iterator[Row]:
 def _points(
     rows: Iterator[Row], column: str, limit: float, source: str, max_rows: int
 ) -> list[tuple[float, float]]:
-    """Read the points row by row; the first problem is the one that is reported."""
+    """Read the points row by row; of problems in rows the first is reported."""
     points: list[tuple[float, float]] = []
     _, first = next(rows, (0, []))
     header = [name.strip() for name in first]
     index = _column(header, column, source) if header else 0
     for line, row in rows:
-        points.append(_point(line, row, len(header), index, limit, points, source))
+        try:
+            points.append(_point(line, row, len(header), index, limit, points, source))
+        except SceneError:
+            deque(rows, maxlen=0)  # that the rows are too many, or no CSV, is said before
+            raise
     if not points:
         found = "has 0 rows below the header"
         raise SceneError(source, [f"{found}; expected a header and 1 to {max_rows} rows"])

@@ -73,14 +73,15 @@ def _at_least(smallest: float) -> AfterValidator:
 def _drawable(value: float) -> float:
     """Refuse display factors that nothing can be drawn with."""
     low, high = EXAGGERATION
-    if not low <= value <= high:
-        raise PydanticCustomError(
-            "exaggeration", "expected {low} to {high}", {"low": f"{low:g}", "high": f"{high:,.0f}"}
-        )
+    if value > high:
+        raise PydanticCustomError("large", "expected at most {high}", {"high": f"{high:,.0f}"})
+    if value < low:
+        raise PydanticCustomError("small", "expected at least {low}", {"low": f"{low:g}"})
     return value
 
 
-Finite = Annotated[float, Field(strict=True, allow_inf_nan=False), _at_least(MIN_NUMBER)]
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Finite = Annotated[Number, _at_least(MIN_NUMBER)]
 Length = Annotated[Finite, Field(ge=-MAX_LENGTH_MM, le=MAX_LENGTH_MM)]
 ErrorValue = Annotated[Finite, Field(ge=-MAX_ERROR, le=MAX_ERROR)]
 HalfWidth = Annotated[Finite, Field(ge=0, le=MAX_ERROR), _at_least(MIN_HALF_WIDTH)]
@@ -152,7 +153,7 @@ class ViewSection(Section):
 
     exaggeration: Annotated[
         Annotated[Literal["auto"], Tag("word")]
-        | Annotated[Finite, Field(gt=0), AfterValidator(_drawable), Tag("number")],
+        | Annotated[Number, Field(gt=0), AfterValidator(_drawable), Tag("number")],
         Discriminator(lambda value: "word" if isinstance(value, str) else "number"),
     ] = "auto"
     reference: Annotated[

@@ -102,10 +102,10 @@ def test_empty_tables_are_counted() -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        '"""\n' + '\\"""\n' * 700_000 + "\\",
-        "'''\n" + "''\n" * 1_000_000,
-        '"' * 4_000_000,
-        "=" * 4_000_000,
+        '"""\n' + '\\"""\n' * 200_000 + "\\",
+        "'''\n" + "''\n" * 300_000,
+        '"' * 1_000_000,
+        "=" * 1_000_000,
     ],
     ids=["escaped quotes", "single quotes", "quotes", "signs"],
 )

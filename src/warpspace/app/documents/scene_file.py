@@ -40,7 +40,7 @@ MAX_COMPARED = 400_000
 """Characters of a comparison in a file."""
 MAX_PACKED_TEXT = 1_000_000
 SCENE, PACKED, NAME = "scene", "file", "name"
-_HEAD = re.compile(r"(?:[ \t]*(?:#[^\n]*)?\n)*")
+_HEAD = re.compile(r"(?:[ \t]*+(?:#[^\n]*+)?\n)*+")
 _VIEW, _COMPARISON = (
     re.compile(rf"^{re.escape(mark)}(\S*)\s*$", re.MULTILINE) for mark in (MARK, COMPARED)
 )
