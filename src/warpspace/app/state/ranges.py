@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from warpspace.machine.limits import MAX_ERROR, MIN_HALF_WIDTH
+from warpspace.machine.limits import MAX_ERROR, MIN_HALF_WIDTH, MIN_NUMBER
 from warpspace.machine.parameters import parameter
 from warpspace.machine.tolerances import Tolerance
 from warpspace.scene.model import Scene
@@ -36,7 +36,8 @@ class Span:
         """Bring a number that may be anything into the range; what is no number falls back."""
         if math.isnan(value):
             return fallback
-        return min(max(value, self.low), self.high)
+        kept = min(max(value, self.low), self.high)
+        return 0.0 if 0.0 < abs(kept) < MIN_NUMBER else kept
 
 
 def round_up(value: float) -> float:
