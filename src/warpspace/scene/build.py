@@ -238,7 +238,7 @@ def _costly_notes(errors: ErrorSet) -> tuple[str, ...]:
         return ()
     terms = sum(len(curve.terms) for curve in waves)
     found = f"errors: {len(waves)} curves with {terms} harmonics, many of short wavelength"
-    return (f"{found}: each change of a rotary position takes seconds; fewer terms are faster",)
+    return (f"{found}: opening the scene takes seconds; fewer terms are faster",)
 
 
 def _carried_notes(machine: Machine, errors: ErrorSet) -> tuple[str, ...]:
