@@ -10,6 +10,8 @@ import pytest
 import viser
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from warpspace.app.viewport.layers.other import OtherLayer
+from warpspace.app.viewport.layers.why import WhyLayer
 
 from random_scenes import scenes
 from warpspace import to_pyvista
@@ -33,9 +35,7 @@ from warpspace.app.viewport.layers.annotations import AnnotationsLayer, bar_line
 from warpspace.app.viewport.layers.axes import AxesLayer, axes_room_mm
 from warpspace.app.viewport.layers.box import BoxLayer, ghost_dashes
 from warpspace.app.viewport.layers.machine import MachineLayer
-from warpspace.app.viewport.layers.other import OtherLayer
 from warpspace.app.viewport.layers.traces import TracesLayer
-from warpspace.app.viewport.layers.why import WhyLayer
 from warpspace.app.viewport.named_views import VIEWS, CameraSetup, view_pose
 from warpspace.kinematics.model import Loop
 from warpspace.machine.parameters import LINEAR_AXES
