@@ -1,6 +1,7 @@
 """A comparison, a point of a trace and a lever in files and links: identical, or one message."""
 
 import base64
+import tracemalloc
 import zlib
 from dataclasses import fields, replace
 from urllib.parse import urlencode
@@ -9,7 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from warpspace.app.documents.scene_file import open_link, open_text, state_to_link, state_to_toml
+from warpspace.app.documents.links import pack, unpack
+from warpspace.app.documents.scene_file import (
+    is_looked_at,
+    open_link,
+    open_text,
+    state_to_link,
+    state_to_toml,
+)
 from warpspace.app.documents.stored_comparison import NAMES, PREFIX
 from warpspace.app.evaluation.compare import pinned_side, scene_side, with_pin, with_sides
 from warpspace.app.evaluation.conventions import with_choice
@@ -206,3 +214,30 @@ def test_a_link_to_a_scene_that_only_this_tab_has_carries_it() -> None:
     mine = start_state(replace(SECOND, name="dvf5000_first", title="Mine"))
     back, _ = open_link(state_to_link(mine, None, KNOWN), KNOWN)
     assert back == mine
+
+
+def test_a_short_link_with_one_key_of_many_parts_is_refused_at_once() -> None:
+    """Such a link of 419 characters took 7.7 GB."""
+    text = 'machine = "dvf5000"\na' + ".a" * 40_000 + " = 1\n"
+    link = urlencode({"name": "x", "file": packed(text)})
+    assert len(link) < 600
+    with pytest.raises(SceneError, match="the scene in the link: line 2: a key of over 8 parts"):
+        open_link(link, KNOWN)
+    with pytest.raises(SceneError, match=r"x.toml: line 2: a key of over 8 parts"):
+        open_text(text, "x", "x.toml")
+
+
+def test_a_link_longer_than_an_address_is_not_unpacked() -> None:
+    with pytest.raises(OptionError, match="expected at most 8,000"):
+        unpack("A" * 8_001)
+    assert unpack(pack("scene=dvf5000_first")) == "scene=dvf5000_first"
+
+
+@pytest.mark.parametrize("text", ["\n" * 300_000, "#\n" * 200_000, "# warpspace-view: a\n" * 9])
+def test_remarks_at_the_head_of_a_file_take_little_memory(text: str) -> None:
+    tracemalloc.start()
+    try:
+        is_looked_at(text)
+        assert tracemalloc.get_traced_memory()[1] < 5e6
+    finally:
+        tracemalloc.stop()

@@ -1,8 +1,13 @@
 """CSV files of a scene that cannot be used: the message names scene, key, CSV file and line."""
 
+import os
+import tracemalloc
 from pathlib import Path
 
 import pytest
+
+from warpspace.exceptions import SceneError
+from warpspace.scene.csv_column import read_csv_column
 
 CSV_PROBLEMS = {
     "ragged": ("q,pitch\n0,1\n1,2,3\n", "line 3 has 3 fields; expected 2 as in the header"),
@@ -76,3 +81,48 @@ def test_csv_from_a_spreadsheet_is_read(scene: Path, warpspace) -> None:
     scene.with_name("x.csv").write_bytes(text.replace(', "', ',"').encode())
     result = warpspace("field", scene, "--at", "X=0,Y=0,Z=0", "--json")
     assert result.status == 0, result.err
+
+
+@pytest.mark.parametrize("name", ["/dev/zero", "/dev/null", "pipe"])
+def test_device_or_pipe_is_refused_unread(name: str, tmp_path: Path, warpspace) -> None:
+    if name == "pipe":
+        os.mkfifo(tmp_path / name)
+    path = tmp_path / "scene.toml"
+    path.write_text(
+        f'machine = "dvf5000"\n[errors]\nEBX = {{ csv = "{name}", column = "p" }}\n',
+        encoding="utf-8",
+    )
+    warpspace("check", path).refused("errors.EBX", "is no regular file; expected a file")
+
+
+LONG = {
+    "short rows": ("q,pitch\n" + "0,1\n" * 1_000_000, "has more than 100000 rows"),
+    "blank rows": ("q,pitch\n" + "\n" * 600_000, "has more than 500,000 lines"),
+    "one row": ("q,pitch\n" + "," * 10_000_000, "line 2 is longer than 16,384 characters"),
+    "many columns": ("q" + ",p" * 300 + "\n0,1\n", "line 1 has 301 fields; expected at most 256"),
+    "row over many lines": ("q,pitch\n" + '"\n",' * 1_000_000, "is not valid CSV: line 22"),
+}
+
+
+@pytest.mark.parametrize("case", LONG)
+def test_long_csv_is_read_in_little_memory(case: str, tmp_path: Path) -> None:
+    """64 MB of short rows took 3.6 GB and 22 s, a million of them above 200 MB."""
+    text, fragment = LONG[case]
+    path = tmp_path / "x.csv"
+    path.write_text(text, encoding="utf-8")
+    del text
+    tracemalloc.start()
+    try:
+        with pytest.raises(SceneError) as caught:
+            read_csv_column(path, "pitch", 1e5, 100_000)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert fragment in str(caught.value)
+    assert peak < 20e6
+
+
+def test_a_header_may_have_a_line_break_in_a_name(tmp_path: Path) -> None:
+    path = tmp_path / "x.csv"
+    path.write_text('"q\n[mm]",pitch\n0,1\n', encoding="utf-8")
+    assert read_csv_column(path, "pitch", 1e5, 10) == [(0.0, 1.0)]

@@ -119,10 +119,27 @@ MALFORMED = {
     "key twice": (DVF + DVF, "is not valid TOML", "line 2"),
     "lists nested deeply": (DVF + f"title = {'[' * 99999}", "is not valid TOML: nested too deeply"),
     "keys nested deeply": (
-        DVF + f"errors.EAX.{'a.' * 2000}a = 1",
+        DVF + f"errors.EAX.{'a.' * 4}a = 1",
         "errors.EAX = { a = { a = ",
         FORMS,
     ),
+    "key of many parts": (
+        DVF + f"errors.EAX.{'a.' * 2000}a = 1",
+        "line 2: a key of over 8 parts; expected at most 8",
+    ),
+    "factor too large": (
+        DVF + "view.exaggeration = 1e7",
+        "view.exaggeration = 10000000.0: expected at most 1,000,000",
+    ),
+    "factor too small": (
+        DVF + "view.exaggeration = 5e-324",
+        "view.exaggeration = 5e-324: expected at least 0.001",
+    ),
+    "tolerance too small": (
+        DVF + "tolerances.EXX = 5e-324",
+        "tolerances.EXX = 5e-324: expected 0, or at least",
+    ),
+    "error too small": (DVF + "errors.EXX = 5e-324", "errors.EXX = 5e-324: expected 0, or at"),
     "empty file": ("", "machine: is missing"),
 }
 

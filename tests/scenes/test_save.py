@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from warpspace import evaluate, load_scene, scene_names
 from warpspace.machine.errors import Constant, ErrorSet, Harmonics, Poly, Ramp, Table
+from warpspace.machine.limits import MIN_HALF_WIDTH
 from warpspace.machine.tolerances import Tolerance, ToleranceSet
 from warpspace.scene.library import parse_scene
 from warpspace.scene.save import scene_to_toml
@@ -27,7 +28,7 @@ def test_every_bundled_scene_reloads_identically(name: str) -> None:
     title=st.text(max_size=60),
     value=finite,
     centre=finite,
-    half=st.floats(0, 1e3),
+    half=st.just(0.0) | st.floats(MIN_HALF_WIDTH, 1e3),
     rows=st.lists(st.tuples(finite, finite), min_size=1, max_size=20, unique_by=lambda row: row[0]),
     exaggeration=st.none() | st.floats(1e-3, 1e6),
 )

@@ -30,9 +30,11 @@ from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import View
 from warpspace.field.grid import Workspace
 from warpspace.kinematics.model import Loop, Model
+from warpspace.machine.limits import SAMPLES
 from warpspace.units import Array
 
-DEFAULT_SAMPLES, MAX_SAMPLES = 100_000, 1_000_000_000
+DEFAULT_SAMPLES = 100_000
+MIN_SAMPLES, MAX_SAMPLES = SAMPLES
 DEFAULT_NODES = 11
 CHUNK = 8192
 """Machines per random stream; part of what a seed means, so not to be changed lightly."""
@@ -77,7 +79,7 @@ class Plan:
         OptionError
             Naming the value and what was expected.
         """
-        if not 1 <= self.samples <= MAX_SAMPLES:
+        if not MIN_SAMPLES <= self.samples <= MAX_SAMPLES:
             raise OptionError(f"samples: {self.samples}; expected 1 to {MAX_SAMPLES:,}")
         if self.seed < 0:
             raise OptionError(f"seed: {self.seed}; expected a whole number, 0 or above")

@@ -11,6 +11,9 @@ from warpspace.outputs.exports.formats import (
 
 __all__ = ["embed_view", "export_formats", "write_export", "write_page"]
 
+BYTES_PER_RESPONSE = 48
+"""Position and orientation error of one node to one parameter: six numbers."""
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -19,10 +22,17 @@ if TYPE_CHECKING:
 
 
 def write_page(picture: "ScenePicture", target: "Path", *, overwrite: bool) -> None:
-    """Write the interactive scene as one page that needs no network."""
+    """Write the interactive scene as one page that needs no network.
+
+    Raises
+    ------
+    OptionError
+        If the grid is too fine: the page is built from the response to every parameter.
+    """
     from warpspace.app.documents.offline_page import build_offline_html, offline_picture
     from warpspace.outputs.files import write_atomically
 
+    _check_size(picture)
     live = offline_picture(
         picture.scene,
         exaggeration=picture.exaggeration,
@@ -33,6 +43,23 @@ def write_page(picture: "ScenePicture", target: "Path", *, overwrite: bool) -> N
     page = build_offline_html(live, picture.provenance)
     with write_atomically(target, overwrite=overwrite) as temporary:
         temporary.write_text(page, encoding="utf-8")
+
+
+def _check_size(picture: "ScenePicture") -> None:
+    """Refuse a page that takes too much memory to build, before it is built."""
+    from warpspace.exceptions import OptionError
+    from warpspace.machine.limits import MAX_PAGE_BYTES
+
+    nodes, keys = picture.values.size, len(picture.scene.parameter_keys)
+    needed = nodes * keys * BYTES_PER_RESPONSE
+    if needed > MAX_PAGE_BYTES:
+        per_axis = max(picture.grid.shape)
+        fits = int(per_axis * (MAX_PAGE_BYTES / needed) ** (1.0 / 3.0))
+        raise OptionError(
+            f"grid {per_axis}: the page needs about {needed / 1e9:.1f} GB of memory for"
+            f" {keys} parameters at {nodes:,} nodes; expected at most {MAX_PAGE_BYTES / 1e9:.1f} GB"
+            f" (--grid {fits}, or a .vts or .csv file, which hold any grid)"
+        )
 
 
 register_format(

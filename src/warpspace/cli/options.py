@@ -160,4 +160,9 @@ def parse_exaggeration(text: str | None) -> float | Literal["auto"] | None:
 
 def print_json(value: Mapping[str, object]) -> None:
     """Print one JSON object; numbers that are not finite are refused rather than misspelt."""
-    click.echo(json.dumps(value, ensure_ascii=False, allow_nan=False))
+    click.echo(spell_json(value))
+
+
+def spell_json(value: object) -> str:
+    """Spell a value as JSON; numbers that are not finite are refused rather than misspelt."""
+    return json.dumps(value, ensure_ascii=False, allow_nan=False)

@@ -11,10 +11,12 @@ from warpspace.exceptions import OptionError
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, nominal_point
 from warpspace.kinematics.model import Coordinates, Loop, Model
+from warpspace.machine.limits import GRID_NODES
 from warpspace.machine.parameters import LINEAR_AXES
 from warpspace.units import Array
 
-MIN_NODES, MAX_NODES, DEFAULT_NODES = 2, 101, 21
+DEFAULT_NODES = 21
+MIN_NODES, MAX_NODES = GRID_NODES
 
 
 @dataclass(frozen=True, slots=True)

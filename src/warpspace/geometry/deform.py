@@ -2,13 +2,13 @@
 
 import math
 
+from warpspace.machine.limits import EXAGGERATION
 from warpspace.units import MM_PER_UM, Array
 
 TARGET_FRACTION = 0.1
 """Largest displacement on screen, as a fraction of the volume's longest edge, that auto aims at."""
 NEUTRAL_EXAGGERATION = 1000.0
 """What auto chooses where nothing is displaced."""
-MAX_EXAGGERATION = 1e6
 _ROUND = (1.0, 2.0, 5.0, 10.0)
 
 
@@ -46,10 +46,11 @@ def auto_exaggeration(largest_um: float, longest_edge_mm: float) -> float:
         The number 1, 2 or 5 × 10ⁿ nearest (in ratio) to the one that makes the largest displacement
         a tenth of the longest edge; 1000 where nothing is displaced.
     """
-    if not largest_um > 0.0 or not longest_edge_mm > 0.0:
+    largest_mm = largest_um * MM_PER_UM  # zero also where an error is too small to be divided by
+    if not largest_mm > 0.0 or not longest_edge_mm > 0.0:
         return NEUTRAL_EXAGGERATION
-    wanted = TARGET_FRACTION * longest_edge_mm / (largest_um * MM_PER_UM)
-    wanted = min(max(wanted, 1.0), MAX_EXAGGERATION)
+    wanted = TARGET_FRACTION * longest_edge_mm / largest_mm
+    wanted = min(max(wanted, 1.0), EXAGGERATION[1])
     decade = 10.0 ** math.floor(math.log10(wanted))
     return min((step * decade for step in _ROUND), key=lambda value: abs(math.log(value / wanted)))
 

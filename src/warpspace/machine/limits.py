@@ -1,5 +1,72 @@
-"""The largest magnitudes that the model takes, whoever gives them."""
+"""Every limit on what a user may give, in one table: for files, options, widgets and drawing.
+
+Where a limit is a pair of numbers both ends are allowed. Whatever lies within passes through the
+whole program; whatever lies beyond is refused where it comes in, or brought back by a widget.
+"""
+
+import sys
+
+# --- the model ------------------------------------------------------------------------------------
 
 MAX_ERROR = 1e5
 """100 mm in µm and 0.1 rad in µrad: no rigid-body model of small errors holds beyond."""
 MAX_LENGTH_MM = 1e5
+"""Of coordinates, offsets, travels (mm or degrees) and phases."""
+MIN_SPAN = 1e-6
+"""Millimetres or degrees: a range narrower than a nanometre is empty."""
+MIN_NUMBER = sys.float_info.min
+"""Smallest magnitude beside 0: below it a processor holds fewer digits, and quotients overflow."""
+MIN_HALF_WIDTH = 1e-6
+"""µm or µrad: smallest half width of a tolerance beside 0, a picometre."""
+
+# --- error curves ---------------------------------------------------------------------------------
+
+MAX_COEFFICIENTS = 16
+MAX_TERMS = 64
+"""Harmonics of one curve."""
+MAX_ORDER = 1000
+MAX_POINTS = 100_000
+"""Points of a table, rows of a CSV file."""
+MAX_CSV_COLUMNS = 256
+MAX_CSV_LINES = 500_000
+"""Blank ones included."""
+MAX_CSV_LINE = 16_384
+"""Characters of one line."""
+
+# --- scene files ----------------------------------------------------------------------------------
+
+MAX_SCENE_BYTES = 4 * 1024 * 1024
+MAX_PACKED_TEXT = 1_000_000
+"""Bytes of a scene in a link, unpacked."""
+MAX_CSV_BYTES = 64 * 1024 * 1024
+MAX_KEY_PARTS = 8
+"""Parts of one key, dots between them; `tolerances.default.translation` has three."""
+MAX_NESTING = 32
+"""Lists and tables within each other."""
+MAX_KEYS = 50_000
+"""Parts of all keys of a file together."""
+MAX_TEXT = 4000
+"""Characters of a title or description."""
+MAX_TRACES = 64
+
+# --- how a scene is looked at ---------------------------------------------------------------------
+
+EXAGGERATION = (1e-3, 1e6)
+RANGE_TOP = (1e-3, 1e6)
+"""Upper end of a colour scale, µm or µrad."""
+GRID_NODES = (2, 101)
+"""Nodes per axis of a computed grid."""
+LIVE_NODES = (3, 31)
+"""Nodes per axis in the app, an odd number."""
+MAX_PAGE_BYTES = 600 * 1024 * 1024
+"""Memory that the responses of an offline page may take while it is built."""
+
+# --- figures, animations, samples -----------------------------------------------------------------
+
+MIN_FIGURE_PX = (400, 300)
+"""Width and height."""
+MAX_FIGURE_SIDE_PX = 12_000
+MAX_FIGURE_AREA_PX = 64_000_000
+ANIMATION_FRAMES = (2, 600)
+SAMPLES = (1, 1_000_000_000)
+"""Machines of a Monte Carlo run."""

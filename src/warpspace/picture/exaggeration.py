@@ -1,10 +1,10 @@
 """Which display factor a picture is drawn with: what is asked for, the scene's, or a round one."""
 
-import math
 from typing import Literal
 
 from warpspace.exceptions import OptionError
-from warpspace.geometry.deform import MAX_EXAGGERATION, auto_exaggeration
+from warpspace.geometry.deform import auto_exaggeration
+from warpspace.machine.limits import EXAGGERATION
 
 Exaggeration = float | Literal["auto"] | None
 """A display factor, "auto" for a round one that suits the errors, None for what the scene says."""
@@ -16,16 +16,15 @@ def given_exaggeration(wanted: Exaggeration, own: float | None) -> float | None:
     Raises
     ------
     OptionError
-        If it is no number above 0 and at most a million.
+        If it is no number from a thousandth to a million.
     """
     factor = own if wanted is None else wanted
     if factor is None or factor == "auto":
         return None
-    if not math.isfinite(factor) or not 0.0 < factor <= MAX_EXAGGERATION:
-        raise OptionError(
-            f"exaggeration {factor:g}; expected auto or a number above 0, at most"
-            f" {MAX_EXAGGERATION:,.0f}"
-        )
+    low, high = EXAGGERATION
+    if not low <= factor <= high:  # nor is NaN
+        found = f"exaggeration {factor:g}; expected auto or a number above 0"
+        raise OptionError(f"{found}, from {low:g} to {high:,.0f}")
     return float(factor)
 
 

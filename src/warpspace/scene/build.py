@@ -8,7 +8,7 @@ from warpspace.exceptions import SceneError, near_miss
 from warpspace.field.grid import Workspace
 from warpspace.kinematics.model import Model
 from warpspace.machine.description import Machine, build_machine
-from warpspace.machine.errors import ErrorFunction, ErrorSet
+from warpspace.machine.errors import ErrorFunction, ErrorSet, Harmonics
 from warpspace.machine.limits import MAX_ERROR
 from warpspace.machine.parameters import AXES, LINEAR_AXES, PARAMETERS, ErrorKind
 from warpspace.machine.tolerances import TOLERANCE_CLASSES, Tolerance, ToleranceSet
@@ -27,6 +27,8 @@ SECTIONS = (
     "tolerances",
     "view",
 )
+MANY_COSINES = 10_000_000
+"""Cosines that the curves of a scene take before it is said: about a second of computing."""
 Raw = Mapping[str, object]
 STAND_IN = build_machine("wFXYZABCt")
 """Has every axis there is: with it the rest of a document is checked whose machine is unusable."""
@@ -98,7 +100,11 @@ def build_scene(
         exaggeration=None if view.exaggeration == "auto" else float(view.exaggeration),
         reference=reference,
         description=texts.get("description") or "",
-        notes=(*_travel_notes(machine, workspace), *_carried_notes(machine, errors)),
+        notes=(
+            *_travel_notes(machine, workspace),
+            *_carried_notes(machine, errors),
+            *_costly_notes(errors),
+        ),
     )
 
 
@@ -223,6 +229,16 @@ def _travel_notes(machine: Machine, workspace: Workspace) -> tuple[str, ...]:
                 f" {first:g} … {last:g} {unit}"
             )
     return tuple(notes)
+
+
+def _costly_notes(errors: ErrorSet) -> tuple[str, ...]:
+    """Remark on harmonics that take long to evaluate: many terms with short waves."""
+    waves = [curve for curve in errors.functions.values() if isinstance(curve, Harmonics)]
+    if sum(curve.cosines for curve in waves) <= MANY_COSINES:
+        return ()
+    terms = sum(len(curve.terms) for curve in waves)
+    found = f"errors: {len(waves)} curves with {terms} harmonics, many of short wavelength"
+    return (f"{found}: opening the scene takes seconds; fewer terms are faster",)
 
 
 def _carried_notes(machine: Machine, errors: ErrorSet) -> tuple[str, ...]:

@@ -7,9 +7,8 @@ from warpspace.machine.curves.constant import Constant
 from warpspace.machine.curves.curve import ErrorFunction
 from warpspace.machine.curves.reading import MISSING, CsvColumn, Points, ValueReader, is_number
 from warpspace.machine.curves.registry import find_form, spell_forms
-from warpspace.machine.curves.table import MAX_POINTS
-from warpspace.machine.limits import MAX_ERROR
-from warpspace.scene.files import read_csv_column
+from warpspace.machine.limits import MAX_ERROR, MAX_POINTS
+from warpspace.scene.csv_column import read_csv_column
 from warpspace.scene.sections import Problems
 from warpspace.scene.words import location
 

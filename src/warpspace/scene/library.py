@@ -3,9 +3,10 @@
 from pathlib import Path
 
 from warpspace.exceptions import SceneError, near_miss
+from warpspace.machine.limits import MAX_SCENE_BYTES
 from warpspace.resources import scenes_dir
 from warpspace.scene.build import build_scene
-from warpspace.scene.files import MAX_SCENE_BYTES, parse_toml, read_text
+from warpspace.scene.files import parse_toml, read_text
 from warpspace.scene.machines import load_machine, machine_names, machine_of
 from warpspace.scene.model import Scene
 from warpspace.scene.sections import Problems

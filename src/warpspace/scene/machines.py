@@ -2,8 +2,9 @@
 
 from warpspace.exceptions import ChainError, SceneError, UnknownNameError
 from warpspace.machine.description import FIXED_FRAMES, Machine, build_machine, parse_chain
+from warpspace.machine.limits import MAX_SCENE_BYTES
 from warpspace.resources import assets_dir
-from warpspace.scene.files import MAX_SCENE_BYTES, parse_toml, read_text
+from warpspace.scene.files import parse_toml, read_text
 from warpspace.scene.sections import Problems
 
 

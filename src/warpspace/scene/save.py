@@ -7,6 +7,7 @@ import tomli_w
 
 from warpspace.exceptions import SceneError
 from warpspace.machine.description import DEFAULT_TRAVEL, ORIGIN, Machine
+from warpspace.machine.limits import MIN_NUMBER
 from warpspace.machine.parameters import PARAMETERS, Parameter
 from warpspace.machine.tolerances import Tolerance
 from warpspace.scene.machines import load_machine, machine_names
@@ -156,4 +157,8 @@ def _inline(value: object) -> str:
         return "[\n" + "".join(f"  {entry},\n" for entry in entries) + "]"
     if isinstance(value, str):
         return tomli_w.dumps({"value": value}).split("=", 1)[1].strip()
-    return repr(value) if isinstance(value, int) else repr(float(cast("float", value)))
+    if isinstance(value, int):
+        return repr(value)
+    number = float(cast("float", value))
+    # a scaled curve may hold numbers so small that no reader takes them
+    return repr(0.0 if 0.0 < abs(number) < MIN_NUMBER else number)

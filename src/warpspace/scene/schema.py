@@ -17,13 +17,16 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from warpspace.kinematics.conventions.registry import convention_names
-from warpspace.machine.limits import MAX_ERROR, MAX_LENGTH_MM
-
-MAX_EXAGGERATION = 1e7
-MAX_TRACES = 64
-MIN_SPAN = 1e-6
-"""Millimetres or degrees: a range narrower than a nanometre is empty."""
-MAX_TEXT = 4000
+from warpspace.machine.limits import (
+    EXAGGERATION,
+    MAX_ERROR,
+    MAX_LENGTH_MM,
+    MAX_TEXT,
+    MAX_TRACES,
+    MIN_HALF_WIDTH,
+    MIN_NUMBER,
+    MIN_SPAN,
+)
 
 
 def _entries(spelling: str) -> BeforeValidator:
@@ -54,10 +57,34 @@ def _whole_number(value: object) -> object:
     return value
 
 
-Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+def _at_least(smallest: float) -> AfterValidator:
+    """Refuse magnitudes so small that they are neither 0 nor of any use."""
+
+    def check(value: float) -> float:
+        if 0.0 < abs(value) < smallest:
+            raise PydanticCustomError(
+                "too_small", "expected 0, or at least {least}", {"least": f"{smallest:.3g}"}
+            )
+        return value
+
+    return AfterValidator(check)
+
+
+def _drawable(value: float) -> float:
+    """Refuse display factors that nothing can be drawn with."""
+    low, high = EXAGGERATION
+    if value > high:
+        raise PydanticCustomError("large", "expected at most {high}", {"high": f"{high:,.0f}"})
+    if value < low:
+        raise PydanticCustomError("small", "expected at least {low}", {"low": f"{low:g}"})
+    return value
+
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Finite = Annotated[Number, _at_least(MIN_NUMBER)]
 Length = Annotated[Finite, Field(ge=-MAX_LENGTH_MM, le=MAX_LENGTH_MM)]
 ErrorValue = Annotated[Finite, Field(ge=-MAX_ERROR, le=MAX_ERROR)]
-HalfWidth = Annotated[Finite, Field(ge=0, le=MAX_ERROR)]
+HalfWidth = Annotated[Finite, Field(ge=0, le=MAX_ERROR), _at_least(MIN_HALF_WIDTH)]
 Point = Annotated[tuple[Length, Length, Length], _entries("[x, y, z]")]
 Text = Annotated[str, Field(strict=True, max_length=MAX_TEXT)]
 
@@ -126,7 +153,7 @@ class ViewSection(Section):
 
     exaggeration: Annotated[
         Annotated[Literal["auto"], Tag("word")]
-        | Annotated[Finite, Field(gt=0, le=MAX_EXAGGERATION), Tag("number")],
+        | Annotated[Number, Field(gt=0), AfterValidator(_drawable), Tag("number")],
         Discriminator(lambda value: "word" if isinstance(value, str) else "number"),
     ] = "auto"
     reference: Annotated[

@@ -9,6 +9,9 @@ import binascii
 
 from warpspace.exceptions import OptionError
 
+MAX_WORD = 8_000
+"""Characters of a packed link: servers take request lines of 8 kB."""
+
 
 def pack(link: str) -> str:
     """Spell a query string as one word that needs no escaping in an address."""
@@ -21,8 +24,12 @@ def unpack(word: str) -> str:
     Raises
     ------
     OptionError
-        If it is something else.
+        If it is something else, or longer than a link can be.
     """
+    if len(word) > MAX_WORD:
+        raise OptionError(
+            f"the link is {len(word):,} characters long; expected at most {MAX_WORD:,}"
+        )
     try:
         return base64.urlsafe_b64decode(word + "=" * (-len(word) % 4)).decode()
     except (binascii.Error, ValueError):

@@ -4,7 +4,7 @@ import re
 
 from warpspace.app.browser.uploads import size_message
 from warpspace.exceptions import OptionError
-from warpspace.scene.files import MAX_SCENE_BYTES
+from warpspace.machine.limits import MAX_SCENE_BYTES
 
 _UNSAFE = re.compile(r"[^A-Za-z0-9._ -]+")
 LONGEST_NAME = 60

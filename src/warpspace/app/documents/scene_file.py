@@ -27,6 +27,7 @@ from warpspace.app.evaluation.resulting_scene import scene_of
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.viewport.camera import CameraMemory
 from warpspace.exceptions import OptionError
+from warpspace.machine.limits import MAX_PACKED_TEXT
 from warpspace.scene.library import load_scene, parse_scene, scene_names
 from warpspace.scene.machines import load_machine, machine_names
 from warpspace.scene.model import Scene
@@ -38,9 +39,8 @@ MAX_LINK = 5_500
 """Characters of a link before it is packed: servers take request lines of 8 kB."""
 MAX_COMPARED = 400_000
 """Characters of a comparison in a file."""
-MAX_PACKED_TEXT = 1_000_000
 SCENE, PACKED, NAME = "scene", "file", "name"
-_HEAD = re.compile(r"(?:[ \t]*(?:#[^\n]*)?\n)*")
+_HEAD = re.compile(r"(?:[ \t]*+(?:#[^\n]*+)?\n)*+")
 _VIEW, _COMPARISON = (
     re.compile(rf"^{re.escape(mark)}(\S*)\s*$", re.MULTILINE) for mark in (MARK, COMPARED)
 )

@@ -24,7 +24,7 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.comparison import Comparison
 from warpspace.app.viewport.camera import CameraMemory
 from warpspace.exceptions import OptionError, WarpspaceError
-from warpspace.scene.files import MAX_SCENE_BYTES
+from warpspace.machine.limits import MAX_SCENE_BYTES
 
 logger = logging.getLogger(__name__)
 FIGURE_S, VIEW_S, PAGE_S, EXPORT_S = 5.0, 1.5, 1.0, 1.0

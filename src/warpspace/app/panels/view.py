@@ -132,7 +132,7 @@ class ViewPanel:
     def _add_exaggeration(self, state: AppState) -> None:
         """Add factor, logarithmic slider and the two buttons."""
         gui, context = self._context.gui, self._context
-        start = state.exaggeration or TRUE_SCALE
+        start = state.exaggeration or TRUE_SCALE  # the slider begins at true scale
         self._factor: Input[float] = Input(
             gui.add_number(
                 "Displacement drawn ×",
@@ -140,7 +140,7 @@ class ViewPanel:
                 min=EXAGGERATION.low,
                 max=EXAGGERATION.high,
                 step=1.0,
-                hint="Display factor of the errors, 1 to 1 000 000.",
+                hint="Display factor of the errors, 0.001 to 1 000 000.",
             ),
             context.changed,
         )
@@ -151,7 +151,7 @@ class ViewPanel:
                 min=0.0,
                 max=top,
                 step=0.01,
-                initial_value=math.log10(start),
+                initial_value=max(math.log10(start), 0.0),
                 marks=((0.0, "×1"), (2.0, "×100"), (4.0, "×10 000"), (top, "×10⁶")),
                 hint="Display factor of the errors, each mark 100 times the one before.",
             ),
@@ -254,7 +254,7 @@ class ViewPanel:
         self._know(state.origin)
         self._scene.show(self._title)
         self._factor.show(float(f"{picture.exaggeration:.4g}"))
-        self._log.show(round(math.log10(picture.exaggeration), 2))
+        self._log.show(max(round(math.log10(picture.exaggeration), 2), 0.0))
         self._show_component(state)
         self._loop.show(self._loops.text(state.loop))
         self._nodes.show(float(state.nodes))

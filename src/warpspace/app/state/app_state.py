@@ -16,16 +16,17 @@ from warpspace.app.state.picked import Picked
 from warpspace.app.state.ranges import Span, amplitude_spans, position_spans
 from warpspace.app.state.specification import Specification
 from warpspace.geometry.colour import COMPONENTS
-from warpspace.geometry.deform import MAX_EXAGGERATION
 from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import ErrorSet
+from warpspace.machine.limits import EXAGGERATION as FACTORS
+from warpspace.machine.limits import LIVE_NODES
 from warpspace.machine.parameters import parameter
 from warpspace.machine.tolerances import ToleranceSet
 from warpspace.scene.model import Scene
 
-NODES = Span(3.0, 31.0, 2.0)
+NODES = Span(*LIVE_NODES, 2.0)
 """Grid nodes per axis: odd numbers."""
-EXAGGERATION = Span(1.0, MAX_EXAGGERATION, 1.0)
+EXAGGERATION = Span(*FACTORS, 1.0)
 TRUE_SCALE = 1.0
 START_NODES = 21
 

@@ -6,6 +6,7 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.ranges import Span, amplitude_span, round_up
 from warpspace.app.state.specification import Specification
 from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet
+from warpspace.machine.limits import MAX_ERROR, MIN_HALF_WIDTH
 from warpspace.machine.parameters import parameter
 from warpspace.machine.tolerances import Tolerance
 
@@ -74,7 +75,7 @@ def half_width_span(state: AppState, key: str) -> Span:
     """Choose the range of a tolerance slider: up to about twice the scene's half width."""
     found = state.origin.tolerances.get(key)
     widest = max(2.0 * (found.half_width if found else 0.0), LEAST_HALF_WIDTH)
-    return Span(0.0, round_up(widest), 0.1)
+    return Span(0.0, min(round_up(widest), MAX_ERROR), 0.1)
 
 
 def with_half_width(state: AppState, key: str, half_width: float) -> AppState:
@@ -84,6 +85,7 @@ def with_half_width(state: AppState, key: str, half_width: float) -> AppState:
     present = state.tolerances.get(key) or Tolerance(0.0, 0.0)
     span = Span(0.0, max(MAX_HALF_WIDTH, half_width_span(state, key).high), 0.1)
     kept = span.clamp(half_width, present.half_width)
+    kept = 0.0 if kept < MIN_HALF_WIDTH else kept
     notes = state.notes
     if kept != half_width:
         notes = (*notes, f"tolerance of {key} = {half_width:g}: clamped to ±{kept:g}")

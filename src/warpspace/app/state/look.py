@@ -11,6 +11,7 @@ from typing import Any
 from warpspace.app.state.ranges import Span
 from warpspace.geometry.slices import slice_ranges
 from warpspace.geometry.traces import TILT_STEP_DEG
+from warpspace.machine import limits
 from warpspace.machine.description import Vector
 from warpspace.machine.parameters import LINEAR_AXES
 from warpspace.scene.model import Scene
@@ -23,7 +24,7 @@ SURFACES = {
 }
 QUANTITIES = ("position", "orientation")
 RANGES = {"auto": "auto", "fixed": "fixed", "shared": "shared"}
-RANGE_TOP = Span(0.001, 1e6, 0.001)
+RANGE_TOP = Span(*limits.RANGE_TOP, 0.001)
 START_TOP = 50.0
 POINT_MM = Span(-2000.0, 2000.0, 1.0)
 MOST_TYPED = 200

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 
+from warpspace.machine.limits import MAX_ERROR, MIN_HALF_WIDTH, MIN_NUMBER
 from warpspace.machine.parameters import parameter
 from warpspace.machine.tolerances import Tolerance
 from warpspace.scene.model import Scene
@@ -35,7 +36,8 @@ class Span:
         """Bring a number that may be anything into the range; what is no number falls back."""
         if math.isnan(value):
             return fallback
-        return min(max(value, self.low), self.high)
+        kept = min(max(value, self.low), self.high)
+        return 0.0 if 0.0 < abs(kept) < MIN_NUMBER else kept
 
 
 def round_up(value: float) -> float:
@@ -66,12 +68,14 @@ def amplitude_span(key: str, value: float, tolerance: Tolerance | None) -> Span:
     Returns
     -------
     Span
-        Symmetric about zero with round ends; holds the tolerance and twice the value.
+        Symmetric about zero with round ends; holds the tolerance and twice the value, as far as the
+        model holds.
     """
     least = LEAST_ROTATION_URAD if parameter(key).is_rotation else LEAST_TRANSLATION_UM
     if tolerance is not None:
-        least = abs(tolerance.centre) + tolerance.half_width or least
-    high = round_up(max(least, 2.0 * abs(value)))
+        reach = abs(tolerance.centre) + tolerance.half_width
+        least = reach if reach >= MIN_HALF_WIDTH else least
+    high = min(round_up(max(least, 2.0 * abs(value))), MAX_ERROR)
     return Span(-high, high, _step(high))
 
 

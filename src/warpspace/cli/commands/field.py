@@ -12,8 +12,8 @@ from warpspace.cli.options import (
     json_option,
     loop_option,
     parse_point,
-    print_json,
     scene_argument,
+    spell_json,
 )
 from warpspace.cli.progress import progress
 from warpspace.cli.tables import Column, number_columns, print_table, print_text
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from warpspace.units import Array
 
 MAX_LISTED = 20
+POINTS_AT_ONCE = 5000
+"""Points that are turned into JSON at a time."""
 
 
 @click.command()
@@ -74,7 +76,7 @@ def field(
 
         write_field_csv(csv_path, axes, result)
     if as_json:
-        print_json({"points": _rows(axes, result), "statistics": asdict(summary)})
+        _print_json(axes, result, asdict(summary))
         return
     print_text(f"{loaded.title} · {loop} loop · {'exact' if exact else 'first order'}")
     if points:
@@ -127,8 +129,32 @@ def _evaluate(
     return axes, flat
 
 
+def _print_json(
+    axes: "dict[str, Array]", result: "ErrorField", summary: "dict[str, object]"
+) -> None:
+    """Print the JSON object piece by piece: a million points are never held as one text."""
+    import numpy as np
+
+    from warpspace.field.basis import ErrorField
+
+    arrays = (result.nominal_mm, result.error_um, result.norm_um, result.orientation_urad)
+    if not all(np.isfinite(values).all() for values in arrays):
+        raise OptionError("the field has points whose error is no number; JSON cannot hold them")
+    click.echo('{"points": [', nl=False)
+    for start in range(0, result.norm_um.size, POINTS_AT_ONCE):
+        part = slice(start, start + POINTS_AT_ONCE)
+        rows = _rows(
+            {name: values[part] for name, values in axes.items()},
+            ErrorField(
+                result.nominal_mm[part], result.error_um[part], result.orientation_urad[part]
+            ),
+        )
+        click.echo((", " if start else "") + spell_json(rows)[1:-1], nl=False)
+    click.echo(f'], "statistics": {spell_json(summary)}}}')
+
+
 def _rows(axes: "dict[str, Array]", result: "ErrorField") -> list[dict[str, object]]:
-    """Spell each point as the JSON output has it."""
+    """Spell points as the JSON output has them."""
     positions = [dict(zip(axes, row, strict=True)) for row in zip(*axes.values(), strict=True)]
     return [
         {

@@ -8,6 +8,7 @@ largest value (with its sign) of anything else.
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -69,11 +70,16 @@ class ErrorFunction(ABC):
     def scaled(self, factor: float) -> Self:
         """Give the same curve with all values times a factor."""
 
+    @cached_property
+    def _peak(self) -> float:
+        """Largest value over the span: looked for once, since a curve never changes."""
+        values = self.evaluate(np.linspace(*self.span, self.samples))
+        return float(values[np.argmax(np.abs(values))])
+
     @property
     def amplitude(self) -> float:
         """Largest value over the span, with its sign, µm or µrad."""
-        values = self.evaluate(np.linspace(*self.span, self.samples))
-        return float(values[np.argmax(np.abs(values))])
+        return self._peak
 
     @property
     def samples(self) -> int:

@@ -9,12 +9,12 @@ from warpspace.exceptions import OptionError
 from warpspace.machine.curves.curve import SPAN_SAMPLES, ErrorFunction, Rows, Span, Spell
 from warpspace.machine.curves.reading import ValueReader
 from warpspace.machine.curves.rows import limited, refuse_more
-from warpspace.machine.limits import MAX_ERROR, MAX_LENGTH_MM
+from warpspace.machine.limits import MAX_ERROR, MAX_LENGTH_MM, MAX_ORDER, MAX_TERMS
 from warpspace.units import Array
 
-MAX_ORDER = 1000
-MAX_TERMS = 64
 MAX_SAMPLES = 200_001
+MAX_COSINES = 2_000_000
+"""Cosines that the peak of a curve may take: terms × positions."""
 SAMPLES_PER_WAVE = 16
 SHOWN_TERMS = 3
 LIMITS = ((0.0, MAX_ORDER), (-MAX_ERROR, MAX_ERROR), (-MAX_LENGTH_MM, MAX_LENGTH_MM))
@@ -55,7 +55,13 @@ class Harmonics(ErrorFunction):
         """Number of positions that resolves the shortest wave."""
         highest = max((order for order, _, _ in self.terms), default=0.0)
         waves = highest * (self.span[1] - self.span[0]) / 360.0
-        return int(min(max(SPAN_SAMPLES, SAMPLES_PER_WAVE * waves + 1), MAX_SAMPLES))
+        most = min(MAX_SAMPLES, MAX_COSINES // max(len(self.terms), 1))
+        return int(min(max(SPAN_SAMPLES, SAMPLES_PER_WAVE * waves + 1), most))
+
+    @property
+    def cosines(self) -> int:
+        """Number of cosines that its peak takes: what opening a scene with this curve costs."""
+        return self.samples * len(self.terms)
 
     @classmethod
     def read(cls, raw: Any, span: Span, reader: ValueReader) -> Self:

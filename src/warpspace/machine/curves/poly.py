@@ -9,9 +9,8 @@ from numpy.polynomial import polynomial
 from warpspace.machine.curves.curve import ErrorFunction, Rows, Span, Spell
 from warpspace.machine.curves.reading import ValueReader
 from warpspace.machine.curves.rows import refuse_more
+from warpspace.machine.limits import MAX_COEFFICIENTS
 from warpspace.units import Array
-
-MAX_COEFFICIENTS = 16
 
 
 @dataclass(frozen=True)

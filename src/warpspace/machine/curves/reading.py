@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import cast
 
 from warpspace.exceptions import SceneError
+from warpspace.machine.limits import MIN_NUMBER
 
 Path = tuple[int | str, ...]
 """Keys and indices below the error, for instance ``("table", 3, 0)``."""
@@ -72,6 +73,8 @@ class ValueReader:
             return math.nan
         if not math.isfinite(number):
             self.note(path, "expected a finite number", value)
+        elif 0.0 < abs(number) < MIN_NUMBER:
+            self.note(path, f"expected 0, or at least {MIN_NUMBER:.3g}", value)
         elif number < low:
             self.note(path, f"expected at least {low:g}", value)
         elif number > high:

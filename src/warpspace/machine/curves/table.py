@@ -11,10 +11,9 @@ from warpspace.exceptions import OptionError
 from warpspace.machine.curves.curve import ErrorFunction, Rows, Span, Spell
 from warpspace.machine.curves.reading import ValueReader
 from warpspace.machine.curves.rows import limited, refuse_more
-from warpspace.machine.limits import MAX_ERROR, MAX_LENGTH_MM
+from warpspace.machine.limits import MAX_ERROR, MAX_LENGTH_MM, MAX_POINTS
 from warpspace.units import Array
 
-MAX_POINTS = 100_000
 MAX_ROWS = 500
 """Rows that may be edited as text."""
 MAX_FILE_NAME, MAX_COLUMN_NAME = 1024, 256

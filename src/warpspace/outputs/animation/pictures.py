@@ -9,6 +9,7 @@ from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import evaluate_first_order
 from warpspace.geometry.deform import deform
 from warpspace.geometry.traces import build_traces
+from warpspace.machine.limits import ANIMATION_FRAMES
 from warpspace.outputs.drawing.content import Drawing
 from warpspace.outputs.drawing.map3d import draw_map, fit_map
 from warpspace.outputs.drawing.panel import draw_panel
@@ -34,7 +35,7 @@ from warpspace.scene.model import Scene
 from warpspace.units import Array
 
 MOTIONS = ("exaggeration", "rotation")
-MIN_FRAMES, MAX_FRAMES = 2, 600
+MIN_FRAMES, MAX_FRAMES = ANIMATION_FRAMES
 MAX_PIXELS = 1_500_000_000
 """Of all pictures together."""
 _TRACE_SAMPLES = 241

@@ -1,22 +1,21 @@
 """What a figure is asked for."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from warpspace.exceptions import OptionError
 from warpspace.geometry.colour import COMPONENTS, ColourScale
+from warpspace.machine.limits import MAX_FIGURE_AREA_PX as LARGEST_AREA
+from warpspace.machine.limits import MAX_FIGURE_SIDE_PX as LARGEST_SIDE
+from warpspace.machine.limits import MIN_FIGURE_PX as SMALLEST_SIZE
+from warpspace.machine.limits import RANGE_TOP
 from warpspace.outputs.drawing.style import DARK, LIGHT, Theme
 from warpspace.picture.exaggeration import Exaggeration, given_exaggeration
 from warpspace.picture.model import Picture, choose_scale
 from warpspace.picture.scene_picture import ScenePicture, evaluate_picture
 from warpspace.picture.views import VIEWS
 from warpspace.scene.model import Scene
-
-SMALLEST_SIZE = (400, 300)
-LARGEST_SIDE = 12_000
-LARGEST_AREA = 64_000_000
 
 B_MINUS_A, A_MINUS_B = "B − A", "A − B"
 
@@ -73,8 +72,10 @@ class FigureSettings:
         given_exaggeration(self.exaggeration, None)
         if self.difference not in (B_MINUS_A, A_MINUS_B):
             raise OptionError(f"difference {self.difference!r}; expected B − A or A − B")
-        if self.range_top is not None and not 0.0 < self.range_top < math.inf:
-            raise OptionError(f"range_top {self.range_top:g}; expected a number above 0")
+        low, high = RANGE_TOP
+        if self.range_top is not None and not low <= self.range_top <= high:
+            found = f"range_top {self.range_top:g}; expected a number above 0"
+            raise OptionError(f"{found}, from {low:g} to {high:,.0f}")
         check_size(self.size)
 
     @property

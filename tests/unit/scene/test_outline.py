@@ -1,0 +1,131 @@
+"""Text that would be expensive to parse is refused before it is parsed; good text never is."""
+
+import contextlib
+import subprocess
+import sys
+import time
+import tomllib
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from warpspace.exceptions import SceneError
+from warpspace.machine.limits import MAX_KEY_PARTS, MAX_KEYS, MAX_NESTING
+from warpspace.resources import assets_dir, scenes_dir
+from warpspace.scene.files import parse_toml
+from warpspace.scene.outline import check_outline
+
+FILES = [*scenes_dir().glob("*.toml"), *assets_dir().rglob("*.toml")]
+BARE = st.text("abcXYZ019_-", min_size=1, max_size=6)
+QUOTED = st.text(st.sampled_from(list("ab.=[]{}#'\"\\\n,")), max_size=12)
+
+
+def basic(text: str) -> str:
+    """Spell a text between double quotes."""
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    return f'"{escaped}"'
+
+
+def multiline(text: str) -> str:
+    """Spell a text between three double quotes, with line breaks and some quotes as they are."""
+    return '"""\n' + text.replace("\\", "\\\\").replace('""', '"\\"') + '"""'
+
+
+def literal(text: str) -> str:
+    """Spell a text between three single quotes."""
+    return "'''" + text.replace("''", "'") + "'''" if not text.endswith("'") else basic(text)
+
+
+STRINGS = st.builds(
+    lambda spell, text: spell(text), st.sampled_from([basic, multiline, literal]), QUOTED
+)
+VALUES = st.recursive(
+    STRINGS | st.floats(-1e6, 1e6).map(repr) | st.integers(-99, 99).map(str) | st.just("true"),
+    lambda inner: st.lists(inner, max_size=4).map(lambda many: f"[ # list ].[\n{','.join(many)}]"),
+    max_leaves=12,
+)
+KEYS = st.lists(BARE | QUOTED.map(basic), min_size=1, max_size=MAX_KEY_PARTS - 1).map(" . ".join)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_every_bundled_file_passes(path) -> None:
+    check_outline(path.read_text(encoding="utf-8"), path.name)
+
+
+@given(st.lists(st.tuples(KEYS, VALUES), min_size=1, max_size=6))
+def test_valid_text_passes_whatever_stands_in_its_strings_and_remarks(pairs) -> None:
+    lines = [
+        f"k{number}.{key} = {value} # a.b.c.d.e.f.g.h.i.j = [[["
+        for number, (key, value) in enumerate(pairs)
+    ]
+    text = "\n".join(lines)
+    tomllib.loads(text)
+    check_outline(text, "x.toml")
+
+
+@given(st.text(st.sampled_from(list("ab.=[]{}#'\"\\\n, 1")), max_size=80))
+def test_anything_gives_a_table_or_one_message(text: str) -> None:
+    with contextlib.suppress(SceneError):
+        assert isinstance(parse_toml(text, "x.toml"), dict)
+
+
+@pytest.mark.parametrize("part", ["a", '"a"', "'a'", " a "])
+def test_a_key_may_have_so_many_parts_and_no_more(part: str) -> None:
+    most = ".".join([part] * MAX_KEY_PARTS)
+    for text in (f"{most} = 1", f"[{most}]", f"x = {{ {most} = 1 }}"):
+        assert parse_toml(text, "x.toml")
+        with pytest.raises(SceneError, match=r"line 2: a key of over 8 parts; expected at most 8"):
+            parse_toml("\n" + text.replace(most, f"{most}.{part}"), "x.toml")
+
+
+def test_nesting_ends_at_a_depth() -> None:
+    assert parse_toml(f"x = {'[' * MAX_NESTING}{']' * MAX_NESTING}", "x.toml")
+    for left, right in ("[]", ("{a = ", "}")):
+        deep = f"x = {left * (MAX_NESTING + 1)}1{right * (MAX_NESTING + 1)}"
+        with pytest.raises(SceneError, match="line 1: is not valid TOML: nested too deeply, more"):
+            parse_toml(deep, "x.toml")
+
+
+@pytest.mark.parametrize("entry", ["k{} = 1\n", "[k{}]\n", "[[k{}]]\n"])
+def test_keys_are_counted(entry: str) -> None:
+    assert parse_toml("".join(map(entry.format, range(1000))), "x.toml")
+    with pytest.raises(SceneError, match="more than 50,000 parts of keys"):
+        parse_toml("".join(map(entry.format, range(MAX_KEYS + 1))), "x.toml")
+
+
+def test_empty_tables_are_counted() -> None:
+    with pytest.raises(SceneError, match="more than 50,000 parts of keys"):
+        parse_toml(f"x = [{'{},' * (MAX_KEYS + 1)}]", "x.toml")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '"""\n' + '\\"""\n' * 200_000 + "\\",
+        "'''\n" + "''\n" * 300_000,
+        '"' * 1_000_000,
+        "=" * 1_000_000,
+    ],
+    ids=["escaped quotes", "single quotes", "quotes", "signs"],
+)
+def test_time_grows_with_the_length_only(text: str) -> None:
+    started = time.process_time()
+    with pytest.raises(SceneError):
+        parse_toml(text, "x.toml")
+    assert time.process_time() - started < 5.0
+
+
+def test_a_key_of_thirty_thousand_parts_takes_no_memory() -> None:
+    """It took 13 s and 3.5 GB."""
+    code = (
+        "import resource; resource.setrlimit(resource.RLIMIT_AS, (800 << 20, 800 << 20))\n"
+        "from warpspace.scene.files import parse_toml\n"
+        "from warpspace.exceptions import SceneError\n"
+        "try: parse_toml('a' + '.a' * 30000 + ' = 1', 'x')\n"
+        "except SceneError as error: print(error)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True
+    )
+    assert done.stdout.strip() == "x: line 1: a key of over 8 parts; expected at most 8"
