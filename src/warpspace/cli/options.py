@@ -8,6 +8,7 @@ from typing import Any, Literal
 import click
 from click.shell_completion import CompletionItem
 
+from warpspace.cli.terminal import escape_json
 from warpspace.exceptions import OptionError
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
@@ -160,4 +161,4 @@ def parse_exaggeration(text: str | None) -> float | Literal["auto"] | None:
 
 def print_json(value: Mapping[str, object]) -> None:
     """Print one JSON object; numbers that are not finite are refused rather than misspelt."""
-    click.echo(json.dumps(value, ensure_ascii=False, allow_nan=False))
+    click.echo(escape_json(json.dumps(value, ensure_ascii=False, allow_nan=False)))
