@@ -65,7 +65,8 @@ def end_pool(pool: ProcessPoolExecutor, *, wait: bool = True) -> None:
     _pools.discard(pool)
     if not wait:
         _kill(pool)
-    pool.shutdown(wait=wait, cancel_futures=True)
+    # also after a kill, which takes no time: the interpreter must not end in the midst of it
+    pool.shutdown(wait=True, cancel_futures=True)
 
 
 def kill_pools() -> None:
