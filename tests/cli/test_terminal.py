@@ -67,10 +67,9 @@ def test_a_title_reaches_the_terminal_harmless(
 ) -> None:
     path = tmp_path / "s.toml"
     title = json.dumps(EVIL)
-    path.write_text(
-        f'title = {title}\nmachine = "dvf5000"\n[errors]\nEC0Y = 5\n[tolerances]\nEXX = 3\n',
-        "utf-8",
-    )
+    half_widths = "default = { translation = 10, rotation = 20, squareness = 25 }"
+    text = f'title = {title}\nmachine = "dvf5000"\n[errors]\nEC0Y = 5\n[tolerances]\n{half_widths}'
+    path.write_text(text, "utf-8")
     result = warpspace(command[0], path, *command[1:])
     assert result.status == 0, result.err
     assert not any(character in result.out + result.err for character in STEERING)
