@@ -172,7 +172,7 @@ def test_the_next_run_clears_what_a_killed_one_left(tmp_path: Path) -> None:
 
 DRAWING_VIEW = """
 import threading, time, sys
-import warpspace.app.server.viewer as viewer
+import warpspace.app.server.run as viewer
 from warpspace.cli.services import build_services
 from warpspace.app.documents.services import Request
 from warpspace.scene.library import load_scene
