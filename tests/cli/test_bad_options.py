@@ -84,6 +84,8 @@ def test_position_where_a_curve_leaves_the_model_is_refused(tmp_path: Path, warp
 def test_failed_write_keeps_the_file_that_was_there(tmp_path: Path, warpspace) -> None:
     target = tmp_path / "points.csv"
     target.write_text("mine", encoding="utf-8")
-    warpspace("field", "dvf5000_first", "--at", "Q=1", "--csv", target).refused("unknown axis Q")
+    warpspace("field", "dvf5000_first", "--at", "Q=1", "--csv", target, "--force").refused(
+        "unknown axis Q"
+    )
     assert target.read_text(encoding="utf-8") == "mine"
     assert list(tmp_path.iterdir()) == [target]

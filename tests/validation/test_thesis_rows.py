@@ -70,7 +70,9 @@ def tried() -> tuple[Hypothesis, ...]:
 
 def test_generated_page_is_up_to_date(tried) -> None:
     expected = thesis_markdown(ROWS, tried)
-    assert PAGE.read_text("utf-8") == expected, "run: warpspace thesis --markdown docs/thesis.md"
+    assert PAGE.read_text("utf-8") == expected, (
+        "run: warpspace thesis --markdown docs/thesis.md --force"
+    )
 
 
 def test_hypotheses_reach_a_verdict_on_every_question(tried) -> None:

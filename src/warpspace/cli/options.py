@@ -8,6 +8,7 @@ from typing import Any, Literal
 import click
 from click.shell_completion import CompletionItem
 
+from warpspace.cli.terminal import escape_json
 from warpspace.exceptions import OptionError
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
@@ -165,4 +166,4 @@ def print_json(value: Mapping[str, object]) -> None:
 
 def spell_json(value: object) -> str:
     """Spell a value as JSON; numbers that are not finite are refused rather than misspelt."""
-    return json.dumps(value, ensure_ascii=False, allow_nan=False)
+    return escape_json(json.dumps(value, ensure_ascii=False, allow_nan=False))

@@ -13,6 +13,8 @@ from typing import NamedTuple
 
 import click
 
+from warpspace.cli.terminal import plain
+
 WIDTH_ELSEWHERE = 80
 """Characters in a line where the output is no terminal."""
 READABLE = 20
@@ -79,6 +81,7 @@ def print_text(text: str) -> None:
     """
     import textwrap
 
+    text = plain(text)
     indent = text[: len(text) - len(text.lstrip(" "))]
     lines = textwrap.wrap(
         _TOGETHER.sub("\N{NO-BREAK SPACE}", text.strip()),
@@ -106,6 +109,7 @@ def print_table(columns: Sequence[Column], rows: Sequence[Row], indent: int = 2)
     from textwrap import indent as indented
 
     room = output_width() - indent
+    rows = [[plain(cell) for cell in row] for row in rows]
     sizes = [_measure(column, [row[i] for row in rows]) for i, column in enumerate(columns)]
     for number, part in enumerate(_split(columns, [size.readable for size in sizes], room)):
         if number:

@@ -1,15 +1,16 @@
 """Figures drawn in a process of their own: a crash of the renderer loses that figure only."""
 
+import os
 import subprocess
 import sys
 import threading
 from collections.abc import Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import CancelledError, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
 
 from warpspace.exceptions import OptionError, RenderError, SceneError, UnknownNameError
 from warpspace.outputs.drawing.settings import FigureSettings
+from warpspace.outputs.processes import end_pool, interrupts_held_back, is_in_use, start_pool
 from warpspace.scene.model import Scene
 
 PICTURES_PER_PROCESS = 100
@@ -17,8 +18,18 @@ PICTURES_PER_PROCESS = 100
 TIMEOUT_S = 300.0
 PROBE_TIMEOUT_S = 60.0
 PACKAGES = "libegl1 libgl1-mesa-dri"
+WINDOW_VARIABLE = "VTK_DEFAULT_OPENGL_WINDOW"
+WINDOWS = (
+    "vtkEGLRenderWindow",
+    "vtkOSOpenGLRenderWindow",
+    "vtkXOpenGLRenderWindow",
+    "vtkWin32OpenGLRenderWindow",
+    "vtkCocoaRenderWindow",
+)
+"""What the variable may name."""
 _PROBE = """
-import os, sys
+import faulthandler, os, sys
+faulthandler.dump_traceback_later(60.0, exit=True)
 if sys.platform == "linux":
     os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 import pyvista
@@ -52,7 +63,10 @@ def probe_renderer() -> str:
 
 
 def _advice() -> str:
-    """Say what to install."""
+    """Say what to change or to install."""
+    window = os.environ.get(WINDOW_VARIABLE)
+    if window is not None and window not in WINDOWS:
+        return f"The variable {WINDOW_VARIABLE} is {window!r}, which VTK does not know; unset it."
     if sys.platform == "linux":
         return f"Install the Debian packages {PACKAGES} (apt-get install {PACKAGES})."
     return "Check the OpenGL driver."
@@ -113,10 +127,12 @@ class FigureWorker:
         WarpspaceError
             Whatever drawing it in this process would have raised.
         """
+        pool, future = self._submit(name, tuple(scenes), settings or FigureSettings(), form)
         try:
-            future = self._submit(name, tuple(scenes), settings or FigureSettings(), form)
             return future.result(self._timeout_s)
-        except BrokenProcessPool:
+        except (BrokenProcessPool, CancelledError):
+            if not is_in_use(pool):
+                raise RenderError(f"figure {name!r} was given up: its renderer was ended") from None
             self.close(wait=False)
             problem = probe_renderer()
             raise RenderError(
@@ -131,30 +147,25 @@ class FigureWorker:
 
     def _submit(
         self, name: str, scenes: Sequence[Scene], settings: FigureSettings, form: str
-    ) -> "Future[bytes]":
+    ) -> "tuple[ProcessPoolExecutor, Future[bytes]]":
         """Hand a request to the process; start one where there is none."""
         with self._lock:
             if self._pool is None:
-                self._pool = ProcessPoolExecutor(
-                    1, get_context("spawn"), max_tasks_per_child=PICTURES_PER_PROCESS
-                )
-            return self._pool.submit(_draw, name, scenes, settings, form)
+                self._pool = start_pool(1, tasks_per_process=PICTURES_PER_PROCESS)
+            with interrupts_held_back():
+                return self._pool, self._pool.submit(_draw, name, scenes, settings, form)
 
     def close(self, *, wait: bool = True) -> None:
         """End the process; the next request starts a new one."""
         with self._lock:
             pool, self._pool = self._pool, None
-        if pool is None:
-            return
-        if not wait:
-            for process in list((pool._processes or {}).values()):  # noqa: SLF001 - no public way
-                process.kill()
-        pool.shutdown(wait=wait, cancel_futures=True)
+        if pool is not None:
+            end_pool(pool, wait=wait)
 
     def __enter__(self) -> "FigureWorker":
         """Use the worker in a with statement."""
         return self
 
-    def __exit__(self, *_: object) -> None:
-        """End the process."""
-        self.close()
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        """End the process; after a failure without waiting for what it draws."""
+        self.close(wait=kind is None)

@@ -71,7 +71,8 @@ def load_scene(name_or_path: str | Path) -> Scene:
         With every problem of the file: key, value and what was expected.
     """
     path = scene_path(name_or_path)
-    return parse_scene(read_text(path, MAX_SCENE_BYTES), path.stem, str(path), path.parent)
+    name = path.stem.encode(errors="replace").decode()  # bytes that are no text become "?"
+    return parse_scene(read_text(path, MAX_SCENE_BYTES), name, str(path), path.parent)
 
 
 def parse_scene(

@@ -5,9 +5,10 @@ from typing import Any
 import click
 
 from warpspace.cli.figure_options import figure_options, parse_settings
-from warpspace.cli.file_options import output_option
+from warpspace.cli.file_options import check_output, output_option
 from warpspace.cli.options import scene_argument
 from warpspace.cli.progress import progress
+from warpspace.cli.terminal import echo
 
 
 @click.command()
@@ -39,12 +40,11 @@ def animate(
     """
     from warpspace.outputs.animation.pictures import AnimationSettings
     from warpspace.outputs.animation.write import ENDINGS, write_animation
-    from warpspace.outputs.files import check_target
     from warpspace.scene.library import load_scene
 
-    check_target(output, ENDINGS, overwrite=force)
+    check_output(output, ENDINGS, force=force, scenes=[scene])
     settings = AnimationSettings(motion, frames, fps, parse_settings(**options))
     loaded = load_scene(scene)
     with progress("drawing", frames, "pictures") as bar:
         write_animation(loaded, output, settings, overwrite=force, progress=bar.advance)
-    click.echo(f"{output}: {frames} pictures, {frames / fps:.1f} s")
+    echo(f"{output}: {frames} pictures, {frames / fps:.1f} s")

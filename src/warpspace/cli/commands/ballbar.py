@@ -2,7 +2,7 @@
 
 import click
 
-from warpspace.cli.file_options import check_targets, plot_option
+from warpspace.cli.file_options import check_targets, force_option, plot_option
 from warpspace.cli.options import json_option, parse_point, print_json, scene_argument
 from warpspace.cli.tables import print_text
 
@@ -22,6 +22,7 @@ from warpspace.cli.tables import print_text
 )
 @click.option("--points", type=int, default=360, show_default=True, help="Points of the circle.")
 @plot_option("polar plot")
+@force_option
 @json_option
 def ballbar(
     scene: str,
@@ -31,6 +32,7 @@ def ballbar(
     points: int,
     plot: str | None,
     *,
+    force: bool,
     as_json: bool,
 ) -> None:
     """Run the circular test of ISO 230-4 on SCENE.
@@ -46,7 +48,7 @@ def ballbar(
     from warpspace.scene import verbs
     from warpspace.scene.library import load_scene
 
-    check_targets(plot=plot)
+    check_targets(scene, force=force, plot=plot)
     loaded = load_scene(scene)
     result = verbs.ballbar(
         loaded,
@@ -60,7 +62,9 @@ def ballbar(
     if plot is not None:
         from warpspace.outputs.charts import ballbar_chart, write_chart
 
-        write_chart(ballbar_chart(result, f"Circular test · {loaded.title}", where), plot)
+        write_chart(
+            ballbar_chart(result, f"Circular test · {loaded.title}", where), plot, overwrite=force
+        )
     if as_json:
         print_json(
             {

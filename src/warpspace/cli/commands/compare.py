@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from warpspace.cli.figure_options import draw_figure_file, figure_options, parse_settings
-from warpspace.cli.file_options import output_option
+from warpspace.cli.file_options import check_output, output_option
 from warpspace.cli.options import json_option, print_json, scene_argument
 from warpspace.cli.progress import progress
 from warpspace.cli.tables import Column, number_columns, print_table
+from warpspace.cli.terminal import echo
 
 if TYPE_CHECKING:
     from warpspace.analysis.statistics import Statistics
@@ -30,12 +31,13 @@ def compare(
     the difference are drawn on one sheet, with one colour scale and one exaggeration.
     """
     from warpspace.outputs.drawing.style import FIGURE_ENDINGS
-    from warpspace.outputs.files import check_target
     from warpspace.picture.comparison import subtract_scenes
     from warpspace.picture.scene_picture import evaluate_picture
     from warpspace.scene.library import load_scene
 
-    target = None if output is None else check_target(output, FIGURE_ENDINGS, overwrite=force)
+    target = None
+    if output is not None:
+        target = check_output(output, FIGURE_ENDINGS, force=force, scenes=[first, second])
     settings = parse_settings(**options)
     scenes = [load_scene(first), load_scene(second)]
     with progress("evaluating", silent=as_json):
@@ -53,7 +55,7 @@ def compare(
     names = (f"A  {scenes[0].name}", f"B  {scenes[1].name}", "B − A")
     _print(list(zip(names, found.values(), strict=True)))
     if output is not None:
-        click.echo(f"wrote {output}")
+        echo(f"wrote {output}")
 
 
 def _print(found: "list[tuple[str, Statistics]]") -> None:

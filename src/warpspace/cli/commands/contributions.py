@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from warpspace.cli.file_options import check_targets, plot_option
+from warpspace.cli.file_options import check_targets, force_option, plot_option
 from warpspace.cli.options import json_option, loop_option, print_json, scene_argument
 from warpspace.cli.progress import progress
 from warpspace.cli.sampling_options import (
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     " samples, a power of two such as 1024.",
 )
 @plot_option("chart")
+@force_option
 @json_option
 def contributions(
     scene: str,
@@ -45,6 +46,7 @@ def contributions(
     sobol: int | None,
     plot: str | None,
     *,
+    force: bool,
     clip: bool,
     as_json: bool,
 ) -> None:
@@ -62,7 +64,7 @@ def contributions(
     from warpspace.scene import verbs
     from warpspace.scene.library import load_scene
 
-    check_targets(plot=plot)
+    check_targets(scene, force=force, plot=plot)
     if sobol is not None and sobol < 2:
         raise OptionError(f"--sobol {sobol}; expected a power of two, 2 or above")
     loaded = load_scene(scene)
@@ -81,7 +83,7 @@ def contributions(
         from warpspace.outputs.charts import contributions_chart, write_chart
 
         title = f"Which tolerances matter · {loaded.title}"
-        write_chart(contributions_chart(found, title, where), plot)
+        write_chart(contributions_chart(found, title, where), plot, overwrite=force)
     if as_json:
         rows = [asdict(row) for row in found.rows]
         totals = {"variance_um2": found.variance_um2, "rms_um": found.rms_um}

@@ -3,7 +3,7 @@
 import click
 
 from warpspace.cli.exports import export_formats, write_export
-from warpspace.cli.file_options import force_option, output_option, size_text
+from warpspace.cli.file_options import check_output, force_option, output_option, size_text
 from warpspace.cli.options import (
     component_option,
     exaggeration_option,
@@ -13,6 +13,7 @@ from warpspace.cli.options import (
     scene_argument,
 )
 from warpspace.cli.progress import progress
+from warpspace.cli.terminal import echo
 
 
 def _formats_help() -> str:
@@ -43,11 +44,12 @@ def export(
     The ending of FILE chooses the format. Every format carries the scene, the settings, the display
     factor and the program's version. `warpspace view FILE.vts` shows a stored field again.
     """
-    from warpspace.outputs.files import check_target
     from warpspace.picture.scene_picture import evaluate_picture
     from warpspace.scene.library import load_scene
 
-    target = check_target(output, [form.ending for form in export_formats()], overwrite=force)
+    target = check_output(
+        output, [form.ending for form in export_formats()], force=force, scenes=[scene]
+    )
     with progress("writing"):
         picture = evaluate_picture(
             load_scene(scene),
@@ -57,7 +59,7 @@ def export(
             component=component,
         )
         write_export(picture, target, overwrite=force)
-    click.echo(
+    echo(
         f"{output}: {picture.scene.title}, displacement drawn ×{picture.exaggeration:g},"
         f" {size_text(target)}"
     )

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from warpspace.cli.file_options import csv_option
+from warpspace.cli.file_options import check_targets, csv_option, force_option
 from warpspace.cli.options import (
     at_option,
     grid_option,
@@ -43,6 +43,7 @@ POINTS_AT_ONCE = 5000
     help="Frame of the resulting vectors.",
 )
 @csv_option
+@force_option
 @json_option
 def field(
     scene: str,
@@ -52,6 +53,7 @@ def field(
     frame: str,
     csv_path: str | None,
     *,
+    force: bool,
     exact: bool,
     as_json: bool,
 ) -> None:
@@ -67,6 +69,7 @@ def field(
 
     if points and grid is not None:
         raise OptionError("--at and --grid exclude each other; give one of them")
+    check_targets(scene, force=force, csv_path=csv_path)
     loaded = load_scene(scene)
     with progress("evaluating", silent=as_json):
         axes, result = _evaluate(loaded, points, grid, loop=loop, frame=frame, exact=exact)
@@ -74,7 +77,7 @@ def field(
     if csv_path is not None:
         from warpspace.outputs.exports.table import write_field_csv
 
-        write_field_csv(csv_path, axes, result)
+        write_field_csv(csv_path, axes, result, overwrite=force)
     if as_json:
         _print_json(axes, result, asdict(summary))
         return

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from warpspace.cli.file_options import check_targets, csv_option, plot_option
+from warpspace.cli.file_options import check_targets, csv_option, force_option, plot_option
 from warpspace.cli.options import (
     at_option,
     json_option,
@@ -19,6 +19,8 @@ from warpspace.cli.tables import Column, number_columns, print_table, print_text
 from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from warpspace.analysis.gains import Gain
     from warpspace.scene.model import Scene
 
@@ -49,6 +51,7 @@ if TYPE_CHECKING:
 )
 @csv_option
 @plot_option("chart")
+@force_option
 @json_option
 def gains(
     scene: str,
@@ -59,6 +62,7 @@ def gains(
     csv_path: str | None,
     plot: str | None,
     *,
+    force: bool,
     over_travel: bool,
     as_json: bool,
 ) -> None:
@@ -75,7 +79,7 @@ def gains(
         raise OptionError("--at: expected one point, and none with --max")
     if step_deg is not None and not over_travel:
         raise OptionError("--step belongs to --max")
-    check_targets(plot=plot, csv_path=csv_path)
+    check_targets(scene, force=force, plot=plot, csv_path=csv_path)
     loaded = load_scene(scene)
     with progress("computing", silent=as_json):
         found = verbs.gains(
@@ -88,9 +92,12 @@ def gains(
         )
     where = _where(found, loop, over_travel=over_travel)
     if csv_path is not None:
-        _write_csv(csv_path, loaded, found)
+        _write_csv(csv_path, loaded, found, force=force)
     if plot is not None:
-        _plot(plot, loaded, found, where, share, signed=not over_travel)
+        from warpspace.outputs.charts import write_chart
+
+        chart = _chart(loaded, found, where, share, signed=not over_travel)
+        write_chart(chart, plot, overwrite=force)
     if as_json:
         print_json({"gains": [_json_row(gain) for gain in found]})
         return
@@ -193,7 +200,7 @@ def _place(gain: "Gain") -> str:
     )
 
 
-def _write_csv(path: str, scene: "Scene", found: "Sequence[Gain]") -> None:
+def _write_csv(path: str, scene: "Scene", found: "Sequence[Gain]", *, force: bool) -> None:
     """Write one row a parameter, lever and axis positions included."""
     import csv
 
@@ -204,7 +211,7 @@ def _write_csv(path: str, scene: "Scene", found: "Sequence[Gain]") -> None:
     lever = ("lever_x_mm", "lever_y_mm", "lever_z_mm")
     head = ("key", "symbol", "name", "unit", "x", "y", "z", "norm", *lever, "key_error")
     with (
-        write_atomically(path) as temporary,
+        write_atomically(path, overwrite=force) as temporary,
         temporary.open("w", newline="", encoding="utf-8") as file,
     ):
         writer = csv.writer(file)
@@ -222,11 +229,11 @@ def _write_csv(path: str, scene: "Scene", found: "Sequence[Gain]") -> None:
             )
 
 
-def _plot(
-    path: str, scene: "Scene", found: "Sequence[Gain]", where: str, share: float, *, signed: bool
-) -> None:
+def _chart(
+    scene: "Scene", found: "Sequence[Gain]", where: str, share: float, *, signed: bool
+) -> "Figure":
     """Draw the chart."""
-    from warpspace.outputs.charts import gains_chart, write_chart
+    from warpspace.outputs.charts import gains_chart
 
     title = f"Error gains · {scene.machine.title}"
-    write_chart(gains_chart(found, title, where, share, signed=signed), path)
+    return gains_chart(found, title, where, share, signed=signed)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from warpspace.cli.file_options import check_targets, plot_option
+from warpspace.cli.file_options import check_targets, force_option, plot_option
 from warpspace.cli.options import (
     grid_option,
     json_option,
@@ -53,6 +53,7 @@ OVER = ("sampled", "max", "mean")
     "--workers", type=int, help="Threads; the result does not depend on it.  [one per core]"
 )
 @plot_option("histogram")
+@force_option
 @json_option
 def montecarlo(
     scene: str,
@@ -67,6 +68,7 @@ def montecarlo(
     workers: int | None,
     plot: str | None,
     *,
+    force: bool,
     clip: bool,
     as_json: bool,
 ) -> None:
@@ -83,7 +85,7 @@ def montecarlo(
     from warpspace.scene import verbs
     from warpspace.scene.library import load_scene
 
-    check_targets(plot=plot)
+    check_targets(scene, force=force, plot=plot)
     loaded = load_scene(scene)
     size = parse_cylinder(cylinder)
     with progress("sampling", max(samples, 0), "machines", silent=as_json) as bar:
@@ -102,7 +104,7 @@ def montecarlo(
             progress=bar.advance,
         )
     if plot is not None:
-        _plot(plot, loaded, result)
+        _plot(plot, loaded, result, force=force)
     if as_json:
         print_json(result_json(result))
         return
@@ -164,12 +166,12 @@ def printed_value(scene: "Scene", result: "MonteCarlo") -> float | None:
     return float(found) if found and here and str(result.plan.over) == "sampled" else None
 
 
-def _plot(path: str, scene: "Scene", result: "MonteCarlo") -> None:
+def _plot(path: str, scene: "Scene", result: "MonteCarlo", *, force: bool) -> None:
     """Draw the histogram."""
     from warpspace.outputs.charts import montecarlo_chart, write_chart
 
     chart = montecarlo_chart(result, scene.title, describe(result), printed_value(scene, result))
-    write_chart(chart, path)
+    write_chart(chart, path, overwrite=force)
 
 
 def _print(scene: "Scene", result: "MonteCarlo") -> None:

@@ -2,7 +2,7 @@
 
 import click
 
-from warpspace.cli.file_options import force_option, output_option, size_text
+from warpspace.cli.file_options import check_output, force_option, output_option, size_text
 from warpspace.cli.options import (
     exaggeration_option,
     grid_option,
@@ -17,6 +17,7 @@ from warpspace.cli.sampling_options import (
     seed_option,
     specification_option,
 )
+from warpspace.cli.terminal import echo
 
 
 @click.command()
@@ -51,12 +52,11 @@ def report(
     """
     from warpspace.cli.exports import embed_view
     from warpspace.exceptions import OptionError
-    from warpspace.outputs.files import check_target
     from warpspace.outputs.report import ReportSettings, write_report
     from warpspace.outputs.report.build import ENDINGS
     from warpspace.scene.library import load_scene, scene_path
 
-    target = check_target(output, ENDINGS, overwrite=force)
+    target = check_output(output, ENDINGS, force=force, scenes=scenes)
     if len(scenes) > 2:
         raise OptionError(f"report: {len(scenes)} scenes; expected one, or two to compare")
     settings = ReportSettings(
@@ -79,4 +79,4 @@ def report(
             overwrite=force,
         )
     titles = " and ".join(scene.title for scene in loaded)
-    click.echo(f"{output}: design review of {titles}, {size_text(target)}")
+    echo(f"{output}: design review of {titles}, {size_text(target)}")

@@ -5,8 +5,9 @@ from typing import Any
 import click
 
 from warpspace.cli.figure_options import draw_figure_file, figure_options, parse_settings
-from warpspace.cli.file_options import output_option
+from warpspace.cli.file_options import check_output, output_option
 from warpspace.cli.options import scene_argument
+from warpspace.cli.terminal import echo
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.outputs.figures.catalogue import figure_names
 
@@ -29,15 +30,14 @@ def snapshot(scene: str, output: str, figure: str, *, force: bool, **options: An
     byte for byte, whenever it is repeated. Charts keep their own height to the width given.
     """
     from warpspace.outputs.drawing.style import FIGURE_ENDINGS
-    from warpspace.outputs.files import check_target
     from warpspace.scene.library import load_scene
 
     if figure in figure_names(scenes=2):
         raise OptionError(f"figure {figure!r} takes two scenes: warpspace compare A B -o FILE")
     if figure not in figure_names():
         raise UnknownNameError("figure", figure, figure_names())
-    target = check_target(output, FIGURE_ENDINGS, overwrite=force)
+    target = check_output(output, FIGURE_ENDINGS, force=force, scenes=[scene])
     settings = parse_settings(**options)
     loaded = load_scene(scene)
     draw_figure_file(figure, [loaded], settings, target, force=force)
-    click.echo(f"wrote {output}")
+    echo(f"wrote {output}")

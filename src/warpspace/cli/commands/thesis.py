@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from warpspace.cli.file_options import check_output, force_option
 from warpspace.cli.options import json_option, print_json
 from warpspace.cli.progress import progress
 from warpspace.cli.tables import Column, print_table, print_text
@@ -14,8 +15,9 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.option("--markdown", type=click.Path(), help="Write the comparison to this .md file.")
+@force_option
 @json_option
-def thesis(markdown: str | None, *, as_json: bool) -> None:
+def thesis(markdown: str | None, *, force: bool, as_json: bool) -> None:
     """Recompute every number that the thesis prints.
 
     That is its tables 4-1 to 4-8 and 5-3 to 5-5; each number comes with its unit.
@@ -23,18 +25,18 @@ def thesis(markdown: str | None, *, as_json: bool) -> None:
     why; what was tried is listed below them. Nothing is tuned to agree.
     """
     from warpspace.analysis.thesis import thesis_hypotheses
-    from warpspace.outputs.files import check_target, write_atomically
+    from warpspace.outputs.files import write_atomically
     from warpspace.outputs.thesis_page import thesis_markdown
     from warpspace.scene import verbs
 
     if markdown is not None:
-        check_target(markdown, (".md",))
+        check_output(markdown, (".md",), force=force)
     needed = markdown is not None or not as_json
     with progress("computing", silent=as_json):
         rows = verbs.thesis()
         tried = thesis_hypotheses(verbs.thesis_case()) if needed else ()
     if markdown is not None:
-        with write_atomically(markdown) as temporary:
+        with write_atomically(markdown, overwrite=force) as temporary:
             temporary.write_text(thesis_markdown(rows, tried), encoding="utf-8")
     if as_json:
         print_json({"rows": [_json_row(row) for row in rows]})

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from warpspace.cli.options import scene_argument
+from warpspace.cli.terminal import echo
 
 if TYPE_CHECKING:
     from warpspace.app.state.app_state import AppState
@@ -83,8 +84,8 @@ def view(
         access=Access(allow_hosts, token, no_token=no_token),
         code=sys.stdout.isatty(),
         browser=not no_browser,
-        say=click.echo,
-        warn=lambda text: click.secho(text, err=True, fg="yellow"),
+        say=echo,
+        warn=lambda text: echo(text, err=True, fg="yellow"),
     )
 
 

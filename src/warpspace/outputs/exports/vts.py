@@ -180,6 +180,8 @@ def _read_arrays(path: Path) -> tuple[dict[str, Array], tuple[int, int, int]]:
         reader.SetFileName(source)
         reader.Update()
         mesh = cast("Any", pv.wrap(reader.GetOutput()))
+    except UnicodeEncodeError:
+        raise SceneError(source, ["cannot be read: VTK wants a file name in UTF-8"]) from None
     finally:
         vtkObject.SetGlobalWarningDisplay(shown)
     arrays = {name: np.asarray(mesh.field_data[name]) for name in mesh.field_data}

@@ -1,0 +1,211 @@
+"""Whatever ends the program, no process lives on, and the next run finds and leaves nothing."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(sys.platform != "linux", reason="reads /proc"),
+]
+MARK = "WARPSPACE_TEST_RUN"
+MAIN = "from warpspace.cli import main; main()"
+FIELD = ("field", "dvf5000_first", "--grid", "41", "--force", "--csv", "x.csv")
+PICTURE = ("snapshot", "dvf5000_first", "--force", "-o", "x.png")
+MOVIE = ("animate", "dvf5000_first", "--frames", "30", "--force", "-o", "x.gif")
+REPORT = ("report", "dvf5000_first", "--force", "-o", "x.html")
+# writes slowly, so that it is hit while its temporary file is there
+WRITER = """
+import sys, time
+from warpspace.cli import main
+from warpspace.cli.main import cli
+from warpspace.outputs.files import write_atomically
+def work(**options):
+    with write_atomically("x.csv") as temporary, temporary.open("w") as file:
+        while True:
+            file.write("0,1,2\\n"); file.flush(); time.sleep(0.001)
+cli.main = work
+main()
+"""
+
+
+def start(folder: Path, *arguments: str, code: str = MAIN) -> "subprocess.Popen[bytes]":
+    """Start the command; its processes carry the folder in their environment."""
+    with (folder / "log").open("wb") as log:
+        return subprocess.Popen(
+            [sys.executable, "-c", code, *arguments],
+            cwd=folder,
+            env={**os.environ, MARK: str(folder)},
+            stdout=log,
+            stderr=log,
+            start_new_session=True,
+        )
+
+
+def processes(folder: Path) -> list[int]:
+    """List the processes of a run that live."""
+    mark = f"{MARK}={folder}".encode()
+    found: list[int] = []
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            if mark in (path / "environ").read_bytes().split(b"\0"):
+                found.append(int(path.name))
+        except OSError:
+            continue
+    return found
+
+
+def all_have_ended(folder: Path, within_s: float = 20.0) -> bool:
+    """Wait until no process of a run lives."""
+    until = time.monotonic() + within_s
+    while processes(folder):
+        if time.monotonic() > until:
+            return False
+        time.sleep(0.05)
+    return True
+
+
+def wait_for(folder: Path, pattern: str, process: "subprocess.Popen[bytes]") -> None:
+    """Wait until a file is there."""
+    while not list(folder.glob(pattern)):
+        assert process.poll() is None, (folder / "log").read_text()
+        time.sleep(0.005)
+
+
+def wait_for_workers(folder: Path, process: "subprocess.Popen[bytes]", count: int = 3) -> None:
+    """Wait until the command has started a renderer beside itself and the tracker."""
+    while len(processes(folder)) < count:
+        assert process.poll() is None, (folder / "log").read_text()
+        time.sleep(0.02)
+
+
+def hidden(folder: Path) -> list[str]:
+    """List the temporary files that are there."""
+    return [path.name for path in folder.glob(".warpspace-*")]
+
+
+def run_again(folder: Path) -> None:
+    """Let the next run write a small file into the folder."""
+    again = start(folder, *FIELD[:2], "--grid", "2", *FIELD[4:])
+    assert again.wait(60) == 0, (folder / "log").read_text()
+
+
+def test_a_hundred_kills_leave_nothing(tmp_path: Path) -> None:
+    chance = random.Random(11)
+    for number in range(100):
+        how = signal.SIGKILL if number % 2 else signal.SIGTERM
+        if number % 20 == 0:
+            process = start(tmp_path, *chance.choice([PICTURE, MOVIE]))
+            wait_for_workers(tmp_path, process)
+            time.sleep(chance.uniform(0.0, 1.5))
+        elif number % 4 == 0:
+            process = start(tmp_path, *FIELD)
+            time.sleep(chance.uniform(0.1, 1.5))
+        else:
+            process = start(tmp_path, code=WRITER)
+            wait_for(tmp_path, f".warpspace-*-{process.pid}-*", process)
+            time.sleep(chance.uniform(0.0, 0.02))
+        process.send_signal(how)
+        status = process.wait(30)
+        if how == signal.SIGTERM:
+            assert status in (0, 143, -signal.SIGTERM), (tmp_path / "log").read_text()
+    assert all_have_ended(tmp_path)
+    run_again(tmp_path)
+    assert hidden(tmp_path) == []
+    assert sorted(path.name for path in tmp_path.iterdir() if path.name[0] != "x") == ["log"]
+
+
+@pytest.mark.parametrize("command", [PICTURE, MOVIE, REPORT], ids=lambda command: command[0])
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_renderers_end_with_their_command(
+    command: tuple[str, ...], how: signal.Signals, tmp_path: Path
+) -> None:
+    process = start(tmp_path, *command)
+    wait_for_workers(tmp_path, process)
+    time.sleep(0.3)
+    if how == signal.SIGINT:
+        os.killpg(process.pid, how)  # as a terminal does
+    else:
+        process.send_signal(how)
+    status = process.wait(10)
+    assert all_have_ended(tmp_path)
+    said = (tmp_path / "log").read_text()
+    assert "Traceback" not in said
+    if how != signal.SIGKILL:
+        assert status == 128 + how
+        word = "interrupted" if how == signal.SIGINT else "terminated"
+        assert said.split() == ["warpspace:", word]
+        assert hidden(tmp_path) == []
+
+
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_removes_the_temporary_file(how: signal.Signals, tmp_path: Path) -> None:
+    process = start(tmp_path, code=WRITER)
+    wait_for(tmp_path, ".warpspace-*", process)
+    process.send_signal(how)
+    process.send_signal(how)  # some programs send it twice
+    assert process.wait(10) == 128 + how
+    assert hidden(tmp_path) == []
+
+
+def test_the_next_run_clears_what_a_killed_one_left(tmp_path: Path) -> None:
+    process = start(tmp_path, code=WRITER)
+    wait_for(tmp_path, ".warpspace-*", process)
+    alive = start(tmp_path, code=WRITER)
+    wait_for(tmp_path, f".warpspace-*-{alive.pid}-*", alive)
+    process.kill()
+    process.wait()
+    (tmp_path / ".warpspace-notes.csv").write_text("a user's own", "utf-8")
+    run_again(tmp_path)
+    left = hidden(tmp_path)
+    alive.kill()
+    alive.wait()
+    assert len(left) == 2
+    assert all(f"-{alive.pid}-" in name or name == ".warpspace-notes.csv" for name in left)
+
+
+DRAWING_VIEW = """
+import threading, time, sys
+import warpspace.app.server.run as viewer
+from warpspace.cli.services import build_services
+from warpspace.app.documents.services import Request
+from warpspace.scene.library import load_scene
+serve = viewer.run_viewer
+def run(scene, scenes, *, services, **options):
+    def draw():
+        from warpspace.outputs.worker import FigureWorker
+        try:
+            with FigureWorker() as worker:
+                while True:
+                    worker.render("error-map", [scene])
+        except Exception as error:
+            print("gave up", type(error).__name__, flush=True)
+    threading.Thread(target=draw).start()
+    serve(scene, scenes, services=services, **options)
+viewer.run_viewer = run
+from warpspace.cli import main
+main()
+"""
+
+
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGINT])
+def test_view_ends_at_once_while_a_figure_is_drawn(how: signal.Signals, tmp_path: Path) -> None:
+    process = start(tmp_path, "view", "--no-browser", code=DRAWING_VIEW)
+    wait_for_workers(tmp_path, process)
+    while "is shown at" not in (tmp_path / "log").read_text():
+        assert process.poll() is None
+        time.sleep(0.05)
+    begin = time.monotonic()
+    os.killpg(process.pid, how)
+    assert process.wait(20) in (0, 128 + how)
+    assert time.monotonic() - begin < 5.0
+    assert all_have_ended(tmp_path)
+    said = (tmp_path / "log").read_text()
+    assert "Traceback" not in said, said
+    assert "ended" in said

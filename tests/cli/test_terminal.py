@@ -1,0 +1,130 @@
+"""Titles and file names cannot steer the terminal; odd surroundings give a clear message."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from warpspace.cli.terminal import escape_json, plain
+
+EVIL = "red\x1b[31m\x9b2J\x07 \u202egpj.exe\u2066 end"
+STEERING = ("\x1b", "\x9b", "\x07", "\u202e", "\u2066")
+MAIN = "from warpspace.cli import main; main()"
+
+
+def run(
+    *arguments: str | bytes, cwd: Path | None = None, **variables: str
+) -> "subprocess.CompletedProcess[bytes]":
+    """Run the command in a process of its own."""
+    return subprocess.run(
+        [sys.executable, "-c", MAIN, *arguments],
+        cwd=cwd,
+        env={**os.environ, **variables},
+        capture_output=True,
+        check=False,
+        timeout=120,
+    )
+
+
+def is_refusal(result: "subprocess.CompletedProcess[bytes]", *fragments: str) -> None:
+    """Check for exit 2 and one message."""
+    text = result.stderr.decode()
+    assert result.returncode == 2, text
+    assert "Traceback" not in text
+    for fragment in fragments:
+        assert fragment in text
+
+
+def test_steering_characters_are_spelt_out() -> None:
+    assert plain(EVIL) == r"red\x1b[31m\x9b2J\x07 \u202egpj.exe\u2066 end"
+    assert plain("a\nb\tc") == "a\nb\tc"
+    assert plain("a\nb", breaks=False) == r"a\x0ab"
+    assert plain(os.fsdecode(b"\xff.toml")) == r"\xff.toml"
+    assert plain("µm · ×5 δ 面") == "µm · ×5 δ 面"
+    text = json.dumps(EVIL, ensure_ascii=False)
+    assert json.loads(escape_json(text)) == EVIL
+    assert not any(character in escape_json(text) for character in STEERING)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("check",),
+        ("check", "--json"),
+        ("field", "--at", "X=0"),
+        ("gains",),
+        ("ballbar", "--plane", "XY", "--radius", "100"),
+        ("measured",),
+        ("montecarlo", "--samples", "100"),
+    ],
+    ids=lambda command: " ".join(command[:2]),
+)
+def test_a_title_reaches_the_terminal_harmless(
+    command: tuple[str, ...], tmp_path: Path, warpspace
+) -> None:
+    path = tmp_path / "s.toml"
+    title = json.dumps(EVIL)
+    half_widths = "default = { translation = 10, rotation = 20, squareness = 25 }"
+    text = f'title = {title}\nmachine = "dvf5000"\n[errors]\nEC0Y = 5\n[tolerances]\n{half_widths}'
+    path.write_text(text, "utf-8")
+    result = warpspace(command[0], path, *command[1:])
+    assert result.status == 0, result.err
+    assert not any(character in result.out + result.err for character in STEERING)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("check", EVIL), (EVIL,), ("check", f"--{EVIL}"), ("gains", "dvf5000_first", "--loop", EVIL)],
+    ids=["scene", "command", "option", "value"],
+)
+def test_a_refused_word_reaches_the_terminal_harmless(arguments: tuple[str], warpspace) -> None:
+    result = warpspace(*arguments)
+    assert result.status == 2
+    assert not any(character in result.out + result.err for character in STEERING)
+
+
+def test_a_file_name_that_is_no_text(tmp_path: Path) -> None:
+    folder = os.fsencode(tmp_path)
+    (tmp_path / os.fsdecode(b"\xff.toml")).write_text('title = "t"\nmachine = "dvf5000"\n', "utf-8")
+    target = folder + b"/\xfe.csv"
+    done = run("export", folder + b"/\xff.toml", "--grid", "3", "-o", target)
+    assert done.returncode == 0, done.stderr
+    assert rb"\xfe.csv" in done.stdout
+    assert Path(os.fsdecode(target)).stat().st_size > 100
+    is_refusal(run("check", folder + b"/\xfd.toml"), r"\xfd.toml")
+
+
+def test_a_working_folder_that_is_gone(tmp_path: Path) -> None:
+    folder = tmp_path / "gone"
+    folder.mkdir()
+    code = f"import os; os.rmdir({str(folder)!r}); {MAIN}"
+    done = subprocess.run(
+        [sys.executable, "-c", code, "check", "dvf5000_first"],
+        cwd=folder,
+        capture_output=True,
+        check=False,
+    )
+    is_refusal(done, "the working folder does not exist any more")
+
+
+@pytest.mark.slow
+def test_an_unknown_window_of_vtk(tmp_path: Path) -> None:
+    done = run(
+        *("snapshot", "dvf5000_first", "--grid", "3", "-o", str(tmp_path / "x.png")),
+        VTK_DEFAULT_OPENGL_WINDOW="bogus",
+    )
+    is_refusal(done, "VTK_DEFAULT_OPENGL_WINDOW is 'bogus'", "unset it")
+    assert b"apt-get" not in done.stderr
+
+
+@pytest.mark.parametrize("keep", [0.1, 0.5, 0.9, 0.99])
+def test_a_damaged_stored_field(keep: float, tmp_path: Path, warpspace) -> None:
+    whole = tmp_path / "whole.vts"
+    assert warpspace("export", "dvf5000_first", "--grid", 3, "-o", whole).status == 0
+    data = whole.read_bytes()
+    damaged = tmp_path / "damaged.vts"
+    damaged.write_bytes(data[: int(keep * len(data))])
+    warpspace("view", damaged, "--no-browser").refused("damaged.vts")
