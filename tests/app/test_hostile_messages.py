@@ -242,12 +242,12 @@ def test_ten_thousand_hostile_messages_leave_an_honest_tab_served(app: App) -> N
             )
             taken: list[float] = []
             for value in itertools.count(1):
-                taken.append(await honest.answer_s(value % 40 + 0.5))
+                taken.append(await honest.answer_s(value % 10 + 0.5))
                 if own.done() and other.done():
                     break
                 await asyncio.sleep(0.1)
             await asyncio.gather(own, other)
-            taken.append(await honest.answer_s(33.0))
+            taken.append(await honest.answer_s(15.0))
             # the tab that was steered by force still does what it is asked for
             taken.append(await hostile.answer_s(12.0))
             return taken, app.memory_mb - before
