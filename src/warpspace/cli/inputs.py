@@ -20,7 +20,8 @@ def input_files(*scenes: str) -> Iterator[Path]:
     ------
     Path
     """
-    from warpspace.scene.files import MAX_SCENE_BYTES, parse_toml, read_text
+    from warpspace.machine.limits import MAX_SCENE_BYTES
+    from warpspace.scene.files import parse_toml, read_text
     from warpspace.scene.library import scene_path
 
     for scene in scenes:
