@@ -357,7 +357,7 @@ def test_a_value_of_the_same_kind_may_be_set(present: object, value: object) -> 
 @pytest.mark.parametrize(
     ("present", "value"),
     [(1.5, True), (1.5, "2"), (True, 1), ("a", 1.0), ((1.0, 2.0), [3.0]), ((1.0,), ["a"]),
-     (None, "a"), ((1.0,), 1.0)],
+     (None, "a"), ((1.0,), 1.0), (3, float("nan")), (3, 1e300)],
 )  # fmt: skip
 def test_a_value_of_another_kind_may_not(present: object, value: object) -> None:
     assert not may_set(present, {"value": value})

@@ -1,8 +1,8 @@
 """What a page may say: every message of a client is checked here before viser acts on it.
 
 viser builds an object of whatever kind a message names and sets whatever attribute of a widget it
-names. Here only the kinds the app has a use for pass, with fields of the right type and size and
-with finite numbers; of a widget a page sets nothing but `value`, to something of the kind it shows.
+names. Here only the kinds the app has a use for pass, with fields of the right type and size; of
+a widget a page sets nothing but `value`, to something of the kind it shows.
 What is refused is left out and the connection stays open, since a new one would cost the server
 more than a message that is dropped.
 """
@@ -35,7 +35,8 @@ Name = Annotated[str, Meta(max_length=LONGEST_NAME)]
 Text = Annotated[str, Meta(max_length=LONGEST_TEXT)]
 Numbers = Annotated[tuple[Number, ...], Meta(max_length=MOST_NUMBERS)]
 Vector = tuple[Number, Number, Number]
-Value = bool | Number | Text | Numbers
+Value = bool | float | Text | Numbers
+"""Of a widget; the app clamps a number that is too large or none, and tells the user so."""
 
 
 class Update(Struct, forbid_unknown_fields=True):
@@ -190,9 +191,11 @@ def _is_alike(present: object, value: object) -> bool:
         )
     if isinstance(present, bool | str):
         return type(value) is type(present)
-    if isinstance(present, int | float):
-        return isinstance(value, int | float) and not isinstance(value, bool)
-    return False
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    if isinstance(present, int):  # viser makes one of it
+        return abs(value) <= LARGEST_NUMBER
+    return isinstance(present, float) and (isinstance(value, float) or value.bit_length() <= 64)
 
 
 def _is_picture(payload: bytes) -> bool:
