@@ -99,11 +99,11 @@ def test_hostile_density_factor_and_words(tab: Tab) -> None:
     tab.send("Grid density", "NaN")
     tab.page.wait_for_timeout(100)
     tab.send("Displacement", "-5")
-    tab.until(lambda: tab.text("factor") == "true scale")
+    tab.until(lambda: tab.text("factor") == "displacement drawn ×0.001")  # the least there is
     tab.send("Colour", "'<script>'")
     tab.page.wait_for_timeout(500)
     tab.send("EXX", "4")
-    wanted = START.with_amplitude("EXX", 4.0).with_exaggeration(1.0)
+    wanted = START.with_amplitude("EXX", 4.0).with_exaggeration(0.001)
     tab.until(lambda: tab.shows(drawn_nodes(model(wanted))))
 
 
