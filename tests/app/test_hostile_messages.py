@@ -22,21 +22,10 @@ import viser
 import websockets
 import zstandard
 
+from app.first_camera import CAMERA
 from warpspace.app.browser.incoming import may_pass, may_set
 from warpspace.app.server.repeated_lines import RepeatedLines
 
-CAMERA = {
-    "type": "ViewerCameraMessage",
-    "wxyz": (1.0, 0.0, 0.0, 0.0),
-    "position": (30.0, -30.0, 30.0),
-    "fov": 0.4,
-    "near": 0.01,
-    "far": 1000.0,
-    "image_height": 900,
-    "image_width": 1600,
-    "look_at": (0.0, 0.0, 0.0),
-    "up_direction": (0.0, 0.0, 1.0),
-}
 MESSAGES = 10_000
 CONNECTIONS = 200
 pack = msgspec.msgpack.encode

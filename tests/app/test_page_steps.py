@@ -15,6 +15,7 @@ import zstandard
 from websockets.sync.client import connect
 from websockets.sync.connection import Connection
 
+from app.first_camera import CAMERA
 from warpspace.app.browser.arrivals import CARRIER
 from warpspace.app.browser.opening import drawn_script, stage_script
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -26,18 +27,6 @@ from warpspace.app.state.app_state import start_state
 from warpspace.machine.parameters import PARAMETERS
 from warpspace.scene.library import load_scene
 
-CAMERA = {
-    "type": "ViewerCameraMessage",
-    "wxyz": (1.0, 0.0, 0.0, 0.0),
-    "position": (30.0, -30.0, 30.0),
-    "fov": 0.4,
-    "near": 0.01,
-    "far": 1000.0,
-    "image_height": 900,
-    "image_width": 1600,
-    "look_at": (0.0, 0.0, 0.0),
-    "up_direction": (0.0, 0.0, 1.0),
-}
 KEYS = set(start_state(load_scene("dvf5000_first")).amplitudes)
 OPEN = stage_script("open")
 

@@ -10,6 +10,7 @@ import viser
 import zstandard
 from websockets.sync.client import connect
 
+from app.first_camera import CAMERA
 from still_scenes import TEXTS, still_scene
 from warpspace.app.browser.arrivals import CARRIER
 from warpspace.app.browser.opening import stage_script
@@ -21,19 +22,6 @@ from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import start_state
 from warpspace.app.viewport.layers.axes import axes_room_mm
 from warpspace.picture.mesh import map_mesh, outline_pieces
-
-CAMERA = {
-    "type": "ViewerCameraMessage",
-    "wxyz": (1.0, 0.0, 0.0, 0.0),
-    "position": (30.0, -30.0, 30.0),
-    "fov": 0.4,
-    "near": 0.01,
-    "far": 1000.0,
-    "image_height": 900,
-    "image_width": 1600,
-    "look_at": (0.0, 0.0, 0.0),
-    "up_direction": (0.0, 0.0, 1.0),
-}
 
 
 def messages_until_open(viewer: Viewer) -> list[dict]:

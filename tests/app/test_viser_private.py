@@ -15,6 +15,7 @@ import viser
 from viser import _messages as messages
 from websockets.sync.client import connect
 
+from app.first_camera import CAMERA
 from warpspace.app import browser
 from warpspace.app.browser.viser_private import dom_id, serve_with, wake_sender_on_its_thread
 from warpspace.app.server.viewer import Viewer
@@ -22,18 +23,6 @@ from warpspace.scene.library import load_scene
 
 APP = Path(browser.__file__).parents[1]
 ONLY = APP / "browser" / "viser_private.py"
-CAMERA = {
-    "type": "ViewerCameraMessage",
-    "wxyz": (1.0, 0.0, 0.0, 0.0),
-    "position": (30.0, -30.0, 30.0),
-    "fov": 0.4,
-    "near": 0.01,
-    "far": 1000.0,
-    "image_height": 900,
-    "image_width": 1600,
-    "look_at": (0.0, 0.0, 0.0),
-    "up_direction": (0.0, 0.0, 1.0),
-}
 SERVER = ("_websock_server.register_handler", "_websock_server.queue_message")
 CLIENT = (
     "_websock_connection.queue_message",
