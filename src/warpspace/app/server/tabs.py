@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib import import_module
+from pkgutil import resolve_name
 from typing import Literal
 
 from warpspace.app.panels import Panel, PanelContext
@@ -40,13 +40,7 @@ class Tab:
 
     def load(self) -> list[Build]:
         """Give what builds its panels."""
-        return [_imported(build) if isinstance(build, str) else build for build in self.build]
-
-
-def _imported(path: str) -> Build:
-    """Import what builds a panel."""
-    module, _, name = path.partition(":")
-    return getattr(import_module(module), name)
+        return [resolve_name(build) if isinstance(build, str) else build for build in self.build]
 
 
 _HERE = "warpspace.app.panels"

@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING
 
 from warpspace.exceptions import OptionError
@@ -39,10 +39,7 @@ class ExportFormat:
 
     def load(self) -> Write:
         """Give the function that writes it."""
-        if callable(self.write):
-            return self.write
-        module, _, function = self.write.partition(":")
-        return getattr(import_module(module), function)
+        return resolve_name(self.write) if isinstance(self.write, str) else self.write
 
 
 _FORMATS: dict[str, ExportFormat] = {}

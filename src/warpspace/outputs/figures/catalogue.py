@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib import import_module
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING
 
 from warpspace.exceptions import OptionError, UnknownNameError
@@ -43,10 +43,7 @@ class FigureKind:
 
     def load(self) -> Draw:
         """Give the function that draws it."""
-        if callable(self.draw):
-            return self.draw
-        module, _, function = self.draw.partition(":")
-        return getattr(import_module(module), function)
+        return resolve_name(self.draw) if isinstance(self.draw, str) else self.draw
 
 
 _HERE = "warpspace.outputs.figures"
