@@ -79,6 +79,17 @@ class Grid:
         return np.where(along < 0.0, -1.0, 1.0)
 
     @cached_property
+    def weights(self) -> Array:
+        """Share of the volume that belongs to each node, [nx, ny, nz], trapezoidal; sums to 1."""
+        weights = np.ones(())
+        for nodes in self.shape:
+            along = np.ones(nodes)
+            if nodes > 1:
+                along[[0, -1]] = 0.5
+            weights = weights[..., None] * (along / along.sum())
+        return weights
+
+    @cached_property
     def extent_mm(self) -> Array:
         """Edge lengths of the nominal volume in R, [3], mm."""
         return self.bounds_mm[1] - self.bounds_mm[0]

@@ -6,7 +6,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from warpspace.analysis.statistics import Statistics, statistics
+from warpspace.analysis.statistics import Statistics, volume_statistics
 from warpspace.exceptions import OptionError
 from warpspace.field.basis import ErrorField
 from warpspace.field.evaluate import View
@@ -79,8 +79,8 @@ class Picture:
 
     @cached_property
     def statistics(self) -> Statistics:
-        """Statistics of the length of the position error."""
-        return statistics(self.field)
+        """Statistics of the length of the position error over the volume."""
+        return volume_statistics(self.field, self.grid)
 
     @cached_property
     def values(self) -> Array:

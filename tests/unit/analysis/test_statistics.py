@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
-from warpspace.analysis.statistics import statistics
+from warpspace.analysis.statistics import statistics, volume_statistics
 from warpspace.exceptions import OptionError
 from warpspace.field.basis import ErrorField
+from warpspace.field.grid import build_grid
+from warpspace.scene.library import load_scene
+from warpspace.scene.pipeline import evaluate
 
 
 def field_of(norms: np.ndarray) -> ErrorField:
@@ -38,3 +41,40 @@ def test_one_point_is_enough_and_none_is_not() -> None:
     assert statistics(field_of(np.array(7.0))).max_um == 7.0
     with pytest.raises(OptionError, match="expected at least one"):
         statistics(field_of(np.zeros(0)))
+
+
+@pytest.mark.parametrize("name", ["dvf5000_first", "dvf5000_second"])
+def test_statistics_of_the_volume_hardly_depend_on_the_number_of_nodes(name: str) -> None:
+    scene = load_scene(name)
+    found = {}
+    for nodes in (11, 31, 61):
+        grid = build_grid(scene.model, scene.workspace, nodes)
+        found[nodes] = volume_statistics(evaluate(scene, grid=nodes), grid)
+    for nodes in (11, 31):
+        assert found[nodes].mean_um == pytest.approx(found[61].mean_um, rel=0.005)
+        assert found[nodes].rms_um == pytest.approx(found[61].rms_um, rel=0.005)
+        assert found[nodes].p95_um == pytest.approx(found[61].p95_um, rel=0.005)
+
+
+def test_statistics_of_the_volume_of_a_linear_error_are_those_of_its_integral() -> None:
+    """|E| = 100·u over a bar 0 ≤ u ≤ 1: mean 50, RMS 100/√3 (at many nodes), P95 95."""
+    scene = load_scene("dvf5000_nominal")
+    grid = build_grid(scene.model, scene.workspace, (101, 2, 2))
+    error = np.zeros((*grid.shape, 3))
+    error[..., 1] = np.linspace(0.0, 100.0, 101)[:, None, None]
+    found = volume_statistics(ErrorField(grid.nominal_mm, error, np.zeros_like(error)), grid)
+    assert found.mean_um == pytest.approx(50.0)
+    assert found.rms_um == pytest.approx(100.0 / np.sqrt(3.0), rel=1e-4)
+    assert found.p95_um == pytest.approx(95.0, abs=0.02)
+    assert found.max_at_axes["X"] == 275.0
+
+
+def test_the_worst_node_is_named_in_both_coordinate_systems() -> None:
+    """The corner of the first machine: axes X 275 Y −225 Z −480, in R z −51."""
+    scene = load_scene("dvf5000_first")
+    grid = build_grid(scene.model, scene.workspace, 5)
+    field = evaluate(scene, grid=5)
+    found = volume_statistics(field, grid)
+    assert {axis: found.max_at_axes[axis] for axis in "XYZ"} == {"X": 275, "Y": -225, "Z": -480}
+    assert found.max_at_mm[2] == pytest.approx(-51.0, abs=0.5)
+    assert statistics(field, grid.coordinates).max_at_axes == found.max_at_axes
