@@ -201,7 +201,7 @@ class BarePage:
         gui.main_panel.set_width(LEFT_WIDTH)
         slider = gui.add_slider("EXX", -10.0, 10.0, 0.1, 0.0)
         panel = gui.add_panel()
-        with panel.add_tab("Result"):
+        with panel.add_tab("Volumetric error"):
             texts = {m.uuid: gui.add_html("") for move in moves for m in move if is_text(m)}
         panel.dock_right()
         panel.set_width(RIGHT_WIDTH)

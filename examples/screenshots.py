@@ -163,22 +163,22 @@ VISITS = {
     "app_dark": Visit(dark),
     "app_rotary": Visit(signed, scene="teach_wobbling_table"),
     "tab_errors": Visit(switched, "Errors"),
-    "tab_one_error": Visit(curved, "One error", share=0.45),
-    "tab_result": Visit(as_opened, "Result", share=0.52),
-    "tab_why": Visit(asked, "Why"),
-    "tab_gains": Visit(by_effect, "Gains"),
+    "tab_one_error": Visit(curved, "Error curve", share=0.45),
+    "tab_result": Visit(as_opened, "Volumetric error", share=0.52),
+    "tab_why": Visit(asked, "Error budget"),
+    "tab_gains": Visit(by_effect, "Sensitivities"),
     "tab_compare": Visit(compared, "Compare"),
     "tab_files": Visit(as_opened, "Files", share=0.4),
     "tab_view": Visit(sliced, "View"),
     "tab_machine": Visit(bent, "Machine", share=0.6),
-    "tab_table": Visit(as_opened, "Table", "teach_wobbling_table"),
-    "tab_chance": Visit(sampled, "Chance"),
+    "tab_table": Visit(as_opened, "Rotary axes", "teach_wobbling_table"),
+    "tab_chance": Visit(sampled, "Tolerances"),
     "tab_conventions": Visit(as_opened, "Conventions"),
 }
 """File name to visit."""
 LEFT_TABS, LOWER_TABS = (
-    ("Errors", "One error"),
-    ("One error", "View", "Machine", "Table", "Chance", "Conventions"),
+    ("Errors", "Error curve"),
+    ("Error curve", "View", "Machine", "Rotary axes", "Tolerances", "Conventions"),
 )
 
 

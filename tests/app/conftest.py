@@ -88,7 +88,7 @@ class Tab:
         self.page.wait_for_selector("html[data-warpspace=open]")
         self.page.keyboard.press("Escape")
         self.written("Find an error").fill("")
-        self.panel("Result")
+        self.panel("Volumetric error")
         self.panel("View")
         session.context.act(forget)
         session.context.look_from(self._camera)

@@ -152,11 +152,11 @@ def test_a_point_of_a_trace_and_its_lever_come_with_a_link(
         lever="EC0B",
     )
     tab.session.context.post(lambda _: asked)
-    tab.panel("Why")
+    tab.panel("Error budget")
     tab.until(lambda: tab.page.locator("[data-value='why norm']").count() == 1)
     norm = tab.text("why norm")
     other = follow(press_link(tab))
-    other.panel("Why")
+    other.panel("Error budget")
     other.until(lambda: other.page.locator("[data-value='why norm']").count() == 1)
     assert other.text("why norm") == norm
     assert "mm" in other.text("lever")

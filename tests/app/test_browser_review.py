@@ -185,7 +185,7 @@ def test_undo_and_redo_of_everything(tab: Tab) -> None:
 
 
 def test_tolerances_are_traded_by_hand(tab: Tab) -> None:
-    tab.page.get_by_role("tab", name="Chance").click()
+    tab.page.get_by_role("tab", name="Tolerances").click()
     tab.page.wait_for_selector("[data-value='chance']")
     before = float(tab.text("chance").split()[0])
     assert 60.0 < before < 80.0
@@ -222,7 +222,7 @@ def test_readouts_keep_their_style_sheet_when_a_panel_is_collapsed(tab: Tab) -> 
 def test_a_tolerance_change_is_answered_within_300_ms_on_the_server(
     tab: Tab,
 ) -> None:
-    tab.page.get_by_role("tab", name="Chance").click()
+    tab.page.get_by_role("tab", name="Tolerances").click()
     tab.page.wait_for_selector("[data-value='chance']")
     session = tab.session
     panel = next(p for p in session.display.panels if type(p).__name__ == "TolerancesPanel")
@@ -240,7 +240,7 @@ def test_a_tolerance_change_is_answered_within_300_ms_on_the_server(
 
 
 def test_gain_chart_follows_the_errors(tab: Tab) -> None:
-    tab.page.get_by_role("tab", name="Gains").click()
+    tab.page.get_by_role("tab", name="Sensitivities").click()
     tab.page.wait_for_selector("[data-bar]")
     bars = "[...document.querySelectorAll('[data-bar]')].map(b => b.dataset.bar)"
     assert tab.page.evaluate(bars)[0] in {"EA0Z", "EB0Z"}

@@ -259,7 +259,7 @@ def test_machine_moves_bends_and_carries_the_tool_point(tab: Tab) -> None:
 
 def test_circles_in_numbers_for_chosen_points_and_positions(tab: Tab) -> None:
     tab.choose("Scene", load_scene("teach_tilted_c").title)
-    go(tab, "Table")
+    go(tab, "Rotary axes")
     tab.until(lambda: tab.page.locator("[data-value='circles']").count() > 0)
     table = tab.page.locator("[data-value='circles']").first
     assert "C at B −30°" in table.inner_text()
@@ -299,7 +299,7 @@ def settled(tab: Tab) -> tuple[object, str]:
 def test_rotation_plays_pauses_and_stops_with_its_session(tab: Tab) -> None:
     go(tab, "Machine")
     tick(tab, "Machine bodies")
-    go(tab, "Table")
+    go(tab, "Rotary axes")
     tab.until(lambda: drawn(tab, "/machine/C_table") is not None)
     still = drawn(tab, "/machine/C_table")
     tab.page.get_by_role("button", name="Play rotation").click()

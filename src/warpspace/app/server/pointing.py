@@ -43,5 +43,5 @@ class Pointing:
         if self._context.next_click is not None and picked.point_mm is None:
             self._context.next_click(picked)
             return
-        self._context.page.run_script(front_script("Why"))
+        self._context.page.run_script(front_script("Error budget"))
         self._context.post(lambda state: with_picked(state, picked))

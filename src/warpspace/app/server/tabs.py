@@ -66,9 +66,9 @@ def tabs() -> tuple[Tab, ...]:
 
 
 for _tab in (
-    Tab("Result", "results", [f"{_HERE}.summary:summary_panel"], "first"),
-    Tab("Why", "results", [f"{_HERE}.budget:BudgetPanel"]),
-    Tab("Gains", "results", [f"{_HERE}.sensitivities:SensitivitiesPanel"]),
+    Tab("Volumetric error", "results", [f"{_HERE}.summary:summary_panel"], "first"),
+    Tab("Error budget", "results", [f"{_HERE}.budget:BudgetPanel"]),
+    Tab("Sensitivities", "results", [f"{_HERE}.sensitivities:SensitivitiesPanel"]),
     Tab("Compare", "results", [f"{_HERE}.compare:ComparePanel"]),
     Tab("Files", "results", [f"{_HERE}.files:FilesPanel"]),
     Tab(
@@ -82,8 +82,8 @@ for _tab in (
         "front",
     ),
     Tab("Machine", "settings", [f"{_HERE}.machine:MachinePanel"]),
-    Tab("Table", "settings", [f"{_HERE}.rotary_axes:RotaryAxesPanel"]),
-    Tab("Chance", "settings", [f"{_HERE}.tolerances:TolerancesPanel"]),
+    Tab("Rotary axes", "settings", [f"{_HERE}.rotary_axes:RotaryAxesPanel"]),
+    Tab("Tolerances", "settings", [f"{_HERE}.tolerances:TolerancesPanel"]),
     Tab("Conventions", "settings", [f"{_HERE}.conventions:ConventionsPanel"]),
 ):
     register_tab(_tab)
