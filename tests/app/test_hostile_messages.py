@@ -87,6 +87,7 @@ class Tab:
         self._app = app
         self.widgets: dict[str, str] = {}
         self.mean = ""
+        self.notices: list[str] = []
         self.is_open = False
 
     async def __aenter__(self) -> "Tab":
@@ -120,6 +121,8 @@ class Tab:
 
     async def _take(self, message: dict[str, Any]) -> None:
         part = message.get("props") or message.get("updates") or {}
+        if message["type"].startswith("Notification"):
+            self.notices.append(str(message))
         if isinstance(part.get("label"), str):
             self.widgets.setdefault(part["label"].split(" ")[0], message["uuid"])
         if 'data-value="mean"' in str(part.get("content")):
@@ -245,6 +248,46 @@ def test_ten_thousand_hostile_messages_leave_an_honest_tab_served(app: App) -> N
     assert max(taken) < 1.0, [round(seconds, 2) for seconds in taken]
     assert growth < 30.0
     assert len(app.log) < 12, "\n".join(app.log[:40])
+
+
+def upload(button: str, name: str, content: bytes) -> list[bytes]:
+    """Give the messages by which a page uploads a file."""
+    return [
+        pack({"type": "FileTransferStartUpload", "source_component_uuid": button,
+              "transfer_uuid": name, "filename": f"{name}.toml", "mime_type": "",
+              "part_count": 1, "size_bytes": len(content)}),
+        pack({"type": "FileTransferPart", "source_component_uuid": button, "transfer_uuid": name,
+              "part_index": 0, "content": content}),
+    ]  # fmt: skip
+
+
+def test_others_are_answered_while_the_worst_files_that_are_allowed_are_read(app: App) -> None:
+    points = ",".join(f"[{index},{index % 7}]" for index in range(240_000))
+    files = [
+        f'title = "{entry[:1]}"\nx = [{entry}]'.encode()
+        for entry in (points, "1," * 900_000, "[]," * 300_000, "\n" * 900_000)
+    ]
+
+    async def run() -> tuple[list[float], float]:
+        async with Tab(app) as honest, Tab(app) as other:
+            await honest.answer_s(20.0)
+            before = app.memory_mb
+            for number, content in enumerate(files):
+                for message in upload(other.widgets["Open"], f"file{number}", content):
+                    await other.socket.send(message)
+            taken: list[float] = []
+            end = time.monotonic() + 60.0
+            for value in itertools.count(1):
+                taken.append(await honest.answer_s(value % 10 + 0.5))
+                if sum("file" in notice for notice in other.notices) == len(files):
+                    return taken, app.memory_mb - before
+                assert time.monotonic() < end, other.notices
+                await asyncio.sleep(0.05)
+            raise AssertionError
+
+    taken, growth = asyncio.run(run())
+    assert max(taken) < 1.0, [round(seconds, 2) for seconds in taken]
+    assert growth < 200.0
 
 
 async def steadily(socket: websockets.ClientConnection, messages: list[bytes]) -> None:

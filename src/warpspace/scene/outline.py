@@ -8,7 +8,7 @@ in proportion to the length of the text and no memory.
 import re
 
 from warpspace.exceptions import SceneError
-from warpspace.machine.limits import MAX_KEY_PARTS, MAX_KEYS, MAX_NESTING
+from warpspace.machine.limits import MAX_KEY_PARTS, MAX_KEYS, MAX_MARKS, MAX_NESTING
 
 _TOKENS = re.compile(
     r'"""(?:[^"\\]++|\\.|"(?!""))*+(?:"{3,5})?'  # a text may end with two quotes of its own
@@ -41,8 +41,16 @@ def check_outline(text: str, source: str) -> None:
         Naming the line and what was expected.
     """
     dots = depth = keys = 0
-    for found in _TOKENS.finditer(text):
+    for count, found in enumerate(_TOKENS.finditer(text)):
         mark = found[0]
+        if count >= MAX_MARKS:
+            _refuse(
+                text,
+                found,
+                source,
+                f"more than {MAX_MARKS:,} brackets, commas, dots and lines; expected long tables in"
+                " CSV files of their own",
+            )
         if mark == ".":  # between the parts of a key; a number has one at most
             dots += 1
             if dots >= MAX_KEY_PARTS:

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from warpspace.exceptions import SceneError
-from warpspace.machine.limits import MAX_KEY_PARTS, MAX_KEYS, MAX_NESTING
+from warpspace.machine.limits import MAX_KEY_PARTS, MAX_KEYS, MAX_MARKS, MAX_NESTING, MAX_POINTS
 from warpspace.resources import assets_dir, scenes_dir
 from warpspace.scene.files import parse_toml
 from warpspace.scene.outline import check_outline
@@ -129,3 +129,14 @@ def test_a_key_of_thirty_thousand_parts_takes_no_memory() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True
     )
     assert done.stdout.strip() == "x: line 1: a key of over 8 parts; expected at most 8"
+
+
+@pytest.mark.parametrize("entry", ["1,", "[],", "#\n", "\n", "1.5,", "'',"])
+def test_more_marks_than_a_reader_gets_through_in_seconds_are_refused(entry: str) -> None:
+    with pytest.raises(SceneError, match=r"line \d+: more than 1,000,000 brackets.*CSV files"):
+        parse_toml(f"x = [{entry * MAX_MARKS}]", "x.toml")
+
+
+def test_a_table_of_the_most_points_is_read() -> None:
+    rows = ",".join(f"[{index}.5, 1.5]" for index in range(MAX_POINTS))
+    assert len(parse_toml(f"x = [{rows}]", "x.toml")["x"]) == MAX_POINTS  # type: ignore[arg-type]
