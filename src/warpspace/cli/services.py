@@ -1,10 +1,8 @@
 """What the app has the outputs do: figures in a process of their own, exports in memory."""
 
-import tempfile
 import threading
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import replace
-from pathlib import Path
 
 from warpspace.app.documents.services import CancelledError, Request, Services
 from warpspace.exceptions import OptionError
@@ -109,6 +107,7 @@ def write_export(request: Request, ending: str) -> bytes:
     bytes
         The file's content.
     """
+    from warpspace.outputs.leftovers import temporary_folder
     from warpspace.picture.comparison import subtract_scenes
     from warpspace.picture.scene_picture import evaluate_picture
 
@@ -127,7 +126,7 @@ def write_export(request: Request, ending: str) -> bytes:
     )
     if subtracted:
         picture = subtract_scenes(picture, subtracted[0], "A − B")
-    with tempfile.TemporaryDirectory(prefix="warpspace-") as folder:
-        target = Path(folder) / f"export{ending}"
+    with temporary_folder() as folder:
+        target = folder / f"export{ending}"
         write(picture, target, overwrite=False)
         return target.read_bytes()

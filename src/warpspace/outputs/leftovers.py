@@ -10,9 +10,11 @@ import shutil
 import socket
 import stat
 import sys
+import tempfile
 import time
 import zlib
-from contextlib import suppress
+from collections.abc import Generator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 _NAME = re.compile(r"\.warpspace-([0-9a-f]{8})-(\d{1,10})-")
@@ -44,6 +46,17 @@ def clear_leftovers(folder: Path) -> None:
             with suppress(OSError):
                 if _is_left_over(path):
                     _remove(path)
+
+
+@contextmanager
+def temporary_folder() -> Generator[Path]:
+    """Give a folder of the system's for temporary files, gone afterwards.
+
+    What a killed process has left there is removed by the next that asks for one.
+    """
+    clear_leftovers(Path(tempfile.gettempdir()))
+    with tempfile.TemporaryDirectory(prefix=temporary_prefix()) as name:
+        yield Path(name)
 
 
 def _is_left_over(path: Path) -> bool:

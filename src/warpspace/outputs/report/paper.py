@@ -1,7 +1,6 @@
 """The report as PDF, typeset by Typst: vector figures, page numbers, tables that run over pages."""
 
 import json
-import tempfile
 from dataclasses import asdict
 from importlib.resources import files
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import Any
 
 from warpspace import __version__
 from warpspace.exceptions import OutputError, RenderError
+from warpspace.outputs.leftovers import temporary_folder
 from warpspace.outputs.report.blocks import Block, Embedded, Picture, Report
 from warpspace.outputs.report.clock import report_time
 
@@ -43,8 +43,7 @@ def render_pdf(report: Report) -> bytes:
     import typst
 
     try:
-        with tempfile.TemporaryDirectory(prefix="warpspace-report-") as name:
-            folder = Path(name)
+        with temporary_folder() as folder:
             template = files("warpspace.outputs.report") / "templates" / TEMPLATE
             (folder / TEMPLATE).write_bytes(template.read_bytes())
             text = json.dumps(_data(report, folder), ensure_ascii=False, allow_nan=False)
