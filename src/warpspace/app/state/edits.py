@@ -6,11 +6,10 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.ranges import Span, amplitude_span, round_up
 from warpspace.app.state.specification import Specification
 from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet
-from warpspace.machine.limits import MAX_ERROR, MIN_HALF_WIDTH
+from warpspace.machine.limits import MAX_ERROR, MAX_HALF_WIDTH, MIN_HALF_WIDTH
 from warpspace.machine.parameters import parameter
 from warpspace.machine.tolerances import Tolerance
 
-MAX_HALF_WIDTH = 1000.0
 LEAST_HALF_WIDTH = 10.0
 
 
