@@ -172,7 +172,7 @@ VISITS = {
     "tab_view": Visit(sliced, "View"),
     "tab_machine": Visit(bent, "Machine", share=0.6),
     "tab_table": Visit(as_opened, "Rotary axes", "teach_wobbling_table"),
-    "tab_chance": Visit(sampled, "Tolerances"),
+    "tab_tolerances": Visit(sampled, "Tolerances"),
     "tab_conventions": Visit(as_opened, "Conventions"),
 }
 """File name to visit."""

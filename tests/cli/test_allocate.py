@@ -74,7 +74,7 @@ def test_text_names_every_error_once_with_before_and_after(warpspace, monkeypatc
     result = warpspace("allocate", "dvf5000_first", "--limit-um", "40", *QUICK, "--fixed", "EXX")
     assert result.err == ""
     lines = {line.split()[0]: line for line in result.out.splitlines() if line.strip()}
-    assert lines["EXX"].split() == ["EXX", *"positioning of X".split(), "10", "10", "µm", "fixed"]
+    assert lines["EXX"].split() == ["EXX", *["positioning", "of", "X"], "10", "10", "µm", "fixed"]
     assert "evaluated at a random point" in result.out
     assert "95 % interval" in result.out
 

@@ -77,8 +77,10 @@ class Ensemble:
         """
         middle, half = centre.astype(np.float32), half_width.astype(np.float32)
         if self.spread is not None:
-            return self.spread @ half + self.gains @ middle
-        return (middle + half * self.unit) @ self.gains
+            error = self.spread @ half + self.gains @ middle
+        else:
+            error = (middle + half * self.unit) @ self.gains
+        return error.astype(np.float32, copy=False)
 
     def norm_um(self, centre: Array, half_width: Array) -> Array:
         """Evaluate |E| of every machine, [S], µm; see `error_um` for the parameters."""

@@ -90,11 +90,11 @@ def allocate(
 ) -> None:
     """Find the widest tolerances that keep a limit of |E|.
 
-    Of the machines drawn from the new tolerances of SCENE the wanted share keeps |E| ≤ LIMIT, at the
-    least cost: a half width w of an error costs 1/w, or what --cost says over w. A tolerance of 0
-    holds its error and stays 0; centres stay; half widths are rounded down to three digits and at
-    most 1000 µm or µrad. The probability printed is that of new machines, drawn after the tolerances
-    were found; `warpspace montecarlo FILE --spec-um LIMIT` repeats it on others.
+    Of the machines drawn from the new tolerances of SCENE the wanted share keeps |E| ≤ LIMIT, at
+    the least cost: a half width w of an error costs 1/w, or what --cost says over w. A tolerance of
+    0 holds its error and stays 0; centres stay; half widths are rounded down to three digits and at
+    most 1000 µm or µrad. The probability printed is that of new machines, drawn after the
+    tolerances were found; `warpspace montecarlo FILE --spec-um LIMIT` repeats it on others.
     """
     from dataclasses import replace
 
