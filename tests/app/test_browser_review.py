@@ -1,4 +1,4 @@
-"""A design review in a real Chromium: errors, tolerances, sessions, keys; what is then on screen."""
+"""A design review in a real Chromium: errors, tolerances, keys; what is then on screen."""
 
 import json
 import time

@@ -39,10 +39,12 @@ def test_the_probability_is_said_with_its_interval():
     found = estimated(0.7131, 0.707, 0.7193)
     text = spell_probability(found)
     assert "71.3 %" in text
-    assert "70.7 … 71.9 %" in text
-    assert "20\u202f000 machines" in text
-    assert "limit 50 µm" in text
-    assert "74.0" in spell_scatter(found)
+    assert "within <b>50 µm</b> at a random point" in text
+    below = spell_scatter(found)
+    assert "70.7 … 71.9 %" in below
+    assert "20\u202f000 machines" in below
+    assert "limit 50 µm" in below
+    assert "74.0" in below
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,27 @@ MARGIN = 1.02
 
 
 def spell_probability(estimated: "Estimate") -> str:
-    """Spell the probability with its confidence interval, and the key to the histogram.
+    """Spell the probability and the limit: what stays at the top of the panel.
+
+    Parameters
+    ----------
+    estimated : Estimate
+
+    Returns
+    -------
+    str
+        HTML.
+    """
+    return render(
+        "probability",
+        probability=percent(estimated.probability.probability),
+        limit_um=estimated.probability.spec_um,
+        everywhere=estimated.over == MAX,
+    )
+
+
+def spell_scatter(estimated: "Estimate") -> str:
+    """Spell the key to the histogram, mean, P95 and the largest error, and the confidence interval.
 
     Parameters
     ----------
@@ -35,30 +55,13 @@ def spell_probability(estimated: "Estimate") -> str:
     """
     found = estimated.probability
     return render(
-        "probability",
-        probability=percent(found.probability),
+        "scatter",
+        limit_um=found.spec_um,
+        numbers={"mean": estimated.mean_um, "P95": estimated.p95_um, "largest": estimated.max_um},
         low=percent(found.low),
         high=percent(found.high),
-        limit_um=found.spec_um,
-        everywhere=estimated.over == MAX,
         machines=thousands(estimated.samples),
     )
-
-
-def spell_scatter(estimated: "Estimate") -> str:
-    """Spell mean, P95 and the largest error.
-
-    Parameters
-    ----------
-    estimated : Estimate
-
-    Returns
-    -------
-    str
-        HTML.
-    """
-    numbers = {"mean": estimated.mean_um, "P95": estimated.p95_um, "largest": estimated.max_um}
-    return render("scatter", numbers=numbers)
 
 
 def spell_tolerance(

@@ -13,6 +13,8 @@ from warpspace.machine.parameters import parameter
 from warpspace.machine.tolerances import Tolerance
 
 LEAST_HALF_WIDTH = 10.0
+FINE_UP_TO = 100.0
+"""µm or µrad: sliders of tolerances that end below have a step of 0.01."""
 
 
 def axis_span(state: AppState, key: str) -> tuple[float, float]:
@@ -80,7 +82,9 @@ def half_width_span(state: AppState, key: str) -> Span:
     found = state.origin.tolerances.get(key)
     widest = max(2.0 * (found.half_width if found else 0.0), LEAST_HALF_WIDTH)
     widest = max(widest, half_width_of(state, key))
-    return Span(0.0, min(round_up(widest), MAX_ERROR), 0.1)
+    high = min(round_up(widest), MAX_ERROR)
+    # number boxes show as many decimals as the step has
+    return Span(0.0, high, 0.01 if high <= FINE_UP_TO else 0.1)
 
 
 def with_half_width(state: AppState, key: str, half_width: float) -> AppState:

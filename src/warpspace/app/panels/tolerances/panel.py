@@ -55,19 +55,19 @@ class TolerancesPanel:
     def __init__(self, context: PanelContext, state: AppState) -> None:
         self._context, gui = context, context.gui
         wanted = state.specification
-        with gui.add_folder(None):
-            self._words = gui.add_html("")
-            self._limit: Input[float] = Input(
-                gui.add_slider(
-                    "|E| allowed [µm]",
-                    min=LIMIT_UM.low,
-                    max=LIMIT_UM.high,
-                    step=LIMIT_UM.step,
-                    initial_value=wanted.limit_um,
-                    hint="The limit: the largest volumetric error that is accepted.",
-                ),
-                context.changed,
-            )
+        # the style sheet keeps these two at the top
+        self._limit: Input[float] = Input(
+            gui.add_slider(
+                "|E| allowed [µm]",
+                min=LIMIT_UM.low,
+                max=LIMIT_UM.high,
+                step=LIMIT_UM.step,
+                initial_value=wanted.limit_um,
+                hint="The limit: the largest volumetric error that is accepted.",
+            ),
+            context.changed,
+        )
+        self._words = gui.add_html("")
         self._allocation = AllocationPart(context, state)
         self._histogram = add_chart(
             gui,
