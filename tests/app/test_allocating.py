@@ -89,7 +89,7 @@ def test_keys_of_another_machine_are_left_out(ensemble):
 
 
 def test_without_tolerances_there_is_nothing_to_allocate():
-    scene = load_scene("teach_squareness")
+    scene = load_scene("dvf5000_nominal")
     with pytest.raises(OptionError, match="nothing to allocate"):
         allocated(start_state(scene), build_ensemble(scene))
 

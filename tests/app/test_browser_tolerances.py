@@ -4,8 +4,8 @@ import time
 from dataclasses import replace
 
 import pytest
-from app.conftest import SCENES, Tab
 
+from app.conftest import SCENES, Tab
 from warpspace.app.state.app_state import AppState
 from warpspace.scene import verbs
 
