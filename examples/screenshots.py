@@ -153,9 +153,12 @@ def bent(page: Page) -> None:
     page.keyboard.press("f")
 
 
-def sampled(page: Page) -> None:
-    """Wait for the sampled machines."""
+def allocated(page: Page) -> None:
+    """Allocate tolerances for 40 µm."""
     page.wait_for_selector("[data-value='histogram']")
+    write(page, "|E| allowed", "40")
+    press(page, "Allocate")
+    page.wait_for_selector("[data-value='allocated']")
 
 
 VISITS = {
@@ -172,7 +175,7 @@ VISITS = {
     "tab_view": Visit(sliced, "View"),
     "tab_machine": Visit(bent, "Machine", share=0.6),
     "tab_table": Visit(as_opened, "Rotary axes", "teach_wobbling_table"),
-    "tab_chance": Visit(sampled, "Tolerances"),
+    "tab_tolerances": Visit(allocated, "Tolerances"),
     "tab_conventions": Visit(as_opened, "Conventions"),
 }
 """File name to visit."""

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from warpspace.scene.model import Scene
     from warpspace.scene.pipeline import evaluate
     from warpspace.scene.verbs import (
+        allocate,
         ballbar,
         contributions,
         gains,
@@ -30,6 +31,7 @@ _HOME = {
     "SceneError": "warpspace.exceptions",
     "WarpspaceError": "warpspace.exceptions",
     "evaluate": "warpspace.scene.pipeline",
+    "allocate": "warpspace.scene.verbs",
     "ballbar": "warpspace.scene.verbs",
     "contributions": "warpspace.scene.verbs",
     "gains": "warpspace.scene.verbs",
@@ -47,6 +49,7 @@ __all__ = [
     "SceneError",
     "WarpspaceError",
     "__version__",
+    "allocate",
     "ballbar",
     "contributions",
     "evaluate",

@@ -73,7 +73,9 @@ def busy() -> AppState:
         rotary=state.rotary.with_point(1, on=False)
         .with_own((10.0, 20.0, 30.5))
         .with_held("B", (-15.0, 0.0)),
-        specification=Specification(25.0, "max", "normal"),
+        specification=Specification(
+            25.0, "max", "normal", 99.0, frozenset({"EXX", "EAZ"}), "EA0Z=4,EXY=0.5"
+        ),
         picked=Picked({"X": 1.5, "Y": -2.0, "Z": -100.0}),
         lever="EAX",
     )

@@ -11,7 +11,7 @@ from warpspace.analysis.distribution import Histogram, Probability
 from warpspace.analysis.montecarlo import Over
 from warpspace.app.browser.opening import hint_script
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.evaluation.probability import Chance
+from warpspace.app.evaluation.probability import Estimate
 from warpspace.app.evaluation.sensitivities import rank_picture
 from warpspace.app.panels.commands import Command, help_text, spell_change
 from warpspace.app.readouts.gains import spell_ranking
@@ -23,8 +23,8 @@ LIVE = LiveModel()
 FRAME = LIVE.evaluate(start_state(load_scene("dvf5000_first")))
 
 
-def chance(probability, low, high, counts=(5, 10, 5)):
-    return Chance(
+def estimated(probability, low, high, counts=(5, 10, 5)):
+    return Estimate(
         Over.SAMPLED,
         20_000,
         41.0,
@@ -36,32 +36,32 @@ def chance(probability, low, high, counts=(5, 10, 5)):
 
 
 def test_the_probability_is_said_with_its_interval():
-    found = chance(0.7131, 0.707, 0.7193)
+    found = estimated(0.7131, 0.707, 0.7193)
     text = spell_probability(found)
     assert "71.3 %" in text
-    assert "70.7 … 71.9 %" in text
-    assert "20\u202f000 machines" in text
-    assert "limit 50 µm" in text
-    shares = spell_scatter(found, {"EAX": 0.25, "EAY": 0.75})
-    assert shares.index("EAY") < shares.index("EAX")
-    assert "74.0" in shares
+    assert "within <b>50 µm</b> at a random point" in text
+    below = spell_scatter(found)
+    assert "70.7 … 71.9 %" in below
+    assert "20\u202f000 machines" in below
+    assert "limit 50 µm" in below
+    assert "74.0" in below
 
 
 @pytest.mark.parametrize(
     ("share", "said"), [(0.0, "0.0 %"), (1.0, "100.0 %"), (0.99999, "99.9 %"), (1e-5, "0.1 %")]
 )
 def test_only_what_is_certain_reads_as_certain(share, said):
-    assert f">{said}<" in spell_probability(chance(share, share, share))
+    assert f">{said}<" in spell_probability(estimated(share, share, share))
 
 
 def test_bars_change_colour_at_the_limit():
-    lines = histogram_lines(chance(0.7, 0.6, 0.8, counts=(5, 10, 5, 2)))
-    at, within, beyond, limit = lines
+    lines = histogram_lines(estimated(0.7, 0.6, 0.8, counts=(5, 10, 5, 2)))
+    at, within, outside, limit = lines
     assert len({len(line) for line in lines}) == 1
     assert (np.diff(at) >= 0).all()
     middles = np.array([10.0, 30.0, 50.0 - 1e-6, 70.0])
     np.testing.assert_array_equal(np.interp(middles, at, within), [5, 10, 5, 0])
-    np.testing.assert_array_equal(np.interp(middles, at, beyond), [0, 0, 0, 2])
+    np.testing.assert_array_equal(np.interp(middles, at, outside), [0, 0, 0, 2])
     drawn = ~np.isnan(limit)
     assert at[drawn].tolist() == [50.0, 50.0]
     assert limit[drawn].tolist() == [0.0, 1.0]
@@ -70,21 +70,20 @@ def test_bars_change_colour_at_the_limit():
 @pytest.mark.parametrize("limit_um", [10.0, 20.0, 50.0, 60.0, 80.0, 300.0])
 def test_the_outline_encloses_all_machines_wherever_the_limit_is(limit_um):
     counts = (5, 10, 5, 2)
-    found = chance(0.7, 0.6, 0.8, counts=counts)
+    found = estimated(0.7, 0.6, 0.8, counts=counts)
     found = replace(found, probability=replace(found.probability, spec_um=limit_um))
-    at, within, beyond, limit = histogram_lines(found)
+    at, within, outside, limit = histogram_lines(found)
     # each kind of bars is as large as its machines, 20 µm wide
     middles = (np.arange(4) + 0.5) * 20.0
     assert np.trapezoid(within, at) == 20.0 * np.sum(counts, where=middles <= limit_um)
-    assert np.trapezoid(beyond, at) == 20.0 * np.sum(counts, where=middles > limit_um)
+    assert np.trapezoid(outside, at) == 20.0 * np.sum(counts, where=middles > limit_um)
     assert at[-1] > max(80.0, limit_um)
     assert set(at[~np.isnan(limit)]) == {limit_um}
 
 
 def test_no_error_at_all_can_be_drawn():
-    found = chance(1.0, 0.99, 1.0, counts=(20_000,))
+    found = estimated(1.0, 0.99, 1.0, counts=(20_000,))
     assert "100.0 %" in spell_probability(found)
-    assert "scatter" not in spell_scatter(found, {"EAX": 0.0}).split(">", 1)[1]
     assert np.max(histogram_lines(found)[1]) == 20_000
 
 

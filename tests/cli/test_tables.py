@@ -27,6 +27,7 @@ COMMANDS = {
     "contributions": ("contributions", "dvf5000_general"),
     "sobol": ("contributions", "dvf5000_proposed", "--sobol", "32"),
     "montecarlo": ("montecarlo", "dvf5000_proposed", "--samples", "500", "--spec-um", "40"),
+    "allocate": ("allocate", "dvf5000_first", "--limit-um", "40", "--samples", "2000"),
     "ballbar": ("ballbar", "dvf5000_first", "--plane", "XY", "--radius", "50"),
     "thesis": ("thesis",),
 }

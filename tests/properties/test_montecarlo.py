@@ -46,8 +46,8 @@ def test_errors_scale_with_the_tolerance_and_quantiles_are_in_order(
     assert one.median_um <= one.p95_um <= one.p99_um <= one.max_um
     assert 0.0 <= one.mean_um <= one.rms_um <= one.max_um
     assert one.histogram.counts.sum() == 300
-    chance = scaled.probability
-    assert 0.0 <= chance.low <= chance.probability <= chance.high <= 1.0
+    kept = scaled.probability
+    assert 0.0 <= kept.low <= kept.probability <= kept.high <= 1.0
 
 
 @settings(max_examples=30)

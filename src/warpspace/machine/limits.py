@@ -18,6 +18,14 @@ MIN_NUMBER = sys.float_info.min
 """Smallest magnitude beside 0: below it a processor holds fewer digits, and quotients overflow."""
 MIN_HALF_WIDTH = 1e-6
 """µm or µrad: smallest half width of a tolerance beside 0, a picometre."""
+MAX_HALF_WIDTH = 1000.0
+"""µm or µrad: largest half width that an allocation gives, and that sliders reach."""
+LIMIT_UM = (1e-3, 1e6)
+"""Of |E| that tolerances are allocated for, µm."""
+PROBABILITY = (0.5, 0.9999)
+"""Of keeping the limit."""
+COST = (1e-6, 1e6)
+"""Of a tolerance, by that of others."""
 
 # --- error curves ---------------------------------------------------------------------------------
 

@@ -1,7 +1,7 @@
 """Tolerance sets: the range within which each error parameter of a machine may fall."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from warpspace.machine.parameters import parameter
 
@@ -51,3 +51,11 @@ class ToleranceSet:
     def missing(self, keys: Sequence[str]) -> tuple[str, ...]:
         """List the parameters that have no tolerance."""
         return tuple(key for key in keys if self.get(key) is None)
+
+    def with_half_widths(self, half_widths: Mapping[str, float]) -> "ToleranceSet":
+        """Give parameters other half widths, µm or µrad; centres stay where they are."""
+        own = dict(self.own)
+        for key, half_width in half_widths.items():
+            present = self.get(key)
+            own[key] = Tolerance(0.0 if present is None else present.centre, half_width)
+        return replace(self, own=own)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
+from warpspace.analysis import allocation as allocating
 from warpspace.analysis import ballbar as circles
 from warpspace.analysis import contributions as shares
 from warpspace.analysis import gains as levers
@@ -133,6 +134,51 @@ def montecarlo(
     plan.check()
     draws = scene_draws(scene, view.loop, distribution, clip=clip)
     return sampling.montecarlo(scene.model, draws, scene.workspace, view, plan, progress)
+
+
+def allocate(
+    scene: Scene,
+    wish: allocating.Wish,
+    *,
+    samples: int = sampling.DEFAULT_SAMPLES,
+    seed: int = 0,
+    distribution: Distribution | str = Distribution.UNIFORM,
+    clip: bool = False,
+    loop: Loop | str = Loop.TOOL,
+    over: Over | str = Over.SAMPLED,
+    cylinder: Cylinder | None = None,
+    workers: int | None = None,
+    progress: allocating.Progress | None = None,
+) -> allocating.Allocation:
+    """Find the widest tolerances of a scene that keep a limit of |E| with a probability.
+
+    See `montecarlo` for the other parameters; `progress` is called with the share of the work that
+    was done since the last call.
+
+    Parameters
+    ----------
+    scene : Scene
+    wish : Wish
+        Limit, probability, costs, and what is fixed.
+
+    Returns
+    -------
+    Allocation
+
+    Raises
+    ------
+    SceneError
+        If the scene has no tolerances, or not for every parameter.
+    OptionError, UnknownNameError
+        If an argument is out of range, nothing is free, or what is fixed does not keep the limit.
+    """
+    view = choose_view(scene, loop)
+    plan = sampling.Plan(samples, seed, over, cylinder=cylinder, workers=workers)
+    plan.check()
+    draws = scene_draws(scene, view.loop, distribution, clip=clip)
+    return allocating.allocate(
+        scene.model, draws, scene.workspace, wish, view, plan, progress=progress
+    )
 
 
 def contributions(

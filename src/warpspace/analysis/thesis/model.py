@@ -136,7 +136,7 @@ def figure_4_3(gains: dict[str, Gain]) -> list[Row]:
 
 
 def table_4_5() -> list[Row]:
-    """Chance of a value within k standard deviations."""
+    """Probability of a value within k standard deviations."""
     return [
         number_row(
             "table_4_5",

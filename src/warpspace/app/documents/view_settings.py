@@ -87,6 +87,8 @@ def _differences(state: AppState) -> Iterator[tuple[str, str]]:
                     for axis, at in value.items()
                     if axis in state.scene.machine.axes
                 )
+            elif isinstance(value, frozenset):
+                yield f"{group}.{field.name}", ",".join(sorted(map(str, value)))
             else:
                 yield f"{group}.{field.name}", spell(value)
     if state.rotary.off:
@@ -179,6 +181,15 @@ def _handlers(state: AppState) -> dict[str, Handler]:
         "specification.distribution": lambda s, v: replace(
             s, specification=s.specification.with_distribution(v)
         ),
+        "specification.percent": lambda s, v: replace(
+            s, specification=s.specification.with_percent(read_number(v))
+        ),
+        "specification.fixed": lambda s, v: replace(
+            s, specification=replace(s.specification, fixed=_known_keys(s, v))
+        ),
+        "specification.costs": lambda s, v: replace(
+            s, specification=s.specification.with_costs(v, s.amplitudes.keys())
+        ),
         "rotary.off": lambda s, v: replace(
             s, rotary=replace(s.rotary, off=frozenset(_indices(s, v)))
         ),
@@ -237,6 +248,11 @@ def _with_silenced(state: AppState, *, muted: str = "", soloed: str = "") -> App
         frozenset(soloed.split(",")) if soloed else state.exclusions.soloed,
     )
     return replace(state, exclusions=exclusions.within(state.amplitudes.keys()))
+
+
+def _known_keys(state: AppState, text: str) -> frozenset[str]:
+    """Read keys of the machine with commas between; others are left out."""
+    return frozenset(text.split(",")) & state.amplitudes.keys()
 
 
 def _with_held(state: AppState, axis: str, text: str) -> AppState:

@@ -1,87 +1,23 @@
-"""Live Monte Carlo of a scene's tolerances: what is random is drawn once, tolerances move freely.
-
-Every sampled machine keeps its unit draws (where in each tolerance it lies) and its point. Moving a
-tolerance is then one product of what was precomputed with the vectors of centres and half widths,
-and since the machines stay the same, the result moves smoothly with the tolerance.
-"""
+"""Live Monte Carlo of a scene's tolerances: they move freely, the machines stay the same."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpspace.analysis.allocation import Ensemble
+from warpspace.analysis.allocation import build_ensemble as draw_ensemble
+from warpspace.analysis.allocation.ensemble import SAMPLES, SEED
 from warpspace.analysis.distribution import Histogram, Probability, Stream
-from warpspace.analysis.draws import Distribution, build_draws, loop_keys
-from warpspace.analysis.montecarlo import Over, node_gains
-from warpspace.analysis.points import choose_cylinder, extreme_places, random_places
-from warpspace.exceptions import OptionError
+from warpspace.analysis.draws import Distribution, loop_keys
+from warpspace.analysis.nodes import Over
 from warpspace.kinematics.model import Loop
 from warpspace.machine.tolerances import Tolerance, ToleranceSet
 from warpspace.scene.model import Scene
-from warpspace.units import Array
-
-SAMPLES = 20_000
-SEED = 20_240_601
-CORNER_NODES = 2
-Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True)
-class Ensemble:
-    """Sampled machines before their tolerances are known.
-
-    Attributes
-    ----------
-    keys : tuple of str, (K,)
-        Parameters of the loop.
-    unit : ndarray of float32, [S, K]
-        Place of each parameter in its tolerance: 0 in the centre, ±1 at the limits.
-    gains : ndarray of float32, [3, S, K] or [3, K, N]
-        µm per µm or µrad: at the one point of each machine, or at the N points common to all.
-    spread : ndarray of float32, [3, S, K], or None
-        Gains times unit draws, where each machine has one point.
-    over : Over
-        `sampled` for one random point per machine, `max` for the worst point of each.
-    """
-
-    keys: tuple[str, ...]
-    unit: Floats
-    gains: Floats
-    spread: Floats | None
-    over: Over
-
-    @property
-    def size(self) -> int:
-        """Bytes it holds."""
-        spread = 0 if self.spread is None else self.spread.nbytes
-        return self.unit.nbytes + self.gains.nbytes + spread
-
-    def norm_um(self, centre: Array, half_width: Array) -> Array:
-        """Evaluate |E| of every machine.
-
-        Parameters
-        ----------
-        centre, half_width : ndarray, [K], µm or µrad
-
-        Returns
-        -------
-        ndarray, [S], µm
-        """
-        middle, half = centre.astype(np.float32), half_width.astype(np.float32)
-        if self.spread is not None:
-            error = self.spread @ half + self.gains @ middle
-            return np.sqrt(np.einsum("cs,cs->s", error, error)).astype(float)
-        amplitudes = middle + half * self.unit
-        square = np.zeros((len(self.unit), self.gains.shape[2]), dtype=np.float32)
-        for gain in self.gains:
-            error = amplitudes @ gain
-            square += error * error
-        return np.sqrt(square.max(axis=1)).astype(float)
-
-
-@dataclass(frozen=True, slots=True)
-class Chance:
+class Estimate:
     """What a tolerance set is likely to give.
 
     Attributes
@@ -136,29 +72,19 @@ def build_ensemble(
     OptionError
         If the loop has no axis, or its worst point lies among too many to be found live.
     """
-    keys = loop_keys(scene.model, loop, scene.parameter_keys)
-    workspace = scene.workspace.moved(positions or {})
-    view = scene.view(loop)
-    cylinder = choose_cylinder(scene.model) if loop is Loop.WORKPIECE else None
-    rng = np.random.default_rng(seed)
-    ones = ToleranceSet({}, dict.fromkeys(keys, Tolerance(0.0, 1.0)))
-    unit = build_draws(ones, keys, distribution).draw(rng, samples).astype(np.float32)
-    if over is Over.SAMPLED:
-        places = random_places(scene.model, loop, workspace, cylinder, rng, samples)
-        by_key = node_gains(scene.model, keys, view, places).astype(np.float32)
-        gains = np.ascontiguousarray(np.swapaxes(by_key, 1, 2))
-        return Ensemble(keys, unit, gains, gains * unit, over)
-    if loop is Loop.WORKPIECE:
-        raise OptionError(
-            "the worst point of the workpiece loop lies among all turns of the table:"
-            " ask for one random point per machine, or use the command montecarlo --over max"
-        )
-    places = extreme_places(scene.model, loop, workspace, cylinder, CORNER_NODES)
-    gains = node_gains(scene.model, keys, view, places).astype(np.float32)
-    return Ensemble(keys, unit, gains, None, over)
+    return draw_ensemble(
+        scene.model,
+        loop_keys(scene.model, loop, scene.parameter_keys),
+        scene.workspace.moved(positions or {}),
+        scene.view(loop),
+        over,
+        distribution,
+        samples=samples,
+        seed=seed,
+    )
 
 
-def estimate(ensemble: Ensemble, tolerances: ToleranceSet, spec_um: float) -> Chance:
+def estimate(ensemble: Ensemble, tolerances: ToleranceSet, spec_um: float) -> Estimate:
     """Work out what a tolerance set gives.
 
     Parameters
@@ -171,7 +97,7 @@ def estimate(ensemble: Ensemble, tolerances: ToleranceSet, spec_um: float) -> Ch
 
     Returns
     -------
-    Chance
+    Estimate
     """
     none = Tolerance(0.0, 0.0)
     found = [tolerances.get(key) or none for key in ensemble.keys]
@@ -183,7 +109,7 @@ def estimate(ensemble: Ensemble, tolerances: ToleranceSet, spec_um: float) -> Ch
     stream.add(norm)
     probability = stream.probability()
     assert probability is not None  # noqa: S101 - a specification was given
-    return Chance(
+    return Estimate(
         ensemble.over,
         len(norm),
         stream.mean_um,
@@ -212,14 +138,10 @@ def tolerance_shares(
         Share of the variance of E (its three components added) over all machines and points,
         between 0 and 1; they add up to 1 over all parameters of the loop.
     """
-    if ensemble.spread is not None:
-        square = np.einsum("csk,csk->k", ensemble.gains, ensemble.gains) / len(ensemble.unit)
-    else:
-        square = np.einsum("ckn,ckn->k", ensemble.gains, ensemble.gains) / ensemble.gains.shape[2]
     half = np.array(
         [found.half_width if (found := tolerances.get(key)) else 0.0 for key in ensemble.keys]
     )
-    parts = half**2 * square
+    parts = half**2 * ensemble.mean_square_gain
     total = float(parts.sum()) or 1.0
     by_key = dict(zip(ensemble.keys, (parts / total).tolist(), strict=True))
     return {key: by_key.get(key, 0.0) for key in keys}

@@ -1,67 +1,126 @@
 """What a tolerance set is likely to give: the probability in words, its histogram, the shares."""
 
-from collections.abc import Mapping
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
+from markupsafe import Markup
 
 from warpspace.app.readouts.html import render
 from warpspace.app.readouts.numbers import thousands
 from warpspace.app.state.specification import MAX
+from warpspace.machine.parameters import Parameter
 from warpspace.units import Array
 
 if TYPE_CHECKING:
-    from warpspace.app.evaluation.probability import Chance
+    from warpspace.analysis.allocation import Allocation
+    from warpspace.app.evaluation.probability import Estimate
 
-SHOWN_SHARES = 6
+FIXED = "fixed"
 MARGIN = 1.02
 """Length of the chart's axis by the largest value on it."""
 
 
-def spell_probability(chance: "Chance") -> str:
-    """Spell the probability with its confidence interval, and the key to the histogram.
+def spell_probability(estimated: "Estimate") -> str:
+    """Spell the probability and the limit: what stays at the top of the panel.
 
     Parameters
     ----------
-    chance : Chance
+    estimated : Estimate
 
     Returns
     -------
     str
         HTML.
     """
-    found = chance.probability
     return render(
-        "chance",
-        probability=percent(found.probability),
-        low=percent(found.low),
-        high=percent(found.high),
-        limit_um=found.spec_um,
-        everywhere=chance.over == MAX,
-        machines=thousands(chance.samples),
+        "probability",
+        probability=percent(estimated.probability.probability),
+        limit_um=estimated.probability.spec_um,
+        everywhere=estimated.over == MAX,
     )
 
 
-def spell_scatter(chance: "Chance", shares: Mapping[str, float]) -> str:
-    """Spell mean, P95 and the largest error, and which tolerances the scatter comes from.
+def spell_scatter(estimated: "Estimate") -> str:
+    """Spell the key to the histogram, mean, P95 and the largest error, and the confidence interval.
 
     Parameters
     ----------
-    chance : Chance
-    shares : mapping of str to float
-        Share of the scatter by parameter.
+    estimated : Estimate
 
     Returns
     -------
     str
         HTML.
     """
-    ranked = sorted(shares.items(), key=lambda item: -item[1])[:SHOWN_SHARES]
+    found = estimated.probability
     return render(
         "scatter",
-        numbers={"mean": chance.mean_um, "P95": chance.p95_um, "largest": chance.max_um},
-        shares={key: share for key, share in ranked if share > 0.0},
-        longest=ranked[0][1] if ranked else 1.0,
+        limit_um=found.spec_um,
+        numbers={"mean": estimated.mean_um, "P95": estimated.p95_um, "largest": estimated.max_um},
+        low=percent(found.low),
+        high=percent(found.high),
+        machines=thousands(estimated.samples),
+    )
+
+
+def spell_tolerance(
+    row: Parameter, share: float, longest: float, *, fixed: bool, button: Callable[[str], Markup]
+) -> str:
+    """Draw the share of one error's tolerance as a bar, and its box "fixed".
+
+    Parameters
+    ----------
+    row : Parameter
+    share : float
+        Of the variance of E, between 0 and 1.
+    longest : float
+        Share whose bar is longest.
+    fixed : bool
+    button : callable
+        Gives the attributes of a button that sends a word.
+
+    Returns
+    -------
+    str
+        HTML to stand directly before the slider of the tolerance.
+    """
+    return render(
+        "tolerance",
+        row=row,
+        share=share,
+        length=share / longest if longest > 0.0 else 0.0,
+        fixed=fixed,
+        word=f"{FIXED} {row.key}",
+        button=button,
+    )
+
+
+def spell_allocation(found: "Allocation") -> str:
+    """Say what an allocation has reached.
+
+    Parameters
+    ----------
+    found : Allocation
+
+    Returns
+    -------
+    str
+        HTML.
+    """
+    return render(
+        "allocation",
+        limit_um=found.wish.limit_um,
+        before=percent(found.before.probability),
+        after=percent(found.after.probability),
+        low=percent(found.after.low),
+        high=percent(found.after.high),
+        machines=thousands(found.samples),
+        cost_before=found.cost_before,
+        cost_after=found.cost_after,
+        count=len(found.tolerances),
+        at_widest=found.at_widest,
+        widest=found.wish.widest,
     )
 
 
@@ -73,33 +132,33 @@ def percent(share: float) -> str:
     return "0.1" if value == "0.0" and share > 0.0 else value
 
 
-def histogram_lines(chance: "Chance") -> tuple[Array, Array, Array, Array]:
-    """Outline the bars of the histogram of the error, those beyond the limit by themselves.
+def histogram_lines(estimated: "Estimate") -> tuple[Array, Array, Array, Array]:
+    """Outline the bars of the histogram of the error, those outside the limit by themselves.
 
     Parameters
     ----------
-    chance : Chance
+    estimated : Estimate
 
     Returns
     -------
     error_um : ndarray, [n], µm
         Ascending; each edge of a bar stands here twice, so that the lines go straight up and down.
-    within, beyond : ndarray, [n]
+    within, outside : ndarray, [n]
         Machines per bar, zero where the bar is of the other kind. A bar is within the limit where
         its middle is.
     limit : ndarray, [n]
         From 0 to 1 at the limit, for an axis of its own; NaN elsewhere, where nothing is drawn.
     """
-    edges, counts = chance.histogram.edges_um, chance.histogram.counts.astype(float)
-    limit_um = chance.probability.spec_um
+    edges, counts = estimated.histogram.edges_um, estimated.histogram.counts.astype(float)
+    limit_um = estimated.probability.spec_um
     heights = np.append(np.repeat(counts, 2), [0.0, 0.0])
     is_within = np.append(np.repeat((edges[:-1] + edges[1:]) / 2.0 <= limit_um, 2), [True, True])
     error_um = np.append(edges.repeat(2)[1:], max(float(edges[-1]), limit_um) * MARGIN)
-    within, beyond = np.where(is_within, heights, 0.0), np.where(is_within, 0.0, heights)
+    within, outside = np.where(is_within, heights, 0.0), np.where(is_within, 0.0, heights)
     # two points at the limit, for a line of their own; the bar it stands in goes on as it is
     at = int(np.searchsorted(error_um, limit_um, side="right"))
     error_um = np.insert(error_um, at, [limit_um] * 2)
     limit = np.full(error_um.shape, np.nan)
     limit[at : at + 2] = 0.0, 1.0
-    within, beyond = (np.insert(line, at, [line[at - 1]] * 2) for line in (within, beyond))
-    return error_um, within, beyond, limit
+    within, outside = (np.insert(line, at, [line[at - 1]] * 2) for line in (within, outside))
+    return error_um, within, outside, limit

@@ -1,17 +1,20 @@
 """Changes of a state that reach into its scene: curves and tolerances. Pure, and clamped."""
 
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.ranges import Span, amplitude_span, round_up
 from warpspace.app.state.specification import Specification
+from warpspace.app.state.spelling import Unreadable
 from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet
-from warpspace.machine.limits import MAX_ERROR, MIN_HALF_WIDTH
+from warpspace.machine.limits import MAX_ERROR, MAX_HALF_WIDTH, MIN_HALF_WIDTH
 from warpspace.machine.parameters import parameter
 from warpspace.machine.tolerances import Tolerance
 
-MAX_HALF_WIDTH = 1000.0
 LEAST_HALF_WIDTH = 10.0
+FINE_UP_TO = 100.0
+"""µm or µrad: sliders of tolerances that end below have a step of 0.01."""
 
 
 def axis_span(state: AppState, key: str) -> tuple[float, float]:
@@ -72,10 +75,16 @@ def half_width_of(state: AppState, key: str) -> float:
 
 
 def half_width_span(state: AppState, key: str) -> Span:
-    """Choose the range of a tolerance slider: up to about twice the scene's half width."""
+    """Choose the range of a tolerance slider: up to about twice the scene's half width, or more.
+
+    It holds the present half width, which an allocation may have made wider.
+    """
     found = state.origin.tolerances.get(key)
     widest = max(2.0 * (found.half_width if found else 0.0), LEAST_HALF_WIDTH)
-    return Span(0.0, min(round_up(widest), MAX_ERROR), 0.1)
+    widest = max(widest, half_width_of(state, key))
+    high = min(round_up(widest), MAX_ERROR)
+    # number boxes show as many decimals as the step has
+    return Span(0.0, high, 0.01 if high <= FINE_UP_TO else 0.1)
 
 
 def with_half_width(state: AppState, key: str, half_width: float) -> AppState:
@@ -96,6 +105,48 @@ def with_half_width(state: AppState, key: str, half_width: float) -> AppState:
 def with_scene_tolerances(state: AppState) -> AppState:
     """Go back to the tolerances of the scene."""
     return replace(state, tolerances=state.origin.tolerances)
+
+
+def with_scaled_tolerances(state: AppState, keys: Collection[str], factor: float) -> AppState:
+    """Widen or narrow tolerances in the same ratio; those that are fixed stay.
+
+    Parameters
+    ----------
+    state : AppState
+    keys : collection of str
+        Parameters meant; one without a tolerance above zero stays at zero.
+    factor : float
+    """
+    half_widths = {
+        key: min(half_width * factor, max(MAX_HALF_WIDTH, half_width))
+        for key in keys
+        if key not in state.specification.fixed and (half_width := half_width_of(state, key)) > 0.0
+    }
+    return with_half_widths(state, half_widths)
+
+
+def with_half_widths(state: AppState, half_widths: Mapping[str, float]) -> AppState:
+    """Set the half widths of several tolerances at once, µm or µrad; centres stay.
+
+    Only for numbers that the program has worked out itself: they are taken as they are.
+    """
+    return replace(state, tolerances=state.tolerances.with_half_widths(half_widths))
+
+
+def with_fixed(state: AppState, key: str, fixed: bool) -> AppState:
+    """Fix the tolerance of one parameter, or free it; an unknown one changes nothing."""
+    if key not in state.amplitudes:
+        return state
+    return with_specification(state, state.specification.with_fixed(key, fixed))
+
+
+def with_costs(state: AppState, text: str) -> AppState:
+    """Set the costs of tolerances from a list as a user types it; notes say what is wrong."""
+    try:
+        wanted = state.specification.with_costs(text, state.amplitudes.keys())
+    except Unreadable as problem:
+        return replace(state, notes=(*state.notes, f"costs stay as they were; {problem}"))
+    return with_specification(state, wanted)
 
 
 def with_muted(state: AppState, key: str, muted: bool) -> AppState:

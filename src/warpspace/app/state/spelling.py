@@ -6,8 +6,8 @@ from typing import NoReturn
 from warpspace.machine.description import Vector
 
 
-class Unreadable(ValueError):  # noqa: N818 - it is handled where lines are read, never shown
-    """A value that means nothing."""
+class Unreadable(ValueError):  # noqa: N818 - it is handled where text is read
+    """A value that means nothing; where it has a text, that says what was expected."""
 
 
 def refuse() -> NoReturn:

@@ -193,10 +193,10 @@ def _print(scene: "Scene", result: "MonteCarlo") -> None:
         )
     if (value := printed_value(scene, result)) is not None:
         print_text(f"  the thesis prints {value:g} µm (table 4-8; see `warpspace thesis`)")
-    if (chance := result.probability) is not None:
+    if (kept := result.probability) is not None:
         print_text(
-            f"  |E| ≤ {chance.spec_um:g} µm: {100.0 * chance.probability:.2f} % of the machines,"
-            f" 95 % interval {100.0 * chance.low:.2f} … {100.0 * chance.high:.2f} %"
+            f"  |E| ≤ {kept.spec_um:g} µm: {100.0 * kept.probability:.2f} % of the machines,"
+            f" 95 % interval {100.0 * kept.low:.2f} … {100.0 * kept.high:.2f} %"
         )
     held = [
         key

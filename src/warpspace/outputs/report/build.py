@@ -18,7 +18,7 @@ from warpspace.outputs.report.blocks import (
 from warpspace.outputs.report.clock import report_time
 from warpspace.outputs.report.closing import conventions, provenance
 from warpspace.outputs.report.figures import ReportFigures
-from warpspace.outputs.report.promises import chance_blocks
+from warpspace.outputs.report.promises import sampling_blocks
 from warpspace.outputs.report.review import ReportSettings, Review, Reviewed, build_review
 from warpspace.outputs.report.wording import volume
 from warpspace.scene.model import Scene
@@ -131,7 +131,7 @@ def build_report(
             *([_differences(review)] if len(review.scenes) == 2 else []),
             _errors(review),
             _gains(review, painter),
-            _chances(review, painter),
+            _samplings(review, painter),
             conventions(review),
             provenance(review, files),
         ]
@@ -229,7 +229,7 @@ def _gains(review: Review, painter: ReportFigures) -> Section:
     return parts.section("How errors arrive at the point", blocks)
 
 
-def _chances(review: Review, painter: ReportFigures) -> Section:
+def _samplings(review: Review, painter: ReportFigures) -> Section:
     """Tell what the tolerances promise; once where they are the same."""
     blocks: list[Block] = []
     shown: list[Scene] = []
@@ -241,6 +241,6 @@ def _chances(review: Review, painter: ReportFigures) -> Section:
             blocks.append(Text(f"{letter}: the same tolerances, the same machines.", "note"))
             continue
         shown.append(scene)
-        blocks += chance_blocks(letter, reviewed)
-        blocks += painter.chance(reviewed, f"{letter}: " if letter else "")
+        blocks += sampling_blocks(letter, reviewed)
+        blocks += painter.sampling(reviewed, f"{letter}: " if letter else "")
     return parts.section("What the tolerances promise", blocks)

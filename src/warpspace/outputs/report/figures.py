@@ -97,19 +97,21 @@ class ReportFigures:
         )
         return self._chart("gains", figure, f"{prefix}Gains of the {len(shown)} largest errors.")
 
-    def chance(self, reviewed: Reviewed, prefix: str) -> list[Block]:
+    def sampling(self, reviewed: Reviewed, prefix: str) -> list[Block]:
         """Histogram of sampled machines and bars of what their variance comes from."""
         from warpspace.outputs.charts.gains import contributions_chart
         from warpspace.outputs.charts.histogram import montecarlo_chart
 
-        chance = reviewed.chance
-        if chance is None:
+        sampling = reviewed.sampling
+        if sampling is None:
             return []
-        machines = f"{chance.sampled.plan.samples:,} machines".replace(",", " ")
+        machines = f"{sampling.sampled.plan.samples:,} machines".replace(",", " ")
         figure = montecarlo_chart(
-            chance.sampled, f"{prefix}{reviewed.scene.title}", f"{machines}, one random point each"
+            sampling.sampled,
+            f"{prefix}{reviewed.scene.title}",
+            f"{machines}, one random point each",
         )
-        shares = replace(chance.shares, rows=chance.shares.rows[:MOST_GAINS])
+        shares = replace(sampling.shares, rows=sampling.shares.rows[:MOST_GAINS])
         bars = contributions_chart(
             shares, f"{prefix}Which tolerances matter", self._loop_words(reviewed)
         )

@@ -9,15 +9,15 @@ from warpspace.picture.words import spell, spell_short
 from warpspace.units import MICROMETRE
 
 
-def chance_blocks(letter: str, reviewed: Reviewed) -> list[Block]:
+def sampling_blocks(letter: str, reviewed: Reviewed) -> list[Block]:
     """Monte Carlo and variance shares in numbers."""
-    chance = reviewed.chance
-    if chance is None:
-        return [Text(prefixed(letter, reviewed.why_no_chance), "note")]
+    sampling = reviewed.sampling
+    if sampling is None:
+        return [Text(prefixed(letter, reviewed.why_not_sampled), "note")]
     rows: list[tuple[str, ...]] = []
     for name, result in (
-        ("at a random point", chance.sampled),
-        ("at the worst point", chance.worst),
+        ("at a random point", sampling.sampled),
+        ("at the worst point", sampling.worst),
     ):
         share = result.probability
         rows.append(
@@ -31,7 +31,7 @@ def chance_blocks(letter: str, reviewed: Reviewed) -> list[Block]:
                 f"{percent(share.low, 2)} … {percent(share.high, 2)}" if share else "–",
             )
         )
-    spec = chance.sampled.plan.spec_um
+    spec = sampling.sampled.plan.spec_um
     columns = [
         Column("|E| of a machine", width=1.7),
         Column("machines", "right", 1.1),
@@ -42,7 +42,8 @@ def chance_blocks(letter: str, reviewed: Reviewed) -> list[Block]:
     caption = prefixed(
         letter,
         f"Machines drawn from the tolerances of {reviewed.scene.title}"
-        f" ({chance.sampled.draws.distribution}, seed {chance.sampled.plan.seed}), {MICROMETRE}.",
+        f" ({sampling.sampled.draws.distribution}, seed {sampling.sampled.plan.seed}),"
+        f" {MICROMETRE}.",
     )
     shares = [
         (
@@ -52,7 +53,7 @@ def chance_blocks(letter: str, reviewed: Reviewed) -> list[Block]:
             spell(row.variance_um2),
             percent(row.share),
         )
-        for row in chance.shares.rows[:MOST_ROWS]
+        for row in sampling.shares.rows[:MOST_ROWS]
         if row.share > 0.0
     ]
     share_columns = [

@@ -55,7 +55,7 @@ class ReportSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class Chance:
+class Sampling:
     """What the tolerances of a scene promise.
 
     Attributes
@@ -87,8 +87,8 @@ class Reviewed:
         Why it is the worst.
     gains : tuple of Gain
         Largest over the working volume (rotary axes: over their travel), largest first.
-    chance : Chance or None
-        None without tolerances for every parameter of the loop; `why_no_chance` says which lack.
+    sampling : Sampling or None
+        None without tolerances for every parameter of the loop; `why_not_sampled` says which lack.
     linearisation_um : float, µm
         Largest difference between the exact chain and the first order.
     """
@@ -97,8 +97,8 @@ class Reviewed:
     worst_at: dict[str, float]
     explanation: Explanation
     gains: tuple[Gain, ...]
-    chance: Chance | None
-    why_no_chance: str
+    sampling: Sampling | None
+    why_not_sampled: str
     linearisation_um: float
 
     @property
@@ -178,13 +178,13 @@ def _review_scene(picture: ScenePicture, settings: ReportSettings) -> Reviewed:
         for name, values in picture.grid.coordinates.items()
     }
     explanation = explain(scene.model, scene.errors, at, picture.view, picture.grid.point_mm[index])
-    chance, why = _chance(scene, settings)
+    sampling, why = _sample(scene, settings)
     return Reviewed(
         picture,
         {name: float(value) for name, value in at.items()},
         explanation,
         _gains(scene, picture.view.loop),
-        chance,
+        sampling,
         why,
         linearisation_error_um(scene, 5),
     )
@@ -203,7 +203,7 @@ def _gains(scene: Scene, loop: Loop) -> tuple[Gain, ...]:
         return ()
 
 
-def _chance(scene: Scene, settings: ReportSettings) -> tuple[Chance | None, str]:
+def _sample(scene: Scene, settings: ReportSettings) -> tuple[Sampling | None, str]:
     """Sample machines from the tolerances of a scene; why not, where that is impossible."""
     if not scene.tolerances:
         return None, "The scene has no tolerances."
@@ -219,7 +219,7 @@ def _chance(scene: Scene, settings: ReportSettings) -> tuple[Chance | None, str]
             return montecarlo(scene.model, draws, scene.workspace, view, plan)
 
         return (
-            Chance(
+            Sampling(
                 run(Over.SAMPLED, settings.samples),
                 run(Over.MAX, min(settings.samples, WORST_SAMPLES)),
                 variance_contributions(scene.model, draws, scene.workspace, view),

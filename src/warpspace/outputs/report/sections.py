@@ -71,8 +71,8 @@ def _cards(review: Review) -> list[Card]:
         Card("P95", microns(stats.p95_um)),
         Card("max", microns(stats.max_um), f"at {worst_place(reviewed)}"),
     ]
-    if reviewed.chance is not None:
-        worst = reviewed.chance.worst
+    if reviewed.sampling is not None:
+        worst = reviewed.sampling.worst
         if worst.probability is not None:
             kept = percent(worst.probability.probability)
             found.append(Card(f"keep {limit(worst.probability.spec_um)}", kept, "of machines"))

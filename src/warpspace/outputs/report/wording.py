@@ -6,7 +6,7 @@ from warpspace.analysis.explain import Contribution
 from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import ErrorFunction
 from warpspace.machine.parameters import parameter
-from warpspace.outputs.report.review import Chance, Review, Reviewed
+from warpspace.outputs.report.review import Review, Reviewed, Sampling
 from warpspace.picture.words import MINUS, TIMES, spell, spell_factor, spell_positions, spell_short
 from warpspace.scene.model import Scene
 from warpspace.units import MICROMETRE
@@ -114,8 +114,8 @@ def _one(review: Review, reviewed: Reviewed) -> list[str]:
                 f"The specification of {limit(review.settings.spec_um)} is"
                 f" {'kept everywhere' if kept else 'not kept'}."
             )
-    if reviewed.chance is not None:
-        sentences.append(chance_sentence(reviewed.chance))
+    if reviewed.sampling is not None:
+        sentences.append(sampling_sentence(reviewed.sampling))
     return sentences
 
 
@@ -165,9 +165,9 @@ def _kept(review: Review, spec_um: float) -> str:
         sentence = f"Neither keeps {what} everywhere."
     else:
         sentence = f"{'A' if keeps[0] else 'B'} keeps {what} everywhere, the other does not."
-    if first.chance is None or second.chance is None:
+    if first.sampling is None or second.sampling is None:
         return sentence
-    a, b = first.chance.worst.probability, second.chance.worst.probability
+    a, b = first.sampling.worst.probability, second.sampling.worst.probability
     if a is None or b is None:
         return sentence
     return (
@@ -176,14 +176,14 @@ def _kept(review: Review, spec_um: float) -> str:
     )
 
 
-def chance_sentence(chance: Chance) -> str:
+def sampling_sentence(sampling: Sampling) -> str:
     """Say what the tolerances promise."""
-    within = chance.worst.probability
+    within = sampling.worst.probability
     if within is None:
         return (
             f"Of machines that its tolerances allow, 95 % stay below"
-            f" {microns(chance.worst.p95_um)} at their worst point, and"
-            f" {microns(chance.sampled.mean_um)} is the mean error."
+            f" {microns(sampling.worst.p95_um)} at their worst point, and"
+            f" {microns(sampling.sampled.mean_um)} is the mean error."
         )
     return (
         f"Of machines that its tolerances allow, {percent(within.probability)} keep the"

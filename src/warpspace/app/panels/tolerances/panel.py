@@ -1,7 +1,7 @@
-"""The chance panel: tolerance sliders, and what machines within them are likely to be."""
+"""Limit, probability and histogram of the tolerances, and what is done with all of them."""
 
-from itertools import groupby
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from viser import uplot
@@ -10,6 +10,8 @@ from warpspace.app.browser.handles import Input
 from warpspace.app.evaluation.cache import Cache, Identity
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
+from warpspace.app.panels.tolerances.allocation import AllocationPart
+from warpspace.app.panels.tolerances.rows import ToleranceRows
 from warpspace.app.readouts.charts import WHOLE, add_chart, chart_axis
 from warpspace.app.readouts.html import message
 from warpspace.app.readouts.probability import histogram_lines, spell_probability, spell_scatter
@@ -18,17 +20,18 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.specification import LIMIT_UM, MAX, NORMAL, SAMPLED, UNIFORM
 from warpspace.exceptions import WarpspaceError
 from warpspace.kinematics.model import Loop
-from warpspace.machine.parameters import parameter
 
 if TYPE_CHECKING:
-    from warpspace.app.evaluation.probability import Ensemble
+    from warpspace.analysis.allocation import Ensemble
 
-OVER_NAMES = {SAMPLED: "a random point (thesis)", MAX: "the worst point of each machine"}
+OVER_NAMES = {SAMPLED: "a random point", MAX: "everywhere"}
 SPREAD_NAMES = {UNIFORM: "uniform", NORMAL: "normal, 3σ at the limits"}
 KEPT_BYTES = 100_000_000
-WITHIN, BEYOND, LIMIT = "#4a7ab5", "#c9863a", "#d6336c"
+WITHIN, OUTSIDE, LIMIT = "#4a7ab5", "#c9863a", "#d6336c"
 """Colours of the histogram; its key in the style sheet has the same."""
 CHART_HEIGHT = 150
+SCALES = {"÷ 1.5": 1.0 / 1.5, "− 5 %": 0.95, "+ 5 %": 1.05, "× 1.5": 1.5}
+"""What the buttons for all tolerances multiply them by."""
 
 
 def _new_store() -> "Cache[Ensemble]":
@@ -52,6 +55,7 @@ class TolerancesPanel:
     def __init__(self, context: PanelContext, state: AppState) -> None:
         self._context, gui = context, context.gui
         wanted = state.specification
+        # the style sheet keeps these two at the top
         self._limit: Input[float] = Input(
             gui.add_slider(
                 "|E| allowed [µm]",
@@ -59,17 +63,32 @@ class TolerancesPanel:
                 max=LIMIT_UM.high,
                 step=LIMIT_UM.step,
                 initial_value=wanted.limit_um,
-                marks=((LIMIT_UM.low, ""), (100.0, "100"), (LIMIT_UM.high, f"{LIMIT_UM.high:g}")),
-                hint="The specification: the largest volumetric error that is accepted.",
+                hint="The limit: the largest volumetric error that is accepted.",
             ),
             context.changed,
         )
+        self._words = gui.add_html("")
+        self._allocation = AllocationPart(context, state)
+        self._histogram = add_chart(
+            gui,
+            (np.array([0.0, 1.0]),) + (np.zeros(2),) * 3,
+            (
+                uplot.Series(label="within", fill=WITHIN, width=0),
+                uplot.Series(label="outside", fill=OUTSIDE, width=0),
+                uplot.Series(label="limit", scale=WHOLE, stroke=LIMIT, width=2, dash=(5.0, 3.0)),
+            ),
+            CHART_HEIGHT,
+            axes=(chart_axis("|E| [µm]", 34), chart_axis("machines", 50)),
+            visible=False,
+        )
+        self._numbers = gui.add_html("")
         self._over: Input[str] = Input(
             gui.add_dropdown(
-                "Must hold at",
+                "Evaluated at",
                 tuple(OVER_NAMES.values()),
                 initial_value=OVER_NAMES[wanted.over],
-                hint="Where each sampled machine is measured.",
+                hint="Where each sampled machine has to stay within the limit: at one random point"
+                " (as in the thesis), or everywhere in the volume.",
             ),
             context.changed,
         )
@@ -82,29 +101,27 @@ class TolerancesPanel:
             ),
             context.changed,
         )
-        self._words = gui.add_html("")
-        self._histogram = add_chart(
-            gui,
-            (np.array([0.0, 1.0]),) + (np.zeros(2),) * 3,
-            (
-                uplot.Series(label="within", fill=WITHIN, width=0),
-                uplot.Series(label="beyond", fill=BEYOND, width=0),
-                uplot.Series(label="limit", scale=WHOLE, stroke=LIMIT, width=2, dash=(5.0, 3.0)),
-            ),
-            CHART_HEIGHT,
-            axes=(chart_axis("|E| [µm]", 34), chart_axis("machines", 50)),
-            visible=False,
+        self._allocation.add_costs(state)
+        scale = gui.add_button_group(
+            "Scale all",
+            tuple(SCALES),
+            hint="Narrows or widens all tolerances in the same ratio; fixed ones stay.",
         )
-        self._numbers = gui.add_html("")
+        scale.on_click(lambda event: self._scale(str(event.target.value)))
         reset = gui.add_button(
             "Tolerances of the scene", color="gray", hint="Give all tolerances the scene's values."
         )
         reset.on_click(lambda _: context.post(edits.with_scene_tolerances))
-        self._home: Any = gui.add_folder(None)
-        self._folders: list[Any] = []
-        self._sliders: dict[str, Input[float]] = {}
+        self._rows = ToleranceRows(context)
         self._built_for: tuple[object, ...] = ()
         self._shown: tuple[object, ...] = ()
+
+    def _scale(self, name: str) -> None:
+        """Scale all tolerances that are not fixed."""
+        factor = SCALES.get(name)
+        if factor is not None:
+            keys = self._rows.keys
+            self._context.post(partial(edits.with_scaled_tolerances, keys=keys, factor=factor))
 
     def read(self, state: AppState) -> AppState:
         """Take over what a browser has set."""
@@ -118,11 +135,7 @@ class TolerancesPanel:
             wanted = wanted.with_distribution(_value(SPREAD_NAMES, spread))
         if wanted != state.specification:
             state = edits.with_specification(state, wanted)
-        for key, slider in self._sliders.items():
-            half_width = slider.poll()
-            if half_width is not None:
-                state = edits.with_half_width(state, key, half_width)
-        return state
+        return self._rows.read(self._allocation.read(state))
 
     def concerns(self, picture: LivePicture) -> tuple[object, ...]:
         """Give what the widgets show."""
@@ -135,10 +148,9 @@ class TolerancesPanel:
         self._limit.show(state.specification.limit_um)
         self._over.show(OVER_NAMES[state.specification.over])
         self._spread.show(SPREAD_NAMES[state.specification.distribution])
-        if self._built_for[:1] != (Identity(state.origin),):
-            return  # these sliders are about to be replaced: nothing is sent to them any more
-        for key, slider in self._sliders.items():
-            slider.show(edits.half_width_of(state, key))
+        self._allocation.show(state)
+        if self._built_for[:1] == (Identity(state.origin),):
+            self._rows.show(state)  # others are about to be replaced: nothing is sent to them
 
     def settle(self, picture: LivePicture) -> None:
         """Sample again, which takes some milliseconds, and draw."""
@@ -154,7 +166,8 @@ class TolerancesPanel:
             state.specification.distribution,
             moving,
         )
-        shown = (sampled, state.tolerances, state.specification.limit_um)
+        wanted = state.specification
+        shown = (sampled, state.tolerances, wanted.limit_um, wanted.fixed)
         if shown == self._shown:
             return
         self._shown = shown
@@ -164,49 +177,27 @@ class TolerancesPanel:
             self._words.content = message(str(error), "refusal", small=True)
             self._numbers.content = ""
             self._histogram.visible = False
+            self._allocation.use(None)
             return
+        self._allocation.use(ensemble)
         self._draw(ensemble, state)
-        wanted = (Identity(state.origin), ensemble.keys)
-        if wanted != self._built_for:
-            self._built_for = wanted
-            self._build(state, ensemble.keys)
 
     def _draw(self, ensemble: "Ensemble", state: AppState) -> None:
         """Work out and draw what the tolerances of a state give."""
         from warpspace.app.evaluation.probability import estimate, tolerance_shares
 
-        chance = estimate(ensemble, state.tolerances, state.specification.limit_um)
+        estimated = estimate(ensemble, state.tolerances, state.specification.limit_um)
         shares = tolerance_shares(ensemble, state.tolerances, ensemble.keys)
-        self._words.content = spell_probability(chance)
-        self._histogram.data = histogram_lines(chance)
+        self._words.content = spell_probability(estimated)
+        self._histogram.data = histogram_lines(estimated)
         self._histogram.visible = True
-        self._numbers.content = spell_scatter(chance, shares)
-
-    def _build(self, state: AppState, keys: tuple[str, ...]) -> None:
-        """Lay out the sliders of the parameters of a loop."""
-        gui = self._context.gui
-        for folder in self._folders:
-            folder.remove()
-        self._folders, self._sliders = [], {}
-        rows = sorted(map(parameter, keys), key=lambda row: "XYZABC".index(row.axis))
-        for axis, members in groupby(rows, key=lambda row: row.axis):
-            with self._home:
-                folder = gui.add_folder(f"Tolerances of {axis}", expand_by_default=False)
-            self._folders.append(folder)
-            with folder:
-                for row in members:
-                    span = edits.half_width_span(state, row.key)
-                    centre = found.centre if (found := state.tolerances.get(row.key)) else 0.0
-                    slider = gui.add_slider(
-                        f"{row.key} · {row.name} ± [{row.unit}]",
-                        min=span.low,
-                        max=span.high,
-                        step=span.step,
-                        initial_value=edits.half_width_of(state, row.key),
-                        hint=f"Half width of the tolerance of {row.name} about {centre:g}"
-                        f" {row.unit}; 0 holds it there.",
-                    )
-                    self._sliders[row.key] = Input(slider, self._context.changed)
+        self._numbers.content = spell_scatter(estimated)
+        built_for = (Identity(state.origin), ensemble.keys)
+        if built_for != self._built_for:
+            self._built_for = built_for
+            self._rows.build(state, shares)
+        else:
+            self._rows.show_shares(state, shares)
 
 
 def _value(names: dict[str, str], text: str) -> str:
@@ -218,7 +209,7 @@ def _sample(state: AppState) -> "Ensemble":
     """Sample machines for a state."""
     # scipy's distributions take half a second to import: not before the first picture
     from warpspace.analysis.draws import Distribution
-    from warpspace.analysis.montecarlo import Over
+    from warpspace.analysis.nodes import Over
     from warpspace.app.evaluation.probability import build_ensemble
 
     return build_ensemble(

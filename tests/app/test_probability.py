@@ -87,21 +87,21 @@ def test_a_tolerance_change_takes_less_than_50_ms(scene, over):
 
 def test_a_wider_tolerance_never_helps(scene):
     ensemble = build_ensemble(scene, over=Over.MAX)
-    chances = [
+    found = [
         estimate(ensemble, with_half_width(scene.tolerances, "EAY", half), SPEC)
         for half in (0.0, 10.0, 20.0, 40.0, 80.0)
     ]
-    p95 = [chance.p95_um for chance in chances]
-    share = [chance.probability.probability for chance in chances]
+    p95 = [estimated.p95_um for estimated in found]
+    share = [estimated.probability.probability for estimated in found]
     assert p95 == sorted(p95)
     assert share == sorted(share, reverse=True)
 
 
 def test_no_tolerances_give_a_machine_without_errors():
     scene = load_scene("teach_squareness")
-    chance = estimate(build_ensemble(scene), ToleranceSet(), 10.0)
-    assert chance.max_um == 0.0
-    assert chance.probability.probability == 1.0
+    estimated = estimate(build_ensemble(scene), ToleranceSet(), 10.0)
+    assert estimated.max_um == 0.0
+    assert estimated.probability.probability == 1.0
 
 
 @pytest.mark.parametrize("over", [Over.SAMPLED, Over.MAX])
