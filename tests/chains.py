@@ -8,11 +8,12 @@ from hypothesis import strategies as st
 from warpspace.kinematics.chain import exact_error
 from warpspace.kinematics.conventions.registry import convention_names
 from warpspace.kinematics.model import Loop, Model
+from warpspace.machine.axes import AXIS_NAMES, MAX_AXES, is_linear
 from warpspace.machine.description import FIXED_FRAMES, Chain, build_machine
-from warpspace.machine.parameters import AXES, LINEAR_AXES
 
 MAX_OFFSET_MM = 1000.0
 MAX_LINEAR_MM = 500.0
+TURNED = st.sampled_from((False, False, True))
 STEP = 50.0
 """Step of the central difference, µm or µrad: cubic terms and rounding are both far below 1e-6."""
 
@@ -29,9 +30,11 @@ def vectors(limit: float = MAX_OFFSET_MM) -> st.SearchStrategy[tuple[float, floa
 
 @st.composite
 def chains(draw: st.DrawFn) -> Chain:
-    """Chains of one to six axes, in any order, on either side."""
-    order = draw(st.permutations(AXES))
-    count = draw(st.integers(1, len(AXES)))
+    """Chains of one to eight axes, letters repeated, in any order, on either side."""
+    plain = st.permutations("XYZABC")
+    any_names = st.lists(st.sampled_from(AXIS_NAMES), min_size=1, max_size=MAX_AXES, unique=True)
+    order = draw(plain | any_names)
+    count = draw(st.integers(1, len(order)))
     split = draw(st.integers(0, count))
     return Chain(tuple(order[:split]), tuple(order[split:count]))
 
@@ -44,10 +47,14 @@ def models(draw: st.DrawFn, component_errors: str | None = None) -> Model:
     machine = build_machine(
         chain,
         offset_mm={frame: draw(vectors()) for frame in frames},
+        rotation_deg={frame: draw(vectors(180.0)) for frame in frames if draw(TURNED)},
         direction={axis: draw(st.sampled_from((1, -1))) for axis in chain.axes},
     )
-    convention = component_errors or draw(st.sampled_from(convention_names()))
-    return Model(machine, convention, draw(vectors(300.0)), draw(vectors(300.0)))
+    names = st.sampled_from(convention_names())
+    convention, own = component_errors or draw(names), ()
+    if component_errors is None:
+        own = tuple((axis, draw(names)) for axis in chain.axes if draw(TURNED))
+    return Model(machine, convention, draw(vectors(300.0)), draw(vectors(300.0)), own)
 
 
 def positions(
@@ -57,7 +64,7 @@ def positions(
     size = int(np.prod(shape))
 
     def one(axis: str) -> st.SearchStrategy[np.ndarray]:
-        limit = MAX_LINEAR_MM if axis in LINEAR_AXES else 180.0
+        limit = MAX_LINEAR_MM if is_linear(axis) else 180.0
         values = st.lists(lengths(limit), min_size=size, max_size=size)
         return values.map(lambda found: np.array(found).reshape(shape))
 

@@ -5,8 +5,9 @@ from hypothesis import strategies as st
 
 from chains import chains
 from warpspace.exceptions import SceneError
+from warpspace.machine.axes import is_linear
 from warpspace.machine.description import Chain, build_machine
-from warpspace.machine.parameters import LINEAR_AXES, parameter
+from warpspace.machine.parameters import parameter
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import Scene
 
@@ -38,7 +39,7 @@ def scene_texts(draw: st.DrawFn) -> str:
     middles = {axis: draw(PLACES) for axis in chain.axes}
     ranges: dict[str, object] = {}
     for axis in chain.axes:
-        half = draw(HALF_TRAVEL) if axis in LINEAR_AXES and draw(MOVES) else 0.0
+        half = draw(HALF_TRAVEL) if is_linear(axis) and draw(MOVES) else 0.0
         at = middles[axis]
         ranges[axis] = [at - half, at + half] if half else at
     traced = draw(st.lists(POINTS, max_size=2))
@@ -63,7 +64,7 @@ def curves(key: str) -> st.SearchStrategy[str]:
         SIZES.map(lambda value: f"{{ poly = [{value}, 0.001] }}"),
         SIZES.map(lambda value: f"{{ table = [[-100, 0.0], [80, {value}]] }}"),
     ]
-    if parameter(key).axis not in LINEAR_AXES:
+    if not is_linear(parameter(key).axis):
         forms.append(SIZES.map(lambda value: f"{{ harmonics = [[2, {abs(value)}, 30.0]] }}"))
     return st.one_of(constant, *forms)
 

@@ -111,8 +111,8 @@ MALFORMED = {
     # chains
     "axis twice": ('[machine]\nchain = "wCXFXt"', "machine.chain", "has axis X twice"),
     "impossible chain": ('[machine]\nchain = "hello"', "chain 'hello' cannot be read", "wCBFXYZt"),
-    "chain without axes": ('[machine]\nchain = "wFt"', "has no axis; expected one to six"),
-    "axis of no name": ('[machine]\nchain = "wFXYUt"', "unknown axis U"),
+    "chain without axes": ('[machine]\nchain = "wFt"', "has no axis; expected one to eight"),
+    "axis of no name": ('[machine]\nchain = "wFXYQt"', "unknown axis Q"),
     "no chain": ('[machine]\ntitle = "a"', "machine.chain: is missing"),
     # files
     "no TOML": ("= 1\n", "is not valid TOML", "line 1"),

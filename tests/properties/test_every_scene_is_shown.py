@@ -38,7 +38,7 @@ from warpspace.app.viewport.layers.other_side import OtherSideLayer
 from warpspace.app.viewport.layers.traces import TracesLayer
 from warpspace.app.viewport.named_views import VIEWS, CameraSetup, view_pose
 from warpspace.kinematics.model import Loop
-from warpspace.machine.parameters import LINEAR_AXES
+from warpspace.machine.axes import is_linear
 from warpspace.outputs.exports.glb import build_glb
 from warpspace.outputs.exports.vts import build_vts
 from warpspace.picture.mesh import edge_pieces, grid_pieces, isoline_pieces, line_mesh, map_mesh
@@ -134,7 +134,7 @@ def _check_finite(picture: LivePicture) -> None:
 @given(state=states())
 def test_every_panel_has_words_for_it(state: AppState) -> None:
     picture = LiveModel().evaluate(state)
-    at = {name: 0.0 for name in state.scene.machine.axes if name in LINEAR_AXES}
+    at = {name: 0.0 for name in state.scene.machine.axes if is_linear(name)}
     said = [
         summary(picture),
         heading(picture),

@@ -10,6 +10,7 @@ from warpspace.field.evaluate import View, evaluate_first_order
 from warpspace.field.grid import Workspace
 from warpspace.kinematics.chain import branch_pose, nominal_point
 from warpspace.kinematics.model import Coordinates, Loop, Model, complete_coordinates
+from warpspace.machine.axes import is_linear
 from warpspace.machine.errors import ErrorSet
 from warpspace.units import UM_PER_MM_URAD, Array
 
@@ -183,7 +184,7 @@ def _check_circle(
     for name, value in centre.items():
         low, high = workspace.ranges[name]
         if name not in axes:
-            if name in "XYZ" and not low <= value <= high:
+            if is_linear(name) and not low <= value <= high:
                 problems.append(f"{name} = {value:g} lies outside {low:g} … {high:g} mm")
         elif value - radius_mm < low or value + radius_mm > high:
             problems.append(

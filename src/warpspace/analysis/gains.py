@@ -1,5 +1,6 @@
 """Error gains: how much of each error parameter arrives at the functional point, and why."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -17,10 +18,10 @@ from warpspace.machine.parameters import Parameter, parameter
 from warpspace.units import Array
 
 DEFAULT_SHARE = 0.8
-DEFAULT_STEP_DEG = 1.0
-COARSE_STEP_DEG = 5.0
-"""Default where three rotary axes turn in one loop."""
+DEFAULT_STEPS_DEG = (1.0, 5.0, 10.0, 15.0, 30.0, 45.0, 90.0)
+"""Of rotary axes: the finest that keeps to `MAX_DEFAULT_NODES` positions; 1° for two axes."""
 MAX_NODES = 5_000_000
+MAX_DEFAULT_NODES = 500_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,8 +226,7 @@ def _sweep(
     sides = ("tool", "workpiece") if loop is Loop.RELATIVE else (str(loop),)
     axes = [axis for side in sides for axis in model.machine.branch(side)]
     rotary = [axis.name for axis in axes if not axis.is_linear]
-    default = DEFAULT_STEP_DEG if len(rotary) < 3 else COARSE_STEP_DEG
-    step = default if step_deg is None else step_deg
+    step = _default_step(ranges, rotary) if step_deg is None else step_deg
     if not 0.0 < step <= 90.0:
         raise OptionError(f"step: {step:g}°; expected above 0, at most 90")
     turns: dict[str, Array] = {}
@@ -247,3 +247,12 @@ def _sweep(
             fixed = zip((*linear, *outer), (*ends, *first), strict=True)
             given = {**mesh, **{name: np.asarray(value) for name, value in fixed}}
             yield complete_coordinates(model.machine, given)
+
+
+def _default_step(ranges: Mapping[str, tuple[float, float]], rotary: Sequence[str]) -> float:
+    """Choose the step of rotary axes, degrees, so that there are not too many positions."""
+    spans = [ranges[name][1] - ranges[name][0] for name in rotary]
+    for step in DEFAULT_STEPS_DEG:
+        if math.prod(math.ceil(span / step) + 1 for span in spans) <= MAX_DEFAULT_NODES:
+            return step
+    return DEFAULT_STEPS_DEG[-1]

@@ -5,7 +5,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from warpspace.kinematics.chain import branch_frames, branch_pose
+from warpspace.kinematics import transforms
+from warpspace.kinematics.chain import branch_frames
 from warpspace.kinematics.model import Loop, Model, complete_coordinates
 from warpspace.machine.parameters import parameter
 from warpspace.units import Array
@@ -37,7 +38,7 @@ def lever_parts(model: Model, loop: Loop, key: str, at: Mapping[str, float]) -> 
     side = "tool" if on_tool else "workpiece"
     coordinates = complete_coordinates(model.machine, at)
     stops: list[tuple[str, Array]] = []
-    started = False
+    started, last = False, np.eye(4)
     for frames in branch_frames(model, side, coordinates):
         name = frames.axis.name
         if started:
@@ -48,25 +49,22 @@ def lever_parts(model: Model, loop: Loop, key: str, at: Mapping[str, float]) -> 
             stops.append(("", model.convention(name).frame(frames, row)[:3, 3]))
         if started:
             stops.append((f"{name} motion", frames.after[:3, 3]))
-    stops += _end_stops(model, side, coordinates, stops[-1][1])
+        last = frames.after
+    stops += _end_stops(model, side, last)
     pairs = pairwise(stops)
     vectors = [(name, vector(end - start)) for (_, start), (name, end) in pairs]
     return tuple((name, vector) for name, vector in vectors if any(vector))
 
 
-def _end_stops(
-    model: Model, side: str, coordinates: Mapping[str, Array], last: Array
-) -> list[tuple[str, Array]]:
+def _end_stops(model: Model, side: str, last: Array) -> list[tuple[str, Array]]:
     """Positions in R of the fixed frames behind the last axis and of the functional point."""
-    pose = branch_pose(model, side, coordinates)
-    names = ("S", "t") if side == "tool" else ("w",)
+    pose = last
     stops: list[tuple[str, Array]] = []
-    place = last
-    for name, offset in zip(names, model.machine.end_offsets_mm(side), strict=True):
-        place = place + pose[:3, :3] @ np.asarray(offset)
-        stops.append((name, place))
+    for name, offset, rotation in model.machine.end_frames(side):
+        pose = pose @ transforms.placed(offset, rotation)
+        stops.append((name, pose[:3, 3]))
     point = model.tool_point_mm if side == "tool" else model.workpiece_point_mm
-    stops.append(("point", place + pose[:3, :3] @ np.asarray(point)))
+    stops.append(("point", transforms.apply(pose, point)))
     return stops
 
 

@@ -11,11 +11,13 @@ from warpspace.field.grid import Workspace, build_grid, node_counts
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, nominal_point
 from warpspace.kinematics.model import Loop, Model, complete_coordinates
+from warpspace.machine.axes import is_linear, is_rotary
 from warpspace.units import Array
 
 MAX_CYLINDER_MM = 1e5
 FULL_TURN = 360.0
 AVERAGE_POWER = 14
+ROTARY_PARTS = 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,7 +164,7 @@ def extreme_places(
     node_counts(nodes)
     ranges = moving_ranges(model, loop, workspace)
     along = {
-        name: _rotary_nodes(low, high, nodes) if name in "ABC" else np.array([low, high])
+        name: _rotary_nodes(low, high, nodes) if is_rotary(name) else np.array([low, high])
         for name, (low, high) in ranges.items()
     }
     if loop is not Loop.WORKPIECE:
@@ -183,8 +185,9 @@ def average_places(
 ) -> Places:
     """Give places whose plain mean is the mean over all points of anything quadratic in them.
 
-    Two Gauss points per linear axis, which is exact for the square of an error; for the workpiece
-    loop 2¹⁴ points of a Sobol sequence, which is good to about 0.01 %.
+    Two Gauss points per linear axis, which is exact for the square of an error, and the middles of
+    16 parts of the range of a rotary one; for the workpiece loop 2¹⁴ points of a Sobol sequence,
+    which is good to about 0.01 %.
 
     Returns
     -------
@@ -195,9 +198,10 @@ def average_places(
         dimensions = len(moving_ranges(model, loop, workspace)) + 3
         unit = qmc.Sobol(dimensions, scramble=True, rng=0).random_base2(AVERAGE_POWER)
     else:
-        axes = len(moving_ranges(model, loop, workspace))
         gauss = 0.5 + np.array([-0.5, 0.5]) / math.sqrt(3.0)
-        mesh = np.meshgrid(*[gauss] * axes)
+        middles = (np.arange(ROTARY_PARTS) + 0.5) / ROTARY_PARTS
+        axes = moving_ranges(model, loop, workspace)
+        mesh = np.meshgrid(*(gauss if is_linear(name) else middles for name in axes))
         unit = np.stack([values.ravel() for values in mesh], -1) if axes else np.zeros((1, 0))
     return _places(model, loop, workspace, cylinder, unit)
 
@@ -214,14 +218,14 @@ def moving_ranges(model: Model, loop: Loop, workspace: Workspace) -> dict[str, t
     Returns
     -------
     dict of str to tuple of float, (2,), mm or degrees
-        The linear axes of the working volume; for the workpiece loop the axes that carry the
+        The axes that span the working volume; for the workpiece loop the axes that carry the
         workpiece, rotary ones over their travel.
     """
     if loop is not Loop.WORKPIECE:
         return {
             name: span
             for name, span in workspace.ranges.items()
-            if name in "XYZ" and span[0] < span[1]
+            if name in model.machine.axes and span[0] < span[1]
         }
     return {
         axis.name: workspace.ranges[axis.name] if axis.is_linear else axis.travel

@@ -11,12 +11,47 @@ from warpspace.exceptions import OptionError
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, nominal_point
 from warpspace.kinematics.model import Coordinates, Loop, Model
+from warpspace.machine.axes import direction_index, is_linear, sort_axes
 from warpspace.machine.limits import GRID_NODES
-from warpspace.machine.parameters import LINEAR_AXES
 from warpspace.units import Array
 
 DEFAULT_NODES = 21
 MIN_NODES, MAX_NODES = GRID_NODES
+DIMENSIONS = 3
+VolumeAxes = tuple[str, str, str]
+"""The axis that runs along each direction of a volume; empty where none does."""
+
+
+def find_volume_axes(ranges: Mapping[str, tuple[float, float]]) -> VolumeAxes:
+    """Find the axes that span a volume, by direction.
+
+    Linear axes take the direction they move along; rotary ones with a range take what is left, in
+    the order of their names: the volume of a robot with two rotary axes in series is curved.
+
+    Parameters
+    ----------
+    ranges : mapping of str to tuple of float, (2,), mm or degrees
+
+    Returns
+    -------
+    tuple of str, (3,)
+        Empty where no axis runs along a direction.
+
+    Raises
+    ------
+    OptionError
+        If two linear axes with a range move along one direction, or more than three have one.
+    """
+    slots = ["", "", ""]
+    for axis in sort_axes(axis for axis, (low, high) in ranges.items() if low < high):
+        wanted = [direction_index(axis)] if is_linear(axis) else range(DIMENSIONS)
+        free = [slot for slot in wanted if not slots[slot]]
+        if not free:
+            taken = ", ".join(slots[slot] for slot in wanted)
+            expected = "expected one position for one of them"
+            raise OptionError(f"{axis} has a range beside {taken}; {expected}")
+        slots[free[0]] = axis
+    return slots[0], slots[1], slots[2]
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +70,11 @@ class Workspace:
     def positions(self) -> dict[str, float]:
         """Position of the axes that stand still, the middle of those that move."""
         return {axis: (low + high) / 2.0 for axis, (low, high) in self.ranges.items()}
+
+    @property
+    def volume_axes(self) -> VolumeAxes:
+        """Axes that span the volume, by direction; see `find_volume_axes`."""
+        return find_volume_axes(self.ranges)
 
     def moved(self, positions: Mapping[str, float]) -> "Workspace":
         """Give the workspace with some axes standing at other positions, mm or degrees."""
@@ -58,17 +98,23 @@ class Grid:
     point_mm : ndarray, [nx, ny, nz, 3], mm
         Nominal tool point in R at each node, where its error is evaluated. The same as
         `nominal_mm` on a machine whose linear axes all carry the tool.
+    axes : tuple of str, (3,)
+        The axis that runs along each direction of the grid; empty where there is one node.
     """
 
     coordinates: dict[str, Array]
     shape: tuple[int, int, int]
     nominal_mm: Array
     point_mm: Array
+    axes: VolumeAxes = ("X", "Y", "Z")
 
     @cached_property
     def bounds_mm(self) -> Array:
-        """Lower and upper corner of the nominal volume in R, [2, 3], mm; its faces are flat."""
-        x, y, z = (max(n - 1, 1) for n in self.shape)
+        """Lower and upper corner of the nominal volume in R, [2, 3], mm."""
+        steps = [max(n - 1, 1) for n in self.shape]
+        if any(axis and not is_linear(axis) for axis in self.axes):  # its faces are curved
+            steps = [1, 1, 1]
+        x, y, z = steps
         corners = self.nominal_mm[::x, ::y, ::z].reshape(-1, 3)
         return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
@@ -120,7 +166,7 @@ def node_counts(nodes: int | Sequence[int]) -> tuple[int, int, int]:
         counts = _counts(nodes)
     except TypeError:
         raise OptionError(f"grid: {nodes!r}; expected whole numbers of nodes") from None
-    if len(counts) != len(LINEAR_AXES) or any(not MIN_NODES <= n <= MAX_NODES for n in counts):
+    if len(counts) != DIMENSIONS or any(not MIN_NODES <= n <= MAX_NODES for n in counts):
         given = " × ".join(map(str, counts)) if isinstance(nodes, Sequence) else nodes
         raise OptionError(f"grid: {given} nodes; expected {MIN_NODES} to {MAX_NODES} per axis")
     return counts[0], counts[1], counts[2]
@@ -130,7 +176,7 @@ def _counts(nodes: int | Sequence[int]) -> tuple[int, ...]:
     """Give one whole number per linear axis, whatever kind of integer was given."""
     if isinstance(nodes, Sequence):
         return tuple(map(whole_number, nodes))
-    return (whole_number(nodes),) * len(LINEAR_AXES)
+    return (whole_number(nodes),) * DIMENSIONS
 
 
 def build_grid(
@@ -142,9 +188,9 @@ def build_grid(
     ----------
     model : Model
     workspace : Workspace
-        Linear axes with a range are gridded; every other axis stands at its position.
+        Axes with a range are gridded; every other axis stands at its position.
     nodes : int or sequence of int, (3,), optional
-        Nodes along X, Y and Z; an axis that stands still has one.
+        Nodes along x, y and z; a direction that no axis runs along has one.
 
     Returns
     -------
@@ -153,32 +199,37 @@ def build_grid(
     Raises
     ------
     OptionError
-        If the number of nodes is out of range.
+        If the number of nodes is out of range, or the axes span no volume.
     """
     counts = node_counts(nodes)
+    axes = workspace.volume_axes
     positions = workspace.positions
     coordinates = {name: np.asarray(positions.get(name, 0.0)) for name in model.machine.axes}
     shape = [1, 1, 1]
-    for index, name in enumerate(LINEAR_AXES):
-        low, high = workspace.ranges.get(name, (0.0, 0.0))
-        if name not in model.machine.axes or low == high:
+    for index, name in enumerate(axes):
+        if name not in model.machine.axes:
             continue
+        low, high = workspace.ranges[name]
         shape[index] = counts[index]
         along = [1, 1, 1]
         along[index] = counts[index]
         coordinates[name] = np.linspace(low, high, counts[index]).reshape(along)
     full = (shape[0], shape[1], shape[2])
     point = np.broadcast_to(nominal_point(model, Loop.TOOL, coordinates), (*full, 3)).copy()
-    return Grid(
-        coordinates, full, _seen_from_workpiece(model, coordinates, positions, point), point
-    )
+    seen = _seen_from_workpiece(model, coordinates, positions, point, axes)
+    return Grid(coordinates, full, seen, point, axes)
 
 
 def _seen_from_workpiece(
-    model: Model, coordinates: Coordinates, middle: Mapping[str, float], point_mm: Array
+    model: Model,
+    coordinates: Coordinates,
+    middle: Mapping[str, float],
+    point_mm: Array,
+    axes: VolumeAxes,
 ) -> Array:
-    """Move points with the linear axes of the workpiece back to the middle of their ranges."""
-    carrying = [axis.name for axis in model.machine.branch("workpiece") if axis.is_linear]
+    """Move points with the axes that carry the workpiece back to the middle of their ranges."""
+    branch = model.machine.branch("workpiece")
+    carrying = [axis.name for axis in branch if axis.is_linear or axis.name in axes]
     if not carrying:
         return point_mm
     home = {**coordinates, **{name: np.asarray(middle.get(name, 0.0)) for name in carrying}}

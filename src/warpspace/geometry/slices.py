@@ -12,7 +12,6 @@ from warpspace.field.grid import DEFAULT_NODES, Grid, Workspace, build_grid
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import Model, complete_coordinates
-from warpspace.machine.parameters import LINEAR_AXES
 
 PLANES: Mapping[str, str] = {"X": "YZ", "Y": "XZ", "Z": "XY"}
 """Axis that stands still, and the plane it leaves."""
@@ -30,16 +29,12 @@ def slice_ranges(model: Model, workspace: Workspace) -> dict[str, tuple[float, f
     -------
     dict of str to tuple of float, (2,), mm
         Lower and upper position of the axis that stands still; axes that do not move in the
-        workspace are left out, and all of them where fewer than two others span a plane.
+        workspace are left out, and all of them where X, Y and Z do not span the volume.
     """
-    moving = {
-        axis: workspace.ranges[axis]
-        for axis in LINEAR_AXES
-        if axis in model.machine.axes
-        and axis in workspace.ranges
-        and workspace.ranges[axis][0] != workspace.ranges[axis][1]
-    }
-    return moving if len(moving) == len(LINEAR_AXES) else {}
+    spanning = [axis for axis in workspace.volume_axes if axis in model.machine.axes]
+    if tuple(spanning) != tuple(PLANES):
+        return {}
+    return {axis: workspace.ranges[axis] for axis in spanning}
 
 
 def build_slice(

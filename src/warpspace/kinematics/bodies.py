@@ -14,7 +14,7 @@ from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_frames
 from warpspace.kinematics.firstorder import column
 from warpspace.kinematics.model import Coordinates, Model
-from warpspace.machine.parameters import PARAMETERS
+from warpspace.machine.parameters import axis_parameters
 from warpspace.units import MM_PER_UM, RAD_PER_URAD, Array
 
 BASE = "R"
@@ -76,12 +76,12 @@ def body_motions(
     """
     still = np.zeros(3)
     found = {BASE: BodyMotion(np.eye(4), still, still)}
-    for side, ends in (("tool", ("S", "t")), ("workpiece", ("w",))):
+    for side in ("tool", "workpiece"):
         pose, rotation, displacement = np.eye(4), still, still
         for frames in branch_frames(model, side, coordinates):
             pose = frames.after
-            for row in PARAMETERS.values():
-                value = float(values.get(row.key, 0.0)) if row.axis == frames.axis.name else 0.0
+            for row in axis_parameters(frames.axis.name):
+                value = float(values.get(row.key, 0.0))
                 if value == 0.0:
                     continue
                 col = column(model, row, frames, np.zeros(3))
@@ -89,7 +89,7 @@ def body_motions(
                 if row.is_rotation:
                     rotation = rotation + col.direction * value * RAD_PER_URAD
             found[frames.axis.name] = BodyMotion(pose, rotation, displacement)
-        for name, offset in zip(ends, model.machine.end_offsets_mm(side), strict=True):
-            pose = pose @ transforms.translation(offset)
+        for name, offset, turned in model.machine.end_frames(side):
+            pose = pose @ transforms.placed(offset, turned)
             found[name] = BodyMotion(pose, rotation, displacement)
     return found

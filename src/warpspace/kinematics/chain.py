@@ -1,7 +1,8 @@
 """The exact chain: every transformation in full, multiplied out.
 
-Per axis ``T = Trans(offset) · E0 · Motion(direction·q) · E(q)``, or what another convention makes
-of these factors; E0 and E(q) are ``Trans(δ) · Rot(ε)`` with the full rotation of the vector ε.
+Per axis ``T = Trans(offset) · Rot(fixed) · E0 · Motion(direction·q) · E(q)``, or what another
+convention makes of the last three; E0 and E(q) are ``Trans(δ) · Rot(ε)`` with the full rotation of
+the vector ε.
 """
 
 from collections.abc import Iterator, Mapping
@@ -17,8 +18,8 @@ from warpspace.kinematics.model import (
     Loop,
     Model,
 )
+from warpspace.machine.axes import DIRECTIONS
 from warpspace.machine.description import Axis, Vector
-from warpspace.machine.parameters import AXES
 from warpspace.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM, URAD_PER_RAD, Array
 
 ErrorValues = Mapping[str, Array]
@@ -49,7 +50,7 @@ def error_transform(axis: str, values: ErrorValues, *, constant: bool) -> Array 
     Parameters
     ----------
     axis : str
-        Axis letter.
+        Name of the axis.
     values : mapping of str to ndarray, [...], µm or µrad
     constant : bool
         Whether to take the constant or the component errors.
@@ -59,7 +60,7 @@ def error_transform(axis: str, values: ErrorValues, *, constant: bool) -> Array 
     ndarray, [..., 4, 4] or None
     """
     middle = "0" if constant else ""
-    keys = [f"E{letter}{middle}{axis}" for letter in AXES]
+    keys = [f"E{letter}{middle}{axis}" for letter in DIRECTIONS]
     if not any(key in values for key in keys):
         return None
     parts = np.broadcast_arrays(*(np.asarray(values.get(key, 0.0), dtype=float) for key in keys))
@@ -84,7 +85,7 @@ def branch_frames(model: Model, side: str, coordinates: Coordinates) -> Iterator
     """
     pose = np.eye(4)
     for axis in model.machine.branch(side):
-        before = pose @ transforms.translation(axis.offset_mm)
+        before = pose @ transforms.placed(axis.offset_mm, axis.rotation_deg)
         pose = before @ motion(axis, coordinates[axis.name])
         yield AxisFrames(axis, before, pose)
 
@@ -110,14 +111,14 @@ def branch_pose(
     pose = np.eye(4)
     errors = values or {}
     for axis in model.machine.branch(side):
-        pose = pose @ transforms.translation(axis.offset_mm)
+        pose = pose @ transforms.placed(axis.offset_mm, axis.rotation_deg)
         move = motion(axis, coordinates[axis.name])
         constant = error_transform(axis.name, errors, constant=True)
         component = error_transform(axis.name, errors, constant=False)
         for factor in model.convention(axis.name).factors(constant, move, component):
             pose = pose if factor is None else pose @ factor
-    for offset in model.machine.end_offsets_mm(side):
-        pose = pose @ transforms.translation(offset)
+    for _, offset, rotation in model.machine.end_frames(side):
+        pose = pose @ transforms.placed(offset, rotation)
     return pose
 
 

@@ -14,7 +14,7 @@ from warpspace.machine.description import ORIGIN, Machine, Vector
 from warpspace.units import Array
 
 Coordinates = Mapping[str, Array]
-"""Axis letter to positions, [...], broadcastable: mm for linear axes, degrees for rotary ones."""
+"""Axis to positions, [...], broadcastable: mm for linear axes, degrees for rotary ones."""
 
 
 class Loop(StrEnum):
@@ -46,6 +46,8 @@ class Model:
     component_errors : str
         Name of the convention for component errors: one of `ComponentErrors`, or one that was
         registered.
+    own_component_errors : tuple of (str, str)
+        Axes that have another one: name of the axis and of its convention.
     tool_point_mm : tuple of float, (3,), mm
         Functional point in the tool frame.
     workpiece_point_mm : tuple of float, (3,), mm
@@ -56,6 +58,7 @@ class Model:
     component_errors: str = ComponentErrors.AFTER_MOTION
     tool_point_mm: Vector = ORIGIN
     workpiece_point_mm: Vector = ORIGIN
+    own_component_errors: tuple[tuple[str, str], ...] = ()
 
     def convention(self, axis: str) -> Convention:
         """Give the convention for the component errors of an axis.
@@ -65,8 +68,12 @@ class Model:
         UnknownNameError
             If no convention has the name.
         """
-        del axis  # one convention holds for all axes
-        return find_convention(self.component_errors)
+        return find_convention(dict(self.own_component_errors).get(axis, self.component_errors))
+
+    @property
+    def convention_names(self) -> tuple[str, ...]:
+        """Names of the conventions that axes of the machine have, each once."""
+        return tuple(dict.fromkeys(self.convention(axis).name for axis in self.machine.axes))
 
 
 def batch_shape(coordinates: Coordinates) -> tuple[int, ...]:
@@ -83,7 +90,7 @@ def complete_coordinates(
     ----------
     machine : Machine
     given : mapping of str to array_like, [...], mm or degrees
-        Positions by axis letter.
+        Positions by axis.
     default : mapping of str to float, optional
         Positions of the axes not given; zero where absent.
 

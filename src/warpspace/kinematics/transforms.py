@@ -114,6 +114,26 @@ def rigid(rotation: Array, position_mm: ArrayLike) -> Array:
     return out
 
 
+def placed(offset_mm: ArrayLike, rotation_deg: ArrayLike) -> Array:
+    """Build the fixed placement of a frame: ``Trans(offset) · Rz · Ry · Rx``.
+
+    Parameters
+    ----------
+    offset_mm : array_like, [3], mm
+    rotation_deg : array_like, [3], degrees
+        About the fixed x, y and z axes in that order, as the roll, pitch and yaw of URDF.
+
+    Returns
+    -------
+    ndarray, [4, 4]
+    """
+    x, y, z = np.deg2rad(np.asarray(rotation_deg, dtype=float))
+    if x == y == z == 0.0:
+        return translation(offset_mm)
+    turned = axis_rotation(2, z) @ axis_rotation(1, y) @ axis_rotation(0, x)
+    return rigid(turned, offset_mm)
+
+
 def inverse(transform: Array) -> Array:
     """Invert rigid transformations, [..., 4, 4], without solving."""
     turned = np.swapaxes(transform[..., :3, :3], -1, -2)

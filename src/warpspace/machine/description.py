@@ -5,7 +5,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from warpspace.exceptions import ChainError, UnknownNameError
-from warpspace.machine.parameters import AXES, LINEAR_AXES, PARAMETERS, default_keys
+from warpspace.machine.axes import (
+    LINEAR_LETTERS,
+    MAX_AXES,
+    direction_index,
+    is_axis_name,
+    is_linear,
+    sort_axes,
+)
+from warpspace.machine.parameters import axis_parameters, default_keys
 
 Vector = tuple[float, float, float]
 Range = tuple[float, float]
@@ -14,11 +22,16 @@ ORIGIN: Vector = (0.0, 0.0, 0.0)
 FIXED_FRAMES = ("S", "t", "w")
 """Frames without motion: spindle and tool at the end of the tool branch, workpiece of the other."""
 
-DEFAULT_TRAVEL: Mapping[str, Range] = {
-    **dict.fromkeys("XYZ", (-250.0, 250.0)),
+_DEFAULT_TRAVEL: Mapping[str, Range] = {
+    **dict.fromkeys(LINEAR_LETTERS, (-250.0, 250.0)),
     **dict.fromkeys("AB", (-90.0, 90.0)),
     "C": (0.0, 360.0),
 }
+
+
+def default_travel(axis: str) -> Range:
+    """Give the travel of an axis that none is given for, mm or degrees."""
+    return _DEFAULT_TRAVEL[axis[0]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,9 +51,8 @@ class Chain:
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """All axes of the machine in the order X Y Z A B C."""
-        present = {*self.workpiece, *self.tool}
-        return tuple(axis for axis in AXES if axis in present)
+        """All axes of the machine in the order X Y Z U V W A B C."""
+        return sort_axes({*self.workpiece, *self.tool})
 
     def __str__(self) -> str:
         """Write the chain in its canonical spelling, for instance ``wCBFXYZt``."""
@@ -53,8 +65,8 @@ def parse_chain(text: str) -> Chain:
     Parameters
     ----------
     text : str
-        For instance ``wCBFXYZt``, ``(w)CBFXYZ(t)`` or ``[w C' B' b X Y Z t]``. Brackets, primes,
-        blanks, hyphens and a small ``b`` for the frame are accepted.
+        For instance ``wCBFXYZt``, ``(w)CBFXYZ(t)``, ``[w C' B' b X Y Z t]`` or ``wC2XFZC1t``.
+        Brackets, primes, blanks, hyphens and a small ``b`` for the frame are accepted.
 
     Returns
     -------
@@ -63,24 +75,31 @@ def parse_chain(text: str) -> Chain:
     Raises
     ------
     ChainError
-        If it does not run from w to t over one frame with one to six different axes.
+        If it does not run from w to t over one frame with one to eight different axes.
     """
     bare = re.sub(r"[\s()\[\]{}'’′\-–_]", "", text)
-    expected = "expected w, axes out of X Y Z A B C, F (or b), axes, t; for instance wCBFXYZt"
-    matched = re.fullmatch(r"[wW]([A-Z]*?)(b|F)([A-EG-Z]*)[tT]", bare)
+    expected = (
+        "expected w, axes (a letter of X Y Z U V W A B C and an optional digit), F (or b), axes, t;"
+        " for instance wCBFXYZt or wC2XFZC1t"
+    )
+    matched = re.fullmatch(r"[wW]((?:[A-Z][0-9]*)*?)(b|F)((?:[A-EG-Z][0-9]*)*)[tT]", bare)
     if matched is None:
         raise ChainError(f"chain {text!r} cannot be read; {expected}")
-    workpiece, _, tool = matched.groups()
+    workpiece, tool = (tuple(re.findall(r"[A-Z][0-9]*", matched[side])) for side in (1, 3))
     axes = workpiece + tool
-    unknown = sorted({letter for letter in axes if letter not in AXES})
+    unknown = sorted({name for name in axes if not is_axis_name(name)})
     if unknown:
         raise ChainError(f"chain {text!r} has unknown axis {', '.join(unknown)}; {expected}")
-    twice = sorted({letter for letter in axes if axes.count(letter) > 1})
+    twice = sorted({name for name in axes if axes.count(name) > 1})
     if twice:
-        raise ChainError(f"chain {text!r} has axis {', '.join(twice)} twice; expected each once")
-    if not axes:
-        raise ChainError(f"chain {text!r} has no axis; expected one to six")
-    return Chain(tuple(reversed(workpiece)), tuple(tool))
+        raise ChainError(
+            f"chain {text!r} has axis {', '.join(twice)} twice; expected each name once"
+            f" (a digit tells them apart: {twice[0][0]}1, {twice[0][0]}2)"
+        )
+    if not 1 <= len(axes) <= MAX_AXES:
+        found = f"{len(axes)} axes" if axes else "no axis"
+        raise ChainError(f"chain {text!r} has {found}; expected one to eight")
+    return Chain(tuple(reversed(workpiece)), tool)
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,29 +109,33 @@ class Axis:
     Attributes
     ----------
     name : str
-        X Y Z (linear) or A B C (rotary, about x y z).
+        X Y Z U V W (linear) or A B C (rotary, about x y z), and an optional digit.
     offset_mm : tuple of float, (3,)
         Origin of its frame in the frame before it, mm.
     travel : tuple of float, (2,)
         Lower and upper end, mm or degrees.
     direction : int
         +1, or −1 for an axis that moves against its name.
+    rotation_deg : tuple of float, (3,)
+        Fixed rotation of its frame against the frame before it, degrees, about the fixed x, y and z
+        axes in that order (roll, pitch, yaw of URDF).
     """
 
     name: str
     offset_mm: Vector
     travel: Range
     direction: int = 1
+    rotation_deg: Vector = ORIGIN
 
     @property
     def is_linear(self) -> bool:
         """Whether it translates."""
-        return self.name in LINEAR_AXES
+        return is_linear(self.name)
 
     @property
     def index(self) -> int:
         """Index 0, 1 or 2 of the coordinate direction along or about which it moves."""
-        return AXES.index(self.name) % 3
+        return direction_index(self.name)
 
     @property
     def unit(self) -> str:
@@ -129,10 +152,12 @@ class Machine:
     chain : Chain
         Order and side of the axes.
     axes : mapping of str to Axis
-        The axes by name, in the order X Y Z A B C.
+        The axes by name, in the order X Y Z U V W A B C.
     fixed_mm : mapping of str to tuple of float, (3,)
         Origins of S (spindle) and t (tool) at the end of the tool branch, and w (workpiece) at the
         end of the workpiece branch, each in the frame before it, mm.
+    fixed_deg : mapping of str to tuple of float, (3,)
+        Their fixed rotations, degrees, as those of axes.
     name, title : str
         Short name and full name.
     body_dir : str
@@ -145,9 +170,10 @@ class Machine:
     name: str = "machine"
     title: str = ""
     body_dir: str = ""
+    fixed_deg: Mapping[str, Vector] = field(default_factory=dict[str, Vector])
 
     def axis(self, name: str) -> Axis:
-        """Look up an axis by its letter.
+        """Look up an axis by its name.
 
         Raises
         ------
@@ -170,10 +196,19 @@ class Machine:
         names = self.chain.tool if side == "tool" else self.chain.workpiece
         return tuple(self.axes[name] for name in names)
 
-    def end_offsets_mm(self, side: str) -> tuple[Vector, ...]:
-        """List the fixed offsets behind the last axis of a branch, mm."""
+    def end_frames(self, side: str) -> tuple[tuple[str, Vector, Vector], ...]:
+        """List the fixed frames behind the last axis of a branch: name, offset [mm], turn [°].
+
+        Parameters
+        ----------
+        side : str
+            "tool" or "workpiece".
+        """
         names = ("S", "t") if side == "tool" else ("w",)
-        return tuple(self.fixed_mm.get(name, ORIGIN) for name in names)
+        return tuple(
+            (name, self.fixed_mm.get(name, ORIGIN), self.fixed_deg.get(name, ORIGIN))
+            for name in names
+        )
 
     @property
     def parameter_keys(self) -> tuple[str, ...]:
@@ -184,21 +219,22 @@ class Machine:
     def reference_keys(self) -> tuple[str, ...]:
         """Keys of the rotations of the reference axis, which the frame R absorbs by definition.
 
-        The reference axis is the first of X Y Z that the machine has.
+        The reference axis is the first linear one in the order X Y Z U V W.
         """
-        linear = [axis for axis in LINEAR_AXES if axis in self.axes]
+        linear = [axis for axis in self.axes if is_linear(axis)]
         return tuple(f"E{letter}0{axis}" for axis in linear[:1] for letter in "ABC")
 
     @property
     def allowed_keys(self) -> tuple[str, ...]:
         """Keys of all parameters that may be given, every constant of every axis included."""
-        return tuple(key for key, row in PARAMETERS.items() if row.axis in self.axes)
+        return tuple(row.key for axis in self.axes for row in axis_parameters(axis))
 
 
 def build_machine(
     chain: str | Chain,
     *,
     offset_mm: Mapping[str, Vector] | None = None,
+    rotation_deg: Mapping[str, Vector] | None = None,
     travel: Mapping[str, Range] | None = None,
     direction: Mapping[str, int] | None = None,
     name: str = "machine",
@@ -213,6 +249,9 @@ def build_machine(
         Order of the axes, for instance ``wCBFXYZt``.
     offset_mm : mapping of str to tuple of float, (3,), optional
         Origin of each frame (axes, S, t, w) in the frame before it, mm. Absent is zero.
+    rotation_deg : mapping of str to tuple of float, (3,), optional
+        Fixed rotation of each frame after its offset, degrees, about the fixed x, y and z axes in
+        that order. Absent is zero.
     travel : mapping of str to tuple of float, (2,), optional
         Lower and upper end of each axis, mm or degrees.
     direction : mapping of str to int, optional
@@ -230,15 +269,18 @@ def build_machine(
         If the chain cannot be read.
     """
     parsed = parse_chain(chain) if isinstance(chain, str) else chain
-    offsets, travels, directions = offset_mm or {}, travel or {}, direction or {}
+    offsets, rotations = offset_mm or {}, rotation_deg or {}
+    travels, directions = travel or {}, direction or {}
     axes = {
         axis: Axis(
             axis,
             offsets.get(axis, ORIGIN),
-            travels.get(axis, DEFAULT_TRAVEL[axis]),
+            travels.get(axis, default_travel(axis)),
             directions.get(axis, 1),
+            rotations.get(axis, ORIGIN),
         )
         for axis in parsed.axes
     }
     fixed = {frame: offsets.get(frame, ORIGIN) for frame in FIXED_FRAMES}
-    return Machine(parsed, axes, fixed, name, title or name, body_dir)
+    turned = {frame: rotations[frame] for frame in FIXED_FRAMES if frame in rotations}
+    return Machine(parsed, axes, fixed, name, title or name, body_dir, turned)

@@ -3,19 +3,25 @@
 Keys are ISO 230-1 names in ASCII: ``E`` + direction + axis for a component error that varies along
 the axis (``EAX``: rotation about x of the X axis), ``E`` + direction + ``0`` + axis for a constant
 (``EC0Y``: the squareness of Y to X). Directions X Y Z are translations, A B C rotations about them.
+An axis may carry a digit: ``EXC1``, ``EA0C1``.
 """
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from types import MappingProxyType
+from functools import cache, lru_cache
 
 from warpspace.exceptions import UnknownNameError
+from warpspace.machine.axes import (
+    AXIS_NAMES,
+    DIRECTIONS,
+    ROTARY_LETTERS,
+    direction_index,
+    is_linear,
+    sort_axes,
+)
 from warpspace.units import MICROMETRE, MICRORADIAN
-
-LINEAR_AXES = "XYZ"
-ROTARY_AXES = "ABC"
-AXES = LINEAR_AXES + ROTARY_AXES
 
 _GREEK = {"X": "δ_x", "Y": "δ_y", "Z": "δ_z", "A": "ε_x", "B": "ε_y", "C": "ε_z"}
 _CONSTANT_GREEK = {"X": "δx", "Y": "δy", "Z": "δz", "A": "α", "B": "β", "C": "γ"}
@@ -46,6 +52,10 @@ _LINEAR_ROTATIONS = {  # roll about the motion, pitch about the horizontal norma
 }
 
 
+_THESIS_AXES = ("X", "Y", "Z", "B", "C")
+_KEY = re.compile(r"E([XYZABC])(0?)([XYZUVWABC][0-9]?)")
+
+
 class ErrorKind(StrEnum):
     """What an error parameter describes, in the words of ISO 230-1."""
 
@@ -69,7 +79,7 @@ class Parameter:
     name : str
         Plain name, for instance "roll of X".
     axis : str
-        The axis it belongs to, one of X Y Z A B C.
+        Name of the axis it belongs to.
     kind : ErrorKind
         What it describes.
     source : str
@@ -91,12 +101,12 @@ class Parameter:
     @property
     def direction(self) -> int:
         """Index 0, 1 or 2 of the frame axis along or about which the error acts."""
-        return AXES.index(self.letter) % 3
+        return direction_index(self.letter)
 
     @property
     def is_rotation(self) -> bool:
         """Whether it is an angle."""
-        return self.letter in ROTARY_AXES
+        return self.letter in ROTARY_LETTERS
 
     @property
     def is_constant(self) -> bool:
@@ -127,19 +137,20 @@ class Parameter:
 
 def _component(letter: str, axis: str) -> Parameter:
     """Build the row of one component error."""
-    rotation = letter in ROTARY_AXES
-    along = AXES.index(letter) % 3 == AXES.index(axis) % 3
-    low = "xyz"[AXES.index(letter) % 3]
-    if axis in LINEAR_AXES:
+    rotation = letter in ROTARY_LETTERS
+    about, own = direction_index(letter), direction_index(axis)
+    low = "xyz"[about]
+    if is_linear(axis):
         if rotation:
-            name = f"{_LINEAR_ROTATIONS[letter + axis]} of {axis}"
+            name = f"{_LINEAR_ROTATIONS[letter + 'XYZ'[own]]} of {axis}"
         else:
-            name = f"positioning of {axis}" if along else f"straightness of {axis} in {low}"
+            name = f"positioning of {axis}" if about == own else f"straightness of {axis} in {low}"
     elif rotation:
-        name = f"angular positioning of {axis}" if along else f"tilt of {axis} about {low}"
+        name = f"angular positioning of {axis}" if about == own else f"tilt of {axis} about {low}"
     else:
-        name = f"axial error of {axis}" if along else f"radial error of {axis} in {low}"
-    source = "ISO 230-1; thesis table 4-2" if axis != "A" else "ISO 230-1, 3.4 (not in the thesis)"
+        name = f"axial error of {axis}" if about == own else f"radial error of {axis} in {low}"
+    of_thesis = axis in _THESIS_AXES
+    source = "ISO 230-1; thesis table 4-2" if of_thesis else "ISO 230-1, 3.4 (not in the thesis)"
     kind = ErrorKind.ROTATION if rotation else ErrorKind.TRANSLATION
     return Parameter(f"E{letter}{axis}", f"{_GREEK[letter]}{axis}", name, axis, kind, source)
 
@@ -147,20 +158,20 @@ def _component(letter: str, axis: str) -> Parameter:
 def _constant(letter: str, axis: str) -> Parameter:
     """Build the row of one constant error of an axis."""
     key = f"E{letter}0{axis}"
-    low = "xyz"[AXES.index(letter) % 3]
-    if letter in LINEAR_AXES:
+    about, own = direction_index(letter), direction_index(axis)
+    low = "xyz"[about]
+    if letter not in ROTARY_LETTERS:
         kind = ErrorKind.LOCATION
         name = f"location of {axis} in {low}"
-    elif axis in ROTARY_AXES:
+    elif not is_linear(axis):
         kind = ErrorKind.ORIENTATION
         name = f"orientation of {axis} about {low}"
     else:
         kind = ErrorKind.SQUARENESS
-        about, own = AXES.index(letter) % 3, AXES.index(axis) % 3
         if about == own:
             name = f"rotation of {axis} about itself"
         else:
-            name = f"squareness of {axis} to {LINEAR_AXES[3 - about - own]}"
+            name = f"squareness of {axis} to {'XYZ'[3 - about - own]}"
     symbol = _THESIS_CONSTANTS.get(key, f"{_CONSTANT_GREEK[letter]}_0{axis}")
     if kind is ErrorKind.LOCATION and key in _THESIS_CONSTANTS:
         source = "ISO 230-1; thesis equations (left out of its table 4-2)"
@@ -171,16 +182,43 @@ def _constant(letter: str, axis: str) -> Parameter:
     return Parameter(key, symbol, name, axis, kind, source)
 
 
-def _build_table() -> dict[str, Parameter]:
-    """Build all rows there can be: six component and six constant errors of six axes."""
-    rows = [
-        build(letter, axis) for axis in AXES for build in (_component, _constant) for letter in AXES
-    ]
-    return {row.key: row for row in rows}
+@cache
+def axis_parameters(axis: str) -> tuple[Parameter, ...]:
+    """List the six component and the six constant errors that an axis can have."""
+    return tuple(build(letter, axis) for build in (_component, _constant) for letter in DIRECTIONS)
 
 
-PARAMETERS = MappingProxyType(_build_table())
-"""Key to parameter, for every axis a machine may have. The only list of parameters there is."""
+@lru_cache(maxsize=4096)
+def _row(key: str) -> Parameter | None:
+    """Give the parameter of a key; None where it is no key."""
+    matched = _KEY.fullmatch(key)
+    if matched is None:
+        return None
+    letter, constant, axis = matched.groups()
+    return axis_parameters(axis)[DIRECTIONS.index(letter) + (len(DIRECTIONS) if constant else 0)]
+
+
+class ParameterTable(Mapping[str, Parameter]):
+    """Key to parameter, for every axis that a machine may have. Rows are made when asked for."""
+
+    def __getitem__(self, key: str) -> Parameter:
+        """Look up one parameter."""
+        row = _row(key)
+        if row is None:
+            raise KeyError(key)
+        return row
+
+    def __iter__(self) -> Iterator[str]:
+        """List all keys, axis by axis."""
+        return (row.key for axis in AXIS_NAMES for row in axis_parameters(axis))
+
+    def __len__(self) -> int:
+        """Count the parameters of all axes there can be."""
+        return 2 * len(DIRECTIONS) * len(AXIS_NAMES)
+
+
+PARAMETERS = ParameterTable()
+"""The only table of parameters there is."""
 
 
 def parameter(key: str) -> Parameter:
@@ -200,10 +238,16 @@ def parameter(key: str) -> Parameter:
     UnknownNameError
         If there is no such parameter; the message names the near misses.
     """
-    try:
-        return PARAMETERS[key]
-    except KeyError:
-        raise UnknownNameError("error parameter", key, PARAMETERS) from None
+    row = _row(key)
+    if row is None:
+        classic = [name for axis in "XYZABC" for name in _keys(axis)]
+        raise UnknownNameError("error parameter", key, classic)
+    return row
+
+
+def _keys(axis: str) -> tuple[str, ...]:
+    """List the keys of all parameters that an axis can have."""
+    return tuple(row.key for row in axis_parameters(axis))
 
 
 def default_keys(axes: Sequence[str]) -> tuple[str, ...]:
@@ -215,7 +259,7 @@ def default_keys(axes: Sequence[str]) -> tuple[str, ...]:
     Parameters
     ----------
     axes : sequence of str
-        Axis letters, in any order.
+        Names of axes, in any order.
 
     Returns
     -------
@@ -224,24 +268,25 @@ def default_keys(axes: Sequence[str]) -> tuple[str, ...]:
 
     Notes
     -----
-    The reference axis is the first of X, Y, Z that the machine has, the reference plane that of the
-    first two: the first linear axis has no squareness, the second one, the third two.
+    The reference axis is the first linear axis that the machine has in the order X Y Z U V W, the
+    reference plane that of the first two: the first has no squareness, the second one, the third
+    two. An axis parallel to an earlier one has the two angles between them.
     """
     keys: list[str] = []
-    linear = [axis for axis in LINEAR_AXES if axis in axes]
-    for axis in (axis for axis in AXES if axis in axes):
-        keys += [f"E{letter}{axis}" for letter in AXES]
-        own = AXES.index(axis) % 3
-        if axis in ROTARY_AXES:
-            letters = [letter for letter in "ABCXYZ" if AXES.index(letter) % 3 != own]
+    earlier: list[int] = []
+    for axis in sort_axes(axes):
+        keys += [row.key for row in axis_parameters(axis) if not row.is_constant]
+        own = direction_index(axis)
+        if is_linear(axis):
+            letters = [letter for letter in "ABC" if _turns_away(letter, own, earlier)]
+            earlier.append(own)
         else:
-            before = linear[: linear.index(axis)]
-            letters = [letter for letter in "ABC" if _turns_into(letter, own, before)]
+            letters = [letter for letter in "ABCXYZ" if direction_index(letter) != own]
         keys += [f"E{letter}0{axis}" for letter in letters]
     return tuple(keys)
 
 
-def _turns_into(letter: str, own: int, before: Sequence[str]) -> bool:
+def _turns_away(letter: str, own: int, earlier: Sequence[int]) -> bool:
     """Tell whether turning direction `own` about `letter` changes its angle to an earlier axis."""
-    about = AXES.index(letter) % 3
-    return any({about, own, LINEAR_AXES.index(axis)} == {0, 1, 2} for axis in before)
+    about = direction_index(letter)
+    return about != own and (own in earlier or 3 - about - own in earlier)

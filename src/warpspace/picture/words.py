@@ -6,7 +6,7 @@ from typing import SupportsFloat
 
 from warpspace.kinematics.conventions.registry import find_convention
 from warpspace.kinematics.model import Loop
-from warpspace.machine.parameters import LINEAR_AXES
+from warpspace.machine.axes import is_linear
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
@@ -93,10 +93,8 @@ def spell_positions(at: Mapping[str, SupportsFloat]) -> str:
     str
         Linear axes first: ``X 275, Y −225, Z −480 mm · B 0°``.
     """
-    linear = ", ".join(
-        f"{name} {spell_coordinate(q)}" for name, q in at.items() if name in LINEAR_AXES
-    )
-    rotary = [f"{name} {spell_coordinate(q)}°" for name, q in at.items() if name not in LINEAR_AXES]
+    linear = ", ".join(f"{name} {spell_coordinate(q)}" for name, q in at.items() if is_linear(name))
+    rotary = [f"{name} {spell_coordinate(q)}°" for name, q in at.items() if not is_linear(name)]
     return " · ".join((*([f"{linear} mm"] if linear else ()), *rotary))
 
 

@@ -7,14 +7,17 @@ from typing import Any
 from warpspace.exceptions import SceneError, near_miss
 from warpspace.field.grid import Workspace
 from warpspace.kinematics.model import Model
+from warpspace.machine.axes import direction_index, is_linear
 from warpspace.machine.description import Machine, build_machine
 from warpspace.machine.errors import ErrorFunction, ErrorSet, Harmonics
 from warpspace.machine.limits import MAX_ERROR
-from warpspace.machine.parameters import AXES, LINEAR_AXES, PARAMETERS, ErrorKind
+from warpspace.machine.parameters import PARAMETERS, ErrorKind
 from warpspace.machine.tolerances import TOLERANCE_CLASSES, Tolerance, ToleranceSet
+from warpspace.scene.conventions import component_orders
 from warpspace.scene.curves import read_curve
 from warpspace.scene.model import Scene
 from warpspace.scene.sections import Problems
+from warpspace.scene.volume import read_workspace
 
 SECTIONS = (
     "title",
@@ -80,15 +83,16 @@ def build_scene(
     convention = problems.validate("convention", "convention", raw.get("convention", {}))
     points = problems.validate("points_mm", "points_mm", raw.get("points_mm", {}))
     view = problems.validate("view", "view", raw.get("view", {}))
-    workspace = _workspace(problems.table("workspace", raw.get("workspace")), machine, problems)
+    workspace = read_workspace(problems.table("workspace", raw.get("workspace")), machine, problems)
     fixed = getattr(convention, "reference_axis", "free") == "fixed"
     refused = machine.reference_keys if fixed else ()
     errors = _errors(raw.get("errors"), machine, refused, workspace, folder, problems)
     tolerances = _tolerances(raw.get("tolerances"), machine, refused, problems)
     reference = _reference(view, workspace, problems)
+    order, own_orders = component_orders(convention, machine, problems)
     if problems.lines:
         raise SceneError(source, problems.lines)
-    model = Model(machine, convention.component_errors, points.tool, points.workpiece)
+    model = Model(machine, order, points.tool, points.workpiece, own_orders)
     return Scene(
         name=name,
         title=texts.get("title") or name,
@@ -106,23 +110,6 @@ def build_scene(
             *_costly_notes(errors),
         ),
     )
-
-
-def _workspace(raw: Raw, machine: Machine, problems: Problems) -> Workspace:
-    """Read the working volume; an axis that is not given has its travel, a rotary one zero."""
-    ranges = {
-        name: axis.travel if axis.is_linear else (0.0, 0.0) for name, axis in machine.axes.items()
-    }
-    for name, value in raw.items():
-        key = f"workspace.{name}"
-        if name not in machine.axes:
-            problems.unknown("workspace", name, machine.axes, "axis of this machine")
-        elif (valid := problems.validate("range", key, value)) is not None:
-            if isinstance(valid, tuple) and name not in LINEAR_AXES:
-                problems.add(key, "expected one position in degrees for a rotary axis", value)
-            else:
-                ranges[name] = valid if isinstance(valid, tuple) else (valid, valid)
-    return Workspace(ranges)
 
 
 def _known_parameters(
@@ -213,14 +200,17 @@ def _reference(view: Any, workspace: Workspace, problems: Problems) -> dict[str,
     for axis in view.reference:
         if axis not in workspace.ranges:
             problems.unknown("view.reference", axis, workspace.ranges, "axis of this machine")
-    middle = {name: q for name, q in workspace.positions.items() if name in LINEAR_AXES}
+    spanning = workspace.volume_axes
+    middle = {
+        name: q for name, q in workspace.positions.items() if is_linear(name) or name in spanning
+    }
     return {**middle, **view.reference}
 
 
 def _travel_notes(machine: Machine, workspace: Workspace) -> tuple[str, ...]:
     """Remark on axes that are drawn outside their travel."""
     notes: list[str] = []
-    for name in (axis for axis in AXES if axis in machine.axes):
+    for name in machine.axes:
         (low, high), (first, last) = workspace.ranges[name], machine.axes[name].travel
         if low < first or high > last:
             unit = machine.axes[name].unit
@@ -248,10 +238,10 @@ def _carried_notes(machine: Machine, errors: ErrorSet) -> tuple[str, ...]:
         row = PARAMETERS[key]
         if row.kind is not ErrorKind.SQUARENESS or errors.amplitude(key) == 0.0:
             continue
-        own = LINEAR_AXES.index(row.axis)
+        own = direction_index(row.axis)
         if row.direction == own:
             continue
-        other = LINEAR_AXES[3 - row.direction - own]
+        other = "XYZ"[3 - row.direction - own]
         branches = (machine.chain.tool, machine.chain.workpiece)
         shared = next((branch for branch in branches if {row.axis, other} <= {*branch}), None)
         if shared and shared.index(other) > shared.index(row.axis):

@@ -79,6 +79,7 @@ def machine_of(
         return None
     for part, known in (
         ("offset_mm", (*chain.axes, *FIXED_FRAMES)),
+        ("rotation_deg", (*chain.axes, *FIXED_FRAMES)),
         ("travel", chain.axes),
         ("direction", chain.axes),
     ):
@@ -88,6 +89,7 @@ def machine_of(
     return build_machine(
         chain,
         offset_mm=section.offset_mm,
+        rotation_deg=section.rotation_deg,
         travel=section.travel,
         direction=section.direction,
         name=name,

@@ -6,7 +6,7 @@ from typing import cast
 import tomli_w
 
 from warpspace.exceptions import SceneError
-from warpspace.machine.description import DEFAULT_TRAVEL, ORIGIN, Machine
+from warpspace.machine.description import ORIGIN, Machine, default_travel
 from warpspace.machine.limits import MIN_NUMBER
 from warpspace.machine.parameters import PARAMETERS, Parameter
 from warpspace.machine.tolerances import Tolerance
@@ -45,7 +45,7 @@ def scene_to_toml(scene: Scene) -> str:
     parts = [tomli_w.dumps(head, multiline_strings="\r" not in scene.description)]
     if not bundled:
         parts += _machine_sections(scene.machine)
-    convention = {"component_errors": str(scene.model.component_errors)}
+    convention: dict[str, object] = {"component_errors": _component_errors(scene)}
     if {*scene.machine.reference_keys} & {*scene.errors, *scene.tolerances.own}:
         convention["reference_axis"] = "free"
     parts.append(_section("convention", convention))
@@ -82,18 +82,29 @@ def _is_bundled(machine: Machine) -> bool:
 def _machine_sections(machine: Machine) -> list[str]:
     """Spell a machine inline."""
     offsets = {name: axis.offset_mm for name, axis in machine.axes.items()} | dict(machine.fixed_mm)
+    turned = {name: axis.rotation_deg for name, axis in machine.axes.items()}
+    turned |= dict(machine.fixed_deg)
     travel = {
         name: axis.travel
         for name, axis in machine.axes.items()
-        if axis.travel != DEFAULT_TRAVEL[name]
+        if axis.travel != default_travel(name)
     }
     direction = {name: axis.direction for name, axis in machine.axes.items() if axis.direction != 1}
     return [
         _section("machine", {"title": machine.title, "chain": str(machine.chain)}),
         _section("machine.offset_mm", {k: v for k, v in offsets.items() if v != ORIGIN}),
+        _section("machine.rotation_deg", {k: v for k, v in turned.items() if v != ORIGIN}),
         _section("machine.travel", travel),
         _section("machine.direction", direction),
     ]
+
+
+def _component_errors(scene: Scene) -> object:
+    """Spell the convention, or which axis has which."""
+    model = scene.model
+    if len(model.convention_names) == 1:
+        return model.convention_names[0]
+    return {axis: model.convention(axis).name for axis in scene.machine.axes}
 
 
 def _errors_section(scene: Scene) -> str:

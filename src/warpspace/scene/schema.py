@@ -19,6 +19,7 @@ from pydantic_core import PydanticCustomError
 from warpspace.kinematics.conventions.registry import convention_names
 from warpspace.machine.limits import (
     EXAGGERATION,
+    FULL_TURN_DEG,
     MAX_ERROR,
     MAX_LENGTH_MM,
     MAX_TEXT,
@@ -83,9 +84,11 @@ def _drawable(value: float) -> float:
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Finite = Annotated[Number, _at_least(MIN_NUMBER)]
 Length = Annotated[Finite, Field(ge=-MAX_LENGTH_MM, le=MAX_LENGTH_MM)]
+Angle = Annotated[Finite, Field(ge=-FULL_TURN_DEG, le=FULL_TURN_DEG)]
 ErrorValue = Annotated[Finite, Field(ge=-MAX_ERROR, le=MAX_ERROR)]
 HalfWidth = Annotated[Finite, Field(ge=0, le=MAX_ERROR), _at_least(MIN_HALF_WIDTH)]
 Point = Annotated[tuple[Length, Length, Length], _entries("[x, y, z]")]
+Turn = Annotated[tuple[Angle, Angle, Angle], _entries("[x, y, z]")]
 Text = Annotated[str, Field(strict=True, max_length=MAX_TEXT)]
 
 
@@ -101,6 +104,9 @@ Span = Annotated[
 ]
 
 
+ConventionName = Annotated[str, BeforeValidator(_registered_convention)]
+
+
 class Section(BaseModel):
     """Base of all sections: unknown keys are errors."""
 
@@ -114,6 +120,7 @@ class MachineSection(Section):
     description: Text = ""
     chain: Annotated[str, Field(strict=True, max_length=100)]
     offset_mm: dict[str, Point] = {}
+    rotation_deg: dict[str, Turn] = {}
     travel: dict[str, Span] = {}
     direction: dict[str, Annotated[Literal[1, -1], BeforeValidator(_whole_number)]] = {}
 
@@ -121,7 +128,10 @@ class MachineSection(Section):
 class ConventionSection(Section):
     """Where component errors sit, and whether the reference axis itself may be out of direction."""
 
-    component_errors: Annotated[str, BeforeValidator(_registered_convention)] = "after_motion"
+    component_errors: Annotated[
+        Annotated[ConventionName, Tag("word")] | Annotated[dict[str, ConventionName], Tag("table")],
+        Discriminator(lambda value: "table" if isinstance(value, dict) else "word"),
+    ] = "after_motion"
     reference_axis: Literal["fixed", "free"] = "fixed"
 
 
@@ -170,7 +180,7 @@ ToleranceValue = Annotated[
     Annotated[HalfWidth, Tag("number")] | Annotated[ToleranceSpec, Tag("range")],
     Discriminator(lambda value: "range" if isinstance(value, dict) else "number"),
 ]
-TAG_AT = {"range": 0, "tolerance": 0, "view": 1}
+TAG_AT = {"range": 0, "tolerance": 0, "view": 1, "convention": 1}
 """Which part of a pydantic location is the tag of a union and no key, per kind of value."""
 ALTERNATIVES = {
     "range": "a number or [lower, upper]",

@@ -3,7 +3,7 @@
 import pytest
 
 from warpspace.exceptions import ChainError, UnknownNameError
-from warpspace.machine.description import DEFAULT_TRAVEL, Chain, build_machine, parse_chain
+from warpspace.machine.description import Chain, build_machine, default_travel, parse_chain
 
 
 @pytest.mark.parametrize(
@@ -33,6 +33,19 @@ def test_branches_run_from_the_frame_outwards(text, workpiece, tool, axes) -> No
     assert chain.axes == tuple(axes)
 
 
+def test_names_may_carry_a_digit_and_letters_may_be_repeated() -> None:
+    chain = parse_chain("w C2' X' F Z W C1 t")
+    assert chain.workpiece == ("X", "C2")
+    assert chain.tool == ("Z", "W", "C1")
+    assert chain.axes == ("X", "Z", "W", "C1", "C2")
+    assert str(chain) == "wC2XFZWC1t"
+    machine = build_machine(chain)
+    assert machine.axis("W").is_linear
+    assert machine.axis("W").index == 2
+    assert machine.axis("C1").travel == (0.0, 360.0)
+    assert {"EXC1", "EA0C2", "EB0W", "EA0W"} <= {*machine.parameter_keys}
+
+
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
@@ -44,6 +57,9 @@ def test_branches_run_from_the_frame_outwards(text, workpiece, tool, axes) -> No
         ("wFt", "has no axis"),
         ("wXFXt", "axis X twice"),
         ("wXYFYXt", "axis X, Y twice"),
+        ("wC1FC1t", r"axis C1 twice.*C1, C2"),
+        ("wC12FXt", "unknown axis C12"),
+        ("wABCUVWFXYZt", "9 axes; expected one to eight"),
         ("wFXYQt", "unknown axis Q"),
         ("wXFYFZt", "unknown axis F"),
     ],
@@ -58,11 +74,12 @@ def test_machine_fills_in_what_is_not_given() -> None:
     machine = build_machine("wCFXt", offset_mm={"C": (1.0, 2.0, 3.0), "t": (0.0, 0.0, -50.0)})
     assert list(machine.axes) == ["X", "C"]
     assert machine.axis("X").offset_mm == (0.0, 0.0, 0.0)
-    assert machine.axis("X").travel == DEFAULT_TRAVEL["X"]
+    assert machine.axis("X").travel == default_travel("X")
     assert machine.axis("C").offset_mm == (1.0, 2.0, 3.0)
     assert machine.axis("C").direction == 1
-    assert machine.end_offsets_mm("tool") == ((0.0, 0.0, 0.0), (0.0, 0.0, -50.0))
-    assert machine.end_offsets_mm("workpiece") == ((0.0, 0.0, 0.0),)
+    still = (0.0, 0.0, 0.0)
+    assert machine.end_frames("tool") == (("S", still, still), ("t", (0.0, 0.0, -50.0), still))
+    assert machine.end_frames("workpiece") == (("w", still, still),)
     assert machine.title == machine.name
 
 

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from warpspace.exceptions import SceneError
+from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import ComponentErrors
 from warpspace.machine.errors import Constant, Harmonics, Poly, Ramp, Table
 from warpspace.machine.tolerances import Tolerance
 from warpspace.scene.library import parse_scene
+from warpspace.scene.pipeline import evaluate
 from warpspace.scene.save import scene_to_toml
 
 DVF = 'machine = "dvf5000"\n'
@@ -72,7 +74,7 @@ def test_own_machine_takes_offsets_travels_and_directions() -> None:
     assert machine.axis("X").offset_mm == (1, 2, 3)
     assert machine.axis("X").travel == (0, 800)
     assert machine.axis("C").direction == -1
-    assert machine.end_offsets_mm("tool")[1] == (0, 0, -9)
+    assert machine.end_frames("tool")[1][1] == (0, 0, -9)
 
 
 def test_constant_beyond_the_default_ones_becomes_a_parameter_of_the_scene() -> None:
@@ -125,3 +127,113 @@ def test_squareness_of_an_axis_that_carries_the_other_is_remarked_on() -> None:
     assert "EC0Y turns X as well" in note
     for chain in ("wFXYZt", "wYFXZt", "wXFYZt"):
         assert parse_scene(text.format(chain), "x").notes == ()
+
+
+NUTATING = """
+title = "Two tables and a nutating head"
+[machine]
+chain = "wC2FXYZC1B1t"
+[machine.offset_mm]
+B1 = [0, 0, -100]
+[machine.rotation_deg]
+B1 = [45, 0, 0]
+t = [0, 10, -20]
+[convention]
+component_errors = { linear = "after_motion", rotary = "before_motion", C1 = "after_motion" }
+[workspace]
+C1 = 30
+[errors]
+EXC1 = 5.0
+EA0C2 = 20.0
+EBB1 = { table = [[-90, 0.0], [90, 12.0]] }
+"""
+
+
+def test_repeated_letters_rotations_and_mixed_conventions_are_read_and_written() -> None:
+    scene = parse_scene(NUTATING, "nutating")
+    machine, model = scene.machine, scene.model
+    assert machine.axis("B1").rotation_deg == (45.0, 0.0, 0.0)
+    assert machine.end_frames("tool")[1] == ("t", (0.0, 0.0, 0.0), (0.0, 10.0, -20.0))
+    names = {axis: model.convention(axis).name for axis in machine.axes}
+    assert names == {
+        **dict.fromkeys(("X", "Y", "Z", "C1"), "after_motion"),
+        **dict.fromkeys(("B1", "C2"), "before_motion"),
+    }
+    again = parse_scene(scene_to_toml(scene), "nutating")
+    assert again == scene
+
+
+def test_a_rotated_head_points_where_its_rotation_says() -> None:
+    """B at 45° about x: its axis is (0, 1, 1)/√2; half a turn about it turns the tool round."""
+    scene = parse_scene(NUTATING.replace("t = [0, 10, -20]\n", ""), "nutating")
+    at = {"X": 0.0, "Y": 0.0, "Z": 0.0, "C1": 0.0, "C2": 0.0, "B1": 0.0}
+    tool = [
+        evaluate(scene, at={**at, "B1": angle}, loop="tool").nominal_mm.reshape(3)
+        for angle in (0.0, 180.0)
+    ]
+    assert tool[0] == pytest.approx(tool[1])  # the tool point lies in the pivot
+    scene = parse_scene(NUTATING.replace("t = [0, 10, -20]", "").replace(
+        "B1 = [0, 0, -100]", "B1 = [0, 0, -100]\nt = [0, 0, -100]"), "nutating")  # fmt: skip
+    tool = [
+        evaluate(scene, at={**at, "B1": angle}, loop="tool").nominal_mm.reshape(3)
+        for angle in (0.0, 180.0)
+    ]
+    s = 100.0 / 2.0**0.5
+    assert tool[0] == pytest.approx([0.0, s, -100.0 - s])
+    assert tool[1] == pytest.approx([0.0, -s, -100.0 + s])
+
+
+def test_rotary_axes_span_the_volume_of_a_robot() -> None:
+    scene = parse_scene(
+        'title = "r"\n[machine]\nchain = "wFZC1C2t"\n'
+        "offset_mm = { C2 = [300, 0, 0], t = [250, 0, 0] }\n"
+        "[workspace]\nZ = [0, 100]\nC1 = [-90, 90]\nC2 = [10, 150]\n[errors]\nECC1 = 50\n",
+        "robot",
+    )
+    assert scene.workspace.volume_axes == ("C1", "C2", "Z")
+    grid = build_grid(scene.model, scene.workspace, (7, 5, 3))
+    assert grid.shape == (7, 5, 3)
+    reach = np.hypot(grid.nominal_mm[..., 0], grid.nominal_mm[..., 1])
+    assert reach[0, 0, 0] == pytest.approx(np.hypot(300 + 250 * np.cos(np.radians(10)),
+                                                    250 * np.sin(np.radians(10))))  # fmt: skip
+    assert evaluate(scene, grid=5).norm_um.max() == pytest.approx(0.05 * reach.max())
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        ("C1 = 30", None),
+        ("C1 = [0, 30]", "expected one position in degrees for a rotary axis"),
+        ("C9 = 30", "unknown axis of this machine"),
+    ],
+)
+def test_ranges_that_are_too_many_are_named(change: str, problem: str | None) -> None:
+    text = NUTATING.replace("C1 = 30", change)
+    if problem is None:
+        parse_scene(text, "n")
+        return
+    with pytest.raises(SceneError, match=problem):
+        parse_scene(text, "n")
+
+
+def test_two_ranges_along_one_direction_are_refused() -> None:
+    text = 'title = "z"\n[machine]\nchain = "wFXYZWt"\n[workspace]\nZ = [0, 9]\nW = [0, 5]\n'
+    with pytest.raises(SceneError, match=r"workspace\.W.*W has a range beside Z; expected one pos"):
+        parse_scene(text, "z")
+    scene = parse_scene(text.replace("W = [0, 5]\n", ""), "z")
+    assert scene.workspace.ranges["W"] == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ("B1 = [45, 0, 0]", 'B1 = "x"', r"machine.rotation_deg.B1 = \"x\": expected \[x, y, z\]"),
+        ("B1 = [45, 0, 0]", "B1 = [45, 0, 999]", "rotation_deg.B1.*expected at most 360"),
+        ("B1 = [45, 0, 0]", "B7 = [45, 0, 0]", "rotation_deg.B7: unknown frame of this machine"),
+        ('C1 = "after_motion"', 'C9 = "after_motion"', "component_errors.C9: unknown kind or axis"),
+        ('C1 = "after_motion"', 'C1 = "during"', "component_errors.C1.*expected \"after_motion\""),
+    ],
+)  # fmt: skip
+def test_bad_rotations_and_conventions_are_named(old: str, new: str, problem: str) -> None:
+    with pytest.raises(SceneError, match=problem):
+        parse_scene(NUTATING.replace(old, new), "n")

@@ -18,8 +18,8 @@ from warpspace.geometry.thicken import is_thin
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, nominal_point
 from warpspace.kinematics.model import Loop
+from warpspace.machine.axes import is_linear
 from warpspace.machine.errors import Constant, ErrorSet
-from warpspace.machine.parameters import LINEAR_AXES
 from warpspace.picture.mesh import thick_map
 from warpspace.units import Array
 
@@ -108,7 +108,7 @@ def _between_nodes(grid: Grid, nodes: Index, weights: Array) -> Picked:
         {
             name: float(np.broadcast_to(values, grid.shape).reshape(-1)[nodes] @ weights)
             for name, values in grid.coordinates.items()
-            if name in LINEAR_AXES
+            if is_linear(name) or name in grid.axes
         }
     )
 

@@ -15,7 +15,7 @@ from warpspace.field.evaluate import View, build_basis
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.conventions.registry import convention_names
 from warpspace.kinematics.model import Loop
-from warpspace.machine.parameters import LINEAR_AXES
+from warpspace.machine.axes import is_linear
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
@@ -46,8 +46,8 @@ def reference_spans(scene: Scene) -> dict[str, Span]:
     ranges = scene.workspace.ranges
     return {
         name: Span(*(ranges.get(name) or scene.machine.axes[name].travel), 1.0)
-        for name in LINEAR_AXES
-        if name in scene.machine.axes
+        for name in scene.machine.axes
+        if is_linear(name)
     }
 
 
@@ -55,7 +55,7 @@ def with_component_errors(state: AppState, order: str) -> AppState:
     """Take another convention for component errors; an unknown name changes nothing."""
     if order not in convention_names():
         return state
-    model = replace(state.scene.model, component_errors=order)
+    model = replace(state.scene.model, component_errors=order, own_component_errors=())
     return _with_scene(state, replace(state.scene, model=model))
 
 

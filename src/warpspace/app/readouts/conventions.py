@@ -9,7 +9,7 @@ from warpspace.app.evaluation.conventions import Effect, choices, chosen, own_st
 from warpspace.app.readouts.html import render
 from warpspace.app.state.app_state import AppState
 from warpspace.kinematics.conventions.registry import find_convention
-from warpspace.machine.parameters import LINEAR_AXES
+from warpspace.machine.axes import is_linear
 
 GROUPS = {
     "component_errors": ("Component errors", "where the errors of a motion act"),
@@ -42,7 +42,7 @@ def spell_choice(choice: str) -> str:
 def _group(choice: str) -> str:
     """Give the key of `GROUPS` that a choice belongs to."""
     what, _, axis = choice.split("=", maxsplit=1)[0].partition(" ")
-    return what if not axis else "linear" if axis in LINEAR_AXES else "rotary"
+    return what if not axis else "linear" if is_linear(axis) else "rotary"
 
 
 def conventions_html(state: AppState, effects: Mapping[str, Effect], attributes: Attributes) -> str:

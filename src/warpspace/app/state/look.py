@@ -12,8 +12,8 @@ from warpspace.app.state.ranges import Span
 from warpspace.geometry.slices import slice_ranges
 from warpspace.geometry.traces import TILT_STEP_DEG
 from warpspace.machine import limits
+from warpspace.machine.axes import is_linear
 from warpspace.machine.description import Vector
-from warpspace.machine.parameters import LINEAR_AXES
 from warpspace.scene.model import Scene
 
 SURFACES = {
@@ -176,8 +176,8 @@ def slice_spans(scene: Scene) -> dict[str, Span]:
 def linear_spans(scene: Scene) -> dict[str, Span]:
     """Give the ranges of the linear axes of a scene, mm: travels, widened by the workspace."""
     found: dict[str, Span] = {}
-    for name in LINEAR_AXES:
-        if name not in scene.machine.axes:
+    for name in scene.machine.axes:
+        if not is_linear(name):
             continue
         low, high = scene.machine.axes[name].travel
         first, last = scene.workspace.ranges.get(name, (low, high))

@@ -190,13 +190,13 @@ def _print_table(scene: "Scene", found: "Sequence[Gain]", *, over_travel: bool) 
 
 def _place(gain: "Gain") -> str:
     """Say where on the travel a gain is largest: the axes of its kind, linear or rotary."""
-    from warpspace.machine.parameters import ROTARY_AXES
+    from warpspace.machine.axes import is_rotary
 
     if not gain.parameter.is_rotation:
         return ""
-    rotary = gain.parameter.axis in ROTARY_AXES
+    rotary = is_rotary(gain.parameter.axis)
     return ", ".join(
-        f"{name} {value:g}" for name, value in gain.at.items() if (name in ROTARY_AXES) == rotary
+        f"{name} {value:g}" for name, value in gain.at.items() if is_rotary(name) == rotary
     )
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from warpspace.field.basis import ErrorField
-from warpspace.machine.parameters import LINEAR_AXES
+from warpspace.machine.axes import is_linear
 from warpspace.outputs.files import write_atomically
 from warpspace.picture.scene_picture import ScenePicture
 from warpspace.units import Array
@@ -83,7 +83,7 @@ def write_field_csv(
             field.orientation_urad.reshape(-1, 3),
         ]
     )
-    names = [f"{name}_{'mm' if name in LINEAR_AXES else 'deg'}" for name in axes]
+    names = [f"{name}_{'mm' if is_linear(name) else 'deg'}" for name in axes]
     remarks = remarks or {}
     row = ",".join([_NUMBER] * table.shape[1])
     tail = "".join("," + _quoted(text) for text in remarks.values()) + "\n"

@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from warpspace.machine.axes import DIRECTIONS, axis_order
 from warpspace.machine.description import Axis
-from warpspace.machine.parameters import AXES, LINEAR_AXES, ROTARY_AXES, parameter
+from warpspace.machine.parameters import parameter
 from warpspace.machine.tolerances import Tolerance
 from warpspace.outputs.drawing.canvas import POINTS_PER_PX, Canvas
 from warpspace.outputs.drawing.content import Drawing
@@ -27,7 +28,7 @@ WIDTHS = (4.4, 2.8, 1.5)
 """Of the three curves of a panel: those drawn later are thinner, so that none hides another."""
 LEAST_ROW = 105.0
 """Height of a row, px of a 1600 × 1200 figure, below which axes without errors are left out."""
-KINDS = ((LINEAR_AXES, MICROMETRE, "translation"), (ROTARY_AXES, MICRORADIAN, "rotation"))
+KINDS = (("XYZ", MICROMETRE, "translation"), ("ABC", MICRORADIAN, "rotation"))
 
 
 def draw_curves(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
@@ -83,7 +84,7 @@ def draw_curves(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
 
 def _has_errors(scene: Scene, axis: Axis) -> bool:
     """Tell whether any component error of an axis is not zero."""
-    keys = (f"E{letter}{axis.name}" for letter in AXES)
+    keys = (f"E{letter}{axis.name}" for letter in DIRECTIONS)
     return any(scene.errors.amplitude(key) != 0.0 for key in keys if key in scene.errors)
 
 
@@ -176,7 +177,9 @@ def _draw_bands(
 def _constant_keys(scene: Scene) -> list[str]:
     """List the constant errors of a scene's machine, angles first."""
     keys = [key for key in scene.parameter_keys if parameter(key).is_constant]
-    return sorted(keys, key=lambda key: (not parameter(key).is_rotation, AXES.index(key[3])))
+    return sorted(
+        keys, key=lambda key: (not parameter(key).is_rotation, axis_order(parameter(key).axis))
+    )
 
 
 def _draw_constants(canvas: Canvas, scene: Scene, keys: Sequence[str], box: Rect) -> None:

@@ -1,0 +1,141 @@
+"""Two hundred random machines against a product of matrices that is written apart from the model.
+
+Chains of one to eight axes with repeated letters, fixed rotations, both directions of motion,
+conventions that differ from axis to axis, and errors of every kind.
+"""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from chains import central_differences
+from warpspace.kinematics.chain import exact_error, nominal_point
+from warpspace.kinematics.firstorder import jacobian
+from warpspace.kinematics.model import Loop, Model
+from warpspace.machine.description import Machine, build_machine
+
+MACHINES = 200
+LETTERS = "XYZUVWABC"
+ALONG = {"X": 0, "Y": 1, "Z": 2, "U": 0, "V": 1, "W": 2, "A": 0, "B": 1, "C": 2}
+
+
+def random_machine(rng: np.random.Generator) -> Model:
+    """Give a machine with everything that a description can have."""
+    names = [letter + digit for letter in LETTERS for digit in ("", "1", "2")]
+    count = int(rng.integers(1, 9))
+    chosen = [str(name) for name in rng.choice(names, count, replace=False)]
+    split = int(rng.integers(0, count + 1))
+    chain = f"w{''.join(reversed(chosen[:split]))}F{''.join(chosen[split:])}t"
+    frames = [*chosen, "S", "t", "w"]
+    orders = ("after_motion", "before_motion")
+    machine = build_machine(
+        chain,
+        offset_mm={frame: tuple(rng.uniform(-500.0, 500.0, 3)) for frame in frames},
+        rotation_deg={
+            frame: tuple(rng.uniform(-180, 180, 3)) for frame in frames if rng.random() < 0.5
+        },
+        direction={name: int(rng.choice((1, -1))) for name in chosen},
+    )
+    return Model(
+        machine,
+        str(rng.choice(orders)),
+        tuple(rng.uniform(-200.0, 200.0, 3)),
+        tuple(rng.uniform(-200.0, 200.0, 3)),
+        tuple((name, str(rng.choice(orders))) for name in chosen if rng.random() < 0.3),
+    )
+
+
+def rigid(rotation: Rotation, shift: object) -> np.ndarray:
+    """Give a matrix of four rows."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation.as_matrix()
+    matrix[:3, 3] = shift
+    return matrix
+
+
+def product(
+    machine: Machine, model: Model, side: str, at: dict[str, float], errors: dict[str, float]
+) -> np.ndarray:
+    """Multiply out a branch with nothing of the model's own kinematics."""
+    result = np.eye(4)
+    for name in machine.chain.tool if side == "tool" else machine.chain.workpiece:
+        axis = machine.axes[name]
+        result = result @ rigid(
+            Rotation.from_euler("xyz", axis.rotation_deg, degrees=True), axis.offset_mm
+        )
+        steps = axis.direction * at[name] * np.eye(3)[ALONG[name[0]]]
+        move = (
+            rigid(Rotation.from_rotvec(steps, degrees=True), np.zeros(3))
+            if name[0] in "ABC"
+            else rigid(Rotation.identity(), steps)
+        )
+        constant, component = (
+            rigid(
+                Rotation.from_rotvec([1e-6 * errors.get(f"E{k}{zero}{name}", 0.0) for k in "ABC"]),
+                [1e-3 * errors.get(f"E{k}{zero}{name}", 0.0) for k in "XYZ"],
+            )
+            for zero in ("0", "")
+        )
+        order = dict(model.own_component_errors).get(name, model.component_errors)
+        result = result @ constant
+        result = result @ (move @ component if order == "after_motion" else component @ move)
+    for name in ("S", "t") if side == "tool" else ("w",):
+        turn = Rotation.from_euler("xyz", machine.fixed_deg.get(name, (0, 0, 0)), degrees=True)
+        result = result @ rigid(turn, machine.fixed_mm[name])
+    return result
+
+
+def error_apart(
+    model: Model, loop: Loop, at: dict[str, float], errors: dict[str, float]
+) -> np.ndarray:
+    """Give the error of the functional point of a loop, µm."""
+    machine, none = model.machine, {}
+    tool = product(machine, model, "tool", at, none) @ (*model.tool_point_mm, 1.0)
+    own = {"tool": model.tool_point_mm, "workpiece": model.workpiece_point_mm}
+    moved = {}
+    for side in ("tool", "workpiece"):
+        nominal = product(machine, model, side, at, none)
+        point = nominal @ (*own[side], 1.0)
+        if loop is Loop.RELATIVE:
+            point = tool
+        moved[side] = (
+            product(machine, model, side, at, errors) @ np.linalg.inv(nominal) @ point - point
+        )
+    found = {
+        Loop.TOOL: moved["tool"],
+        Loop.WORKPIECE: moved["workpiece"],
+        Loop.RELATIVE: moved["tool"] - moved["workpiece"],
+    }
+    return 1e3 * found[loop][:3]
+
+
+@pytest.mark.parametrize("seed", range(MACHINES))
+def test_a_random_machine_is_as_its_product_says(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    model = random_machine(rng)
+    keys = [key for key in model.machine.allowed_keys if rng.random() < 0.6]
+    errors = {key: float(rng.uniform(-30.0, 30.0)) for key in keys}
+    at = {
+        name: float(rng.uniform(-300.0, 300.0) if axis.is_linear else rng.uniform(-180.0, 180.0))
+        for name, axis in model.machine.axes.items()
+    }
+    coordinates = {name: np.asarray(value) for name, value in at.items()}
+    for loop in Loop:
+        point = nominal_point(model, loop, coordinates)
+        values = {key: np.asarray(value) for key, value in errors.items()}
+        exact, _ = exact_error(model, loop, coordinates, values, point)
+        np.testing.assert_allclose(exact, error_apart(model, loop, at, errors), rtol=0, atol=1e-3)
+        position, _ = jacobian(model, loop, keys, coordinates, point)
+        left = np.abs(exact - np.array(list(errors.values())) @ position).max(initial=0.0)
+        small = {key: value / 4.0 for key, value in values.items()}
+        exact_small, _ = exact_error(model, loop, coordinates, small, point)
+        left_small = np.abs(exact_small - np.array(list(errors.values())) @ position / 4.0).max(
+            initial=0.0
+        )
+        # what first order leaves shrinks with the square of the errors: a sixteenth
+        assert left_small <= left / 12.0 + 1e-6
+    if seed % 10 == 0:
+        point = nominal_point(model, Loop.TOOL, coordinates)
+        difference, _ = central_differences(model, Loop.TOOL, keys, coordinates, point)
+        position, _ = jacobian(model, Loop.TOOL, keys, coordinates, point)
+        np.testing.assert_allclose(position, difference, rtol=0, atol=1e-5)
