@@ -1,17 +1,16 @@
 """The tab "Rotary axes" as a user works with it: one trace at a time, polar plots, play."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
 
+from app.conftest import Tab
+from warpspace.app.state.app_state import start_state
 from warpspace.field.evaluate import evaluate_exact
 from warpspace.picture.axis_motion import evaluate_axis_motion, name_trace
 from warpspace.picture.traces import evaluate_traces, trace_lines
 from warpspace.scene.library import load_scene
-
-if TYPE_CHECKING:
-    from tests.app.conftest import Tab
 
 pytestmark = pytest.mark.browser
 
@@ -30,17 +29,15 @@ DRAWN = """name => {
 SECOND = "C at B −30°, point (0, 275, 450) mm"
 
 
-def drawn(tab: "Tab", name: str) -> Any:
+def drawn(tab: Tab, name: str) -> Any:
     """Numbers of what is drawn under a name; None where nothing is seen of it."""
     found = tab.page.evaluate(DRAWN, name)
     return None if found is None else np.array(found)
 
 
 @pytest.fixture
-def wobbling(tab: "Tab") -> "Tab":
+def wobbling(tab: Tab) -> Tab:
     """The tab with the wobbling table, the panel in front."""
-    from warpspace.app.state.app_state import start_state
-
     scene = load_scene("teach_wobbling_table")
     tab.session.context.post(lambda _: start_state(scene, nodes=5))
     tab.panel("Rotary axes")
@@ -48,7 +45,7 @@ def wobbling(tab: "Tab") -> "Tab":
     return tab
 
 
-def test_no_trace_where_no_error_moves_one(tab: "Tab") -> None:
+def test_no_trace_where_no_error_moves_one(tab: Tab) -> None:
     tab.panel("Rotary axes")
     tab.until(lambda: "No error moves" in tab.text("polar none"))
     for name in ("actual", "nominal", "others"):
@@ -60,7 +57,7 @@ def test_no_trace_where_no_error_moves_one(tab: "Tab") -> None:
 
 
 def test_chosen_trace_is_drawn_named_and_plotted_as_the_exact_model_has_it(
-    wobbling: "Tab",
+    wobbling: Tab,
 ) -> None:
     tab = wobbling
     scene = load_scene("teach_wobbling_table")
@@ -84,11 +81,12 @@ def test_chosen_trace_is_drawn_named_and_plotted_as_the_exact_model_has_it(
             )
     assert tab.state().rotary.chosen == SECOND
     tab.until(lambda: not np.allclose(drawn(tab, "/traces/actual"), first, atol=1.0))
+    tab.page.evaluate("document.activeElement.blur()")
     tab.page.keyboard.press("Control+z")
     tab.until(lambda: tab.text("polar name") == "C at B 0°, point (275, 0, 0) mm")
 
 
-def test_play_turns_the_table_of_a_machine_that_is_not_shown(wobbling: "Tab") -> None:
+def test_play_turns_the_table_of_a_machine_that_is_not_shown(wobbling: Tab) -> None:
     tab = wobbling
     assert drawn(tab, "/machine/C_table") is None
     tab.page.get_by_role("button", name="Play rotation").click()
@@ -104,7 +102,7 @@ def test_play_turns_the_table_of_a_machine_that_is_not_shown(wobbling: "Tab") ->
     tab.until(lambda: tab.session.state.positions["C"] == 0.0)
 
 
-def test_position_of_the_machine_follows_the_play(wobbling: "Tab") -> None:
+def test_position_of_the_machine_follows_the_play(wobbling: Tab) -> None:
     tab = wobbling
     tab.page.get_by_role("button", name="Play rotation").click()
     tab.panel("Machine")

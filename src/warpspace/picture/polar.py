@@ -51,7 +51,7 @@ def polar_plot(motion: Motion, angle_deg: Array) -> PolarPlot:
     """
     largest = float(max(np.abs(motion.values).max(), np.abs(motion.about_line).max()))
     varies = largest > LEAST
-    ring = round_width(largest / RINGS) if varies else 1.0
+    ring = round_width(largest / RINGS * (1.0 - 1e-6)) if varies else 1.0
     per_unit = REACH / (RINGS * ring)
     theta = np.deg2rad(angle_deg)
     ways = np.stack([np.cos(theta), np.sin(theta)], axis=-1)

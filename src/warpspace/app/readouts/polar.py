@@ -14,7 +14,7 @@ ON_THE_AXIS = "The point lies on the axis: it has no direction that deviations c
 MARKS = {
     "radial": "towards the point",
     "axial": "along the axis",
-    "tilt": "axis leans to the point",
+    "tilt": "leans to the point",
 }
 """What is positive."""
 
