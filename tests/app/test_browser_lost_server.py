@@ -40,7 +40,9 @@ class Served:
         """Start it and wait until it answers."""
         command = [sys.executable, "-m", "warpspace", "view", scene, "--no-browser", "--port"]
         self._process = subprocess.Popen(
-            [*command, str(self.port), *options], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+            [*command, str(self.port), *options],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
         )
         until = time.monotonic() + SECONDS
         while time.monotonic() < until:
@@ -90,13 +92,13 @@ def test_killed_server_is_said_and_its_tab_restored(
     wait_until_open(page)
     opened = maximum(page)
     box = number_box(page, "EAX")
-    box.fill("40")
+    box.fill("12")
     box.press("Enter")
     page.wait_for_function(
         "w => document.querySelector(\"[data-value='max']\").innerText !== w", arg=opened
     )
     page.wait_for_function(
-        "JSON.parse(sessionStorage.getItem('warpspace-kept') ?? '{}').text?.includes('EAX=40')"
+        "JSON.parse(sessionStorage.getItem('warpspace-kept') ?? '{}').text?.includes('EAX=12')"
     )
     changed = maximum(page)
 
@@ -116,9 +118,9 @@ def test_killed_server_is_said_and_its_tab_restored(
     wait_until_open(page)
     wait_for_maximum(page, changed)
     said = page.inner_text(BOX)
-    assert "restarted; this tab is restored" in said
+    assert "This tab is restored" in said
     assert "Not restored: what Undo and Redo could go back to;" in said
-    assert number_box(page, "EAX").input_value() == "40"
+    assert number_box(page, "EAX").input_value() == "12"
     page.screenshot(path=str(tmp_path / "back.png"))
     page.get_by_role("button", name="Close").click()
     assert page.locator(BOX).count() == 0

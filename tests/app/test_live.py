@@ -149,7 +149,9 @@ def test_motion_of_the_chosen_axis_is_that_of_the_state(live: LiveModel) -> None
     centre, radius, normal = fit_circle(line.nominal_mm)
     outwards = (line.nominal_mm - centre) / radius
     at = line.trace.axis
-    sweep = picture.traces[0].group.coordinates[at][picture.traces[0].group.traces.index(line.trace)]
+    sweep = picture.traces[0].group.coordinates[at][
+        picture.traces[0].group.traces.index(line.trace)
+    ]
     radial = np.interp(sweep, motion.angle_deg, motion.radial.values)
     face = motion.axial.values - 1e-3 * radius * motion.tilt.values
     np.testing.assert_allclose(np.sum(line.error_um * outwards, axis=-1), radial, atol=0.02)

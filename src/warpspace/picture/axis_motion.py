@@ -90,4 +90,3 @@ def _of_group(
         for point in points_on_axis(nominal)
     )
     return axis_motion(nominal, coordinates[trace.axis], on_axis, above, closed=trace.closed)
-

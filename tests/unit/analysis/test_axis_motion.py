@@ -69,6 +69,8 @@ def test_harmonics_are_counted():
 def test_arc_has_no_times_a_turn():
     part = slice(0, 30)
     above = np.zeros((30, 3))
-    found = axis_motion(CIRCLE[part], ANGLE[part], above + [1.0, 0.0, 0.0], above, closed=False)
+    found = axis_motion(
+        CIRCLE[part], ANGLE[part], np.tile([1.0, 0.0, 0.0], (30, 1)), above, closed=False
+    )
     assert found.radial.times_a_turn is None
     assert found.radial.values == pytest.approx(np.cos(THETA[part]))

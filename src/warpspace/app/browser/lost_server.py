@@ -38,7 +38,7 @@ OTHER_LINK = (
 BACK_TITLE = "The app answers again"
 BACK = "Only the connection had been interrupted; everything is as it was, Undo too."
 BEGUN_ANEW = (
-    "Its server was restarted and knows nothing of this tab, and nothing was kept here: it begins"
+    "Its server was restarted, or has forgotten this tab, and nothing was kept here: it begins"
     " anew."
 )
 

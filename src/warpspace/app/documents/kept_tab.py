@@ -18,6 +18,7 @@ LINK, FILE, NAME, ALONE = "link", "file", "name", "alone"
 NEVER_KEPT = (
     "what Undo and Redo could go back to",
     "other scenes that were opened in this tab",
+    "which error's curve was shown",
     "a file that was being made",
 )
 COMPARISON = "the comparison, which was too large to keep"

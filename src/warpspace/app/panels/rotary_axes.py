@@ -1,4 +1,4 @@
-"""The tab "Rotary axes": play, the trace that is looked at as polar plots, all traces in numbers."""
+"""The tab "Rotary axes": play, one trace as polar plots, all of them in numbers."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -17,7 +17,6 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import parse_positions, quarters
 from warpspace.machine.description import Vector
 from warpspace.scene.model import Scene
-
 
 NONE_MOVED = "none is moved"
 CHOSEN_HINT = "The trace in colour, with its name; the others are faint."

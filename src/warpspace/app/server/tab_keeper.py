@@ -11,18 +11,22 @@ from warpspace.app.panels import PanelContext
 from warpspace.app.state.app_state import AppState
 from warpspace.exceptions import WarpspaceError
 
-RESTORED_TITLE = "The server was restarted; this tab is restored"
+RESTORED_TITLE = "This tab is restored"
 RESTORED = (
-    "Scene, errors, view, camera, comparison and the point asked about are as this tab had kept"
-    " them. Undo goes to what the server was started with."
+    "Its server was restarted, or had forgotten it after ten minutes. What the tab had kept is"
+    " back: scene, errors, view, camera, the point asked about, and what is compared unless named"
+    " below. Undo goes to what the server was started with."
 )
 MISSING = "Not restored: {}."
-REFUSED_TITLE = "The server was restarted; this tab could not be restored"
-REFUSED = "It begins anew, since what it had kept cannot be used here: {}"
-JOINED_TITLE = "The server was restarted; you are in its shared review"
+REFUSED_TITLE = "This tab could not be restored"
+REFUSED = (
+    "Its server was restarted, or had forgotten it after ten minutes. It begins anew, since what it"
+    " had kept cannot be used here: {}"
+)
+JOINED_TITLE = "You are in the shared review as it is now"
 JOINED = (
-    "Somebody has changed it since, so it is shown as it is now. What this tab had kept was not"
-    " brought back."
+    "The server was restarted, and somebody has changed the review since. What this tab had kept"
+    " was not brought back."
 )
 CAMERA_PAUSE_S = 1.0
 """How long after a move the camera is kept: not with each of its steps."""
