@@ -112,7 +112,7 @@ def test_every_setting_is_written() -> None:
     ):
         for field in fields(kind):
             assert f"{group}.{field.name}" in line, field.name
-    assert {field.name for field in fields(RotaryLook)} == {"off", "own_mm", "held"}
+    assert {field.name for field in fields(RotaryLook)} == {"off", "own_mm", "held", "chosen"}
 
 
 @pytest.mark.parametrize("name", scene_names())

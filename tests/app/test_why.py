@@ -51,7 +51,7 @@ def test_a_ray_past_everything_and_hostile_rays_find_nothing() -> None:
 
 
 def test_a_trace_in_front_of_the_box_is_what_a_click_on_it_means() -> None:
-    picture = LIVE.evaluate(START)
+    picture = LIVE.evaluate(START.with_amplitude("EXC", 1.0))
     lines = picture.traces[0]
     hits = [
         (picked, trace.point_mm)
@@ -61,6 +61,14 @@ def test_a_trace_in_front_of_the_box_is_what_a_click_on_it_means() -> None:
     ]
     assert sum(picked.point_mm == point for picked, point in hits) > 20
     assert all(p.loop is Loop.WORKPIECE for p, _ in hits if p.point_mm is not None)
+
+
+def test_a_trace_that_is_not_drawn_is_not_clicked() -> None:
+    picture = LIVE.evaluate(START)
+    for points in picture.traces[0].actual_mm:
+        for target in points[::6]:
+            picked = pick(picture, *look_at(picture, target))
+            assert picked is None or picked.point_mm is None
 
 
 def test_contributions_add_up_to_the_error_with_the_remainder() -> None:

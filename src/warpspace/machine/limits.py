@@ -48,6 +48,8 @@ MAX_CSV_LINE = 16_384
 MAX_SCENE_BYTES = 4 * 1024 * 1024
 MAX_PACKED_TEXT = 1_000_000
 """Bytes of a scene in a link, unpacked."""
+MAX_KEPT_TEXT = 700_000
+"""Characters that a page keeps of its tab, for a restarted server."""
 MAX_CSV_BYTES = 64 * 1024 * 1024
 MAX_KEY_PARTS = 8
 """Parts of one key, dots between them; `tolerances.default.translation` has three."""

@@ -95,6 +95,8 @@ def _differences(state: AppState) -> Iterator[tuple[str, str]]:
         yield "rotary.off", ",".join(map(str, sorted(state.rotary.off)))
     if state.rotary.own_mm is not None:
         yield "rotary.own", spell_numbers(state.rotary.own_mm)
+    if state.rotary.chosen:
+        yield "rotary.chosen", state.rotary.chosen
     for axis, at in state.rotary.held:
         if axis in state.positions:
             yield f"rotary.held.{axis}", spell_numbers(at)
@@ -194,6 +196,7 @@ def _handlers(state: AppState) -> dict[str, Handler]:
             s, rotary=replace(s.rotary, off=frozenset(_indices(s, v)))
         ),
         "rotary.own": lambda s, v: replace(s, rotary=s.rotary.with_own(read_point(v))),
+        "rotary.chosen": lambda s, v: replace(s, rotary=s.rotary.with_chosen(v)),
         "muted": lambda s, v: _with_silenced(s, muted=v),
         "soloed": lambda s, v: _with_silenced(s, soloed=v),
         TRACE: lambda s, v: replace(s, picked=read_trace(v)),

@@ -20,6 +20,7 @@ from warpspace.kinematics.chain import branch_pose, nominal_point
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
 from warpspace.machine.errors import Constant, ErrorSet
+from warpspace.picture.axis_motion import is_moved
 from warpspace.picture.mesh import thick_map
 from warpspace.units import Array
 
@@ -118,11 +119,15 @@ def _on_trace(picture: LivePicture, origin: Array, unit: Array) -> tuple[Picked,
     best: tuple[Picked, float] | None = None
     for lines in picture.traces:
         shape = lines.actual_mm.shape[:2]
-        dense = _denser(lines.actual_mm)
+        drawn = [number for number, line in enumerate(lines.each()) if is_moved(line)]
+        if not drawn:
+            continue
+        dense = _denser(lines.actual_mm[drawn])
         found = pick_point(origin, unit, dense.reshape(-1, 3), TOLERANCE_RAD)
         if found is None or (best is not None and best[1] <= found[1]):
             continue
-        number, sample = divmod(found[0], dense.shape[1])
+        row, sample = divmod(found[0], dense.shape[1])
+        number = drawn[row]
         trace = lines.group.traces[number]
         at = {
             name: float(_denser(np.broadcast_to(values, shape)[..., None])[number, sample, 0])

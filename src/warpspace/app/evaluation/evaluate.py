@@ -4,7 +4,7 @@ Grids and first-order responses are kept, since they change only with the scene,
 rotary positions and the loop; a slider move is then one matrix-vector product.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -61,7 +61,7 @@ class LiveModel:
             state.nodes,
             tuple(state.positions.items()),
             state.loop,
-            state.rotary,
+            replace(state.rotary, chosen=""),
         )
         return self._responses.get(key, lambda: _build(state), lambda response: response.size)
 

@@ -78,11 +78,22 @@ def drawn_bodies(
     Returns
     -------
     tuple of PlacedBody
-        Empty for a machine without bodies.
+        Empty for a machine without bodies. Of a machine that is not shown the rotary axes on the
+        side of those that are turned, and the workpiece there.
     """
     state = picture.state
     factor = picture.exaggeration if state.machine.bent else 0.0
-    return place_bodies(state.scene, machine_motions(state, turned), factor)
+    only = None if state.machine.shown else _turning_frames(state, turned or {})
+    return place_bodies(state.scene, machine_motions(state, turned), factor, only)
+
+
+def _turning_frames(state: AppState, turned: Mapping[str, float]) -> tuple[str, ...]:
+    """Name the frames of the rotary axes on the side of those that are turned."""
+    for side, end in (("workpiece", "w"), ("tool", "t")):
+        rotary = [axis.name for axis in state.scene.machine.branch(side) if not axis.is_linear]
+        if not turned.keys().isdisjoint(rotary):
+            return (*rotary, end)
+    return ()
 
 
 def tool_point(picture: LivePicture) -> ToolPoint:

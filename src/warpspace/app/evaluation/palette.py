@@ -9,7 +9,7 @@ Rgb = tuple[int, int, int]
 
 @dataclass(frozen=True, slots=True)
 class Palette:
-    """Quiet colours around the map, sRGB."""
+    """Quiet colours around the map, sRGB; only the trace that is looked at stands out."""
 
     edge: Rgb
     grid: Rgb
@@ -24,18 +24,18 @@ LIGHT = Palette(
     edge=(24, 32, 46),
     grid=(24, 32, 46),
     ghost=(140, 150, 165),
-    trace_nominal=(196, 202, 211),
-    trace_actual=(45, 55, 72),
-    trace_elsewhere=(150, 158, 171),
+    trace_nominal=(130, 139, 153),
+    trace_actual=(206, 84, 8),
+    trace_elsewhere=(196, 202, 211),
     axis=(110, 120, 135),
 )
 DARK = Palette(
     edge=(215, 220, 228),
     grid=(20, 24, 32),
     ghost=(130, 138, 150),
-    trace_nominal=(90, 98, 110),
-    trace_actual=(205, 212, 222),
-    trace_elsewhere=(118, 126, 138),
+    trace_nominal=(150, 158, 170),
+    trace_actual=(224, 142, 62),
+    trace_elsewhere=(84, 92, 104),
     axis=(150, 158, 170),
 )
 

@@ -1,5 +1,6 @@
 """The machine tab: its bodies, where its axes stand, whether they are bent."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -51,7 +52,17 @@ class MachinePanel:
         self._sliders: dict[str, Any] = {}
         self._linear: dict[str, Input[float]] = {}
         self._rotary: dict[str, Input[float]] = {}
+        self._state = state
         self._build(state)
+        if context.stage is not None:
+            context.stage.listen(self._follow)
+
+    def _follow(self, turned: Mapping[str, float]) -> None:
+        """Show where the axis is that is played, or where it stands once that is over."""
+        for axis, bound in self._rotary.items():
+            at = turned.get(axis, self._state.positions.get(axis))
+            if at is not None:
+                bound.show(float(round(at)) if axis in turned else at)
 
     def _build(self, state: AppState) -> None:
         """Add the sliders of a scene's axes."""
@@ -103,7 +114,7 @@ class MachinePanel:
 
     def show(self, picture: LivePicture) -> None:
         """Make the widgets show the state."""
-        state = picture.state
+        state = self._state = picture.state
         if self._built_for is None or state.scene.machine is not self._built_for.machine:
             self._build(state)
         for name, switch in self._switches.items():

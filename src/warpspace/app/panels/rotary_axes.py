@@ -1,23 +1,30 @@
-"""The table tab: traced points, where the other axes stand, the circles in numbers, play."""
+"""The tab "Rotary axes": play, one trace as polar plots, all of them in numbers."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 from warpspace.app.browser.handles import Input
 from warpspace.app.evaluation.cache import Identity
+from warpspace.app.evaluation.chosen_trace import chosen_trace, motion_of, moved_traces
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.rotation import played_axis
 from warpspace.app.panels import PanelContext
 from warpspace.app.readouts.circles import circle_rows, circle_table
 from warpspace.app.readouts.html import message
+from warpspace.app.readouts.polar import no_motion, polar_html
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import parse_positions, quarters
 from warpspace.machine.description import Vector
 from warpspace.scene.model import Scene
 
+NONE_MOVED = "none is moved"
+CHOSEN_HINT = "The trace in colour, with its name; the others are faint."
+STAND_HINT = "Have the axis stand where the rotation is paused; undo takes it back."
+
 
 class RotaryAxesPanel:
-    """Points, positions, play and the table of deviations.
+    """Play, the chosen trace and its polar plots, points, positions and the table of deviations.
 
     Parameters
     ----------
@@ -35,7 +42,17 @@ class RotaryAxesPanel:
         self._button.on_click(lambda _: context.act(self._toggle))
         stop = gui.add_button("Stop", color="gray", hint="Stop, and stand where the axis stands.")
         stop.on_click(lambda _: context.act(self._stop))
+        self._stand: Any = gui.add_button(
+            "Stand here", color="gray", visible=False, hint=STAND_HINT
+        )
+        self._stand.on_click(lambda _: context.act(self._stand_here))
         self._angle: Any = gui.add_html("")
+        self._chosen: Input[str] = Input(
+            gui.add_dropdown("Trace", (NONE_MOVED,), visible=False, hint=CHOSEN_HINT),
+            context.changed,
+        )
+        self._names: tuple[str, ...] = (NONE_MOVED,)
+        self._polar: Any = gui.add_html("")
         self._home: Any = gui.add_folder("Traced points", expand_by_default=False)
         self._scene: Scene | None = None
         self._parts: list[Any] = []
@@ -44,6 +61,10 @@ class RotaryAxesPanel:
         self._build(state)
         self._table: Any = gui.add_html("")
         self._written = ""
+        self._drawn = ""
+        self._position: dict[str, float] = {}
+        if self._stage is not None:
+            self._stage.listen(self._write_position)
 
     def _toggle(self) -> None:
         """Play or pause."""
@@ -60,18 +81,31 @@ class RotaryAxesPanel:
     def _play(self, *, on: bool | None) -> None:
         """Play, pause or take back the rotation."""
         if self._stage is not None:
-            self._stage.play(on, self._write_position)
+            self._stage.play(on)
 
-    def _write_position(self, position: str) -> None:
+    def _stand_here(self) -> None:
+        """Have the axis stand where the rotation is paused: the volume is then that of there."""
+        for axis, value in self._position.items():
+            at = float(round(value))
+            self._context.post(lambda state, axis=axis, at=at: state.with_position(axis, at))
+
+    def _write_position(self, position: Mapping[str, float]) -> None:
         """Write where the played axis is; without a position the play is over."""
-        self._angle.content = message(position, "turning") if position else ""
+        self._position = dict(position)
+        text = ", ".join(f"{axis} = {value:.0f}°" for axis, value in position.items())
+        self._angle.content = message(text, "turning") if text else ""
         if not position and self._playing:
             self._playing = False
-            self._name_button()
+        self._name_button()
 
     def _name_button(self) -> None:
         """Say what a click would do."""
-        self._button.label = "Pause rotation" if self._playing else "Play rotation"
+        label = "Pause rotation" if self._playing else "Play rotation"
+        if label != self._button.label:
+            self._button.label = label
+        paused = bool(self._position) and not self._playing
+        if paused != self._stand.visible:
+            self._stand.visible = paused
 
     def _build(self, state: AppState) -> None:
         """Add what depends on the scene: points and axes."""
@@ -138,6 +172,9 @@ class RotaryAxesPanel:
                 positions, note = parse_positions(text, state.position_spans[axis])
                 rotary = rotary.with_held(axis, positions)
                 notes = (*notes, f"{axis} held at: {note}") if note else notes
+        name = self._chosen.poll()
+        if name is not None and name != NONE_MOVED:
+            rotary = rotary.with_chosen(name)
         if rotary == state.rotary and notes == state.notes:
             return state
         return replace(state, rotary=rotary, notes=notes)
@@ -169,11 +206,31 @@ class RotaryAxesPanel:
                 bound.show(_spell(state, axis))
 
     def settle(self, picture: LivePicture) -> None:
-        """Write the table of deviations."""
-        written = circle_table(circle_rows(picture) if picture.state.shown.traces else [])
+        """Write the polar plots and the table of deviations."""
+        moved = moved_traces(picture)
+        name = chosen_trace(picture, moved)
+        self._offer(tuple(moved) or (NONE_MOVED,), name or NONE_MOVED)
+        motion = motion_of(picture, moved[name]) if name else None
+        shown = picture.state.shown.traces
+        drawn = polar_html(motion, name) if motion else no_motion(shown=shown, nominal=not moved)
+        if drawn != self._drawn:
+            self._drawn = drawn
+            self._polar.content = drawn
+        written = circle_table(circle_rows(picture)) if moved else ""
         if written != self._written:
             self._written = written
             self._table.content = written
+
+    def _offer(self, names: tuple[str, ...], chosen: str) -> None:
+        """Offer traces to choose from."""
+        handle = self._chosen.handle
+        if names != self._names:
+            self._names = names
+            handle.options = names
+            handle.visible = names != (NONE_MOVED,)
+            if handle.value != chosen:  # viser has taken the first
+                handle.value = chosen
+        self._chosen.show(chosen)
 
 
 def _at_quarters(state: AppState) -> AppState:

@@ -5,6 +5,7 @@ from functools import cache
 import numpy as np
 from markupsafe import Markup
 
+from warpspace.app.evaluation.chosen_trace import moved_traces
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.palette import palette
 from warpspace.app.readouts.html import render
@@ -90,10 +91,10 @@ def _key_to_lines(picture: LivePicture) -> list[tuple[str, str, str]]:
     rows = [("solid", colours.edge, "bent working volume")]
     if shown.ghost:
         rows.append(("dashed", colours.ghost, "nominal working volume"))
-    if shown.traces and picture.traces:
+    if moved_traces(picture):
         rows += [
-            ("solid", colours.trace_actual, "rotary traces, actual (paler: at other tilts)"),
-            ("solid", colours.trace_nominal, "rotary traces, nominal, where apart"),
+            ("solid", colours.trace_actual, "trace of a rotary axis, actual (faint: other traces)"),
+            ("solid", colours.trace_nominal, "its nominal trace, where apart"),
         ]
     return [(style, f"rgb{rgb}", text) for style, rgb, text in rows]
 

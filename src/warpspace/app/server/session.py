@@ -29,6 +29,7 @@ from warpspace.app.panels import PanelContext
 from warpspace.app.server.display import Display
 from warpspace.app.server.layout import Places, apply_theme
 from warpspace.app.server.page_steps import PageSteps
+from warpspace.app.server.tab_keeper import TabKeeper
 from warpspace.app.server.tab_memory import TabRecord, new_token
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.store import StateStore, apply_each
@@ -62,6 +63,8 @@ class Session:
         when its connection was dropped.
     services : Services, optional
         Draw figures and write exports.
+    shared : bool, optional
+        Whether others steer the same state.
     """
 
     def __init__(
@@ -75,12 +78,16 @@ class Session:
         arrival: Arrival,
         claim: "Callable[[Session, str], TabRecord | None] | None" = None,
         services: Services | None = None,
+        *,
+        shared: bool = False,
     ) -> None:
         self._client, self._live, self._places = client, live, places
         self.context = PanelContext(server, client, store, scenes, services or Services())
         self.token = new_token()
         self._arrival: Arrival | None = arrival
         self._claim = claim
+        self._shared = shared
+        self._keeper: TabKeeper | None = None
         self.display = Display()
         self.steps = PageSteps(self.context, places, self.display)
         self._stopped = threading.Event()
@@ -154,6 +161,7 @@ class Session:
 
     def _build(self) -> None:
         """Show map, sliders and numbers; all else follows step by step."""
+        self._keeper = keeper = TabKeeper(self.context, shared=self._shared)
         if self._arrival is not None and self._arrival.wait(TOKEN_WAIT_S, self.context.wake):
             self._recognize(self._arrival)
         picture = self._live.evaluate(self.state)
@@ -163,6 +171,7 @@ class Session:
             self.context.page.set_title(picture.state.scene.title)
             self.context.camera.place(picture, docked=False)
             self.steps.begin(picture)
+            self.display.add(picture, panels=[keeper])
         self._client.flush()
         self.context.shown = picture
 
@@ -174,6 +183,8 @@ class Session:
         if record is not None:
             self.use(record.store)
             self.context.camera.wanted = record.camera
+        if self._keeper is not None:
+            self._keeper.begin(known=record is not None)
 
     def _follow(self) -> None:
         """Take in what has changed and show the outcome."""

@@ -7,7 +7,7 @@ a while under its token.
 
 Limits: a page whose browser forbids `sessionStorage`, and a tab that was closed and opened anew,
 start afresh; after `KEPT_SECONDS`, or when more than `KEPT_TABS` tabs have left, the oldest are
-forgotten; a restarted server knows no one.
+forgotten; a restarted server knows no one. What the page itself keeps (`tab_keeper.py`) then helps.
 """
 
 import re

@@ -162,6 +162,7 @@ class Viewer:
             self._arrivals.expect(client.client_id),
             self._claim,
             self._services,
+            shared=self._shared is not None,
         )
         with self._lock:
             self._sessions[client.client_id] = session

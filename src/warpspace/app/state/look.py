@@ -135,11 +135,19 @@ class RotaryLook:
     held : tuple of (str, tuple of float), degrees
         Positions an axis is held at while another one turns; an axis not given where
         `warpspace.geometry.traces` puts it.
+    chosen : str
+        Name of the trace that is looked at (`picture.axis_motion.name_trace`); a name of none of
+        them, for instance an empty one, lets the app choose.
     """
 
     off: frozenset[int] = frozenset()
     own_mm: Vector | None = None
     held: tuple[tuple[str, tuple[float, ...]], ...] = ()
+    chosen: str = ""
+
+    def with_chosen(self, name: str) -> "RotaryLook":
+        """Look at the trace of a name; anything, since it comes from a browser."""
+        return replace(self, chosen=name[:MOST_TYPED])
 
     def with_point(self, number: int, *, on: bool) -> "RotaryLook":
         """Trace one of the scene's points, or do not."""

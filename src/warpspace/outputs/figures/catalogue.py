@@ -102,6 +102,11 @@ for _kind in (
         evidence=True,
     ),
     FigureKind(
+        "rotary",
+        "Error motions of the rotary axes, ISO 230-7.",
+        f"{_HERE}.rotary:draw_rotary",
+    ),
+    FigureKind(
         "machine",
         "The machine with its bent bodies.",
         f"{_HERE}.machine:draw_machine",

@@ -28,7 +28,7 @@ def draw_gains(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool
     where = f"{_loop(scene, settings)} · largest absolute gains over the travel"
     with on_ground(settings.theme):
         figure = gains_chart(found, title, where, DEFAULT_SHARE)
-    return _finish(figure, title, scene, settings, "gains")
+    return finish_chart(figure, title, scene, settings, "gains")
 
 
 def draw_montecarlo(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
@@ -42,7 +42,7 @@ def draw_montecarlo(scenes: Sequence[Scene], settings: FigureSettings, *, exact:
     ).replace(",", " ", 1)
     with on_ground(settings.theme):
         figure = montecarlo_chart(result, title, what)
-    return _finish(figure, title, scene, settings, "montecarlo")
+    return finish_chart(figure, title, scene, settings, "montecarlo")
 
 
 def draw_ballbar(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
@@ -54,7 +54,7 @@ def draw_ballbar(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bo
     where = f"{PLANE} plane · radius {RADIUS_MM:g} mm · centre {middle}"
     with on_ground(settings.theme):
         figure = ballbar_chart(result, title, where)
-    return _finish(figure, title, scene, settings, "ballbar")
+    return finish_chart(figure, title, scene, settings, "ballbar")
 
 
 def _loop(scene: Scene, settings: FigureSettings) -> str:
@@ -62,10 +62,24 @@ def _loop(scene: Scene, settings: FigureSettings) -> str:
     return LOOP_WORDS[choose_view(scene, settings.loop).loop]
 
 
-def _finish(
+def finish_chart(
     figure: Figure, title: str, scene: Scene, settings: FigureSettings, name: str
 ) -> Drawing:
-    """Give a chart the width asked for (its height follows) and say where it comes from."""
+    """Give a chart the width asked for (its height follows) and say where it comes from.
+
+    Parameters
+    ----------
+    figure : Figure
+    title : str
+    scene : Scene
+    settings : FigureSettings
+    name : str
+        Of the figure.
+
+    Returns
+    -------
+    Drawing
+    """
     width, height = figure.get_size_inches()
     dpi = settings.size[0] / width
     figure.set_size_inches(round(width * dpi) / dpi, round(height * dpi) / dpi)

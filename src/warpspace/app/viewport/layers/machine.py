@@ -25,6 +25,8 @@ BALL = 0.010
 class MachineLayer:
     """Bodies of the machine, moved by its positions and bent by its errors.
 
+    While an axis is turned its table is drawn also where the machine is not.
+
     Parameters
     ----------
     scene : viser.SceneApi
@@ -57,22 +59,18 @@ class MachineLayer:
     def _draw(self) -> None:
         """Place everything."""
         picture, look = self._picture, self._picture.state.machine
-        for mesh, lines in self._bodies.values():
-            mesh.put(visible=look.shown)
-            lines.put(visible=look.shown)
         self._label.put(visible=look.shown)
         if self._ball is not None:
             self._ball.put(visible=look.shown)
-        if not look.shown:
-            return
-        placed = drawn_bodies(picture, self._turned)
+        placed = drawn_bodies(picture, self._turned) if look.shown or self._turned else ()
         for name in set(self._bodies) - {part.body.name for part in placed}:
-            for part in self._bodies.pop(name):
-                part.handle.remove()
+            for part in self._bodies[name]:
+                part.put(visible=False)
         edge = colour_bytes(DARK_EDGE if picture.state.shown.dark else EDGE)
         for part in placed:
             self._draw_body(part, edge)
-        self._draw_tool_point(picture)
+        if look.shown:
+            self._draw_tool_point(picture)
 
     def _draw_body(self, part: PlacedBody, edge: Any) -> None:
         """Add a body, or move its vertices where they have changed."""
@@ -82,6 +80,8 @@ class MachineLayer:
         known = self._bodies.get(name)
         if known is not None and known[0].handle.vertices.shape == vertices.shape:
             mesh, lines = known
+            mesh.put(visible=True)
+            lines.put(visible=True)
             if not np.array_equal(mesh.handle.vertices, vertices):
                 mesh.put(vertices=vertices)
                 lines.put(points=edges)

@@ -1,6 +1,6 @@
 """Map notes, machine and turning table as one layer, with the player that turns the table."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from viser import ClientHandle, SceneApi
 
@@ -16,7 +16,8 @@ from warpspace.app.viewport.layers.rotation import RotationLayer
 from warpspace.app.viewport.layers.traces import TracesLayer
 from warpspace.app.viewport.rotation_player import Player
 
-Tell = Callable[[str], None]
+Tell = Callable[[Mapping[str, float]], None]
+"""Takes the position of the played axis, degrees; none where the play is over."""
 
 
 def draw_around(scene: SceneApi, picture: LivePicture) -> list[Layer]:
@@ -46,7 +47,8 @@ class MovingLayer:
         self._annotations = AnnotationsLayer(client.scene, picture)
         self._machine = MachineLayer(client.scene, picture)
         self._rotation = RotationLayer(client.scene, picture)
-        self._tell: Tell = _nobody
+        self._listeners: list[Tell] = []
+        self._position: dict[str, float] = {}
         self._due = False
         self._player = Player(self._ask)
 
@@ -55,33 +57,35 @@ class MovingLayer:
         before, self._picture = self._picture.state, picture
         if before.origin is not picture.state.origin or before.positions != picture.state.positions:
             self._player.rewind()
-            self._rotation.turn(None)
-            self._machine.turn({})
-            self._tell("")
+            self._stand({})
         self._annotations.show(picture)
         self._rotation.show(picture)
         self._machine.show(picture)
 
-    def play(self, on: bool | None, tell: Tell) -> None:
-        """Play (True), pause (False), or go back to where the axis stands (None).
+    def listen(self, tell: Tell) -> None:
+        """Have somebody told where the played axis is."""
+        self._listeners.append(tell)
 
-        Parameters
-        ----------
-        on : bool or None
-        tell : callable
-            Takes the spelt position of the played axis, empty for none.
-        """
-        self._tell = tell
+    def play(self, on: bool | None) -> None:
+        """Play (True), pause (False), or go back to where the axis stands (None)."""
         if on:
             self._player.play()
         elif on is False:
             self._player.pause()
+            for tell in self._listeners:
+                tell(self._position)
         elif self._player.rewind():
             with self._client.atomic():
-                self._rotation.turn(None)
-                self._machine.turn({})
-                tell("")
+                self._stand({})
             self._client.flush()
+
+    def _stand(self, position: Mapping[str, float]) -> None:
+        """Draw table and points with the played axis at a position; none where it stands."""
+        self._position = dict(position)
+        self._rotation.turn(self._position or None)
+        self._machine.turn(self._position)
+        for tell in self._listeners:
+            tell(self._position)
 
     @property
     def playing(self) -> bool:
@@ -105,11 +109,5 @@ class MovingLayer:
             return
         position = played_position(self._picture.state, self._player.angle_deg)
         with self._client.atomic():
-            self._rotation.turn(position)
-            self._machine.turn(position)
-            self._tell(", ".join(f"{axis} = {value:.0f}°" for axis, value in position.items()))
+            self._stand(position)
         self._client.flush()
-
-
-def _nobody(_text: str) -> None:
-    """Do nothing: no panel shows the position yet."""

@@ -1,58 +1,69 @@
-"""Traces of the rotary axes: nominal light, actual strong, with the exaggeration of the box.
+"""Traces of the rotary axes: one in colour, with its nominal circle and its name; the others faint.
 
-Traces that belong to the positions the axes stand at are dark, those at other tilts paler. Where
-actual and nominal coincide on screen only the actual one is drawn.
+What no error moves is not drawn. All have the exaggeration of the box. Where the actual trace that
+is looked at and its nominal one coincide on screen only the actual one is drawn.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 from viser import SceneApi
 
-from warpspace.app.evaluation.cache import Identity
+from warpspace.app.browser.handles import Handle
+from warpspace.app.evaluation.chosen_trace import chosen_trace, moved_traces
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.palette import palette
-from warpspace.app.viewport.layers import NOTHING, colour_bytes, polyline_pieces
+from warpspace.app.viewport.layers import NOTHING, SCENE_PER_MM, colour_bytes, polyline_pieces
 from warpspace.app.viewport.layers.adding import add_lines
-from warpspace.app.viewport.tone_map import line_vertex_colours
-from warpspace.geometry.traces import TraceGroup
-from warpspace.picture.traces import TraceLines
+from warpspace.picture.marks import spell_micrometres
+from warpspace.picture.traces import TraceLine
+from warpspace.units import Array
 
 APART = 0.002
 """Distance from which nominal and actual are both drawn, as a part of the longest edge."""
+NAME_AWAY = 0.03
+"""Distance of the name from the trace, likewise."""
 
 
-def apart(lines: TraceLines, distance_mm: float) -> NDArray[np.float32]:
-    """Give the pieces of the nominal traces that the actual ones do not cover, [S, 2, 3], mm."""
-    way = lines.actual_mm - lines.nominal_mm
+def apart(nominal_mm: Array, actual_mm: Array, distance_mm: float) -> NDArray[np.float32]:
+    """Give the pieces of a nominal trace that the actual one does not cover, [S, 2, 3], mm.
+
+    Parameters
+    ----------
+    nominal_mm, actual_mm : ndarray, [..., n, 3], mm
+    distance_mm : float, mm
+    """
+    way = actual_mm - nominal_mm
     far = np.einsum("...i,...i->...", way, way) > distance_mm**2
     kept = (far[..., :-1] | far[..., 1:]).reshape(-1)
     if not kept.any():
         return np.zeros((0, 2, 3), np.float32)
-    return polyline_pieces([lines.nominal_mm])[kept]
+    return polyline_pieces([nominal_mm])[kept]
 
 
-def is_here(group: TraceGroup, positions: dict[str, float]) -> NDArray[np.bool_]:
-    """Tell which traces belong to the positions the rotary axes stand at, [T]."""
-    return np.array(
-        [all(positions.get(name) == at for name, at in trace.at.items()) for trace in group.traces]
-    )
+def name_place(line: TraceLine, size_mm: float) -> tuple[Array, float]:
+    """Find where a trace is named: outside of its place of the largest error.
 
+    Parameters
+    ----------
+    line : TraceLine
+    size_mm : float, mm
+        Longest edge of the picture.
 
-def trace_colours(picture: LivePicture) -> NDArray[np.uint8]:
-    """Colour the pieces of all actual traces, [S, 2, 3]."""
-    colours = palette(picture)
-    found: list[NDArray[np.uint8]] = []
-    for lines in picture.traces:
-        here = is_here(lines.group, dict(picture.state.positions))
-        rgb = np.where(here[:, None], colours.trace_actual, colours.trace_elsewhere)
-        pieces = lines.actual_mm.shape[1] - 1
-        found.append(np.repeat(rgb.astype(np.uint8), pieces, axis=0))
-    flat = np.concatenate(found)
-    return line_vertex_colours(np.stack([flat, flat], axis=1))
+    Returns
+    -------
+    tuple of (ndarray, [3], mm, and float, µm)
+        The place and the largest error.
+    """
+    lengths = np.linalg.norm(line.error_um, axis=-1)
+    worst = int(np.argmax(lengths))
+    away = line.actual_mm[worst] - line.actual_mm.mean(axis=0)
+    length = float(np.linalg.norm(away))
+    outwards = away / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
+    return line.actual_mm[worst] + NAME_AWAY * size_mm * outwards, float(lengths[worst])
 
 
 class TracesLayer:
-    """Circles and arcs of the scene's trace points.
+    """Circles and arcs of the scene's trace points, as far as errors move them.
 
     Parameters
     ----------
@@ -61,28 +72,42 @@ class TracesLayer:
     """
 
     def __init__(self, scene: SceneApi, picture: LivePicture) -> None:
-        self._drawn_for: tuple[object, ...] = ()
-        self._nominal, self._actual = (
-            add_lines(scene, name, palette(picture).trace_nominal, thickness)
-            for name, thickness in (("/traces/nominal", 1.5), ("/traces/actual", 1.6))
+        colours = palette(picture)
+        self._others = add_lines(scene, "/traces/others", colours.trace_elsewhere, 1.0)
+        self._nominal = add_lines(scene, "/traces/nominal", colours.trace_nominal, 1.5)
+        self._actual = add_lines(scene, "/traces/actual", colours.trace_actual, 3.0)
+        self._name = Handle(
+            scene.add_label(
+                "/traces/name", "", visible=False, font_screen_scale=0.8, anchor="bottom-center"
+            )
         )
         self.show(picture)
 
     def show(self, picture: LivePicture) -> None:
-        """Move the traces."""
-        visible = picture.state.shown.traces and bool(picture.traces)
-        self._nominal.put(visible=visible)
-        self._actual.put(visible=visible)
-        if not visible:
+        """Draw the traces."""
+        moved = moved_traces(picture)
+        name = chosen_trace(picture, moved)
+        for part in (self._actual, self._nominal, self._name):
+            part.put(visible=bool(name))
+        others = [line.actual_mm for other, line in moved.items() if other != name]
+        self._others.put(visible=bool(others))
+        colours = palette(picture)
+        if others:
+            self._others.put(
+                points=polyline_pieces(others), colors=colour_bytes(colours.trace_elsewhere)
+            )
+        if not name:
             return
-        distance = APART * picture.size_mm
-        nominal = np.concatenate([apart(lines, distance) for lines in picture.traces])
+        line = moved[name]
+        nominal = apart(line.nominal_mm, line.actual_mm, APART * picture.size_mm)
         self._nominal.put(
             points=nominal if len(nominal) else NOTHING,
-            colors=colour_bytes(palette(picture).trace_nominal),
+            colors=colour_bytes(colours.trace_nominal),
         )
-        self._actual.put(points=polyline_pieces([lines.actual_mm for lines in picture.traces]))
-        drawn_for = (Identity(picture.traces[0].group), picture.state.shown.dark)
-        if drawn_for != self._drawn_for:
-            self._drawn_for = drawn_for
-            self._actual.put(colors=trace_colours(picture))
+        self._actual.put(
+            points=polyline_pieces([line.actual_mm]), colors=colour_bytes(colours.trace_actual)
+        )
+        place, largest = name_place(line, picture.size_mm)
+        self._name.put(
+            text=f"{name}: max {spell_micrometres(largest)}", position=place * SCENE_PER_MM
+        )

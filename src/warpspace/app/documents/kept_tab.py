@@ -1,0 +1,116 @@
+"""What a page keeps of its tab, for a server that has been restarted and knows no tab."""
+
+import json
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+from warpspace.app.documents.received_files import safe_name
+from warpspace.app.documents.scene_file import open_link, open_text, state_to_link, state_to_toml
+from warpspace.app.state.app_state import AppState
+from warpspace.app.state.comparison import Comparison
+from warpspace.app.viewport.camera import CameraMemory
+from warpspace.exceptions import OptionError, WarpspaceError
+from warpspace.machine.limits import MAX_KEPT_TEXT
+from warpspace.scene.model import Scene
+
+LINK, FILE, NAME, ALONE = "link", "file", "name", "alone"
+NEVER_KEPT = (
+    "what Undo and Redo could go back to",
+    "other scenes that were opened in this tab",
+    "which error's curve was shown",
+    "a file that was being made",
+)
+COMPARISON = "the comparison, which was too large to keep"
+START_VALUES = "the values that Reset goes back to: it goes back to those restored"
+UNREADABLE = "what this tab has kept cannot be read"
+
+
+@dataclass(frozen=True, slots=True)
+class Restored:
+    """What has come back.
+
+    Attributes
+    ----------
+    state : AppState
+    camera : CameraMemory or None
+    missing : tuple of str
+        What has not, in words.
+    """
+
+    state: AppState
+    camera: CameraMemory | None
+    missing: tuple[str, ...]
+
+
+def kept_text(state: AppState, camera: CameraMemory | None, known: Sequence[Scene]) -> str:
+    """Spell a state for its page to keep.
+
+    Parameters
+    ----------
+    state : AppState
+    camera : CameraMemory or None
+    known : sequence of Scene
+        Scenes that the server has after a restart as well.
+
+    Returns
+    -------
+    str
+        Empty where it is too large.
+    """
+    alone = replace(state, comparison=Comparison())
+    for whole in (state,) if alone == state else (state, alone):
+        with suppress(OptionError):
+            kept = {NAME: whole.scene.name, FILE: state_to_toml(whole, camera)}
+            with suppress(OptionError):
+                kept[LINK] = state_to_link(whole, camera, known)
+            if whole is not state:
+                kept[ALONE] = "yes"
+            text = json.dumps(kept)
+            if len(text) <= MAX_KEPT_TEXT:
+                return text
+    return ""
+
+
+def read_kept(text: str, known: Sequence[Scene]) -> Restored:
+    """Build what a page has kept.
+
+    Parameters
+    ----------
+    text : str
+        Anything, since it comes from a browser.
+    known : sequence of Scene
+        Scenes of the server.
+
+    Returns
+    -------
+    Restored
+        By the link where that leads to the very same file, else of the file.
+
+    Raises
+    ------
+    OptionError, SceneError
+        If it cannot be read.
+    """
+    kept = _parse(text)
+    file, link = kept.get(FILE, ""), kept.get(LINK, "")
+    missing = (*NEVER_KEPT, *((COMPARISON,) if ALONE in kept else ()))
+    with suppress(WarpspaceError):
+        state, camera = open_link(link, known)
+        if state_to_toml(state, camera) == file:
+            return Restored(state, camera, missing)
+    state, camera = open_text(file, safe_name(kept.get(NAME, ""), "kept"), "what this tab has kept")
+    return Restored(state, camera, (*missing, START_VALUES))
+
+
+def _parse(text: str) -> dict[str, str]:
+    """Take the text apart."""
+    if len(text) > MAX_KEPT_TEXT:
+        raise OptionError(UNREADABLE)
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError):
+        raise OptionError(UNREADABLE) from None
+    if not isinstance(found, dict):
+        raise OptionError(UNREADABLE)
+    return {str(key): value for key, value in found.items() if isinstance(value, str)}  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
