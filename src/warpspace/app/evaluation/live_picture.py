@@ -89,6 +89,13 @@ class LivePicture(Picture):
         """Whether a difference of two states is drawn."""
         return self.compared is not None and self.compared.shown == "difference"
 
+    @property
+    def is_steered(self) -> bool:
+        """Whether what is drawn is what the sliders move, not what that is compared with."""
+        chosen = self.state.comparison
+        side = {"a": chosen.a, "b": chosen.b}.get(self.compared.shown) if self.compared else None
+        return self.compared is None or (side is not None and side.state is None)
+
     def both_words(self, word: Callable[[AppState], str]) -> str:
         """Say something of what is drawn; of a difference for both sides where they are not alike.
 

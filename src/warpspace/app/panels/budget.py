@@ -1,4 +1,4 @@
-"""The panel "Why": the error of the point that was clicked, taken apart."""
+"""The panel "Error budget": the error of the point that was asked about, taken apart."""
 
 import numpy as np
 
@@ -7,8 +7,21 @@ from warpspace.app.browser.handles import Handle
 from warpspace.app.evaluation.budget import answer, with_lever, with_picked
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
-from warpspace.app.readouts.budget import ASK, REFUSED, answer_html
+from warpspace.app.panels.worst_point import HINT, WORST, add_worst_button, ask_worst
+from warpspace.app.readouts.budget import (
+    ASK,
+    AT,
+    EDIT,
+    EXCLUDE,
+    INCLUDE,
+    LEVER,
+    REFUSED,
+    answer_html,
+    field_html,
+)
 from warpspace.app.state.app_state import AppState
+from warpspace.app.state.edits import with_muted
+from warpspace.app.state.typed_point import with_typed_point
 from warpspace.app.viewport.camera import CameraMemory, fit_camera, heading_share
 from warpspace.app.viewport.layers import SCENE_PER_MM
 
@@ -24,7 +37,9 @@ class BudgetPanel:
     def __init__(self, context: PanelContext, _state: AppState) -> None:
         gui = context.gui
         self._context = context
-        self._clicks = Clicks(gui, lambda key: context.post(lambda s: with_lever(s, key)))
+        self._clicks = Clicks(gui, self._clicked)
+        add_worst_button(context)
+        self._field = Handle(gui.add_html(""))
         self._text = Handle(gui.add_html(ASK))
         far = gui.add_button(
             "Show the whole lever",
@@ -43,6 +58,27 @@ class BudgetPanel:
         self._far, self._clear = Handle(far), Handle(clear)
         command = gui.add_command("Forget the point", description="End the question", hotkey="N")
         command.on_trigger(lambda _: context.post(forget))
+        worst = gui.add_command(WORST, description=HINT, hotkey="W")
+        worst.on_trigger(lambda _: context.act(lambda: ask_worst(context)))
+
+    def _clicked(self, word: str) -> None:
+        """Take note of a click on a row, or of a point that was typed."""
+        what, _, rest = word.partition(" ")
+        context = self._context
+        if what == AT:
+            context.post(lambda state: with_typed_point(state, rest))
+        elif what == LEVER:
+            context.post(lambda state: with_lever(state, rest))
+        elif what in (EXCLUDE, INCLUDE):
+            context.post(lambda state: with_muted(state, rest, what == EXCLUDE))
+        elif what == EDIT:
+            context.act(lambda: self._edit(rest))
+
+    def _edit(self, key: str) -> None:
+        """Bring the slider of an error into view, and its curve below."""
+        if key in self._context.store.state.amplitudes and self._context.reveal_error is not None:
+            self._context.post(lambda state: state.with_chosen_error(key))
+            self._context.reveal_error(key)
 
     def read(self, state: AppState) -> AppState:
         """Nothing to take over: clicks post what they change."""
@@ -54,13 +90,21 @@ class BudgetPanel:
         picked = picture.state.picked
         self._clear.put(visible=picked is not None)
         self._far.put(visible=picked is not None and bool(picture.state.lever))
+        at = None
         if picked is None:
-            self._text.put(content=ASK)
+            text = ASK
         elif picture.is_difference:
-            self._text.put(content=REFUSED)
+            text = REFUSED
         else:
             found = answer(state, picked, picture.exaggeration)
-            self._text.put(content=answer_html(found, picture.state.lever, self._clicks.attributes))
+            at = found.at
+            # only what is steered can be changed, not what it is compared with
+            button = self._clicks.button if picture.is_steered else None
+            text = answer_html(
+                found, picture.state.lever, self._clicks.attributes, button, state.exclusions.muted
+            )
+        self._text.put(content=text)
+        self._field.put(content=field_html(at, self._clicks.field(AT)))
 
     def _stand_back(self) -> None:
         """Move the camera back until the frame of the chosen contribution is in view."""

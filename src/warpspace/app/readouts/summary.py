@@ -11,7 +11,7 @@ from warpspace.app.readouts.html import render
 from warpspace.app.readouts.numbers import thousands
 from warpspace.geometry.colour import ColourScale, colour_table
 from warpspace.geometry.deform import round_down
-from warpspace.picture.words import spell_factor, spell_place, spell_short
+from warpspace.picture.words import spell_factor, spell_short
 from warpspace.units import MICROMETRE, MM_PER_UM
 
 BAR_PX = 190
@@ -138,7 +138,7 @@ def summary(picture: LivePicture) -> str:
             "P95": found.p95_um,
             "max": found.max_um,
         },
-        worst_place=spell_place(found.max_at_mm),
+        found=found,
         scale_bars=_scale_bars(picture),
         lines=_key_to_lines(picture),
     )
