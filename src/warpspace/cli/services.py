@@ -50,7 +50,7 @@ def draw_figure(request: Request, cancelled: threading.Event) -> bytes:
     RenderError
         If it cannot be drawn here.
     """
-    from warpspace.outputs.drawing.settings import A_MINUS_B, FigureSettings
+    from warpspace.outputs.drawing.settings import FigureSettings
     from warpspace.outputs.worker import FigureWorker
 
     settings = FigureSettings(
@@ -59,7 +59,6 @@ def draw_figure(request: Request, cancelled: threading.Event) -> bytes:
         dark=request.dark,
         loop=request.loop,
         grid=request.nodes,
-        difference=A_MINUS_B,
         range_top=None if request.colours is None else request.colours.high,
     )
     name, scenes = request.figure or "error-map", [request.scene]
@@ -71,7 +70,7 @@ def draw_figure(request: Request, cancelled: threading.Event) -> bytes:
         name, scenes = "comparison", list(request.pair)
     elif request.minus is not None:
         raise OptionError(
-            f"A is seen through the {request.loop} loop, B through the {request.minus.loop} loop; a"
+            f"A is seen through the {request.minus.loop} loop, B through the {request.loop} loop; a"
             " figure of both needs one loop. GLB, CSV and HTML show their difference."
         )
     elif request.tilts and not request.figure:
@@ -126,7 +125,7 @@ def write_export(request: Request, ending: str) -> bytes:
         if part is not None
     )
     if subtracted:
-        picture = subtract_scenes(picture, subtracted[0], "A − B")
+        picture = subtract_scenes(picture, subtracted[0], "B − A")
     with tempfile.TemporaryDirectory(prefix="warpspace-") as folder:
         target = Path(folder) / f"export{ending}"
         write(picture, target, overwrite=False)

@@ -26,7 +26,7 @@ class Compared:
         What they are, looked at as now.
     a, b : Statistics
     difference : Statistics or None
-        None where there is no difference.
+        Of the length of the change at each node, |E_B − E_A|; None where there is no difference.
     other_mm : ndarray, [nx, ny, nz, 3], mm, or None
         Displaced nodes of the side that is not drawn; None for the difference.
     refused : str
@@ -46,7 +46,7 @@ class Compared:
     def title(self) -> str:
         """Name of what is drawn."""
         a, b = self.titles
-        return {"a": f"A: {a}", "b": f"B: {b}", "difference": f"A − B: {a} − {b}"}[self.shown]
+        return {"a": f"A: {a}", "b": f"B: {b}", "difference": f"B − A: {b} − {a}"}[self.shown]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,4 +107,4 @@ class LivePicture(Picture):
         if self.compared is None or not self.is_difference:
             return word(self.drawn_state)
         a, b = (word(side) for side in self.compared.sides)
-        return a if a == b else f"{a} − {b}"
+        return a if a == b else f"{b} − {a}"
