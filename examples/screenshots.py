@@ -137,7 +137,7 @@ def compared(page: Page) -> None:
     """Pin, mend one squareness, draw the difference."""
     press(page, "Pin now and compare")
     write(page, "EA0Z", "0")
-    press(page, "A − B")
+    press(page, "B − A")
 
 
 def sliced(page: Page) -> None:

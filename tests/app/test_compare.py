@@ -34,7 +34,7 @@ def test_a_b_and_difference_share_colours_factor_and_numbers() -> None:
     np.testing.assert_array_equal(a.field.error_um, alone[0].field.error_um)
     np.testing.assert_array_equal(b.field.error_um, alone[1].field.error_um)
     np.testing.assert_allclose(
-        difference.field.error_um, a.field.error_um - b.field.error_um, atol=1e-12
+        difference.field.error_um, b.field.error_um - a.field.error_um, atol=1e-12
     )
     assert a.scale == b.scale == difference.scale
     assert a.exaggeration == b.exaggeration == difference.exaggeration
@@ -51,7 +51,7 @@ def test_now_against_a_snapshot_moves_while_the_snapshot_stays() -> None:
     alone = LIVE.evaluate(
         start_state(load_scene("dvf5000_nominal"), nodes=9).with_amplitude("EXX", 8.0)
     )
-    np.testing.assert_allclose(difference.field.error_um, alone.field.error_um, atol=1e-9)
+    np.testing.assert_allclose(-difference.field.error_um, alone.field.error_um, atol=1e-9)
     assert picture_of(with_pin(START), "difference").statistics.max_um == 0.0
 
 
@@ -99,7 +99,7 @@ def test_the_difference_is_cut_into_slices_evaluated_where_they_lie() -> None:
         assert difference.slices[0].position_mm == 31.0
         for one, two, part in zip(a.slices, b.slices, difference.slices, strict=True):
             np.testing.assert_array_equal(one.grid.nominal_mm, two.grid.nominal_mm)
-            error = one.field.error_um - two.field.error_um
+            error = two.field.error_um - one.field.error_um
             np.testing.assert_allclose(part.field.error_um, error, atol=1e-12)
             drawn = deform(one.grid.nominal_mm, error, difference.exaggeration)
             np.testing.assert_allclose(part.drawn_mm, drawn, atol=1e-9)

@@ -139,12 +139,12 @@ def _title(state: AppState, side: Side[AppState]) -> str:
 
 
 def _difference(a: LivePicture, b: LivePicture) -> LivePicture:
-    """Subtract b from a: node by node, slice by slice and trace by trace."""
+    """Subtract a from b: node by node, slice by slice and trace by trace."""
     return replace(
-        subtract_pictures(a, b),
+        subtract_pictures(b, a),
         colours=None,
-        traces=subtract_traces(a.traces, b.traces),
-        slices=subtract_slices(a.slices, b.slices),
+        traces=subtract_traces(b.traces, a.traces),
+        slices=subtract_slices(b.slices, a.slices),
     )
 
 

@@ -46,7 +46,7 @@ class Compared:
     def title(self) -> str:
         """Name of what is drawn."""
         a, b = self.titles
-        return {"a": f"A: {a}", "b": f"B: {b}", "difference": f"A − B: {a} − {b}"}[self.shown]
+        return {"a": f"A: {a}", "b": f"B: {b}", "difference": f"B − A: {b} − {a}"}[self.shown]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,4 +100,4 @@ class LivePicture(Picture):
         if self.compared is None or not self.is_difference:
             return word(self.drawn_state)
         a, b = (word(side) for side in self.compared.sides)
-        return a if a == b else f"{a} − {b}"
+        return a if a == b else f"{b} − {a}"

@@ -6,7 +6,7 @@ from typing import Generic, TypeVar
 State = TypeVar("State")
 """What a side holds: the state of the app, which in turn holds a comparison."""
 
-SHOWN = {"a": "A", "b": "B", "difference": "A − B"}
+SHOWN = {"a": "A", "b": "B", "difference": "B − A"}
 NOW, NOBODY = "now", "nothing"
 """Names of what is steered, and of no other side."""
 
