@@ -62,15 +62,15 @@ def draw_figure(request: Request, cancelled: threading.Event) -> bytes:
         range_top=None if request.colours is None else request.colours.high,
     )
     name, scenes = request.figure or "error-map", [request.scene]
-    if request.figure and request.minus is not None:
+    if request.figure and request.beside is not None:
         raise OptionError(f"figure {name!r} is of one machine; show A or B in the tab Compare")
     if not request.figure and request.pair is not None:
         if request.tilts:
             settings = replace(settings, range_top=None)
         name, scenes = "comparison", list(request.pair)
-    elif request.minus is not None:
+    elif request.beside is not None:
         raise OptionError(
-            f"A is seen through the {request.minus.loop} loop, B through the {request.loop} loop; a"
+            f"A is seen through the {request.loop} loop, B through the {request.beside.loop} loop; a"
             " figure of both needs one loop. GLB, CSV and HTML show their difference."
         )
     elif request.tilts and not request.figure:
@@ -108,7 +108,7 @@ def write_export(request: Request, ending: str) -> bytes:
     bytes
         The file's content.
     """
-    from warpspace.picture.comparison import subtract_scenes
+    from warpspace.picture.comparison import scene_change
     from warpspace.picture.scene_picture import evaluate_picture
 
     picture, *subtracted = (
@@ -121,11 +121,11 @@ def write_export(request: Request, ending: str) -> bytes:
             quantity="orientation" if request.tilts else "position",
             colours=request.colours,
         )
-        for part in (request, request.minus)
+        for part in (request, request.beside)
         if part is not None
     )
     if subtracted:
-        picture = subtract_scenes(picture, subtracted[0], "B − A")
+        picture = scene_change(picture, subtracted[0])
     with tempfile.TemporaryDirectory(prefix="warpspace-") as folder:
         target = Path(folder) / f"export{ending}"
         write(picture, target, overwrite=False)

@@ -21,8 +21,8 @@ def build_request(picture: LivePicture) -> Request:
     Returns
     -------
     Request
-        The side that is drawn, or B with A to be subtracted; with the factor that is drawn, and the
-        colours that all maps of the comparison share.
+        The side that is drawn, or A with B beside it for the change; with the factor that is
+        drawn, and the colours that all maps of the comparison share.
     """
     found, drawn = picture.compared, picture.drawn_state
     if found is None:
@@ -31,11 +31,12 @@ def build_request(picture: LivePicture) -> Request:
         replace(_scene(side, picture), name=f"{name}: {title}", title=title)
         for name, title, side in zip("AB", found.titles, found.sides, strict=True)
     )
-    request = _request(picture, drawn, a if found.shown == "a" else b)
+    side, scene = (found.sides[1], b) if found.shown == "b" else (found.sides[0], a)
+    request = _request(picture, side, scene)
     loops = [side.loop for side in found.sides]
     return replace(
         request,
-        minus=Beside(a, loops[0].value) if found.shown == "difference" else None,
+        beside=Beside(b, loops[1].value) if found.shown == "difference" else None,
         pair=(a, b) if not found.refused and loops[0] == loops[1] else None,
     )
 
