@@ -98,7 +98,7 @@ def press_link(tab: Tab) -> str:
     return links.unpack(tab.page.url.partition(f"{PARAMETER}=")[2].split("&")[0])
 
 
-def test_a_link_brings_the_comparison_with_its_snapshot(
+def test_a_link_brings_the_comparison_with_the_state_before(
     tab: Tab, follow: Callable[[str], Tab]
 ) -> None:
     state = compare_with_pin(tab)
@@ -107,11 +107,11 @@ def test_a_link_brings_the_comparison_with_its_snapshot(
     assert other.state() == state
     other.panel("Compare")
     other.until(lambda: other.page.locator("[data-compared='mean B − A']").count() == 1)
-    snapshot = state.comparison.pinned.title
-    assert other.page.get_by_label("B", exact=True).input_value() == snapshot
-    assert other.page.get_by_label("A", exact=True).input_value() == "now"
+    before = state.comparison.pinned.title
+    assert other.page.get_by_label("A", exact=True).input_value() == before
+    assert other.page.get_by_label("B", exact=True).input_value() == "present errors"
     # and it goes on from there
-    other.page.get_by_role("button", name="B", exact=True).click()
+    other.page.get_by_role("button", name="A", exact=True).click()
     other.until(lambda: other.shows(drawn_nodes(LIVE.evaluate(START))))
 
 

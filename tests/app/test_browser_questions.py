@@ -113,15 +113,15 @@ def test_two_scenes_are_compared_with_one_scale(tab: Tab) -> None:
     tab.until(lambda: tab.shows(drawn_nodes(LIVE.evaluate(START))))
 
 
-def test_now_is_compared_with_a_pinned_snapshot(tab: Tab) -> None:
+def test_what_is_steered_is_compared_with_the_state_before(tab: Tab) -> None:
     tab.panel("Compare")
     tab.page.get_by_role("button", name="Pin as before").click()
     tab.until(lambda: tab.page.locator("[data-compared='mean B − A']").count() == 1)
     tab.send("EXX", "10")
     wanted = f"{LIVE.evaluate(START.with_amplitude('EXX', 10.0)).statistics.mean_um:.2f}"
-    tab.until(lambda: tab.page.inner_text("[data-compared='mean A']") == wanted)
+    tab.until(lambda: tab.page.inner_text("[data-compared='mean B']") == wanted)
     mean = f"{LIVE.evaluate(START).statistics.mean_um:.2f}"
-    assert tab.page.inner_text("[data-compared='mean B']") == mean
+    assert tab.page.inner_text("[data-compared='mean A']") == mean
 
 
 def test_a_convention_changes_the_map_and_says_by_how_much(tab: Tab) -> None:

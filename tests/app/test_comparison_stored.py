@@ -175,9 +175,7 @@ def test_a_comparison_that_means_nothing_is_refused(way: str, pairs: dict[str, s
     assert len(str(caught.value)) < 400
 
 
-@pytest.mark.parametrize(
-    ("old", "new"), [("a", "b"), ("b", "a"), ("difference", "difference")]
-)
+@pytest.mark.parametrize(("old", "new"), [("a", "b"), ("b", "a"), ("difference", "difference")])
 def test_an_older_link_with_a_snapshot_shows_the_same_change(old: str, new: str) -> None:
     """It had what is steered as A and the snapshot as B, and drew A − B."""
     given = {"b": "pinned", "shown": old, "pinned": "scene=dvf5000_second"}

@@ -126,7 +126,10 @@ def test_the_figure_is_a_sheet_of_both_and_the_difference_as_the_app_takes_it(
     renderer: str,
 ) -> None:
     request = build_request(picture_of("a"))
-    assert [scene.title for scene in request.pair] == [f"present errors: {FIRST.title}", SECOND.title]
+    assert [scene.title for scene in request.pair] == [
+        f"present errors: {FIRST.title}",
+        SECOND.title,
+    ]
     settings = FigureSettings(grid=5, exaggeration=request.exaggeration)
     drawing = draw("comparison", list(request.pair), settings)
     difference = picture_of("difference")
@@ -206,7 +209,7 @@ def test_two_loops_on_one_sheet_are_refused_in_words() -> None:
     rows = list(csv.DictReader(io.StringIO(text)))
     errors = np.array([[float(row[f"error_{c}_um"]) for c in "xyz"] for row in rows])
     np.testing.assert_allclose(errors, picture.field.error_um.reshape(-1, 3), atol=1e-6)
-    assert rows[0]["loop"] == "tool − relative"
+    assert rows[0]["loop"] == "relative − tool"
 
 
 @pytest.mark.parametrize(

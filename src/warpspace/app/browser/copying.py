@@ -2,8 +2,6 @@
 
 import json
 
-from markupsafe import Markup, escape
-
 COPY_SCRIPT = """(() => {
   window.warpspaceCopy = button => {
     const text = button.dataset.copy, word = button.textContent;
@@ -44,27 +42,6 @@ COPY_SCRIPT = """(() => {
   }, true);
 })();"""
 """Has to run in the page once; copies also where a page without TLS has no clipboard of its own."""
-
-
-def copy_button(text: str, what: str = "as --at of a command") -> Markup:
-    """Spell a button that copies a text.
-
-    Parameters
-    ----------
-    text : str
-        What is copied.
-    what : str, optional
-        What that is, for its hint.
-
-    Returns
-    -------
-    Markup
-    """
-    return Markup(  # noqa: S704 - escaped here
-        f'<button type="button" class="ws-copy" data-copy="{escape(text)}"'
-        f' title="Copy {escape(text)}" aria-label="Copy {escape(what)}"'
-        ' onclick="warpspaceCopy(this)">copy</button>'
-    )
 
 
 def reveal_script(label: str) -> str:

@@ -9,9 +9,8 @@ from importlib.resources import files
 from typing import SupportsFloat
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
-from warpspace.app.browser.copying import copy_button
 from warpspace.app.readouts import numbers
 from warpspace.machine.parameters import parameter
 from warpspace.picture.coordinates import spell_at, spell_point
@@ -59,8 +58,8 @@ def point(axes: Mapping[str, SupportsFloat], point_mm: Array | Sequence[float]) 
     Markup
         The button copies what the option ``--at`` of a command takes.
     """
-    button = copy_button(spell_at(axes)) if axes else Markup()
-    return escape(spell_point(axes, point_mm)) + Markup(" ") + button
+    text = render("point", text=spell_point(axes, point_mm), at=spell_at(axes))
+    return Markup(text)  # noqa: S704 - escaped by its template
 
 
 def render(name: str, /, **values: object) -> str:
