@@ -13,6 +13,7 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import RANGES, SURFACES, slice_positions, slice_spans
 from warpspace.app.viewport.named_views import VIEWS
 from warpspace.geometry.slices import PLANES
+from warpspace.picture.slices import Slice
 from warpspace.scene.model import Scene
 
 QUANTITY_NAMES = {
@@ -215,6 +216,8 @@ class AppearancePanel:
         for axis, position in slice_positions(state.scene, look, state.machine).items():
             if axis in self._slices:
                 self._slices[axis].show(position)
-        self._places.put(content=slices_html(picture.slices))
+        self._places.put(
+            content=slices_html([one for one in picture.slices if isinstance(one, Slice)])
+        )
         for name, bound in self._switches.items():
             bound.show(getattr(look, name))

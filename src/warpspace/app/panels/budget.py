@@ -2,12 +2,12 @@
 
 import numpy as np
 
+from warpspace.app.browser.arrangement import front_script
 from warpspace.app.browser.clicks import Clicks
 from warpspace.app.browser.handles import Handle
-from warpspace.app.evaluation.budget import answer, with_lever, with_picked
+from warpspace.app.evaluation.budget import answer, pick_worst, with_lever, with_picked
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
-from warpspace.app.panels.worst_point import HINT, WORST, add_worst_button, ask_worst
 from warpspace.app.readouts.budget import (
     ASK,
     AT,
@@ -24,6 +24,25 @@ from warpspace.app.state.edits import with_muted
 from warpspace.app.state.typed_point import with_typed_point
 from warpspace.app.viewport.camera import CameraMemory, fit_camera, heading_share
 from warpspace.app.viewport.layers import SCENE_PER_MM
+
+TAB = "Error budget"
+WORST = "Worst point"
+HINT = "Ask what the largest error of the volume is made of (W does the same)."
+
+
+def add_worst_button(context: PanelContext, label: str = WORST) -> None:
+    """Add the button that asks about the worst point."""
+    button = context.gui.add_button(label, color="gray", hint=HINT)
+    button.on_click(lambda _: context.act(lambda: ask_worst(context)))
+
+
+def ask_worst(context: PanelContext) -> None:
+    """Ask about the worst point of what is drawn, and bring its budget to the front."""
+    if context.shown is None:
+        return
+    picked = pick_worst(context.shown)
+    context.page.run_script(front_script(TAB))
+    context.post(lambda state: with_picked(state, picked))
 
 
 class BudgetPanel:

@@ -223,6 +223,8 @@ def help_text(commands: tuple[Command, ...]) -> str:
         "| **Ctrl + K** | Command palette | All of this by name |\n"
         "| **A S D Q E** | Camera | Fly through the scene |\n"
         "| **← →** | Slider with focus | One step |\n"
+        "| **W** | Worst point | What its error consists of |\n"
+        "| **N** | Forget the point | End the question |\n"
         f"{rows}\n\n"
         "Keys act when no text box has the focus. After a dropped connection the tab finds its"
         " state again for ten minutes."

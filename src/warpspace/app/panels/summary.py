@@ -5,7 +5,7 @@ from collections.abc import Callable
 from warpspace.app.browser.handles import Handle
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
-from warpspace.app.panels.worst_point import add_worst_button
+from warpspace.app.panels.budget import add_worst_button
 from warpspace.app.readouts.summary import heading, summary
 from warpspace.app.state.app_state import AppState
 

@@ -80,6 +80,10 @@ def answer_html(
     ranked = sorted(found.contributions, key=lambda part: abs(part.along_um), reverse=True)
     listed, rest = _split(ranked, lever)
 
+    # bars fill the column from the one that lessens most to the one that adds most
+    lessens = max((0.0, *(-part.along_um for part in listed)))
+    width = lessens + max((0.0, *(part.along_um for part in listed))) or 1.0
+
     def summed(
         name: str, error_um: Array, kind: str = "", spell: Callable[[float], str] = signed
     ) -> dict[str, object]:
@@ -95,7 +99,8 @@ def answer_html(
         error_um=found.error_um,
         length_um=float(np.linalg.norm(found.error_um)),
         listed=listed,
-        largest=max((abs(part.along_um) for part in listed), default=0.0) or 1.0,
+        width=width,
+        zero=lessens / width,
         chosen=lever,
         attributes=attributes,
         button=button,

@@ -6,7 +6,7 @@ The templates escape every value by themselves; only what is `Markup` already go
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
-from typing import SupportsFloat
+from typing import Any, SupportsFloat
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
@@ -39,7 +39,8 @@ def _templates() -> Environment:
         "parameter": parameter,
     }
     environment.filters.update(spell)
-    environment.globals.update(point=point)
+    functions: dict[str, Any] = {"point": point}
+    environment.globals.update(functions)
     return environment
 
 
