@@ -5,10 +5,12 @@ from functools import cache
 import numpy as np
 from markupsafe import Markup
 
+from warpspace.analysis.statistics import volume_statistics
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.palette import palette
 from warpspace.app.readouts.html import render
 from warpspace.app.readouts.numbers import thousands
+from warpspace.field.basis import ErrorField
 from warpspace.geometry.colour import ColourScale, colour_table
 from warpspace.geometry.deform import round_down
 from warpspace.picture.words import spell_factor, spell_short
@@ -52,16 +54,15 @@ def _marked(picture: LivePicture) -> dict[str, float]:
         # the length of the error says nothing of a signed component: its own ends do
         return {
             "min": float(values.min()),
-            "mean": float(values.mean()),
+            "mean": float(np.sum(picture.grid.weights * values.reshape(picture.shape))),
             "max": float(values.max()),
         }
-    if picture.scale.unit == MICROMETRE:
-        return {"mean": found.mean_um, "P95": found.p95_um, "max": found.max_um}
-    return {
-        "mean": float(values.mean()),
-        "P95": float(np.percentile(values, 95.0)),
-        "max": float(values.max()),
-    }
+    if picture.scale.unit != MICROMETRE:
+        # the length of the tilt is summarised as that of the position error is
+        tilt = picture.field.orientation_urad
+        field = ErrorField(picture.field.nominal_mm, tilt, tilt)
+        found = volume_statistics(field, picture.grid)
+    return {"mean": found.mean_um, "P95": found.p95_um, "max": found.max_um}
 
 
 def _height(scale: ColourScale, value: float) -> float:
