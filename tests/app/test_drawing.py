@@ -113,13 +113,11 @@ def test_the_bar_marks_what_is_coloured() -> None:
     for state in (start, tilted):
         lengths = live.evaluate(state)
         weights = lengths.grid.weights
-        assert marks(lengths) == pytest.approx(
-            {
-                "mean": (weights * lengths.values).sum(),
-                "P95": p95_of_volume(lengths.values),
-                "max": lengths.values.max(),
-            },
-            abs=0.03,
+        found = marks(lengths)
+        # the bar interpolates 40 cells an axis
+        assert found.pop("P95") == pytest.approx(p95_of_volume(lengths.values), abs=0.03)
+        assert found == pytest.approx(
+            {"mean": (weights * lengths.values).sum(), "max": lengths.values.max()}, abs=0.006
         )
         signed = live.evaluate(state.with_component("y"))
         assert marks(signed) == pytest.approx(
