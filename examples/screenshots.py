@@ -135,9 +135,9 @@ def by_effect(page: Page) -> None:
 
 def compared(page: Page) -> None:
     """Pin, mend one squareness, draw the difference."""
-    press(page, "Pin now and compare")
+    press(page, "Pin as before")
     write(page, "EA0Z", "0")
-    press(page, "A − B")
+    press(page, "B − A")
 
 
 def sliced(page: Page) -> None:

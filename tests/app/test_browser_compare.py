@@ -73,13 +73,13 @@ def test_a_link_to_another_scene_with_changed_errors_leaves_no_message(
 def compare_with_pin(tab: Tab) -> AppState:
     """Pin, change an error, and draw the difference; give the state it amounts to."""
     tab.panel("Compare")
-    tab.page.get_by_role("button", name="Pin now and compare").click()
-    tab.until(lambda: tab.page.locator("[data-compared='mean A − B']").count() == 1)
+    tab.page.get_by_role("button", name="Pin as before").click()
+    tab.until(lambda: tab.page.locator("[data-compared='mean B − A']").count() == 1)
     tab.send("EXX", "10")
     state = with_pin(START).with_amplitude("EXX", 10.0)
     state = replace(state, comparison=state.comparison.with_shown("difference"))
     tab.page.wait_for_timeout(100)
-    tab.page.get_by_role("button", name="A − B", exact=True).click()
+    tab.page.get_by_role("button", name="B − A", exact=True).click()
     tab.until(lambda: tab.shows(drawn_nodes(LIVE.evaluate(state))))
     assert tab.state() == state
     return state
@@ -98,7 +98,7 @@ def press_link(tab: Tab) -> str:
     return links.unpack(tab.page.url.partition(f"{PARAMETER}=")[2].split("&")[0])
 
 
-def test_a_link_brings_the_comparison_with_its_snapshot(
+def test_a_link_brings_the_comparison_with_the_state_before(
     tab: Tab, follow: Callable[[str], Tab]
 ) -> None:
     state = compare_with_pin(tab)
@@ -106,12 +106,12 @@ def test_a_link_brings_the_comparison_with_its_snapshot(
     other.until(lambda: other.shows(drawn_nodes(LIVE.evaluate(state))))
     assert other.state() == state
     other.panel("Compare")
-    other.until(lambda: other.page.locator("[data-compared='mean A − B']").count() == 1)
-    snapshot = state.comparison.pinned.title
-    assert other.page.get_by_label("B", exact=True).input_value() == snapshot
-    assert other.page.get_by_label("A", exact=True).input_value() == "now"
+    other.until(lambda: other.page.locator("[data-compared='mean B − A']").count() == 1)
+    before = state.comparison.pinned.title
+    assert other.page.get_by_label("A", exact=True).input_value() == before
+    assert other.page.get_by_label("B", exact=True).input_value() == "present errors"
     # and it goes on from there
-    other.page.get_by_role("button", name="B", exact=True).click()
+    other.page.get_by_role("button", name="A", exact=True).click()
     other.until(lambda: other.shows(drawn_nodes(LIVE.evaluate(START))))
 
 
@@ -120,7 +120,7 @@ def test_a_saved_scene_brings_the_comparison_of_two_scenes(
 ) -> None:
     tab.panel("Compare")
     tab.choose("B", SCENES[1].title)
-    tab.until(lambda: tab.page.locator("[data-compared='mean A − B']").count() == 1)
+    tab.until(lambda: tab.page.locator("[data-compared='mean B − A']").count() == 1)
     state = with_sides(START, Side(), scene_side(SCENES[1]))
     tab.panel("Files")
     with tab.page.expect_download() as waiting:
@@ -132,7 +132,7 @@ def test_a_saved_scene_brings_the_comparison_of_two_scenes(
     other.until(lambda: other.state().comparison == state.comparison)
     other.panel("Compare")
     other.until(lambda: other.page.get_by_label("B", exact=True).input_value() == SCENES[1].title)
-    other.page.get_by_role("button", name="A − B", exact=True).click()
+    other.page.get_by_role("button", name="B − A", exact=True).click()
     picture = LIVE.evaluate(replace(state, comparison=state.comparison.with_shown("difference")))
     other.until(lambda: other.shows(drawn_nodes(picture)))
     # a scene that says nothing of how it is looked at leaves the comparison alone
@@ -204,7 +204,7 @@ def test_exports_show_the_difference_that_is_drawn(tab: Tab) -> None:
     for name, ending in (("CSV", "csv"), ("HTML", "html"), ("GLB", "glb")):
         with tab.page.expect_download(timeout=60_000) as waiting:
             tab.page.get_by_role("button", name=name, exact=True).click()
-        assert waiting.value.suggested_filename == f"now_minus_snapshot.{ending}"
+        assert waiting.value.suggested_filename == f"after_minus_before.{ending}"
         contents[ending] = Path(waiting.value.path()).read_bytes()
         tab.until(lambda: tab.page.get_by_role("button", name="Cancel", exact=True).count() == 0)
     rows = list(csv.DictReader(io.StringIO(contents["csv"].decode())))
@@ -212,7 +212,7 @@ def test_exports_show_the_difference_that_is_drawn(tab: Tab) -> None:
     assert largest == pytest.approx(picture.statistics.max_um, abs=1e-6)
     assert picture.compared.title in contents["html"].decode()
     length = int.from_bytes(contents["glb"][12:16], "little")
-    assert "A − B" in str(json.loads(contents["glb"][20 : 20 + length]))
+    assert "B − A" in str(json.loads(contents["glb"][20 : 20 + length]))
     tab.panel("Compare")
     tab.choose("B", "nothing")
     tab.panel("Files")
@@ -223,7 +223,7 @@ def test_the_difference_is_drawn_in_slices_and_cut_open(tab: Tab) -> None:
     tab.panel("Compare")
     tab.choose("B", SCENES[1].title)
     tab.page.wait_for_timeout(100)
-    tab.page.get_by_role("button", name="A − B", exact=True).click()
+    tab.page.get_by_role("button", name="B − A", exact=True).click()
     state = with_sides(START, Side(), scene_side(SCENES[1]))
     state = replace(state, comparison=state.comparison.with_shown("difference"))
     for shown, word in (("slices", "slices"), ("cut octant", "cut")):

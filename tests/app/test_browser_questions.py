@@ -93,7 +93,7 @@ def test_two_scenes_are_compared_with_one_scale(tab: Tab) -> None:
     tab.panel("Compare")
     tab.choose("B", SCENES[1].title)
     state = with_sides(START, Side(), scene_side(SCENES[1]))
-    for name, word in (("B", "b"), ("A − B", "difference"), ("A", "a")):
+    for name, word in (("B", "b"), ("B − A", "difference"), ("A", "a")):
         picture = LIVE.evaluate(replace(state, comparison=state.comparison.with_shown(word)))
         tab.page.get_by_role("button", name=name, exact=True).click()
         tab.until(lambda picture=picture: tab.shows(drawn_nodes(picture)))
@@ -102,7 +102,7 @@ def test_two_scenes_are_compared_with_one_scale(tab: Tab) -> None:
         for column, found in (
             ("A", picture.compared.a),
             ("B", picture.compared.b),
-            ("A − B", picture.compared.difference),
+            ("B − A", picture.compared.difference),
         ):
             for row, value in (("mean", found.mean_um), ("RMS", found.rms_um)):
                 shown = tab.page.inner_text(f"[data-compared='{row} {column}']")
@@ -113,15 +113,15 @@ def test_two_scenes_are_compared_with_one_scale(tab: Tab) -> None:
     tab.until(lambda: tab.shows(drawn_nodes(LIVE.evaluate(START))))
 
 
-def test_now_is_compared_with_a_pinned_snapshot(tab: Tab) -> None:
+def test_what_is_steered_is_compared_with_the_state_before(tab: Tab) -> None:
     tab.panel("Compare")
-    tab.page.get_by_role("button", name="Pin now and compare").click()
-    tab.until(lambda: tab.page.locator("[data-compared='mean A − B']").count() == 1)
+    tab.page.get_by_role("button", name="Pin as before").click()
+    tab.until(lambda: tab.page.locator("[data-compared='mean B − A']").count() == 1)
     tab.send("EXX", "10")
     wanted = f"{LIVE.evaluate(START.with_amplitude('EXX', 10.0)).statistics.mean_um:.2f}"
-    tab.until(lambda: tab.page.inner_text("[data-compared='mean A']") == wanted)
+    tab.until(lambda: tab.page.inner_text("[data-compared='mean B']") == wanted)
     mean = f"{LIVE.evaluate(START).statistics.mean_um:.2f}"
-    assert tab.page.inner_text("[data-compared='mean B']") == mean
+    assert tab.page.inner_text("[data-compared='mean A']") == mean
 
 
 def test_a_convention_changes_the_map_and_says_by_how_much(tab: Tab) -> None:
@@ -268,7 +268,7 @@ def test_ten_uploads_at_once_and_a_script_in_a_title(tab: Tab) -> None:
     tab.until(lambda: tab.shows(drawn_nodes(LIVE.evaluate(start_state(SCENES[1])))), 30.0)
     tab.until(lambda: tab.state().scene.name == "scene 9", 30.0)
     tab.panel("Compare")
-    tab.page.get_by_role("button", name="Pin now and compare").click()
+    tab.page.get_by_role("button", name="Pin as before").click()
     tab.page.wait_for_timeout(800)
     assert tab.page.evaluate("window.hacked") is None
     assert tab.page.get_by_text("<script>").first.is_visible()

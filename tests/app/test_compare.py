@@ -34,7 +34,7 @@ def test_a_b_and_difference_share_colours_factor_and_numbers() -> None:
     np.testing.assert_array_equal(a.field.error_um, alone[0].field.error_um)
     np.testing.assert_array_equal(b.field.error_um, alone[1].field.error_um)
     np.testing.assert_allclose(
-        difference.field.error_um, a.field.error_um - b.field.error_um, atol=1e-12
+        difference.field.error_um, b.field.error_um - a.field.error_um, atol=1e-12
     )
     assert a.scale == b.scale == difference.scale
     assert a.exaggeration == b.exaggeration == difference.exaggeration
@@ -45,7 +45,7 @@ def test_a_b_and_difference_share_colours_factor_and_numbers() -> None:
     np.testing.assert_array_equal(a.compared.other_mm, b.drawn_mm)
 
 
-def test_now_against_a_snapshot_moves_while_the_snapshot_stays() -> None:
+def test_what_is_steered_moves_while_the_state_before_stays() -> None:
     state = with_pin(START).with_amplitude("EXX", 8.0)
     difference = picture_of(state, "difference")
     alone = LIVE.evaluate(
@@ -63,7 +63,7 @@ def test_other_volumes_have_no_difference_but_both_sides() -> None:
     assert picture.compared is not None
     assert picture.compared.refused
     assert picture.compared.difference is None
-    assert picture.compared.shown == "a"
+    assert picture.compared.shown == "b"
 
 
 def test_titles_are_escaped() -> None:
@@ -73,7 +73,7 @@ def test_titles_are_escaped() -> None:
     assert "&lt;img" in text
 
 
-def test_a_snapshot_of_a_comparison_holds_no_comparison() -> None:
+def test_a_pinned_state_of_a_comparison_holds_no_comparison() -> None:
     once = with_pin(START)
     twice = pinned_side(once).state
     assert twice is not None
@@ -99,13 +99,13 @@ def test_the_difference_is_cut_into_slices_evaluated_where_they_lie() -> None:
         assert difference.slices[0].position_mm == 31.0
         for one, two, part in zip(a.slices, b.slices, difference.slices, strict=True):
             np.testing.assert_array_equal(one.grid.nominal_mm, two.grid.nominal_mm)
-            error = one.field.error_um - two.field.error_um
+            error = two.field.error_um - one.field.error_um
             np.testing.assert_allclose(part.field.error_um, error, atol=1e-12)
             drawn = deform(one.grid.nominal_mm, error, difference.exaggeration)
             np.testing.assert_allclose(part.drawn_mm, drawn, atol=1e-9)
             coloured = error
             if quantity == "orientation":
-                coloured = one.field.orientation_urad - two.field.orientation_urad
+                coloured = two.field.orientation_urad - one.field.orientation_urad
             np.testing.assert_allclose(
                 part.values, component_values(coloured, component), atol=1e-12
             )

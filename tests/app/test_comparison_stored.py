@@ -110,7 +110,7 @@ def test_an_edited_snapshot_and_an_opened_scene_come_back_as_they_were(way: str)
     pinned = with_choice(pinned, "component_errors=before_motion").with_amplitude("EYX", 3.0)
     opened = replace(SECOND, name="shop floor", title="Shop floor, machine 7")
     now = edits.with_curve(START, "EYY", Ramp(edits.axis_span(START, "EYY"), 2.5))
-    state = with_sides(with_pin(pinned), scene_side(opened), with_pin(pinned).comparison.b)
+    state = with_sides(with_pin(pinned), scene_side(opened), with_pin(pinned).comparison.a)
     state = replace(now, comparison=state.comparison.with_shown("difference"))
     if way == "file":
         back, _ = open_text(state_to_toml(state), now.scene.name, "x.toml")
@@ -175,6 +175,21 @@ def test_a_comparison_that_means_nothing_is_refused(way: str, pairs: dict[str, s
     assert len(str(caught.value)) < 400
 
 
+@pytest.mark.parametrize(("old", "new"), [("a", "b"), ("b", "a"), ("difference", "difference")])
+def test_an_older_link_with_a_snapshot_shows_the_same_change(old: str, new: str) -> None:
+    """It had what is steered as A and the snapshot as B, and drew A − B."""
+    given = {"b": "pinned", "shown": old, "pinned": "scene=dvf5000_second"}
+    given["pinned.title"] = "snapshot: DVF5000 · 2 changed"
+    line = urlencode([(PREFIX + name, value) for name, value in given.items()])
+    back, _ = open_link(f"scene=dvf5000_first&{line}", KNOWN)
+    found = back.comparison
+    assert (found.shown, found.a, found.b) == (new, found.pinned, Side())
+    assert found.pinned is not None
+    assert found.pinned.title == "before: DVF5000 · 2 changed"
+    again, _ = open_link(state_to_link(back, None, KNOWN), KNOWN)
+    assert again.comparison == found
+
+
 def test_a_comparison_within_a_comparison_is_not_looked_at() -> None:
     line = urlencode({"compare.pinned": NESTED, "compare.b": "pinned"})
     back, _ = open_link(f"scene=dvf5000_first&{line}", KNOWN)
@@ -185,17 +200,17 @@ def test_wild_numbers_of_a_snapshot_are_clamped_and_named() -> None:
     line = urlencode({"compare.pinned": "scene=dvf5000_first&EXX=1e9", "compare.b": "pinned"})
     back, _ = open_link(f"scene=dvf5000_first&{line}", KNOWN)
     assert back.comparison.b.state.amplitudes["EXX"] == START.spans["EXX"].high
-    assert any(note.startswith("snapshot: EXX") for note in back.notes)
+    assert any(note.startswith("before: EXX") for note in back.notes)
 
 
-@pytest.mark.parametrize("title", ["now", "nothing", "", "x" * 1_000])
+@pytest.mark.parametrize("title", ["now", "present errors", "nothing", "", "x" * 1_000])
 def test_titles_from_a_link_cannot_pose_as_something_else(title: str) -> None:
     given = {"b": "scene=dvf5000_second", "b.title": title, "pinned": "scene=dvf5000_first"}
     given["pinned.title"] = title
     line = urlencode([(PREFIX + name, value) for name, value in given.items()])
     back, _ = open_link(f"scene=dvf5000_first&{line}", KNOWN)
     for side in (back.comparison.b, back.comparison.pinned):
-        assert side.title not in ("now", "nothing", "")
+        assert side.title not in ("now", "present errors", "nothing", "")
         assert len(side.title) <= 200
 
 

@@ -26,6 +26,7 @@ from warpspace.scene.library import load_scene
 
 LIVE = LiveModel()
 START = start_state(load_scene("dvf5000_first"), nodes=7)
+WEIGHTS = LIVE.evaluate(START).grid.weights
 
 
 @pytest.mark.parametrize("choice", choices(START))
@@ -35,8 +36,28 @@ def test_every_choice_can_be_made_and_measures_its_change(choice: str) -> None:
     effect = Effects().of(START)[choice]
     change = LIVE.evaluate(state).field.error_um - LIVE.evaluate(START).field.error_um
     length = np.linalg.norm(change, axis=-1)
-    assert effect.mean_um == pytest.approx(float(length.mean()), abs=1e-9)
+    assert effect.mean_um == pytest.approx(float((WEIGHTS * length).sum()), abs=1e-9)
     assert effect.max_um == pytest.approx(float(length.max()), abs=1e-9)
+
+
+@pytest.mark.parametrize("nodes", [5, 21])
+def test_effects_are_those_of_the_nodes_of_the_result_whatever_was_moved_before(nodes: int) -> None:
+    effects = Effects()
+    state = START.with_nodes(nodes)
+    effects.of(state)
+    for key, value in (("EAX", 9.0), ("EAX", -4.0), ("EBZ", 3.0), ("EXX", 2.0)):
+        state = state.with_amplitude(key, value)
+        effects.of(state)
+    state = state.reset().with_amplitude("EXC", 7.0)
+    found = effects.of(state)
+    for choice in ("loop=workpiece", "direction C=-1", "component_errors=before_motion"):
+        own, other = LIVE.evaluate(state), LIVE.evaluate(with_choice(state, choice))
+        length = np.linalg.norm(other.field.error_um - own.field.error_um, axis=-1)
+        mean = float((own.grid.weights * length).sum())
+        assert found[choice].mean_um == pytest.approx(mean, abs=1e-9)
+        assert found[choice].max_um == pytest.approx(float(length.max()), abs=1e-9)
+    assert f"{nodes}×{nodes}×{nodes} nodes" in conventions_html(state, found, lambda *_: Markup())
+    assert all(effect.max_um == 0.0 for effect in effects.of(state.zeroed()).values())
 
 
 def test_nonsense_changes_nothing() -> None:
@@ -117,7 +138,8 @@ def test_the_panel_does_nothing_while_a_slider_moves(monkeypatch: pytest.MonkeyP
         lambda *_: calls.append("written") or f"text {len(calls)}",
     )
     panel = object.__new__(ConventionsPanel)
-    panel._scene, panel._known, panel._at = START.origin, {}, {}
+    panel._scene, panel._known, panel._at, panel._asked = START.origin, {}, {}, None
+    panel._context = SimpleNamespace(act=lambda step: step())
     panel._effects, panel._text = Effects(), SimpleNamespace(content="")
     panel._clicks = SimpleNamespace(attributes=None)
     parts = Display()

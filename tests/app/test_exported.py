@@ -22,7 +22,7 @@ from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.comparison import Side
 from warpspace.cli.services import draw_figure, write_export
 from warpspace.exceptions import OptionError
-from warpspace.outputs.drawing.settings import A_MINUS_B, FigureSettings
+from warpspace.outputs.drawing.settings import FigureSettings
 from warpspace.outputs.figures.catalogue import draw_figure as draw
 from warpspace.picture.scene_picture import evaluate_picture
 from warpspace.scene.library import load_scene
@@ -32,9 +32,9 @@ FIRST, SECOND = (load_scene(f"dvf5000_{name}") for name in ("first", "second"))
 START = start_state(FIRST, nodes=5).with_amplitude("EXX", 6.0)
 BOTH = with_sides(START, Side(), scene_side(SECOND))
 WORDS = {
-    "a": f"A: now, {FIRST.title}",
+    "a": f"A: present errors: {FIRST.title}",
     "b": f"B: {SECOND.title}",
-    "difference": f"A − B: now, {FIRST.title} − {SECOND.title}",
+    "difference": f"B − A: {SECOND.title} − present errors: {FIRST.title}",
 }
 
 
@@ -71,7 +71,7 @@ def test_glb_has_the_title_the_factor_and_the_shared_colours(shown: str) -> None
     for title in picture.compared.titles if shown == "difference" else [WORDS[shown][3:]]:
         assert title in extras["title"]
     if shown == "difference":
-        assert extras["settings"]["difference"] == "A − B"
+        assert extras["settings"]["difference"] == "B − A"
         assert extras["a"]["parameters"]["EXX"]["amplitude"] == 6.0
         assert "parameters" not in extras
     names = {node.get("name", "") for node in document["nodes"]}
@@ -126,17 +126,18 @@ def test_the_figure_is_a_sheet_of_both_and_the_difference_as_the_app_takes_it(
     renderer: str,
 ) -> None:
     request = build_request(picture_of("a"))
-    assert [scene.title for scene in request.pair] == [f"now, {FIRST.title}", SECOND.title]
-    settings = FigureSettings(grid=5, exaggeration=request.exaggeration, difference=A_MINUS_B)
+    assert [scene.title for scene in request.pair] == [
+        f"present errors: {FIRST.title}",
+        SECOND.title,
+    ]
+    settings = FigureSettings(grid=5, exaggeration=request.exaggeration)
     drawing = draw("comparison", list(request.pair), settings)
     difference = picture_of("difference")
     np.testing.assert_allclose(drawing.maps[2].values, difference.values, atol=1e-6)
     np.testing.assert_allclose(drawing.maps[2].drawn_mm, difference.drawn_mm, atol=1e-6)
-    assert any("A − B" in text.get_text() for text in drawing.figure.texts) or any(
-        "A − B" in text.get_text() for axes in drawing.figure.axes for text in axes.texts
+    assert any("B − A" in text.get_text() for text in drawing.figure.texts) or any(
+        "B − A" in text.get_text() for axes in drawing.figure.axes for text in axes.texts
     )
-    with pytest.raises(OptionError, match="A − B"):
-        FigureSettings(difference="A + B")
 
 
 def ranged(top: float) -> LivePicture:
@@ -194,7 +195,7 @@ def test_the_figure_shows_what_is_coloured_in_the_range_that_is_fixed(
 def test_tilts_are_compared_by_position_errors_on_the_sheet_and_it_says_so(renderer: str) -> None:
     look = BOTH.look.with_choice(quantity="orientation")
     picture = picture_of("difference", replace(BOTH, look=look))
-    assert "shows the position errors of A, B and A − B" in exported_words(picture)
+    assert "shows the position errors of A, B and B − A" in exported_words(picture)
     content = draw_figure(build_request(picture), threading.Event())
     assert "range" not in Image.open(io.BytesIO(content)).info["Description"]
 
@@ -213,7 +214,7 @@ def test_two_loops_on_one_sheet_are_refused_in_words() -> None:
 
 @pytest.mark.parametrize(
     ("shown", "stem"),
-    [("a", "A_now"), ("b", "B_dvf5000_second"), ("difference", "now_minus_dvf5000_second")],
+    [("a", "A_present"), ("b", "B_dvf5000_second"), ("difference", "dvf5000_second_minus_present")],
 )
 def test_files_and_the_panel_name_what_is_exported(shown: str, stem: str) -> None:
     picture = picture_of(shown)
@@ -229,6 +230,6 @@ def test_volumes_that_differ_export_the_side_that_is_drawn() -> None:
     picture = picture_of("difference", with_sides(START, Side(), scene_side(other)))
     request = build_request(picture)
     assert request.pair is None
-    assert request.minus is None
-    assert file_stem(picture) == "A_now"
+    assert request.beside is None
+    assert file_stem(picture) == "B_other"
     assert "sheet" not in exported_words(picture)

@@ -25,7 +25,7 @@ def test_titles_are_unique_and_never_words_of_the_page() -> None:
     scenes = SceneList({FIRST.title: FIRST})
     again = replace(FIRST, name="other")
     assert scenes.add(again) == (f"{FIRST.title} (2)", "")
-    assert scenes.add(replace(SECOND, title="now"))[0] == "now (2)"
+    assert scenes.add(replace(SECOND, title="present errors"))[0] == "present errors (2)"
     assert scenes.add(replace(SECOND, title="", name="nothing"))[0] == "nothing (2)"
     assert scenes[f"{FIRST.title} (2)"] is again
 

@@ -28,9 +28,10 @@ def test_points_and_positions_carry_their_units() -> None:
 def test_result_and_gains_name_the_worst_point_alike() -> None:
     picture = LiveModel().evaluate(start_state(load_scene("dvf5000_first")))
     ranking = rank_picture(picture)
-    place = spell_place(picture.statistics.max_at_mm)
-    assert f'data-value="gain at">{place}<' in spell_ranking(ranking)
-    assert f'data-value="max at">{place}<' in summary(picture)
     # Z of the drawing counts from the table, that of the axis from its upper end
-    assert spell_positions(ranking.at).startswith("X 275, Y −225, Z −480 mm")
+    place = "axes X 275 Y −225 Z −480 · in R x 275 y −225 z −51"
+    copied = 'data-copy="X=275,Y=-225,Z=-480,B=0,C=0"'
+    for value, text in (("gain at", spell_ranking(ranking)), ("max at", summary(picture))):
+        assert f'data-value="{value}">{place} <' in text
+        assert copied in text
     assert np.isclose(picture.statistics.max_at_mm[2], -51.0)

@@ -48,7 +48,7 @@ def draw_figure(request: Request, cancelled: threading.Event) -> bytes:
     RenderError
         If it cannot be drawn here.
     """
-    from warpspace.outputs.drawing.settings import A_MINUS_B, FigureSettings
+    from warpspace.outputs.drawing.settings import FigureSettings
     from warpspace.outputs.worker import FigureWorker
 
     settings = FigureSettings(
@@ -57,19 +57,18 @@ def draw_figure(request: Request, cancelled: threading.Event) -> bytes:
         dark=request.dark,
         loop=request.loop,
         grid=request.nodes,
-        difference=A_MINUS_B,
         range_top=None if request.colours is None else request.colours.high,
     )
     name, scenes = request.figure or "error-map", [request.scene]
-    if request.figure and request.minus is not None:
+    if request.figure and request.beside is not None:
         raise OptionError(f"figure {name!r} is of one machine; show A or B in the tab Compare")
     if not request.figure and request.pair is not None:
         if request.tilts:
             settings = replace(settings, range_top=None)
         name, scenes = "comparison", list(request.pair)
-    elif request.minus is not None:
+    elif request.beside is not None:
         raise OptionError(
-            f"A is seen through the {request.loop} loop, B through the {request.minus.loop} loop; a"
+            f"A is seen through the {request.loop} loop, B through the {request.beside.loop} loop; a"
             " figure of both needs one loop. GLB, CSV and HTML show their difference."
         )
     elif request.tilts and not request.figure:
@@ -108,7 +107,7 @@ def write_export(request: Request, ending: str) -> bytes:
         The file's content.
     """
     from warpspace.outputs.leftovers import temporary_folder
-    from warpspace.picture.comparison import subtract_scenes
+    from warpspace.picture.comparison import scene_change
     from warpspace.picture.scene_picture import evaluate_picture
 
     picture, *subtracted = (
@@ -121,11 +120,11 @@ def write_export(request: Request, ending: str) -> bytes:
             quantity="orientation" if request.tilts else "position",
             colours=request.colours,
         )
-        for part in (request, request.minus)
+        for part in (request, request.beside)
         if part is not None
     )
     if subtracted:
-        picture = subtract_scenes(picture, subtracted[0], "A − B")
+        picture = scene_change(picture, subtracted[0])
     with temporary_folder() as folder:
         target = folder / f"export{ending}"
         write(picture, target, overwrite=False)

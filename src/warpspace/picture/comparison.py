@@ -1,10 +1,14 @@
-"""Two scenes over one working volume: what they share, and the picture of their difference."""
+"""Two scenes over one working volume: what they share, and the change from A to B.
+
+The change is always B − A: of the error vectors node by node, and of each statistic.
+"""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any, cast
 
+from warpspace.analysis.statistics import Statistics
 from warpspace.exceptions import OptionError
 from warpspace.machine.errors import ErrorSet
 from warpspace.picture.exaggeration import Exaggeration, choose_exaggeration
@@ -12,56 +16,60 @@ from warpspace.picture.model import P, Picture, same_nodes, subtract_fields
 from warpspace.picture.scene_picture import ScenePicture
 from warpspace.picture.traces import TraceLines, subtract_traces
 
+CHANGE = "B − A"
+"""How a change is called, and its sign."""
+DIFFERENCE_LENGTH = "|E_B − E_A|"
+"""What the statistics of the difference are of: the length of the change of the error vector."""
+STATISTICS = {"mean": "mean_um", "RMS": "rms_um", "P95": "p95_um", "max": "max_um"}
+"""Name of a statistic, and its attribute of `Statistics`."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class DifferencePicture(ScenePicture):
-    """The difference of two scenes, one − other; the bodies of its machine stand nominally.
+    """The change from scene A to scene B, B − A; the bodies of its machine stand nominally.
 
     Attributes
     ----------
-    one, other : ScenePicture
-    sign : str
-        How the two are called: "A − B" or "B − A".
+    a, b : ScenePicture
     """
 
-    one: ScenePicture
-    other: ScenePicture
-    sign: str
+    a: ScenePicture
+    b: ScenePicture
 
     @cached_property
     def traces(self) -> tuple[TraceLines, ...]:
         """Traces that both have, each displaced by the difference."""
-        return subtract_traces(self.one.traces, self.other.traces)
+        return subtract_traces(self.b.traces, self.a.traces)
 
     @cached_property
     def settings(self) -> dict[str, Any]:
         """How both were looked at; where they differ, a list of two."""
-        pairs = {
-            name: (value, self.other.settings[name]) for name, value in self.one.settings.items()
-        }
+        pairs = {name: (value, self.b.settings[name]) for name, value in self.a.settings.items()}
         return {
             **{name: a if a == b else [a, b] for name, (a, b) in pairs.items()},
-            "difference": self.sign,
+            "difference": CHANGE,
         }
 
     @property
     def remarks(self) -> dict[str, str]:
         """What a table says of every row, of both scenes where they differ."""
-        pairs = zip(self.one.remarks.items(), self.other.remarks.values(), strict=True)
-        found = {name: a if a == b else f"{a} − {b}" for (name, a), b in pairs}
+        pairs = zip(self.a.remarks.items(), self.b.remarks.values(), strict=True)
+        found = {name: a if a == b else f"{b} − {a}" for (name, a), b in pairs}
         return {**found, "scene": self.scene.name}
 
     @cached_property
     def provenance(self) -> dict[str, Any]:
         """Program, settings and statistics of the difference, and all of both scenes."""
         return {
-            "program": self.one.provenance["program"],
+            "program": self.a.provenance["program"],
             "scene": self.scene.name,
             "title": self.scene.title,
             "settings": self.settings,
             "statistics": asdict(self.statistics),
-            "a": self.one.provenance,
-            "b": self.other.provenance,
+            "statistics_of": DIFFERENCE_LENGTH,
+            "change": statistics_change(self.a.statistics, self.b.statistics),
+            "a": self.a.provenance,
+            "b": self.b.provenance,
         }
 
 
@@ -80,44 +88,46 @@ def check_same_nodes(first: ScenePicture, second: ScenePicture) -> None:
         )
 
 
-def subtract_scenes(one: ScenePicture, other: ScenePicture, sign: str) -> DifferencePicture:
-    """Subtract one evaluated scene from another, one − other.
+def statistics_change(a: Statistics, b: Statistics) -> dict[str, float]:
+    """Subtract each statistic of A from that of B, µm, by the names of their attributes."""
+    return {name: getattr(b, name) - getattr(a, name) for name in STATISTICS.values()}
+
+
+def scene_change(a: ScenePicture, b: ScenePicture) -> DifferencePicture:
+    """Subtract the errors of evaluated scene A from those of B, B − A.
 
     Parameters
     ----------
-    one, other : ScenePicture
-    sign : str
-        How the two are called: "A − B" or "B − A".
+    a, b : ScenePicture
 
     Returns
     -------
     DifferencePicture
-        Drawn with the factor, the component and the colours of `one`.
+        Drawn with the factor, the component and the colours of A.
 
     Raises
     ------
     OptionError
         If the working volumes are not the same.
     """
-    check_same_nodes(one, other)
+    check_same_nodes(a, b)
     scene = replace(
-        one.scene,
-        name=f"{one.scene.name} minus {other.scene.name}",
-        title=f"{sign}: {one.scene.title} − {other.scene.title}",
+        a.scene,
+        name=f"{b.scene.name} minus {a.scene.name}",
+        title=f"{CHANGE}: {b.scene.title} − {a.scene.title}",
         errors=ErrorSet(),
     )
     return DifferencePicture(
-        view=one.view,
-        grid=one.grid,
-        field=subtract_fields(one.field, other.field),
-        exaggeration=one.exaggeration,
-        component=one.component,
-        quantity=one.quantity,
-        colours=one.colours,
+        view=a.view,
+        grid=a.grid,
+        field=subtract_fields(b.field, a.field),
+        exaggeration=a.exaggeration,
+        component=a.component,
+        quantity=a.quantity,
+        colours=a.colours,
         scene=scene,
-        one=one,
-        other=other,
-        sign=sign,
+        a=a,
+        b=b,
     )
 
 

@@ -44,6 +44,11 @@ def spell(value: float, digits: int = 3) -> str:
     return text.replace("-", MINUS)
 
 
+def spell_signed(value: float, digits: int = 3) -> str:
+    """Spell a change with its sign: ``+3.24``, ``−17.1``, ``0``."""
+    return ("+" if value > 0.0 else "") + spell(value, digits)
+
+
 def spell_short(value: float) -> str:
     """Spell a number without trailing zeros, with a true minus sign."""
     return f"{value:.6g}".replace("-", MINUS)

@@ -85,6 +85,12 @@ class Clicks:
         """Spell the attributes of a real button, which needs no more to be reached by key."""
         return Markup('type="button" ') + self._sends(word)
 
+    def field(self, word: str) -> Markup:
+        """Spell the attributes of a field that sends a word, a blank and what was entered."""
+        return Markup(  # noqa: S704 - escaped here
+            f"onchange=\"warpspaceEnter(this,'{escape(word)}','{dom_id(self._carrier)}')\""
+        )
+
     def _sends(self, word: str) -> Markup:
         """Spell the attributes of what sends a word when it is clicked."""
         return Markup(SENDS % (escape(word), dom_id(self._carrier)))  # noqa: S704 - escaped here

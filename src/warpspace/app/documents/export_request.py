@@ -7,6 +7,7 @@ from warpspace.app.documents.services import Beside, Request
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.state.app_state import AppState
+from warpspace.app.state.comparison import AFTER, BEFORE, Side
 from warpspace.scene.model import Scene
 
 
@@ -20,8 +21,8 @@ def build_request(picture: LivePicture) -> Request:
     Returns
     -------
     Request
-        The side that is drawn, or A with B to be subtracted; with the factor that is drawn, and the
-        colours that all maps of the comparison share.
+        The side that is drawn, or A with B beside it for the change; with the factor that is
+        drawn, and the colours that all maps of the comparison share.
     """
     found, drawn = picture.compared, picture.drawn_state
     if found is None:
@@ -30,11 +31,12 @@ def build_request(picture: LivePicture) -> Request:
         replace(_scene(side, picture), name=f"{name}: {title}", title=title)
         for name, title, side in zip("AB", found.titles, found.sides, strict=True)
     )
-    request = _request(picture, drawn, b if found.shown == "b" else a)
+    side, scene = (found.sides[1], b) if found.shown == "b" else (found.sides[0], a)
+    request = _request(picture, side, scene)
     loops = [side.loop for side in found.sides]
     return replace(
         request,
-        minus=Beside(b, loops[1].value) if found.shown == "difference" else None,
+        beside=Beside(b, loops[1].value) if found.shown == "difference" else None,
         pair=(a, b) if not found.refused and loops[0] == loops[1] else None,
     )
 
@@ -64,12 +66,19 @@ def file_stem(picture: LivePicture) -> str:
     if found is None:
         return safe_name(picture.state.scene.name)
     a, b = (
-        "now" if side.state is None else side.state.scene.name if side.is_scene else "snapshot"
+        _side_stem(side, picture.state.comparison.pinned)
         for side in (picture.state.comparison.a, picture.state.comparison.b)
         if side is not None
     )
-    words = {"a": f"A_{a}", "b": f"B_{b}", "difference": f"{a}_minus_{b}"}
+    words = {"a": f"A_{a}", "b": f"B_{b}", "difference": f"{b}_minus_{a}"}
     return safe_name(words[found.shown])
+
+
+def _side_stem(side: Side[AppState], pinned: Side[AppState] | None) -> str:
+    """Name one side of a comparison in the name of a file."""
+    if side.state is None:
+        return AFTER if pinned is not None else "present"
+    return side.state.scene.name if side.is_scene else BEFORE
 
 
 def exported_words(picture: LivePicture) -> str:
@@ -88,4 +97,4 @@ def build_sheet_words(picture: LivePicture) -> str:
     if found is None or found.refused or found.sides[0].loop != found.sides[1].loop:
         return ""
     what = "the position errors of " if picture.state.look.tilts else ""
-    return f" The figure shows {what}A, B and A − B on one sheet."
+    return f" The figure shows {what}A, B and B − A on one sheet."

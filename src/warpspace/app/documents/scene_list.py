@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 
-from warpspace.app.state.comparison import NOBODY, NOW
+from warpspace.app.state.comparison import NOBODY, PRESENT
 from warpspace.scene.model import Scene
 
 MOST_OPENED = 20
@@ -64,7 +64,7 @@ class SceneList(Mapping[str, Scene]):
         """Give a scene a title that nothing else in a list of scenes has."""
         own = scene.title or scene.name
         title, number = own, 2
-        while title in self or title in (NOW, NOBODY):
+        while title in self or title in (PRESENT, NOBODY):
             title = f"{own} ({number})"
             number += 1
         return title

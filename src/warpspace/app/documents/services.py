@@ -47,8 +47,8 @@ class Request:
     colours : ColourScale or None
         The colours that are shown, where they are not those of the request's own map: fixed by the
         user, or shared with other maps.
-    minus : Beside or None
-        What is subtracted, where a difference is wanted.
+    beside : Beside or None
+        B, where the change from the scene (A) to B is wanted: B − A.
     pair : tuple of Scene, (2,), or None
         Both sides of a comparison where they can be drawn on one sheet, with their difference.
     figure : str
@@ -63,7 +63,7 @@ class Request:
     dark: bool
     tilts: bool = False
     colours: ColourScale | None = None
-    minus: Beside | None = None
+    beside: Beside | None = None
     pair: tuple[Scene, Scene] | None = None
     figure: str = ""
 

@@ -1,7 +1,7 @@
-"""A comparison as one line of text: what is compared, what is drawn, and the pinned snapshot.
+"""A comparison as one line of text: what is compared, what is drawn, and what was pinned.
 
-A side that is a scene, and the snapshot, are spelt as links of their own, so that they come back as
-they are seen: by the name of a scene that is known, or with all that is in them.
+A side that is a scene, and what was pinned, are spelt as links of their own, so that they come
+back as they are seen: by the name of a scene that is known, or with all that is in them.
 """
 
 from collections.abc import Callable, Mapping
@@ -10,12 +10,15 @@ from urllib.parse import urlencode
 
 from warpspace.app.evaluation.compare import scene_side
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.comparison import NOBODY, NOW, SHOWN, Comparison, Side
+from warpspace.app.state.comparison import BEFORE, NOBODY, PRESENT, SHOWN, Comparison, Side
 from warpspace.exceptions import OptionError
 
 PREFIX = "compare."
 PINNED = "pinned"
-SNAPSHOT = "snapshot: "
+NOW = "now"
+"""What is steered, in files and links."""
+TITLE, OLD_TITLE = f"{BEFORE}: ", "snapshot: "
+"""What the title of a pinned state begins with, now and in older files and links."""
 LONGEST_TITLE = 200
 NAMES = frozenset({"a", "b", "shown", "ghost", PINNED, "a.title", "b.title", "pinned.title"})
 Write = Callable[[AppState], str]
@@ -54,7 +57,7 @@ def comparison_line(comparison: Comparison[AppState], write: Write) -> str:
 
 
 def _side_text(side: Side[AppState], write: Write) -> str:
-    """Spell one side; a snapshot is the pinned one."""
+    """Spell one side: what is steered, a scene, or what was pinned."""
     if side.state is None:
         return NOW
     return write(side.state) if side.is_scene else PINNED
@@ -75,7 +78,9 @@ def with_comparison(state: AppState, pairs: Mapping[str, str], read: Read) -> Ap
     Returns
     -------
     AppState
-        Numbers of the snapshot that are out of range are clamped; `notes` says so.
+        Numbers of the pinned state that are out of range are clamped; `notes` says so. In older
+        links A was what is steered and B what was pinned: they change places, so that the change
+        is still that from before to after.
 
     Raises
     ------
@@ -91,15 +96,18 @@ def with_comparison(state: AppState, pairs: Mapping[str, str], read: Read) -> Ap
     pinned = None
     notes = state.notes
     if PINNED in given:
-        snapshot = read(given[PINNED])
-        notes = (*notes, *(f"snapshot: {note}" for note in snapshot.notes))
-        plain = replace(snapshot, comparison=Comparison(), picked=None, lever="", notes=())
-        title = SNAPSHOT + given.get("pinned.title", "").removeprefix(SNAPSHOT)
+        before = read(given[PINNED])
+        notes = (*notes, *(f"{BEFORE}: {note}" for note in before.notes))
+        plain = replace(before, comparison=Comparison(), picked=None, lever="", notes=())
+        given_title = given.get("pinned.title", "")
+        title = TITLE + given_title.removeprefix(OLD_TITLE).removeprefix(TITLE)
         pinned = Side(title[:LONGEST_TITLE], plain)
     a, b = (_side(given, name, pinned, read) for name in "ab")
     shown, ghost = given.get("shown", Comparison().shown), given.get("ghost", "1")
     if shown not in SHOWN or ghost not in ("0", "1"):
         raise OptionError("the comparison does not say what is drawn: expected a, b or difference")
+    if given.get("pinned.title", "").startswith(OLD_TITLE) and a is None and b is pinned:
+        a, b, shown = pinned, Side(), {"a": "b", "b": "a"}.get(shown, shown)
     found = Comparison(a or Side(), b, shown, ghost == "1", pinned)
     return replace(state, comparison=found, notes=notes)
 
@@ -113,8 +121,8 @@ def _side(
         return None if text is None else Side()
     if text == PINNED:
         if pinned is None:
-            raise OptionError("the comparison is with a snapshot, but holds none")
+            raise OptionError("the comparison is with a pinned state, but holds none")
         return pinned
     side = scene_side(read(text).scene)
     title = given.get(f"{name}.title", side.title)[:LONGEST_TITLE]
-    return side if title in (NOW, NOBODY, "") else replace(side, title=title)
+    return side if title in (NOW, PRESENT, NOBODY, "") else replace(side, title=title)

@@ -83,6 +83,12 @@ def pick(picture: LivePicture, origin_mm: Array, direction: Array) -> Picked | N
     return None if surface is None else surface[0]
 
 
+def pick_worst(picture: LivePicture) -> Picked:
+    """Give the node whose position error is largest in what is drawn."""
+    found = picture.statistics.max_at_axes
+    return Picked({name: at for name, at in found.items() if name in LINEAR_AXES})
+
+
 def _on_surface(picture: LivePicture, origin: Array, unit: Array) -> tuple[Picked, float] | None:
     """Intersect the drawn surface, or the slices; give the point and its distance, mm."""
     drawn = [(picture.grid, picture.drawn_mm, picture.topology.surface)]

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from warpspace.app.evaluation.live_picture import Compared, LivePicture
 from warpspace.app.state.app_state import AppState, start_state
-from warpspace.app.state.comparison import Comparison, Side
+from warpspace.app.state.comparison import AFTER, BEFORE, PRESENT, Comparison, Side
 from warpspace.app.state.look import RotaryLook
 from warpspace.geometry.colour import ColourScale
 from warpspace.picture.model import choose_scale, same_nodes, subtract_pictures
@@ -32,7 +32,7 @@ def side_state(now: AppState, side: Side[AppState]) -> AppState:
     -------
     AppState
         Component, density, factor and look are those of now. A scene also stands at the rotary
-        positions of now, in its loop; a snapshot keeps what it was taken with.
+        positions of now, in its loop; what was pinned keeps its own.
     """
     base = side.state or now
     if side.is_scene:
@@ -67,13 +67,13 @@ def scene_side(scene: Scene) -> Side[AppState]:
 
 
 def pinned_side(state: AppState) -> Side[AppState]:
-    """Make a side of what is shown now; it holds no comparison of its own."""
+    """Make the side "before" of what is steered; it holds no comparison of its own."""
     edited = len(state.changed_keys)
     title = state.scene.title or state.scene.name
     if edited:
         title += f" · {edited} changed"
     plain = replace(state, comparison=Comparison(), picked=None, lever="")
-    return Side(f"snapshot: {title}", plain)
+    return Side(f"{BEFORE}: {title}", plain)
 
 
 def compare_pictures(single: Callable[[AppState], LivePicture], state: AppState) -> LivePicture:
@@ -100,12 +100,12 @@ def compare_pictures(single: Callable[[AppState], LivePicture], state: AppState)
     difference = None if refused else _difference(a, b)
     maps = [a, b] if difference is None else [a, b, difference]
     scale = _shared_scale(state, maps)
-    shown = "a" if refused and chosen.shown == "difference" else chosen.shown
-    drawn, other = {"a": (a, b), "b": (b, a), "difference": (difference or a, None)}[shown]
+    shown = "b" if refused and chosen.shown == "difference" else chosen.shown
+    drawn, other = {"a": (a, b), "b": (b, a), "difference": (difference or b, None)}[shown]
     alike = other is not None and other.drawn_mm.shape == drawn.drawn_mm.shape
     compared = Compared(
         shown,
-        (_title(state, chosen.a), _title(state, other_side)),
+        (_title(state, chosen.a, other_side), _title(state, other_side, chosen.a)),
         (a.state, b.state),
         a.statistics,
         b.statistics,
@@ -133,18 +133,21 @@ def _with_one_factor(
     return a, b
 
 
-def _title(state: AppState, side: Side[AppState]) -> str:
+def _title(state: AppState, side: Side[AppState], beside: Side[AppState]) -> str:
     """Name a side on the page."""
-    return side.title if side.state else f"now, {state.scene.title or state.scene.name}"
+    if side.state:
+        return side.title
+    pinned = beside.state is not None and not beside.is_scene
+    return f"{AFTER if pinned else PRESENT}: {state.scene.title or state.scene.name}"
 
 
 def _difference(a: LivePicture, b: LivePicture) -> LivePicture:
-    """Subtract b from a: node by node, slice by slice and trace by trace."""
+    """Take the change from a to b, b − a: node by node, slice by slice and trace by trace."""
     return replace(
-        subtract_pictures(a, b),
+        subtract_pictures(b, a),
         colours=None,
-        traces=subtract_traces(a.traces, b.traces),
-        slices=subtract_slices(a.slices, b.slices),
+        traces=subtract_traces(b.traces, a.traces),
+        slices=subtract_slices(b.slices, a.slices),
     )
 
 
@@ -165,8 +168,8 @@ def with_sides(state: AppState, a: Side[AppState], b: Side[AppState] | None) -> 
 
 
 def with_pin(state: AppState) -> AppState:
-    """Take a snapshot of now and compare now against it."""
+    """Pin what is steered as the state before (A); what is steered from then on is B, after."""
     pinned = pinned_side(state)
     return replace(
-        state, comparison=replace(state.comparison, a=Side(), b=pinned, shown="a", pinned=pinned)
+        state, comparison=replace(state.comparison, a=pinned, b=Side(), shown="b", pinned=pinned)
     )

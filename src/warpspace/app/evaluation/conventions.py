@@ -12,7 +12,7 @@ import numpy as np
 from warpspace.app.state.app_state import AppState, start_loop
 from warpspace.app.state.ranges import Span
 from warpspace.field.evaluate import View, build_basis
-from warpspace.field.grid import build_grid
+from warpspace.field.grid import Grid, build_grid
 from warpspace.kinematics.conventions.registry import convention_names
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
@@ -21,6 +21,8 @@ from warpspace.units import Array
 
 NODES = 7
 """Nodes per axis at which the effect of a choice is worked out."""
+OWN = "own"
+"""The scene's own conventions, among the choices that are compared with them."""
 Reference = Mapping[str, float] | None
 
 
@@ -158,12 +160,19 @@ def chosen(state: AppState) -> set[str]:
 
 
 class Effects:
-    """Works out what every choice does; keeps the responses while only amplitudes change."""
+    """Works out what every choice does; keeps the changes of the map for the next amplitudes.
+
+    The first-order model is linear in the amplitudes, so that an amplitude that has moved adds its
+    own part to what is known already. The response to the one that was moved last is kept.
+    """
 
     def __init__(self) -> None:
         self._for: tuple[object, ...] = ()
-        self._own: Array | None = None
-        self._bases: dict[str, Array] = {}
+        self._looks: dict[str, AppState] = {}
+        self._changes: dict[str, Array] = {}
+        self._amplitudes = self._weights = np.zeros(0)
+        self._moved: tuple[str, ...] = ()
+        self._responses: dict[str, Array] = {}
 
     def of(self, state: AppState) -> dict[str, Effect]:
         """Compare each choice, taken alone, with the scene's own conventions.
@@ -175,31 +184,57 @@ class Effects:
         Returns
         -------
         dict of str to Effect
-            By choice; "all" is the present combination. Over 7 × 7 × 7 nodes, first order, at the
-            same axis positions. What the scene itself chooses changes nothing.
+            By choice; "all" is the present combination. Over the nodes of the result, first order,
+            at the same axis positions. What the scene itself chooses changes nothing.
         """
-        needed = (state.origin, state.scene, tuple(state.positions.items()), state.loop)
-        if self._own is None or not _same(needed, self._for):
-            own = own_state(state)
-            self._for = needed
-            self._own = _response(own)
-            self._bases = {
-                choice: _response(with_choice(own, choice))
-                for choice in choices(state)
-                if choice not in chosen(own)
-            }
-            if state.scene.reference is not None:
-                held = with_reference(own, state.scene.reference)
-                self._bases["reference=point"] = _response(held)
-            self._bases["all"] = _response(state)
+        turned = tuple(state.positions.items())
+        needed = (state.origin, state.scene, turned, state.loop, state.nodes)
         amplitudes = np.fromiter(state.active.values(), float, len(state.amplitudes))
-        base = self._own
+        if not self._looks or not amplitudes.any() or not _same(needed, self._for):
+            self._for = needed
+            self._begin(state)
+        self._add(amplitudes, tuple(state.amplitudes))
         found = {choice: Effect(choice, 0.0, 0.0) for choice in choices(state)}
-        for choice, response in self._bases.items():
-            change = np.tensordot(amplitudes, response - base, axes=1)
+        for choice, change in self._changes.items():
             length = np.linalg.norm(change, axis=-1)
-            found[choice] = Effect(choice, float(length.mean()), float(length.max()))
+            mean = float(np.sum(self._weights * length))
+            found[choice] = Effect(choice, mean, float(length.max()))
         return found
+
+    def _begin(self, state: AppState) -> None:
+        """List the states that are compared; as long as all errors are zero they are the same."""
+        own, held = own_state(state), state.scene.reference
+        own_choices = chosen(own)
+        looks = {c: with_choice(own, c) for c in choices(state) if c not in own_choices}
+        if held is not None:
+            looks["reference=point"] = with_reference(own, held)
+        self._looks = {OWN: own, **looks, "all": state}
+        self._weights = _grid(own).weights
+        shape = (*self._weights.shape, 3)
+        self._changes = {choice: np.zeros(shape) for choice in self._looks if choice != OWN}
+        self._amplitudes = np.zeros(len(state.amplitudes))
+        self._moved, self._responses = (), {}
+
+    def _add(self, amplitudes: Array, keys: tuple[str, ...]) -> None:
+        """Add what the amplitudes that have moved change, [K], µm or µrad."""
+        steps = amplitudes - self._amplitudes
+        indices = np.flatnonzero(steps)
+        moved = tuple(keys[index] for index in indices)
+        if not moved:
+            return
+        if moved != self._moved:
+            self._moved, self._responses = moved, {}
+        parts: dict[str, Array] = {}
+        for choice, look in self._looks.items():
+            response = self._responses.get(choice)
+            if response is None:
+                response = _response(look, moved)
+            if len(moved) == 1:
+                self._responses[choice] = response
+            parts[choice] = np.tensordot(steps[indices], response, axes=1)
+        for choice in self._changes:
+            self._changes[choice] = self._changes[choice] + parts[choice] - parts[OWN]
+        self._amplitudes = amplitudes
 
 
 def own_state(state: AppState) -> AppState:
@@ -214,11 +249,14 @@ def _same(new: tuple[object, ...], old: tuple[object, ...]) -> bool:
     )
 
 
-def _response(state: AppState) -> Array:
-    """Respond to every amplitude over a coarse grid, [K, nx, ny, nz, 3]."""
-    scene = state.scene
-    grid = build_grid(scene.model, scene.workspace.moved(state.positions), NODES)
+def _grid(state: AppState) -> Grid:
+    """Lay the grid of the result."""
+    return build_grid(state.scene.model, state.scene.workspace.moved(state.positions), state.nodes)
+
+
+def _response(state: AppState, keys: tuple[str, ...]) -> Array:
+    """Respond to some amplitudes over the grid of the result, [K, nx, ny, nz, 3]."""
+    scene, grid = state.scene, _grid(state)
     view = View(loop=state.loop, reference=scene.reference)
-    keys = tuple(state.amplitudes)
     basis = build_basis(scene.model, scene.errors, keys, grid.coordinates, view, grid.point_mm)
     return basis.position

@@ -26,7 +26,7 @@ class Compared:
         What they are, looked at as now.
     a, b : Statistics
     difference : Statistics or None
-        None where there is no difference.
+        Of the length of the change at each node, |E_B − E_A|; None where there is no difference.
     other_mm : ndarray, [nx, ny, nz, 3], mm, or None
         Displaced nodes of the side that is not drawn; None for the difference.
     refused : str
@@ -46,7 +46,7 @@ class Compared:
     def title(self) -> str:
         """Name of what is drawn."""
         a, b = self.titles
-        return {"a": f"A: {a}", "b": f"B: {b}", "difference": f"A − B: {a} − {b}"}[self.shown]
+        return {"a": f"A: {a}", "b": f"B: {b}", "difference": f"B − A: {b} − {a}"}[self.shown]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,6 +89,13 @@ class LivePicture(Picture):
         """Whether a difference of two states is drawn."""
         return self.compared is not None and self.compared.shown == "difference"
 
+    @property
+    def is_steered(self) -> bool:
+        """Whether what is drawn is what the sliders move, not what that is compared with."""
+        chosen = self.state.comparison
+        side = {"a": chosen.a, "b": chosen.b}.get(self.compared.shown) if self.compared else None
+        return self.compared is None or (side is not None and side.state is None)
+
     def both_words(self, word: Callable[[AppState], str]) -> str:
         """Say something of what is drawn; of a difference for both sides where they are not alike.
 
@@ -100,4 +107,4 @@ class LivePicture(Picture):
         if self.compared is None or not self.is_difference:
             return word(self.drawn_state)
         a, b = (word(side) for side in self.compared.sides)
-        return a if a == b else f"{a} − {b}"
+        return a if a == b else f"{b} − {a}"

@@ -12,7 +12,8 @@ from warpspace.field.evaluate import build_basis
 from warpspace.geometry.deform import deform
 from warpspace.kinematics import transforms
 from warpspace.kinematics.bodies import BodyMotion
-from warpspace.kinematics.model import complete_coordinates
+from warpspace.kinematics.chain import nominal_point
+from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.picture.bodies import PlacedBody, place_bodies, scene_motions
 from warpspace.picture.model import coloured_values
 from warpspace.units import Array
@@ -50,6 +51,29 @@ def machine_positions(
     """
     linear = linear_positions(state.scene, state.machine)
     return {**state.scene.workspace.positions, **linear, **state.positions, **(turned or {})}
+
+
+def standing(state: AppState, at: Mapping[str, float]) -> tuple[dict[str, float], Array]:
+    """Tell where the tool point is while some axes stand somewhere, nominally.
+
+    Parameters
+    ----------
+    state : AppState
+    at : mapping of str to float, mm or degrees
+        Axes left out stand where the state has them, linear ones in the middle.
+
+    Returns
+    -------
+    dict of str to float, mm or degrees
+        Positions of all axes.
+    ndarray, [3], mm
+        The point in R.
+    """
+    scene = state.scene
+    stands = {**scene.workspace.positions, **state.positions, **at}
+    axes = {name: float(stands.get(name, 0.0)) for name in scene.machine.axes}
+    coordinates = complete_coordinates(scene.machine, axes)
+    return axes, nominal_point(scene.model, Loop.TOOL, coordinates)
 
 
 def machine_motions(

@@ -4,14 +4,16 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from warpspace.app.browser.handles import Input
+from warpspace.app.browser.handles import Handle, Input
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
+from warpspace.app.readouts.places import slices_html
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import RANGES, SURFACES, slice_positions, slice_spans
 from warpspace.app.viewport.named_views import VIEWS
 from warpspace.geometry.slices import PLANES
+from warpspace.picture.slices import Slice
 from warpspace.scene.model import Scene
 
 QUANTITY_NAMES = {
@@ -157,6 +159,7 @@ class AppearancePanel:
                 )
                 for axis, span in slice_spans(state.scene).items()
             }
+            self._places = Handle(self._context.gui.add_html(""))
 
     def read(self, state: AppState) -> AppState:
         """Take over what a browser has chosen."""
@@ -213,5 +216,8 @@ class AppearancePanel:
         for axis, position in slice_positions(state.scene, look, state.machine).items():
             if axis in self._slices:
                 self._slices[axis].show(position)
+        self._places.put(
+            content=slices_html([one for one in picture.slices if isinstance(one, Slice)])
+        )
         for name, bound in self._switches.items():
             bound.show(getattr(look, name))

@@ -1,16 +1,48 @@
-"""The panel "Why": the error of the point that was clicked, taken apart."""
+"""The panel "Error budget": the error of the point that was asked about, taken apart."""
 
 import numpy as np
 
+from warpspace.app.browser.arrangement import front_script
 from warpspace.app.browser.clicks import Clicks
 from warpspace.app.browser.handles import Handle
-from warpspace.app.evaluation.budget import answer, with_lever, with_picked
+from warpspace.app.evaluation.budget import answer, pick_worst, with_lever, with_picked
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
-from warpspace.app.readouts.budget import ASK, REFUSED, answer_html
+from warpspace.app.readouts.budget import (
+    ASK,
+    AT,
+    EDIT,
+    EXCLUDE,
+    INCLUDE,
+    LEVER,
+    REFUSED,
+    answer_html,
+    field_html,
+)
 from warpspace.app.state.app_state import AppState
+from warpspace.app.state.edits import with_muted
+from warpspace.app.state.typed_point import with_typed_point
 from warpspace.app.viewport.camera import CameraMemory, fit_camera, heading_share
 from warpspace.app.viewport.layers import SCENE_PER_MM
+
+TAB = "Error budget"
+WORST = "Worst point"
+HINT = "Ask what the largest error of the volume is made of (W does the same)."
+
+
+def add_worst_button(context: PanelContext, label: str = WORST) -> None:
+    """Add the button that asks about the worst point."""
+    button = context.gui.add_button(label, color="gray", hint=HINT)
+    button.on_click(lambda _: context.act(lambda: ask_worst(context)))
+
+
+def ask_worst(context: PanelContext) -> None:
+    """Ask about the worst point of what is drawn, and bring its budget to the front."""
+    if context.shown is None:
+        return
+    picked = pick_worst(context.shown)
+    context.page.run_script(front_script(TAB))
+    context.post(lambda state: with_picked(state, picked))
 
 
 class BudgetPanel:
@@ -24,7 +56,9 @@ class BudgetPanel:
     def __init__(self, context: PanelContext, _state: AppState) -> None:
         gui = context.gui
         self._context = context
-        self._clicks = Clicks(gui, lambda key: context.post(lambda s: with_lever(s, key)))
+        self._clicks = Clicks(gui, self._clicked)
+        add_worst_button(context)
+        self._field = Handle(gui.add_html(""))
         self._text = Handle(gui.add_html(ASK))
         far = gui.add_button(
             "Show the whole lever",
@@ -43,6 +77,27 @@ class BudgetPanel:
         self._far, self._clear = Handle(far), Handle(clear)
         command = gui.add_command("Forget the point", description="End the question", hotkey="N")
         command.on_trigger(lambda _: context.post(forget))
+        worst = gui.add_command(WORST, description=HINT, hotkey="W")
+        worst.on_trigger(lambda _: context.act(lambda: ask_worst(context)))
+
+    def _clicked(self, word: str) -> None:
+        """Take note of a click on a row, or of a point that was typed."""
+        what, _, rest = word.partition(" ")
+        context = self._context
+        if what == AT:
+            context.post(lambda state: with_typed_point(state, rest))
+        elif what == LEVER:
+            context.post(lambda state: with_lever(state, rest))
+        elif what in (EXCLUDE, INCLUDE):
+            context.post(lambda state: with_muted(state, rest, what == EXCLUDE))
+        elif what == EDIT:
+            context.act(lambda: self._edit(rest))
+
+    def _edit(self, key: str) -> None:
+        """Bring the slider of an error into view, and its curve below."""
+        if key in self._context.store.state.amplitudes and self._context.reveal_error is not None:
+            self._context.post(lambda state: state.with_chosen_error(key))
+            self._context.reveal_error(key)
 
     def read(self, state: AppState) -> AppState:
         """Nothing to take over: clicks post what they change."""
@@ -54,13 +109,21 @@ class BudgetPanel:
         picked = picture.state.picked
         self._clear.put(visible=picked is not None)
         self._far.put(visible=picked is not None and bool(picture.state.lever))
+        at = None
         if picked is None:
-            self._text.put(content=ASK)
+            text = ASK
         elif picture.is_difference:
-            self._text.put(content=REFUSED)
+            text = REFUSED
         else:
             found = answer(state, picked, picture.exaggeration)
-            self._text.put(content=answer_html(found, picture.state.lever, self._clicks.attributes))
+            at = found.at
+            # only what is steered can be changed, not what it is compared with
+            button = self._clicks.button if picture.is_steered else None
+            text = answer_html(
+                found, picture.state.lever, self._clicks.attributes, button, state.exclusions.muted
+            )
+        self._text.put(content=text)
+        self._field.put(content=field_html(at, self._clicks.field(AT)))
 
     def _stand_back(self) -> None:
         """Move the camera back until the frame of the chosen contribution is in view."""

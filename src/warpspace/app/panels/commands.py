@@ -10,7 +10,7 @@ from warpspace.app.state import edits
 from warpspace.app.state.app_state import TRUE_SCALE, AppState
 from warpspace.machine.parameters import PARAMETERS
 
-# W A S D Q E belong to viser's camera.
+# A S D Q E belong to viser's camera; W is taken from it, see browser/copying.py.
 WORDS = {
     "amplitudes": "errors",
     "positions": "rotary position",
@@ -221,8 +221,10 @@ def help_text(commands: tuple[Command, ...]) -> str:
         " control explains itself when the mouse rests on it.\n\n"
         "| key | does | |\n|---|---|---|\n"
         "| **Ctrl + K** | Command palette | All of this by name |\n"
-        "| **W A S D Q E** | Camera | Fly through the scene |\n"
+        "| **A S D Q E** | Camera | Fly through the scene |\n"
         "| **← →** | Slider with focus | One step |\n"
+        "| **W** | Worst point | What its error consists of |\n"
+        "| **N** | Forget the point | End the question |\n"
         f"{rows}\n\n"
         "Keys act when no text box has the focus. After a dropped connection the tab finds its"
         " state again for ten minutes."

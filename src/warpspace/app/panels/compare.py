@@ -1,4 +1,4 @@
-"""The panel "Compare": two scenes, or now against a snapshot; A, B or their difference."""
+"""The panel "Compare": two scenes, or the states before and after; A, B or the change."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -11,7 +11,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext, Update
 from warpspace.app.readouts.comparison import MARK, NOTHING, comparison_html, marked
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.comparison import NOBODY, NOW, SHOWN, Side
+from warpspace.app.state.comparison import NOBODY, PRESENT, SHOWN, Side
 from warpspace.scene.model import Scene
 
 
@@ -28,23 +28,26 @@ class ComparePanel:
         self._scenes: Mapping[str, Scene] = scenes
         self._options: tuple[str, ...] = tuple(scenes)
         pin = gui.add_button(
-            "Pin now and compare",
+            "Pin as before",
             color="gray",
-            hint="Take a snapshot of what is shown now; changes are then compared with it.",
+            hint="Keep the present errors as A, before; what you change from then on is B, after.",
         )
         pin.on_click(lambda _: context.post(with_pin))
         self._a: Input[str] = Input(
             gui.add_dropdown(
-                "A", (NOW, *scenes), initial_value=NOW, hint="One side; now: what is steered."
+                "A",
+                (PRESENT, *scenes),
+                initial_value=PRESENT,
+                hint="Before. Present errors: what the sliders say.",
             ),
             context.changed,
         )
         self._b: Input[str] = Input(
             gui.add_dropdown(
                 "B",
-                (NOBODY, NOW, *scenes),
+                (NOBODY, PRESENT, *scenes),
                 initial_value=NOBODY,
-                hint="The other side. Scenes are taken as opened, at the present rotary positions.",
+                hint="After. Scenes are taken as opened, at the present rotary positions.",
             ),
             context.changed,
         )
@@ -52,7 +55,7 @@ class ComparePanel:
             "Drawn",
             marked("a"),
             visible=False,
-            hint="What is drawn. The difference is taken node by node.",
+            hint="What is drawn. The change B − A is taken node by node.",
         )
         self._shown.on_click(lambda event: context.post(_drawn(event.target.value)))
         self._ghost: Input[bool] = Input(
@@ -79,7 +82,7 @@ class ComparePanel:
 
     def _side(self, state: AppState, title: str) -> Side[AppState] | None:
         """Find the side of a title that a browser has sent; None for nothing or nonsense."""
-        if title == NOW:
+        if title == PRESENT:
             return Side()
         used = (state.comparison.pinned, state.comparison.a, state.comparison.b)
         for side in used:
@@ -101,8 +104,8 @@ class ComparePanel:
         options = tuple(dict.fromkeys((*own, *self._scenes)))
         if options != self._options:
             self._options = options
-            self._a.handle.options = (NOW, *options)
-            self._b.handle.options = (NOBODY, NOW, *options)
+            self._a.handle.options = (PRESENT, *options)
+            self._b.handle.options = (NOBODY, PRESENT, *options)
         self._a.show(comparison.a.title)
         self._b.show(NOBODY if comparison.b is None else comparison.b.title)
         self._ghost.show(comparison.ghost)

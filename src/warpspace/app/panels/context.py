@@ -50,6 +50,8 @@ class PanelContext:
         What moves by itself around the map; None before it is drawn.
     next_click : callable or None
         Takes the point of the next click on the map in place of asking about it.
+    reveal_error : callable or None
+        Brings the slider of an error into view; None before it is built. For the session.
     changed_at : float
         When a browser has last changed something, on the monotonic clock, s.
     """
@@ -67,6 +69,7 @@ class PanelContext:
         self.shown: LivePicture | None = None
         self.stage: MovingLayer | None = None
         self.next_click: Callable[[Picked], None] | None = None
+        self.reveal_error: Callable[[str], None] | None = None
         self.changed_at = time.monotonic()
         self._wake = threading.Event()
         self._updates: deque[Update] = deque()

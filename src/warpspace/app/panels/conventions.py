@@ -38,6 +38,7 @@ class ConventionsPanel:
         gui = context.gui
         self._context, self._effects = context, Effects()
         self._known: dict[str, Effect] = {}
+        self._asked: AppState | None = None
         self._clicks = Clicks(gui, lambda word: context.post(lambda s: with_choice(s, word)))
         self._text: Any = gui.add_html("")
         self._pick: Any = gui.add_button(
@@ -100,6 +101,7 @@ class ConventionsPanel:
             Identity(state.scene.model),
             state.scene.reference,
             state.loop,
+            state.nodes,
         )
 
     def show(self, picture: LivePicture) -> None:
@@ -115,11 +117,20 @@ class ConventionsPanel:
         self._write(state)
 
     def settle(self, picture: LivePicture) -> None:
-        """Work out what every choice changes."""
-        known = self._effects.of(picture.state)
+        """Have it worked out what every choice changes: slow, so that other tabs need not wait."""
+        waiting, self._asked = self._asked is not None, picture.state
+        if not waiting:
+            self._context.act(self._work_out)
+
+    def _work_out(self) -> None:
+        """Work out what every choice changes in the state that was shown last."""
+        state, self._asked = self._asked, None
+        if state is None:
+            return
+        known = self._effects.of(state)
         if known != self._known:
             self._known = known
-            self._write(picture.state)
+            self._write(state)
 
     def _write(self, state: AppState) -> None:
         """Write the table."""

@@ -9,6 +9,7 @@ from itertools import groupby
 from typing import Any
 
 from warpspace.app.browser.clicks import Clicks
+from warpspace.app.browser.copying import reveal_script
 from warpspace.app.browser.handles import Input
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -82,6 +83,7 @@ class ErrorsPanel:
         self._missing: deque[tuple[Parameter, ...]] = deque()
         self._begin(state, tuple(state.amplitudes))
         self._add_axis(state)
+        context.reveal_error = self._reveal
 
     def _build(self, state: AppState, keys: tuple[str, ...]) -> None:
         """Lay out the folders of a scene's axes with the parameters that were asked for."""
@@ -149,6 +151,13 @@ class ErrorsPanel:
             self._context.act(self._show_curve)
         else:
             self._context.post(lambda state: with_switched(state, word))
+
+    def _reveal(self, key: str) -> None:
+        """Bring the slider of an error into view; one that is not listed is looked for."""
+        if key not in self._bound:
+            self._search.show(key)
+            self._build(self._context.store.state, (key,))
+        self._context.page.run_script(reveal_script(f"{key} · "))
 
     def read(self, state: AppState) -> AppState:
         """Take over the sliders that a browser has moved."""

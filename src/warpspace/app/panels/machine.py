@@ -4,10 +4,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from warpspace.app.browser.handles import Input
+from warpspace.app.browser.handles import Handle, Input
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.evaluation.machine import machine_positions, standing
 from warpspace.app.panels import PanelContext
+from warpspace.app.readouts.places import tool_point_html
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import linear_positions, linear_spans
 from warpspace.bodies.placed import load_bodies
@@ -46,6 +48,7 @@ class MachinePanel:
             )
             for name, (text, hint) in SWITCHES.items()
         }
+        self._place = Handle(context.gui.add_html(""))
         self._note: Any = context.gui.add_markdown(NO_BODIES, visible=False)
         self._home: Any = context.gui.add_folder("Axis positions")
         self._built_for: Scene | None = None
@@ -117,6 +120,7 @@ class MachinePanel:
         state = self._state = picture.state
         if self._built_for is None or state.scene.machine is not self._built_for.machine:
             self._build(state)
+        self._place.put(content=tool_point_html(*standing(state, machine_positions(state))))
         for name, switch in self._switches.items():
             switch.show(getattr(state.machine, name))
         self._note.visible = state.machine.shown and not load_bodies(state.scene.machine)

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from warpspace.app.browser.handles import Handle
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
+from warpspace.app.panels.budget import add_worst_button
 from warpspace.app.readouts.summary import heading, summary
 from warpspace.app.state.app_state import AppState
 
@@ -33,8 +34,10 @@ class HtmlPanel:
 
 
 def summary_panel(context: PanelContext, _state: AppState) -> HtmlPanel:
-    """Colour bar, numbers and scale bars."""
-    return HtmlPanel(context, summary)
+    """Colour bar, numbers and scale bars, and the way to the worst point."""
+    panel = HtmlPanel(context, summary)
+    add_worst_button(context, "Worst point: error budget")
+    return panel
 
 
 def heading_panel(context: PanelContext) -> HtmlPanel:

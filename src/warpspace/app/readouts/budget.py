@@ -1,6 +1,6 @@
-"""The answer to "why here?" as HTML: the error in numbers, and the contributions it is made of."""
+"""The error budget of a point as HTML: the error in numbers, and the contributions to it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 from markupsafe import Markup
@@ -10,23 +10,50 @@ from warpspace.app.evaluation.budget import Answer
 from warpspace.app.readouts.html import message, render
 from warpspace.app.readouts.numbers import signed, small
 from warpspace.machine.parameters import parameter
-from warpspace.picture.words import spell_place, spell_positions
+from warpspace.picture.coordinates import spell_axes
 from warpspace.units import Array
 
 ASK = message(
-    "Click any point of the box or of a trace: its error appears here, taken apart into what"
-    " causes it."
+    "Click any point of the box or of a trace, enter the positions of its axes above, or press W"
+    " for the worst point: its error appears here, taken apart into what contributes to it."
 )
 REFUSED = message(
-    "A difference of two machines has no causes of its own. Show A or B in the tab Compare to ask"
-    " why."
+    "A difference of two machines has no causes of its own. Show A or B in the tab Compare for its"
+    " error budget."
 )
 SHOWN = 14
 """Contributions listed one by one; the smaller ones are summed up in one row."""
+AT, EDIT, EXCLUDE, INCLUDE, LEVER = "at", "edit", "exclude", "include", "lever"
+"""First words of what a click sends; a point as typed, or the key of an error, follows."""
 Attributes = Callable[[str], Markup]
 
 
-def answer_html(answer: Answer, lever: str, attributes: Attributes) -> str:
+def field_html(at: Mapping[str, float] | None, attributes: Markup) -> str:
+    """Spell the field in which a point is typed.
+
+    Parameters
+    ----------
+    at : mapping of str to float, mm or degrees, or None
+        Positions of all axes at the point asked about; None where there is none.
+    attributes : Markup
+        Make the field send what is entered.
+
+    Returns
+    -------
+    str
+        HTML.
+    """
+    text = "" if at is None else spell_axes(at).removeprefix("axes ")
+    return render("point_field", text=text, attributes=attributes)
+
+
+def answer_html(
+    answer: Answer,
+    lever: str,
+    attributes: Attributes,
+    button: Attributes | None = None,
+    excluded: Collection[str] = (),
+) -> str:
     """Spell an answer.
 
     Parameters
@@ -35,7 +62,11 @@ def answer_html(answer: Answer, lever: str, attributes: Attributes) -> str:
     lever : str
         Key of the chosen contribution, empty for none.
     attributes : callable
-        Gives the attributes that make a row clickable, by key.
+        Gives the attributes that make a row clickable, by the word it sends.
+    button : callable or None, optional
+        Likewise for buttons; None where the errors cannot be changed.
+    excluded : collection of str, optional
+        Keys that take no part, offered to be included again.
 
     Returns
     -------
@@ -49,6 +80,10 @@ def answer_html(answer: Answer, lever: str, attributes: Attributes) -> str:
     ranked = sorted(found.contributions, key=lambda part: abs(part.along_um), reverse=True)
     listed, rest = _split(ranked, lever)
 
+    # bars fill the column from the one that lessens most to the one that adds most
+    lessens = max((0.0, *(-part.along_um for part in listed)))
+    width = lessens + max((0.0, *(part.along_um for part in listed))) or 1.0
+
     def summed(
         name: str, error_um: Array, kind: str = "", spell: Callable[[float], str] = signed
     ) -> dict[str, object]:
@@ -57,16 +92,19 @@ def answer_html(answer: Answer, lever: str, attributes: Attributes) -> str:
 
     return render(
         "why",
-        place=spell_place(found.nominal_mm + answer.shift_mm),
-        axes=spell_positions(answer.at),
+        at=answer.at,
+        point_mm=found.nominal_mm + answer.shift_mm,
         loop=answer.loop.value,
         tilt_urad=float(np.linalg.norm(found.orientation_urad)),
         error_um=found.error_um,
         length_um=float(np.linalg.norm(found.error_um)),
         listed=listed,
-        largest=max((abs(part.along_um) for part in listed), default=0.0) or 1.0,
+        width=width,
+        zero=lessens / width,
         chosen=lever,
         attributes=attributes,
+        button=button,
+        excluded=sorted(excluded),
         mechanism=_mechanism,
         lever_length=lambda part: float(np.linalg.norm(part.lever_mm)),
         rest=[summed(f"{len(rest)} smaller", _sum(rest))] if rest else [],

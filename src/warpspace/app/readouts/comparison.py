@@ -4,11 +4,10 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.readouts.html import message, render
 from warpspace.app.readouts.summary import colour_stops
 from warpspace.app.state.comparison import SHOWN
-from warpspace.picture.words import spell_place
 
 NOTHING = message(
-    "Choose a scene for B, or pin what is shown now and go on changing it: both are drawn with the"
-    " same colours, factor and camera."
+    "Choose a scene for B, or pin the present errors as before and go on changing them: both are"
+    " drawn with the same colours, factor and camera."
 )
 MARK = "▸ "
 """Before the name of what is drawn."""
@@ -31,15 +30,14 @@ def comparison_html(picture: LivePicture) -> str:
     found = picture.compared
     if found is None:
         return NOTHING
-    columns = dict(zip(SHOWN.values(), (found.a, found.b, found.difference), strict=True))
     return render(
         "comparison",
         titles=dict(zip("AB", found.titles, strict=True)),
-        headings=marked(found.shown),
         rows=ROWS,
-        columns=columns,
+        a=found.a,
+        b=found.b,
+        difference=found.difference,
         refused=found.refused,
-        spell_place=spell_place,
         scale=picture.scale,
         colours=colour_stops(diverging=picture.scale.diverging),
     )

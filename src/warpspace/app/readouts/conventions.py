@@ -6,6 +6,7 @@ from itertools import groupby
 from markupsafe import Markup
 
 from warpspace.app.evaluation.conventions import Effect, choices, chosen, own_state
+from warpspace.app.evaluation.machine import standing
 from warpspace.app.readouts.html import render
 from warpspace.app.state.app_state import AppState
 from warpspace.kinematics.conventions.registry import find_convention
@@ -61,11 +62,16 @@ def conventions_html(state: AppState, effects: Mapping[str, Effect], attributes:
     str
         HTML.
     """
+    ranges = state.scene.workspace.ranges
+    moving = (len(set(ranges.get(axis, (0.0,)))) > 1 for axis in LINEAR_AXES)
+    nodes = "×".join(str(state.nodes if moves else 1) for moves in moving)
     return render(
         "conventions",
         groups=[(*GROUPS[name], list(own)) for name, own in groupby(choices(state), _group)],
+        nodes=nodes,
         in_force=chosen(state),
         own=chosen(own_state(state)),
+        held=state.scene.reference and standing(state, state.scene.reference),
         effects=effects,
         spell_choice=spell_choice,
         attributes=attributes,

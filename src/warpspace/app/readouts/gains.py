@@ -2,7 +2,6 @@
 
 from warpspace.app.evaluation.sensitivities import SHOWN_BARS, Ranking
 from warpspace.app.readouts.html import render
-from warpspace.picture.words import spell_place, spell_positions
 
 
 def spell_ranking(ranking: Ranking) -> str:
@@ -22,8 +21,8 @@ def spell_ranking(ranking: Ranking) -> str:
     longest = max(lengths, default=0.0) or 1.0
     return render(
         "gains",
-        place=spell_place(ranking.point_mm),
-        axes=spell_positions(ranking.at),
+        at=ranking.at,
+        point_mm=ranking.point_mm,
         error_um=ranking.error_um,
         by_effect=ranking.by_effect,
         bars=[(bar, length / longest) for bar, length in zip(bars, lengths, strict=True)],

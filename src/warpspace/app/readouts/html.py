@@ -3,15 +3,19 @@
 The templates escape every value by themselves; only what is `Markup` already goes in as it is.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
+from typing import Any, SupportsFloat
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
 
 from warpspace.app.readouts import numbers
 from warpspace.machine.parameters import parameter
+from warpspace.picture.coordinates import spell_at, spell_point
 from warpspace.picture.words import spell_coordinate, spell_short
+from warpspace.units import Array
 
 PACKAGE = "warpspace.app.readouts"
 
@@ -35,7 +39,28 @@ def _templates() -> Environment:
         "parameter": parameter,
     }
     environment.filters.update(spell)
+    functions: dict[str, Any] = {"point": point}
+    environment.globals.update(functions)
     return environment
+
+
+def point(axes: Mapping[str, SupportsFloat], point_mm: Array | Sequence[float]) -> Markup:
+    """Spell a point in both of its coordinates, with a button that copies it.
+
+    Parameters
+    ----------
+    axes : mapping of str to float, mm or degrees
+        Positions of all axes.
+    point_mm : ndarray or sequence of float, [3], mm
+        The point in R, as it is drawn.
+
+    Returns
+    -------
+    Markup
+        The button copies what the option ``--at`` of a command takes.
+    """
+    text = render("point", text=spell_point(axes, point_mm), at=spell_at(axes))
+    return Markup(text)  # noqa: S704 - escaped by its template
 
 
 def render(name: str, /, **values: object) -> str:

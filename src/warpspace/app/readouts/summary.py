@@ -5,14 +5,16 @@ from functools import cache
 import numpy as np
 from markupsafe import Markup
 
+from warpspace.analysis.statistics import volume_statistics
 from warpspace.app.evaluation.chosen_trace import moved_traces
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.palette import palette
 from warpspace.app.readouts.html import render
 from warpspace.app.readouts.numbers import thousands
+from warpspace.field.basis import ErrorField
 from warpspace.geometry.colour import ColourScale, colour_table
 from warpspace.geometry.deform import round_down
-from warpspace.picture.words import spell_factor, spell_place, spell_short
+from warpspace.picture.words import spell_factor, spell_short
 from warpspace.units import MICROMETRE, MM_PER_UM
 
 BAR_PX = 190
@@ -53,16 +55,15 @@ def _marked(picture: LivePicture) -> dict[str, float]:
         # the length of the error says nothing of a signed component: its own ends do
         return {
             "min": float(values.min()),
-            "mean": float(values.mean()),
+            "mean": float(np.sum(picture.grid.weights * values.reshape(picture.shape))),
             "max": float(values.max()),
         }
-    if picture.scale.unit == MICROMETRE:
-        return {"mean": found.mean_um, "P95": found.p95_um, "max": found.max_um}
-    return {
-        "mean": float(values.mean()),
-        "P95": float(np.percentile(values, 95.0)),
-        "max": float(values.max()),
-    }
+    if picture.scale.unit != MICROMETRE:
+        # the length of the tilt is summarised as that of the position error is
+        tilt = picture.field.orientation_urad
+        field = ErrorField(picture.field.nominal_mm, tilt, tilt)
+        found = volume_statistics(field, picture.grid)
+    return {"mean": found.mean_um, "P95": found.p95_um, "max": found.max_um}
 
 
 def _height(scale: ColourScale, value: float) -> float:
@@ -139,7 +140,7 @@ def summary(picture: LivePicture) -> str:
             "P95": found.p95_um,
             "max": found.max_um,
         },
-        worst_place=spell_place(found.max_at_mm),
+        found=found,
         scale_bars=_scale_bars(picture),
         lines=_key_to_lines(picture),
     )

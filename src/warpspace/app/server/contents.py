@@ -5,6 +5,7 @@ from typing import TypeAlias
 
 from warpspace.app.browser.arrangement import split_script
 from warpspace.app.browser.clicks import SCRIPT
+from warpspace.app.browser.copying import COPY_SCRIPT
 from warpspace.app.browser.page import style_script
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import Panel, PanelContext
@@ -49,6 +50,7 @@ class PageContents:
         context = self._context
         box = BoxLayer(context.client.scene, picture)
         context.page.run_script(SCRIPT)
+        context.page.run_script(COPY_SCRIPT)
         context.page.run_script(style_script("readouts", style_sheet()))
         commands = CommandsPanel(context)
         self._errors = errors = ErrorsPanel(context, picture.state, self._expand_curve)

@@ -6,9 +6,12 @@ from typing import Generic, TypeVar
 State = TypeVar("State")
 """What a side holds: the state of the app, which in turn holds a comparison."""
 
-SHOWN = {"a": "A", "b": "B", "difference": "A − B"}
-NOW, NOBODY = "now", "nothing"
+SHOWN = {"a": "A", "b": "B", "difference": "B − A"}
+"""What can be drawn; the difference is the change from A to B."""
+PRESENT, NOBODY = "present errors", "nothing"
 """Names of what is steered, and of no other side."""
+BEFORE, AFTER = "before", "after"
+"""What was pinned, and what is steered beside it."""
 
 
 @dataclass(frozen=True)
@@ -20,13 +23,13 @@ class Side(Generic[State]):
     title : str
         What it is called on the page.
     state : State or None
-        What it is; None for what is steered now.
+        What it is; None for what is steered.
     is_scene : bool
-        Whether it is a scene as opened, which is looked at as now (rotary positions, loop), rather
-        than a snapshot, which keeps its own.
+        Whether it is a scene as opened, which is looked at as what is steered (rotary positions,
+        loop), rather than what was pinned, which keeps its own.
     """
 
-    title: str = NOW
+    title: str = PRESENT
     state: State | None = None
     is_scene: bool = False
 
@@ -45,7 +48,7 @@ class Comparison(Generic[State]):
     ghost : bool
         Whether the other one is drawn as a wireframe.
     pinned : Side or None
-        The snapshot that was taken last.
+        What was pinned last: the state before.
     """
 
     a: Side[State] = field(default_factory=Side[State])
@@ -59,5 +62,5 @@ class Comparison(Generic[State]):
         return replace(self, shown=shown) if shown in SHOWN else self
 
     def off(self) -> "Comparison[State]":
-        """End it; the snapshot stays."""
+        """End it; what was pinned stays."""
         return Comparison(pinned=self.pinned, ghost=self.ghost)

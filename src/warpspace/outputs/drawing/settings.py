@@ -17,8 +17,6 @@ from warpspace.picture.scene_picture import ScenePicture, evaluate_picture
 from warpspace.picture.views import VIEWS
 from warpspace.scene.model import Scene
 
-B_MINUS_A, A_MINUS_B = "B − A", "A − B"
-
 
 @dataclass(frozen=True, slots=True)
 class FigureSettings:
@@ -40,8 +38,6 @@ class FigureSettings:
         "tool", "workpiece" or "relative".
     grid : int
         Nodes per axis of the working volume.
-    difference : str
-        Which way two scenes A and B are subtracted: `B_MINUS_A` or `A_MINUS_B`.
     range_top : float or None, µm or µrad
         Where the colours end (a signed component's begin at its negative); None for a round value
         that holds all of the map.
@@ -59,7 +55,6 @@ class FigureSettings:
     dark: bool = False
     loop: str = "tool"
     grid: int = 21
-    difference: str = B_MINUS_A
     range_top: float | None = None
 
     def __post_init__(self) -> None:
@@ -70,8 +65,6 @@ class FigureSettings:
         if self.view not in VIEWS:
             raise OptionError(f"view {self.view!r}; expected one of {', '.join(VIEWS)}")
         given_exaggeration(self.exaggeration, None)
-        if self.difference not in (B_MINUS_A, A_MINUS_B):
-            raise OptionError(f"difference {self.difference!r}; expected B − A or A − B")
         low, high = RANGE_TOP
         if self.range_top is not None and not low <= self.range_top <= high:
             found = f"range_top {self.range_top:g}; expected a number above 0"

@@ -11,19 +11,21 @@ from warpspace.outputs.drawing.content import Drawing, DrawnMap
 from warpspace.outputs.drawing.map3d import draw_map, fit_map
 from warpspace.outputs.drawing.panel import draw_colour_bar, draw_scale_bars
 from warpspace.outputs.drawing.projection import Rect
-from warpspace.outputs.drawing.settings import (
-    A_MINUS_B,
-    FigureSettings,
-    evaluate_for,
-    shared_colours,
-)
+from warpspace.outputs.drawing.settings import FigureSettings, evaluate_for, shared_colours
 from warpspace.outputs.drawing.sheet import map_legend, metadata, scene_facts, start_sheet
 from warpspace.outputs.drawing.style import SIZES
 from warpspace.outputs.figures.error_map import isoline_words
-from warpspace.picture.comparison import share_exaggeration, subtract_scenes
+from warpspace.picture.comparison import (
+    CHANGE,
+    DIFFERENCE_LENGTH,
+    STATISTICS,
+    scene_change,
+    share_exaggeration,
+    statistics_change,
+)
 from warpspace.picture.scene_picture import ScenePicture
 from warpspace.picture.views import view_words
-from warpspace.picture.words import quantity_words, spell
+from warpspace.picture.words import quantity_words, spell, spell_signed
 from warpspace.scene.model import Scene
 
 
@@ -46,9 +48,7 @@ def draw_comparison(scenes: Sequence[Scene], settings: FigureSettings, *, exact:
         settings.exaggeration,
         scenes[0].exaggeration,
     )
-    ordered = pictures if settings.difference == A_MINUS_B else pictures[::-1]
-    difference = subtract_scenes(ordered[0], ordered[1], settings.difference)
-    contents: list[ScenePicture] = [*pictures, difference]
+    contents: list[ScenePicture] = [*pictures, scene_change(pictures[0], pictures[1])]
     scale = shared_colours(settings, contents)
     contents = [replace(content, colours=scale) for content in contents]
     exaggeration = pictures[0].exaggeration
@@ -70,7 +70,11 @@ def draw_comparison(scenes: Sequence[Scene], settings: FigureSettings, *, exact:
     ]
     rooms = [(c[0], c[1], c[2], c[3] - head) for c in cells]
     shared = fit_map(canvas, contents, rooms[0], settings.view)
-    names = [f"A  {scenes[0].title}", f"B  {scenes[1].title}", f"{settings.difference}  difference"]
+    names = [
+        f"A  {scenes[0].title}",
+        f"B  {scenes[1].title}",
+        f"{CHANGE}  {_change_words(settings.component)}",
+    ]
     maps: list[DrawnMap] = []
     for name, content, cell, room in zip(names, contents, cells, rooms, strict=True):
         shift = np.array([room[0] - rooms[0][0], room[1] - rooms[0][1]])
@@ -85,6 +89,11 @@ def draw_comparison(scenes: Sequence[Scene], settings: FigureSettings, *, exact:
     _draw_corner(canvas, corner, maps[0], found, settings)
     about = metadata(title, scenes, settings, exaggeration, "comparison")
     return Drawing(canvas.figure, title, about, tuple(maps), tuple(canvas.rects))
+
+
+def _change_words(component: str) -> str:
+    """Say what the map of the change shows."""
+    return DIFFERENCE_LENGTH if component == "norm" else f"change of the {component} component"
 
 
 def _draw_corner(
@@ -103,20 +112,17 @@ def _draw_corner(
     bar = (left + canvas.px(4.0), bottom + canvas.px(20.0), left + canvas.px(34.0))
     draw_colour_bar(canvas, (bar[0], bar[1], bar[2], top - canvas.px(44.0)), drawn.scale)
     start = left + canvas.px(130.0)
-    columns = [start + (right - start) * share for share in (0.5, 0.74, 0.99)]
+    columns = [start + (right - start) * share for share in (0.34, 0.51, 0.71, 0.99)]
     y = top - canvas.px(62.0)
-    for x, name in zip(columns, ("A", "B", settings.difference), strict=True):
+    for x, name in zip(columns, ("A", "B", CHANGE, DIFFERENCE_LENGTH), strict=True):
         canvas.text(x, y, name, weight="bold", ha="right")
-    rows = (
-        ("max |E|", [part.max_um for part in found]),
-        ("mean |E|", [part.mean_um for part in found]),
-        ("P95", [part.p95_um for part in found]),
-        ("RMS", [part.rms_um for part in found]),
-    )
-    for name, numbers in rows:
+    change = statistics_change(found[0], found[1])
+    for name, key in STATISTICS.items():
         y -= canvas.px(28.0)
         canvas.text(start, y, f"{name}  [µm]", colour=canvas.theme.muted)
-        for x, number in zip(columns, numbers, strict=True):
-            canvas.text(x, y, spell(number), ha="right")
+        a, b, difference = (getattr(part, key) for part in found)
+        texts = (spell(a), spell(b), spell_signed(change[key]), spell(difference))
+        for x, text in zip(columns, texts, strict=True):
+            canvas.text(x, y, text, ha="right")
     box = (start, bottom + canvas.px(10.0), right, y)
     draw_scale_bars(canvas, box, drawn.projection.px_per_mm, drawn.exaggeration)

@@ -11,12 +11,12 @@ from warpspace.analysis.explain import Explanation, explain
 from warpspace.analysis.gains import Gain, gains_max
 from warpspace.analysis.montecarlo import MonteCarlo, Plan, montecarlo
 from warpspace.analysis.nodes import Over
-from warpspace.analysis.statistics import Statistics, statistics
+from warpspace.analysis.statistics import Statistics
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.kinematics.model import Loop
-from warpspace.picture.comparison import share_exaggeration
+from warpspace.picture.comparison import scene_change, share_exaggeration
 from warpspace.picture.exaggeration import Exaggeration
-from warpspace.picture.model import same_nodes, subtract_fields
+from warpspace.picture.model import same_nodes
 from warpspace.picture.scene_picture import ScenePicture, evaluate_picture
 from warpspace.scene.model import Scene
 from warpspace.scene.pipeline import linearisation_error_um
@@ -124,7 +124,7 @@ class Review:
     largest_um : float, µm
         Largest error of all scenes: the end of the colour scale they share.
     difference : Statistics or None
-        Of second minus first, as vectors, node by node.
+        Of |E_B − E_A|: the length of second minus first, as vectors, node by node.
     """
 
     settings: ReportSettings
@@ -234,7 +234,7 @@ def _difference(pictures: Sequence[ScenePicture]) -> Statistics | None:
     """Statistics of second minus first where the nodes are the same."""
     if len(pictures) != 2:
         return None
-    first, second = (picture.field for picture in pictures)
-    if not same_nodes(first.nominal_mm, second.nominal_mm):
+    first, second = pictures
+    if not same_nodes(first.field.nominal_mm, second.field.nominal_mm):
         return None
-    return statistics(subtract_fields(second, first))
+    return scene_change(first, second).statistics

@@ -27,7 +27,13 @@ from warpspace.outputs.report.wording import (
     verdict,
     worst_place,
 )
-from warpspace.picture.words import spell, spell_point, spell_short
+from warpspace.picture.comparison import (
+    CHANGE,
+    DIFFERENCE_LENGTH,
+    STATISTICS,
+    statistics_change,
+)
+from warpspace.picture.words import spell, spell_point, spell_short, spell_signed
 from warpspace.units import MICROMETRE
 
 MOST_ROWS = 15
@@ -62,7 +68,7 @@ def _cards(review: Review) -> list[Card]:
         ]
         if review.difference is not None:
             largest = microns(review.difference.max_um)
-            found.append(Card("largest change", largest, "of one point, as a vector"))
+            found.append(Card(f"max {DIFFERENCE_LENGTH}", largest, "largest change of a point"))
         return found
     reviewed = review.scenes[0]
     stats = reviewed.statistics
@@ -83,28 +89,34 @@ def _cards(review: Review) -> list[Card]:
 
 def statistics_table(review: Review) -> Block:
     """Statistics of the fields, side by side where there are two."""
-    named = [(letter or "value", reviewed.statistics) for letter, reviewed in letters(review)]
+    found = [reviewed.statistics for reviewed in review.scenes]
+    names = [letter or "value" for letter, _ in letters(review)]
+    change: dict[str, float] = {}
+    if len(found) == 2:
+        change = statistics_change(found[0], found[1])
+        names.append(CHANGE)
     if review.difference is not None:
-        named.append(("B − A", review.difference))
-    rows = [
-        (label, *(spell(getattr(stats, field)) for _, stats in named))
-        for label, field in (
-            (f"mean, {MICROMETRE}", "mean_um"),
-            (f"RMS, {MICROMETRE}", "rms_um"),
-            (f"P95, {MICROMETRE}", "p95_um"),
-            (f"max, {MICROMETRE}", "max_um"),
-        )
-    ]
-    rows.append(
-        (
-            "max at x, y, z, mm",
-            *(spell_point(stats.max_at_mm) for _, stats in named),
-        )
+        found.append(review.difference)
+        names.append(DIFFERENCE_LENGTH)
+    rows: list[tuple[str, ...]] = []
+    for label, field in STATISTICS.items():
+        numbers = [spell(getattr(stats, field)) for stats in found]
+        numbers[2:2] = [spell_signed(change[field])] if change else []
+        rows.append((f"{label}, {MICROMETRE}", *numbers))
+    columns = [Column("|E| over the volume", width=1.4)]
+    columns += [Column(name, "right") for name in names]
+    note = (
+        f" {CHANGE} is the change of each statistic; {DIFFERENCE_LENGTH} the length of the change"
+        " of the error vector, node by node."
+        if change
+        else ""
     )
-    columns = [Column("|E| over the grid", width=1.4)]
-    columns += [Column(name, "right") for name, _ in named]
-    note = " The difference is taken node by node, as vectors." if review.difference else ""
-    return table(f"Statistics of the length of the position error.{note}", columns, rows)
+    return table(
+        "Statistics of the length of the position error, each node counting for its share of the"
+        f" volume.{note}",
+        columns,
+        rows,
+    )
 
 
 def explanation_blocks(letter: str, reviewed: Reviewed) -> list[Block]:

@@ -12,6 +12,7 @@ from warpspace.app.viewport.layers import NOTHING, SCENE_PER_MM
 from warpspace.app.viewport.layers.adding import add_lines
 from warpspace.app.viewport.layers.box import dashes
 from warpspace.machine.parameters import parameter
+from warpspace.picture.coordinates import spell_axes, spell_in_r
 from warpspace.units import Array
 
 ACCENT = (194, 24, 91)
@@ -76,7 +77,9 @@ class AskedPointLayer:
         self._line("vector", np.stack([nominal, found.drawn_mm])[None])
         length = float(np.linalg.norm(found.explanation.error_um))
         self._label(
-            "point", f"{length:.1f} µm", found.drawn_mm + 1.8 * RADIUS * size * np.eye(3)[2]
+            "point",
+            f"{length:.1f} µm\n{spell_axes(found.at)}\n{spell_in_r(nominal)}",
+            found.drawn_mm + 1.8 * RADIUS * size * np.eye(3)[2],
         )
         chosen = [p for p in found.explanation.contributions if p.key == picture.state.lever]
         if chosen:

@@ -95,7 +95,7 @@ class AxesLayer:
             first = len(ticks) - 2 if index == 0 else len(ticks) // 2
             between = np.mean(ticks[max(first, 0) :][:2])
             title = foot + between * along + 6.0 * TICK * longest * out
-            self._label(f"{'XYZ'[index]} [mm]", title, 1.0)
+            self._label(f"{'xyz'[index]} in R [mm]", title, 0.85)
         self._lines.put(points=np.stack(lines).astype(np.float32))
 
     def _label(self, text: str, at: Array, size: float) -> None:
