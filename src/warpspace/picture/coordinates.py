@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import SupportsFloat
 
-from warpspace.machine.parameters import LINEAR_AXES
+from warpspace.machine.axes import is_linear, is_rotary
 from warpspace.picture.words import spell_coordinate
 from warpspace.units import Array
 
@@ -26,8 +26,8 @@ def spell_axes(axes: Mapping[str, SupportsFloat]) -> str:
     str
         Linear axes first. Rotary axes at zero are left out where there are others.
     """
-    linear = [f"{name} {spell_coordinate(axes[name])}" for name in LINEAR_AXES if name in axes]
-    rotary = {name: float(at) for name, at in axes.items() if name not in LINEAR_AXES}
+    linear = [f"{name} {spell_coordinate(axes[name])}" for name in axes if is_linear(name)]
+    rotary = {name: float(at) for name, at in axes.items() if not is_linear(name)}
     turned = {name: at for name, at in rotary.items() if round(at, 1) != 0.0 or not linear}
     return " ".join(
         ("axes", *linear, *(f"{name} {spell_coordinate(at)}°" for name, at in turned.items()))
@@ -71,7 +71,7 @@ def spell_at(axes: Mapping[str, SupportsFloat]) -> str:
     str
         For instance ``X=275,Y=-225,Z=-480,B=0,C=0``, to a nanometre: linear axes first.
     """
-    names = (*(n for n in LINEAR_AXES if n in axes), *(n for n in axes if n not in LINEAR_AXES))
+    names = sorted(axes, key=is_rotary)
     return ",".join(f"{name}={_plain(float(axes[name]))}" for name in names)
 
 

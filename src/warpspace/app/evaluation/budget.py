@@ -86,7 +86,9 @@ def pick(picture: LivePicture, origin_mm: Array, direction: Array) -> Picked | N
 def pick_worst(picture: LivePicture) -> Picked:
     """Give the node whose position error is largest in what is drawn."""
     found = picture.statistics.max_at_axes
-    return Picked({name: at for name, at in found.items() if name in LINEAR_AXES})
+    return Picked(
+        {name: at for name, at in found.items() if is_linear(name) or name in picture.grid.axes}
+    )
 
 
 def _on_surface(picture: LivePicture, origin: Array, unit: Array) -> tuple[Picked, float] | None:

@@ -9,6 +9,7 @@ from warpspace.app.evaluation.conventions import Effect, choices, chosen, own_st
 from warpspace.app.evaluation.machine import standing
 from warpspace.app.readouts.html import render
 from warpspace.app.state.app_state import AppState
+from warpspace.field.grid import find_volume_axes
 from warpspace.kinematics.conventions.registry import find_convention
 from warpspace.machine.axes import is_linear
 
@@ -63,8 +64,7 @@ def conventions_html(state: AppState, effects: Mapping[str, Effect], attributes:
         HTML.
     """
     ranges = state.scene.workspace.ranges
-    moving = (len(set(ranges.get(axis, (0.0,)))) > 1 for axis in LINEAR_AXES)
-    nodes = "×".join(str(state.nodes if moves else 1) for moves in moving)
+    nodes = "×".join(str(state.nodes if axis else 1) for axis in find_volume_axes(ranges))
     return render(
         "conventions",
         groups=[(*GROUPS[name], list(own)) for name, own in groupby(choices(state), _group)],
