@@ -80,7 +80,7 @@ def test_legend_escapes_what_a_scene_file_says() -> None:
 def test_legend_says_factor_units_numbers_and_place() -> None:
     live = LiveModel()
     picture = live.evaluate(start_state(load_scene("dvf5000_first")))
-    assert "displacement drawn ×1000" in legend.heading(picture)
+    assert "exaggeration ×1000" in legend.heading(picture)
     summary = legend.summary(picture)
     assert f"{picture.statistics.mean_um:.2f} µm" in summary
     assert "X 275, Y −225, Z −51 mm" in summary

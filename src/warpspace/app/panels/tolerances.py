@@ -10,6 +10,7 @@ from warpspace.app.browser.handles import Input
 from warpspace.app.evaluation.cache import Cache, Identity
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
+from warpspace.app.readouts.chart_text import chart_text, describe_histogram
 from warpspace.app.readouts.charts import WHOLE, add_chart, chart_axis
 from warpspace.app.readouts.html import message
 from warpspace.app.readouts.probability import histogram_lines, spell_probability, spell_scatter
@@ -83,6 +84,7 @@ class TolerancesPanel:
             context.changed,
         )
         self._words = gui.add_html("")
+        self._alternative = gui.add_html("")
         self._histogram = add_chart(
             gui,
             (np.array([0.0, 1.0]),) + (np.zeros(2),) * 3,
@@ -162,7 +164,7 @@ class TolerancesPanel:
             ensemble = ENSEMBLES.get(sampled, lambda: _sample(state), lambda found: found.size)
         except WarpspaceError as error:
             self._words.content = message(str(error), "refusal", small=True)
-            self._numbers.content = ""
+            self._numbers.content = self._alternative.content = ""
             self._histogram.visible = False
             return
         self._draw(ensemble, state)
@@ -179,6 +181,10 @@ class TolerancesPanel:
         shares = tolerance_shares(ensemble, state.tolerances, ensemble.keys)
         self._words.content = spell_probability(chance)
         self._histogram.data = histogram_lines(chance)
+        bars = chance.histogram
+        self._alternative.content = chart_text(
+            describe_histogram(bars.edges_um, bars.counts, chance.probability.spec_um, "machines")
+        )
         self._histogram.visible = True
         self._numbers.content = spell_scatter(chance, shares)
 

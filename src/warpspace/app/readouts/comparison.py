@@ -8,7 +8,7 @@ from warpspace.picture.words import spell_place
 
 NOTHING = message(
     "Choose a scene for B, or pin what is shown now and go on changing it: both are drawn with the"
-    " same colours, factor and camera."
+    " same colours, exaggeration and camera."
 )
 MARK = "▸ "
 """Before the name of what is drawn."""
