@@ -44,6 +44,7 @@
       }
     for (const button of all(".mantine-Notification-closeButton"))
       put(button, "aria-label", "Close the message");
+    for (const icon of all(".tabler-icon")) put(icon, "aria-hidden", "true");
     for (const button of all(".mantine-Modal-close")) put(button, "aria-label", "Close");
   };
 
@@ -87,6 +88,7 @@
       const text = words(`[data-value="${value}"]`);
       if (text) parts.push(`${value} ${text}`);
     }
+    for (const other of all("canvas")) if (other !== canvas) put(other, "aria-hidden", "true");
     put(canvas, "role", "img");
     put(canvas, "aria-label",
       "Drawing of the deformed working volume. " + parts.filter(Boolean).join(", "));

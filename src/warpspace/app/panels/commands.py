@@ -189,11 +189,11 @@ class CommandsPanel:
         gui, state = self._context.gui, self._context.store.state
         self._help = gui.add_modal("Keys and help")
         with self._help:
-            gui.add_html(help_text(self.commands, state.scene.title, state.scene.description))
             tour = gui.add_button(
                 "Take the tour", color="gray", hint="Five steps: what there is, and how it is used."
             )
             tour.on_click(lambda _: self._context.act(self.show_tour))
+            gui.add_html(help_text(self.commands, state.scene.title, state.scene.description))
             close = gui.add_button("Close", hint="Close this window; H and Esc do the same.")
             close.on_click(lambda _: self._context.act(self._toggle_help))
 

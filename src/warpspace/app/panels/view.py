@@ -38,7 +38,7 @@ SWITCHES = {
     "dark": ("Dark mode", "Light lines on a dark ground; the colours of the map stay."),
 }
 
-UNSEEN = "position:absolute!important;width:1px!important;height:1px;overflow:hidden;clip-path:inset(50%)"
+UNSEEN = "position:absolute!important;width:1px!important;overflow:hidden;clip-path:inset(50%)"
 """Style of what only screen readers are to find."""
 
 
@@ -176,7 +176,8 @@ class ViewPanel:
             f"[id='{dom_id(self._log.handle)}']{{margin-right:14px}}"
             # one control with one name: only screen readers need that of each part
             f"div:has(> p > :is(label[for='{dom_id(self._log.handle)}'],"
-            f"label[for='{dom_id(buttons)}'])){{{UNSEEN}}}</style>"
+            f"label[for='{dom_id(buttons)}'])){{{UNSEEN}}}"
+            f"div:has(> div > p > label[for='{dom_id(buttons)}']){{padding-top:10px}}</style>"
         )
         choices = {"Auto": None, "True scale": TRUE_SCALE}
 

@@ -1,8 +1,9 @@
 """What a chart shows in words, for those who do not see it."""
 
-from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpspace.app.readouts.html import render
 from warpspace.picture.words import spell
@@ -54,7 +55,7 @@ def describe_curve(name: str, unit: str, along: str, at: Array, value: Array) ->
 
 
 def describe_histogram(
-    edges_um: Array, counts: Sequence[int] | Array, limit_um: float, words: str
+    edges_um: Array, counts: NDArray[np.integer[Any]], limit_um: float, words: str
 ) -> str:
     """Say what the histogram of the error shows.
 
