@@ -40,7 +40,7 @@ def test_an_error_is_found_set_looked_at_and_undone_without_a_mouse(tab: Tab) ->
     page = tab.page
     # 1. find: the cursor goes into the search box, and on to the number of what was found
     keys(tab, "/")
-    page.keyboard.type("squareness of y")
+    page.keyboard.type("squareness y to x")
     tab.until(lambda: tab.page.locator(".ws-error").count() == 1)
     keys(tab, "Enter")
     tab.until(lambda: page.evaluate(FOCUSED).startswith("EC0Y"))
@@ -54,7 +54,9 @@ def test_an_error_is_found_set_looked_at_and_undone_without_a_mouse(tab: Tab) ->
     tab.until(lambda: tab.session.state.component == "z")
     # 4. open a tab by its name; the focus is on it, and Tab goes on into it
     keys(tab, "Control+k")
+    tab.until(lambda: page.evaluate("document.activeElement.placeholder") == "Search commands...")
     page.keyboard.type("tab: compare")
+    page.get_by_text("Tab: Compare").wait_for()
     keys(tab, "Enter")
     compare = page.get_by_role("tab", name="Compare", exact=True)
     tab.until(lambda: compare.get_attribute("aria-selected") == "true")

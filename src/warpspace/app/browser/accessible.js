@@ -44,7 +44,9 @@
       }
     for (const button of all(".mantine-Notification-closeButton"))
       put(button, "aria-label", "Close the message");
-    for (const icon of all(".tabler-icon")) put(icon, "aria-hidden", "true");
+    // icons say nothing that their button does not; a drawing that is to be heard has a name
+    for (const icon of all("svg:not([role], [aria-label], :has(title))"))
+      put(icon, "aria-hidden", "true");
     for (const button of all(".mantine-Modal-close")) put(button, "aria-label", "Close");
   };
 
