@@ -69,6 +69,10 @@ def test_an_error_is_found_set_looked_at_and_undone_without_a_mouse(tab: Tab) ->
     keys(tab, "Control+z", "Control+z")
     tab.until(lambda: tab.session.state.component == "norm")
     tab.until(lambda: tab.session.state.amplitudes["EC0Y"] == START.amplitudes["EC0Y"])
+    # 6. and all errors are there again
+    tab.until(lambda: float(tab.box("EC0Y").input_value()) == START.amplitudes["EC0Y"])
+    keys(tab, "/", "Delete")
+    tab.until(lambda: tab.page.locator(".ws-error").count() > 30)
 
 
 def test_keys_work_in_a_check_box_and_not_where_text_is_written(tab: Tab) -> None:
@@ -106,7 +110,8 @@ def test_all_that_is_operated_or_drawn_has_a_name(tab: Tab) -> None:
         assert [role for role, said in found if role in NAMED and not said] == [], name
     tab.panel("View")
     tab.panel("Volumetric error")
-    page.wait_for_timeout(400)
+    tab.session.context.post(lambda state: state.with_chosen_error("EAY"))
+    page.wait_for_timeout(900)
     found = tree(tab)
     # a slider and its number, a text box, a group of buttons, a chart, the drawing, the colours
     for role, said in (
