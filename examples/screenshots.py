@@ -104,7 +104,7 @@ def dark(page: Page) -> None:
 
 def signed(page: Page) -> None:
     """Colour by one signed component."""
-    choose(page, "Colour", "E_z")
+    choose(page, "Component", "E_z")
 
 
 def switched(page: Page) -> None:
@@ -149,7 +149,7 @@ def sliced(page: Page) -> None:
 def bent(page: Page) -> None:
     """Draw the machine as its errors bend it."""
     tick(page, "Machine bodies")
-    tick(page, "Bodies bent by the errors")
+    tick(page, "Bodies deformed by the errors")
     page.keyboard.press("f")
 
 
@@ -210,7 +210,7 @@ def take(browser: Browser, viewer: Viewer, visit: Visit) -> Image.Image:
     page.wait_for_function(LOADED, timeout=60_000)
     page.wait_for_selector("html[data-warpspace=open]", timeout=60_000)
     page.wait_for_timeout(SETTLED_MS)
-    # the client's remark on software rendering, and any first-use hint
+    # the client's remark on software rendering
     for button in page.locator(".mantine-Notification-closeButton").all():
         button.click()
     if visit.tab:

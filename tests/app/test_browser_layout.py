@@ -58,10 +58,10 @@ def test_the_divider_on_the_left_can_be_moved(tab: Tab) -> None:
 
 
 def test_the_colours_of_tilts_are_called_tilts(tab: Tab) -> None:
-    tab.choose("Colour shows", "tool-orientation error [µrad]")
-    colour = tab.page.get_by_label("Colour", exact=True)
+    tab.choose("Quantity", "tool-orientation error [µrad]")
+    colour = tab.page.get_by_label("Component", exact=True)
     tab.until(lambda: colour.input_value() == "|φ| tilt of the tool axis")
-    tab.choose("Colour", "φ_y tilt about y")
+    tab.choose("Component", "φ_y tilt about y")
     tilted = replace(START, look=START.look.with_choice(quantity="orientation"))
     picture = LIVE.evaluate(tilted.with_component("y"))
     wanted = vertex_colours(
@@ -73,5 +73,5 @@ def test_the_colours_of_tilts_are_called_tilts(tab: Tab) -> None:
     assert float(worst.split()[0].replace("−", "-")) == pytest.approx(
         picture.values.max(), abs=0.006
     )
-    tab.choose("Colour shows", "position error [µm]")
+    tab.choose("Quantity", "position error [µm]")
     tab.until(lambda: colour.input_value() == "E_y")

@@ -165,7 +165,7 @@ def test_undo_and_redo_of_everything(tab: Tab) -> None:
     moved = START.with_amplitude("EXX", 8.0)
     shows(tab, moved)
     tab.page.wait_for_timeout(PAUSE)
-    tab.choose("Colour", "E_x")
+    tab.choose("Component", "E_x")
     tab.until(lambda: tab.page.get_by_text("E_x", exact=False).count() > 0)
     tab.page.wait_for_timeout(300)
     press(tab, "Control+z")
@@ -178,7 +178,7 @@ def test_undo_and_redo_of_everything(tab: Tab) -> None:
     press(tab, "Control+Shift+z")
     shows(tab, moved)
     tab.page.get_by_role("button", name="Redo").click()
-    tab.until(lambda: "E_x" in tab.page.get_by_label("Colour", exact=True).input_value())
+    tab.until(lambda: "E_x" in tab.page.get_by_label("Component", exact=True).input_value())
 
 
 # --- 6. statistics and probability ----------------------------------------------------------------
@@ -314,17 +314,17 @@ def test_in_a_shared_review_all_see_and_steer_one_state(shared_tabs: Callable[[]
     assert two.errors == []
 
 
-# --- 11. keys, palette, dark mode, help, hint --------------------------------------------------
+# --- 11. keys, palette, dark mode, help ----- --------------------------------------------------
 
 
 def test_keys_do_the_main_actions(tab: Tab) -> None:
     shows(tab, START)
     press(tab, "t")
-    tab.until(lambda: tab.text("factor") == "true scale")
+    tab.until(lambda: "true scale" in tab.text("factor"))
     press(tab, "x")
     tab.until(lambda: "1000" in tab.text("factor"))
     press(tab, "2")
-    tab.until(lambda: "E_x" in tab.page.get_by_label("Colour", exact=True).input_value())
+    tab.until(lambda: "E_x" in tab.page.get_by_label("Component", exact=True).input_value())
     press(tab, "0")
     tab.until(lambda: tab.number("max") == 0.0)
     press(tab, "r")
@@ -352,7 +352,7 @@ def test_the_palette_and_the_help_list_what_there_is(tab: Tab) -> None:
     press(tab, "Control+k")
     tab.page.get_by_placeholder("Search commands").fill("true scale")
     tab.page.keyboard.press("Enter")
-    tab.until(lambda: tab.text("factor") == "true scale")
+    tab.until(lambda: "true scale" in tab.text("factor"))
     press(tab, "h")
     tab.until(lambda: tab.page.get_by_text("Keys and help").is_visible())
     for words in ("Ctrl + Shift + Z", "Camera to the operator's side", "Command palette"):
@@ -370,19 +370,6 @@ def test_every_control_explains_itself(tab: Tab) -> None:
         if getattr(handle, "visible", True) and not getattr(handle, "hint", "none needed")
     ]
     assert silent == []
-
-
-@pytest.mark.own_page
-def test_the_first_hint_leaves_by_itself_and_does_not_come_back(tab: Tab) -> None:
-    hint = tab.page.locator("#warpspace-hint")
-    assert hint.is_visible()
-    assert "Drag a slider" in hint.inner_text()
-    tab.page.mouse.click(640, 400)
-    tab.until(lambda: hint.count() == 0)
-    tab.page.reload()
-    wait_until_open(tab.page)
-    tab.page.wait_for_timeout(500)
-    assert hint.count() == 0
 
 
 # --- bad input --------------------------------------------------------------------------------

@@ -123,7 +123,7 @@ def test_isolines_arrows_worst_point_and_bars(tab: Tab) -> None:
 
 
 def test_orientation_error_and_colour_ranges(tab: Tab) -> None:
-    tab.choose("Colour shows", "tool-orientation error [µrad]")
+    tab.choose("Quantity", "tool-orientation error [µrad]")
     picture = LIVE.evaluate(looking(quantity="orientation"))
 
     def coloured(picture) -> bool:
@@ -249,7 +249,7 @@ def test_machine_moves_bends_and_carries_the_tool_point(tab: Tab) -> None:
     point = tool_point(LIVE.evaluate(state))
     at = np.array(tab.page.evaluate(PLACE, "/machine/tool_point")) / SCENE_PER_MM
     assert sorted(np.abs(at)) == pytest.approx(sorted(np.abs(point.drawn_mm)), abs=0.01)
-    tick(tab, "Bodies bent by the errors")
+    tick(tab, "Bodies deformed by the errors")
     straight = replace(state, machine=state.machine.switched(bent=False))
     tab.until(lambda: stands(straight))
     assert not stands(state)

@@ -81,7 +81,7 @@ def test_legend_escapes_what_a_scene_file_says() -> None:
 def test_legend_says_factor_units_numbers_and_place() -> None:
     live = LiveModel()
     picture = live.evaluate(start_state(load_scene("dvf5000_first")))
-    assert "displacement drawn ×1000" in legend.heading(picture)
+    assert "exaggeration ×1000" in legend.heading(picture)
     summary = legend.summary(picture)
     assert f"{picture.statistics.mean_um:.2f} µm" in summary
     assert "axes X 275 Y −225 Z −480 · in R x 275 y −225 z −51" in summary

@@ -65,7 +65,7 @@ def test_opens_without_network_and_draws(browser: "Browser", tmp_path: "Path", t
     page.on("pageerror", lambda error: problems.append(str(error)))
     page.on("console", lambda entry: problems.append(entry.text) if entry.type == "error" else None)
     page.goto(path.as_uri())
-    assert page.locator("b[data-value=factor]").inner_text() == "displacement drawn ×1000"
+    assert page.locator("b[data-value=factor]").inner_text() == "exaggeration ×1000"
     canvas = page.frame_locator("iframe").locator("canvas").first
     canvas.wait_for(state="visible", timeout=30_000)
     colours = 0

@@ -1,4 +1,4 @@
-"""What the panels say: histogram and probability, ranked bars, commands, help, the first hint."""
+"""What the panels say: histogram and probability, ranked bars, commands, help."""
 
 import re
 from dataclasses import replace
@@ -9,7 +9,6 @@ import pytest
 from warpspace import load_scene
 from warpspace.analysis.distribution import Histogram, Probability
 from warpspace.analysis.montecarlo import Over
-from warpspace.app.browser.opening import hint_script
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.probability import Estimate
 from warpspace.app.evaluation.sensitivities import rank_picture
@@ -138,10 +137,3 @@ def test_help_lists_the_keys():
     text = help_text((command, Command("Palette only", "", None, None, lambda: None)))
     assert "Ctrl + Shift + Z" in text
     assert "Palette only" not in text
-
-
-def test_the_hint_takes_no_clicks_and_leaves():
-    script = hint_script('a"b</script>', 3.0)
-    assert "pointer-events:none" in script
-    assert "3000" in script
-    assert '"a\\"b</script>"' in script

@@ -44,7 +44,7 @@ def view_png(pixels: NDArray[np.uint8], picture: LivePicture) -> bytes:
     facts = PngImagePlugin.PngInfo()
     facts.add_text("Software", f"warpspace {__version__}")
     facts.add_itxt("Title", picture.title)
-    facts.add_itxt("Description", f"displacement drawn {spell_factor(picture.exaggeration)}")
+    facts.add_itxt("Description", f"exaggeration {spell_factor(picture.exaggeration)}")
     written = BytesIO()
     page.convert("RGB").save(written, "PNG", pnginfo=facts)
     return written.getvalue()
@@ -69,7 +69,7 @@ def _heading(draw: ImageDraw.ImageDraw, picture: LivePicture, ink: tuple[int, in
     draw.text((16, 10), title[:110], ink, _font(22))
     draw.text(
         (16, 38),
-        f"displacement drawn {factor} · |E| mean {found.mean_um:.2f} µm, max {found.max_um:.2f} µm"
+        f"exaggeration {factor} · |E| mean {found.mean_um:.2f} µm, max {found.max_um:.2f} µm"
         f" · {picture.both_words(lambda state: state.loop.value)} loop",
         ink,
         _font(15),

@@ -91,7 +91,7 @@ class AppearancePanel:
         self._folder: Any = None
         self._slices: dict[str, Input[float]] = {}
         self._quantity = self._names(
-            "Colour shows", QUANTITY_NAMES, state.look.quantity, "Which error the colours mean."
+            "Quantity", QUANTITY_NAMES, state.look.quantity, "Which error the colours mean."
         )
         self._range = self._names(
             "Colour range",

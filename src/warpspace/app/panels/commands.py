@@ -1,21 +1,25 @@
-"""What can be done by key, palette and button: undo, reset, view, help."""
+"""What can be done by key, palette and button: undo, reset, view, tabs, help, tour."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
+from warpspace.app.browser.accessible import find_script, tab_script
+from warpspace.app.browser.tour import tour_script, tour_stops
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext, Update
+from warpspace.app.readouts.help import spell_help
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import TRUE_SCALE, AppState
 from warpspace.machine.parameters import PARAMETERS
+from warpspace.picture.words import spell_factor
 
 # A S D Q E belong to viser's camera; W is taken from it, see browser/copying.py.
 WORDS = {
     "amplitudes": "errors",
     "positions": "rotary position",
     "exaggeration": "exaggeration",
-    "component": "colour",
     "loop": "loop",
     "nodes": "grid density",
     "exclusions": "solo and mute",
@@ -62,15 +66,17 @@ class Command:
 
 
 class CommandsPanel:
-    """Undo and redo buttons, the palette with its keys, help, and the first-use hint.
+    """Undo and redo buttons, the palette with its keys, help and tour.
 
     Parameters
     ----------
     context : PanelContext
+    tabs : sequence of str, optional
+        The words on the tabs, each of which can be opened by its name.
     """
 
-    def __init__(self, context: PanelContext) -> None:
-        self._context = context
+    def __init__(self, context: PanelContext, tabs: Sequence[str] = ()) -> None:
+        self._context, self._tabs = context, tabs
         self._help: Any = None
         buttons = context.gui.add_button_group(
             "History",
@@ -96,9 +102,6 @@ class CommandsPanel:
         def does(update: Update) -> Callable[[], None]:
             return lambda: self._context.post(update)
 
-        def coloured(component: str) -> Callable[[], None]:
-            return does(lambda state: state.with_component(component))
-
         return (
             Command("Undo", "Take the latest change back", "Z", "cmd/ctrl", self._undo),
             Command("Redo", "Do it again", "Z", "cmd/ctrl+shift", self._redo),
@@ -107,37 +110,60 @@ class CommandsPanel:
             Command("All errors zero", "The nominal machine", "0", None, does(AppState.zeroed)),
             Command("Hear all errors", "End solo and mute", "L", None, does(edits.include_all)),
             Command(
-                "Exaggeration auto",
-                "A round factor that shows the error",
+                "Exaggeration: auto",
+                "A round number that shows the error",
                 "X",
                 None,
                 does(lambda state: state.with_exaggeration(None)),
             ),
             Command(
-                "True scale",
-                "Displacement drawn ×1",
+                "Exaggeration: ×1, true scale",
+                "Errors drawn as large as they are",
                 "T",
                 None,
                 does(lambda state: state.with_exaggeration(TRUE_SCALE)),
             ),
-            Command(
-                "Colour: magnitude", "Length of the error, or tilt", "1", None, coloured("norm")
-            ),
-            Command(
-                "Colour: x component", "Error along x, or tilt about x", "2", None, coloured("x")
-            ),
-            Command(
-                "Colour: y component", "Error along y, or tilt about y", "3", None, coloured("y")
-            ),
-            Command(
-                "Colour: z component", "Error along z, or tilt about z", "4", None, coloured("z")
-            ),
+            *self._component_commands(),
             Command("Grid lines", "Show or hide", "G", None, does(_toggled("grid_lines"))),
             Command("Nominal box", "Show or hide", "B", None, does(_toggled("ghost"))),
             Command("Rotary traces", "Show or hide", "C", None, does(_toggled("traces"))),
             Command("Dark mode", "Dark or light page", "M", None, does(_toggled("dark"))),
-            Command("Help", "All keys", "H", None, self._toggle_help),
+            Command("Help", "All keys, and what is drawn", "H", None, self._toggle_help),
+            Command("Tour", "Five steps: what there is", None, None, self.show_tour),
+            Command("Find an error", "Cursor into the search box (/)", None, None, self._find),
+            *(
+                Command(f"Tab: {name}", "Open this tab", None, None, partial(self._open, name))
+                for name in self._tabs
+            ),
         )
+
+    def _component_commands(self) -> tuple[Command, ...]:
+        """List the components that colours can show."""
+
+        def coloured(component: str) -> Callable[[], None]:
+            return lambda: self._context.post(lambda state: state.with_component(component))
+
+        return (
+            Command("Component: length", "Of the error, or the tilt", "1", None, coloured("norm")),
+            *(
+                Command(
+                    f"Component: {name}",
+                    f"Colours show the error along {name}, or the tilt about {name}",
+                    key,
+                    None,
+                    coloured(name),
+                )
+                for key, name in zip("234", "xyz", strict=True)
+            ),
+        )
+
+    def _find(self) -> None:
+        """Put the cursor into the search box."""
+        self._context.page.run_script(find_script())
+
+    def _open(self, tab: str) -> None:
+        """Bring a tab to the front."""
+        self._context.page.run_script(tab_script(tab))
 
     def _undo(self) -> None:
         """Take the latest change back and say what it was."""
@@ -160,12 +186,31 @@ class CommandsPanel:
         if opened is not None:
             opened.close()
             return
-        gui = self._context.gui
+        gui, state = self._context.gui, self._context.store.state
         self._help = gui.add_modal("Keys and help")
         with self._help:
-            gui.add_markdown(help_text(self.commands))
-            close = gui.add_button("Close", hint="Close this window; H does the same.")
+            tour = gui.add_button(
+                "Take the tour", color="gray", hint="Five steps: what there is, and how it is used."
+            )
+            tour.on_click(lambda _: self._context.act(self.show_tour))
+            gui.add_html(help_text(self.commands, state.scene.title, state.scene.description))
+            close = gui.add_button("Close", hint="Close this window; H and Esc do the same.")
             close.on_click(lambda _: self._context.act(self._toggle_help))
+
+    def show_tour(self, *, asked: bool = True) -> None:
+        """Show the tour of what is drawn.
+
+        Parameters
+        ----------
+        asked : bool, optional
+            Whether a user wants it; else only a browser that was never here shows it.
+        """
+        if self._help is not None:
+            self._toggle_help()
+        shown, scene = self._context.shown, self._context.store.state.scene
+        factor = "" if shown is None else spell_factor(shown.exaggeration)
+        stops = tour_stops(scene.title, scene.description, factor)
+        self._context.page.run_script(tour_script(stops, asked=asked))
 
     def read(self, state: AppState) -> AppState:
         """Nothing to take over."""
@@ -208,24 +253,20 @@ def spell_change(what: str) -> str:
     return unique[0] if len(unique) == 1 else f"{unique[0]} and {len(unique) - 1} more"
 
 
-def help_text(commands: tuple[Command, ...]) -> str:
-    """Write the help: what the mouse does, and all keys."""
-    rows = "\n".join(
-        f"| **{command.keys}** | {command.label.replace('|', chr(92) + '|')} "
-        f"| {command.description} |"
-        for command in commands
-        if command.keys
-    )
-    return (
-        "Drag to turn the view, drag with the right button to move it, wheel to zoom. Every"
-        " control explains itself when the mouse rests on it.\n\n"
-        "| key | does | |\n|---|---|---|\n"
-        "| **Ctrl + K** | Command palette | All of this by name |\n"
-        "| **A S D Q E** | Camera | Fly through the scene |\n"
-        "| **← →** | Slider with focus | One step |\n"
-        "| **W** | Worst point | What its error consists of |\n"
-        "| **N** | Forget the point | End the question |\n"
-        f"{rows}\n\n"
-        "Keys act when no text box has the focus. After a dropped connection the tab finds its"
-        " state again for ten minutes."
-    )
+def help_text(commands: Sequence[Command], title: str = "", description: str = "") -> str:
+    """Write the help: what is drawn, what the mouse does, and all keys.
+
+    Parameters
+    ----------
+    commands : sequence of Command
+        Those with a key are listed.
+    title, description : str, optional
+        Of the scene.
+
+    Returns
+    -------
+    str
+        HTML.
+    """
+    keys = [(command.keys, command.label, command.description) for command in commands]
+    return spell_help([key for key in keys if key[0]], title, description)

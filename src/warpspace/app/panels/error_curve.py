@@ -9,6 +9,7 @@ from warpspace.app.browser.handles import Input
 from warpspace.app.browser.viser_private import dom_id
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
+from warpspace.app.readouts.chart_text import chart_text, describe_curve
 from warpspace.app.readouts.charts import add_chart, chart_axis
 from warpspace.app.readouts.html import message
 from warpspace.app.state import edits
@@ -60,6 +61,7 @@ class ErrorCurvePanel:
             ),
             context.changed,
         )
+        self._words: Any = gui.add_html("")
         self._chart: Any = add_chart(
             gui,
             _chart_data(None, (0.0, 1.0)),
@@ -165,7 +167,10 @@ class ErrorCurvePanel:
         """Draw the curve along the travel."""
         self._drawn = function
         unit = state.scene.machine.axes[row.axis].unit
-        self._chart.data = _chart_data(function, edits.axis_span(state, row.key))
+        self._chart.data = at, value, _ = _chart_data(function, edits.axis_span(state, row.key))
+        self._words.content = chart_text(
+            describe_curve(f"{row.key}, {row.name}", row.unit, unit, at, value)
+        )
         self._chart.axes = (
             chart_axis(f"{row.axis} [{unit}]", 34),
             chart_axis(f"{row.key} [{row.unit}]", 44),

@@ -1,4 +1,4 @@
-"""The machine tab: its bodies, where its axes stand, whether they are bent."""
+"""The machine tab: its bodies, where its axes stand, whether they are deformed."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -21,8 +21,8 @@ SWITCHES = {
         "A schematic of the machine around the working volume, in true proportions.",
     ),
     "bent": (
-        "Bodies bent by the errors",
-        "Every body takes the errors before it, with the factor of the box. Off: nominal.",
+        "Bodies deformed by the errors",
+        "Every body takes the errors before it, with the exaggeration of the box. Off: nominal.",
     ),
 }
 NO_BODIES = "This machine comes without bodies; its tool point is drawn all the same."

@@ -1,4 +1,4 @@
-"""What is always in view: heading with the display factor, colour bar, statistics, scale bars."""
+"""What is always in view: heading with the exaggeration, colour bar, statistics, scale bars."""
 
 from collections.abc import Callable
 
@@ -41,5 +41,5 @@ def summary_panel(context: PanelContext, _state: AppState) -> HtmlPanel:
 
 
 def heading_panel(context: PanelContext) -> HtmlPanel:
-    """Machine, error set and display factor."""
+    """Machine, error set and exaggeration."""
     return HtmlPanel(context, heading)

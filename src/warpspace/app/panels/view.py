@@ -4,12 +4,13 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from warpspace.app.browser.handles import Input
+from warpspace.app.browser.handles import Handle, Input
 from warpspace.app.browser.viser_private import dom_id
 from warpspace.app.documents.scene_list import MOST_OPENED
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
+from warpspace.app.readouts.help import about_scene
 from warpspace.app.state.app_state import EXAGGERATION, NODES, TRUE_SCALE, AppState
 from warpspace.kinematics.model import Loop
 from warpspace.scene.model import Scene
@@ -31,11 +32,14 @@ LOOP_NAMES = {
 }
 SWITCHES = {
     "traces": ("Rotary traces", "Circles and arcs of the table: nominal light, actual dark."),
-    "ghost": ("Nominal box", "The undeformed working volume, dashed."),
-    "grid_lines": ("Grid lines", "Lines of the grid on the bent box."),
+    "ghost": ("Nominal box", "The working volume without errors, dashed."),
+    "grid_lines": ("Grid lines", "Lines of the grid on the deformed box."),
     "axes": ("Axes", "Coordinates of the machine in mm."),
     "dark": ("Dark mode", "Light lines on a dark ground; the colours of the map stay."),
 }
+
+UNSEEN = "position:absolute!important;width:1px!important;overflow:hidden;clip-path:inset(50%)"
+"""Style of what only screen readers are to find."""
 
 
 class _Names:
@@ -87,15 +91,16 @@ class ViewPanel:
             ),
             changed,
         )
+        self._about = Handle(gui.add_html(""))
         self._add_exaggeration(state)
         names = COMPONENT_NAMES[state.look.quantity]
         self._component: Input[str] = Input(
             gui.add_dropdown(
-                "Colour",
+                "Component",
                 tuple(names.values()),
                 initial_value=names[state.component],
-                hint="What the colours mean: the length of the error or one signed component;"
-                " of the position or of the tool axis, see Colour shows.",
+                hint="What the colours mean: the length or one signed component of the quantity"
+                " chosen below.",
             ),
             changed,
         )
@@ -105,7 +110,7 @@ class ViewPanel:
                 "Structural loop",
                 self._loops.options,
                 initial_value=self._loops.text(state.loop),
-                hint="Structural loop: whose error bends the box.",
+                hint="Structural loop: whose error deforms the box.",
             ),
             changed,
         )
@@ -130,17 +135,17 @@ class ViewPanel:
         }
 
     def _add_exaggeration(self, state: AppState) -> None:
-        """Add factor, logarithmic slider and the two buttons."""
+        """Add the exaggeration: as a number, on a logarithmic slider, and two buttons."""
         gui, context = self._context.gui, self._context
         start = state.exaggeration or TRUE_SCALE  # the slider begins at true scale
-        self._factor: Input[float] = Input(
+        self._exaggeration: Input[float] = Input(
             gui.add_number(
-                "Displacement drawn ×",
+                "Exaggeration ×",
                 initial_value=float(start),
                 min=EXAGGERATION.low,
                 max=EXAGGERATION.high,
                 step=1.0,
-                hint="Display factor of the errors, 0.001 to 1 000 000.",
+                hint="How much larger than true the errors are drawn, 0.001 to 1 000 000.",
             ),
             context.changed,
         )
@@ -153,26 +158,31 @@ class ViewPanel:
                 step=0.01,
                 initial_value=max(math.log10(start), 0.0),
                 marks=((0.0, "×1"), (2.0, "×100"), (4.0, "×10 000"), (top, "×10⁶")),
-                hint="Display factor of the errors, each mark 100 times the one before.",
+                hint="How much larger than true the errors are drawn; each mark is 100 times the"
+                " one before.",
             ),
             context.changed,
+        )
+        buttons = gui.add_button_group(
+            "Exaggeration, auto or true",
+            ("Auto", "True scale"),
+            hint="Auto: a round number that makes the largest error a tenth of the box.",
         )
         # its own number box would show the logarithm
         gui.add_html(
             f"<style>[id='{dom_id(self._log.handle)}'] ~ .mantine-NumberInput-root"
             "{display:none}"
             # the last mark is not cut off
-            f"[id='{dom_id(self._log.handle)}']{{margin-right:14px}}</style>"
+            f"[id='{dom_id(self._log.handle)}']{{margin-right:14px}}"
+            # one control with one name: only screen readers need that of each part
+            f"div:has(> p > :is(label[for='{dom_id(self._log.handle)}'],"
+            f"label[for='{dom_id(buttons)}'])){{{UNSEEN}}}"
+            f"div:has(> div > p > label[for='{dom_id(buttons)}']){{padding-top:10px}}</style>"
         )
-        buttons = gui.add_button_group(
-            "Factor",
-            ("Auto", "True scale"),
-            hint="Auto: a round factor that makes the largest error a tenth of the box.",
-        )
-        factors = {"Auto": None, "True scale": TRUE_SCALE}
+        choices = {"Auto": None, "True scale": TRUE_SCALE}
 
         def choose(name: str) -> None:
-            context.post(lambda s: s.with_exaggeration(factors[name]))
+            context.post(lambda s: s.with_exaggeration(choices[name]))
 
         buttons.on_click(lambda event: choose(event.target.value))
 
@@ -201,9 +211,9 @@ class ViewPanel:
         title = self._scene.poll()
         if title is not None and title in self._scenes:
             state = state.with_scene(self._scenes[title])
-        factor, log = self._factor.poll(), self._log.poll()
-        if factor is not None:
-            state = state.with_exaggeration(factor)
+        exaggeration, log = self._exaggeration.poll(), self._log.poll()
+        if exaggeration is not None:
+            state = state.with_exaggeration(exaggeration)
         elif log is not None:
             state = state.with_exaggeration(_from_log(log))
         component, loop, nodes = self._component.poll(), self._loop.poll(), self._nodes.poll()
@@ -253,7 +263,8 @@ class ViewPanel:
             self._add_positions(state)
         self._know(state.origin)
         self._scene.show(self._title)
-        self._factor.show(float(f"{picture.exaggeration:.4g}"))
+        self._about.put(content=about_scene(state.origin.description))
+        self._exaggeration.show(float(f"{picture.exaggeration:.4g}"))
         self._log.show(max(round(math.log10(picture.exaggeration), 2), 0.0))
         self._show_component(state)
         self._loop.show(self._loops.text(state.loop))
@@ -273,7 +284,7 @@ class ViewPanel:
 
 
 def _from_log(log: float) -> float:
-    """Turn a slider position into a factor of at most three digits; NaN stays NaN."""
+    """Turn a slider position into an exaggeration of at most three digits; NaN stays NaN."""
     if math.isnan(log):
         return math.nan
     return float(f"{10.0 ** min(max(log, -1.0), 300.0):.3g}")

@@ -7,7 +7,7 @@ from warpspace.app.state.comparison import SHOWN
 
 NOTHING = message(
     "Choose a scene for B, or pin the present errors as before and go on changing them: both are"
-    " drawn with the same colours, factor and camera."
+    " drawn with the same colours, exaggeration and camera."
 )
 MARK = "▸ "
 """Before the name of what is drawn."""

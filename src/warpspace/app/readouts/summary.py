@@ -89,7 +89,7 @@ def _marks(picture: LivePicture) -> list[tuple[str, str, float, float]]:
 def _key_to_lines(picture: LivePicture) -> list[tuple[str, str, str]]:
     """List the lines that are drawn: dashing, colour and meaning."""
     colours, shown = palette(picture), picture.state.shown
-    rows = [("solid", colours.edge, "bent working volume")]
+    rows = [("solid", colours.edge, "deformed working volume")]
     if shown.ghost:
         rows.append(("dashed", colours.ghost, "nominal working volume"))
     if moved_traces(picture):
@@ -147,7 +147,7 @@ def summary(picture: LivePicture) -> str:
 
 
 def heading(picture: LivePicture) -> str:
-    """Spell machine, error set and display factor.
+    """Spell machine, error set and exaggeration.
 
     Parameters
     ----------
@@ -159,7 +159,6 @@ def heading(picture: LivePicture) -> str:
         HTML.
     """
     state = picture.drawn_state
-    factor = picture.exaggeration
     active, machine = state.active, state.scene.machine
     return render(
         "heading",
@@ -170,6 +169,6 @@ def heading(picture: LivePicture) -> str:
         machine=f"{machine.title}, chain {machine.chain}",
         size=" × ".join(f"{edge:.0f}" for edge in picture.grid.extent_mm),
         nodes="×".join(str(count) for count in picture.grid.shape),
-        factor="true scale" if factor == 1.0 else f"displacement drawn {spell_factor(factor)}",
+        factor=f"exaggeration {spell_factor(picture.exaggeration)}",
         auto=picture.state.exaggeration is None,
     )

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
+from warpspace.app.browser.accessible import access_script, access_style
 from warpspace.app.browser.arrangement import split_script
 from warpspace.app.browser.clicks import SCRIPT
 from warpspace.app.browser.copying import COPY_SCRIPT
@@ -22,6 +23,9 @@ from warpspace.app.viewport.layers import Layer
 from warpspace.app.viewport.layers.box import BoxLayer
 from warpspace.app.viewport.layers.moving import MovingLayer, draw_around
 
+ERROR_CURVE = "Error curve"
+"""The tab below the sliders."""
+
 Built: TypeAlias = tuple[Sequence[Layer], Sequence[Panel]]
 Build: TypeAlias = Callable[[LivePicture], Built]
 
@@ -39,6 +43,7 @@ class PageContents:
         self._context, self._places = context, places
         self._errors: ErrorsPanel | None = None
         self._expand: Callable[[], None] | None = None
+        self._commands: CommandsPanel | None = None
 
     @property
     def steps(self) -> tuple[Build, ...]:
@@ -52,7 +57,8 @@ class PageContents:
         context.page.run_script(SCRIPT)
         context.page.run_script(COPY_SCRIPT)
         context.page.run_script(style_script("readouts", style_sheet()))
-        commands = CommandsPanel(context)
+        context.page.run_script(style_script("accessible", access_style()))
+        self._commands = commands = CommandsPanel(context, self._tab_names())
         self._errors = errors = ErrorsPanel(context, picture.state, self._expand_curve)
         with self._places.at(HEADING):
             heading = heading_panel(context)
@@ -70,7 +76,7 @@ class PageContents:
         if self._errors is not None:
             self._errors.add_axes(state)
         below = context.gui.add_panel()
-        with below.add_tab("Error curve"):
+        with below.add_tab(ERROR_CURVE):
             curve = ErrorCurvePanel(context, state)
         below.dock_below(context.gui.main_panel)
         self._expand = below.expand
@@ -81,6 +87,7 @@ class PageContents:
         """Build the tabs behind the numbers and behind the view."""
         panels = self._build_tabs("behind", picture.state)
         Pointing(self._context)
+        self._context.page.run_script(access_script())
         return [], panels
 
     def _build_tabs(self, step: Step, state: AppState) -> list[Panel]:
@@ -91,6 +98,15 @@ class PageContents:
                 with self._places.at(tab.name):
                     panels += [build(self._context, state) for build in tab.load()]
         return panels
+
+    def _tab_names(self) -> tuple[str, ...]:
+        """List the words on the tabs of the page."""
+        return (ERROR_CURVE, *(tab.name for tab in tabs() if tab.name in self._places))
+
+    def show_tour(self, *, asked: bool) -> None:
+        """Show the tour if it was asked for, or if this is the browser's first visit."""
+        if self._commands is not None:
+            self._commands.show_tour(asked=asked)
 
     def _expand_curve(self) -> None:
         """Show the panel of one error, should it be minimized."""

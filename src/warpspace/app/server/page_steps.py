@@ -9,7 +9,7 @@ import time
 from collections import deque
 from typing import Any
 
-from warpspace.app.browser.opening import drawn_script, hint_script, stage_script
+from warpspace.app.browser.opening import drawn_script, stage_script
 from warpspace.app.browser.viser_private import dom_id
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
@@ -95,5 +95,5 @@ class PageSteps:
             page.run_script(drawn_script(dom_id(self._answer), self._asked))
         else:
             self._answer.remove()
-            page.run_script(hint_script())
             page.run_script(stage_script("open"))
+            self.contents.show_tour(asked=False)

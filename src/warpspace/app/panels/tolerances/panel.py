@@ -12,6 +12,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
 from warpspace.app.panels.tolerances.allocation import AllocationPart
 from warpspace.app.panels.tolerances.rows import ToleranceRows
+from warpspace.app.readouts.chart_text import chart_text, describe_histogram
 from warpspace.app.readouts.charts import WHOLE, add_chart, chart_axis
 from warpspace.app.readouts.html import message
 from warpspace.app.readouts.probability import histogram_lines, spell_probability, spell_scatter
@@ -69,6 +70,7 @@ class TolerancesPanel:
         )
         self._words = gui.add_html("")
         self._allocation = AllocationPart(context, state)
+        self._alternative = gui.add_html("")
         self._histogram = add_chart(
             gui,
             (np.array([0.0, 1.0]),) + (np.zeros(2),) * 3,
@@ -175,7 +177,7 @@ class TolerancesPanel:
             ensemble = ENSEMBLES.get(sampled, lambda: _sample(state), lambda found: found.size)
         except WarpspaceError as error:
             self._words.content = message(str(error), "refusal", small=True)
-            self._numbers.content = ""
+            self._numbers.content = self._alternative.content = ""
             self._histogram.visible = False
             self._allocation.use(None)
             return
@@ -190,6 +192,12 @@ class TolerancesPanel:
         shares = tolerance_shares(ensemble, state.tolerances, ensemble.keys)
         self._words.content = spell_probability(estimated)
         self._histogram.data = histogram_lines(estimated)
+        bars = estimated.histogram
+        self._alternative.content = chart_text(
+            describe_histogram(
+                bars.edges_um, bars.counts, estimated.probability.spec_um, "machines"
+            )
+        )
         self._histogram.visible = True
         self._numbers.content = spell_scatter(estimated)
         built_for = (Identity(state.origin), ensemble.keys)
