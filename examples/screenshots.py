@@ -108,8 +108,8 @@ def signed(page: Page) -> None:
 
 
 def switched(page: Page) -> None:
-    """Hear two errors, one of them muted."""
-    for word in ("solo EAX", "solo EXX", "mute EXX"):
+    """Include only two errors, one of which is excluded."""
+    for word in ("only EAX", "only EXX", "exclude EXX"):
         page.locator(f"button[data-word='{word}']").click()
         page.wait_for_timeout(PAUSE_MS)
 

@@ -60,7 +60,7 @@ def busy() -> AppState:
     state = state.with_position("B", -30.0).with_position("C", 45.0).with_exaggeration(2000.0)
     state = state.with_component("x").with_loop("relative").with_nodes(11)
     state = state.with_shown(**{f.name: not getattr(state.shown, f.name) for f in fields(Shown)})
-    state = edits.with_soloed(edits.with_muted(state, "EXX", True), "EAX", True)
+    state = edits.with_only(edits.with_excluded(state, "EXX", True), "EAX", True)
     state = edits.with_half_width(state, "EXX", 7.5)
     look = state.look.with_choice(surface="slices", quantity="orientation").with_top(12.5)
     for name in ("isolines", "arrows", "worst", "bars", "follow"):
@@ -149,7 +149,7 @@ def test_hostile_links_are_refused_with_a_message(link: str) -> None:
 def test_hostile_settings_are_clamped_or_left_out_and_named() -> None:
     line = (
         "EXX=1e9&EYX=nan&B=500&nodes=1e6&exaggeration=-3&component=<b>&loop=all&look.surface=evil"
-        "&shown.dark=maybe&rotary.off=0,99,-1&rotary.held.B=inf&muted=EXX,evil&why.X=1e9"
+        "&shown.dark=maybe&rotary.off=0,99,-1&rotary.held.B=inf&excluded=EXX,evil&why.X=1e9"
         "&look.slices_mm.X=1e9&specification.limit_um=1e12&__class__=1&camera=1,2"
     )
     back = with_settings(START, line)
@@ -160,7 +160,7 @@ def test_hostile_settings_are_clamped_or_left_out_and_named() -> None:
     assert back.loop == START.loop
     assert back.look.surface == "surface"
     assert back.rotary.off == frozenset({0})
-    assert back.exclusions.muted == frozenset({"EXX"})
+    assert back.exclusions.excluded == frozenset({"EXX"})
     assert back.picked is not None
     assert abs(back.picked.at["X"]) <= 300.0
     assert any("left out" in note for note in back.notes)

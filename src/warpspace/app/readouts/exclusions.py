@@ -1,4 +1,4 @@
-"""Solo, mute and curve of one error as three small buttons: HTML, and what a click of them does."""
+"""Number box and buttons of one error: only, exclude, curve. HTML, and what a click does."""
 
 from collections.abc import Callable
 
@@ -10,13 +10,13 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.exclusions import Exclusions
 from warpspace.machine.parameters import Parameter
 
-SOLO, MUTE, CURVE = "solo", "mute", "curve"
+ONLY, EXCLUDE, CURVE = "only", "exclude", "curve"
 Attributes = Callable[[str], Markup]
 SWITCHES = (
-    (SOLO, "S", "Solo", "Solo: show the effect of this error alone, or with others on solo"),
-    (MUTE, "M", "Mute", "Mute: leave this error out; its value is kept"),
+    (ONLY, "only", "Only", "Only this error, or only those that are chosen so"),
+    (EXCLUDE, "×", "Exclude", "Exclude this error; its value is kept"),
 )
-"""Word, letter, name and explanation of the switches."""
+"""Word, face, name and explanation of the switches."""
 
 
 def exclusion_buttons(row: Parameter, exclusions: Exclusions, button: Attributes) -> str:
@@ -35,7 +35,7 @@ def exclusion_buttons(row: Parameter, exclusions: Exclusions, button: Attributes
         HTML to stand directly before the error's slider: the style sheet puts the buttons
         at the end of the line with the slider's label.
     """
-    excluded = {SOLO: exclusions.soloed, MUTE: exclusions.muted}
+    excluded = {ONLY: exclusions.only, EXCLUDE: exclusions.excluded}
     return render(
         "exclusions",
         row=row,
@@ -48,17 +48,17 @@ def exclusion_buttons(row: Parameter, exclusions: Exclusions, button: Attributes
 
 
 def with_switched(state: AppState, word: str) -> AppState:
-    """Do what a click of solo or mute asks for.
+    """Do what a click of only or exclude asks for.
 
     Parameters
     ----------
     state : AppState
     word : str
-        For instance "solo EAX"; it comes from a browser, and what means nothing changes nothing.
+        For instance "only EAX"; it comes from a browser, and what means nothing changes nothing.
     """
     what, _, key = word.partition(" ")
-    if what == SOLO:
-        return edits.with_soloed(state, key, key not in state.exclusions.soloed)
-    if what == MUTE:
-        return edits.with_muted(state, key, key not in state.exclusions.muted)
+    if what == ONLY:
+        return edits.with_only(state, key, key not in state.exclusions.only)
+    if what == EXCLUDE:
+        return edits.with_excluded(state, key, key not in state.exclusions.excluded)
     return state

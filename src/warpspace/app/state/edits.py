@@ -1,5 +1,6 @@
 """Changes of a state that reach into its scene: curves and tolerances. Pure, and clamped."""
 
+import math
 from dataclasses import replace
 
 from warpspace.app.state.app_state import AppState
@@ -65,6 +66,20 @@ def with_curve(state: AppState, key: str, function: ErrorFunction) -> AppState:
     )
 
 
+def with_typed_amplitude(state: AppState, key: str, value: float) -> AppState:
+    """Set the amplitude of one parameter to a number that was typed or stored, µm or µrad.
+
+    Unlike the slider's own (`AppState.with_amplitude`), it may lie beyond the slider's range, which
+    then grows; only what the model does not hold for is clamped.
+    """
+    if key not in state.amplitudes:
+        return state.with_amplitude(key, value)
+    span = state.spans[key]
+    if math.isfinite(value) and not span.low <= value <= span.high:
+        span = amplitude_span(key, value, state.scene.tolerances.get(key))
+    return replace(state, spans={**state.spans, key: span}).with_amplitude(key, value)
+
+
 def half_width_of(state: AppState, key: str) -> float:
     """Give the half width of a parameter's tolerance, µm or µrad; 0 where it has none."""
     found = state.tolerances.get(key)
@@ -98,22 +113,22 @@ def with_scene_tolerances(state: AppState) -> AppState:
     return replace(state, tolerances=state.origin.tolerances)
 
 
-def with_muted(state: AppState, key: str, muted: bool) -> AppState:
+def with_excluded(state: AppState, key: str, excluded: bool) -> AppState:
     """Exclude one parameter from the picture, or include it again."""
     if key not in state.amplitudes:
         return state
-    return replace(state, exclusions=state.exclusions.with_muted(key, muted))
+    return replace(state, exclusions=state.exclusions.with_excluded(key, excluded))
 
 
-def with_soloed(state: AppState, key: str, soloed: bool) -> AppState:
+def with_only(state: AppState, key: str, only: bool) -> AppState:
     """Add one parameter to those that alone take part, or take it away."""
     if key not in state.amplitudes:
         return state
-    return replace(state, exclusions=state.exclusions.with_soloed(key, soloed))
+    return replace(state, exclusions=state.exclusions.with_only(key, only))
 
 
 def include_all(state: AppState) -> AppState:
-    """End all solo and mute."""
+    """Include all parameters again."""
     return replace(state, exclusions=type(state.exclusions)())
 
 
