@@ -10,7 +10,7 @@ from warpspace import load_scene
 from warpspace.app.browser.arrangement import split_script
 from warpspace.app.browser.clicks import LONGEST_WORD, MOST_CLICKS, SCRIPT, read_clicks
 from warpspace.app.panels.view import COMPONENT_NAMES, component_of
-from warpspace.app.readouts.exclusions import exclusion_buttons, with_switched
+from warpspace.app.readouts.error_controls import error_controls, with_switched
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.exclusions import Exclusions
@@ -39,8 +39,12 @@ class _Buttons(HTMLParser):
 
 def buttons(exclusions: Exclusions, key: str = "EAX") -> _Buttons:
     return _Buttons(
-        exclusion_buttons(
-            parameter(key), exclusions, lambda word: Markup(f'type="button" data-word="{word}"')
+        error_controls(
+            parameter(key),
+            exclusions,
+            5.5,
+            lambda word: Markup(f'type="button" data-word="{word}"'),
+            lambda word: Markup(f'type="text" data-word="{word}"'),
         )
     )
 
@@ -52,7 +56,11 @@ def pressed(exclusions: Exclusions, key: str = "EAX") -> tuple[str, str]:
 
 def test_the_buttons_say_what_they_do_to_which_error():
     only, exclude, curve = buttons(Exclusions()).found
-    assert [b["data-word"] for b in (only, exclude, curve)] == ["only EAX", "exclude EAX", "curve EAX"]
+    assert [b["data-word"] for b in (only, exclude, curve)] == [
+        "only EAX",
+        "exclude EAX",
+        "curve EAX",
+    ]
     assert only["aria-label"] == "Only EAX, roll of X"
     assert exclude["aria-label"] == "Exclude EAX, roll of X"
     assert curve["aria-label"] == "Curve of EAX, roll of X"

@@ -190,9 +190,7 @@ def _handlers(state: AppState) -> dict[str, Handler]:
         "lever": lambda s, v: replace(s, lever=v) if v in s.amplitudes else refuse(),
     }
     for key in state.amplitudes:
-        found[key] = lambda s, v, key=key: edits.with_typed_amplitude(
-            s, key, read_number(v)
-        )
+        found[key] = lambda s, v, key=key: edits.with_typed_amplitude(s, key, read_number(v))
     for axis in state.positions:
         found[axis] = lambda s, v, axis=axis: s.with_position(axis, read_number(v))
         found[f"why.{axis}"] = lambda s, v, axis=axis: _with_turned(s, axis, read_number(v))
@@ -236,7 +234,7 @@ def _with_top(state: AppState, value: float) -> AppState:
 def _with_exclusions(state: AppState, *, excluded: str = "", only: str = "") -> AppState:
     """Set what is excluded, or what alone takes part, from a list of keys.
 
-    Up to 1.0 the two were called muted and soloed: links and files of that time are read as well.
+    Older links and files call the two muted and soloed.
     """
     exclusions = Exclusions(
         frozenset(excluded.split(",")) if excluded else state.exclusions.excluded,

@@ -105,7 +105,9 @@ class CommandsPanel:
             Command("Fit view", "Camera to the operator's side", "F", None, self._context.fit_view),
             Command("Reset errors", "Values of the scene", "R", None, does(AppState.reset)),
             Command("All errors zero", "The nominal machine", "0", None, does(AppState.zeroed)),
-            Command("Include all errors", "End only and exclude", "L", None, does(edits.include_all)),
+            Command(
+                "Include all errors", "End only and exclude", "L", None, does(edits.include_all)
+            ),
             Command(
                 "Exaggeration auto",
                 "A round factor that shows the error",

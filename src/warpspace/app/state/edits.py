@@ -77,7 +77,8 @@ def with_typed_amplitude(state: AppState, key: str, value: float) -> AppState:
     span = state.spans[key]
     if math.isfinite(value) and not span.low <= value <= span.high:
         span = amplitude_span(key, value, state.scene.tolerances.get(key))
-    return replace(state, spans={**state.spans, key: span}).with_amplitude(key, value)
+        state = replace(state, spans={**state.spans, key: span})
+    return state.with_amplitude(key, value)
 
 
 def half_width_of(state: AppState, key: str) -> float:

@@ -82,7 +82,8 @@ def read_rows(text: str) -> tuple[list[tuple[float, ...]], tuple[str, ...]]:
     numbered = [(number, line) for number, line in enumerate(lines, start=1) if line.strip()]
     remarks: tuple[str, ...] = ()
     if len(numbered) > 1 and _is_heading(numbered[0][1]):
-        remarks = (f"Heading left out: {numbered[0][1][:_SHOWN]!r}.",)
+        heading = " ".join(numbered[0][1].split())[:_SHOWN]
+        remarks = (f"Heading left out: “{heading}”.",)
         del numbered[0]
     return [_numbers(number, line) for number, line in numbered], remarks
 

@@ -92,7 +92,7 @@ class ErrorFunction(ABC):
         return ()
 
     def with_amplitude(self, amplitude: float) -> Self:
-        """Give the same curve with another amplitude; one that is zero everywhere as `grown` has it.
+        """Give the same curve with another amplitude; a zero one takes the shape of `grown`.
 
         Parameters
         ----------

@@ -58,7 +58,9 @@ class Harmonics(ErrorFunction):
         Orders and phases of all terms stay.
         """
         for index in range(len(self.terms)):
-            terms = tuple((n, float(k == index), phase) for k, (n, _, phase) in enumerate(self.terms))
+            terms = tuple(
+                (n, float(k == index), phase) for k, (n, _, phase) in enumerate(self.terms)
+            )
             wave = replace(self, terms=terms)
             if abs(wave.amplitude) > LEAST_PEAK:
                 return wave

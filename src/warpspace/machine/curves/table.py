@@ -18,7 +18,6 @@ from warpspace.units import Array
 MAX_FILE_NAME, MAX_COLUMN_NAME = 1024, 256
 FIRST_POINTS = 5
 """Points that a straight curve of another kind is turned into; a bent one takes more."""
-MOST_FIRST_POINTS = 1281
 KEPT = 0.002
 """Largest distance of the table from the curve it was made of, as a share of its largest value."""
 BETWEEN = 8
@@ -138,17 +137,16 @@ class Table(ErrorFunction):
     def from_curve(cls, present: ErrorFunction, span: Span) -> Self:
         """Give evenly spread points of the present curve, as many as its shape needs.
 
-        Kinks within the range are points as well. A wave too short for the points that a user may
+        Kinks within the range are points as well. A wave too short for the rows that a user may
         edit is kept at these points only.
         """
         peak = abs(present.amplitude)
-        kinks = [q for q in present.kinks if span[0] < q < span[1]][:MOST_FIRST_POINTS]
-        count = FIRST_POINTS
-        while True:
+        kinks = [q for q in present.kinks if span[0] < q < span[1]][: MAX_CURVE_ROWS // 2]
+        count, most = FIRST_POINTS, MAX_CURVE_ROWS - len(kinks)
+        at = np.union1d(np.linspace(*span, count), np.array(kinks))
+        while count < most and _departure(present, at) > KEPT * peak:
+            count = min(2 * count - 1, most)
             at = np.union1d(np.linspace(*span, count), np.array(kinks))
-            if 2 * count > MOST_FIRST_POINTS or _departure(present, at) <= KEPT * peak:
-                break
-            count = 2 * count - 1
         values = present.evaluate(at)
         if peak > 0.0 and np.isfinite(peak):
             digits = DIGITS - int(np.floor(np.log10(peak)))
