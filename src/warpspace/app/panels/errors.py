@@ -14,6 +14,7 @@ from typing import Any
 
 from warpspace.app.browser.clicks import Clicks
 from warpspace.app.browser.handles import Input
+from warpspace.app.browser.viser_private import show_marks
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.effects import effects_alone
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -22,6 +23,7 @@ from warpspace.app.readouts.error_controls import (
     CURVE,
     VALUE,
     error_controls,
+    refusal,
     slider_hint,
     with_switched,
 )
@@ -29,7 +31,7 @@ from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.listing import Listing, is_mostly_zero, listed_keys, used_keys
 from warpspace.app.state.ranges import Span
-from warpspace.app.state.typed_numbers import read_typed, spell_typed
+from warpspace.app.state.typed_numbers import read_typed
 from warpspace.machine.parameters import PARAMETERS, Parameter, parameter
 from warpspace.scene.model import Scene
 
@@ -218,8 +220,7 @@ class ErrorsPanel:
         self._attempts[key] += 1
         self._spell(state, key)
         if refused is not None:
-            value = f"{spell_typed(state.amplitudes[key])} {parameter(key).unit}"
-            text = f"{key}: “{refused}” is no number; it stays {value}."
+            text = refusal(parameter(key), refused, state.amplitudes[key])
             self._context.notify("Not a number", text, "yellow")
 
     def _spell(self, state: AppState, key: str) -> None:
@@ -290,7 +291,7 @@ def _refresh(slider: Any, span: Span) -> None:
     """Follow a changed range; what is the same already is not sent."""
     if (slider.min, slider.max) != (span.low, span.high):
         slider.min, slider.max, slider.step = span.low, span.high, span.step
-        slider.marks = _marks(span)
+        show_marks(slider, _marks(span))
 
 
 def _by_axis(row: Parameter) -> int:

@@ -66,6 +66,12 @@ def error_controls(
     )
 
 
+def refusal(row: Parameter, typed: str, value: float) -> str:
+    """Say that what was typed is no number, and which value stays, µm or µrad."""
+    kept = spell_typed(value).replace("-", "−")
+    return f"{row.key}: “{typed}” is no number; it stays {kept} {row.unit}."
+
+
 def slider_hint(state: AppState, row: Parameter, effect_um: float | None = None) -> str:
     """Say what the slider of an error moves, and its effect alone, µm, where that is known."""
     function = state.scene.errors.functions.get(row.key)
