@@ -1,4 +1,4 @@
-"""Curves and tolerances of a state: edited, clamped, reset; solo and mute in the numbers."""
+"""Curves and tolerances of a state: edited, clamped, reset; only and exclude in the numbers."""
 
 from dataclasses import replace
 

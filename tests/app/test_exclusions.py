@@ -1,4 +1,4 @@
-"""Solo and mute silence amplitudes without touching them."""
+"""Only and exclude make amplitudes count as zero without touching them."""
 
 from warpspace.app.state.exclusions import Exclusions
 
