@@ -83,8 +83,8 @@ class Wire:
 
     @property
     def keys(self) -> set[str]:
-        """Keys of the errors that have a slider."""
-        return {label.split(" ")[0] for label in self.labels} & set(PARAMETERS)
+        """Keys of the errors that have a slider; those of tolerances do not count."""
+        return {label.split(" ")[0] for label in self.labels if "±" not in label} & set(PARAMETERS)
 
     @property
     def question(self) -> tuple[str, str]:
