@@ -91,7 +91,7 @@ WIDGET = """label => [...document.querySelectorAll('label')]
 
 
 OURS_READY = """() => window.__viserMutable?.nodeRefFromName['/box/surface']
-    && [...document.querySelectorAll('label')].some(l => l.textContent.startsWith('EXX'))"""
+    && [...document.querySelectorAll('label')].some(l => l.textContent.startsWith('EAX'))"""
 EMPTY_READY = "() => window.__viserMutable?.canvas"
 OPAQUE = "() => getComputedStyle(window.__viserMutable.canvas).opacity > 0.99"
 DRAWN = """() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => {
@@ -132,7 +132,7 @@ def model_part() -> dict[str, float]:
     live, state = LiveModel(), start_state(load_scene("dvf5000_first"))
     live.evaluate(state)
     return {
-        "model_ms": median_ms(lambda n: live.evaluate(state.with_amplitude("EXX", n / 10)), 50),
+        "model_ms": median_ms(lambda n: live.evaluate(state.with_amplitude("EAX", n / 10)), 50),
         "new_place_ms": median_ms(lambda n: live.evaluate(state.with_position("B", -1.0 - n)), 10),
     }
 
@@ -199,7 +199,7 @@ class BarePage:
         gui = client.gui
         gui.main_panel.dock_left()
         gui.main_panel.set_width(LEFT_WIDTH)
-        slider = gui.add_slider("EXX", -10.0, 10.0, 0.1, 0.0)
+        slider = gui.add_slider("EAX", -10.0, 10.0, 0.1, 0.0)
         panel = gui.add_panel()
         with panel.add_tab("Volumetric error"):
             texts = {m.uuid: gui.add_html("") for move in moves for m in move if is_text(m)}
@@ -232,7 +232,7 @@ def open_page(browser: Browser, url: str) -> tuple[Page, str]:
     page.wait_for_function(OURS_READY)
     page.wait_for_timeout(4000)
     page.evaluate(DRAWN)  # a page that is still drawing would answer late
-    return page, page.evaluate(WIDGET, "EXX")
+    return page, page.evaluate(WIDGET, "EAX")
 
 
 def values(count: int) -> list[float]:

@@ -16,7 +16,7 @@ import time
 import numpy as np
 from app_client import Tab, rss_mb, running_app
 
-KEYS = ("EXX", "EAX", "EBY", "EAZ", "EC0Y", "EA0Z", "EAC")
+KEYS = ("EAX", "EAY", "ECY", "EAZ", "EC0Y", "EA0Z", "EB0Z")
 MAX_MB_PER_HOUR = 20.0
 
 
@@ -54,7 +54,7 @@ async def check_return(url: str) -> bool:
     """Tell whether a tab that comes back finds its state."""
     tab = Tab(url)
     await tab.open()
-    await tab.drag("EXX", 7.5)
+    await tab.drag("EAX", 7.5)
     await asyncio.sleep(1.0)
     numbers = tab.shown
     await tab.close()

@@ -89,9 +89,8 @@ def tick(page: Page, name: str) -> None:
 
 
 def write(page: Page, label: str, value: str) -> None:
-    """Write into the number box of the slider whose label begins with a word."""
-    row = page.locator("label", has_text=label).first.get_attribute("for")
-    box = page.locator(f"[id='{row}'] ~ div input")
+    """Write into the number box of an error."""
+    box = page.locator(f"input[data-number='{label}']")
     box.fill(value)
     box.press("Enter")
     page.wait_for_timeout(PAUSE_MS)
@@ -108,8 +107,8 @@ def signed(page: Page) -> None:
 
 
 def switched(page: Page) -> None:
-    """Hear two errors, one of them muted."""
-    for word in ("solo EAX", "solo EXX", "mute EXX"):
+    """Include only two errors, one of which is excluded."""
+    for word in ("only EAX", "only EAY", "exclude EAY"):
         page.locator(f"button[data-word='{word}']").click()
         page.wait_for_timeout(PAUSE_MS)
 

@@ -54,9 +54,14 @@ def wait_until_open(page: "Page") -> None:
 
 
 class Tab:
-    """A browser tab with the app in it; `query` goes into its address."""
+    """A browser tab with the app in it; `query` goes into its address.
 
-    def __init__(self, page: "Page", viewer: Viewer, query: str = "") -> None:
+    Most errors of most machines are zero and hidden at first; with `everything` they are listed.
+    """
+
+    def __init__(
+        self, page: "Page", viewer: Viewer, query: str = "", *, everything: bool = True
+    ) -> None:
         self.page, self.viewer = page, viewer
         self.errors: list[str] = []
         page.on("pageerror", lambda error: self.errors.append(str(error)))
@@ -64,6 +69,8 @@ class Tab:
         page.goto(f"{viewer.url}/?fixedDpr=1{query}")
         wait_until_open(page)
         self.until(lambda: self.vertices() is not None)
+        if everything:
+            self.list_all()
         self._camera = self.session.context.camera.remember()
 
     @property
@@ -77,6 +84,17 @@ class Tab:
         self.page.wait_for_timeout(200)
         return self.session.state
 
+    def list_all(self) -> None:
+        """List the errors that are zero as well."""
+        box = self.page.get_by_role("checkbox", name="Hide errors that are zero")
+        if box.is_checked():
+            box.uncheck()
+            self.until(lambda: self.listed() == len(self.session.state.amplitudes))
+
+    def listed(self) -> int:
+        """Number of errors listed."""
+        return self.page.locator("input[data-number]").count()
+
     def begin_anew(self) -> None:
         """Make the page again what it was when it was opened, in a tenth of the time."""
         start, session = start_state(SCENES[0]), self.session
@@ -88,6 +106,7 @@ class Tab:
         self.page.wait_for_selector("html[data-warpspace=open]")
         self.page.keyboard.press("Escape")
         self.written("Find an error").fill("")
+        self.list_all()
         self.panel("Volumetric error")
         self.panel("View")
         session.context.act(forget)
@@ -154,7 +173,10 @@ class Tab:
         return self.page.evaluate(script, label)
 
     def box(self, label: str) -> Any:
-        """Number box of the slider whose label begins with a word."""
+        """Number box of the slider whose label begins with a word: that of an error, or viser's."""
+        own = self.page.locator(f"input[data-number='{label}']")
+        if own.count():
+            return own
         return self.page.locator(f"[id='{self.widget(label)}'] ~ div input")
 
     def written(self, label: str) -> Any:
@@ -213,11 +235,16 @@ def drawn_nodes(picture: LivePicture) -> np.ndarray:
 
 
 def open_page(
-    viewer: Viewer, browser: "Browser", query: str = "", size: tuple[int, int] = (1280, 720)
+    viewer: Viewer,
+    browser: "Browser",
+    query: str = "",
+    size: tuple[int, int] = (1280, 720),
+    *,
+    everything: bool = True,
 ) -> Tab:
     """Open the app as a visitor of its own; `query` goes into the address."""
     context = browser.new_context(viewport={"width": size[0], "height": size[1]})
-    return Tab(context.new_page(), viewer, query)
+    return Tab(context.new_page(), viewer, query, everything=everything)
 
 
 @pytest.fixture(scope="session")
@@ -279,7 +306,7 @@ def tab(
 
 @pytest.fixture
 def open_tab(viewer: Viewer, browser: "Browser") -> Iterator[Callable[..., Tab]]:
-    """Open further tabs, each as a visitor of its own; takes query and size of `open_page`."""
+    """Open further tabs, each as a visitor of its own; takes what `open_page` takes."""
     tabs: list[Tab] = []
 
     def open_one(**how: Any) -> Tab:

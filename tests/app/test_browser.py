@@ -137,7 +137,7 @@ def test_another_scene_brings_its_title_sliders_and_box(tab: Tab) -> None:
     scene = load_scene("teach_tilted_c")
     tab.choose("Scene", scene.title)
     tab.until(lambda: tab.shows(drawn_nodes(model(start_state(scene)))))
-    assert scene.title in tab.page.title()
+    tab.until(lambda: scene.title in tab.page.title())
     assert float(tab.box("EA0C").input_value()) == 40.0
     assert tab.page.get_by_text("Rotary positions").is_visible()
 

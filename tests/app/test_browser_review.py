@@ -84,34 +84,34 @@ def test_search_narrows_the_sliders_down(tab: Tab) -> None:
     assert float(tab.box("EAX").input_value()) == 12.0
 
 
-def test_solo_and_mute(tab: Tab) -> None:
-    solo = tab.page.get_by_role("button", name="Solo EC0Y, squareness of Y to X")
-    mute = tab.page.get_by_role("button", name="Mute EC0Y, squareness of Y to X")
-    mute.click()
-    shows(tab, edits.with_muted(START, "EC0Y", True))
-    tab.until(lambda: mute.get_attribute("aria-pressed") == "true")
-    assert tab.page.get_by_text("1 silent").is_visible()
-    assert tab.page.get_by_role("group", name="EC0Y, squareness of Y to X, silent").count() == 1
+def test_only_and_exclude(tab: Tab) -> None:
+    only = tab.page.get_by_role("button", name="Only EC0Y, squareness of Y to X")
+    exclude = tab.page.get_by_role("button", name="Exclude EC0Y, squareness of Y to X")
+    exclude.click()
+    shows(tab, edits.with_excluded(START, "EC0Y", True))
+    tab.until(lambda: exclude.get_attribute("aria-pressed") == "true")
+    assert tab.page.get_by_text("1 excluded").is_visible()
+    assert tab.page.get_by_role("group", name="EC0Y, squareness of Y to X, excluded").count() == 1
     # both at once: no click is lost, none counts twice
     tab.page.evaluate(
-        "for (const word of ['mute EC0Y', 'solo EC0Y'])"
+        "for (const word of ['exclude EC0Y', 'only EC0Y'])"
         " document.querySelector(`[data-word='${word}']`).click()"
     )
-    alone = edits.with_soloed(START, "EC0Y", True)
+    alone = edits.with_only(START, "EC0Y", True)
     shows(tab, alone)
-    tab.until(lambda: solo.get_attribute("aria-pressed") == "true")
-    assert mute.get_attribute("aria-pressed") == "false"
+    tab.until(lambda: only.get_attribute("aria-pressed") == "true")
+    assert exclude.get_attribute("aria-pressed") == "false"
     assert tab.number("max") == pytest.approx(model(alone).statistics.max_um, abs=0.006)
     assert float(tab.box("EAX").input_value()) == 5.5
-    tab.page.get_by_role("button", name="Hear all").click()
+    tab.page.get_by_role("button", name="Include all").click()
     shows(tab, START)
-    tab.until(lambda: tab.page.locator(".ws-silent").count() == 0)
+    tab.until(lambda: tab.page.locator(".ws-excluded").count() == 0)
 
 
-def test_solo_by_keyboard_keeps_the_focus_and_is_undone(tab: Tab) -> None:
-    word = "solo EAX"
-    tab.page.get_by_role("button", name="Solo EAX, roll of X").focus()
-    alone = edits.with_soloed(START, "EAX", True)
+def test_only_by_keyboard_keeps_the_focus_and_is_undone(tab: Tab) -> None:
+    word = "only EAX"
+    tab.page.get_by_role("button", name="Only EAX, roll of X").focus()
+    alone = edits.with_only(START, "EAX", True)
     focus = "[document.activeElement.dataset.word, document.activeElement.ariaPressed]"
     for state, pressed in ((alone, "true"), (START, "false"), (alone, "true")):
         tab.page.keyboard.press("Enter")
@@ -364,12 +364,12 @@ def test_the_palette_and_the_help_list_what_there_is(tab: Tab) -> None:
 def test_every_control_explains_itself(tab: Tab) -> None:
     session = tab.session
     handles = session._client.gui._gui_input_handle_from_uuid.values()
-    silent = [
+    unexplained = [
         handle.label
         for handle in handles
         if getattr(handle, "visible", True) and not getattr(handle, "hint", "none needed")
     ]
-    assert silent == []
+    assert unexplained == []
 
 
 # --- bad input --------------------------------------------------------------------------------

@@ -24,6 +24,7 @@ from warpspace.app.state.specification import Specification
 from warpspace.app.viewport.camera import CameraMemory
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.machine.errors import Ramp
+from warpspace.machine.limits import MAX_ERROR
 from warpspace.scene.library import load_scene, scene_names
 
 SCENE = load_scene("dvf5000_first")
@@ -60,7 +61,7 @@ def busy() -> AppState:
     state = state.with_position("B", -30.0).with_position("C", 45.0).with_exaggeration(2000.0)
     state = state.with_component("x").with_loop("relative").with_nodes(11)
     state = state.with_shown(**{f.name: not getattr(state.shown, f.name) for f in fields(Shown)})
-    state = edits.with_soloed(edits.with_muted(state, "EXX", True), "EAX", True)
+    state = edits.with_only(edits.with_excluded(state, "EXX", True), "EAX", True)
     state = edits.with_half_width(state, "EXX", 7.5)
     look = state.look.with_choice(surface="slices", quantity="orientation").with_top(12.5)
     for name in ("isolines", "arrows", "worst", "bars", "follow"):
@@ -151,18 +152,18 @@ def test_hostile_links_are_refused_with_a_message(link: str) -> None:
 def test_hostile_settings_are_clamped_or_left_out_and_named() -> None:
     line = (
         "EXX=1e9&EYX=nan&B=500&nodes=1e6&exaggeration=-3&component=<b>&loop=all&look.surface=evil"
-        "&shown.dark=maybe&rotary.off=0,99,-1&rotary.held.B=inf&muted=EXX,evil&why.X=1e9"
+        "&shown.dark=maybe&rotary.off=0,99,-1&rotary.held.B=inf&excluded=EXX,evil&why.X=1e9"
         "&look.slices_mm.X=1e9&specification.limit_um=1e12&__class__=1&camera=1,2"
     )
     back = with_settings(START, line)
-    assert back.amplitudes["EXX"] == START.spans["EXX"].high
+    assert back.amplitudes["EXX"] == back.spans["EXX"].high == MAX_ERROR
     assert back.amplitudes["EYX"] == START.amplitudes["EYX"]
     assert back.positions["B"] == START.position_spans["B"].high
     assert back.component == "norm"
     assert back.loop == START.loop
     assert back.look.surface == "surface"
     assert back.rotary.off == frozenset({0})
-    assert back.exclusions.muted == frozenset({"EXX"})
+    assert back.exclusions.excluded == frozenset({"EXX"})
     assert back.picked is not None
     assert abs(back.picked.at["X"]) <= 300.0
     assert any("left out" in note for note in back.notes)

@@ -1,4 +1,4 @@
-"""Curves and tolerances of a state: edited, clamped, reset; solo and mute in the numbers."""
+"""Curves and tolerances of a state: edited, clamped, reset; only and exclude in the numbers."""
 
 from dataclasses import replace
 
@@ -81,15 +81,15 @@ def test_tolerances_go_back_to_the_scene():
 
 
 def test_unknown_keys_change_nothing():
-    assert edits.with_muted(STATE, "EXA", True) is STATE
-    assert edits.with_soloed(STATE, "EXA", True) is STATE
+    assert edits.with_excluded(STATE, "EXA", True) is STATE
+    assert edits.with_only(STATE, "EXA", True) is STATE
     assert edits.with_half_width(STATE, "EXA", 1.0).tolerances == STATE.tolerances
     assert edits.with_curve(STATE, "EXA", Constant(SPAN, 1.0)).amplitudes == STATE.amplitudes
 
 
 def test_solo_draws_one_error_alone_and_mute_leaves_it_out():
-    alone = LIVE.evaluate(edits.with_soloed(STATE, "EC0Y", True))
-    without = LIVE.evaluate(edits.with_muted(STATE, "EC0Y", True))
+    alone = LIVE.evaluate(edits.with_only(STATE, "EC0Y", True))
+    without = LIVE.evaluate(edits.with_excluded(STATE, "EC0Y", True))
     whole = LIVE.evaluate(STATE)
     np.testing.assert_allclose(
         alone.field.error_um + without.field.error_um, whole.field.error_um, atol=1e-9

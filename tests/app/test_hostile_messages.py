@@ -104,7 +104,7 @@ class Tab:
     async def answer_s(self, value: float) -> float:
         """Move a slider; give how long it takes until the mean is another."""
         before, began = self.mean, time.perf_counter()
-        await self.socket.send(update(self.widgets["EXX"], {"value": value}))
+        await self.socket.send(update(self.widgets["EAX"], {"value": value}))
         await until(lambda: self.mean != before, 20.0)
         return time.perf_counter() - began
 

@@ -17,7 +17,12 @@ from websockets.sync.client import connect
 
 from app.first_camera import CAMERA
 from warpspace.app import browser
-from warpspace.app.browser.viser_private import dom_id, serve_with, wake_sender_on_its_thread
+from warpspace.app.browser.viser_private import (
+    dom_id,
+    serve_with,
+    show_marks,
+    wake_sender_on_its_thread,
+)
 from warpspace.app.server.viewer import Viewer
 from warpspace.scene.library import load_scene
 
@@ -126,6 +131,16 @@ def test_a_client_has_what_is_used_of_it(client: Any, path: str) -> None:
 def test_a_widget_has_an_id_in_the_page(client: Any) -> None:
     widget = client[1].gui.add_text("", "")
     assert look_up(widget, "_impl.uuid") == dom_id(widget)
+
+
+def test_the_marks_of_a_slider_can_be_changed(client: Any) -> None:
+    slider = client[1].gui.add_slider("", 0.0, 1.0, 0.1, 0.0, marks=((0.0, "0"),))
+    show_marks(slider, ((0.0, "0"), (1.0, "1")))
+    look_up(messages, "GuiSliderMark")
+    assert look_up(slider, "_impl.props._marks") == (
+        messages.GuiSliderMark(0.0, "0"),
+        messages.GuiSliderMark(1.0, "1"),
+    )
 
 
 def test_a_connection_has_an_event_that_wakes_its_sender(client: Any) -> None:

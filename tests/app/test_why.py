@@ -87,13 +87,13 @@ def test_contributions_add_up_to_the_error_with_the_remainder() -> None:
     np.testing.assert_allclose(found.drawn_mm, picture.drawn_mm[7, 0, 11], atol=0.05)
 
 
-def test_what_is_muted_contributes_nothing() -> None:
-    from warpspace.app.state.edits import with_muted
+def test_what_is_excluded_contributes_nothing() -> None:
+    from warpspace.app.state.edits import with_excluded
 
     picture = LIVE.evaluate(START)
     picked = pick(picture, *look_at(picture, picture.drawn_mm[7, 0, 11]))
     assert picked is not None
-    found = answer(with_muted(START, "EC0Y", True), picked, 1.0).explanation
+    found = answer(with_excluded(START, "EC0Y", True), picked, 1.0).explanation
     assert "EC0Y" not in {part.key for part in found.contributions}
 
 

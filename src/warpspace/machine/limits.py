@@ -37,6 +37,12 @@ MAX_TERMS = 64
 MAX_ORDER = 1000
 MAX_POINTS = 100_000
 """Points of a table, rows of a CSV file."""
+MAX_CURVE_ROWS = 2000
+"""Rows of a curve that may be edited or pasted in the app."""
+MAX_CURVE_TEXT = 80_000
+"""Their characters."""
+MAX_TYPED_NUMBER = 40
+"""Characters of one typed number."""
 MAX_CSV_COLUMNS = 256
 MAX_CSV_LINES = 500_000
 """Blank ones included."""

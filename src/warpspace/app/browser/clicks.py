@@ -12,9 +12,10 @@ MOST_CLICKS = 8
 """Clicks that one message carries: the latest and those before it, should some have got lost."""
 SCRIPT = f"""(() => {{
   const sent = {{}};
-  window.warpspaceClick = (part, uuid) => {{
+  window.warpspaceClick = (part, uuid, typed = "") => {{
     const word = part.dataset.word, clicks = (sent[uuid] ??= {{count: 0, latest: []}});
-    clicks.latest = [...clicks.latest, `${{++clicks.count}}:${{word}}`].slice(-{MOST_CLICKS});
+    clicks.latest = [...clicks.latest, `${{++clicks.count}}:${{word}}${{typed}}`]
+      .slice(-{MOST_CLICKS});
     __viserMutable.sendMessage({{
       type: "GuiUpdateMessage", uuid, updates: {{value: clicks.latest.join("\\n")}},
     }});
@@ -37,6 +38,16 @@ KEYS = (
 )
 SENDS = 'data-word="%s" onclick="warpspaceClick(this,\'%s\')"'
 """Attributes of what is reached with Tab and Enter, and of what sends a word when clicked."""
+TYPED = (
+    'type="text" autocomplete="off" spellcheck="false" data-word="%s"'
+    " onkeydown=\"if(event.key==='Escape')this.value=this.defaultValue\""
+    ' onchange="const typed=this.value;this.value=this.defaultValue;'
+    "warpspaceClick(this,'%s',' '+typed)\""
+)
+"""Attributes of a text box that sends its word, a blank and what was typed.
+
+It shows the old text until the answer comes, which is none where what was typed meant nothing.
+"""
 
 
 class Clicks:
@@ -85,11 +96,12 @@ class Clicks:
         """Spell the attributes of a real button, which needs no more to be reached by key."""
         return Markup('type="button" ') + self._sends(word)
 
-    def field(self, word: str) -> Markup:
-        """Spell the attributes of a field that sends a word, a blank and what was entered."""
-        return Markup(  # noqa: S704 - escaped here
-            f"onchange=\"warpspaceEnter(this,'{escape(word)}','{dom_id(self._carrier)}')\""
-        )
+    def text_box(self, word: str) -> Markup:
+        """Spell the attributes of a text box; `clicked` gets the word, a blank and what was typed.
+
+        It sends once, on Enter or when it is left, and Escape takes back what was typed.
+        """
+        return Markup(TYPED % (escape(word), dom_id(self._carrier)))  # noqa: S704 - escaped here
 
     def _sends(self, word: str) -> Markup:
         """Spell the attributes of what sends a word when it is clicked."""

@@ -1,4 +1,4 @@
-"""Buttons that copy a text, and fields that hand over what is typed once it is entered."""
+"""Buttons that copy a text, and the way from an error to its slider."""
 
 import json
 
@@ -22,13 +22,6 @@ COPY_SCRIPT = """(() => {
     };
     if (navigator.clipboard) navigator.clipboard.writeText(text).then(done, byHand);
     else byHand();
-  };
-  window.warpspaceEnter = (field, word, uuid) => {
-    const text = field.value;
-    // shows the old text until the answer comes, which is none where it meant nothing
-    field.value = field.defaultValue;
-    field.dataset.word = `${word} ${text}`;
-    warpspaceClick(field, uuid);
   };
   // viser flies through the scene with W: what gets through is the key without its place
   window.addEventListener("keydown", event => {

@@ -7,7 +7,7 @@ version of viser that lacks one fails there with a clear message and not somewhe
 import asyncio
 import contextlib
 import threading
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import Future
 from importlib import import_module
 from typing import Any, TypeAlias
@@ -28,6 +28,15 @@ def dom_id(handle: Any) -> str:
     Style sheets and scripts find a widget by it. A public `handle.uuid` would replace this.
     """
     return str(handle._impl.uuid)  # noqa: SLF001
+
+
+def show_marks(slider: Any, marks: Iterable[tuple[float, str]]) -> None:
+    """Put other marks below a slider; each is a value and its label.
+
+    viser takes marks when a slider is added and has no way to change them: without this, those of a
+    slider whose range has grown stay where they were. A public `slider.marks` would replace this.
+    """
+    slider._marks = tuple(messages.GuiSliderMark(value, label) for value, label in marks)  # noqa: SLF001
 
 
 def send_script(client: ClientHandle, source: str) -> None:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import fields, replace
 from urllib.parse import parse_qsl, urlencode
 
+from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, Shown, start_state
 from warpspace.app.state.exclusions import Exclusions
 from warpspace.app.state.look import linear_spans, slice_spans
@@ -100,7 +101,7 @@ def _differences(state: AppState) -> Iterator[tuple[str, str]]:
     for axis, at in state.rotary.held:
         if axis in state.positions:
             yield f"rotary.held.{axis}", spell_numbers(at)
-    for name in ("muted", "soloed"):
+    for name in ("excluded", "only"):
         if keys := getattr(state.exclusions, name):
             yield name, ",".join(sorted(keys))
     if state.picked is not None:
@@ -197,13 +198,13 @@ def _handlers(state: AppState) -> dict[str, Handler]:
         ),
         "rotary.own": lambda s, v: replace(s, rotary=s.rotary.with_own(read_point(v))),
         "rotary.chosen": lambda s, v: replace(s, rotary=s.rotary.with_chosen(v)),
-        "muted": lambda s, v: _with_silenced(s, muted=v),
-        "soloed": lambda s, v: _with_silenced(s, soloed=v),
+        **dict.fromkeys(("excluded", "muted"), lambda s, v: _with_exclusions(s, excluded=v)),
+        **dict.fromkeys(("only", "soloed"), lambda s, v: _with_exclusions(s, only=v)),
         TRACE: lambda s, v: replace(s, picked=read_trace(v)),
         "lever": lambda s, v: replace(s, lever=v) if v in s.amplitudes else refuse(),
     }
     for key in state.amplitudes:
-        found[key] = lambda s, v, key=key: s.with_amplitude(key, read_number(v))
+        found[key] = lambda s, v, key=key: edits.with_typed_amplitude(s, key, read_number(v))
     for axis in state.positions:
         found[axis] = lambda s, v, axis=axis: s.with_position(axis, read_number(v))
         found[f"why.{axis}"] = lambda s, v, axis=axis: _with_turned(s, axis, read_number(v))
@@ -244,11 +245,14 @@ def _with_top(state: AppState, value: float) -> AppState:
     return replace(state, look=state.look.with_top(value).with_choice(range_mode=mode))
 
 
-def _with_silenced(state: AppState, *, muted: str = "", soloed: str = "") -> AppState:
-    """Set what is muted or soloed from a list of keys."""
+def _with_exclusions(state: AppState, *, excluded: str = "", only: str = "") -> AppState:
+    """Set what is excluded, or what alone takes part, from a list of keys.
+
+    Older links and files call the two muted and soloed.
+    """
     exclusions = Exclusions(
-        frozenset(muted.split(",")) if muted else state.exclusions.muted,
-        frozenset(soloed.split(",")) if soloed else state.exclusions.soloed,
+        frozenset(excluded.split(",")) if excluded else state.exclusions.excluded,
+        frozenset(only.split(",")) if only else state.exclusions.only,
     )
     return replace(state, exclusions=exclusions.within(state.amplitudes.keys()))
 

@@ -18,7 +18,7 @@ def scene_of(state: AppState) -> Scene:
     Returns
     -------
     Scene
-        All parameters take part, silenced or not.
+        All parameters take part, excluded or not.
     """
     scene = state.scene
     keys = [
@@ -39,5 +39,5 @@ def scene_of(state: AppState) -> Scene:
 
 
 def active_scene(state: AppState) -> Scene:
-    """Give the scene as it is drawn: what is silenced by solo and mute is left out."""
+    """Give the scene as it is drawn: what is excluded is left out."""
     return scene_of(replace(state, amplitudes=dict(state.active)))

@@ -20,7 +20,7 @@ from warpspace.app.readouts.budget import (
     field_html,
 )
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.edits import with_muted
+from warpspace.app.state.edits import with_excluded
 from warpspace.app.state.typed_point import with_typed_point
 from warpspace.app.viewport.camera import CameraMemory, fit_camera, heading_share
 from warpspace.app.viewport.layers import SCENE_PER_MM
@@ -89,7 +89,7 @@ class BudgetPanel:
         elif what == LEVER:
             context.post(lambda state: with_lever(state, rest))
         elif what in (EXCLUDE, INCLUDE):
-            context.post(lambda state: with_muted(state, rest, what == EXCLUDE))
+            context.post(lambda state: with_excluded(state, rest, what == EXCLUDE))
         elif what == EDIT:
             context.act(lambda: self._edit(rest))
 
@@ -119,11 +119,10 @@ class BudgetPanel:
             at = found.at
             # only what is steered can be changed, not what it is compared with
             button = self._clicks.button if picture.is_steered else None
-            text = answer_html(
-                found, picture.state.lever, self._clicks.attributes, button, state.exclusions.muted
-            )
+            left_out, clicks = state.exclusions.excluded, self._clicks.attributes
+            text = answer_html(found, picture.state.lever, clicks, button, left_out)
         self._text.put(content=text)
-        self._field.put(content=field_html(at, self._clicks.field(AT)))
+        self._field.put(content=field_html(at, self._clicks.text_box(AT)))
 
     def _stand_back(self) -> None:
         """Move the camera back until the frame of the chosen contribution is in view."""

@@ -22,7 +22,7 @@ WORDS = {
     "exaggeration": "exaggeration",
     "loop": "loop",
     "nodes": "grid density",
-    "exclusions": "solo and mute",
+    "exclusions": "which errors are included",
     "rotary": "rotary traces",
     "tolerances": "tolerance",
     "specification": "specification",
@@ -108,7 +108,9 @@ class CommandsPanel:
             Command("Fit view", "Camera to the operator's side", "F", None, self._context.fit_view),
             Command("Reset errors", "Values of the scene", "R", None, does(AppState.reset)),
             Command("All errors zero", "The nominal machine", "0", None, does(AppState.zeroed)),
-            Command("Hear all errors", "End solo and mute", "L", None, does(edits.include_all)),
+            Command(
+                "Include all errors", "End only and exclude", "L", None, does(edits.include_all)
+            ),
             Command(
                 "Exaggeration: auto",
                 "A round number that shows the error",
@@ -244,7 +246,7 @@ def spell_change(what: str) -> str:
         elif parts[0] == "shown":
             word = WORDS.get(parts[-1], parts[-1].replace("_", " "))
         elif parts[0] == "exclusions" and name:
-            word = f"{'solo' if parts[1] == 'soloed' else 'mute'} of {word}"
+            word = f"{'only' if parts[1] == 'only' else 'exclusion of'} {word}"
         words.append(f"tolerance of {word}" if parts[0] == "tolerances" and name else word)
     unique = list(dict.fromkeys(words))
     if "scene" in unique:

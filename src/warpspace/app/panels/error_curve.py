@@ -17,7 +17,7 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.curve_text import (
     convert_shape,
     kind_titles,
-    parse_shape,
+    read_curve,
     sample_curve,
     shape_kind,
     spell_rows,
@@ -101,17 +101,19 @@ class ErrorCurvePanel:
         span, present = edits.axis_span(state, key), edits.curve_of(state, key)
         try:
             if kind is not None and kind != shape_kind(present):
-                function = convert_shape(present, kind, span)
+                function, remarks = convert_shape(present, kind, span), ()
                 # numbers of the kind before mean something else now
                 rows = None
             elif rows is not None:
-                function = parse_shape(shape_kind(present), rows, span)
+                entered = read_curve(shape_kind(present), rows, span)
+                function, remarks = entered.function, entered.remarks
             else:
                 return state
         except OptionError as error:
             self._problem.content = message(str(error), "curve problem", small=True)
             return state
-        self._problem.content = ""
+        said = " ".join(remarks)
+        self._problem.content = message(said, "curve remark", small=True) if said else ""
         if rows is not None:
             # what is being written stays as it was written
             self._written = function
@@ -202,7 +204,10 @@ def _options(keys: tuple[str, ...]) -> tuple[str, ...]:
 def _rows_hint(kind: str) -> str:
     """Say how the numbers of a kind of curve are written."""
     text = curve_kind(kind).row_words
-    return f"{text[0].upper()}{text[1:]}. Blanks between numbers; q in mm or degrees."
+    return (
+        f"{text[0].upper()}{text[1:]}. Blanks, tabs or semicolons between numbers, decimal point or"
+        " comma, or cells pasted from a spreadsheet; q in mm or degrees."
+    )
 
 
 def _chart_data(

@@ -165,7 +165,7 @@ def heading(picture: LivePicture) -> str:
         title=state.scene.title,
         compared=picture.compared.title if picture.compared is not None else "",
         edited=len(state.changed_keys),
-        silent=sum(1 for key, value in state.amplitudes.items() if value != active[key]),
+        excluded=sum(1 for key, value in state.amplitudes.items() if value != active[key]),
         machine=f"{machine.title}, chain {machine.chain}",
         size=" × ".join(f"{edge:.0f}" for edge in picture.grid.extent_mm),
         nodes="×".join(str(count) for count in picture.grid.shape),

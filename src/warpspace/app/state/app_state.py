@@ -124,7 +124,7 @@ class AppState:
 
     @property
     def active(self) -> Mapping[str, float]:
-        """Amplitudes that count, µm or µrad: those silenced by solo and mute are zero."""
+        """Amplitudes that count, µm or µrad: those that are excluded are zero."""
         return self.exclusions.effective(self.amplitudes)
 
     def with_amplitude(self, key: str, value: float) -> "AppState":

@@ -1,23 +1,35 @@
 """The shape of a component error as text that people edit, checked, and sampled for a chart."""
 
-import math
-import re
+from dataclasses import dataclass
 
 import numpy as np
 
+from warpspace.app.state.typed_numbers import comma_rows, read_rows, spell_typed
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.machine.curves.constant import Constant
 from warpspace.machine.curves.curve import ErrorFunction
 from warpspace.machine.curves.registry import CurveKind, curve_kind, curve_kinds
-from warpspace.machine.limits import MAX_ERROR
+from warpspace.machine.limits import MAX_CURVE_ROWS, MAX_CURVE_TEXT, MAX_ERROR
 from warpspace.units import Array
 
 CHART_SAMPLES = 181
-MAX_TEXT = 8000
 MAX_KINKS = 500
 """Kinks of a curve that are drawn where they are."""
-SHOWN_ROWS = 200
-"""Rows of a measured table that are offered for editing; longer ones are thinned out."""
+
+
+@dataclass(frozen=True, slots=True)
+class EnteredCurve:
+    """A curve that a user has entered.
+
+    Attributes
+    ----------
+    function : ErrorFunction
+    remarks : tuple of str
+        What was left out or put in order, a sentence each.
+    """
+
+    function: ErrorFunction
+    remarks: tuple[str, ...] = ()
 
 
 def kind_titles() -> tuple[str, ...]:
@@ -31,31 +43,38 @@ def shape_kind(function: ErrorFunction | None) -> str:
 
 
 def spell_rows(function: ErrorFunction | None) -> str:
-    """Write the numbers of a function as the rows that `parse_shape` reads."""
+    """Write the numbers of a function as the rows that `read_curve` reads.
+
+    A measured table with more rows than may be edited is thinned out.
+    """
     if function is None:
         return "0"
     rows = function.rows()
-    if len(rows) > SHOWN_ROWS:
-        rows = [rows[i] for i in np.linspace(0, len(rows) - 1, SHOWN_ROWS).astype(int)]
-    return "\n".join("  ".join(f"{value:.6g}" for value in row) for row in rows)
+    if len(rows) > MAX_CURVE_ROWS:
+        rows = [rows[i] for i in np.linspace(0, len(rows) - 1, MAX_CURVE_ROWS).astype(int)]
+    return "\n".join("  ".join(map(spell_typed, row)) for row in rows)
 
 
 def parse_shape(kind: str, text: str, span: tuple[float, float]) -> ErrorFunction:
-    """Read the rows that a user has edited.
+    """Read the rows that a user has edited; as `read_curve`, without its remarks."""
+    return read_curve(kind, text, span).function
+
+
+def read_curve(kind: str, text: str, span: tuple[float, float]) -> EnteredCurve:
+    """Read the rows that a user has edited, or pasted from a spreadsheet.
 
     Parameters
     ----------
     kind : str
         Title of a kind of curve.
     text : str
-        Rows of numbers; blanks, semicolons and tabs between the numbers, a comma with a blank as
-        well, `#` starts a remark.
+        Rows of numbers as `warpspace.app.state.typed_numbers.read_rows` reads them.
     span : tuple of float, (2,), mm or degrees
         Range of the axis.
 
     Returns
     -------
-    ErrorFunction
+    EnteredCurve
 
     Raises
     ------
@@ -63,17 +82,28 @@ def parse_shape(kind: str, text: str, span: tuple[float, float]) -> ErrorFunctio
         Naming the row, what it holds and what was expected.
     """
     chosen = _kind(kind)
-    if len(text) > MAX_TEXT:
-        raise OptionError(f"{len(text):,} characters; expected at most {MAX_TEXT:,}")
-    lines = (line.split("#", 1)[0].strip() for line in text.splitlines())
-    rows = [_numbers(number, line) for number, line in enumerate(lines, start=1) if line]
+    if len(text) > MAX_CURVE_TEXT:
+        raise OptionError(f"{len(text):,} characters; expected at most {MAX_CURVE_TEXT:,}")
+    try:
+        return _read(chosen, text, span)
+    except OptionError:
+        with_commas = comma_rows(text)
+        if with_commas is None:
+            raise
+    return _read(chosen, with_commas, span)
+
+
+def _read(kind: CurveKind, text: str, span: tuple[float, float]) -> EnteredCurve:
+    """Read a curve from rows, put in order."""
+    rows, left_out = read_rows(text)
     if not rows:
-        raise OptionError(f"no numbers; expected {chosen.row_words}")
-    function = chosen.from_rows(span, rows)
+        raise OptionError(f"no numbers; expected {kind.row_words}")
+    ordered, tidied = kind.tidied(rows)
+    function = kind.from_rows(span, ordered)
     peak = function.amplitude
     if not abs(peak) <= MAX_ERROR:
         raise OptionError(f"the curve reaches {peak:.3g}; expected at most ±{MAX_ERROR:g}")
-    return function
+    return EnteredCurve(function, (*left_out, *tidied))
 
 
 def convert_shape(
@@ -121,15 +151,3 @@ def _kind(title: str) -> CurveKind:
     except UnknownNameError as error:
         expected = f"expected one of {', '.join(error.known)}"
         raise OptionError(f"shape {title!r}; {expected}") from None
-
-
-def _numbers(number: int, line: str) -> tuple[float, ...]:
-    """Read the numbers of one line."""
-    words = [word for word in re.split(r"[\s;|]+|,\s+", line.replace("−", "-")) if word]
-    try:
-        values = tuple(float(word.replace(",", ".")) for word in words)
-    except ValueError:
-        raise OptionError(f"row {number}: {line[:40]!r} holds what is no number") from None
-    if not all(map(math.isfinite, values)):
-        raise OptionError(f"row {number}: {line[:40]!r}; expected finite numbers")
-    return values

@@ -1,5 +1,6 @@
 """Changes of a state that reach into its scene: curves and tolerances. Pure, and clamped."""
 
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 
@@ -66,6 +67,21 @@ def with_curve(state: AppState, key: str, function: ErrorFunction) -> AppState:
         amplitudes={**state.amplitudes, key: amplitude},
         spans={**state.spans, key: span},
     )
+
+
+def with_typed_amplitude(state: AppState, key: str, value: float) -> AppState:
+    """Set the amplitude of one parameter to a number that was typed or stored, µm or µrad.
+
+    Unlike the slider's own (`AppState.with_amplitude`), it may lie beyond the slider's range, which
+    then grows; only what the model does not hold for is clamped.
+    """
+    if key not in state.amplitudes:
+        return state.with_amplitude(key, value)
+    span = state.spans[key]
+    if math.isfinite(value) and not span.low <= value <= span.high:
+        span = amplitude_span(key, value, state.scene.tolerances.get(key))
+        state = replace(state, spans={**state.spans, key: span})
+    return state.with_amplitude(key, value)
 
 
 def half_width_of(state: AppState, key: str) -> float:
@@ -149,22 +165,22 @@ def with_costs(state: AppState, text: str) -> AppState:
     return with_specification(state, wanted)
 
 
-def with_muted(state: AppState, key: str, muted: bool) -> AppState:
+def with_excluded(state: AppState, key: str, excluded: bool) -> AppState:
     """Exclude one parameter from the picture, or include it again."""
     if key not in state.amplitudes:
         return state
-    return replace(state, exclusions=state.exclusions.with_muted(key, muted))
+    return replace(state, exclusions=state.exclusions.with_excluded(key, excluded))
 
 
-def with_soloed(state: AppState, key: str, soloed: bool) -> AppState:
+def with_only(state: AppState, key: str, only: bool) -> AppState:
     """Add one parameter to those that alone take part, or take it away."""
     if key not in state.amplitudes:
         return state
-    return replace(state, exclusions=state.exclusions.with_soloed(key, soloed))
+    return replace(state, exclusions=state.exclusions.with_only(key, only))
 
 
 def include_all(state: AppState) -> AppState:
-    """End all solo and mute."""
+    """Include all parameters again."""
     return replace(state, exclusions=type(state.exclusions)())
 
 

@@ -1,4 +1,4 @@
-"""Solo and mute: which parameters take part while one listens to a few of them."""
+"""Which errors take part: those that were excluded do not, or only the chosen ones do."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
@@ -10,22 +10,22 @@ class Exclusions:
 
     Attributes
     ----------
-    muted : frozenset of str
+    excluded : frozenset of str
         Keys that do not take part.
-    soloed : frozenset of str
-        Where there are any, only these take part; a muted one among them still does not.
+    only : frozenset of str
+        Where there are any, only these take part; an excluded one among them still does not.
     """
 
-    muted: frozenset[str] = frozenset()
-    soloed: frozenset[str] = frozenset()
+    excluded: frozenset[str] = frozenset()
+    only: frozenset[str] = frozenset()
 
     def __bool__(self) -> bool:
-        """Whether anything is silenced."""
-        return bool(self.muted or self.soloed)
+        """Whether anything is left out."""
+        return bool(self.excluded or self.only)
 
     def active(self, key: str) -> bool:
         """Tell whether a parameter takes part."""
-        return key not in self.muted and (not self.soloed or key in self.soloed)
+        return key not in self.excluded and (not self.only or key in self.only)
 
     def effective(self, amplitudes: Mapping[str, float]) -> Mapping[str, float]:
         """Give the amplitudes that count, µm or µrad: zero for what does not take part."""
@@ -33,17 +33,17 @@ class Exclusions:
             return amplitudes
         return {key: value if self.active(key) else 0.0 for key, value in amplitudes.items()}
 
-    def with_muted(self, key: str, muted: bool) -> "Exclusions":
+    def with_excluded(self, key: str, excluded: bool) -> "Exclusions":
         """Exclude one parameter, or include it again."""
-        return replace(self, muted=_with(self.muted, key, muted))
+        return replace(self, excluded=_with(self.excluded, key, excluded))
 
-    def with_soloed(self, key: str, soloed: bool) -> "Exclusions":
+    def with_only(self, key: str, only: bool) -> "Exclusions":
         """Add one parameter to those that alone take part, or take it away."""
-        return replace(self, soloed=_with(self.soloed, key, soloed))
+        return replace(self, only=_with(self.only, key, only))
 
     def within(self, keys: Collection[str]) -> "Exclusions":
         """Keep what concerns the parameters of a machine."""
-        return Exclusions(self.muted & frozenset(keys), self.soloed & frozenset(keys))
+        return Exclusions(self.excluded & frozenset(keys), self.only & frozenset(keys))
 
 
 def _with(keys: frozenset[str], key: str, on: bool) -> frozenset[str]:

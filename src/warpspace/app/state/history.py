@@ -129,9 +129,9 @@ def describe_change(old: object, new: object) -> str:
     Returns
     -------
     str
-        Dotted names with commas between, for instance "amplitudes.EAX", or "emphasis.muted.+EAX"
-        for what has come into a set; empty where they are equal. On and off are thus two things,
-        and two steps however fast they follow each other.
+        Dotted names with commas between, for instance "amplitudes.EAX", or
+        "exclusions.excluded.+EAX" for what has come into a set; empty where they are equal. On and
+        off are thus two things, and two steps however fast they follow each other.
     """
     return ", ".join(_differences(old, new))
 

@@ -32,6 +32,11 @@ class Span:
     high: float
     step: float
 
+    @property
+    def marks(self) -> tuple[tuple[float, str], ...]:
+        """Both ends and zero, with what is written there."""
+        return ((self.low, f"{self.low:g}"), (0.0, "0"), (self.high, f"{self.high:g}"))
+
     def clamp(self, value: float, fallback: float) -> float:
         """Bring a number that may be anything into the range; what is no number falls back."""
         if math.isnan(value):

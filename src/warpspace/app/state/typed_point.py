@@ -8,13 +8,16 @@ from dataclasses import replace
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import linear_spans
 from warpspace.app.state.picked import Picked
+from warpspace.machine.axes import axis_order
 from warpspace.picture.coordinates import IN_R
 
 LONGEST = 200
 """Characters that are read."""
 EXAMPLE = "X 275 Y -225 Z -480"
 _NUMBER = r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:e[-+]?\d+)?"
-_PAIR = re.compile(rf"([a-z])\s*[=:]?\s*({_NUMBER})\s*(?:mm|°|deg)?", re.IGNORECASE)
+# a digit belongs to the name where a number follows apart: C1 30, C1=30, but C30
+_NAME = r"[a-z][0-9](?=\s*[=:]|\s+[-+.,0-9])|[a-z]"
+_PAIR = re.compile(rf"({_NAME})\s*[=:]?\s*({_NUMBER})\s*(?:mm|°|deg)?", re.IGNORECASE)
 _BETWEEN = re.compile(r"[\s,;·]*")
 
 
@@ -93,7 +96,7 @@ def with_typed_point(state: AppState, text: str) -> AppState:
 
 def _in_order(axes: "set[str]") -> list[str]:
     """Sort axes as machines list them: X, Y, Z, A, B, C."""
-    return sorted(axes, key="XYZABC".index)
+    return sorted(axes, key=axis_order)
 
 
 def _present(state: AppState, axis: str) -> float:

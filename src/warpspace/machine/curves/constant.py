@@ -35,7 +35,7 @@ class Constant(ErrorFunction):
         """The value itself."""
         return self.value
 
-    def with_amplitude(self, amplitude: float) -> ErrorFunction:
+    def with_amplitude(self, amplitude: float) -> Self:
         """Give another constant."""
         return replace(self, value=amplitude)
 

@@ -91,18 +91,37 @@ class ErrorFunction(ABC):
         """Positions at which the slope jumps, mm or degrees: charts have a point there."""
         return ()
 
-    def with_amplitude(self, amplitude: float) -> "ErrorFunction":
-        """Give the same curve with another amplitude; a flat zero curve becomes a constant."""
-        # The constant is a subclass of this class: its module cannot be imported earlier.
-        from warpspace.machine.curves.constant import Constant
+    def with_amplitude(self, amplitude: float) -> Self:
+        """Give the same curve with another amplitude; a zero one takes the shape of `grown`.
 
+        Parameters
+        ----------
+        amplitude : float, µm or µrad
+
+        Returns
+        -------
+        ErrorFunction
+            Of the same kind. Zero where it was zero and stays so, and where `grown` is.
+        """
         present = self.amplitude
-        if abs(present) < NEGLIGIBLE:
-            return Constant(self.span, amplitude)
-        return self.scaled(amplitude / present)
+        if abs(present) >= NEGLIGIBLE:
+            return self.scaled(amplitude / present)
+        if amplitude == present:
+            return self
+        grown = self.grown()
+        reached = grown.amplitude
+        return self if abs(reached) < NEGLIGIBLE else grown.scaled(amplitude / reached)
+
+    def grown(self) -> Self:
+        """Give the curve that a zero one becomes when its slider leaves zero, of any amplitude.
+
+        Needed by kinds of several numbers, all of which can be zero: their shape is lost then. A
+        kind that keeps zero needs no more than its own `with_amplitude`.
+        """
+        return self
 
     def shape(self, position: Array) -> Array:
-        """Give the curve for an amplitude of one; 1 everywhere for a flat zero curve.
+        """Give the curve for an amplitude of one; of a zero curve that of the `grown` one.
 
         Parameters
         ----------
@@ -171,6 +190,18 @@ class ErrorFunction(ABC):
         return f"{self.name} along {axis}; this is its largest value"
 
     # --- edited as rows of numbers ----------------------------------------------------------------
+
+    @classmethod
+    def tidied(cls, rows: Rows) -> tuple[Rows, tuple[str, ...]]:
+        """Put rows as a user has them into the order that `from_rows` expects.
+
+        Returns
+        -------
+        rows : sequence of sequence of float
+        remarks : tuple of str
+            What was changed, a sentence each.
+        """
+        return rows, ()
 
     @classmethod
     @abstractmethod

@@ -17,6 +17,8 @@ MAX_COSINES = 2_000_000
 """Cosines that the peak of a curve may take: terms × positions."""
 SAMPLES_PER_WAVE = 16
 SHOWN_TERMS = 3
+LEAST_PEAK = 1e-6
+"""Largest value below which a wave of amplitude one does not leave zero within the range."""
 LIMITS = ((0.0, MAX_ORDER), (-MAX_ERROR, MAX_ERROR), (-MAX_LENGTH_MM, MAX_LENGTH_MM))
 """Of order, amplitude and phase."""
 
@@ -49,6 +51,20 @@ class Harmonics(ErrorFunction):
     def scaled(self, factor: float) -> Self:
         """Multiply all amplitudes."""
         return replace(self, terms=tuple((n, factor * a, phase) for n, a, phase in self.terms))
+
+    def grown(self) -> Self:
+        """Give the first of its waves that is not zero by its order and phase, else one whole wave.
+
+        Orders and phases of all terms stay.
+        """
+        for index in range(len(self.terms)):
+            terms = tuple(
+                (n, float(k == index), phase) for k, (n, _, phase) in enumerate(self.terms)
+            )
+            wave = replace(self, terms=terms)
+            if abs(wave.amplitude) > LEAST_PEAK:
+                return wave
+        return replace(self, terms=((_one_wave(self.span), 1.0, 0.0),))
 
     @property
     def samples(self) -> int:
@@ -105,5 +121,9 @@ class Harmonics(ErrorFunction):
     @classmethod
     def from_curve(cls, present: ErrorFunction, span: Span) -> Self:
         """Give one wave over the range, with the amplitude of the present curve."""
-        low, high = span
-        return cls(span, ((float(f"{360.0 / (high - low):.6g}"), present.amplitude, 0.0),))
+        return cls(span, ((_one_wave(span), present.amplitude, 0.0),))
+
+
+def _one_wave(span: Span) -> float:
+    """Give the order, rounded, of the wave that is as long as the range."""
+    return float(f"{360.0 / (span[1] - span[0]):.6g}")

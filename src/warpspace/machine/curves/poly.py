@@ -35,6 +35,17 @@ class Poly(ErrorFunction):
         """Multiply all coefficients."""
         return replace(self, coefficients=tuple(factor * c for c in self.coefficients))
 
+    def grown(self) -> Self:
+        """Give the line from 0 at the lower end to 1 at the upper; of c0 alone the constant 1.
+
+        The number of coefficients stays.
+        """
+        if len(self.coefficients) < 2:
+            return replace(self, coefficients=(1.0,))
+        low, high = self.span
+        rest = (0.0,) * (len(self.coefficients) - 2)
+        return replace(self, coefficients=(-low / (high - low), 1.0 / (high - low), *rest))
+
     @classmethod
     def read(cls, raw: Any, span: Span, reader: ValueReader) -> Self:
         """Read ``{ poly = [c0, c1, …] }``."""

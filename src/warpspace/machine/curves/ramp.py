@@ -37,7 +37,7 @@ class Ramp(ErrorFunction):
         """The value at the upper end."""
         return self.value
 
-    def with_amplitude(self, amplitude: float) -> ErrorFunction:
+    def with_amplitude(self, amplitude: float) -> Self:
         """Give the ramp to that value; a ramp of zero stays a ramp."""
         return replace(self, value=amplitude)
 

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import fsum
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -11,16 +12,22 @@ from warpspace.exceptions import OptionError
 from warpspace.machine.curves.curve import ErrorFunction, Rows, Span, Spell
 from warpspace.machine.curves.reading import ValueReader
 from warpspace.machine.curves.rows import limited, refuse_more
-from warpspace.machine.limits import MAX_ERROR, MAX_LENGTH_MM, MAX_POINTS
+from warpspace.machine.limits import MAX_CURVE_ROWS, MAX_ERROR, MAX_LENGTH_MM, MAX_POINTS
 from warpspace.units import Array
 
-MAX_ROWS = 500
-"""Rows that may be edited as text."""
 MAX_FILE_NAME, MAX_COLUMN_NAME = 1024, 256
 FIRST_POINTS = 5
-"""Points that a curve of another kind is turned into."""
+"""Points that a straight curve of another kind is turned into; a bent one takes more."""
+KEPT = 0.002
+"""Largest distance of the table from the curve it was made of, as a share of its largest value."""
+BETWEEN = 8
+"""Places between two points at which that distance is looked for."""
+DIGITS = 6
+"""Digits behind the point of the share of the amplitude that a first value is rounded to."""
 LIMITS = ((-MAX_LENGTH_MM, MAX_LENGTH_MM), (-MAX_ERROR, MAX_ERROR))
 """Of position and value."""
+SHOWN_POSITIONS = 3
+"""Positions that a remark names."""
 Point = tuple[float, float]
 
 
@@ -37,7 +44,7 @@ class Table(ErrorFunction):
     name: ClassVar[str] = "table"
     title: ClassVar[str] = "table"
     forms: ClassVar[tuple[tuple[str, ...], ...]] = (("table",), ("csv", "column"))
-    row_words: ClassVar[str] = "position and value in each row, positions ascending"
+    row_words: ClassVar[str] = "position and value in each row"
     points: tuple[Point, ...] = ()
 
     def evaluate(self, position: Array) -> Array:
@@ -59,6 +66,14 @@ class Table(ErrorFunction):
         """The positions of the points."""
         return tuple(q for q, _ in self.points)
 
+    def grown(self) -> Self:
+        """Give the line from 0 at its first position to 1 at its last; of one row the value 1."""
+        first, last = self.points[0][0], self.points[-1][0]
+        reach = last - first
+        return replace(
+            self, points=tuple((q, (q - first) / reach if reach else 1.0) for q, _ in self.points)
+        )
+
     @classmethod
     def read(cls, raw: Any, span: Span, reader: ValueReader) -> Self:
         """Read ``{ table = [[q, value], …] }`` or ``{ csv = file, column = name }``."""
@@ -79,8 +94,8 @@ class Table(ErrorFunction):
 
     @classmethod
     def from_rows(cls, span: Span, rows: Rows) -> Self:
-        """Read points; positions must ascend."""
-        refuse_more(len(rows), MAX_ROWS, "rows")
+        """Read points; positions must ascend, see `tidied`."""
+        refuse_more(len(rows), MAX_CURVE_ROWS, "rows")
         for number, row in enumerate(rows, start=1):
             if len(row) != 2:
                 raise OptionError(f"row {number}: {len(row)} numbers; expected {cls.row_words}")
@@ -94,15 +109,57 @@ class Table(ErrorFunction):
             )
         return cls(span, points)
 
+    @classmethod
+    def tidied(cls, rows: Rows) -> tuple[Rows, tuple[str, ...]]:
+        """Sort rows by position, and average the values of one position."""
+        if any(len(row) != 2 for row in rows):
+            return rows, ()  # `from_rows` says so
+        if all(low[0] < high[0] for low, high in pairwise(rows)):
+            return rows, ()
+        remarks: list[str] = []
+        if any(low[0] > high[0] for low, high in pairwise(rows)):
+            remarks.append("Rows sorted by position.")
+        values: dict[float, list[float]] = {}
+        for position, value in rows:
+            values.setdefault(position, []).append(value)
+        repeated = sorted(q for q, found in values.items() if len(found) > 1)
+        if repeated:
+            shown = ", ".join(f"{q:g}" for q in repeated[:SHOWN_POSITIONS])
+            more = ", …" if len(repeated) > SHOWN_POSITIONS else ""
+            remarks.append(f"Values of the same position averaged, at {shown}{more}.")
+        return [(q, fsum(values[q]) / len(values[q])) for q in sorted(values)], tuple(remarks)
+
     def rows(self) -> Rows:
         """Give one point a row."""
         return self.points
 
     @classmethod
     def from_curve(cls, present: ErrorFunction, span: Span) -> Self:
-        """Give a few points of the present curve, evenly spread."""
-        at = np.linspace(*span, FIRST_POINTS)
-        return cls(span, tuple(zip(at.tolist(), present.evaluate(at).tolist(), strict=True)))
+        """Give evenly spread points of the present curve, as many as its shape needs.
+
+        Kinks within the range are points as well. A wave too short for the rows that a user may
+        edit is kept at these points only.
+        """
+        peak = abs(present.amplitude)
+        kinks = [q for q in present.kinks if span[0] < q < span[1]][: MAX_CURVE_ROWS // 2]
+        count, most = FIRST_POINTS, MAX_CURVE_ROWS - len(kinks)
+        at = np.union1d(np.linspace(*span, count), np.array(kinks))
+        while count < most and _departure(present, at) > KEPT * peak:
+            count = min(2 * count - 1, most)
+            at = np.union1d(np.linspace(*span, count), np.array(kinks))
+        values = present.evaluate(at)
+        if peak > 0.0 and np.isfinite(peak):
+            digits = DIGITS - int(np.floor(np.log10(peak)))
+            values = np.round(values, digits) + 0.0
+        return cls(span, tuple(zip(at.tolist(), values.tolist(), strict=True)))
+
+
+def _departure(curve: ErrorFunction, at: Array) -> float:
+    """Give how far straight lines between positions of a curve are from it at most."""
+    share = np.arange(1, BETWEEN) / BETWEEN
+    between = (at[:-1, None] + np.diff(at)[:, None] * share).reshape(-1)
+    straight = np.interp(between, at, curve.evaluate(at))
+    return float(np.max(np.abs(curve.evaluate(between) - straight)))
 
 
 def _points(raw: object, reader: ValueReader) -> tuple[Point, ...]:

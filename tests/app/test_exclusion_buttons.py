@@ -10,7 +10,7 @@ from warpspace import load_scene
 from warpspace.app.browser.arrangement import split_script
 from warpspace.app.browser.clicks import LONGEST_WORD, MOST_CLICKS, SCRIPT, read_clicks
 from warpspace.app.panels.view import COMPONENT_NAMES, component_of
-from warpspace.app.readouts.exclusions import exclusion_buttons, with_switched
+from warpspace.app.readouts.error_controls import error_controls, with_switched
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.exclusions import Exclusions
@@ -39,57 +39,65 @@ class _Buttons(HTMLParser):
 
 def buttons(exclusions: Exclusions, key: str = "EAX") -> _Buttons:
     return _Buttons(
-        exclusion_buttons(
-            parameter(key), exclusions, lambda word: Markup(f'type="button" data-word="{word}"')
+        error_controls(
+            parameter(key),
+            exclusions,
+            5.5,
+            lambda word: Markup(f'type="button" data-word="{word}"'),
+            lambda word: Markup(f'type="text" data-word="{word}"'),
         )
     )
 
 
 def pressed(exclusions: Exclusions, key: str = "EAX") -> tuple[str, str]:
-    solo, mute, _ = buttons(exclusions, key).found
-    return solo["aria-pressed"], mute["aria-pressed"]
+    only, exclude, _ = buttons(exclusions, key).found
+    return only["aria-pressed"], exclude["aria-pressed"]
 
 
 def test_the_buttons_say_what_they_do_to_which_error():
-    solo, mute, curve = buttons(Exclusions()).found
-    assert [b["data-word"] for b in (solo, mute, curve)] == ["solo EAX", "mute EAX", "curve EAX"]
-    assert solo["aria-label"] == "Solo EAX, roll of X"
-    assert mute["aria-label"] == "Mute EAX, roll of X"
+    only, exclude, curve = buttons(Exclusions()).found
+    assert [b["data-word"] for b in (only, exclude, curve)] == [
+        "only EAX",
+        "exclude EAX",
+        "curve EAX",
+    ]
+    assert only["aria-label"] == "Only EAX, roll of X"
+    assert exclude["aria-label"] == "Exclude EAX, roll of X"
     assert curve["aria-label"] == "Curve of EAX, roll of X"
-    assert all(b["title"] and b["type"] == "button" for b in (solo, mute, curve))
+    assert all(b["title"] and b["type"] == "button" for b in (only, exclude, curve))
 
 
-def test_the_buttons_show_what_is_pressed_and_who_is_silent():
+def test_the_buttons_show_what_is_pressed_and_what_is_excluded():
     assert pressed(Exclusions()) == ("false", "false")
-    assert pressed(Exclusions().with_muted("EAX", True)) == ("false", "true")
-    alone = Exclusions().with_soloed("EAX", True)
+    assert pressed(Exclusions().with_excluded("EAX", True)) == ("false", "true")
+    alone = Exclusions().with_only("EAX", True)
     assert pressed(alone) == ("true", "false")
     assert pressed(alone, "EBX") == ("false", "false")
-    assert "silent" not in buttons(alone).group["aria-label"]
-    assert buttons(alone, "EBX").group["aria-label"].endswith("silent")
-    assert "ws-silent" in buttons(alone, "EBX").group["class"]
-    assert "ws-silent" not in buttons(alone).group["class"]
+    assert "excluded" not in buttons(alone).group["aria-label"]
+    assert buttons(alone, "EBX").group["aria-label"].endswith("excluded")
+    assert "ws-excluded" in buttons(alone, "EBX").group["class"]
+    assert "ws-excluded" not in buttons(alone).group["class"]
 
 
 def test_a_click_switches_and_a_second_one_switches_back():
-    once = with_switched(STATE, "solo EAX")
-    assert once == edits.with_soloed(STATE, "EAX", True)
-    assert with_switched(once, "solo EAX") == STATE
-    muted = with_switched(STATE, "mute EC0Y")
-    assert muted.exclusions.muted == frozenset({"EC0Y"})
-    assert with_switched(muted, "mute EC0Y") == STATE
+    once = with_switched(STATE, "only EAX")
+    assert once == edits.with_only(STATE, "EAX", True)
+    assert with_switched(once, "only EAX") == STATE
+    excluded = with_switched(STATE, "exclude EC0Y")
+    assert excluded.exclusions.excluded == frozenset({"EC0Y"})
+    assert with_switched(excluded, "exclude EC0Y") == STATE
 
 
-@pytest.mark.parametrize("word", ["", "solo", "solo EXA", "mute <script>", "delete EAX", " EAX"])
+@pytest.mark.parametrize("word", ["", "only", "only EXA", "exclude <script>", "delete EAX", " EAX"])
 def test_words_that_mean_nothing_change_nothing(word):
     assert with_switched(STATE, word) is STATE
 
 
 def test_each_switch_is_a_step_however_fast_they_follow_each_other():
     history = History(STATE)
-    for number, word in enumerate(("mute EAX", "mute EBX", "mute EBX", "solo EBX")):
+    for number, word in enumerate(("exclude EAX", "exclude EBX", "exclude EBX", "only EBX")):
         history = history.push(with_switched(history.present, word), 0.01 * number)
-    assert history.undoes == "exclusions.soloed.+EBX"
+    assert history.undoes == "exclusions.only.+EBX"
     history = history.undo()
     assert history.present.exclusions == Exclusions(frozenset({"EAX"}))
     history = history.undo()
@@ -98,12 +106,12 @@ def test_each_switch_is_a_step_however_fast_they_follow_each_other():
 
 
 def test_clicks_are_read_in_order_with_their_numbers():
-    assert read_clicks("7:solo EAX\n8:mute EBX") == ((7, "solo EAX"), (8, "mute EBX"))
+    assert read_clicks("7:only EAX\n8:exclude EBX") == ((7, "only EAX"), (8, "exclude EBX"))
     assert read_clicks("3:a:b") == ((3, "a:b"),)
 
 
 @pytest.mark.parametrize(
-    "text", ["", "solo EAX", "x:solo EAX", "-1:a", "²:a", "9" * 40 + ":a", "1.5:a", "None"]
+    "text", ["", "only EAX", "x:only EAX", "-1:a", "²:a", "9" * 40 + ":a", "1.5:a", "None"]
 )
 def test_what_is_no_click_is_left_out(text):
     assert read_clicks(text) == ()
