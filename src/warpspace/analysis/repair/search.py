@@ -1,4 +1,4 @@
-"""Which errors to adjust: the best set of one, of two, of three …"""
+"""Which errors to adjust: the best set of one, of two, and so on."""
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations

@@ -6,9 +6,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.patheffects import Normal, Stroke
 
-from warpspace.analysis.repair import Outcome, Repairs
-from warpspace.machine.parameters import parameter
+from warpspace.analysis.repair import Outcome, Repair, Repairs
 from warpspace.outputs.charts.paper import (
     SMALL,
     TEXT,
@@ -19,11 +19,11 @@ from warpspace.outputs.charts.paper import (
     sheet,
     style,
 )
-from warpspace.picture.words import spell_short
+from warpspace.picture.words import spell, spell_short
 
 WIDTH_IN = 11.0
 ROW_IN = 0.36
-MOST_ERRORS = 14
+MOST_ERRORS, MOST_VALUES = 14, 3
 COLUMNS = (("mean |E|", "mean_um"), ("RMS |E|", "rms_um"), ("max |E|", "max_um"))
 _BAR = 0.36
 
@@ -41,7 +41,7 @@ def repair_chart(found: Repairs, title: str, subtitle: str) -> Figure:
     Figure
     """
     with style():
-        height = 1.95 + ROW_IN * max(_rows(found), 2)
+        height = 1.95 + ROW_IN * max(min(len(found.effects), MOST_ERRORS) + len(found.repairs), 2)
         figure, top = sheet(WIDTH_IN, height, title, subtitle, top_in=1.25)
         axes = figure.subplots(1, len(COLUMNS), sharey=True)
         figure.subplots_adjust(
@@ -62,13 +62,18 @@ def repair_chart(found: Repairs, title: str, subtitle: str) -> Figure:
         return figure
 
 
+def _set_colour() -> str:
+    """Colour of the best sets."""
+    return ground().series[2]
+
+
 def repair_key() -> list[Patch | Line2D]:
     """Say what the bars mean."""
     return [
         Line2D([], [], color=ground().ink, linestyle=(0, (4, 3)), label="before"),
         Patch(color=bar_colour(), label="this error left out"),
         Patch(color=key_colour(), label="this error at its best value"),
-        Patch(color=ground().accent, label="best set of adjustments"),
+        Patch(color=_set_colour(), label="best set of adjustments"),
     ]
 
 
@@ -100,36 +105,34 @@ def draw_repair_bars(axes: Sequence[Axes], found: Repairs, size: float = SMALL) 
         below = list(places[len(effects) :])
         panel.barh(upper, out, height=_BAR, color=bar_colour())
         panel.barh(lower, best, height=_BAR, color=key_colour())
-        panel.barh(below, together, height=2 * _BAR, color=ground().accent)
+        panel.barh(below, together, height=2 * _BAR, color=_set_colour())
         panel.axvline(before, color=ground().ink, linewidth=1.0, linestyle=(0, (4, 3)))
         largest = max((before, *out, *best, *together)) or 1.0
         rows = ((upper, out), (lower, best), (below, together))
         for spots, numbers in rows:
             for spot, number in zip(spots, numbers, strict=True):
-                panel.text(
-                    number + 0.015 * largest, spot, f"{number:.1f}", va="center", size=0.9 * size
+                text = panel.text(
+                    number + 0.015 * largest, spot, f"{number:.1f}", va="center", size=0.85 * size
                 )
+                text.set_path_effects([Stroke(linewidth=2.5, foreground=ground().paper), Normal()])
         _set_up(panel, title, before, 1.16 * largest, size)
     labels = [
         *(
             f"{effect.parameter.name}  {effect.key}  {spell_short(effect.present)} →"
-            f" {effect.best_value:.1f} {effect.parameter.unit}"
+            f" {spell(effect.best_value)} {effect.parameter.unit}"
             for effect in effects
         ),
-        *(
-            "\n".join(f"{key} → {value:.1f} {parameter(key).unit}" for key, value in pairs)
-            for one in sets
-            for pairs in [list(one.adjust.items())]
-        ),
+        *(_set_words(one) for one in sets),
     ]
     axes[0].set_yticks(list(places), labels, size=size)
     axes[0].set_ylim(max(len(places), 1) - 0.45, -0.55)
 
 
-def _rows(found: Repairs) -> int:
-    """Count the rows, one for each line of a label."""
-    lines = sum(max(1, len(one.adjust) * 0.55) for one in found.repairs)
-    return round(min(len(found.effects), MOST_ERRORS) + lines + 0.49)
+def _set_words(repair: Repair) -> str:
+    """Name a set in one line; the values of a large one stand elsewhere."""
+    if len(repair.adjust) > MOST_VALUES:
+        return f"{len(repair.adjust)} adjusted: " + ", ".join(repair.adjust)
+    return ", ".join(f"{key} → {spell(value)}" for key, value in repair.adjust.items())
 
 
 def _set_up(panel: Axes, title: str, before: float, end: float, size: float) -> None:

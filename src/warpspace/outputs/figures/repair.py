@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from warpspace.analysis.repair import Repairs
+from warpspace.machine.limits import REPAIR_NODES
 from warpspace.machine.parameters import parameter
 from warpspace.outputs.charts.paper import on_ground, style
 from warpspace.outputs.charts.repair import draw_repair_bars, repair_key
@@ -24,9 +25,9 @@ from warpspace.picture.words import quantity_words, spell
 from warpspace.scene import verbs
 from warpspace.scene.model import Scene
 
-MAPS_SHARE = 0.52
+MAPS_SHARE = 0.5
 """Of the height of the content."""
-TEXT_PX = 17.0
+TEXT_PX = 15.0
 
 
 def draw_repair(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
@@ -45,7 +46,7 @@ def draw_repair(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
         Squareness and alignment are adjusted so that the RMS is smallest, up to three of them.
     """
     scene = scenes[0]
-    found = verbs.repair(scene, loop=settings.loop, grid=settings.grid)
+    found = verbs.repair(scene, loop=settings.loop, grid=min(settings.grid, REPAIR_NODES[1]))
     after = verbs.repaired(scene, found.repairs[-1].adjust) if found.repairs else scene
     pictures = share_exaggeration(
         [evaluate_for(settings, one) for one in (scene, after)],
@@ -92,12 +93,10 @@ def _draw_maps(
     maps: list[DrawnMap] = []
     for name, picture, cell in zip(("Before", "After"), pictures, cells, strict=True):
         shift = np.array([cell[0] - cells[0][0], cell[1] - cells[0][1]])
-        maps.append(
-            draw_map(canvas, picture, cell, settings.view, projection=shared.moved(shift))
-        )
+        maps.append(draw_map(canvas, picture, cell, settings.view, projection=shared.moved(shift)))
         numbers = picture.statistics
         words = (
-            f"{name}  mean {spell(numbers.mean_um)} · RMS {spell(numbers.rms_um)} ·"
+            f"{name}: mean {spell(numbers.mean_um)} · RMS {spell(numbers.rms_um)} ·"
             f" max {spell(numbers.max_um)} µm"
         )
         text, size = canvas.fit(words, half - 1.5 * head, SIZES.heading, "bold")
