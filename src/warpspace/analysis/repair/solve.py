@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpspace.analysis.repair.volume import Volume
 from warpspace.units import Array
@@ -77,10 +78,10 @@ def least_rms(volume: Volume, indices: tuple[int, ...], bounds: Array) -> Soluti
 
     matrix, error = volume.triangle
     low, high = bounds[list(indices)].T
-    change = np.linalg.lstsq(matrix[:, indices], -error)[0]
+    change: Array = np.asarray(np.linalg.lstsq(matrix[:, indices], -error)[0], dtype=float)
     if np.any(change < low) or np.any(change > high):
         found = lsq_linear(matrix[:, indices], -error, (low, high), method="bvls", tol=1e-12)
-        change = np.clip(found.x, low, high)
+        change = np.clip(np.asarray(found.x, dtype=float), low, high)
     return Solution(indices, change, volume.rms_um(indices, change))
 
 
@@ -130,7 +131,7 @@ def least_max(
     return Solution(indices, best, best_um)
 
 
-def _worst(norm: Array) -> Array:
+def _worst(norm: Array) -> NDArray[np.intp]:
     """Give the places of the worst nodes, [M]."""
     count = min(NODES_AT_ONCE, norm.size)
     return np.argpartition(norm, norm.size - count)[norm.size - count :]

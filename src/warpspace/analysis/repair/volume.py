@@ -57,7 +57,7 @@ class Volume:
         root = np.sqrt(self.grid.weights.reshape(-1))[:, None]
         rows = (self.response * root).reshape(len(self.basis.keys), -1)
         full = np.column_stack([rows.T, (self.error_um * root).reshape(-1)])
-        triangle = np.linalg.qr(full, mode="r")
+        triangle = np.linalg.qr(full).R
         return triangle[:, :-1], triangle[:, -1]
 
     def rms_um(self, indices: tuple[int, ...], change: Array) -> float:
