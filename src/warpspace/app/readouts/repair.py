@@ -1,6 +1,6 @@
 """What repairs the volume, as HTML: the best sets with their buttons, and every error alone."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 from markupsafe import Markup
 
@@ -78,12 +78,12 @@ def _words(found: Repairs, one: Repair) -> str:
     )
 
 
-def _cells(before: Outcome, outcome: Outcome) -> list[Mapping[str, str]]:
+def _cells(before: Outcome, outcome: Outcome) -> list[dict[str, object]]:
     """Spell mean, RMS, P95 and max, each marked where it got better or worse."""
-    cells: list[Mapping[str, str]] = []
+    cells: list[dict[str, object]] = []
     for name, field in COLUMNS.items():
         value, was = (float(getattr(one, field)) for one in (outcome, before))
         change = value - was
-        kind = "" if abs(change) < NO_GAIN_UM else "ws-better" if change < 0 else "ws-worse"
-        cells.append({"name": name, "text": f"{value:.2f}", "kind": kind})
+        better, worse = change <= -NO_GAIN_UM, change >= NO_GAIN_UM
+        cells.append({"name": name, "text": f"{value:.2f}", "better": better, "worse": worse})
     return cells
