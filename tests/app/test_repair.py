@@ -129,8 +129,10 @@ def test_a_page_gets_the_answer_and_takes_only_known_words():
         assert wire.read_until(lambda: OPEN in wire.scripts, seconds=30.0)
         (session,) = viewer.sessions
         (panel,) = [p for p in session.display.panels if type(p).__name__ == "RepairPanel"]
+        assert not wire.read_until(lambda: panel._looking or panel._answered, seconds=1.5)
+        panel._clicked("seen")  # what the page says once somebody sees the panel
         assert wire.read_until(lambda: panel._answered is not None, seconds=30.0)
-        for word in ("apply 9", "delete 1", "apply", "", "apply 1 1", "x" * 100):
+        for word in ("apply 9", "delete 1", "apply", "", "apply 1 1", "x" * 100, "seen"):
             panel._clicked(word)
         panel._clicked("apply 1")
         assert wire.read_until(lambda: session.state.amplitudes["EA0Z"] < 21.0)

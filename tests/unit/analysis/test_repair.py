@@ -1,7 +1,7 @@
 """What to repair: against direct evaluation, least squares, and a second convex solver."""
 
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
@@ -177,7 +177,7 @@ def test_more_adjustments_are_never_worse(objective):
     found = verbs.repair(FIRST, plan, grid=5)
     values = [getattr(one.outcome, f"{objective}_um") for one in found.repairs]
     assert [len(one.adjust) for one in found.repairs] == [1, 2, 3, 4]
-    assert all(b <= a + 1e-3 for a, b in zip(values, values[1:], strict=False))
+    assert all(b <= a + 1e-3 for a, b in pairwise(values))
     assert values[0] < getattr(found.before, f"{objective}_um")
 
 

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import cast
 
 import numpy as np
 
@@ -10,6 +11,8 @@ from warpspace.field.basis import ErrorBasis
 from warpspace.field.grid import Grid
 from warpspace.units import Array
 
+NODES_AT_ONCE = 1000
+"""Nodes whose rows are reduced at a time, so that memory stays small."""
 SILENT = 1e-12
 """µm per µm or µrad: a response below it everywhere is none."""
 
@@ -54,10 +57,15 @@ class Volume:
         The RMS of a change d of the amplitudes is |matrix @ d + error|, in µm. It is the triangle
         of the QR decomposition of all weighted nodes, so that thousands of sets cost little.
         """
-        root = np.sqrt(self.grid.weights.reshape(-1))[:, None]
-        rows = (self.response * root).reshape(len(self.basis.keys), -1)
-        full = np.column_stack([rows.T, (self.error_um * root).reshape(-1)])
-        triangle = np.linalg.qr(full).R
+        nodes = self.error_um.shape[0]
+        root = np.sqrt(self.grid.weights.reshape(-1))
+        triangle = np.empty((0, len(self.basis.keys) + 1))
+        for first in range(0, nodes, NODES_AT_ONCE):
+            part = slice(first, first + NODES_AT_ONCE)
+            columns = [*self.response[:, part], self.error_um[part]]
+            rows = [(column * root[part, None]).reshape(-1) for column in columns]
+            stacked = np.concatenate([triangle, np.array(rows).T])
+            triangle = cast("Array", np.linalg.qr(stacked, mode="r"))
         return triangle[:, :-1], triangle[:, -1]
 
     def rms_um(self, indices: tuple[int, ...], change: Array) -> float:

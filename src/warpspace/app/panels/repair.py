@@ -8,11 +8,12 @@ from functools import partial
 from warpspace.analysis.repair import DEFAULT_LIMIT, Objective, Repairs
 from warpspace.app.browser.clicks import Clicks
 from warpspace.app.browser.handles import Handle, Input
+from warpspace.app.evaluation.cache import Cache
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.repair import Question, ask, with_preview, with_repair
 from warpspace.app.panels import PanelContext
 from warpspace.app.readouts.html import message
-from warpspace.app.readouts.repair import LOOKING, repair_html
+from warpspace.app.readouts.repair import SEEN, looking_html, repair_html
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.ranges import Span
 from warpspace.exceptions import WarpspaceError
@@ -27,12 +28,24 @@ PAUSE_S = 0.5
 """Pause in the changes after which repairs are looked for: nothing is done during a drag."""
 ONE_AT_A_TIME = threading.Lock()
 """Repairs of all tabs are looked for one after the other."""
+KEPT_BYTES, ANSWER_BYTES = 10_000_000, 100_000
+"""All answers that are kept, and about what one takes with its scene."""
+
+
+def _new_store() -> Cache[Repairs]:
+    """Make the store of answers."""
+    return Cache(KEPT_BYTES)
+
+
+ANSWERS = _new_store()
+"""Answers for all sessions together: pages that show the same ask the same."""
 
 
 class RepairPanel:
     """Objective, limits, the best sets with their buttons, and every error alone.
 
-    A thread of its own looks for repairs once changes have paused, so that nobody waits for it.
+    A thread of its own looks for repairs while somebody sees the panel and once changes have
+    paused, so that nobody waits for it and no page that does not show it costs anything.
 
     Parameters
     ----------
@@ -69,10 +82,11 @@ class RepairPanel:
             ),
             self._choose,
         )
-        self._text = Handle(gui.add_html(LOOKING))
+        self._looking_text = looking_html(self._clicks.button)
+        self._text = Handle(gui.add_html(self._looking_text))
         self._lock = threading.Lock()
         self._wanted: Question | None = None
-        self._looking = False
+        self._looking = self._seen = False
         self._answered: tuple[Question, Repairs] | None = None
         self._picture: LivePicture | None = None
 
@@ -104,12 +118,21 @@ class RepairPanel:
             if question == self._wanted:
                 return
             self._wanted = question
-            start, self._looking = not self._looking, True
-        self._text.put(content=LOOKING)
-        if start:
-            threading.Thread(
-                target=self._look, args=(question,), name="warpspace-repair", daemon=True
-            ).start()
+        self._text.put(content=self._looking_text)
+        if self._answered is not None:  # the page has told of the text that stood here before
+            self._answered, self._seen = None, False
+        self._begin()
+
+    def _begin(self) -> None:
+        """Have the thread work, if there is a question and somebody who sees the panel."""
+        with self._lock:
+            question = self._wanted
+            if question is None or not self._seen or self._looking:
+                return
+            self._looking = True
+        threading.Thread(
+            target=self._look, args=(question,), name="warpspace-repair", daemon=True
+        ).start()
 
     def _look(self, question: Question) -> None:
         """Answer a question and those that have come meanwhile."""
@@ -120,6 +143,8 @@ class RepairPanel:
             latest = self._other_than(question)
             if latest is not None:
                 continue  # still being changed
+            if not self._context.page.is_open:
+                return  # nobody waits for it any more
             self._context.act(self._answer(question))
             with self._lock:
                 latest = self._wanted if self._wanted is not question else None
@@ -134,14 +159,17 @@ class RepairPanel:
         """Answer a question; give what the session is to do about it."""
         try:
             with ONE_AT_A_TIME:
-                return partial(self._draw, question, question.answer())
+                found = ANSWERS.get(question, question.answer, lambda _: ANSWER_BYTES)
+            return partial(self._draw, question, found)
         except WarpspaceError as error:
             return partial(self._refuse, str(error))
         except Exception as error:  # noqa: BLE001 - handed to the session, which shows it
             return partial(_raise, error)
 
     def _draw(self, question: Question, found: Repairs) -> None:
-        """Show an answer."""
+        """Show an answer, unless something else is asked by now."""
+        if self._other_than(question) is not None:
+            return
         self._answered = (question, found)
         self._text.put(content=repair_html(found, self._clicks.button))
 
@@ -155,7 +183,12 @@ class RepairPanel:
         self._context.act(partial(self._do, word))
 
     def _do(self, word: str) -> None:
-        """Show or apply a set, if the answer on the page is that to the present state."""
+        """Begin, show or apply a set; sets only of the answer to the present state."""
+        if word == SEEN:
+            if self._answered is None:
+                self._seen = True
+                self._begin()
+            return
         with self._lock:
             wanted = self._wanted
         if self._answered is None or self._answered[0] is not wanted:

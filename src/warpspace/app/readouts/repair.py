@@ -9,12 +9,18 @@ from warpspace.app.readouts.html import message, render
 from warpspace.machine.parameters import parameter
 from warpspace.picture.words import spell, spell_short
 
-LOOKING = message("Looking for the best repair …", "repair looking")
+SEEN = "seen"
+"""Word that the page sends once a reader sees where the answer will be."""
 NOTHING = message("No point is off in this loop: there is nothing to repair.", "repair none")
 NO_GAIN_UM = 0.01
 """A repair that gains less is not offered, µm."""
 COLUMNS = {"mean": "mean_um", "RMS": "rms_um", "P95": "p95_um", "max": "max_um"}
 Button = Callable[[str], Markup]
+
+
+def looking_html(button: Button) -> str:
+    """Say that repairs are looked for; the page tells with the word `SEEN` when that is seen."""
+    return render("repair_looking", attributes=button(SEEN))
 
 
 def repair_html(found: Repairs, button: Button) -> str:
