@@ -127,6 +127,12 @@ def asked(page: Page) -> None:
     press(page, "Show the whole lever")
 
 
+def repaired(page: Page) -> None:
+    """Compare with the best set of two adjustments."""
+    page.locator("[data-set='2'] button", has_text="Compare").click()
+    page.wait_for_timeout(PAUSE_MS)
+
+
 def by_effect(page: Page) -> None:
     """Rank by what the errors do."""
     choose(page, "Ranked by", "effect of the present errors")
@@ -168,6 +174,7 @@ VISITS = {
     "tab_one_error": Visit(curved, "Error curve", share=0.45),
     "tab_result": Visit(as_opened, "Volumetric error", share=0.52),
     "tab_why": Visit(asked, "Error budget"),
+    "tab_repair": Visit(repaired, "Repair"),
     "tab_gains": Visit(by_effect, "Sensitivities"),
     "tab_compare": Visit(compared, "Compare"),
     "tab_files": Visit(as_opened, "Files", share=0.4),

@@ -90,3 +90,7 @@ MAX_FIGURE_AREA_PX = 64_000_000
 ANIMATION_FRAMES = (2, 600)
 SAMPLES = (1, 1_000_000_000)
 """Machines of a Monte Carlo run."""
+REPAIR_COUNT = (1, 12)
+"""Adjustments in one set of a repair."""
+REPAIR_NODES = (2, 41)
+"""Nodes per axis of the grid that repairs are looked for on: all responses are held at once."""

@@ -68,6 +68,7 @@ def tabs() -> tuple[Tab, ...]:
 for _tab in (
     Tab("Volumetric error", "results", [f"{_HERE}.summary:summary_panel"], "first"),
     Tab("Error budget", "results", [f"{_HERE}.budget:BudgetPanel"]),
+    Tab("Repair", "results", [f"{_HERE}.repair:RepairPanel"]),
     Tab("Sensitivities", "results", [f"{_HERE}.sensitivities:SensitivitiesPanel"]),
     Tab("Compare", "results", [f"{_HERE}.compare:ComparePanel"]),
     Tab("Files", "results", [f"{_HERE}.files:FilesPanel"]),

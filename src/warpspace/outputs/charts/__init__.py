@@ -4,6 +4,7 @@ from warpspace.outputs.charts.circle import ballbar_chart
 from warpspace.outputs.charts.gains import contributions_chart, gains_chart
 from warpspace.outputs.charts.histogram import montecarlo_chart
 from warpspace.outputs.charts.paper import CHART_ENDINGS, write_chart
+from warpspace.outputs.charts.repair import repair_chart
 
 __all__ = [
     "CHART_ENDINGS",
@@ -11,5 +12,6 @@ __all__ = [
     "contributions_chart",
     "gains_chart",
     "montecarlo_chart",
+    "repair_chart",
     "write_chart",
 ]

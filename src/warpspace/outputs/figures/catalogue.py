@@ -118,6 +118,11 @@ for _kind in (
         "Volumetric error of machines within tolerance.",
         f"{_HERE}.charts:draw_montecarlo",
     ),
+    FigureKind(
+        "repair",
+        "Before and after the best repair, and what each error does to the whole volume.",
+        f"{_HERE}.repair:draw_repair",
+    ),
     FigureKind("ballbar", "Circular test, ISO 230-4.", f"{_HERE}.charts:draw_ballbar"),
     FigureKind(
         "comparison",

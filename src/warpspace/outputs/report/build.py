@@ -19,6 +19,7 @@ from warpspace.outputs.report.clock import report_time
 from warpspace.outputs.report.closing import conventions, provenance
 from warpspace.outputs.report.figures import ReportFigures
 from warpspace.outputs.report.promises import sampling_blocks
+from warpspace.outputs.report.repair import repair_section
 from warpspace.outputs.report.review import ReportSettings, Review, Reviewed, build_review
 from warpspace.outputs.report.wording import volume
 from warpspace.scene.model import Scene
@@ -128,6 +129,7 @@ def build_report(
             parts.section("", [*parts.summary_blocks(review), painter.first()]),
             _where(review, painter, embed),
             _why(review),
+            repair_section(review, painter),
             *([_differences(review)] if len(review.scenes) == 2 else []),
             _errors(review),
             _gains(review, painter),
@@ -187,7 +189,7 @@ def _why(review: Review) -> Section:
         for letter, reviewed in parts.letters(review)
         for block in parts.explanation_blocks(letter, reviewed)
     ]
-    return parts.section("Why the worst point is the worst", blocks)
+    return parts.section("Error budget at the worst point", blocks)
 
 
 def _differences(review: Review) -> Section:

@@ -85,6 +85,14 @@ class ReportFigures:
             left_out.add("machine")
         return left_out
 
+    def repair(self, reviewed: Reviewed, prefix: str) -> Block:
+        """Draw the volume before and after the repair, with bars of what each error does."""
+        caption = f"{prefix}Before and after the last set of the table; bars of the whole volume."
+        try:
+            return self._map("repair", [reviewed.scene], caption)
+        except WarpspaceError as error:
+            return Text(f"{caption} {error}", "note")
+
     def gains(self, reviewed: Reviewed, prefix: str) -> Block | None:
         """Bars of the gains; none where the loop has no axis."""
         from warpspace.outputs.charts.gains import gains_chart

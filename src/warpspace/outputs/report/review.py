@@ -11,13 +11,16 @@ from warpspace.analysis.explain import Explanation, explain
 from warpspace.analysis.gains import Gain, gains_max
 from warpspace.analysis.montecarlo import MonteCarlo, Plan, montecarlo
 from warpspace.analysis.nodes import Over
+from warpspace.analysis.repair import Repairs
 from warpspace.analysis.statistics import Statistics
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.kinematics.model import Loop
+from warpspace.machine.limits import REPAIR_NODES
 from warpspace.picture.comparison import scene_change, share_exaggeration
 from warpspace.picture.exaggeration import Exaggeration
 from warpspace.picture.model import same_nodes
 from warpspace.picture.scene_picture import ScenePicture, evaluate_picture
+from warpspace.scene import verbs
 from warpspace.scene.model import Scene
 from warpspace.scene.pipeline import linearisation_error_um
 
@@ -91,6 +94,8 @@ class Reviewed:
         None without tolerances for every parameter of the loop; `why_not_sampled` says which lack.
     linearisation_um : float, µm
         Largest difference between the exact chain and the first order.
+    repairs : Repairs
+        What adjusting squareness and alignment gives for the whole volume.
     """
 
     picture: ScenePicture
@@ -100,6 +105,7 @@ class Reviewed:
     sampling: Sampling | None
     why_not_sampled: str
     linearisation_um: float
+    repairs: Repairs
 
     @property
     def scene(self) -> Scene:
@@ -187,6 +193,7 @@ def _review_scene(picture: ScenePicture, settings: ReportSettings) -> Reviewed:
         sampling,
         why,
         linearisation_error_um(scene, 5),
+        verbs.repair(scene, loop=settings.loop, grid=min(settings.grid, REPAIR_NODES[1])),
     )
 
 

@@ -122,7 +122,6 @@ def statistics_table(review: Review) -> Block:
 def explanation_blocks(letter: str, reviewed: Reviewed) -> list[Block]:
     """Contributions at the worst point, adding up to its error."""
     found = reviewed.explanation
-    total = sum(part.along_um for part in found.contributions)
     rows: list[tuple[str, ...]] = []
     ranked = sorted(found.contributions, key=lambda part: -abs(part.along_um))
     for part in ranked[:MOST_ROWS]:
@@ -134,34 +133,28 @@ def explanation_blocks(letter: str, reviewed: Reviewed) -> list[Block]:
                 f"{given(part.value)} {row.unit}",
                 *(signed(value) for value in part.error_um),
                 signed(part.along_um),
-                percent(part.along_um / total, 0) if total > 0.0 else "",
             )
         )
     rest = ranked[MOST_ROWS:]
     if rest:
         vector = np.sum([part.error_um for part in rest], axis=0)
         along = sum(part.along_um for part in rest)
-        share = percent(along / total, 0) if total > 0.0 else ""
-        rows.append(
-            (f"{len(rest)} more", "", "", *(signed(v) for v in vector), signed(along), share)
-        )
-    rows.append(
-        ("remainder", "second order", "", *(signed(v, 2) for v in found.remainder_um), "", "")
-    )
-    rows.append(("total", "exact chain", "", *(signed(v) for v in found.error_um), "", ""))
+        rows.append((f"{len(rest)} more", "", "", *(signed(v) for v in vector), signed(along)))
+    rows.append(("remainder", "second order", "", *(signed(v, 2) for v in found.remainder_um), ""))
+    rows.append(("total", "exact chain", "", *(signed(v) for v in found.error_um), ""))
     columns = [
         Column("key", width=1.15),
         Column("error", width=2.2),
         Column("value there", "right", 1.3),
         *(Column(f"{axis}, {MICROMETRE}", "right", 0.95) for axis in "xyz"),
         Column(f"along E, {MICROMETRE}", "right", 1.15),
-        Column("share", "right", 0.8),
     ]
     marks: list[Mark] = ["" for _ in rows]
     marks[-1] = "strong"
     caption = (
         f"What each error does to the worst point, {worst_place(reviewed)}. The parts along E"
-        " add up to the length of the first-order error."
+        " add up to the length of the first-order error. This is no advice what to repair: what"
+        " adds most here may make up for other errors elsewhere; see Repair."
     )
     return [
         Text(prefixed(letter, reviewed.scene.title), "heading"),

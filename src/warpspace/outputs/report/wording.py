@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 
-from warpspace.analysis.explain import Contribution
 from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import ErrorFunction
 from warpspace.machine.parameters import parameter
@@ -18,8 +17,8 @@ SUBJECTS = {
 }
 NBSP = "\N{NO-BREAK SPACE}"
 """Keeps a number and its unit on one line."""
-_NAMED = 3
-_LEAST_SHARE = 0.05
+_WORTH = 0.01
+"""Share of the RMS that an adjustment must gain to be named."""
 
 
 def signed(value: float, digits: int = 3) -> str:
@@ -77,14 +76,21 @@ def listed(words: Sequence[str]) -> str:
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
-def leading(reviewed: Reviewed) -> list[tuple[Contribution, float]]:
-    """Find the parameters that matter most at the worst point, with their share of its error."""
-    parts = sorted(reviewed.explanation.contributions, key=lambda part: -part.along_um)
-    total = sum(part.along_um for part in parts)
-    if not total > 0.0:
-        return []
-    shares = [(part, part.along_um / total) for part in parts]
-    return [(part, share) for part, share in shares if share >= _LEAST_SHARE][:_NAMED]
+def repair_words(reviewed: Reviewed) -> str:
+    """Say which one adjustment helps the whole volume most; empty where none does."""
+    found = reviewed.repairs
+    if not found.repairs:
+        return ""
+    best = found.repairs[0]
+    ((key, value),) = best.adjust.items()
+    if not best.outcome.rms_um < found.before.rms_um - _WORTH * found.before.rms_um:
+        return ""
+    return (
+        f"Of all squareness and alignment errors, {named(key)} helps most: set from"
+        f" {given(found.present[key])} to {signed(value)}{NBSP}{parameter(key).unit}, it brings the"
+        f" mean to {microns(best.outcome.mean_um)} and the largest error to"
+        f" {microns(best.outcome.max_um)}."
+    )
 
 
 def verdict(review: Review) -> str:
@@ -120,10 +126,8 @@ def _one(review: Review, reviewed: Reviewed) -> list[str]:
 
 
 def _cause(reviewed: Reviewed) -> str:
-    """Say where the worst point is and what makes it so."""
-    first = f"The worst point is {worst_place(reviewed)}"
-    causes = [f"{named(part.key)} makes {percent(share, 0)}" for part, share in leading(reviewed)]
-    return f"{first}: {listed(causes)} of the error there." if causes else f"{first}."
+    """Say where the worst point is, and what helps."""
+    return f"The worst point is {worst_place(reviewed)}. {repair_words(reviewed)}".rstrip()
 
 
 def _two(review: Review) -> list[str]:
@@ -145,10 +149,9 @@ def _two(review: Review) -> list[str]:
         f"The largest error is {microns(b.max_um)} in B and {microns(a.max_um)} in A.",
     ]
     for letter, reviewed in (("A", first), ("B", second)):
-        causes = [f"{named(part.key)} {percent(share, 0)}" for part, share in leading(reviewed)]
-        if causes:
-            at = worst_place(reviewed)
-            sentences.append(f"In {letter} the worst point is {at}, caused by {listed(causes)}.")
+        if reviewed.statistics.max_um > 0.0:
+            words = f"In {letter} the worst point is {worst_place(reviewed)}."
+            sentences.append(f"{words} {repair_words(reviewed)}".rstrip())
     if review.settings.spec_um is not None:
         sentences.append(_kept(review, review.settings.spec_um))
     return sentences

@@ -1,0 +1,12 @@
+"""What to repair: before and after the best adjustments, and what each error does to the volume.
+
+Run ``python examples/repair.py [FILE]``; FILE ends in .png, .svg or .pdf.
+"""
+
+import sys
+
+from warpspace import load_scene
+from warpspace.outputs.save import write_figure
+
+target = sys.argv[1] if len(sys.argv) > 1 else "repair.png"
+write_figure(target, "repair", [load_scene("dvf5000_first")])

@@ -1,0 +1,123 @@
+"""Repairs of what is shown: what is asked, the answer, and the states before and after."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from warpspace.analysis.repair import Objective, RepairPlan, Repairs, find_repairs
+from warpspace.app.evaluation.cache import Identity
+from warpspace.app.state.app_state import AppState
+from warpspace.app.state.comparison import Comparison, Side
+from warpspace.app.state.ranges import amplitude_span
+from warpspace.field.evaluate import build_basis
+from warpspace.field.grid import build_grid
+from warpspace.kinematics.model import Loop
+from warpspace.machine.limits import MAX_ERROR
+from warpspace.machine.parameters import parameter
+from warpspace.picture.words import spell
+from warpspace.scene.model import Scene
+
+BEFORE = "before repair"
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """All that an answer depends on; equal questions have equal answers.
+
+    Attributes
+    ----------
+    scene : Identity
+        Scene with machine and curves; its amplitudes are not used.
+    amplitudes : tuple of (str, float), µm or µrad
+        Errors that are not excluded.
+    positions : tuple of (str, float), degrees
+        Where the rotary axes stand.
+    loop : Loop
+    nodes : int
+    objective : Objective
+    any_error : bool
+        Whether errors other than squareness and alignment are adjusted, too.
+    limit : float, µm or µrad
+    """
+
+    scene: Identity
+    amplitudes: tuple[tuple[str, float], ...]
+    positions: tuple[tuple[str, float], ...]
+    loop: Loop
+    nodes: int
+    objective: Objective
+    any_error: bool
+    limit: float
+
+    def answer(self) -> Repairs:
+        """Find the repairs; takes from a tenth of a second to some seconds."""
+        scene: Scene = self.scene.thing
+        grid = build_grid(scene.model, scene.workspace.moved(dict(self.positions)), self.nodes)
+        keys = tuple(key for key, _ in self.amplitudes)
+        basis = build_basis(
+            scene.model,
+            scene.errors,
+            keys,
+            grid.coordinates,
+            scene.view(self.loop),
+            grid.point_mm,
+        )
+        basis = replace(basis, nominal_mm=grid.nominal_mm)
+        plan = RepairPlan(self.objective, any_error=self.any_error, limit=self.limit)
+        return find_repairs(basis, grid, np.array([value for _, value in self.amplitudes]), plan)
+
+
+def ask(state: AppState, objective: Objective, *, any_error: bool, limit: float) -> Question:
+    """Ask what repairs a state; excluded errors neither act nor are adjusted."""
+    active = {k: v for k, v in state.amplitudes.items() if state.exclusions.active(k)}
+    return Question(
+        Identity(state.scene),
+        tuple(active.items()),
+        tuple(state.positions.items()),
+        state.loop,
+        state.nodes,
+        objective,
+        any_error,
+        limit,
+    )
+
+
+def with_adjusted(state: AppState, adjust: Mapping[str, float]) -> AppState:
+    """Give some errors other amplitudes, µm or µrad; their sliders grow where that is needed."""
+    for key, value in adjust.items():
+        if key not in state.amplitudes:
+            continue
+        kept = min(max(value, -MAX_ERROR), MAX_ERROR)
+        span = state.spans[key]
+        if not span.low <= kept <= span.high:
+            span = amplitude_span(key, kept, state.scene.tolerances.get(key))
+        state = replace(
+            state,
+            amplitudes={**state.amplitudes, key: kept},
+            spans={**state.spans, key: span},
+        )
+    return state
+
+
+def with_preview(state: AppState, adjust: Mapping[str, float]) -> AppState:
+    """Compare what is steered with the same after a repair, and draw the latter."""
+    plain = replace(state, comparison=Comparison(), picked=None, lever="")
+    after = Side(_after_words(adjust), with_adjusted(plain, adjust))
+    comparison = replace(state.comparison, a=Side(), b=after, shown="b")
+    return replace(state, comparison=comparison)
+
+
+def with_repair(state: AppState, adjust: Mapping[str, float]) -> AppState:
+    """Apply a repair; the state before it stays as the other side of a comparison."""
+    plain = replace(state, comparison=Comparison(), picked=None, lever="")
+    before = Side(BEFORE, plain)
+    repaired = with_adjusted(state, adjust)
+    comparison = replace(state.comparison, a=before, b=Side(), shown="b", pinned=before)
+    return replace(repaired, comparison=comparison)
+
+
+def _after_words(adjust: Mapping[str, float]) -> str:
+    """Name a repair that is looked at."""
+    parts = ", ".join(f"{key} {spell(v)} {parameter(key).unit}" for key, v in adjust.items())
+    return f"after repair: {parts}"
