@@ -5,7 +5,7 @@ import pytest
 from app.conftest import SCENES, Tab, drawn_nodes
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import start_state
-from warpspace.scene import verbs
+from warpspace.scene import repairs as scene_repairs
 
 pytestmark = pytest.mark.browser
 LIVE = LiveModel()
@@ -13,7 +13,7 @@ START = start_state(SCENES[0])
 
 
 def test_find_and_apply_the_best_repair(tab: Tab) -> None:
-    found = verbs.repair(SCENES[0])
+    found = scene_repairs.repair(SCENES[0])
     tab.panel("Repair")  # action 1
     tab.until(lambda: tab.page.locator("[data-repair='2 mean']").count() == 1)
     for size, repair in ((1, found.repairs[0]), (2, found.repairs[1])):

@@ -14,7 +14,7 @@ from warpspace.app.server.viewer import Viewer
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.store import StateStore
-from warpspace.scene import verbs
+from warpspace.scene import repairs as scene_repairs
 from warpspace.scene.library import load_scene
 
 SCENE = load_scene("dvf5000_first")
@@ -28,7 +28,7 @@ def found(state=START, objective=Objective.RMS, *, any_error=False, limit=200.0)
 
 
 def test_the_answer_is_that_of_the_command():
-    assert found() == verbs.repair(SCENE, grid=7)
+    assert found() == scene_repairs.repair(SCENE, grid=7)
 
 
 def test_a_question_is_new_only_where_the_answer_may_be():

@@ -18,8 +18,6 @@ from warpspace.machine.tolerances import ToleranceSet
 from warpspace.scene.library import load_scene
 from warpspace.scene.model import Scene
 from warpspace.scene.pipeline import choose_view
-from warpspace.scene.repairs import repair as repair
-from warpspace.scene.repairs import repaired as repaired
 
 THESIS_SCENES = ("dvf5000_general", "dvf5000_proposed", "dvf5000_first", "dvf5000_second")
 

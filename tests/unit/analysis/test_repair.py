@@ -14,7 +14,7 @@ from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.field.evaluate import evaluate_first_order
 from warpspace.field.grid import build_grid
 from warpspace.machine.errors import ErrorSet
-from warpspace.scene import verbs
+from warpspace.scene import repairs as scene_repairs
 from warpspace.scene.library import load_scene
 from warpspace.scene.pipeline import grid_basis
 
@@ -24,7 +24,7 @@ SQUARENESS = ("EC0Y", "EA0Z", "EB0Z")
 
 
 def with_values(scene, **values):
-    return verbs.repaired(scene, values)
+    return scene_repairs.repaired(scene, values)
 
 
 def outcome_of(scene, nodes=NODES):
@@ -82,7 +82,7 @@ def least_max(keys, low, high, scene=FIRST):
 
 
 def test_leaving_one_out_is_what_direct_evaluation_gives():
-    found = verbs.repair(FIRST, grid=NODES)
+    found = scene_repairs.repair(FIRST, grid=NODES)
     assert numbers(found.before) == pytest.approx(outcome_of(FIRST), abs=1e-9)
     assert {effect.key for effect in found.effects} == set(FIRST.errors) - {"EX0B", "EZ0B"}
     for effect in found.effects:
@@ -97,7 +97,7 @@ def test_leaving_one_out_is_what_direct_evaluation_gives():
 
 def test_the_worst_contributor_is_not_what_to_leave_out():
     """What the issue measured: without EA0Z all gets worse; only without EAX the max falls."""
-    found = verbs.repair(FIRST)
+    found = scene_repairs.repair(FIRST)
     effects = {effect.key: effect for effect in found.effects}
     out = effects["EA0Z"].left_out
     assert (found.before.max_um, out.max_um) == pytest.approx((51.7, 63.6), abs=0.05)
@@ -116,7 +116,7 @@ def test_the_worst_contributor_is_not_what_to_leave_out():
 
 @pytest.mark.parametrize("size", [1, 2, 3])
 def test_rms_is_the_least_squares_optimum_over_all_sets(size):
-    found = verbs.repair(FIRST, grid=NODES).repairs[size - 1]
+    found = scene_repairs.repair(FIRST, grid=NODES).repairs[size - 1]
     best = np.inf
     for keys in combinations(SQUARENESS, size):
         matrix, present, weights = response(keys)
@@ -134,7 +134,7 @@ def test_rms_is_the_least_squares_optimum_over_all_sets(size):
 def test_rms_within_limits_is_the_bounded_optimum():
     keys, limit = ("EXX", "EYX", "EZX", "EAY", "EA0Z"), 4.0
     plan = RepairPlan(count=5, adjustable=keys, limit=limit, limits={"EA0Z": 1.5})
-    found = verbs.repair(FIRST, plan, grid=NODES).repairs[-1]
+    found = scene_repairs.repair(FIRST, plan, grid=NODES).repairs[-1]
     matrix, present, weights = response(keys)
     root = np.sqrt(weights)
     high = np.array([1.5 if key == "EA0Z" else limit for key in keys])
@@ -152,7 +152,7 @@ def test_rms_within_limits_is_the_bounded_optimum():
 )
 def test_max_is_what_a_second_solver_finds(keys, limit):
     plan = RepairPlan(Objective.MAX, count=len(keys), adjustable=keys, limit=limit)
-    found = verbs.repair(FIRST, plan, grid=NODES).repairs[-1]
+    found = scene_repairs.repair(FIRST, plan, grid=NODES).repairs[-1]
     assert found.outcome.max_um == pytest.approx(least_max(keys, -limit, limit), abs=1e-3)
     assert outcome_of(with_values(FIRST, **found.adjust))[3] == pytest.approx(
         found.outcome.max_um, abs=1e-9
@@ -163,7 +163,7 @@ def test_max_is_what_a_second_solver_finds(keys, limit):
 
 def test_max_of_one_error_is_the_minimum_of_a_fine_scan():
     plan = RepairPlan(Objective.MAX, count=1)
-    (found,) = verbs.repair(FIRST, plan, grid=NODES).repairs
+    (found,) = scene_repairs.repair(FIRST, plan, grid=NODES).repairs
     scanned = {
         value: outcome_of(with_values(FIRST, EA0Z=value))[3] for value in np.arange(29, 31, 0.02)
     }
@@ -174,7 +174,7 @@ def test_max_of_one_error_is_the_minimum_of_a_fine_scan():
 @pytest.mark.parametrize("objective", Objective)
 def test_more_adjustments_are_never_worse(objective):
     plan = RepairPlan(objective, count=4, any_error=True)
-    found = verbs.repair(FIRST, plan, grid=5)
+    found = scene_repairs.repair(FIRST, plan, grid=5)
     values = [getattr(one.outcome, f"{objective}_um") for one in found.repairs]
     assert [len(one.adjust) for one in found.repairs] == [1, 2, 3, 4]
     assert all(b <= a + 1e-3 for a, b in pairwise(values))
@@ -184,9 +184,9 @@ def test_more_adjustments_are_never_worse(objective):
 @pytest.mark.parametrize("objective", Objective)
 def test_sets_that_are_built_up_say_so_and_are_near_the_best(objective, monkeypatch):
     plan = RepairPlan(objective, count=3, any_error=True)
-    every = verbs.repair(FIRST, plan, grid=3)
+    every = scene_repairs.repair(FIRST, plan, grid=3)
     monkeypatch.setattr(sets, "MOST_SETS", dict.fromkeys(Objective, 21))
-    built = verbs.repair(FIRST, plan, grid=3)
+    built = scene_repairs.repair(FIRST, plan, grid=3)
     assert [one.proven for one in built.repairs] == [True, False, False]
     for one, best in zip(built.repairs, every.repairs, strict=True):
         value = getattr(one.outcome, f"{objective}_um")
@@ -195,14 +195,14 @@ def test_sets_that_are_built_up_say_so_and_are_near_the_best(objective, monkeypa
 
 
 def test_the_grid_hardly_matters():
-    coarse, fine = (verbs.repair(FIRST, grid=nodes).repairs[1] for nodes in (11, 31))
+    coarse, fine = (scene_repairs.repair(FIRST, grid=nodes).repairs[1] for nodes in (11, 31))
     assert set(coarse.adjust) == set(fine.adjust)
     assert coarse.outcome.rms_um == pytest.approx(fine.outcome.rms_um, rel=0.005)
 
 
 def test_a_zero_error_is_adjusted_too():
     plan = RepairPlan(count=1, adjustable=("EYX",))
-    (found,) = verbs.repair(FIRST, plan, grid=NODES).repairs
+    (found,) = scene_repairs.repair(FIRST, plan, grid=NODES).repairs
     assert FIRST.errors.amplitude("EYX") == 0.0
     assert outcome_of(with_values(FIRST, **found.adjust)) == pytest.approx(
         numbers(found.outcome), abs=1e-9
@@ -210,7 +210,7 @@ def test_a_zero_error_is_adjusted_too():
 
 
 def test_nothing_to_repair():
-    found = verbs.repair(load_scene("dvf5000_nominal"), grid=5)
+    found = scene_repairs.repair(load_scene("dvf5000_nominal"), grid=5)
     assert (found.before.max_um, found.effects, found.repairs) == (0.0, (), ())
 
 
@@ -243,15 +243,15 @@ def test_a_loop_without_alignment_has_no_sets():
 )
 def test_bad_plans_are_refused(plan, words):
     with pytest.raises(OptionError, match=words):
-        verbs.repair(FIRST, plan, grid=3)
+        scene_repairs.repair(FIRST, plan, grid=3)
 
 
 def test_an_unknown_error_is_refused():
     with pytest.raises(UnknownNameError, match="EQQ"):
-        verbs.repair(FIRST, RepairPlan(adjustable=("EQQ",)), grid=3)
+        scene_repairs.repair(FIRST, RepairPlan(adjustable=("EQQ",)), grid=3)
 
 
 @pytest.mark.parametrize("nodes", [1, 42])
 def test_the_grid_is_bounded(nodes):
     with pytest.raises(OptionError, match="expected 2 to 41 per axis for a repair"):
-        verbs.repair(FIRST, grid=nodes)
+        scene_repairs.repair(FIRST, grid=nodes)

@@ -93,7 +93,7 @@ def repair(
     RMS is made smallest by weighted least squares, max as a convex problem, to within 0.0001 µm.
     Model: first order. Each node of the grid weighs its share of the volume.
     """
-    from warpspace.scene import verbs
+    from warpspace.scene import repairs as scene_repairs
     from warpspace.scene.library import load_scene
 
     target = check_output(output, ENDINGS, force=force, scenes=[scene]) if output else None
@@ -101,7 +101,7 @@ def repair(
     loaded = load_scene(scene)
     plan = _plan(objective, count, adjustable, limits)
     with progress("searching", silent=as_json):
-        found = verbs.repair(loaded, plan, loop=loop, grid=grid)
+        found = scene_repairs.repair(loaded, plan, loop=loop, grid=grid)
     if target is not None:
         _write(target, loaded, found, force=force)
     if plot is not None:
@@ -176,12 +176,12 @@ def _keys(adjustable: Sequence[str]) -> tuple[str, ...] | None:
 def _write(target: "Path", scene: "Scene", found: "Repairs", *, force: bool) -> None:
     """Write the repaired scene."""
     from warpspace.outputs.files import write_atomically
-    from warpspace.scene import verbs
+    from warpspace.scene import repairs as scene_repairs
     from warpspace.scene.save import scene_to_toml
 
     if not found.repairs:
         raise OptionError(f"-o {target}: there is nothing to adjust in this loop, so no scene")
-    text = scene_to_toml(verbs.repaired(scene, found.repairs[-1].adjust))
+    text = scene_to_toml(scene_repairs.repaired(scene, found.repairs[-1].adjust))
     with write_atomically(target, overwrite=force) as temporary:
         temporary.write_text(text, encoding="utf-8")
 

@@ -22,7 +22,7 @@ from warpspace.outputs.figures.error_map import isoline_words
 from warpspace.picture.comparison import share_exaggeration
 from warpspace.picture.scene_picture import ScenePicture
 from warpspace.picture.words import quantity_words, spell
-from warpspace.scene import verbs
+from warpspace.scene import repairs as scene_repairs
 from warpspace.scene.model import Scene
 
 MAPS_SHARE = 0.5
@@ -46,8 +46,10 @@ def draw_repair(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
         Squareness and alignment are adjusted so that the RMS is smallest, up to three of them.
     """
     scene = scenes[0]
-    found = verbs.repair(scene, loop=settings.loop, grid=min(settings.grid, REPAIR_NODES[1]))
-    after = verbs.repaired(scene, found.repairs[-1].adjust) if found.repairs else scene
+    found = scene_repairs.repair(
+        scene, loop=settings.loop, grid=min(settings.grid, REPAIR_NODES[1])
+    )
+    after = scene_repairs.repaired(scene, found.repairs[-1].adjust) if found.repairs else scene
     pictures = share_exaggeration(
         [evaluate_for(settings, one) for one in (scene, after)],
         settings.exaggeration,

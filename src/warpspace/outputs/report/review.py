@@ -20,7 +20,7 @@ from warpspace.picture.comparison import scene_change, share_exaggeration
 from warpspace.picture.exaggeration import Exaggeration
 from warpspace.picture.model import same_nodes
 from warpspace.picture.scene_picture import ScenePicture, evaluate_picture
-from warpspace.scene import verbs
+from warpspace.scene import repairs as scene_repairs
 from warpspace.scene.model import Scene
 from warpspace.scene.pipeline import linearisation_error_um
 
@@ -193,7 +193,7 @@ def _review_scene(picture: ScenePicture, settings: ReportSettings) -> Reviewed:
         sampling,
         why,
         linearisation_error_um(scene, 5),
-        verbs.repair(scene, loop=settings.loop, grid=min(settings.grid, REPAIR_NODES[1])),
+        scene_repairs.repair(scene, loop=settings.loop, grid=min(settings.grid, REPAIR_NODES[1])),
     )
 
 
