@@ -105,12 +105,69 @@ def spell_positions(at: Mapping[str, SupportsFloat]) -> str:
     return " · ".join((*([f"{linear} mm"] if linear else ()), *rotary))
 
 
+def spell_axes(at: Mapping[str, SupportsFloat]) -> str:
+    """Spell positions of axes in a short way: ``X 275 Y −225 Z −480 B 30°``, mm and degrees."""
+    units = {name: "" if name in LINEAR_AXES else "°" for name in at}
+    return " ".join(f"{name} {spell_coordinate(q)}{units[name]}" for name, q in at.items())
+
+
+def spell_both(at: Mapping[str, SupportsFloat], point_mm: Array | Sequence[float]) -> str:
+    """Spell a point in both ways it is given: as axis positions and as a point of R.
+
+    Parameters
+    ----------
+    at : mapping of str to float, mm or degrees
+        Positions of the axes that are named.
+    point_mm : ndarray or sequence of float, (3,), mm
+
+    Returns
+    -------
+    str
+        ``axes X 275 Y −225 Z −480 · in R x 275 y −225 z −51 mm``.
+    """
+    pairs = zip("xyz", point_mm, strict=True)
+    point = " ".join(f"{name} {spell_coordinate(value)}" for name, value in pairs)
+    return f"axes {spell_axes(at)} · in R {point} mm" if at else f"in R {point} mm"
+
+
+def own_axes(scene: Scene, at: Mapping[str, float]) -> dict[str, float]:
+    """Choose the axes that name a point: the linear ones, and those not at their scene's place."""
+    placed = scene.workspace.positions
+    return {
+        name: value
+        for name, value in at.items()
+        if name in LINEAR_AXES or abs(value - placed.get(name, 0.0)) > 1e-9
+    }
+
+
+def at_argument(at: Mapping[str, float]) -> str:
+    """Spell axis positions as commands take them: ``--at X=275,Y=-225,Z=-480``."""
+    return "--at " + ",".join(f"{name}={value + 0.0:.10g}" for name, value in at.items())
+
+
 def reference_words(scene: Scene) -> str:
     """Say what errors are referred to."""
     if scene.reference is None:
         return "absolute errors"
-    at = " ".join(f"{axis} {spell_short(value)}" for axis, value in scene.reference.items())
-    return f"held still at {at}"
+    return f"reference point {spell_axes(scene.reference)}"
+
+
+def exclusion_words(excluded: Sequence[str], only: Sequence[str] = ()) -> tuple[str, ...]:
+    """Say which errors a picture leaves out: ``excluded: EA0Z``, ``only: EAX``.
+
+    Parameters
+    ----------
+    excluded, only : sequence of str
+        Keys that do not take part; keys that alone do, where there are any.
+    """
+    found = [f"only: {', '.join(only)}"] if only else []
+    return (*found, *([f"excluded: {', '.join(excluded)}"] if excluded else []))
+
+
+def range_words(low: float, high: float, unit: str) -> str:
+    """Say that colours end where somebody chose: ``range fixed 0–50 µm``."""
+    between = "–" if low >= 0.0 else " to "
+    return f"range fixed {spell_short(low)}{between}{spell_short(high)} {unit}"
 
 
 def convention_words(scene: Scene) -> str:

@@ -70,7 +70,11 @@ def draw_comparison(scenes: Sequence[Scene], settings: FigureSettings, *, exact:
     ]
     rooms = [(c[0], c[1], c[2], c[3] - head) for c in cells]
     shared = fit_map(canvas, contents, rooms[0], settings.view)
-    names = [f"A  {scenes[0].title}", f"B  {scenes[1].title}", f"{CHANGE}  {_change_words(settings.component)}"]
+    names = [
+        f"A  {scenes[0].title}",
+        f"B  {scenes[1].title}",
+        f"{CHANGE}  {_change_words(settings.component)}",
+    ]
     maps: list[DrawnMap] = []
     for name, content, cell, room in zip(names, contents, cells, rooms, strict=True):
         shift = np.array([room[0] - rooms[0][0], room[1] - rooms[0][1]])
