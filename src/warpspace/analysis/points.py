@@ -128,9 +128,9 @@ def spread_places(
 ) -> Places:
     """Give the nodes that a mean over the points of one machine is taken over.
 
-    The grid of the working volume, each node with its share of the volume; for the workpiece loop nodes³ low-discrepancy points (Sobol
-    sequence) over cylinder and rotary travel, since a five-dimensional grid would be either coarse
-    or huge.
+    The grid of the working volume, each node with its share of the volume. For the workpiece loop
+    nodes³ low-discrepancy points (Sobol sequence) over cylinder and rotary travel, since a
+    five-dimensional grid would be either coarse or huge.
 
     Returns
     -------

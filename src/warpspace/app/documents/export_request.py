@@ -22,8 +22,8 @@ def build_request(picture: LivePicture) -> Request:
     Returns
     -------
     Request
-        The side that is drawn, or A with B beside it for the change; with the factor that is drawn, and the
-        colours that all maps of the comparison share.
+        The side that is drawn, or A with B beside it for the change; with the factor that is
+        drawn, and the colours that all maps of the comparison share.
     """
     found, drawn = picture.compared, picture.drawn_state
     if found is None:

@@ -21,6 +21,7 @@ from warpspace.outputs.report.figures import ReportFigures
 from warpspace.outputs.report.promises import chance_blocks
 from warpspace.outputs.report.review import ReportSettings, Review, Reviewed, build_review
 from warpspace.outputs.report.wording import volume
+from warpspace.picture.words import reference_words
 from warpspace.scene.model import Scene
 
 ENDINGS = (".html", ".pdf")
@@ -157,6 +158,7 @@ def _facts(review: Review) -> tuple[str, ...]:
         *machines,
         *volumes,
         f"{review.settings.loop} loop",
+        *dict.fromkeys(reference_words(reviewed.scene) for reviewed in review.scenes),
         report_time().strftime("%Y-%m-%d"),
         f"warpspace {__version__}",
     )

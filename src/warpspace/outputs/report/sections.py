@@ -33,7 +33,15 @@ from warpspace.picture.comparison import (
     STATISTICS,
     statistics_change,
 )
-from warpspace.picture.words import spell, spell_point, spell_short, spell_signed
+from warpspace.picture.words import (
+    at_argument,
+    own_axes,
+    spell,
+    spell_both,
+    spell_point,
+    spell_short,
+    spell_signed,
+)
 from warpspace.units import MICROMETRE
 
 MOST_ROWS = 15
@@ -103,6 +111,15 @@ def statistics_table(review: Review) -> Block:
         numbers = [spell(getattr(stats, field)) for stats in found]
         numbers[2:2] = [spell_signed(change[field])] if change else []
         rows.append((f"{label}, {MICROMETRE}", *numbers))
+    places: list[str] = []
+    arguments: list[str] = []
+    for number, stats in enumerate(found):
+        own = own_axes(review.scenes[min(number, len(review.scenes) - 1)].scene, stats.max_at_axes)
+        places.append(spell_both(own, stats.max_at_mm) if stats.max_um > 0.0 else "–")
+        arguments.append(at_argument(own) if stats.max_um > 0.0 else "–")
+    for cells in (places, arguments):
+        cells[2:2] = [""] if change else []
+    rows += [("max at", *places), ("as an argument", *arguments)]
     columns = [Column("|E| over the volume", width=1.4)]
     columns += [Column(name, "right") for name in names]
     note = (

@@ -3,11 +3,19 @@
 from collections.abc import Sequence
 
 from warpspace.analysis.explain import Contribution
-from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import ErrorFunction
 from warpspace.machine.parameters import parameter
 from warpspace.outputs.report.review import Chance, Review, Reviewed
-from warpspace.picture.words import MINUS, TIMES, spell, spell_factor, spell_positions, spell_short
+from warpspace.picture.words import (
+    MINUS,
+    TIMES,
+    own_axes,
+    spell,
+    spell_axes,
+    spell_both,
+    spell_factor,
+    spell_short,
+)
 from warpspace.scene.model import Scene
 from warpspace.units import MICROMETRE
 
@@ -53,12 +61,9 @@ def percent(share: float, digits: int = 1) -> str:
 
 
 def worst_place(reviewed: Reviewed) -> str:
-    """Spell the axis positions of the worst point, those that matter in the loop."""
-    tool = reviewed.picture.view.loop is Loop.TOOL
-    axes = reviewed.scene.machine.chain.tool if tool else reviewed.worst_at
-    return spell_positions(
-        {name: value for name, value in reviewed.worst_at.items() if name in axes}
-    )
+    """Spell the worst point: axis positions, and the point of R."""
+    own = own_axes(reviewed.scene, reviewed.worst_at)
+    return spell_both(own, reviewed.statistics.max_at_mm)
 
 
 def volume(reviewed: Reviewed) -> str:
@@ -203,7 +208,7 @@ def reference_words(scene: Scene) -> str:
     """Say what errors are referred to."""
     if scene.reference is None:
         return "Absolute: errors include the part that is the same everywhere."
-    return f"Relative to {spell_positions(scene.reference)}, which is held still."
+    return f"Relative to the reference point {spell_axes(scene.reference)}, which is held still."
 
 
 def factor_words(factor: float) -> str:
