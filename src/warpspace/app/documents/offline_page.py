@@ -172,7 +172,8 @@ def build_offline_html(
     """
     # a page in an attribute: only these two characters would end or change it
     inner = build_scene_html(picture, camera=camera).replace("&", "&amp;").replace('"', "&quot;")
-    about = {**(provenance or {}), "conditions": list(picture_conditions(picture))}
+    conditions = list(picture_conditions(picture))
+    about = {**(provenance or {}), **({"conditions": conditions} if conditions else {})}
     stored = json.dumps(about, ensure_ascii=False, allow_nan=False)
     templates = Environment(
         loader=PackageLoader("warpspace.app"), autoescape=True, undefined=StrictUndefined
@@ -214,11 +215,10 @@ def point_words(picture: LivePicture) -> str:
     picked = picture.state.picked
     if picked is None or picture.is_difference:
         return ""
-    found = answer(picture.drawn_state, picked, picture.exaggeration).explanation
-    at = answer(picture.drawn_state, picked, picture.exaggeration).at
-    length = float(np.linalg.norm(found.error_um))
-    own = own_axes(picture.drawn_state.scene, at)
-    return f"marked point: {spell_both(own, found.nominal_mm)}, |E| {length:.1f} µm"
+    found = answer(picture.drawn_state, picked, picture.exaggeration)
+    length = float(np.linalg.norm(found.explanation.error_um))
+    place = spell_both(own_axes(picture.drawn_state.scene, found.at), found.explanation.nominal_mm)
+    return f"marked point: {place}, |E| {length:.1f} µm"
 
 
 def _row(key: str, value: str) -> dict[str, str]:
