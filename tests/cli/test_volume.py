@@ -36,3 +36,11 @@ def test_measured_says_within_and_outside(warpspace) -> None:
     out = warpspace("measured", "dvf5000_second", "--tolerances", "dvf5000_proposed").out
     assert "within" in out
     assert "mean of the nodes 14.58 µm" in " ".join(out.split())
+
+
+def test_long_tables_repeat_their_headings(capsys) -> None:
+    from warpspace.cli.tables import Column, print_table
+
+    print_table([Column("key"), Column("value", "µm")], [(str(n), "1") for n in range(85)])
+    lines = capsys.readouterr().out.splitlines()
+    assert sum(line.split() == ["key", "value"] for line in lines) == 3
