@@ -188,7 +188,8 @@ def _draw(columns: Sequence[Column], rows: Sequence[Row], gap: int, width: int) 
             justify="right" if column.is_number else "left",
             no_wrap=not column.wraps,
         )
-    heads = [Text(column.head) for column in columns]
+    lines = max((column.head.count("\n") for column in columns), default=0)
+    heads = [Text("\n" * (lines - column.head.count("\n")) + column.head) for column in columns]
     for number, row in enumerate(rows):
         if table.show_header and number and number % REPEATED == 0:
             table.add_row()

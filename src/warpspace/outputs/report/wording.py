@@ -126,7 +126,7 @@ def _one(review: Review, reviewed: Reviewed) -> list[str]:
 
 def _cause(reviewed: Reviewed) -> str:
     """Say where the worst point is and what makes it so."""
-    first = f"The worst point is {worst_place(reviewed)}"
+    first = f"The worst point is at {worst_place(reviewed)}"
     causes = [f"{named(part.key)} makes {percent(share, 0)}" for part, share in leading(reviewed)]
     return f"{first}: {listed(causes)} of the error there." if causes else f"{first}."
 
@@ -153,7 +153,7 @@ def _two(review: Review) -> list[str]:
         causes = [f"{named(part.key)} {percent(share, 0)}" for part, share in leading(reviewed)]
         if causes:
             at = worst_place(reviewed)
-            sentences.append(f"In {letter} the worst point is {at}, caused by {listed(causes)}.")
+            sentences.append(f"In {letter} the worst point is at {at}, caused by {listed(causes)}.")
     if review.settings.spec_um is not None:
         sentences.append(_kept(review, review.settings.spec_um))
     return sentences
