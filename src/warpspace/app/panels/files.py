@@ -230,12 +230,8 @@ class FilesPanel:
         if picture is not None:
             toml = {"scene_toml": self._alone_if_large(document.state_to_toml)}
             camera = self._context.camera.remember()
-            self._make(
-                "Page",
-                ".html",
-                PAGE_S,
-                lambda _: build_offline_html(picture, toml, camera).encode(),
-            )
+            make: Make = lambda _: build_offline_html(picture, toml, camera).encode()  # noqa: E731
+            self._make("Page", ".html", PAGE_S, make)
 
     def _export(self, name: str, ending: str) -> None:
         """Write an export."""

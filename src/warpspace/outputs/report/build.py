@@ -166,7 +166,7 @@ def _facts(review: Review) -> tuple[str, ...]:
 
 def _where(review: Review, painter: ReportFigures, embed: Embed | None) -> Section:
     """Where the error is: interactive view, statistics, maps."""
-    blocks: list[Block] = [parts.statistics_table(review)]
+    blocks: list[Block | None] = [parts.statistics_table(review), parts.places_table(review)]
     for letter, reviewed in parts.letters(review):
         if embed is not None:
             page = embed(

@@ -111,15 +111,6 @@ def statistics_table(review: Review) -> Block:
         numbers = [spell(getattr(stats, field)) for stats in found]
         numbers[2:2] = [spell_signed(change[field])] if change else []
         rows.append((f"{label}, {MICROMETRE}", *numbers))
-    places: list[str] = []
-    arguments: list[str] = []
-    for number, stats in enumerate(found):
-        own = own_axes(review.scenes[min(number, len(review.scenes) - 1)].scene, stats.max_at_axes)
-        places.append(spell_both(own, stats.max_at_mm) if stats.max_um > 0.0 else "–")
-        arguments.append(at_argument(own) if stats.max_um > 0.0 else "–")
-    for cells in (places, arguments):
-        cells[2:2] = [""] if change else []
-    rows += [("max at", *places), ("as an argument", *arguments)]
     columns = [Column("|E| over the volume", width=1.4)]
     columns += [Column(name, "right") for name in names]
     note = (
@@ -134,6 +125,31 @@ def statistics_table(review: Review) -> Block:
         columns,
         rows,
     )
+
+
+def places_table(review: Review) -> Block | None:
+    """Say where each field is largest: axis positions, point of R, argument of a command."""
+    found = [
+        (letter or "|E|", reviewed.scene, reviewed.statistics)
+        for letter, reviewed in letters(review)
+    ]
+    if review.difference is not None:
+        found.append((DIFFERENCE_LENGTH, review.scenes[0].scene, review.difference))
+    rows: list[tuple[str, ...]] = []
+    for name, scene, stats in found:
+        if stats.max_um > 0.0:
+            own = own_axes(scene, stats.max_at_axes)
+            axes, _, point = spell_both(own, stats.max_at_mm).rpartition(" · ")
+            rows.append((name, axes, point, at_argument(own)))
+    if not rows:
+        return None
+    columns = [
+        Column("max of", width=0.8),
+        Column("axis positions, mm", width=1.7),
+        Column("point in R", width=1.7),
+        Column("as an argument", width=2.0),
+    ]
+    return table("Where the error is largest.", columns, rows)
 
 
 def explanation_blocks(letter: str, reviewed: Reviewed) -> list[Block]:
