@@ -1,4 +1,4 @@
-"""The machine with its bent bodies.
+"""The machine with its deformed bodies.
 
 Run ``python examples/machine.py [FILE]``; FILE ends in .png, .svg or .pdf.
 """

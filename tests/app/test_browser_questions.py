@@ -208,7 +208,8 @@ def test_pictures_and_exports_are_downloaded(tab: Tab, name: str, ending: str) -
     content = Path(waiting.value.path()).read_bytes()
     begin = {"png": b"\x89PNG", "html": b"<!", "glb": b"glTF"}[ending]
     assert content.startswith(begin)
-    assert waiting.value.suggested_filename == f"dvf5000_first.{ending}"
+    stem = "dvf5000_first_view" if name == "View" else "dvf5000_first"
+    assert waiting.value.suggested_filename == f"{stem}.{ending}"
 
 
 @pytest.mark.render

@@ -8,7 +8,7 @@ from warpspace.app.evaluation.sensitivities import rank_picture
 from warpspace.app.readouts.gains import spell_ranking
 from warpspace.app.readouts.summary import summary
 from warpspace.app.state.app_state import start_state
-from warpspace.picture.words import spell_coordinate, spell_place, spell_positions
+from warpspace.picture.coordinates import spell_coordinate
 from warpspace.scene.library import load_scene
 
 
@@ -17,12 +17,6 @@ from warpspace.scene.library import load_scene
 )
 def test_numbers_are_spelt_to_a_tenth_with_a_proper_minus(value: float, text: str) -> None:
     assert spell_coordinate(value) == text
-
-
-def test_points_and_positions_carry_their_units() -> None:
-    assert spell_place((275.0, -225.0, -51.0)) == "X 275, Y −225, Z −51 mm"
-    assert spell_positions({"C": 90.0, "X": 1.0, "Z": -480.0}) == "X 1, Z −480 mm · C 90°"
-    assert spell_positions({"B": -30.0}) == "B −30°"
 
 
 def test_result_and_gains_name_the_worst_point_alike() -> None:

@@ -29,7 +29,8 @@ def test_field_at_points_prints_the_json_contract(warpspace) -> None:
     assert (result.status, result.err) == (0, "")
     found = only_object(result.out)
     assert set(found) == {"points", "statistics"}
-    assert set(found["statistics"]) == {"mean_um", "rms_um", "p95_um", "max_um", "max_at_mm"}
+    keys = {"mean_um", "rms_um", "p95_um", "max_um", "max_at_mm", "max_at_axes"}
+    assert set(found["statistics"]) == keys
     first, second = found["points"]
     expected = {"axes", "nominal_mm", "error_um", "norm_um", "orientation_urad"}
     assert set(first) == set(second) == expected
@@ -46,17 +47,23 @@ def test_field_over_the_grid_has_every_node_and_its_statistics(warpspace) -> Non
     found = only_object(warpspace("field", "dvf5000_first", "--grid", 11, "--json").out)
     norms = [point["norm_um"] for point in found["points"]]
     assert len(norms) == 11**3
-    assert found["statistics"]["mean_um"] == pytest.approx(31.66, abs=0.02)
+    assert found["statistics_nodes"]["mean_um"] == pytest.approx(31.66, abs=0.02)
+    cube = np.reshape(norms, (11, 11, 11))
+    mean = np.trapezoid(np.trapezoid(np.trapezoid(cube, dx=0.1), dx=0.1), dx=0.1)
+    assert found["statistics"]["mean_um"] == pytest.approx(float(mean))  # 30.95 µm
     assert found["statistics"]["max_um"] == pytest.approx(max(norms))
     worst = found["points"][int(np.argmax(norms))]
     assert found["statistics"]["max_at_mm"] == pytest.approx(worst["nominal_mm"])
+    assert found["statistics"]["max_at_axes"] == worst["axes"]
 
 
 def test_field_without_options_evaluates_21_nodes_per_axis(warpspace) -> None:
     result = warpspace("field", "dvf5000_first")
     assert result.status == 0
     assert "DVF5000, first machine measured · tool loop · first order" in result.out
-    assert "9261 points: mean 31.27" in result.out
+    # 30.89 µm: trapezoidal rule over 21³ nodes; 31.27 µm: their plain mean
+    assert "9261 points, over the volume: mean 30.89" in result.out
+    assert "each node counted once: mean 31.27" in result.out
 
 
 @pytest.mark.parametrize("loop", ["tool", "workpiece", "relative"])
@@ -80,8 +87,10 @@ def test_field_options_mean_what_the_python_function_means(
 def test_field_lists_points_with_units_and_says_when_there_are_more(warpspace) -> None:
     points = [option for x in range(25) for option in ("--at", f"X={x}")]
     result = warpspace("field", "dvf5000_first", *points)
-    first = result.out.partition("tilt")[0]
-    rows = re.findall(r"^ +(\d+) +(\d+) +.*\+\d+\.\d{3}", first, re.MULTILINE)
+    first = result.out.partition("error x")[0]
+    assert "axis X" in first
+    assert "in R x" in first
+    rows = re.findall(r"^ +(\d+) +(\d+) +0 +-280 +0 +0 +\d+ ", first, re.MULTILINE)
     assert rows == [(str(x + 1), str(x)) for x in range(20)]
     assert "|E|" in result.out
     assert "µm" in result.out
@@ -99,10 +108,10 @@ def test_field_csv_holds_the_same_numbers_as_json(tmp_path: Path, warpspace) -> 
     assert len(rows) == len(points) == 27
     for row, point in zip(rows, points, strict=True):
         for axis, value in point["axes"].items():
-            assert float(row[f"{axis}_{'mm' if axis in 'XYZ' else 'deg'}"]) == value
+            assert float(row[f"axis_{axis}_{'mm' if axis in 'XYZ' else 'deg'}"]) == value
         for index, letter in enumerate("xyz"):
             at = point["nominal_mm"][index], point["error_um"][index]
-            assert float(row[f"{letter}_mm"]) == pytest.approx(at[0])
+            assert float(row[f"R_{letter}_mm"]) == pytest.approx(at[0])
             assert float(row[f"error_{letter}_um"]) == pytest.approx(at[1], abs=1e-8)
             tilt = point["orientation_urad"][index]
             assert float(row[f"orientation_{letter}_urad"]) == pytest.approx(tilt, abs=1e-8)

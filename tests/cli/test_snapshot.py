@@ -75,14 +75,21 @@ def test_compare_prints_statistics(warpspace: Command) -> None:
     result = warpspace("compare", "dvf5000_first", "dvf5000_second", "--grid", "11", "--json")
     assert result.status == 0
     found = json.loads(result.out)
-    assert set(found) == {"a", "b", "difference"}
-    assert found["a"]["mean_um"] == pytest.approx(31.66, abs=0.02)
-    assert found["b"]["mean_um"] == pytest.approx(14.58, abs=0.02)
-    assert set(found["difference"]) == {"mean_um", "rms_um", "p95_um", "max_um", "max_at_mm"}
+    assert set(found) == {"a", "b", "difference", "change", "statistics_nodes"}
+    assert found["statistics_nodes"]["a"]["mean_um"] == pytest.approx(31.66, abs=0.02)
+    assert found["statistics_nodes"]["b"]["mean_um"] == pytest.approx(14.58, abs=0.02)
+    # trapezoidal rule over the nodes, by numpy.trapezoid along each axis
+    assert found["a"]["mean_um"] == pytest.approx(30.9465, abs=1e-4)
+    assert found["b"]["mean_um"] == pytest.approx(14.5584, abs=1e-4)
+    keys = {"mean_um", "rms_um", "p95_um", "max_um", "max_at_mm", "max_at_axes"}
+    assert set(found["difference"]) == keys
+    for key, change in found["change"].items():
+        assert change == pytest.approx(found["b"][key] - found["a"][key])
     text = warpspace("compare", "dvf5000_first", "dvf5000_first")
-    assert "B − A" in text.out
-    row = next(line for line in text.out.splitlines() if line.startswith("B − A"))
-    assert row.split()[3:7] == ["0.00"] * 4
+    head = next(line for line in text.out.splitlines() if "B − A" in line)
+    assert head.split()[-3:] == ["|E_B", "−", "E_A|"]
+    row = next(line for line in text.out.splitlines() if line.strip().startswith("mean"))
+    assert row.split() == ["mean", "30.89", "30.89", "+0.00", "0.00"]
 
 
 def test_compare_refuses_different_volumes(warpspace: Command, tmp_path: Path) -> None:

@@ -227,13 +227,13 @@ def test_csv_read_by_pandas(name, tmp_path) -> None:
     write_csv(evaluate_picture(scene, grid=5), tmp_path / "a.csv")
     table = pd.read_csv(tmp_path / "a.csv")
     field = evaluate(scene, grid=5)
-    close(table[["x_mm", "y_mm", "z_mm"]], field.nominal_mm.reshape(-1, 3))
+    close(table[["R_x_mm", "R_y_mm", "R_z_mm"]], field.nominal_mm.reshape(-1, 3))
     errors = ["error_x_um", "error_y_um", "error_z_um"]
     np.testing.assert_allclose(table[errors], field.error_um.reshape(-1, 3), rtol=1e-6, atol=1e-9)
     close(table["norm_um"], field.norm_um.reshape(-1))
     tilts = ["orientation_x_urad", "orientation_y_urad", "orientation_z_urad"]
     close(table[tilts], field.orientation_urad.reshape(-1, 3))
-    again = evaluate(scene, at={axis: table[f"{axis}_mm"].to_numpy() for axis in "XYZ"})
+    again = evaluate(scene, at={axis: table[f"axis_{axis}_mm"].to_numpy() for axis in "XYZ"})
     close(table[errors], again.error_um)
     assert set(table["scene"]) == {name}
     assert table["program"].str.startswith("warpspace ").all()

@@ -62,7 +62,7 @@ def said(*scenes: "Scene", **changes) -> str:
 def test_verdict_names_mean_max_place_and_cause() -> None:
     text = said(load_scene("dvf5000_first"), grid=11)
     assert "30.9 µm away from where it should be, and at most 51.7 µm" in text
-    assert "The worst point is X 275, Y −225, Z −480 mm" in text
+    assert "The worst point is at axes X 275 Y −225 Z −480 · in R x 275 y −225 z −51 mm" in text
     assert "EA0Z (squareness of Z to Y) helps most: set from +33.9 to +20.2 µrad" in text
     assert "brings the mean to 24.7 µm and the largest error to 50.2 µm" in text
     assert "makes" not in text

@@ -53,7 +53,9 @@ def test_orientation_map_shows_the_tilt(component: str) -> None:
 
 def test_comparison_shares_scale_exaggeration_and_projection() -> None:
     scenes = [load_scene("dvf5000_first"), load_scene("dvf5000_second")]
-    first, second, difference = draw_figure("comparison", scenes).maps
+    # large enough that a pixel of the three small maps is finer than the tolerance on the depth
+    settings = FigureSettings(size=(2400, 1800))
+    first, second, difference = draw_figure("comparison", scenes, settings).maps
     assert first.scale == second.scale == difference.scale
     assert first.exaggeration == second.exaggeration == difference.exaggeration
     assert first.projection.px_per_mm == difference.projection.px_per_mm

@@ -161,13 +161,10 @@ def variance_contributions(
     return Contributions(tuple(rows), total, float(np.sqrt(total + offset)))
 
 
-def _node_gains(
-    model: Model, draws: Draws, workspace: Workspace, view: View, plan: Plan, nodes: int
-) -> Array:
-    """Gains at spread places, [3, K, N]."""
+def _spread(model: Model, workspace: Workspace, view: View, plan: Plan, nodes: int) -> Places:
+    """Give the places that a mean over the points of a machine is taken over."""
     cylinder = choose_cylinder(model, plan.cylinder) if view.loop is Loop.WORKPIECE else None
-    places: Places = spread_places(model, view.loop, workspace, cylinder, nodes)
-    return node_gains(model, draws.keys, view, places)
+    return spread_places(model, view.loop, workspace, cylinder, nodes)
 
 
 def _sampled_variance(
@@ -214,8 +211,9 @@ def _sobol(
     drawn = sampling.sample(problem, base, calc_second_order=False, seed=seed)
     unit = np.repeat(unit, len(drawn), axis=0)
     unit[:, wide] = drawn
-    gains = _node_gains(model, draws, workspace, view, plan, SOBOL_NODES)
-    result = reduce_nodes(draws.from_unit(unit), gains, Over.MEAN)
+    places = _spread(model, workspace, view, plan, SOBOL_NODES)
+    gains = node_gains(model, draws.keys, view, places)
+    result = reduce_nodes(draws.from_unit(unit), gains, Over.MEAN, places.weights)
     found = analysis.analyze(problem, result, calc_second_order=False, seed=seed)
     columns = zip(found["S1"], found["ST"], found["ST_conf"], strict=True)
     return {

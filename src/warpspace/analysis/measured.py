@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpspace.analysis.statistics import Statistics, statistics
+from warpspace.analysis.statistics import Statistics, statistics, volume_statistics
 from warpspace.field.basis import ErrorField
 from warpspace.field.evaluate import View, evaluate_first_order
 from warpspace.field.grid import Workspace, build_grid
@@ -62,7 +62,9 @@ class Measured:
     checks : tuple of Check
         One per error of the set.
     predicted : Statistics
-        |E| of the tool loop over the grid of the working volume.
+        |E| of the loop over the working volume.
+    predicted_nodes : Statistics
+        The same over the nodes of the grid, each counted once, as the thesis has it.
     shear_urad : dict of str to float, µrad
         Angle by which the volume is out of square per plane, in the sign of the squareness
         parameter; out of a least-squares affine fit to the whole map.
@@ -70,6 +72,7 @@ class Measured:
 
     checks: tuple[Check, ...]
     predicted: Statistics
+    predicted_nodes: Statistics
     shear_urad: dict[str, float]
 
 
@@ -124,7 +127,12 @@ def measured(
     grid = build_grid(model, workspace, nodes)
     view = view or View()
     field = evaluate_first_order(model, errors, grid.coordinates, view, grid.nominal_mm)
-    return Measured(check_errors(errors, tolerances), statistics(field), shear(field))
+    return Measured(
+        check_errors(errors, tolerances),
+        volume_statistics(field, grid),
+        statistics(field, grid.coordinates),
+        shear(field),
+    )
 
 
 def shear(field: ErrorField) -> dict[str, float]:

@@ -241,6 +241,6 @@ def _job(model: Model, draws: Draws, workspace: Workspace, view: View, plan: Pla
     gains = node_gains(model, draws.keys, view, places)
 
     def all_points_each(rng: np.random.Generator, count: int) -> Array:
-        return reduce_nodes(draws.draw(rng, count), gains, over)
+        return reduce_nodes(draws.draw(rng, count), gains, over, places.weights)
 
     return all_points_each

@@ -43,7 +43,9 @@ def node_gains(model: Model, keys: Sequence[str], view: View, places: Places) ->
     return np.ascontiguousarray(np.moveaxis(flat, -1, 0))
 
 
-def reduce_nodes(amplitudes: Array, gains: Array, over: Over | str) -> Array:
+def reduce_nodes(
+    amplitudes: Array, gains: Array, over: Over | str, weights: Array | None = None
+) -> Array:
     """Evaluate |E| of machines at all nodes and keep its largest or mean.
 
     Parameters
@@ -52,6 +54,8 @@ def reduce_nodes(amplitudes: Array, gains: Array, over: Over | str) -> Array:
     gains : ndarray, [3, K, N], µm per µm or µrad
     over : Over or str
         `max` or `mean`.
+    weights : ndarray, [N], optional
+        What each node counts for in the mean, adding up to 1; all alike by default.
 
     Returns
     -------
@@ -77,6 +81,8 @@ def reduce_nodes(amplitudes: Array, gains: Array, over: Over | str) -> Array:
             np.add(square, term, out=square)
         if over == Over.MAX:
             result[start : start + rows] = np.sqrt(square.max(axis=1))
-        else:
+        elif weights is None:
             result[start : start + rows] = np.sqrt(square, out=square).mean(axis=1)
+        else:
+            result[start : start + rows] = np.sqrt(square, out=square) @ weights
     return result

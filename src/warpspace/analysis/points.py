@@ -46,10 +46,14 @@ class Places:
     coordinates : dict of str to ndarray, [...], mm or degrees
     point_mm : ndarray, [..., 3], mm
         Nominal points in R.
+    weights : ndarray, [N], or None
+        What each point counts for in a mean over the volume, in the order of the points; None
+        where all count alike.
     """
 
     coordinates: dict[str, Array]
     point_mm: Array
+    weights: Array | None = None
 
 
 def choose_cylinder(model: Model, cylinder: Cylinder | None = None) -> Cylinder:
@@ -126,9 +130,9 @@ def spread_places(
 ) -> Places:
     """Give the nodes that a mean over the points of one machine is taken over.
 
-    The grid of the working volume; for the workpiece loop nodes³ low-discrepancy points (Sobol
-    sequence) over cylinder and rotary travel, since a five-dimensional grid would be either coarse
-    or huge.
+    The grid of the working volume, each node with its share of the volume. For the workpiece loop
+    nodes³ low-discrepancy points (Sobol sequence) over cylinder and rotary travel, since a
+    five-dimensional grid would be either coarse or huge.
 
     Returns
     -------
@@ -137,7 +141,7 @@ def spread_places(
     """
     if loop is not Loop.WORKPIECE:
         grid = build_grid(model, workspace, nodes)
-        return Places(grid.coordinates, grid.nominal_mm)
+        return Places(grid.coordinates, grid.nominal_mm, grid.weights.reshape(-1))
     count = node_counts(nodes)[0] ** 3
     dimensions = len(moving_ranges(model, loop, workspace)) + 3
     # Whole powers of two keep the balance of the sequence; the surplus is cut off.

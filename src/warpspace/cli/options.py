@@ -3,13 +3,16 @@
 import json
 import math
 from collections.abc import Callable, Collection, Mapping
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 from click.shell_completion import CompletionItem
 
-from warpspace.cli.terminal import escape_json
+from warpspace.cli.terminal import echo, escape_json
 from warpspace.exceptions import OptionError
+
+if TYPE_CHECKING:
+    from warpspace.machine.description import Machine
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 LOOPS = ("tool", "workpiece", "relative")
@@ -127,6 +130,28 @@ def parse_point(text: str, axes: Collection[str], option: str = "--at") -> dict[
             )
         found[name] = value
     return found
+
+
+def warn_outside_travel(machine: "Machine", point: Mapping[str, float]) -> None:
+    """Say on stderr where a position lies outside the travel of its axis.
+
+    Parameters
+    ----------
+    machine : Machine
+    point : mapping of str to float, mm or degrees
+        As typed.
+    """
+    for name, value in point.items():
+        axis = machine.axes[name]
+        low, high = axis.travel
+        if not low <= value <= high:
+            unit = f" {axis.unit}" if axis.is_linear else axis.unit
+            echo(
+                f"warpspace: warning: --at {name}={value:g} is outside the travel of {name},"
+                f" {low:g} to {high:g}{unit}; its errors are continued beyond it",
+                err=True,
+                fg="yellow",
+            )
 
 
 def parse_exaggeration(text: str | None) -> float | Literal["auto"] | None:

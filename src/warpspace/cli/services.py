@@ -9,6 +9,7 @@ from warpspace.exceptions import OptionError
 from warpspace.outputs.exports.formats import export_formats
 from warpspace.outputs.exports.formats import write_export as write
 from warpspace.outputs.figures.catalogue import figure_kinds
+from warpspace.picture.words import range_words
 
 MOST_RENDERERS = 2
 """Figures drawn at the same time for all tabs together."""
@@ -58,18 +59,21 @@ def draw_figure(request: Request, cancelled: threading.Event) -> bytes:
         loop=request.loop,
         grid=request.nodes,
         range_top=None if request.colours is None else request.colours.high,
+        range_fixed=request.range_fixed,
+        conditions=request.conditions,
     )
     name, scenes = request.figure or "error-map", [request.scene]
     if request.figure and request.beside is not None:
         raise OptionError(f"figure {name!r} is of one machine; show A or B in the tab Compare")
     if not request.figure and request.pair is not None:
+        settings = replace(settings, conditions=request.pair_conditions)
         if request.tilts:
             settings = replace(settings, range_top=None)
         name, scenes = "comparison", list(request.pair)
     elif request.beside is not None:
         raise OptionError(
-            f"A is seen through the {request.loop} loop, B through the {request.beside.loop} loop; a"
-            " figure of both needs one loop. GLB, CSV and HTML show their difference."
+            f"A is seen through the {request.loop} loop, B through the {request.beside.loop} loop;"
+            " a figure of both needs one loop. GLB, CSV and HTML show their difference."
         )
     elif request.tilts and not request.figure:
         name = "orientation-map"
@@ -110,6 +114,12 @@ def write_export(request: Request, ending: str) -> bytes:
     from warpspace.picture.comparison import scene_change
     from warpspace.picture.scene_picture import evaluate_picture
 
+    scale = request.colours
+    fixed = (
+        (range_words(scale.low, scale.high, scale.unit),)
+        if request.range_fixed and scale is not None
+        else ()
+    )
     picture, *subtracted = (
         evaluate_picture(
             part.scene,
@@ -119,6 +129,7 @@ def write_export(request: Request, ending: str) -> bytes:
             component=request.component,
             quantity="orientation" if request.tilts else "position",
             colours=request.colours,
+            conditions=(*part.conditions, *fixed),
         )
         for part in (request, request.beside)
         if part is not None

@@ -2,7 +2,8 @@
 
 The width is that of the terminal, or what the variable COLUMNS says; 80 where the output goes into
 a file or another program. Only words wrap. A table with more columns than fit goes on below, with
-its first columns repeated, so that no number is cut and nothing is left out.
+its first columns repeated, so that no number is cut and nothing is left out. A long table has its
+headings again every forty rows.
 """
 
 import io
@@ -19,6 +20,8 @@ WIDTH_ELSEWHERE = 80
 """Characters in a line where the output is no terminal."""
 READABLE = 20
 """Characters in a line that a column of words has before others go on below."""
+REPEATED = 40
+"""Rows after which a long table has its headings again."""
 Row = Sequence[str]
 _TOGETHER = re.compile(r"(?<=\d) (?=[µm°%])|(?<= [A-Z]) (?=[-+\d])")
 """Blanks that no line ends with: between a number and its unit, an axis and its position."""
@@ -185,7 +188,12 @@ def _draw(columns: Sequence[Column], rows: Sequence[Row], gap: int, width: int) 
             justify="right" if column.is_number else "left",
             no_wrap=not column.wraps,
         )
-    for row in rows:
+    lines = max((column.head.count("\n") for column in columns), default=0)
+    heads = [Text("\n" * (lines - column.head.count("\n")) + column.head) for column in columns]
+    for number, row in enumerate(rows):
+        if table.show_header and number and number % REPEATED == 0:
+            table.add_row()
+            table.add_row(*heads)
         table.add_row(*map(Text, row))
     page = io.StringIO()
     console = Console(

@@ -48,6 +48,7 @@ class DifferencePicture(ScenePicture):
         return {
             **{name: a if a == b else [a, b] for name, (a, b) in pairs.items()},
             "difference": CHANGE,
+            "conditions": list(self.conditions),
         }
 
     @property
@@ -55,7 +56,7 @@ class DifferencePicture(ScenePicture):
         """What a table says of every row, of both scenes where they differ."""
         pairs = zip(self.a.remarks.items(), self.b.remarks.values(), strict=True)
         found = {name: a if a == b else f"{b} − {a}" for (name, a), b in pairs}
-        return {**found, "scene": self.scene.name}
+        return {**found, "scene": self.scene.name, "conditions": "; ".join(self.conditions)}
 
     @cached_property
     def provenance(self) -> dict[str, Any]:
@@ -93,6 +94,15 @@ def statistics_change(a: Statistics, b: Statistics) -> dict[str, float]:
     return {name: getattr(b, name) - getattr(a, name) for name in STATISTICS.values()}
 
 
+def conditions_of_both(a: Sequence[str], b: Sequence[str]) -> tuple[str, ...]:
+    """Say the conditions of two pictures: those of one with its letter, common ones once."""
+    own = [
+        *(f"A {words}" for words in a if words not in b),
+        *(f"B {words}" for words in b if words not in a),
+    ]
+    return (*own, *(words for words in a if words in b))
+
+
 def scene_change(a: ScenePicture, b: ScenePicture) -> DifferencePicture:
     """Subtract the errors of evaluated scene A from those of B, B − A.
 
@@ -125,6 +135,7 @@ def scene_change(a: ScenePicture, b: ScenePicture) -> DifferencePicture:
         component=a.component,
         quantity=a.quantity,
         colours=a.colours,
+        conditions=conditions_of_both(a.conditions, b.conditions),
         scene=scene,
         a=a,
         b=b,

@@ -4,14 +4,36 @@ from collections.abc import Mapping, Sequence
 from typing import SupportsFloat
 
 from warpspace.machine.axes import is_linear, is_rotary
-from warpspace.picture.words import spell_coordinate
+from warpspace.scene.model import Scene
 from warpspace.units import Array
 
+MINUS = "\N{MINUS SIGN}"
 IN_R = "in R"
 """What a point of the machine frame is introduced by."""
 SEPARATOR = " · "
 _DIGITS = 6
 """Decimals of a position in a command: a nanometre."""
+
+
+def spell_coordinate(value: SupportsFloat) -> str:
+    """Spell a coordinate to a tenth, with a true minus; zero has no sign."""
+    return f"{round(float(value), 1) + 0.0:g}".replace("-", MINUS)
+
+
+def list_axes(at: Mapping[str, SupportsFloat]) -> str:
+    """Spell positions of all axes that are given: ``X 275 Y −225 Z −480 B 0°``, mm and degrees."""
+    units = {name: "" if is_linear(name) else "°" for name in at}
+    return " ".join(f"{name} {spell_coordinate(q)}{units[name]}" for name, q in at.items())
+
+
+def own_axes(scene: Scene, at: Mapping[str, float]) -> dict[str, float]:
+    """Choose the axes that name a point: the linear ones, and those not at their scene's place."""
+    placed = scene.workspace.positions
+    return {
+        name: value
+        for name, value in at.items()
+        if is_linear(name) or abs(value - placed.get(name, 0.0)) > 1e-9
+    }
 
 
 def spell_axes(axes: Mapping[str, SupportsFloat]) -> str:
@@ -26,12 +48,10 @@ def spell_axes(axes: Mapping[str, SupportsFloat]) -> str:
     str
         Linear axes first. Rotary axes at zero are left out where there are others.
     """
-    linear = [f"{name} {spell_coordinate(axes[name])}" for name in axes if is_linear(name)]
+    linear = {name: at for name, at in axes.items() if is_linear(name)}
     rotary = {name: float(at) for name, at in axes.items() if not is_linear(name)}
     turned = {name: at for name, at in rotary.items() if round(at, 1) != 0.0 or not linear}
-    return " ".join(
-        ("axes", *linear, *(f"{name} {spell_coordinate(at)}°" for name, at in turned.items()))
-    )
+    return f"axes {list_axes({**linear, **turned})}"
 
 
 def spell_in_r(point_mm: Array | Sequence[float]) -> str:

@@ -45,6 +45,9 @@ class Picture:
         Whether the octant towards the operator is cut away.
     slices : tuple of Picture
         Slices that are drawn in place of the surface, where there are any.
+    conditions : tuple of str
+        What a reader must know who takes the picture for all of its scene: which errors are
+        excluded, and colours that end where somebody chose. Every output says them.
     """
 
     view: View
@@ -56,6 +59,7 @@ class Picture:
     colours: ColourScale | None = None
     cut: bool = False
     slices: "tuple[Picture, ...]" = ()
+    conditions: tuple[str, ...] = ()
 
     @property
     def tilts(self) -> bool:

@@ -1,5 +1,6 @@
 """The picture of a scene as figures, exports and reports draw it, with what it says of itself."""
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
@@ -52,11 +53,12 @@ class ScenePicture(Picture):
             "exaggeration": self.exaggeration,
             "component": self.component,
             "coloured": "tool-orientation error" if self.tilts else "position error",
+            "conditions": list(self.conditions),
         }
 
     @property
     def remarks(self) -> dict[str, str]:
-        """What a table says of every row: scene, loop, reference, convention, program."""
+        """What a table says of every row: scene, loop, reference, convention and the like."""
         held = self.scene.reference
         return {
             "scene": self.scene.name,
@@ -66,6 +68,7 @@ class ScenePicture(Picture):
             else " ".join(f"{axis}={at:g}" for axis, at in held.items()),
             "component_errors": str(self.scene.model.component_errors),
             "model": "first order",
+            "conditions": "; ".join(self.conditions),
             "program": f"warpspace {__version__}",
         }
 
@@ -102,6 +105,7 @@ def evaluate_picture(
     component: str = "norm",
     quantity: str = "position",
     colours: ColourScale | None = None,
+    conditions: Sequence[str] = (),
 ) -> ScenePicture:
     """Evaluate all that a picture of a scene is drawn from.
 
@@ -119,6 +123,8 @@ def evaluate_picture(
         ... of the "position" or the "orientation" error.
     colours : ColourScale, optional
         The colours where they are given.
+    conditions : sequence of str, optional
+        What every output must say of the picture beside its scene.
 
     Returns
     -------
@@ -144,5 +150,6 @@ def evaluate_picture(
         component=component,
         quantity=quantity,
         colours=colours,
+        conditions=tuple(conditions),
         scene=scene,
     )

@@ -1,16 +1,14 @@
 """Numbers, places, factors and conventions as pictures, pages and files spell them."""
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import SupportsFloat
+from collections.abc import Sequence
 
 from warpspace.kinematics.conventions.registry import find_convention
 from warpspace.kinematics.model import Loop
-from warpspace.machine.axes import is_linear
+from warpspace.picture.coordinates import MINUS, list_axes
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
-MINUS = "\N{MINUS SIGN}"
 TIMES = "\N{MULTIPLICATION SIGN}"
 THIN_SPACE = "\N{NARROW NO-BREAK SPACE}"
 LOOP_WORDS = {
@@ -69,46 +67,35 @@ def spell_factor(value: float) -> str:
     return f"{TIMES}{rounded:.10g}"
 
 
-def spell_point(point: Sequence[float] | Array) -> str:
+def spell_vector(point: Sequence[float] | Array) -> str:
     """Spell a point in whole millimetres, tenths below ten: ``(275, −225, −51)``."""
     parts = [f"{v:.0f}" if abs(v) >= 10.0 else f"{round(v, 1) + 0.0:g}" for v in point]
     return "(" + ", ".join(part.replace("-", MINUS) for part in parts) + ")"
-
-
-def spell_coordinate(value: SupportsFloat) -> str:
-    """Spell a coordinate to a tenth, with a true minus; zero has no sign."""
-    return f"{round(float(value), 1) + 0.0:g}".replace("-", MINUS)
-
-
-def spell_place(point_mm: Array | Sequence[float]) -> str:
-    """Spell a point of R by its coordinates: ``X 275, Y −225, Z −51 mm``."""
-    pairs = zip("XYZ", point_mm, strict=True)
-    return ", ".join(f"{name} {spell_coordinate(value)}" for name, value in pairs) + " mm"
-
-
-def spell_positions(at: Mapping[str, SupportsFloat]) -> str:
-    """Spell positions of axes.
-
-    Parameters
-    ----------
-    at : mapping of str to float, mm or degrees
-
-    Returns
-    -------
-    str
-        Linear axes first: ``X 275, Y −225, Z −480 mm · B 0°``.
-    """
-    linear = ", ".join(f"{name} {spell_coordinate(q)}" for name, q in at.items() if is_linear(name))
-    rotary = [f"{name} {spell_coordinate(q)}°" for name, q in at.items() if not is_linear(name)]
-    return " · ".join((*([f"{linear} mm"] if linear else ()), *rotary))
 
 
 def reference_words(scene: Scene) -> str:
     """Say what errors are referred to."""
     if scene.reference is None:
         return "absolute errors"
-    at = " ".join(f"{axis} {spell_short(value)}" for axis, value in scene.reference.items())
-    return f"held still at {at}"
+    return f"reference point {list_axes(scene.reference)}"
+
+
+def exclusion_words(excluded: Sequence[str], only: Sequence[str] = ()) -> tuple[str, ...]:
+    """Say which errors a picture leaves out: ``excluded: EA0Z``, ``only: EAX``.
+
+    Parameters
+    ----------
+    excluded, only : sequence of str
+        Keys that do not take part; keys that alone do, where there are any.
+    """
+    found = [f"only: {', '.join(only)}"] if only else []
+    return (*found, *([f"excluded: {', '.join(excluded)}"] if excluded else []))
+
+
+def range_words(low: float, high: float, unit: str) -> str:
+    """Say that colours end where somebody chose: ``range fixed 0–50 µm``."""
+    between = "–" if low >= 0.0 else " to "
+    return f"range fixed {spell_short(low)}{between}{spell_short(high)} {unit}"
 
 
 def convention_words(scene: Scene) -> str:

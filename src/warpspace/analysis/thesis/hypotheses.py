@@ -171,7 +171,7 @@ def _means(
             for key, each in errors.functions.items()
         }
         result = measured(case.model, ErrorSet(functions), case.proposed, workspace, nodes=nodes)
-        means.append(result.predicted.mean_um)
+        means.append(result.predicted_nodes.mean_um)
     return " and ".join(f"{mean:.2f}" for mean in means)
 
 

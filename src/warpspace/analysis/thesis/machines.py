@@ -64,7 +64,7 @@ def table_5_5(case: ThesisCase) -> list[Row]:
             key = f"{name} machine {check.key}"
             rows.append(number_row("table_5_5", key, value, check.value, 1, unit, note))
             rows.append(text_row("table_5_5", f"{key} mark", mark, check.mark, note=note))
-        mean = machine.predicted.mean_um
+        mean = machine.predicted_nodes.mean_um
         value = printed["volumetric_um"][which]
         key = f"{name} machine volumetric error"
         rows.append(number_row("table_5_5", key, value, mean, 0, "µm", NOTE_RAMP))

@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 
+from warpspace.app.documents.conditions import state_conditions
 from warpspace.app.documents.received_files import safe_name
 from warpspace.app.documents.services import Beside, Request
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.comparison import AFTER, BEFORE, Side
+from warpspace.picture.comparison import conditions_of_both
 from warpspace.scene.model import Scene
 
 
@@ -36,7 +38,10 @@ def build_request(picture: LivePicture) -> Request:
     loops = [side.loop for side in found.sides]
     return replace(
         request,
-        beside=Beside(b, loops[1].value) if found.shown == "difference" else None,
+        beside=Beside(b, loops[1].value, state_conditions(found.sides[1]))
+        if found.shown == "difference"
+        else None,
+        pair_conditions=conditions_of_both(*map(state_conditions, found.sides)),
         pair=(a, b) if not found.refused and loops[0] == loops[1] else None,
     )
 
@@ -57,6 +62,8 @@ def _request(picture: LivePicture, state: AppState, scene: Scene) -> Request:
         picture.state.shown.dark,
         picture.state.look.tilts,
         picture.scale,
+        conditions=state_conditions(state),
+        range_fixed=picture.state.look.range_mode == "fixed",
     )
 
 

@@ -17,14 +17,16 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from warpspace import __version__
-from warpspace.app.evaluation.budget import active_errors
+from warpspace.app.documents.conditions import picture_conditions
+from warpspace.app.evaluation.budget import active_errors, answer
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.readouts import summary as legend
 from warpspace.app.readouts.html import style_sheet
 from warpspace.app.state.app_state import start_state
-from warpspace.app.viewport.camera import fit_camera
+from warpspace.app.viewport.camera import CameraMemory, fit_camera
 from warpspace.app.viewport.layers import SCENE_PER_MM
+from warpspace.app.viewport.layers.asked_point import AskedPointLayer
 from warpspace.app.viewport.layers.axes import AxesLayer, axes_room_mm
 from warpspace.app.viewport.layers.box import BoxLayer
 from warpspace.app.viewport.layers.lights import light_scene
@@ -35,6 +37,7 @@ from warpspace.geometry.thicken import is_thin
 from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import ErrorFunction
 from warpspace.machine.parameters import parameter
+from warpspace.picture.coordinates import own_axes, spell_point
 from warpspace.picture.model import choose_scale
 from warpspace.picture.words import convention_words, reference_words
 from warpspace.scene.model import Scene
@@ -93,7 +96,9 @@ def offline_picture(
     )
 
 
-def build_scene_html(picture: LivePicture, aspect: float = ASPECT) -> str:
+def build_scene_html(
+    picture: LivePicture, aspect: float = ASPECT, camera: CameraMemory | None = None
+) -> str:
     """Export the 3-D scene of a picture as a page of its own, without a word around it.
 
     Parameters
@@ -101,6 +106,8 @@ def build_scene_html(picture: LivePicture, aspect: float = ASPECT) -> str:
     picture : LivePicture
     aspect : float, optional
         Width over height of the room it will fill.
+    camera : CameraMemory, optional
+        Where it is first seen from; by default from the operator's side.
 
     Returns
     -------
@@ -111,9 +118,12 @@ def build_scene_html(picture: LivePicture, aspect: float = ASPECT) -> str:
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         try:
             light_scene(server.scene)
-            for layer in (BoxLayer, TracesLayer, AxesLayer, OtherSideLayer):
+            for layer in (BoxLayer, TracesLayer, AxesLayer, OtherSideLayer, AskedPointLayer):
                 layer(server.scene, picture)
-            _place_camera(server, picture, aspect)
+            if camera is None:
+                _place_camera(server, picture, aspect)
+            else:
+                _keep_camera(server, camera)
             return server.scene.as_html(dark_mode=picture.state.shown.dark)
         finally:
             server.stop()
@@ -132,7 +142,20 @@ def _place_camera(server: viser.ViserServer, picture: LivePicture, aspect: float
     camera.look_at = pose.look_at * SCENE_PER_MM
 
 
-def build_offline_html(picture: LivePicture, provenance: Mapping[str, Any] | None = None) -> str:
+def _keep_camera(server: viser.ViserServer, kept: CameraMemory) -> None:
+    """Let the page open as it was seen."""
+    camera = server.initial_camera
+    camera.up = kept.up
+    camera.fov = kept.fov_rad
+    camera.position = kept.position
+    camera.look_at = kept.look_at
+
+
+def build_offline_html(
+    picture: LivePicture,
+    provenance: Mapping[str, Any] | None = None,
+    camera: CameraMemory | None = None,
+) -> str:
     """Build the page: the interactive scene with its colour bar, numbers and factor.
 
     Parameters
@@ -140,6 +163,8 @@ def build_offline_html(picture: LivePicture, provenance: Mapping[str, Any] | Non
     picture : LivePicture
     provenance : mapping, optional
         Program, scene and settings, stored in the page as JSON.
+    camera : CameraMemory, optional
+        Where it is first seen from; by default from the operator's side.
 
     Returns
     -------
@@ -147,8 +172,10 @@ def build_offline_html(picture: LivePicture, provenance: Mapping[str, Any] | Non
         HTML that requests nothing and carries everything.
     """
     # a page in an attribute: only these two characters would end or change it
-    inner = build_scene_html(picture).replace("&", "&amp;").replace('"', "&quot;")
-    stored = json.dumps(provenance or {}, ensure_ascii=False, allow_nan=False)
+    inner = build_scene_html(picture, camera=camera).replace("&", "&amp;").replace('"', "&quot;")
+    conditions = list(picture_conditions(picture))
+    about = {**(provenance or {}), **({"conditions": conditions} if conditions else {})}
+    stored = json.dumps(about, ensure_ascii=False, allow_nan=False)
     templates = Environment(
         loader=PackageLoader("warpspace.app"), autoescape=True, undefined=StrictUndefined
     )
@@ -162,6 +189,7 @@ def build_offline_html(picture: LivePicture, provenance: Mapping[str, Any] | Non
         scene=Markup(inner),  # noqa: S704
         parameters=parameter_rows(picture),
         counted="unlike in A and B" if picture.is_difference else "not zero",
+        point=point_words(picture),
         remarks=remarks(picture),
         provenance=Markup(stored.replace("<", "\\u003c")),  # noqa: S704
     )
@@ -183,6 +211,18 @@ def parameter_rows(picture: LivePicture) -> list[dict[str, str]]:
     ]
 
 
+def point_words(picture: LivePicture) -> str:
+    """Say where the point is that was asked about, and its error; empty where there is none."""
+    picked = picture.state.picked
+    if picked is None or picture.is_difference:
+        return ""
+    found = answer(picture.drawn_state, picked, picture.exaggeration)
+    length = float(np.linalg.norm(found.explanation.error_um))
+    axes = own_axes(picture.drawn_state.scene, found.at)
+    place = spell_point(axes, found.explanation.nominal_mm)
+    return f"marked point: {place} mm, |E| {length:.1f} µm"
+
+
 def _row(key: str, value: str) -> dict[str, str]:
     """Spell one error."""
     row = parameter(key)
@@ -199,6 +239,7 @@ def remarks(picture: LivePicture) -> list[str]:
     return [
         f"{picture.both_words(lambda state: state.loop.value)} loop",
         picture.both_words(lambda state: reference_words(state.scene)),
+        *picture_conditions(picture),
         picture.both_words(lambda state: convention_words(state.scene)),
         "first-order model",
         "error = actual − nominal",

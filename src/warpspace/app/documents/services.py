@@ -21,10 +21,13 @@ class Beside:
     ----------
     scene : Scene
     loop : str
+    conditions : tuple of str
+        Errors that are excluded there, in words.
     """
 
     scene: Scene
     loop: str
+    conditions: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +56,12 @@ class Request:
         Both sides of a comparison where they can be drawn on one sheet, with their difference.
     figure : str
         Name of the figure; empty for the one that suits what is coloured.
+    conditions : tuple of str
+        Errors that are excluded, in words.
+    pair_conditions : tuple of str
+        The same of both sides of a pair, with the letter of the side.
+    range_fixed : bool
+        Whether the user has fixed the range of the colours.
     """
 
     scene: Scene
@@ -66,6 +75,9 @@ class Request:
     beside: Beside | None = None
     pair: tuple[Scene, Scene] | None = None
     figure: str = ""
+    conditions: tuple[str, ...] = ()
+    pair_conditions: tuple[str, ...] = ()
+    range_fixed: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont, PngImagePlugin
 
 from warpspace import __version__
+from warpspace.app.documents.conditions import picture_conditions
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.picture.words import spell_factor
+from warpspace.picture.words import reference_words, spell_factor
 
 LIGHT, DARK = ((255, 255, 255), (27, 38, 59)), ((26, 27, 30), (222, 226, 232))
 """Ground and ink."""
@@ -44,7 +45,10 @@ def view_png(pixels: NDArray[np.uint8], picture: LivePicture) -> bytes:
     facts = PngImagePlugin.PngInfo()
     facts.add_text("Software", f"warpspace {__version__}")
     facts.add_itxt("Title", picture.title)
-    facts.add_itxt("Description", f"exaggeration {spell_factor(picture.exaggeration)}")
+    facts.add_itxt(
+        "Description",
+        "; ".join((f"exaggeration {spell_factor(picture.exaggeration)}", *_said(picture))),
+    )
     written = BytesIO()
     page.convert("RGB").save(written, "PNG", pnginfo=facts)
     return written.getvalue()
@@ -70,10 +74,24 @@ def _heading(draw: ImageDraw.ImageDraw, picture: LivePicture, ink: tuple[int, in
     draw.text(
         (16, 38),
         f"exaggeration {factor} · |E| mean {found.mean_um:.2f} µm, max {found.max_um:.2f} µm"
-        f" · {picture.both_words(lambda state: state.loop.value)} loop",
+        f" · {' · '.join(_said(picture))}",
         ink,
         _font(15),
     )
+
+
+def _said(picture: LivePicture) -> list[str]:
+    """Say how the picture came about: loop, reference, excluded errors, fixed range."""
+    reference = picture.both_words(lambda state: reference_words(state.scene))
+    held = any(
+        side.scene.reference is not None
+        for side in (picture.compared.sides if picture.compared else (picture.state,))
+    )
+    return [
+        f"{picture.both_words(lambda state: state.loop.value)} loop",
+        *([reference] if held else []),
+        *picture_conditions(picture),
+    ]
 
 
 def _colour_bar(

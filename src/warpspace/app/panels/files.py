@@ -202,7 +202,7 @@ class FilesPanel:
         if draw is not None and picture is not None:
             kind = self._figures.get(self._kind.value, "")
             request = replace(build_request(picture), figure=kind)
-            self._make("Figure", ".png", FIGURE_S, lambda cancelled: draw(request, cancelled))
+            self._make("Figure", ".png", FIGURE_S, lambda cancelled: draw(request, cancelled), kind)
 
     def _view(self) -> None:
         """Have the browser render the view, and put title, factor and colour bar around it."""
@@ -229,9 +229,9 @@ class FilesPanel:
         picture = self._picture
         if picture is not None:
             toml = {"scene_toml": self._alone_if_large(document.state_to_toml)}
-            self._make(
-                "Page", ".html", PAGE_S, lambda _: build_offline_html(picture, toml).encode()
-            )
+            camera = self._context.camera.remember()
+            make: Make = lambda _: build_offline_html(picture, toml, camera).encode()  # noqa: E731
+            self._make("Page", ".html", PAGE_S, make)
 
     def _export(self, name: str, ending: str) -> None:
         """Write an export."""
@@ -240,9 +240,10 @@ class FilesPanel:
             request = build_request(picture)
             self._make(name, ending, EXPORT_S, lambda _: write(request, ending))
 
-    def _make(self, name: str, ending: str, usual_s: float, make: Make) -> None:
+    def _make(self, name: str, ending: str, usual_s: float, make: Make, kind: str = "") -> None:
         """Make a file beside the session and send it."""
         stem = "view" if self._picture is None else file_stem(self._picture)
+        stem += {"Figure": f"_{kind or 'figure'}", "View": "_view"}.get(name, "")
 
         def work(cancelled: threading.Event) -> None:
             content = make(cancelled)

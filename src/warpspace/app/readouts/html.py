@@ -13,8 +13,8 @@ from markupsafe import Markup
 
 from warpspace.app.readouts import numbers
 from warpspace.machine.parameters import parameter
-from warpspace.picture.coordinates import spell_at, spell_point
-from warpspace.picture.words import spell_coordinate, spell_short
+from warpspace.picture.coordinates import spell_at, spell_coordinate, spell_point
+from warpspace.picture.words import spell_short
 from warpspace.units import Array
 
 PACKAGE = "warpspace.app.readouts"

@@ -3,9 +3,8 @@
 from collections.abc import Mapping, Sequence
 
 from warpspace.app.readouts.html import render
-from warpspace.picture.coordinates import SEPARATOR, spell_axes
+from warpspace.picture.coordinates import SEPARATOR, spell_axes, spell_coordinate
 from warpspace.picture.slices import Slice
-from warpspace.picture.words import spell_coordinate
 from warpspace.units import Array
 
 

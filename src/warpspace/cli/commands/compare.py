@@ -9,11 +9,14 @@ from warpspace.cli.figure_options import draw_figure_file, figure_options, parse
 from warpspace.cli.file_options import check_output, output_option
 from warpspace.cli.options import json_option, print_json, scene_argument
 from warpspace.cli.progress import progress
-from warpspace.cli.tables import Column, number_columns, print_table
+from warpspace.cli.tables import Column, number_columns, print_table, print_text
 from warpspace.cli.terminal import echo
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from warpspace.analysis.statistics import Statistics
+    from warpspace.scene.model import Scene
 
 
 @click.command()
@@ -25,13 +28,16 @@ if TYPE_CHECKING:
 def compare(
     first: str, second: str, output: str | None, *, force: bool, as_json: bool, **options: Any
 ) -> None:
-    """Compare the errors of two scenes; the difference is B − A.
+    """Compare the errors of two scenes; the change is B − A.
 
-    They are compared node by node, so that both must have the same working volume. With -o both and
-    the difference are drawn on one sheet, with one colour scale and one exaggeration.
+    Beside the statistics of both and their change stand those of |E_B − E_A|, the length of the
+    change of the error vector. The scenes are compared node by node, so that both must have the
+    same working volume. With -o both and the change are drawn on one sheet, with one colour scale
+    and one exaggeration.
     """
+    from warpspace.analysis.statistics import statistics
     from warpspace.outputs.drawing.style import FIGURE_ENDINGS
-    from warpspace.picture.comparison import subtract_scenes
+    from warpspace.picture.comparison import scene_change, statistics_change
     from warpspace.picture.scene_picture import evaluate_picture
     from warpspace.scene.library import load_scene
 
@@ -42,35 +48,58 @@ def compare(
     scenes = [load_scene(first), load_scene(second)]
     with progress("evaluating", silent=as_json):
         pictures = [evaluate_picture(s, grid=settings.grid, loop=settings.loop) for s in scenes]
-    found = {
-        "a": pictures[0].statistics,
-        "b": pictures[1].statistics,
-        "difference": subtract_scenes(pictures[1], pictures[0], "B − A").statistics,
-    }
+    compared = [*pictures, scene_change(pictures[0], pictures[1])]
+    found = [picture.statistics for picture in compared]
     if target is not None:
         draw_figure_file("comparison", scenes, settings, target, force=force, silent=as_json)
     if as_json:
-        print_json({name: asdict(part) for name, part in found.items()})
+        names = ("a", "b", "difference")
+        nodes = [statistics(picture.field, picture.grid.coordinates) for picture in compared]
+        print_json(
+            {
+                **{name: asdict(part) for name, part in zip(names, found, strict=True)},
+                "change": statistics_change(found[0], found[1]),
+                "statistics_nodes": {
+                    name: asdict(part) for name, part in zip(names, nodes, strict=True)
+                },
+            }
+        )
         return
-    names = (f"A  {scenes[0].name}", f"B  {scenes[1].name}", "B − A")
-    _print(list(zip(names, found.values(), strict=True)))
+    _print(scenes, found)
     if output is not None:
         echo(f"wrote {output}")
 
 
-def _print(found: "list[tuple[str, Statistics]]") -> None:
-    """Print the statistics, one line each."""
+def _print(scenes: "Sequence[Scene]", found: "Sequence[Statistics]") -> None:
+    """Print the statistics of A, B, their change, and those of the length of the change."""
+    from warpspace.picture.comparison import (
+        CHANGE,
+        DIFFERENCE_LENGTH,
+        STATISTICS,
+        statistics_change,
+    )
+    from warpspace.picture.coordinates import own_axes, spell_at, spell_point
+
+    for letter, scene in zip("AB", scenes, strict=True):
+        print_text(f"{letter}  {scene.name}: {scene.title}")
+    change = statistics_change(found[0], found[1])
     columns = (
-        Column(leads=True),
-        *number_columns(("mean", "RMS", "P95", "max"), "µm"),
-        Column("largest at x, y, z", "mm"),
+        Column("|E|", leads=True),
+        *number_columns(("A", "B", CHANGE, DIFFERENCE_LENGTH), "µm"),
     )
     rows = [
         (
             name,
-            *(f"{value:.2f}" for value in (part.mean_um, part.rms_um, part.p95_um, part.max_um)),
-            ", ".join(f"{value:g}" for value in part.max_at_mm),
+            f"{getattr(found[0], key):.2f}",
+            f"{getattr(found[1], key):.2f}",
+            f"{change[key]:+.2f}",
+            f"{getattr(found[2], key):.2f}",
         )
-        for name, part in found
+        for name, key in STATISTICS.items()
     ]
-    print_table(columns, rows, indent=0)
+    print_table(columns, rows)
+    for name, part in zip(("A", "B", DIFFERENCE_LENGTH), found, strict=True):
+        if part.max_um > 0.0:
+            worst = own_axes(scenes[0], part.max_at_axes)
+            print_text(f"  max of {name} at {spell_point(worst, part.max_at_mm)} mm")
+            print_text(f"  --at {spell_at(worst)}")

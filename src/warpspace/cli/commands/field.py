@@ -1,6 +1,6 @@
 """Command `field`: errors at points, or over the grid of the working volume."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import click
@@ -14,6 +14,7 @@ from warpspace.cli.options import (
     parse_point,
     scene_argument,
     spell_json,
+    warn_outside_travel,
 )
 from warpspace.cli.progress import progress
 from warpspace.cli.tables import Column, number_columns, print_table, print_text
@@ -21,6 +22,7 @@ from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
     from warpspace.field.basis import ErrorField
+    from warpspace.field.grid import Grid
     from warpspace.scene.model import Scene
     from warpspace.units import Array
 
@@ -64,7 +66,8 @@ def field(
     """
     from dataclasses import asdict
 
-    from warpspace.analysis.statistics import statistics
+    from warpspace.analysis.statistics import statistics, volume_statistics
+    from warpspace.picture.coordinates import own_axes, spell_at, spell_point
     from warpspace.scene.library import load_scene
 
     if points and grid is not None:
@@ -72,23 +75,32 @@ def field(
     check_targets(scene, force=force, csv_path=csv_path)
     loaded = load_scene(scene)
     with progress("evaluating", silent=as_json):
-        axes, result = _evaluate(loaded, points, grid, loop=loop, frame=frame, exact=exact)
-    summary = statistics(result)
+        axes, result, nodes = _evaluate(loaded, points, grid, loop=loop, frame=frame, exact=exact)
+    plain = statistics(result, axes)
+    summary = plain if nodes is None else volume_statistics(result, nodes)
     if csv_path is not None:
         from warpspace.outputs.exports.table import write_field_csv
 
         write_field_csv(csv_path, axes, result, overwrite=force)
     if as_json:
-        _print_json(axes, result, asdict(summary))
+        found = {"statistics": asdict(summary)}
+        if nodes is not None:
+            found["statistics_nodes"] = asdict(plain)
+        _print_json(axes, result, found)
         return
     print_text(f"{loaded.title} · {loop} loop · {'exact' if exact else 'first order'}")
     if points:
         _list_points(axes, result, [loaded.machine.axes[name].unit for name in axes])
-    worst = ", ".join(f"{value:g}" for value in summary.max_at_mm)
+    over = "" if nodes is None else ", over the volume"
     print_text(
-        f"  {result.norm_um.size} points: mean {summary.mean_um:.2f}, RMS {summary.rms_um:.2f},"
-        f" P95 {summary.p95_um:.2f}, max {summary.max_um:.2f} µm at ({worst}) mm"
+        f"  {result.norm_um.size} points{over}: mean {summary.mean_um:.2f},"
+        f" RMS {summary.rms_um:.2f}, P95 {summary.p95_um:.2f}, max {summary.max_um:.2f} µm"
     )
+    if nodes is not None:
+        print_text(f"  each node counted once: mean {plain.mean_um:.2f} µm")
+    worst = own_axes(loaded, summary.max_at_axes)
+    print_text(f"  max at {spell_point(worst, summary.max_at_mm)} mm")
+    print_text(f"  --at {spell_at(worst)}")
 
 
 def _evaluate(
@@ -99,7 +111,7 @@ def _evaluate(
     loop: str,
     frame: str,
     exact: bool,
-) -> "tuple[dict[str, Array], ErrorField]":
+) -> "tuple[dict[str, Array], ErrorField, Grid | None]":
     """Evaluate at the points given or over the grid; axis positions and field, both flat."""
     import numpy as np
 
@@ -109,14 +121,14 @@ def _evaluate(
     from warpspace.scene.pipeline import evaluate
 
     if points:
+        typed = [parse_point(text, scene.machine.axes) for text in points]
+        for point in typed:
+            warn_outside_travel(scene.machine, point)
         full = [
-            complete_coordinates(
-                scene.machine, parse_point(text, scene.machine.axes), scene.workspace.positions
-            )
-            for text in points
+            complete_coordinates(scene.machine, point, scene.workspace.positions) for point in typed
         ]
         axes = {name: np.array([point[name] for point in full]) for name in scene.machine.axes}
-        return axes, evaluate(scene, at=axes, loop=loop, exact=exact, frame=frame)
+        return axes, evaluate(scene, at=axes, loop=loop, exact=exact, frame=frame), None
     nodes = DEFAULT_NODES if grid is None else grid
     built = build_grid(scene.model, scene.workspace, nodes)
     axes = {
@@ -129,11 +141,11 @@ def _evaluate(
         found.error_um.reshape(-1, 3),
         found.orientation_urad.reshape(-1, 3),
     )
-    return axes, flat
+    return axes, flat, built
 
 
 def _print_json(
-    axes: "dict[str, Array]", result: "ErrorField", summary: "dict[str, object]"
+    axes: "dict[str, Array]", result: "ErrorField", found: "Mapping[str, Mapping[str, object]]"
 ) -> None:
     """Print the JSON object piece by piece: a million points are never held as one text."""
     import numpy as np
@@ -153,7 +165,9 @@ def _print_json(
             ),
         )
         click.echo((", " if start else "") + spell_json(rows)[1:-1], nl=False)
-    click.echo(f'], "statistics": {spell_json(summary)}}}')
+    click.echo(
+        "]" + "".join(f', "{name}": {spell_json(part)}' for name, part in found.items()) + "}"
+    )
 
 
 def _rows(axes: "dict[str, Array]", result: "ErrorField") -> list[dict[str, object]]:
@@ -182,9 +196,14 @@ def _list_points(axes: "dict[str, Array]", result: "ErrorField", units: "Sequenc
     """Print the first points, one line each."""
     listed = min(result.norm_um.size, MAX_LISTED)
     errors, tilts = result.error_um.tolist(), result.orientation_urad.tolist()
+    places = result.nominal_mm.tolist()
     columns = (
         Column("point", is_number=True, leads=True),
-        *(Column(name, unit, is_number=True) for name, unit in zip(axes, units, strict=True)),
+        *(
+            Column(f"axis {name}", unit, is_number=True)
+            for name, unit in zip(axes, units, strict=True)
+        ),
+        *number_columns(("in R x", "y", "z"), "mm"),
         *number_columns(("error x", "y", "z", "|E|"), "µm"),
         *number_columns(("tilt x", "y", "z"), "µrad"),
     )
@@ -192,6 +211,7 @@ def _list_points(axes: "dict[str, Array]", result: "ErrorField", units: "Sequenc
         (
             str(index + 1),
             *(f"{values[index]:g}" for values in axes.values()),
+            *(f"{value:g}" for value in places[index]),
             *(f"{value:+.3f}" for value in errors[index]),
             f"{result.norm_um[index]:.3f}",
             *(f"{value:+.3f}" for value in tilts[index]),

@@ -13,6 +13,7 @@ from warpspace.cli.options import (
     parse_point,
     print_json,
     scene_argument,
+    warn_outside_travel,
 )
 from warpspace.cli.progress import progress
 from warpspace.cli.tables import Column, number_columns, print_table, print_text
@@ -81,10 +82,12 @@ def gains(
         raise OptionError("--step belongs to --max")
     check_targets(scene, force=force, plot=plot, csv_path=csv_path)
     loaded = load_scene(scene)
+    place = parse_point(points[0], loaded.machine.axes) if points else None
+    warn_outside_travel(loaded.machine, place or {})
     with progress("computing", silent=as_json):
         found = verbs.gains(
             loaded,
-            at=parse_point(points[0], loaded.machine.axes) if points else None,
+            at=place,
             loop=loop,
             over_travel=over_travel,
             step_deg=step_deg,

@@ -33,7 +33,7 @@ def measured(
 ) -> None:
     """Set the errors of each SCENE against its tolerances.
 
-    O marks an error that keeps its tolerance, X one that does not. Beside the predicted error
+    Each error lies within its tolerance or outside it. Beside the predicted error
     stands what the LaserTRACER gave, for the machines of the thesis. The shear is that of the best
     affine fit to the predicted map: which plane became a rhombus.
     """
@@ -70,6 +70,7 @@ def _json(scene: "Scene", result: "Measured") -> dict[str, object]:
         "scene": scene.name,
         "checks": [{**asdict(check), "passes": check.passes} for check in result.checks],
         "predicted": asdict(result.predicted),
+        "statistics_nodes": asdict(result.predicted_nodes),
         "measured_um": laser_tracer_um(scene),
         "shear_urad": result.shear_urad,
     }
@@ -79,11 +80,11 @@ def _print(scene: "Scene", result: "Measured") -> None:
     """Print a machine."""
     print_text(scene.title)
     columns = (
-        *(Column("keeps"), Column("key")),
+        *(Column("limit"), Column("key")),
         *(Column("value", is_number=True), Column("unit"), Column("tolerance")),
     )
     rows = [
-        (check.mark, check.key, f"{check.value:.1f}", check.unit, _limits(check))
+        (_verdict(check), check.key, f"{check.value:.1f}", check.unit, _limits(check))
         for check in result.checks
     ]
     print_table(columns, rows)
@@ -91,10 +92,16 @@ def _print(scene: "Scene", result: "Measured") -> None:
     beside = "" if measured_um is None else f"; LaserTRACER {measured_um:g} µm"
     print_text(
         f"  predicted |E|: mean {result.predicted.mean_um:.2f}, RMS {result.predicted.rms_um:.2f},"
-        f" max {result.predicted.max_um:.2f} µm{beside}"
+        f" max {result.predicted.max_um:.2f} µm over the volume;"
+        f" mean of the nodes {result.predicted_nodes.mean_um:.2f} µm{beside}"
     )
     shears = ", ".join(f"{plane} {value:+.1f}" for plane, value in result.shear_urad.items())
     print_text(f"  shear of the volume: {shears} µrad")
+
+
+def _verdict(check: "Check") -> str:
+    """Say whether an error keeps its tolerance."""
+    return {True: "within", False: "outside", None: "none"}[check.passes]
 
 
 def _limits(check: "Check") -> str:

@@ -3,7 +3,7 @@
 import io
 import os
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Any
@@ -121,8 +121,7 @@ def _image_bytes(
     duration = round(1000.0 / settings.fps)
     buffer = io.BytesIO()
     if ending == ".gif":
-        # one palette for all, made from a picture in the middle of the motion
-        palette = pictures[len(pictures) // 2].quantize(256, dither=Image.Dither.NONE)
+        palette = shared_palette(pictures)
         frames = [
             picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures
         ]
@@ -140,6 +139,27 @@ def _image_bytes(
         **options,
     )
     return buffer.getvalue()
+
+
+def shared_palette(pictures: Sequence[Image.Image]) -> Image.Image:
+    """Choose the 256 colours that all pictures of a GIF are drawn with.
+
+    Parameters
+    ----------
+    pictures : sequence of Image
+        Of one size.
+
+    Returns
+    -------
+    Image
+        With the palette, made from all pictures side by side: colours do not change from one
+        picture to the next.
+    """
+    width, height = pictures[0].size
+    sheet = Image.new("RGB", (width, height * len(pictures)))
+    for number, picture in enumerate(pictures):
+        sheet.paste(picture, (0, number * height))
+    return sheet.quantize(256, dither=Image.Dither.NONE)
 
 
 def _find_encoder() -> str:

@@ -15,6 +15,7 @@ from warpspace.picture.exaggeration import Exaggeration, given_exaggeration
 from warpspace.picture.model import Picture, choose_scale
 from warpspace.picture.scene_picture import ScenePicture, evaluate_picture
 from warpspace.picture.views import VIEWS
+from warpspace.picture.words import range_words
 from warpspace.scene.model import Scene
 
 
@@ -41,6 +42,10 @@ class FigureSettings:
     range_top : float or None, µm or µrad
         Where the colours end (a signed component's begin at its negative); None for a round value
         that holds all of the map.
+    range_fixed : bool
+        Whether somebody chose that end: the figure then says so.
+    conditions : tuple of str
+        What the figure must say beside its scenes, for instance "excluded: EA0Z".
 
     Raises
     ------
@@ -56,6 +61,8 @@ class FigureSettings:
     loop: str = "tool"
     grid: int = 21
     range_top: float | None = None
+    range_fixed: bool = False
+    conditions: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -119,7 +126,17 @@ def evaluate_for(
         component=settings.component,
         quantity=quantity,
     )
-    return replace(picture, colours=shared_colours(settings, [picture]))
+    scale = shared_colours(settings, [picture])
+    return replace(
+        picture, colours=scale, conditions=(*settings.conditions, *range_facts(settings, scale))
+    )
+
+
+def range_facts(settings: FigureSettings, scale: ColourScale) -> tuple[str, ...]:
+    """Say where somebody has chosen the end of the colours."""
+    if not settings.range_fixed or settings.range_top is None:
+        return ()
+    return (range_words(scale.low, scale.high, scale.unit),)
 
 
 def shared_colours(settings: FigureSettings, pictures: Sequence[Picture]) -> ColourScale:

@@ -99,7 +99,7 @@ def scene_facts(picture: ScenePicture, exaggeration: float | None) -> list[str]:
     ]
     if still:
         facts.append(" ".join(still))
-    facts += [LOOP_WORDS[picture.view.loop], reference_words(scene)]
+    facts += [LOOP_WORDS[picture.view.loop], reference_words(scene), *picture.conditions]
     if exaggeration is not None:
         facts += [f"displacement drawn {spell_factor(exaggeration)}", "orthographic"]
     return facts
@@ -280,6 +280,8 @@ def start_sheet(
     Sheet
     """
     canvas = new_canvas(settings, exact=exact)
+    said = " · ".join(facts)
+    facts = [*facts, *(words for words in settings.conditions if words not in said)]
     top = draw_heading(canvas, title, facts)
     bottom = draw_footer(canvas, scenes, legend, notes)
     return Sheet(

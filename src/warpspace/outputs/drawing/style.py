@@ -12,6 +12,8 @@ FONT: Final = "DejaVu Sans"
 FIGURE_ENDINGS: Final = (".png", ".svg", ".pdf")
 SMALLEST_FACTOR: Final = 0.5
 """Text never gets smaller than this share of its size in a 1600 × 1200 figure."""
+PRINT: Final = 1.3
+"""What sizes are multiplied by, so that text can be read where a figure is printed 17 cm wide."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +87,7 @@ DARK = Theme(
 class Sizes:
     """Sizes of text and lines, px of a 1600 × 1200 figure."""
 
-    title: float = 34.0
+    title: float = 28.0
     subtitle: float = 17.0
     heading: float = 18.0
     text: float = 16.0
@@ -123,7 +125,8 @@ def factor(width: int, height: int) -> float:
     Returns
     -------
     float
-        1 for 1600 × 1200; larger figures grow in proportion, smaller ones shrink less than that.
+        `PRINT` for 1600 × 1200; larger figures grow in proportion, smaller ones shrink less than
+        that.
     """
     ratio = min(width / REFERENCE_SIZE[0], height / REFERENCE_SIZE[1])
-    return ratio if ratio >= 1.0 else max(ratio**0.85, SMALLEST_FACTOR)
+    return PRINT * ratio if ratio >= 1.0 else max(PRINT * ratio**0.85, SMALLEST_FACTOR)

@@ -14,7 +14,7 @@ from warpspace.picture.scene_picture import ScenePicture
 from warpspace.units import Array
 
 COLUMNS = (
-    *("x_mm", "y_mm", "z_mm", "error_x_um", "error_y_um", "error_z_um", "norm_um"),
+    *("R_x_mm", "R_y_mm", "R_z_mm", "error_x_um", "error_y_um", "error_z_um", "norm_um"),
     *("orientation_x_urad", "orientation_y_urad", "orientation_z_urad"),
 )
 _NUMBER = "%.9g"
@@ -56,7 +56,7 @@ def write_field_csv(
     remarks: Mapping[str, str] | None = None,
     overwrite: bool = True,
 ) -> None:
-    """Write axis positions, nominal points, errors and orientation, one row a point.
+    """Write axis positions, nominal points in R, errors and orientation, one row a point.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def write_field_csv(
             field.orientation_urad.reshape(-1, 3),
         ]
     )
-    names = [f"{name}_{'mm' if is_linear(name) else 'deg'}" for name in axes]
+    names = [f"axis_{name}_{'mm' if is_linear(name) else 'deg'}" for name in axes]
     remarks = remarks or {}
     row = ",".join([_NUMBER] * table.shape[1])
     tail = "".join("," + _quoted(text) for text in remarks.values()) + "\n"

@@ -75,7 +75,7 @@ def figure_names(scenes: int = 1) -> tuple[str, ...]:
 
 for _kind in (
     FigureKind(
-        "error-map", "The bent working volume, coloured.", f"{_HERE}.error_map:draw_error_map"
+        "error-map", "The deformed working volume, coloured.", f"{_HERE}.error_map:draw_error_map"
     ),
     FigureKind(
         "slices",
@@ -108,7 +108,7 @@ for _kind in (
     ),
     FigureKind(
         "machine",
-        "The machine with its bent bodies.",
+        "The machine with its deformed bodies.",
         f"{_HERE}.machine:draw_machine",
         evidence=True,
     ),

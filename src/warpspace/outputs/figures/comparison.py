@@ -73,7 +73,7 @@ def draw_comparison(scenes: Sequence[Scene], settings: FigureSettings, *, exact:
     names = [
         f"A  {scenes[0].title}",
         f"B  {scenes[1].title}",
-        f"{CHANGE}  {_change_words(settings.component)}",
+        f"{CHANGE}:  {_change_words(settings.component)}",
     ]
     maps: list[DrawnMap] = []
     for name, content, cell, room in zip(names, contents, cells, rooms, strict=True):

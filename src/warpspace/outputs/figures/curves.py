@@ -1,11 +1,12 @@
 """Error curves along each axis with tolerance bands, and the constant errors beside them."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from warpspace.machine.axes import DIRECTIONS, axis_order
+from warpspace.machine.axes import axis_order
 from warpspace.machine.description import Axis
 from warpspace.machine.parameters import parameter
 from warpspace.machine.tolerances import Tolerance
@@ -26,8 +27,6 @@ from warpspace.units import MICROMETRE, MICRORADIAN
 SAMPLES = 361
 WIDTHS = (4.4, 2.8, 1.5)
 """Of the three curves of a panel: those drawn later are thinner, so that none hides another."""
-LEAST_ROW = 105.0
-"""Height of a row, px of a 1600 × 1200 figure, below which axes without errors are left out."""
 KINDS = (("XYZ", MICROMETRE, "translation"), ("ABC", MICRORADIAN, "rotation"))
 
 
@@ -48,11 +47,12 @@ def draw_curves(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     """
     scene = scenes[0]
     title = f"Errors along the axes: {scene.title}"
-    axes = list(scene.machine.axes.values())
+    panels = _panels(scene)
     facts = [
         f"{scene.machine.title}, chain {scene.machine.chain}",
         "component errors over the range of each axis, constant errors at the right",
         reference_words(scene) if scene.reference else "",
+        _left_out_words(scene, panels),
     ]
     legend = _legend(banded=bool(scene.tolerances))
     sheet = start_sheet(
@@ -62,19 +62,22 @@ def draw_curves(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     left, bottom, right, top = sheet.content
     constants = _constant_keys(scene)
     split = left + (0.72 if constants else 1.0) * (right - left)
-    if (top - bottom) / len(axes) < canvas.px(LEAST_ROW):
-        axes = [axis for axis in axes if _has_errors(scene, axis)] or axes
-    row = (top - bottom) / len(axes)
-    column = (split - left) / 2.0
-    for number, axis in enumerate(axes):
-        for side, (letters, unit, kind) in enumerate(KINDS):
-            box = (
-                left + side * column + canvas.px(74.0),
-                top - (number + 1) * row + canvas.px(50.0),
-                left + (side + 1) * column - canvas.px(12.0),
-                top - number * row - canvas.px(30.0),
-            )
-            _draw_curves(canvas, scene, axis, letters, unit, kind, box)
+    columns = 1 if len(panels) < 3 else 2
+    row = (top - bottom) / max(math.ceil(len(panels) / columns), 1)
+    column = (split - left) / columns
+    for number, (axis, letters, unit, kind) in enumerate(panels):
+        line, side = divmod(number, columns)
+        box = (
+            left + side * column + canvas.px(74.0),
+            top - (line + 1) * row + canvas.px(50.0),
+            left + (side + 1) * column - canvas.px(12.0),
+            top - line * row - canvas.px(30.0),
+        )
+        _draw_curves(canvas, scene, axis, letters, unit, kind, box)
+    if not panels:
+        words = "No component error: every one is zero along its axis."
+        text, size = canvas.fit(words, split - left, SIZES.heading)
+        canvas.text((left + split) / 2.0, (bottom + top) / 2.0, text, size=size, ha="center")
     if constants:
         box = (split + canvas.px(90.0), bottom + canvas.px(50.0), right, top - canvas.px(30.0))
         _draw_constants(canvas, scene, constants, box)
@@ -82,10 +85,46 @@ def draw_curves(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     return Drawing(canvas.figure, title, about, (), tuple(canvas.rects))
 
 
-def _has_errors(scene: Scene, axis: Axis) -> bool:
-    """Tell whether any component error of an axis is not zero."""
-    keys = (f"E{letter}{axis.name}" for letter in DIRECTIONS)
-    return any(scene.errors.amplitude(key) != 0.0 for key in keys if key in scene.errors)
+Panel = tuple[Axis, str, str, str]
+"""An axis, the letters of the errors of one kind, their unit and the kind."""
+
+
+def _panels(scene: Scene) -> list[Panel]:
+    """List what there is to draw: kinds of errors of an axis with one that is not zero.
+
+    Of a scene without any, those with a tolerance.
+    """
+    every = [(axis, *kind) for axis in scene.machine.axes.values() for kind in KINDS]
+
+    def keys(panel: Panel) -> list[str]:
+        return [f"E{letter}{panel[0].name}" for letter in panel[1]]
+
+    given = [
+        panel
+        for panel in every
+        if any(scene.errors.amplitude(key) != 0.0 for key in keys(panel) if key in scene.errors)
+    ]
+    return given or [
+        panel
+        for panel in every
+        if any(_has_width(scene.tolerances.get(key)) for key in keys(panel))
+    ]
+
+
+def _has_width(tolerance: Tolerance | None) -> bool:
+    """Tell whether there is a tolerance that an error may fall in."""
+    return tolerance is not None and tolerance.half_width > 0.0
+
+
+def _left_out_words(scene: Scene, panels: Sequence[Panel]) -> str:
+    """Say which panels are left out since all their errors are zero; empty where none is."""
+    drawn = {(axis.name, kind) for axis, _, _, kind in panels}
+    missing = [
+        f"{kind}s of {', '.join(names)}"
+        for _, _, kind in KINDS
+        if (names := [name for name in scene.machine.axes if (name, kind) not in drawn])
+    ]
+    return f"zero: {'; '.join(missing)}" if missing and panels else ""
 
 
 def _axes(canvas: Canvas, box: Rect) -> Any:
@@ -175,8 +214,13 @@ def _draw_bands(
 
 
 def _constant_keys(scene: Scene) -> list[str]:
-    """List the constant errors of a scene's machine, angles first."""
-    keys = [key for key in scene.parameter_keys if parameter(key).is_constant]
+    """List the constant errors of a scene that are not zero or have a tolerance, angles first."""
+    keys = [
+        key
+        for key in scene.parameter_keys
+        if parameter(key).is_constant
+        and (scene.errors.amplitude(key) != 0.0 or _has_width(scene.tolerances.get(key)))
+    ]
     return sorted(
         keys, key=lambda key: (not parameter(key).is_rotation, axis_order(parameter(key).axis))
     )
@@ -210,7 +254,7 @@ def _draw_constants(canvas: Canvas, scene: Scene, keys: Sequence[str], box: Rect
     axes.set_xlim(-1.1 * reach, 1.1 * reach)
     axes.set_yticks(range(len(keys)), [f"{key} [{parameter(key).unit}]" for key in keys])
     title = "squareness, orientation and location"
-    text, size = canvas.fit(title, canvas.width - box[0] - canvas.px(8.0), SIZES.small)
+    text, size = canvas.fit(title, box[2] - box[0], SIZES.small)
     canvas.text(box[0], box[3] + canvas.px(7.0), text, size=size, colour=theme.muted)
     for label in axes.get_yticklabels():
         label.set_color(theme.ink)

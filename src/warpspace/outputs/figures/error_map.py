@@ -1,9 +1,10 @@
 """The error map: the bent working volume, coloured by its error."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from warpspace.geometry.colour import ColourScale
 from warpspace.geometry.isolines import isoline_levels
+from warpspace.machine.axes import is_linear
 from warpspace.outputs.drawing.content import Drawing
 from warpspace.outputs.drawing.map3d import draw_map
 from warpspace.outputs.drawing.panel import Row, draw_panel
@@ -18,9 +19,10 @@ from warpspace.outputs.drawing.sheet import (
     panel_rect,
     scene_facts,
 )
+from warpspace.picture.coordinates import list_axes, spell_coordinate
 from warpspace.picture.model import Picture
 from warpspace.picture.views import view_words
-from warpspace.picture.words import quantity_words, spell, spell_point, spell_short
+from warpspace.picture.words import quantity_words, spell, spell_short
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
@@ -92,6 +94,16 @@ def value_marks(picture: Picture) -> list[tuple[str, float]]:
     ]
 
 
+def place_rows(at: Mapping[str, float], point_mm: Sequence[float]) -> list[Row]:
+    """Spell a point in both ways, one row each: axis positions, and a point of R."""
+    linear = {name: value for name, value in at.items() if is_linear(name)}
+    point = " ".join(
+        f"{name} {spell_coordinate(value)}" for name, value in zip("xyz", point_mm, strict=True)
+    )
+    axes: list[Row] = [("max, axes", list_axes(linear))] if linear else []
+    return [*axes, ("max, in R", point)]
+
+
 def statistics_rows(picture: Picture) -> list[Row]:
     """Spell the statistics, the most important first."""
     found = picture.statistics
@@ -100,7 +112,7 @@ def statistics_rows(picture: Picture) -> list[Row]:
         ("mean |E|", f"{spell(found.mean_um)} µm"),
         ("P95", f"{spell(found.p95_um)} µm"),
         ("RMS", f"{spell(found.rms_um)} µm"),
-        ("max at", f"{spell_point(found.max_at_mm)} mm" if found.max_um > 0.0 else "–"),
+        *(place_rows(found.max_at_axes, found.max_at_mm) if found.max_um > 0.0 else ()),
     ]
     if picture.component != "norm":
         values = picture.values

@@ -26,12 +26,12 @@ from warpspace.outputs.drawing.sheet import (
     start_sheet,
 )
 from warpspace.outputs.drawing.style import SIZES
-from warpspace.outputs.figures.error_map import isoline_words
+from warpspace.outputs.figures.error_map import isoline_words, place_rows
 from warpspace.picture.model import Picture
 from warpspace.picture.scene_picture import ScenePicture
 from warpspace.picture.topology import map_faces
 from warpspace.picture.views import view_words
-from warpspace.picture.words import spell, spell_factor, spell_point
+from warpspace.picture.words import spell, spell_factor
 from warpspace.scene.model import Scene
 from warpspace.units import MICRORADIAN, RAD_PER_URAD, Array
 
@@ -137,7 +137,13 @@ def draw_orientation(scenes: Sequence[Scene], settings: FigureSettings, *, exact
         ("max tilt", f"{spell(float(tilt.max()))} {MICRORADIAN}"),
         ("mean tilt", f"{spell(float(tilt.mean()))} {MICRORADIAN}"),
         ("P95", f"{spell(float(np.percentile(tilt, 95.0)))} {MICRORADIAN}"),
-        ("max at", f"{spell_point(picture.grid.nominal_mm.reshape(-1, 3)[worst])} mm"),
+        *place_rows(
+            {
+                name: float(np.broadcast_to(values, picture.grid.shape).reshape(-1)[worst])
+                for name, values in picture.grid.coordinates.items()
+            },
+            picture.grid.nominal_mm.reshape(-1, 3)[worst].tolist(),
+        ),
         ("1° of lean shown", f"{spell(math.radians(1.0) / RAD_PER_URAD / factor)} {MICRORADIAN}"),
     ]
     marks = [("mean", float(values.mean())), ("max", float(values.max()))]

@@ -23,7 +23,7 @@ from warpspace.picture.exaggeration import choose_exaggeration
 from warpspace.picture.model import choose_scale
 from warpspace.picture.scene_picture import evaluate_picture
 from warpspace.picture.traces import TraceLine, evaluate_traces, trace_lines
-from warpspace.picture.words import MINUS, quantity_words, spell, spell_point
+from warpspace.picture.words import MINUS, quantity_words, spell, spell_vector
 from warpspace.scene.model import Scene
 from warpspace.units import MICROMETRE, Array
 
@@ -104,8 +104,8 @@ def draw_traces(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     rows: list[Row] = [
         ("max |E|", f"{spell(largest)} {MICROMETRE}"),
         ("mean |E|", f"{spell(float(norms.mean()))} {MICROMETRE}"),
-        ("max at", f"{spell_point(nominal[int(np.argmax(norms))])} mm"),
-        *((name, f"{spell_point(point)} mm") for point, name in _points(traces).items()),
+        ("max at", f"{spell_vector(nominal[int(np.argmax(norms))])} mm"),
+        *((name, f"{spell_vector(point)} mm") for point, name in _points(traces).items()),
     ]
     marks = [("max", float(values.max())), ("mean", float(values.mean()))]
     heading = quantity_words(settings.component)

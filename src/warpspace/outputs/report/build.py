@@ -22,6 +22,7 @@ from warpspace.outputs.report.promises import sampling_blocks
 from warpspace.outputs.report.repair import repair_section
 from warpspace.outputs.report.review import ReportSettings, Review, Reviewed, build_review
 from warpspace.outputs.report.wording import volume
+from warpspace.picture.words import reference_words
 from warpspace.scene.model import Scene
 
 ENDINGS = (".html", ".pdf")
@@ -159,6 +160,7 @@ def _facts(review: Review) -> tuple[str, ...]:
         *machines,
         *volumes,
         f"{review.settings.loop} loop",
+        *dict.fromkeys(reference_words(reviewed.scene) for reviewed in review.scenes),
         report_time().strftime("%Y-%m-%d"),
         f"warpspace {__version__}",
     )
@@ -166,7 +168,7 @@ def _facts(review: Review) -> tuple[str, ...]:
 
 def _where(review: Review, painter: ReportFigures, embed: Embed | None) -> Section:
     """Where the error is: interactive view, statistics, maps."""
-    blocks: list[Block] = [parts.statistics_table(review)]
+    blocks: list[Block | None] = [parts.statistics_table(review), parts.places_table(review)]
     for letter, reviewed in parts.letters(review):
         if embed is not None:
             page = embed(

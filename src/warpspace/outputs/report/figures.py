@@ -142,7 +142,8 @@ class ReportFigures:
         from warpspace.outputs.drawing.settings import FigureSettings
 
         settings = FigureSettings(
-            exaggeration=self._review.exaggeration,
+            # the lean of the tool axis has a factor of its own, at which it is seen
+            exaggeration="auto" if name == "orientation-map" else self._review.exaggeration,
             loop=self._review.settings.loop,
             grid=self._review.settings.grid,
         )

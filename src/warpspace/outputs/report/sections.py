@@ -33,7 +33,8 @@ from warpspace.picture.comparison import (
     STATISTICS,
     statistics_change,
 )
-from warpspace.picture.words import spell, spell_point, spell_short, spell_signed
+from warpspace.picture.coordinates import own_axes, spell_at, spell_point
+from warpspace.picture.words import spell, spell_short, spell_signed, spell_vector
 from warpspace.units import MICROMETRE
 
 MOST_ROWS = 15
@@ -117,6 +118,31 @@ def statistics_table(review: Review) -> Block:
         columns,
         rows,
     )
+
+
+def places_table(review: Review) -> Block | None:
+    """Say where each field is largest: axis positions, point of R, argument of a command."""
+    found = [
+        (letter or "|E|", reviewed.scene, reviewed.statistics)
+        for letter, reviewed in letters(review)
+    ]
+    if review.difference is not None:
+        found.append((DIFFERENCE_LENGTH, review.scenes[0].scene, review.difference))
+    rows: list[tuple[str, ...]] = []
+    for name, scene, stats in found:
+        if stats.max_um > 0.0:
+            own = own_axes(scene, stats.max_at_axes)
+            axes, _, point = f"{spell_point(own, stats.max_at_mm)} mm".rpartition(" · ")
+            rows.append((name, axes, point, f"--at {spell_at(own)}"))
+    if not rows:
+        return None
+    columns = [
+        Column("max of", width=0.8),
+        Column("axis positions, mm", width=1.7),
+        Column("point in R", width=1.7),
+        Column("as an argument", width=2.0),
+    ]
+    return table("Where the error is largest.", columns, rows)
 
 
 def explanation_blocks(letter: str, reviewed: Reviewed) -> list[Block]:
@@ -233,7 +259,7 @@ def gains_table(letter: str, gains: Sequence[Gain]) -> Block:
             spell(gain.norm),
             *(spell(value) for value in (gain.x, gain.y, gain.z)),
             gain.unit,
-            spell_point(gain.lever_mm),
+            spell_vector(gain.lever_mm),
         )
         for gain in gains[:MOST_ROWS]
     ]

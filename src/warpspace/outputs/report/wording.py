@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 
-from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import ErrorFunction
 from warpspace.machine.parameters import parameter
 from warpspace.outputs.report.review import Review, Reviewed, Sampling
-from warpspace.picture.words import MINUS, TIMES, spell, spell_factor, spell_positions, spell_short
+from warpspace.picture.coordinates import list_axes, own_axes, spell_point
+from warpspace.picture.words import MINUS, TIMES, spell, spell_factor, spell_short
 from warpspace.scene.model import Scene
 from warpspace.units import MICROMETRE
 
@@ -52,12 +52,9 @@ def percent(share: float, digits: int = 1) -> str:
 
 
 def worst_place(reviewed: Reviewed) -> str:
-    """Spell the axis positions of the worst point, those that matter in the loop."""
-    tool = reviewed.picture.view.loop is Loop.TOOL
-    axes = reviewed.scene.machine.chain.tool if tool else reviewed.worst_at
-    return spell_positions(
-        {name: value for name, value in reviewed.worst_at.items() if name in axes}
-    )
+    """Spell the worst point: axis positions, and the point of R."""
+    own = own_axes(reviewed.scene, reviewed.worst_at)
+    return f"{spell_point(own, reviewed.statistics.max_at_mm)} mm"
 
 
 def volume(reviewed: Reviewed) -> str:
@@ -127,7 +124,7 @@ def _one(review: Review, reviewed: Reviewed) -> list[str]:
 
 def _cause(reviewed: Reviewed) -> str:
     """Say where the worst point is, and what helps."""
-    return f"The worst point is {worst_place(reviewed)}. {repair_words(reviewed)}".rstrip()
+    return f"The worst point is at {worst_place(reviewed)}. {repair_words(reviewed)}".rstrip()
 
 
 def _two(review: Review) -> list[str]:
@@ -150,7 +147,7 @@ def _two(review: Review) -> list[str]:
     ]
     for letter, reviewed in (("A", first), ("B", second)):
         if reviewed.statistics.max_um > 0.0:
-            words = f"In {letter} the worst point is {worst_place(reviewed)}."
+            words = f"In {letter} the worst point is at {worst_place(reviewed)}."
             sentences.append(f"{words} {repair_words(reviewed)}".rstrip())
     if review.settings.spec_um is not None:
         sentences.append(_kept(review, review.settings.spec_um))
@@ -206,7 +203,7 @@ def reference_words(scene: Scene) -> str:
     """Say what errors are referred to."""
     if scene.reference is None:
         return "Absolute: errors include the part that is the same everywhere."
-    return f"Relative to {spell_positions(scene.reference)}, which is held still."
+    return f"Relative to the reference point {list_axes(scene.reference)}, which is held still."
 
 
 def factor_words(factor: float) -> str:

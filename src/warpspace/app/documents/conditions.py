@@ -1,0 +1,56 @@
+"""What files must say of a picture beside its scene: excluded errors, a fixed range of colours."""
+
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.state.app_state import AppState
+from warpspace.picture.comparison import conditions_of_both
+from warpspace.picture.words import exclusion_words, range_words
+
+
+def state_conditions(state: AppState) -> tuple[str, ...]:
+    """Say which errors of a state do not take part; nothing where leaving them out changes nothing.
+
+    Parameters
+    ----------
+    state : AppState
+
+    Returns
+    -------
+    tuple of str
+        For instance ``("excluded: EA0Z",)`` or ``("only: EAX",)``.
+    """
+    chosen = state.exclusions
+    own = [key for key, value in state.amplitudes.items() if value != 0.0]
+    excluded = [key for key in own if key in chosen.excluded]
+    only = [key for key in state.amplitudes if key in chosen.only and key not in chosen.excluded]
+    if not chosen.only:
+        return exclusion_words(excluded)
+    if any(not chosen.active(key) for key in own):
+        return exclusion_words([], only or ["no error"])
+    return ()
+
+
+def picture_conditions(picture: LivePicture) -> tuple[str, ...]:
+    """Say all that a file of a picture must say; of a difference for both sides.
+
+    Parameters
+    ----------
+    picture : LivePicture
+
+    Returns
+    -------
+    tuple of str
+    """
+    if picture.is_difference and picture.compared is not None:
+        a, b = (state_conditions(side) for side in picture.compared.sides)
+        found = conditions_of_both(a, b)
+    else:
+        found = state_conditions(picture.drawn_state)
+    return (*found, *range_conditions(picture))
+
+
+def range_conditions(picture: LivePicture) -> tuple[str, ...]:
+    """Say where a user has fixed the range of the colours."""
+    if picture.state.look.range_mode != "fixed":
+        return ()
+    scale = picture.scale
+    return (range_words(scale.low, scale.high, scale.unit),)
