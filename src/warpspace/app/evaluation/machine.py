@@ -85,6 +85,11 @@ def drawn_bodies(
     return place_bodies(state.scene, machine_motions(state, turned), factor)
 
 
+def nominal_bodies(picture: LivePicture) -> tuple[PlacedBody, ...]:
+    """Place the bodies of a picture's machine where they nominally are."""
+    return place_bodies(picture.state.scene, machine_motions(picture.state), 0.0)
+
+
 def tool_point(picture: LivePicture) -> ToolPoint:
     """Find the tool point in the deformed grid of a picture.
 

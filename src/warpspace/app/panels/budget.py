@@ -9,7 +9,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
 from warpspace.app.readouts.budget import ASK, REFUSED, answer_html
 from warpspace.app.state.app_state import AppState
-from warpspace.app.viewport.camera import CameraMemory, fit_camera, heading_share
+from warpspace.app.viewport.camera import CameraMemory, fit_camera
 from warpspace.app.viewport.layers import SCENE_PER_MM
 
 
@@ -73,14 +73,14 @@ class BudgetPanel:
         if not origins:
             return
         points = np.concatenate([picture.drawn_mm.reshape(-1, 3), np.stack(origins)])
-        size = self._context.client.camera
-        width, height = max(size.image_width, 200), max(size.image_height, 200)
+        room = self._context.camera.room
         pose = fit_camera(
             points,
-            width / height,
+            room.aspect,
             fov_deg=float(np.rad2deg(camera.fov_rad)),
             margin=1.2,
-            top=heading_share(height),
+            top=room.top_share,
+            bottom=room.bottom_share,
         )
         x, y, z = (float(value) * SCENE_PER_MM for value in pose.position)
         at = tuple(float(value) * SCENE_PER_MM for value in pose.look_at)

@@ -1,11 +1,12 @@
-"""What is always in view: heading with the display factor, colour bar, statistics, scale bars."""
+"""What is always in view beside the drawing: colour bar, statistics, key to the lines."""
 
 from collections.abc import Callable
+from functools import partial
 
 from warpspace.app.browser.handles import Handle
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
-from warpspace.app.readouts.summary import heading, summary
+from warpspace.app.readouts.summary import summary
 from warpspace.app.state.app_state import AppState
 
 
@@ -33,10 +34,5 @@ class HtmlPanel:
 
 
 def summary_panel(context: PanelContext, _state: AppState) -> HtmlPanel:
-    """Colour bar, numbers and scale bars."""
-    return HtmlPanel(context, summary)
-
-
-def heading_panel(context: PanelContext) -> HtmlPanel:
-    """Machine, error set and display factor."""
-    return HtmlPanel(context, heading)
+    """Colour bar, numbers and key; the scale bars are on the drawing."""
+    return HtmlPanel(context, partial(summary, bars=False))

@@ -114,12 +114,14 @@ def _scale_bars(picture: LivePicture) -> list[tuple[float, str]]:
     ]
 
 
-def summary(picture: LivePicture) -> str:
+def summary(picture: LivePicture, *, bars: bool = True) -> str:
     """Put colour bar, numbers, scale bars and key into one block.
 
     Parameters
     ----------
     picture : LivePicture
+    bars : bool, optional
+        Whether two lengths show how much longer errors are drawn than the geometry.
 
     Returns
     -------
@@ -139,7 +141,7 @@ def summary(picture: LivePicture) -> str:
             "max": found.max_um,
         },
         worst_place=spell_place(found.max_at_mm),
-        scale_bars=_scale_bars(picture),
+        scale_bars=_scale_bars(picture) if bars else [],
         lines=_key_to_lines(picture),
     )
 
