@@ -21,8 +21,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from PIL import Image
 from playwright.sync_api import Browser, Page, sync_playwright
 
-from warpspace.app.server.viewer import Viewer
 from warpspace.app.browser.room import column_widths
+from warpspace.app.server.viewer import Viewer
 from warpspace.cli.services import build_services
 from warpspace.scene.library import load_scene
 

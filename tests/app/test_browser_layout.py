@@ -32,11 +32,11 @@ def shares(tab: Tab) -> tuple[float, float]:
     return errors / (errors + curve), float(errors + curve)
 
 
-def test_tabs_stand_on_one_line_and_sliders_have_the_height(
+def test_tabs_are_all_seen_and_sliders_have_the_height(
     tab: Tab, open_tab: Callable[..., Tab]
 ) -> None:
     for page in (tab, open_tab(size=(1600, 900))):
-        assert set(page.page.evaluate(STRIPS)) == {1}
+        assert max(page.page.evaluate(STRIPS)) <= 2
         page.until(lambda page=page: shares(page)[0] > 0.66)
         # labels do not reach below the buttons beside them
         assert page.page.evaluate(OVERLAPS) == 0

@@ -22,7 +22,7 @@ HEADING_PX, FOOT_PX = 84, 52
 SIDE_PX = 16
 """Kept free at either side, for words at the ends of axes."""
 MOST_SHARE, LEAST_SHARE = 0.4, 0.2
-"""Parts of the room's height: what the heading keeps free at most, what the drawing has at least."""
+"""Parts of the height: what the heading keeps free at most, what the drawing has at least."""
 
 
 def column_widths(page_width: float) -> tuple[int, int]:

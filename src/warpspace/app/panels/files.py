@@ -213,7 +213,6 @@ class FilesPanel:
             return
         width = min(max(client.camera.image_width, 64), LARGEST_VIEW_PX)
         height = min(max(client.camera.image_height, 64), LARGEST_VIEW_PX)
-
         bars = self._context.camera.px_per_mm(picture, height)
 
         def make(_: threading.Event) -> bytes:
