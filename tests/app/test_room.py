@@ -23,7 +23,15 @@ START = start_state(load_scene("dvf5000_first"), nodes=9)
 
 @pytest.mark.parametrize(
     "text",
-    ["", "1,2,3,4", "1,900,700,80,-5", "1,nan,700,80,50", "1,50,700,80,50", "1,9e9,7,8,5", "²,9,9,9,9"],
+    [
+        "",
+        "1,2,3,4",
+        "1,900,700,80,-5",
+        "1,nan,700,80,50",
+        "1,50,700,80,50",
+        "1,9e9,7,8,5",
+        "²,9,9,9,9",
+    ],
 )
 def test_a_room_that_cannot_be_is_none(text: str) -> None:
     assert read_room(text) is None
