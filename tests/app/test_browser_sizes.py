@@ -21,7 +21,10 @@ PICTURE = LiveModel().evaluate(start_state(load_scene("dvf5000_first")))
 SIZES = [(1024, 768), (1600, 1000), (3840, 2160)]
 PHONE = (390, 844)
 BOXES = """() => {
-  const box = e => { const r = e.getBoundingClientRect(); return [r.left, r.top, r.right, r.bottom]; };
+  const box = part => {
+    const { left, top, right, bottom } = part.getBoundingClientRect();
+    return [left, top, right, bottom];
+  };
   const all = selector => [...document.querySelectorAll(selector)].map(box);
   return { head: all(".ws-room-head > *")[0], tabs: all("[role=tab]"),
     room: box(window.__viserMutable.canvas), docks: all("[data-dock-region]"),
@@ -278,7 +281,7 @@ def test_isolines_carry_few_values_on_plates_that_suit_the_page(tab: Tab) -> Non
             tab.page.evaluate(
                 "() => { let dark = 0; window.__viserMutable.scene.traverse(({ material }) => {"
                 " if (material?.uniforms?.uLabelData)"
-                "   dark += /0\\.10, 0\\.11, 0\\.13|0\\.86, 0\\.89, 0\\.93/.test(material.fragmentShader);"
+                "   dark += /0\\.10, 0\\.11|0\\.86, 0\\.89/.test(material.fragmentShader);"
                 " }); return dark; }"
             )
             >= 2

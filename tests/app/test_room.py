@@ -1,4 +1,4 @@
-"""The room of the drawing: what a page says of it, the values on isolines, the bars of a picture."""
+"""The room of the drawing: what a page says of it, values on isolines, bars of a picture."""
 
 from dataclasses import replace
 from io import BytesIO
