@@ -46,9 +46,10 @@ def test_tabs_are_all_seen_and_sliders_have_the_height(
 def test_the_divider_on_the_left_can_be_moved(tab: Tab) -> None:
     tab.until(lambda: shares(tab)[0] > 0.66)
     before, height = shares(tab)
-    at = tab.page.locator(DIVIDER).bounding_box()
-    x, y = at["x"] + 60, at["y"] + at["height"] / 2
-    for start, end, share in ((y, y - 90, before - 90 / height), (y - 90, y, before)):
+    for by in (-90, 90):
+        at = tab.page.locator(DIVIDER).bounding_box()
+        x, start = at["x"] + 60, at["y"] + at["height"] / 2
+        end, share = start + by, before + min(by, 0) / height
         tab.page.mouse.move(x, start)
         tab.page.mouse.down()
         tab.page.mouse.move(x, (start + end) / 2)

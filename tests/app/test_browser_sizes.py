@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from app.conftest import Tab, wait_until_open
+from app.conftest import TIDY, Tab, wait_until_open
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import start_state
@@ -320,11 +320,11 @@ def test_a_phone_shows_drawing_and_numbers_with_the_panels_in_a_sheet(
     assert "max at" in text
     assert within(found["foot"], [0, 0, *PHONE])
     # the sheet is opened: the drawing stays in view above it
+    phone.until(lambda: phone.page.evaluate(TIDY) == 0)
     find(phone, "Errors").tap()
     phone.page.wait_for_selector("text=Find an error")
-    box = settled(phone)
-    sheet = phone.page.get_by_text("Find an error", exact=True).bounding_box()
-    assert box[3] < sheet["y"]
+    sheet = phone.page.get_by_text("Find an error", exact=True)
+    phone.until(lambda: extent(phone)[3] < sheet.bounding_box()["y"])
     for name, tabs in (("Volumetric error", 5), ("View", 5)):
         section = phone.page.get_by_role("button", name=f"Expand panel {name}", exact=True)
         section.scroll_into_view_if_needed()
