@@ -37,14 +37,15 @@ from playwright.sync_api import Browser, Page, Playwright, sync_playwright
 from viser.infra import WebsockClientConnection
 from websockets.asyncio.server import ServerConnection
 
+from warpspace.app.browser.room import column_widths
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.viewport.layers.lights import light_scene
-from warpspace.app.viewport.tab_camera import LEFT_WIDTH, RIGHT_WIDTH
 from warpspace.scene.library import load_scene
 
+PAGE: Any = {"width": 1600, "height": 900}
 LIMITS = {
     "serving_s": 3.0,
     "model_ms": 5.0,
@@ -198,13 +199,13 @@ class BarePage:
         """Lay out the page and replay the first picture."""
         gui = client.gui
         gui.main_panel.dock_left()
-        gui.main_panel.set_width(LEFT_WIDTH)
+        gui.main_panel.set_width(column_widths(PAGE["width"])[0])
         slider = gui.add_slider("EAX", -10.0, 10.0, 0.1, 0.0)
         panel = gui.add_panel()
         with panel.add_tab("Volumetric error"):
             texts = {m.uuid: gui.add_html("") for move in moves for m in move if is_text(m)}
         panel.dock_right()
-        panel.set_width(RIGHT_WIDTH)
+        panel.set_width(column_widths(PAGE["width"])[1])
 
         def replay(messages: list[Any]) -> None:
             with client.atomic():
@@ -227,7 +228,7 @@ class BarePage:
 
 def open_page(browser: Browser, url: str) -> tuple[Page, str]:
     """Open a page and give the id of its slider."""
-    page = browser.new_page(viewport={"width": 1600, "height": 900})
+    page = browser.new_page(viewport=PAGE)
     page.goto(f"{url}/?fixedDpr=1")
     page.wait_for_function(OURS_READY)
     page.wait_for_timeout(4000)
@@ -266,7 +267,7 @@ def page_part() -> dict[str, float]:
     """Time until the page can be used, beside viser's page with nothing in it."""
 
     def opened_ms(browser: Browser, url: str, ready: str) -> tuple[float, float]:
-        with browser.new_context(viewport={"width": 1600, "height": 900}) as context:
+        with browser.new_context(viewport=PAGE) as context:
             page = context.new_page()
             start = time.perf_counter()
             page.goto(f"{url}/?fixedDpr=1")

@@ -21,14 +21,15 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from PIL import Image
 from playwright.sync_api import Browser, Page, sync_playwright
 
+from warpspace.app.browser.room import column_widths
 from warpspace.app.server.viewer import Viewer
-from warpspace.app.viewport.tab_camera import LEFT_WIDTH, RIGHT_WIDTH
 from warpspace.cli.services import build_services
 from warpspace.scene.library import load_scene
 
 SCENES = ("dvf5000_first", "dvf5000_second", "teach_wobbling_table")
 WHOLE, ONE_TAB = (1600, 900), (1280, 900)
 """Width and height of the page, CSS pixels."""
+LEFT_WIDTH, RIGHT_WIDTH = column_widths(ONE_TAB[0])
 CHROMIUM = [
     "--headless=new",
     "--no-sandbox",

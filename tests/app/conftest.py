@@ -50,7 +50,8 @@ FAILED = pytest.StashKey[bool]()
 
 def wait_until_open(page: "Page") -> None:
     """Wait until all of a page is there."""
-    page.wait_for_selector("html[data-warpspace=open] [data-value='max']", timeout=60_000)
+    shown = ":is([data-value='max'], [data-strip='max']):visible"  # the latter on a phone
+    page.wait_for_selector(f"html[data-warpspace=open] {shown}", timeout=60_000)
 
 
 class Tab:

@@ -91,19 +91,18 @@ def test_pages_that_never_show_anything_are_forgotten(
     assert not arrivals.expect(5).is_there
 
 
-def fitted(image_width: int, *, docked: bool, page_width: float | None) -> np.ndarray:
+def fitted(image_width: int, page_width: float | None) -> np.ndarray:
     """Position of a camera whose picture was this wide when it was put in place."""
     camera = SimpleNamespace(image_width=image_width, image_height=720)
     picture = LiveModel().evaluate(start_state(load_scene("dvf5000_first")))
-    TabCamera(SimpleNamespace(camera=camera)).fit(  # pyright: ignore[reportArgumentType]
-        picture, docked=docked, page_width=page_width
-    )
+    tab = TabCamera(SimpleNamespace(camera=camera))  # pyright: ignore[reportArgumentType]
+    tab.page_width = page_width
+    tab.fit(picture)
     return camera.position
 
 
 def test_the_first_view_does_not_depend_on_whether_panels_stood_already() -> None:
-    expected = fitted(1280, docked=False, page_width=1280.0)
-    np.testing.assert_array_equal(fitted(610, docked=False, page_width=1280.0), expected)
+    expected = fitted(1280, page_width=1280.0)
+    np.testing.assert_array_equal(fitted(610, page_width=1280.0), expected)
     # what a page does not say is taken from its picture
-    np.testing.assert_array_equal(fitted(1280, docked=False, page_width=None), expected)
-    np.testing.assert_array_equal(fitted(610, docked=True, page_width=None), expected)
+    np.testing.assert_array_equal(fitted(1280, page_width=None), expected)

@@ -32,11 +32,11 @@ def shares(tab: Tab) -> tuple[float, float]:
     return errors / (errors + curve), float(errors + curve)
 
 
-def test_tabs_stand_on_one_line_and_sliders_have_the_height(
+def test_tabs_are_all_seen_and_sliders_have_the_height(
     tab: Tab, open_tab: Callable[..., Tab]
 ) -> None:
     for page in (tab, open_tab(size=(1600, 900))):
-        assert set(page.page.evaluate(STRIPS)) == {1}
+        assert max(page.page.evaluate(STRIPS)) <= 2
         page.until(lambda page=page: shares(page)[0] > 0.66)
         # labels do not reach below the buttons beside them
         assert page.page.evaluate(OVERLAPS) == 0
@@ -46,9 +46,10 @@ def test_tabs_stand_on_one_line_and_sliders_have_the_height(
 def test_the_divider_on_the_left_can_be_moved(tab: Tab) -> None:
     tab.until(lambda: shares(tab)[0] > 0.66)
     before, height = shares(tab)
-    at = tab.page.locator(DIVIDER).bounding_box()
-    x, y = at["x"] + 60, at["y"] + at["height"] / 2
-    for start, end, share in ((y, y - 90, before - 90 / height), (y - 90, y, before)):
+    for by in (-90, 90):
+        at = tab.page.locator(DIVIDER).bounding_box()
+        x, start = at["x"] + 60, at["y"] + at["height"] / 2
+        end, share = start + by, before + min(by, 0) / height
         tab.page.mouse.move(x, start)
         tab.page.mouse.down()
         tab.page.mouse.move(x, (start + end) / 2)

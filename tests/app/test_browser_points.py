@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from app.conftest import Tab
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import start_state
-from warpspace.app.state.edits import with_muted
+from warpspace.app.state.edits import with_excluded
 from warpspace.app.state.picked import Picked
 from warpspace.cli.commands.field import field
 from warpspace.scene.library import load_scene
@@ -106,8 +106,8 @@ def test_rows_of_the_budget_are_edited_excluded_and_show_their_lever(tab: Tab) -
     tab.until(lambda: tab.state().amplitudes["EB0Z"] != START.amplitudes["EB0Z"])
     tab.page.get_by_role("button", name="Reset", exact=True).click()
     tab.page.get_by_role("button", name="Exclude EA0Z").click()
-    without = LIVE.evaluate(with_muted(START, "EA0Z", True)).statistics.max_um
-    tab.until(lambda: tab.state().exclusions.muted == {"EA0Z"})
+    without = LIVE.evaluate(with_excluded(START, "EA0Z", True)).statistics.max_um
+    tab.until(lambda: tab.state().exclusions.excluded == {"EA0Z"})
     tab.until(lambda: abs(tab.number("max") - without) < 0.006)
     tab.page.get_by_role("button", name="Include EA0Z").click()
     check_budget(tab, WORST)

@@ -70,7 +70,9 @@ def busy() -> AppState:
     state = replace(
         state,
         look=look.with_slice("X", 10.0, span),
-        machine=state.machine.switched(shown=True, bent=False).with_linear("X", 20.0, span),
+        machine=state.machine.switched(shown=True, bent=False, ghost=False).with_linear(
+            "X", 20.0, span
+        ),
         rotary=state.rotary.with_point(1, on=False)
         .with_own((10.0, 20.0, 30.5))
         .with_held("B", (-15.0, 0.0)),

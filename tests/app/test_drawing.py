@@ -42,13 +42,14 @@ def test_grey_and_dark_line_colours_arrive(rgb: tuple[int, int, int]) -> None:
 @given(
     st.floats(min_value=0.3, max_value=4.0),
     st.floats(min_value=0.0, max_value=0.3),
+    st.floats(min_value=0.0, max_value=0.45),
     st.lists(st.tuples(*[st.floats(min_value=-500, max_value=500)] * 3), min_size=2, max_size=12),
 )
-def test_camera_sees_every_point_below_the_heading(
-    aspect: float, top: float, points: list[tuple[float, float, float]]
+def test_camera_sees_every_point_between_heading_and_foot(
+    aspect: float, top: float, bottom: float, points: list[tuple[float, float, float]]
 ) -> None:
     spread = np.array([*points, (600.0, 0.0, 0.0), (-600.0, 0.0, 0.0)])
-    pose = fit_camera(spread, aspect, top=top)
+    pose = fit_camera(spread, aspect, top=top, bottom=bottom)
     back = pose.position - pose.look_at
     back = back / np.linalg.norm(back)
     right = np.cross((0, 0, 1), back)
@@ -60,7 +61,7 @@ def test_camera_sees_every_point_below_the_heading(
     assert (depth > 0).all()
     x, y = seen @ right / depth / (half * aspect), seen @ up / depth / half
     assert np.abs(x).max() <= 1.02
-    assert y.min() >= -1.02
+    assert y.min() >= -1.02 + 2 * bottom
     assert y.max() <= 1.02 - 2 * top
 
 

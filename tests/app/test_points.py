@@ -21,7 +21,7 @@ from warpspace.app.readouts.comparison import comparison_html
 from warpspace.app.readouts.conventions import conventions_html
 from warpspace.app.readouts.places import spell_slice, tool_point_html
 from warpspace.app.state.app_state import AppState, start_state
-from warpspace.app.state.edits import with_muted
+from warpspace.app.state.edits import with_excluded
 from warpspace.app.state.history import History
 from warpspace.app.state.picked import Picked
 from warpspace.app.state.typed_point import LONGEST, read_positions, with_typed_point
@@ -160,13 +160,13 @@ def test_the_worst_point_is_asked_about_undone_linked_and_saved() -> None:
 
 
 def test_the_budget_has_both_coordinates_and_buttons_of_each_row() -> None:
-    state = with_muted(with_picked(START, Picked(WORST)), "EAX", True)
+    state = with_excluded(with_picked(START, Picked(WORST)), "EAX", True)
     found = answer(state, Picked(WORST), 1.0)
 
     def spell(word: str) -> Markup:
         return Markup(f'data-word="{word}"')
 
-    text = answer_html(found, "EA0Z", spell, spell, state.exclusions.muted)
+    text = answer_html(found, "EA0Z", spell, spell, state.exclusions.excluded)
     assert f'data-value="why at">{PLACE} <' in text
     assert f'data-copy="{AT}"' in text
     for word in ("edit EA0Z", "exclude EA0Z", "lever EA0Z", "include EAX"):

@@ -41,11 +41,11 @@ def test_a_question_is_new_only_where_the_answer_may_be():
     assert first != question(START.with_amplitude("EAX", 3.0))
     assert first != question(START.with_loop("relative"))
     assert first != question(START, 10.0)
-    assert first != question(edits.with_muted(START, "EAX", True))
+    assert first != question(edits.with_excluded(START, "EAX", True))
 
 
 def test_excluded_errors_neither_act_nor_are_adjusted():
-    state = edits.with_muted(START, "EA0Z", True)
+    state = edits.with_excluded(START, "EA0Z", True)
     answer = found(state)
     assert "EA0Z" not in answer.adjustable
     assert "EA0Z" not in [effect.key for effect in answer.effects]

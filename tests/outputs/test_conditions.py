@@ -36,7 +36,7 @@ START = start_state(FIRST, nodes=5)
 
 
 def without(key: str, state: AppState = START) -> AppState:
-    return replace(state, exclusions=state.exclusions.with_muted(key, muted=True))
+    return replace(state, exclusions=state.exclusions.with_excluded(key, excluded=True))
 
 
 def fixed(state: AppState) -> LivePicture:
@@ -56,7 +56,7 @@ def test_conditions_name_what_is_excluded_and_the_range() -> None:
     assert picture_conditions(LIVE.evaluate(START)) == ()
     both = without("EA0Z", without("EAX"))
     assert picture_conditions(fixed(both)) == ("excluded: EAX, EA0Z", "range fixed 0–50 µm")
-    only = replace(START, exclusions=START.exclusions.with_soloed("EAX", soloed=True))
+    only = replace(START, exclusions=START.exclusions.with_only("EAX", only=True))
     assert picture_conditions(LIVE.evaluate(only)) == ("only: EAX",)
     # an error that is zero changes nothing when it is left out
     assert picture_conditions(LIVE.evaluate(without("EXX"))) == ()

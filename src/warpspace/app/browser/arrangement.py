@@ -10,9 +10,8 @@ ERRORS_SHARE = 0.68
 
 @cache
 def page_style() -> str:
-    """Give the style sheet of the page as HTML."""
-    css = files("warpspace.app.browser").joinpath("page.css").read_text("utf-8")
-    return f"<style>\n{css}</style>"
+    """Give the style sheet of the page."""
+    return files("warpspace.app.browser").joinpath("page.css").read_text("utf-8")
 
 
 def split_script(share: float = ERRORS_SHARE) -> str:

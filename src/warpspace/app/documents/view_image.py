@@ -12,15 +12,20 @@ from PIL import Image, ImageDraw, ImageFont, PngImagePlugin
 from warpspace import __version__
 from warpspace.app.documents.conditions import picture_conditions
 from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.picture.marks import scale_bars
 from warpspace.picture.words import reference_words, spell_factor
 
 LIGHT, DARK = ((255, 255, 255), (27, 38, 59)), ((26, 27, 30), (222, 226, 232))
 """Ground and ink."""
 BAND_PX = 150
 HEAD_PX = 64
+BAR_PX, BAR_LEFT_PX, BAR_STEP_PX = 150, 16, 24
+"""Longest scale bar, where bars begin, and how far they are apart."""
 
 
-def view_png(pixels: NDArray[np.uint8], picture: LivePicture) -> bytes:
+def view_png(
+    pixels: NDArray[np.uint8], picture: LivePicture, px_per_mm: float | None = None
+) -> bytes:
     """Put a rendered view under a heading and beside its colour bar.
 
     Parameters
@@ -29,6 +34,8 @@ def view_png(pixels: NDArray[np.uint8], picture: LivePicture) -> bytes:
         With a transparent ground where there are four channels.
     picture : LivePicture
         What it shows.
+    px_per_mm : float, optional
+        At the middle of the volume, for scale bars; none by default.
 
     Returns
     -------
@@ -42,6 +49,8 @@ def view_png(pixels: NDArray[np.uint8], picture: LivePicture) -> bytes:
     draw = ImageDraw.Draw(page)
     _heading(draw, picture, ink)
     _colour_bar(page, draw, picture, ink)
+    if px_per_mm is not None:
+        _scale_bars(draw, picture, px_per_mm, ink)
     facts = PngImagePlugin.PngInfo()
     facts.add_text("Software", f"warpspace {__version__}")
     facts.add_itxt("Title", picture.title)
@@ -110,3 +119,21 @@ def _colour_bar(
         at = top + (scale.high - tick) / (scale.high - scale.low) * (height - 1)
         draw.line([(left + 24, at), (left + 30, at)], ink, 1)
         draw.text((left + 35, at - 9), f"{tick:g}".replace("-", "−"), ink, font)
+
+
+def _scale_bars(
+    draw: ImageDraw.ImageDraw, picture: LivePicture, px_per_mm: float, ink: tuple[int, int, int]
+) -> None:
+    """Draw the two lengths at the bottom on the left."""
+    # the longest bar is a quarter of the length that is handed over
+    bars = scale_bars(4.0 * BAR_PX / px_per_mm, picture.exaggeration)
+    factor = spell_factor(picture.exaggeration).replace("\u202f", " ")
+    words = ("geometry", f"error, drawn {factor}")
+    height = draw.im.size[1]
+    for number, (bar, word) in enumerate(zip(bars, words, strict=True)):
+        y = height - 18 - (1 - number) * BAR_STEP_PX
+        end = BAR_LEFT_PX + bar.drawn_mm * px_per_mm
+        draw.line([(BAR_LEFT_PX, y), (end, y)], ink, 2)
+        for x in (BAR_LEFT_PX, end):
+            draw.line([(x, y - 6), (x, y)], ink, 2)
+        draw.text((end + 8, y - 13), f"{bar.text} {word}", ink, _font(14))

@@ -37,7 +37,7 @@ FARTHEST = 1000.0
 FOV_RAD = (0.01, 2.5)
 LOOK_NAMES = ("surface", "quantity", "range_mode")
 LOOK_SWITCHES = ("isolines", "arrows", "worst", "bars", "follow")
-MACHINE_SWITCHES = ("shown", "bent")
+MACHINE_SWITCHES = ("shown", "bent", "ghost")
 TRACE = "why.trace"
 Handler = Callable[[AppState, str], AppState]
 

@@ -120,6 +120,11 @@ def _turning_frames(state: AppState, turned: Mapping[str, float]) -> tuple[str, 
     return ()
 
 
+def nominal_bodies(picture: LivePicture) -> tuple[PlacedBody, ...]:
+    """Place the bodies of a picture's machine where they nominally are."""
+    return place_bodies(picture.state.scene, machine_motions(picture.state), 0.0)
+
+
 def tool_point(picture: LivePicture) -> ToolPoint:
     """Find the tool point in the deformed grid of a picture.
 

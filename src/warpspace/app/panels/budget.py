@@ -22,7 +22,7 @@ from warpspace.app.readouts.budget import (
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.edits import with_excluded
 from warpspace.app.state.typed_point import with_typed_point
-from warpspace.app.viewport.camera import CameraMemory, fit_camera, heading_share
+from warpspace.app.viewport.camera import CameraMemory, fit_camera
 from warpspace.app.viewport.layers import SCENE_PER_MM
 
 TAB = "Error budget"
@@ -135,14 +135,14 @@ class BudgetPanel:
         if not origins:
             return
         points = np.concatenate([picture.drawn_mm.reshape(-1, 3), np.stack(origins)])
-        size = self._context.client.camera
-        width, height = max(size.image_width, 200), max(size.image_height, 200)
+        room = self._context.camera.room
         pose = fit_camera(
             points,
-            width / height,
+            room.aspect,
             fov_deg=float(np.rad2deg(camera.fov_rad)),
             margin=1.2,
-            top=heading_share(height),
+            top=room.top_share,
+            bottom=room.bottom_share,
         )
         x, y, z = (float(value) * SCENE_PER_MM for value in pose.position)
         at = tuple(float(value) * SCENE_PER_MM for value in pose.look_at)

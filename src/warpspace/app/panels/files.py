@@ -213,12 +213,13 @@ class FilesPanel:
             return
         width = min(max(client.camera.image_width, 64), LARGEST_VIEW_PX)
         height = min(max(client.camera.image_height, 64), LARGEST_VIEW_PX)
+        bars = self._context.camera.px_per_mm(picture, height)
 
         def make(_: threading.Event) -> bytes:
             pixels = client.get_render(
                 height, width, transport_format="png", timeout=RENDER_TIMEOUT_S
             )
-            return view_png(pixels, picture)
+            return view_png(pixels, picture, bars)
 
         self._make("View", ".png", VIEW_S, make)
 

@@ -16,6 +16,10 @@ from warpspace.bodies.placed import load_bodies
 from warpspace.scene.model import Scene
 
 SWITCHES = {
+    "ghost": (
+        "Ghost of the machine",
+        "The bodies, nearly transparent, around the working volume; the button on the drawing too.",
+    ),
     "shown": (
         "Machine bodies",
         "A schematic of the machine around the working volume, in true proportions.",

@@ -1,12 +1,13 @@
-"""What is always in view: heading with the exaggeration, colour bar, statistics, scale bars."""
+"""What is always in view beside the drawing: colour bar, statistics, key to the lines."""
 
 from collections.abc import Callable
+from functools import partial
 
 from warpspace.app.browser.handles import Handle
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
 from warpspace.app.panels.budget import add_worst_button
-from warpspace.app.readouts.summary import heading, summary
+from warpspace.app.readouts.summary import summary
 from warpspace.app.state.app_state import AppState
 
 
@@ -34,12 +35,7 @@ class HtmlPanel:
 
 
 def summary_panel(context: PanelContext, _state: AppState) -> HtmlPanel:
-    """Colour bar, numbers and scale bars, and the way to the worst point."""
-    panel = HtmlPanel(context, summary)
+    """Colour bar, numbers and key, and the way to the worst point; scale bars are drawn apart."""
+    panel = HtmlPanel(context, partial(summary, bars=False))
     add_worst_button(context, "Worst point: error budget")
     return panel
-
-
-def heading_panel(context: PanelContext) -> HtmlPanel:
-    """Machine, error set and exaggeration."""
-    return HtmlPanel(context, heading)

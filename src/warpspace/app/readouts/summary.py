@@ -116,12 +116,14 @@ def _scale_bars(picture: LivePicture) -> list[tuple[float, str]]:
     ]
 
 
-def summary(picture: LivePicture) -> str:
+def summary(picture: LivePicture, *, bars: bool = True) -> str:
     """Put colour bar, numbers, scale bars and key into one block.
 
     Parameters
     ----------
     picture : LivePicture
+    bars : bool, optional
+        Whether two lengths show how much longer errors are drawn than the geometry.
 
     Returns
     -------
@@ -141,7 +143,7 @@ def summary(picture: LivePicture) -> str:
             "max": found.max_um,
         },
         found=found,
-        scale_bars=_scale_bars(picture),
+        scale_bars=_scale_bars(picture) if bars else [],
         lines=_key_to_lines(picture),
     )
 

@@ -8,14 +8,15 @@ from warpspace.app.browser.arrangement import split_script
 from warpspace.app.browser.clicks import SCRIPT
 from warpspace.app.browser.copying import COPY_SCRIPT
 from warpspace.app.browser.page import style_script
+from warpspace.app.browser.room import width_script
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import Panel, PanelContext
 from warpspace.app.panels.commands import CommandsPanel
 from warpspace.app.panels.error_curve import ErrorCurvePanel
 from warpspace.app.panels.errors import ErrorsPanel
-from warpspace.app.panels.summary import heading_panel
+from warpspace.app.panels.room import RoomPanel
 from warpspace.app.readouts.html import style_sheet
-from warpspace.app.server.layout import HEADING, Places
+from warpspace.app.server.layout import Places
 from warpspace.app.server.pointing import Pointing
 from warpspace.app.server.tabs import Step, tabs
 from warpspace.app.state.app_state import AppState
@@ -54,15 +55,15 @@ class PageContents:
         """Build what a page cannot be without: the map, its sliders, numbers and heading."""
         context = self._context
         box = BoxLayer(context.client.scene, picture)
+        context.page.run_script(width_script())
         context.page.run_script(SCRIPT)
         context.page.run_script(COPY_SCRIPT)
         context.page.run_script(style_script("readouts", style_sheet()))
         context.page.run_script(style_script("accessible", access_style()))
+        room = RoomPanel(context)
         self._commands = commands = CommandsPanel(context, self._tab_names())
         self._errors = errors = ErrorsPanel(context, picture.state, self._expand_curve)
-        with self._places.at(HEADING):
-            heading = heading_panel(context)
-        return [box], [errors, commands, *self._build_tabs("first", picture.state), heading]
+        return [box], [errors, commands, *self._build_tabs("first", picture.state), room]
 
     def _draw_around(self, picture: LivePicture) -> Built:
         """Draw what lies on and around the map."""

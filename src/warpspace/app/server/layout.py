@@ -1,4 +1,4 @@
-"""Where the panels stand: errors on the left, colour bar and view on the right, heading on top.
+"""Where the panels stand: errors on the left, colour bar and view on the right.
 
 The places are the server's, the same for every tab, and on their way as soon as a page connects;
 what stands in them belongs to each tab.
@@ -10,12 +10,9 @@ from contextlib import contextmanager
 
 from viser import GuiApi, GuiTabHandle
 
-from warpspace.app.browser.arrangement import page_style
+from warpspace.app.browser.room import NARROW_PX, column_widths
 from warpspace.app.server.tabs import tabs
-from warpspace.app.viewport.tab_camera import LEFT_WIDTH, RIGHT_WIDTH
 
-HEADING = "heading"
-"""Where the heading stands; no tab goes by this name."""
 BRAND = (38, 70, 112)
 BRAND_ON_DARK = (122, 162, 214)
 
@@ -74,16 +71,13 @@ def lay_out(gui: GuiApi, *, dark: bool) -> Places:
     apply_theme(gui, dark=dark)
     gui.set_panel_label("Errors")
     gui.main_panel.dock_left()
-    gui.main_panel.set_width(LEFT_WIDTH)
-    gui.add_html(page_style())
+    left, right = column_widths(NARROW_PX)  # a page that is narrower or wider changes them
+    gui.main_panel.set_width(left)
 
     results, settings = gui.add_panel(), gui.add_panel()
     groups = {"results": results, "settings": settings}
     handles = {tab.name: groups[tab.place].add_tab(tab.name) for tab in tabs()}
     results.dock_right()
-    results.set_width(RIGHT_WIDTH)
+    results.set_width(right)
     settings.dock_below(results)
-    top = gui.add_panel()
-    handles[HEADING] = top.add_tab("warpspace")
-    top.float(x=12, y=12, width=520)
     return Places(handles, dark=dark)

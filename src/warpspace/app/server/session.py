@@ -169,7 +169,7 @@ class Session:
             if picture.state.shown.dark != self._places.dark:
                 apply_theme(self._client.gui, dark=picture.state.shown.dark)
             self.context.page.set_title(picture.state.scene.title)
-            self.context.camera.place(picture, docked=False)
+            self.context.camera.place(picture)
             self.steps.begin(picture)
             self.display.add(picture, panels=[keeper])
         self._client.flush()
@@ -201,7 +201,7 @@ class Session:
             self._guarded(action)
         state, shown = self.state, context.shown
         if context.camera.wanted and shown is not None and focus(shown.state) == focus(state):
-            context.camera.place(shown, docked=True)
+            context.camera.place(shown)
         if notes or state is not self.display.state:
             with ONE_AT_A_TIME:
                 self._show(self._live.evaluate(state), notes)
@@ -213,7 +213,7 @@ class Session:
             self.display.show(picture, anew=bool(notes))
             if before is not None and focus(before.state) != focus(picture.state):
                 context.page.set_title(picture.state.scene.title)
-                context.camera.place(picture, docked=True)
+                context.camera.place(picture)
             if before is not None and before.state.shown.dark != picture.state.shown.dark:
                 apply_theme(self._client.gui, dark=picture.state.shown.dark)
         context.shown = picture

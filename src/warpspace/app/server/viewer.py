@@ -11,9 +11,11 @@ from typing import Self
 
 import viser
 
+from warpspace.app.browser.arrangement import page_style
 from warpspace.app.browser.arrivals import Arrivals
 from warpspace.app.browser.incoming import guard_server, guard_widgets
-from warpspace.app.browser.viser_private import serve_with
+from warpspace.app.browser.page import style_script
+from warpspace.app.browser.viser_private import send_script_to_all, serve_with
 from warpspace.app.documents.scene_list import SceneList
 from warpspace.app.documents.services import Services
 from warpspace.app.evaluation.evaluate import LiveModel
@@ -103,6 +105,7 @@ class Viewer:
         self._server = _serve(self.address, self.port, Guard(doors))
         light_scene(self._server.scene)
         self._arrivals = Arrivals(self._server)
+        send_script_to_all(self._server, style_script("page", page_style()))
         self._places = lay_out(self._server.gui, dark=self._start.shown.dark)
         self._server.on_client_connect(self._connect)
         self._server.on_client_disconnect(self._disconnect)

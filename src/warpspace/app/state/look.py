@@ -104,12 +104,15 @@ class MachineLook:
         Whether its bodies are drawn.
     bent : bool
         Whether they are bent by the exaggerated errors.
+    ghost : bool
+        Whether, where they are not drawn, a ghost of them lies around the working volume.
     linear_mm : mapping of str to float, mm
         Positions of the linear axes; an axis not given in the middle of its workspace.
     """
 
     shown: bool = False
     bent: bool = True
+    ghost: bool = True
     linear_mm: Mapping[str, float] = field(default_factory=dict[str, float])
 
     def with_linear(self, axis: str, value: float, span: Span) -> "MachineLook":

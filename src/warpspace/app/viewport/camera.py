@@ -10,9 +10,7 @@ from warpspace.units import Array
 FOV_DEG = 22.0
 """Vertical field of view: long enough that parallel edges look parallel."""
 MARGIN = 1.06
-HEADING_HEIGHT = 130
-"""Room kept free for the heading of the page, CSS pixels."""
-_ROUNDS = 4
+_ROUNDS = 8
 Vector = tuple[float, float, float]
 
 
@@ -41,11 +39,6 @@ class CameraPose:
     fov_rad: float
 
 
-def heading_share(height: float) -> float:
-    """Give the part of a picture's height, CSS pixels, that the heading takes at the top."""
-    return min(HEADING_HEIGHT / height, 0.3)
-
-
 def fit_camera(
     points: Array,
     aspect: float,
@@ -53,6 +46,7 @@ def fit_camera(
     fov_deg: float = FOV_DEG,
     margin: float = MARGIN,
     top: float = 0.0,
+    bottom: float = 0.0,
 ) -> CameraPose:
     """Place a camera so that points fill the picture.
 
@@ -67,8 +61,8 @@ def fit_camera(
         Vertical field of view, degrees.
     margin : float, optional
         Room around the points, 1 for none.
-    top : float, optional
-        Part of the height at the top that is kept free, below a half.
+    top, bottom : float, optional
+        Parts of the height that are kept free at the top and at the bottom, together below one.
 
     Returns
     -------
@@ -80,16 +74,18 @@ def fit_camera(
     right = right / np.linalg.norm(right)
     up = np.cross(back, right)
     half = float(np.tan(np.deg2rad(fov_deg) / 2.0))
-    side, below, above = half * max(aspect, 0.1) / margin, half / margin, half / margin
-    above -= 2.0 * top * half
-    target = (flat.min(axis=0) + flat.max(axis=0)) / 2.0
-    distance = 1.0
+    side = half * max(aspect, 0.1) / margin
+    # middle and half height of what is to be filled
+    middle, free = (bottom - top) * half, (1.0 - top - bottom) * half / margin
+    target, distance = (flat.min(axis=0) + flat.max(axis=0)) / 2.0, 1.0
+    offset = 0.0
     for _ in range(_ROUNDS):
         x, y, towards = ((flat - target) @ np.stack([right, up, back], axis=1)).T
-        least = np.maximum.reduce([np.abs(x) / side, -y / below, y / above]) + towards
-        distance = float(least.max())
+        from_middle = np.abs(y - offset + middle * towards)
+        distance = float((np.maximum(np.abs(x) / side, from_middle / free) + towards).max())
         seen_x, seen_y = x / (distance - towards), y / (distance - towards)
         shift_x = (seen_x.min() + seen_x.max()) / 2.0
-        shift_y = (seen_y.min() + seen_y.max()) / 2.0 + (below - above) / 2.0
+        shift_y = (seen_y.min() + seen_y.max()) / 2.0 - middle
+        offset = middle * distance
         target = target + distance * (shift_x * right + shift_y * up)
     return CameraPose(target + distance * back, target, float(np.deg2rad(fov_deg)))

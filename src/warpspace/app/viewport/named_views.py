@@ -44,7 +44,9 @@ class CameraSetup:
         return TELEPHOTO_DEG if self.orthographic else FOV_DEG
 
 
-def view_pose(points: Array, aspect: float, stand: CameraSetup, top: float = 0.0) -> CameraPose:
+def view_pose(
+    points: Array, aspect: float, stand: CameraSetup, top: float = 0.0, bottom: float = 0.0
+) -> CameraPose:
     """Place a camera for a named view so that points fill the picture.
 
     Parameters
@@ -53,14 +55,14 @@ def view_pose(points: Array, aspect: float, stand: CameraSetup, top: float = 0.0
     aspect : float
         Width over height of the picture.
     stand : CameraSetup
-    top : float, optional
-        Part of the height at the top that is kept free.
+    top, bottom : float, optional
+        Parts of the height that are kept free at the top and at the bottom.
 
     Returns
     -------
     CameraPose
     """
-    return fit_camera(points, aspect, VIEWS[stand.view], stand.fov_deg, top=top)
+    return fit_camera(points, aspect, VIEWS[stand.view], stand.fov_deg, top=top, bottom=bottom)
 
 
 def change_lens(position: Array, look_at: Array, fov_rad: float, new_fov_rad: float) -> Array:

@@ -3,13 +3,13 @@
 import numpy as np
 from viser import ClientHandle
 
+from warpspace.app.browser.room import Room, column_widths
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import machine_room_mm
 from warpspace.app.state.app_state import AppState
-from warpspace.app.viewport.camera import CameraMemory, heading_share
+from warpspace.app.viewport.camera import CameraMemory
 from warpspace.app.viewport.layers import SCENE_PER_MM
-from warpspace.app.viewport.layers.annotations import bar_lines
 from warpspace.app.viewport.layers.axes import axes_room_mm
 from warpspace.app.viewport.named_views import (
     TELEPHOTO_DEG,
@@ -21,10 +21,10 @@ from warpspace.app.viewport.named_views import (
 )
 from warpspace.units import Array
 
-LEFT_WIDTH, RIGHT_WIDTH = 350, 320
-"""Widths of the docked panels, which leave the rest to the drawing, CSS pixels."""
-LEAST_SIZE = 200
+LEAST_SIZE = 120
 """CSS pixels of a picture that is taken to be one."""
+MOVED = 1e-3
+"""How far from where it was put, as a part of its distance, a camera has been moved by hand."""
 
 
 def focus(state: AppState) -> tuple[Identity, bool]:
@@ -52,6 +52,8 @@ class TabCamera:
         self.wanted: CameraMemory | None = None
         self.page_width: float | None = None
         self._stand = CameraSetup()
+        self._told: Room | None = None
+        self._put: CameraMemory | None = None
 
     @property
     def stand(self) -> CameraSetup:
@@ -77,7 +79,7 @@ class TabCamera:
         orthographic = stand.orthographic if lens is None else lens
         self._stand = CameraSetup(view or stand.view, orthographic)
         if view is not None or lens is None:
-            self.fit(picture, docked=True)
+            self.fit(picture)
         elif orthographic != stand.orthographic:
             self._change_lens(picture)
 
@@ -102,50 +104,81 @@ class TabCamera:
         """Give points around all that is to be seen, mm."""
         shown = picture.state.machine.shown
         room = machine_room_mm(picture) if shown else axes_room_mm(picture)
-        bars = [bar_lines(picture)[1].reshape(-1, 3)] if picture.state.look.bars else []
-        return np.concatenate([room, picture.drawn_mm.reshape(-1, 3), *bars])
+        return np.concatenate([room, picture.drawn_mm.reshape(-1, 3)])
 
-    def place(self, picture: LivePicture, *, docked: bool) -> None:
-        """Put it where it is wanted, else where all of the box is seen.
+    @property
+    def room(self) -> Room:
+        """The room of the drawing: as the page has said, until then as its panels will leave it."""
+        if self._told is not None:
+            return self._told
+        camera = self._camera
+        width = self.page_width or camera.image_width
+        return Room(
+            max(width - sum(column_widths(width)), LEAST_SIZE),
+            max(camera.image_height, LEAST_SIZE),
+        )
+
+    def take_room(self, room: Room, picture: LivePicture) -> bool:
+        """Take note of the drawing's room; a camera that nobody has moved fills it again.
 
         Parameters
         ----------
+        room : Room
         picture : LivePicture
-        docked : bool
-            Whether the panels have taken their room already.
+            What is shown.
+
+        Returns
+        -------
+        bool
+            Whether the camera has been put elsewhere.
         """
+        self._told = room
+        if self._put is None or not _near(self._put, self.remember()):
+            return False
+        self.fit(picture)
+        return True
+
+    def place(self, picture: LivePicture) -> None:
+        """Put it where it is wanted, else where all of the box is seen."""
         memory, self.wanted = self.wanted, None
         if memory is not None:
             self.restore(memory)
         else:
-            self.fit(picture, docked=docked, page_width=self.page_width)
+            self.fit(picture)
 
-    def fit(self, picture: LivePicture, *, docked: bool, page_width: float | None = None) -> None:
-        """Fill the room between the panels with the box, its traces and axes.
-
-        Parameters
-        ----------
-        picture : LivePicture
-        docked : bool
-            Whether the panels have taken their room already, in what is known of the camera.
-        page_width : float, optional
-            Of the whole page, CSS pixels; by default that of the camera's picture if the panels
-            have not taken their room.
-        """
-        camera = self._camera
-        if docked:
-            width = camera.image_width
-        else:
-            width = (page_width or camera.image_width) - LEFT_WIDTH - RIGHT_WIDTH
-        width = max(width, LEAST_SIZE)
-        height = max(camera.image_height, LEAST_SIZE)
+    def fit(self, picture: LivePicture) -> None:
+        """Fill the room between the panels with the box, its traces and axes."""
+        camera, room = self._camera, self.room
         points = self._room_mm(picture)
-        pose = view_pose(points, width / height, self._stand, heading_share(height))
+        pose = view_pose(points, room.aspect, self._stand, room.top_share, room.bottom_share)
         self._clip(pose.position * SCENE_PER_MM, points)
         camera.up_direction = (0.0, 0.0, 1.0)
         camera.fov = pose.fov_rad
         camera.position = pose.position * SCENE_PER_MM
         camera.look_at = pose.look_at * SCENE_PER_MM
+        self._put = self.remember()
+
+    def px_per_mm(self, picture: LivePicture, height: float) -> float | None:
+        """Give how long a millimetre across the line of sight is, in the middle of the volume.
+
+        Parameters
+        ----------
+        picture : LivePicture
+        height : float
+            Of the picture as it is drawn, pixels.
+
+        Returns
+        -------
+        float or None
+            None where no scale bars are wanted, or the camera has passed the middle.
+        """
+        camera = self._camera
+        sight = camera.look_at - camera.position
+        away = picture.grid.bounds_mm.mean(axis=0) * SCENE_PER_MM - camera.position
+        depth = float(away @ sight) / float(np.linalg.norm(sight))
+        if depth <= 0.0 or not picture.state.look.bars:
+            return None
+        return height / (2.0 * float(np.tan(camera.fov / 2.0)) * depth) * SCENE_PER_MM
 
     def remember(self) -> CameraMemory:
         """Give where it stands."""
@@ -159,7 +192,7 @@ class TabCamera:
 
     def restore(self, memory: CameraMemory) -> None:
         """Put it where it stood."""
-        camera = self._camera
+        camera, self._put = self._camera, None
         camera.up_direction = memory.up
         telephoto = memory.fov_rad < np.deg2rad(2.0 * TELEPHOTO_DEG)
         self._stand = CameraSetup(self._stand.view, telephoto)
@@ -167,3 +200,11 @@ class TabCamera:
         camera.fov = memory.fov_rad
         camera.position = memory.position
         camera.look_at = memory.look_at
+
+
+def _near(a: CameraMemory, b: CameraMemory) -> bool:
+    """Tell whether a camera stands where another one does."""
+    least = MOVED * float(np.linalg.norm(np.subtract(a.position, a.look_at)))
+    moved = np.linalg.norm(np.subtract(a.position, b.position))
+    turned = np.linalg.norm(np.subtract(a.look_at, b.look_at))
+    return bool(moved <= least and turned <= least and abs(a.fov_rad - b.fov_rad) < MOVED)

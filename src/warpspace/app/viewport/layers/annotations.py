@@ -1,4 +1,4 @@
-"""What is written on the map: corner arrows, the worst point, scale bars."""
+"""What is written on the map: corner arrows and the worst point."""
 
 from typing import Any
 
@@ -7,30 +7,22 @@ from numpy.typing import NDArray
 from viser import SceneApi
 
 from warpspace.app.browser.handles import Handle
-from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.machine import machine_room_mm
 from warpspace.app.evaluation.palette import palette
-from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes
-from warpspace.app.viewport.layers.adding import add_ball, add_lines
-from warpspace.app.viewport.layers.axes import AWAY
+from warpspace.app.viewport.layers import SCENE_PER_MM
+from warpspace.app.viewport.layers.adding import add_ball
 from warpspace.geometry.arrows import build_arrows
 from warpspace.picture.marks import (
     CornerArrows,
-    ScaleBar,
     WorstPoint,
     corner_arrows,
-    scale_bars,
     spell_micrometres,
     worst_point,
 )
-from warpspace.picture.words import spell_factor
-from warpspace.units import MICROMETRE, Array
+from warpspace.units import MICROMETRE
 
 RADIUS, HEAD, BALL = 0.0032, 0.034, 0.009
 """Shaft and head of an arrow, and the marker of the worst point, as parts of the longest edge."""
-BAR_BELOW, BAR_GAP, BAR_TICK = 0.2, 0.055, 0.012
-"""Where scale bars lie below what they belong to and each other, and their end ticks, likewise."""
 CORNERS = 8
 
 
@@ -41,47 +33,8 @@ def _spell_value(value: float, unit: str) -> str:
     return f"max {value:.1f} {unit}".replace("-", "−")
 
 
-def bar_room_mm(picture: LivePicture) -> tuple[Array, float]:
-    """Give the left front lower corner that scale bars lie below, [3], and the longest edge, mm."""
-    if picture.state.machine.shown:
-        points = machine_room_mm(picture)
-        return points.min(axis=0), float(np.ptp(points, axis=0).max())
-    longest = picture.size_mm
-    return picture.grid.bounds_mm[0] - AWAY * longest * np.array([1.0, 1.0, 0.0]), longest
-
-
-def bar_lines(picture: LivePicture) -> tuple[tuple[ScaleBar, ScaleBar], Array, Array]:
-    """Lay the scale bars in front of the box, below the numbers of the X axis.
-
-    Parameters
-    ----------
-    picture : LivePicture
-
-    Returns
-    -------
-    bars : tuple of ScaleBar, (2,)
-    lines_mm : ndarray, [6, 2, 3], mm
-        Each bar with a tick at either end.
-    labels_mm : ndarray, [2, 3], mm
-        Right ends, where the lengths are written.
-    """
-    low, longest = bar_room_mm(picture)
-    bars = scale_bars(longest, picture.exaggeration)
-    tick = np.array([0.0, 0.0, BAR_TICK * longest])
-    lines: list[Array] = []
-    labels: list[Array] = []
-    for number, bar in enumerate(bars):
-        start = low - longest * np.array(
-            [0.0, number * BAR_GAP, BAR_BELOW + 0.7 * number * BAR_GAP]
-        )
-        end = start + np.array([bar.drawn_mm, 0.0, 0.0])
-        lines += [np.stack([start, end]), *(np.stack([p, p + tick]) for p in (start, end))]
-        labels.append(end + longest * np.array([0.015, 0.0, 0.0]))
-    return bars, np.stack(lines), np.stack(labels)
-
-
 class AnnotationsLayer:
-    """Arrows, marker, bars and their numbers.
+    """Arrows, marker and their numbers.
 
     Parameters
     ----------
@@ -97,18 +50,13 @@ class AnnotationsLayer:
         ]
         self._ball: Handle | None = None
         self._worst = self._label("/marks/max", "bottom-center")
-        self._bars = add_lines(scene, "/marks/bars", palette(picture).edge, 2.4)
-        self._bar_labels = [
-            self._label(f"/marks/bar{n}", "center-left", hidden=False) for n in range(2)
-        ]
-        self._bars_for: tuple[object, ...] = ()
         self.show(picture)
 
-    def _label(self, name: str, anchor: Any, *, hidden: bool = True) -> Handle:
-        """Add a label without text yet; one that the map may hide, or one always in front."""
+    def _label(self, name: str, anchor: Any) -> Handle:
+        """Add a label without text yet, which the map may hide."""
         return Handle(
             self._scene.add_label(
-                name, "", visible=False, font_screen_scale=0.8, anchor=anchor, depth_test=hidden
+                name, "", visible=False, font_screen_scale=0.8, anchor=anchor, depth_test=True
             )
         )
 
@@ -117,7 +65,6 @@ class AnnotationsLayer:
         worst = worst_point(picture.values, picture.grid.nominal_mm, picture.drawn_mm)
         self._show_arrows(picture, worst)
         self._show_worst(picture, worst)
-        self._show_bars(picture)
 
     def _show_arrows(self, picture: LivePicture, worst: WorstPoint) -> None:
         """Draw the displacement of the corners."""
@@ -177,32 +124,6 @@ class AnnotationsLayer:
             text=_spell_value(found.value, picture.scale.unit),
             position=(found.drawn_mm + 0.03 * longest * outwards) * SCENE_PER_MM,
         )
-
-    def _show_bars(self, picture: LivePicture) -> None:
-        """Draw the two lengths, where they have changed."""
-        state = picture.state
-        on = state.look.bars
-        self._bars.put(visible=on)
-        for label in self._bar_labels:
-            label.put(visible=on)
-        bars_for = (
-            Identity(picture.grid),
-            picture.exaggeration,
-            state.shown.dark,
-            Identity(state.machine),
-            Identity(state.positions),
-        )
-        if not on or bars_for == self._bars_for:
-            return
-        self._bars_for = bars_for
-        bars, lines, labels = bar_lines(picture)
-        self._bars.put(points=lines.astype(np.float32), colors=colour_bytes(palette(picture).edge))
-        texts = (
-            f"{bars[0].text} geometry",
-            f"{bars[1].text} error, drawn {spell_factor(picture.exaggeration)}",
-        )
-        for label, text, at in zip(self._bar_labels, texts, labels, strict=True):
-            label.put(text=text, position=at * SCENE_PER_MM)
 
 
 def carries_worst(

@@ -91,10 +91,9 @@ class AxesLayer:
                 at = foot + value * along
                 lines.append(np.stack([at, at + TICK * longest * out]))
                 self._label(f"{value:g}".replace("-", "−"), at + 2.4 * TICK * longest * out, 0.8)
-            # between two numbers; that of X at the end, clear of the scale bars
-            first = len(ticks) - 2 if index == 0 else len(ticks) // 2
-            between = np.mean(ticks[max(first, 0) :][:2])
-            title = foot + between * along + 6.0 * TICK * longest * out
+            # between two numbers, and further out: on a small page these stand close together
+            between = np.mean(ticks[len(ticks) // 2 :][:2])
+            title = foot + between * along + 7.0 * TICK * longest * out
             self._label(f"{'xyz'[index]} in R [mm]", title, 0.85)
         self._lines.put(points=np.stack(lines).astype(np.float32))
 
