@@ -5,7 +5,8 @@ from markupsafe import Markup
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.readouts.html import render
 from warpspace.app.readouts.summary import colour_stops
-from warpspace.picture.coordinates import spell_point, spell_short
+from warpspace.picture.coordinates import spell_point
+from warpspace.picture.words import spell_short
 
 
 def strip(picture: LivePicture) -> str:
