@@ -143,7 +143,7 @@ def draw_footer(
     canvas.text(canvas.width - margin, y, source, size=size, colour=theme.muted, ha="right")
     left = room - canvas.text_size(source, size)[0] - canvas.px(24.0)
     words = [
-        convention_words(scenes[0]),
+        " / ".join(dict.fromkeys(map(convention_words, scenes))),
         "error = actual − nominal",
         "coordinates in the machine frame R",
         *notes,
