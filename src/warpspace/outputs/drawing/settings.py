@@ -15,6 +15,7 @@ from warpspace.picture.exaggeration import Exaggeration, given_exaggeration
 from warpspace.picture.model import Picture, choose_scale
 from warpspace.picture.scene_picture import ScenePicture, evaluate_picture
 from warpspace.picture.views import VIEWS
+from warpspace.scene.concepts import ConceptPlan
 from warpspace.scene.model import Scene
 
 B_MINUS_A, A_MINUS_B = "B − A", "A − B"
@@ -45,6 +46,8 @@ class FigureSettings:
     range_top : float or None, µm or µrad
         Where the colours end (a signed component's begin at its negative); None for a round value
         that holds all of the map.
+    concepts : ConceptPlan
+        How machines are sampled that are set side by side.
 
     Raises
     ------
@@ -61,6 +64,7 @@ class FigureSettings:
     grid: int = 21
     difference: str = B_MINUS_A
     range_top: float | None = None
+    concepts: ConceptPlan = ConceptPlan()
 
     def __post_init__(self) -> None:
         """Check the values."""
