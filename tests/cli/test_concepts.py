@@ -49,9 +49,7 @@ def test_concepts_agree_with_montecarlo_and_contributions(warpspace, machines) -
         for key in ("mean_um", "p95_um", "max_um"):
             assert concept[key] == alone[key]
         assert concept["probability"] == alone["specification"]["probability"]
-        shares = json.loads(
-            warpspace("contributions", path, "--loop", "relative", "--json").out
-        )
+        shares = json.loads(warpspace("contributions", path, "--loop", "relative", "--json").out)
         leading = [(row["key"], row["share"]) for row in shares["contributions"][:3]]
         assert [(row["key"], row["share"]) for row in concept["errors"]] == leading
     # the axes of the second machine carry the table, nearer to the workpiece: shorter levers
@@ -64,9 +62,7 @@ def test_tolerances_are_those_of_the_first_scene_unless_each_has_its_own(
     text = machines[1].read_text(encoding="utf-8")
     machines[1].write_text(text.replace("translation = 10", "translation = 100"), encoding="utf-8")
     same = json.loads(warpspace("concepts", *machines, *SAMPLES, "--json").out)
-    own = json.loads(
-        warpspace("concepts", *machines, *SAMPLES, "--own-tolerances", "--json").out
-    )
+    own = json.loads(warpspace("concepts", *machines, *SAMPLES, "--own-tolerances", "--json").out)
     assert same["concepts"][0] == own["concepts"][0]
     assert own["concepts"][1]["mean_um"] > 3.0 * same["concepts"][1]["mean_um"]
     assert own["tolerances"] is None

@@ -16,7 +16,16 @@ from warpspace.scene.save import scene_to_toml
 from warpspace.scene.starter import starter_scene, starter_text
 from warpspace.scene.verbs import montecarlo
 
-CLASSIC = ["wFXYZt", "wXYFZt", "wCBFXYZt", "wBCFXYZt", "wCFXYZBt", "wFXYZCAt", "wXYZCAFt", "wYFXZWt"]
+CLASSIC = [
+    "wFXYZt",
+    "wXYFZt",
+    "wCBFXYZt",
+    "wBCFXYZt",
+    "wCFXYZBt",
+    "wFXYZCAt",
+    "wXYZCAFt",
+    "wYFXZWt",
+]
 
 
 @settings(max_examples=60)

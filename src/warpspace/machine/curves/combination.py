@@ -45,13 +45,13 @@ def combine_curves(first: ErrorFunction, second: ErrorFunction, weights: Weights
             return Constant(span, weights[0] * first.value + weights[1] * second.value)
         case Ramp(), Ramp() if first.span == second.span:
             return Ramp(span, weights[0] * first.value + weights[1] * second.value)
-        case (Constant() | Ramp() | Poly()), (Constant() | Ramp() | Poly()):
+        case ((Constant() | Ramp() | Poly()), (Constant() | Ramp() | Poly())):
             return Poly(span, _added([_coefficients(first), _coefficients(second)], weights))
-        case (Constant() | Harmonics()), (Constant() | Harmonics()):
+        case ((Constant() | Harmonics()), (Constant() | Harmonics())):
             terms = _terms(first, second, weights)
             if len(terms) <= MAX_TERMS:
                 return Harmonics(span, terms)
-        case (Constant() | Table()), (Constant() | Table()):
+        case ((Constant() | Table()), (Constant() | Table())):
             at = np.union1d(first.kinks, second.kinks)
             if len(at) <= MAX_POINTS:
                 return _table(first, second, weights, at)

@@ -1,11 +1,11 @@
 """The text of a scene to start from."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import tomli_w
 
 from warpspace.machine.axes import direction_index, is_linear
-from warpspace.machine.description import ORIGIN, Chain, parse_chain
+from warpspace.machine.description import ORIGIN, Chain, Range, parse_chain
 from warpspace.machine.parameters import ErrorKind, default_keys, parameter
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import Scene
@@ -90,7 +90,7 @@ def starter_text(chain: str | Chain, title: str = "") -> str:
         _choices(parsed),
         _workspace(sizes),
         _points(parsed, sizes),
-        _errors(parsed),
+        error_lines(parsed, sizes.travel),
         [
             "[tolerances]                            # half widths about 0, of each class",
             "default = { translation = 10, rotation = 20, squareness = 25 }  # µm, µrad, µrad",
@@ -125,7 +125,9 @@ def _offsets(chain: Chain, sizes: Layout) -> list[str]:
     before = dict.fromkeys((chain.tool or ("",))[:1] + (chain.workpiece or ("",))[:1], "R")
     for branch in (chain.tool, chain.workpiece):
         before |= dict(zip(branch[1:], branch, strict=False))
-    lines = ["[machine.offset_mm]                     # origin of each frame in the frame before it"]
+    lines = [
+        "[machine.offset_mm]                     # origin of each frame in the frame before it"
+    ]
     for frame, offset in sizes.offset_mm.items():
         if frame in remarks:
             remark = remarks[frame]
@@ -196,8 +198,19 @@ def _points(chain: Chain, sizes: Layout) -> list[str]:
     return lines
 
 
-def _errors(chain: Chain) -> list[str]:
-    """Spell example errors: a few that act, and a few to switch on."""
+def error_lines(chain: Chain, travel: Mapping[str, Range]) -> list[str]:
+    """Spell example errors of a chain: a few that act, and a few to switch on.
+
+    Parameters
+    ----------
+    chain : Chain
+    travel : mapping of str to tuple of float, (2,), mm or degrees
+
+    Returns
+    -------
+    list of str
+        The lines of the section ``[errors]``.
+    """
     given, further = _example_keys(chain)
     lines = [
         "[errors]                                # examples; what is absent is 0, # switches one off"
@@ -208,7 +221,7 @@ def _errors(chain: Chain) -> list[str]:
         lines.append(_line(key, value, f"{row.name}, {row.unit}: {why}"))
     for key in further:
         row = parameter(key)
-        low, high = layout(chain).travel[row.axis]
+        low, high = travel[row.axis]
         table = f"{{ table = [[{low:g}, 0], [{high:g}, 5]] }}"
         lines.append(f"# {_line(key, table, f'{row.name}, {row.unit}: measured points')}")
     first = chain.axes[0]
