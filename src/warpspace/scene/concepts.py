@@ -1,11 +1,11 @@
-"""Several machines side by side with the same tolerances: which concept is better?"""
+"""Several machines side by side with the same tolerances, to choose between concepts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpspace.analysis import contributions as shares
+from warpspace.analysis import contributions as variances
 from warpspace.analysis import montecarlo as sampling
 from warpspace.analysis.draws import Distribution
 from warpspace.analysis.nodes import Over
@@ -69,10 +69,10 @@ class Concept:
 
     scene: Scene
     sampled: sampling.MonteCarlo
-    shares: shares.Contributions
+    shares: variances.Contributions
 
     @property
-    def leading(self) -> tuple[shares.Contribution, ...]:
+    def leading(self) -> tuple[variances.Contribution, ...]:
         """The three errors that matter most."""
         return self.shares.rows[:NAMED]
 
@@ -121,7 +121,7 @@ def compare_concepts(
             raise SceneError(scene.name, [problem])
         parts = (scene.model, draws, scene.workspace, view, settings)
         sampled = sampling.montecarlo(*parts, progress)
-        found.append(Concept(scene, sampled, shares.variance_contributions(*parts)))
+        found.append(Concept(scene, sampled, variances.variance_contributions(*parts)))
     return tuple(found)
 
 

@@ -1,7 +1,7 @@
 """What a figure is asked for."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from warpspace.exceptions import OptionError
@@ -64,7 +64,7 @@ class FigureSettings:
     grid: int = 21
     difference: str = B_MINUS_A
     range_top: float | None = None
-    concepts: ConceptPlan = ConceptPlan()
+    concepts: ConceptPlan = field(default_factory=ConceptPlan)
 
     def __post_init__(self) -> None:
         """Check the values."""

@@ -7,7 +7,7 @@ from warpspace.machine.axes import direction_index, is_linear
 from warpspace.machine.description import ORIGIN, Chain, Range, Vector
 
 TRAVEL: Mapping[int, Range] = {0: (-300.0, 300.0), 1: (-250.0, 250.0), 2: (-400.0, 0.0)}
-"""Of the first linear axis along x, y and z, mm: the tool reaches the table at the lower end of z."""
+"""Of the first linear axis along x, y and z, mm: the tool touches the table at the end of z."""
 SECOND_TRAVEL = (-100.0, 100.0)
 """Of a further linear axis along a direction, mm."""
 TILT_TRAVEL, TURN_TRAVEL, ARM_TRAVEL = (-90.0, 90.0), (0.0, 360.0), (-150.0, 150.0)

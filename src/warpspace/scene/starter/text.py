@@ -74,8 +74,8 @@ def starter_text(chain: str | Chain, title: str = "") -> str:
     spelled = tomli_w.dumps({"title": name}).strip()
     parts = [
         [
-            "# A machine to start from. Lengths mm, errors µm, small angles µrad, rotary positions"
-            " degrees.",
+            "# A machine to start from. Lengths in mm, errors in µm, small angles in µrad, rotary",
+            "# positions in degrees.",
             "# Change what is not yours; `warpspace check FILE` names whatever does not fit.",
             spelled,
         ],
@@ -213,7 +213,7 @@ def error_lines(chain: Chain, travel: Mapping[str, Range]) -> list[str]:
     """
     given, further = _example_keys(chain)
     lines = [
-        "[errors]                                # examples; what is absent is 0, # switches one off"
+        "[errors]                                # examples; what is absent is 0, # takes one out"
     ]
     for key, kind in given:
         value, why = EXAMPLES[kind]

@@ -186,7 +186,9 @@ def _check_joints(joints: Sequence[Any], source: str) -> None:
 def _finite_direction(joint: Any) -> bool:
     """Tell whether the axis of a joint is a direction."""
     axis = np.asarray(joint.axis, dtype=float)
-    return axis.shape == (3,) and bool(np.isfinite(axis).all()) and np.linalg.norm(axis) > PARALLEL
+    if axis.shape != (3,) or not np.isfinite(axis).all():
+        return False
+    return bool(np.linalg.norm(axis) > PARALLEL)
 
 
 def _stands(joint: Any) -> bool:
@@ -218,7 +220,7 @@ def _direction(joint: Any, pose: Array) -> Array:
 
 
 def _axis_names(joints: Sequence[Any], directions: dict[str, Array]) -> dict[str, str]:
-    """Name the axes: as their joints where that fits, else by direction, with digits if repeated."""
+    """Name the axes: as their joints where that fits, else by direction, repeated with digits."""
     letters = {
         joint.name: ("XYZ" if joint.type == "prismatic" else "ABC")[
             int(np.argmax(np.abs(directions[joint.name])))

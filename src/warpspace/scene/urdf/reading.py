@@ -53,7 +53,7 @@ def _check_xml(text: str, source: str) -> tuple[str, ...]:
         Names of the elements beside links, joints and materials.
     """
     try:
-        from lxml import etree
+        from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
     except ImportError:
         raise _not_installed() from None
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
@@ -99,7 +99,8 @@ def _parse(text: str, source: str) -> Any:
 def _not_installed() -> OptionError:
     """Say what is missing."""
     return OptionError(
-        "URDF files need the package yourdfpy; expected it installed (pip install 'warpspace[urdf]')"
+        "URDF files need the package yourdfpy; expected it installed"
+        " (pip install 'warpspace[urdf]')"
     )
 
 

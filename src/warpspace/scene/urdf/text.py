@@ -62,7 +62,7 @@ def _plain(text: str) -> str:
 
 
 def _ranges(machine: Machine) -> dict[str, Range]:
-    """Choose the working volume: linear axes by direction, else the first rotary ones of the tool."""
+    """Choose the working volume: linear axes by direction, else rotary ones of the tool side."""
     taken: set[int] = set()
     found: dict[str, Range] = {}
     for name, axis in machine.axes.items():
