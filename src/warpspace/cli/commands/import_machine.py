@@ -46,7 +46,7 @@ def import_machine(robot: Path, output: str, tool: str, workpiece: str, *, force
     for file in files.values():
         check_target(file, overwrite=force, inputs=read)
     notes = [*found.notes, *unread, *left_out(loaded, others, found.frame_of)]
-    sections: tuple[str, ...] = SECTIONS
+    sections: frozenset[str] = frozenset(SECTIONS)
     names = {frame: file.name for frame, file in files.items() if "bodies" in sections}
     text = imported_text(found.machine, robot.name, notes, names)
     scene = parse_scene(text, target.stem, output)

@@ -29,8 +29,8 @@ from warpspace.units import Array
 
 LETTERS = "ABCDEFGH"
 BODY_ALPHA = 0.55
-CELL_HEAD, CELL_FOOT = 30.0, 74.0
-"""Room in px above a picture for its title, and below it for its numbers."""
+CELL_HEAD, CELL_FOOT, AXIS_LABELS = 30.0, 74.0, 50.0
+"""Room in px above a picture for its title, below it for its numbers, and for labels of axes."""
 
 
 def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
@@ -70,11 +70,7 @@ def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: b
     sheet = start_sheet(settings, title, facts, drawn, legend, exact=exact, errors=False)
     canvas = sheet.canvas
     cells = _cells(sheet.content, len(pictures))
-    rooms = [
-        (c[0] + canvas.px(8.0), c[1] + canvas.px(CELL_FOOT), c[2] - canvas.px(8.0),
-         c[3] - canvas.px(CELL_HEAD))
-        for c in cells
-    ]  # fmt: skip
+    rooms = [_room(canvas, cell) for cell in cells]
     seen = [_points_mm(*pair) for pair in zip(pictures, placed, strict=True)]
     factor = min(
         fit_projection(settings.view, points, room).px_per_mm
@@ -121,6 +117,15 @@ def _cells(rect: Rect, count: int) -> list[Rect]:
         (left + c * width, top - (r + 1) * height, left + (c + 1) * width, top - r * height)
         for r, c in (divmod(index, columns) for index in range(count))
     ]
+
+
+def _room(canvas: Canvas, cell: Rect) -> Rect:
+    """Leave room in a cell for title, numbers and the labels of axes."""
+    left, bottom, right, top = cell
+    side = min(canvas.px(AXIS_LABELS), 0.15 * (right - left))
+    foot = min(canvas.px(CELL_FOOT + AXIS_LABELS), 0.45 * (top - bottom))
+    head = min(canvas.px(CELL_HEAD), 0.15 * (top - bottom))
+    return (left + side, bottom + foot, right - side, top - head)
 
 
 def _points_mm(picture: ConceptPicture, placed: Sequence[PlacedBody]) -> Array:
