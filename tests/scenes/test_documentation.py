@@ -50,7 +50,7 @@ def test_readme_names_every_command():
 
     page = (ROOT / "README.md").read_text("utf-8")
     table = page[page.index("| command") : page.index("Shell completion")]
-    assert set(re.findall(r"`(\w+)`", re.sub(r"\|[^|]*\|\n", "|\n", table))) == set(cli.commands)
+    assert set(re.findall(r"`([\w-]+)`", re.sub(r"\|[^|]*\|\n", "|\n", table))) == set(cli.commands)
 
 
 def test_every_picture_that_is_linked_exists_and_every_other_picture_is_linked():

@@ -13,6 +13,7 @@ from warpspace.machine.axes import (
     is_linear,
     sort_axes,
 )
+from warpspace.machine.gantry import Gantry, default_across
 from warpspace.machine.parameters import axis_parameters, default_keys
 
 Vector = tuple[float, float, float]
@@ -162,6 +163,8 @@ class Machine:
         Short name and full name.
     body_dir : str
         Folder with the schematic bodies, empty where there are none.
+    gantries : mapping of str to Gantry
+        Linear axes that stand on two guides.
     """
 
     chain: Chain
@@ -171,6 +174,7 @@ class Machine:
     title: str = ""
     body_dir: str = ""
     fixed_deg: Mapping[str, Vector] = field(default_factory=dict[str, Vector])
+    gantries: Mapping[str, Gantry] = field(default_factory=dict[str, Gantry])
 
     def axis(self, name: str) -> Axis:
         """Look up an axis by its name.
@@ -237,6 +241,7 @@ def build_machine(
     rotation_deg: Mapping[str, Vector] | None = None,
     travel: Mapping[str, Range] | None = None,
     direction: Mapping[str, int] | None = None,
+    gantry: Mapping[str, tuple[float, str | None]] | None = None,
     name: str = "machine",
     title: str = "",
     body_dir: str = "",
@@ -256,6 +261,9 @@ def build_machine(
         Lower and upper end of each axis, mm or degrees.
     direction : mapping of str to int, optional
         +1 or −1; absent is +1.
+    gantry : mapping of str to (float, str or None), optional
+        Linear axes on two guides: distance of the guides in mm, and the direction "x", "y" or "z"
+        in which they lie apart (None for the other horizontal one).
     name, title, body_dir : str, optional
         Short name, full name, folder of the schematic bodies.
 
@@ -283,4 +291,8 @@ def build_machine(
     }
     fixed = {frame: offsets.get(frame, ORIGIN) for frame in FIXED_FRAMES}
     turned = {frame: rotations[frame] for frame in FIXED_FRAMES if frame in rotations}
-    return Machine(parsed, axes, fixed, name, title or name, body_dir, turned)
+    gantries = {
+        axis: Gantry(axis, span_mm, across or default_across(axis))
+        for axis, (span_mm, across) in (gantry or {}).items()
+    }
+    return Machine(parsed, axes, fixed, name, title or name, body_dir, turned, gantries)

@@ -15,6 +15,7 @@ from warpspace.machine.parameters import PARAMETERS, ErrorKind
 from warpspace.machine.tolerances import TOLERANCE_CLASSES, Tolerance, ToleranceSet
 from warpspace.scene.conventions import component_orders
 from warpspace.scene.curves import read_curve
+from warpspace.scene.guides import is_guides, read_guides
 from warpspace.scene.model import Scene
 from warpspace.scene.sections import Problems
 from warpspace.scene.volume import read_workspace
@@ -155,17 +156,22 @@ def _errors(
         where, row = f"errors.{key}", PARAMETERS[key]
         low, high = workspace.ranges[row.axis]
         span = (low, high) if low < high else machine.axes[row.axis].travel
-        function = read_curve(value, span, where, folder, problems, constant=row.is_constant)
-        if function is None:
-            continue
-        peak = function.amplitude
-        if machine is not STAND_IN and not abs(peak) <= MAX_ERROR:
-            problems.add(
-                where,
-                f"reaches {peak:g} {row.unit} within {span[0]:g} … {span[1]:g};"
-                f" expected at most ±{MAX_ERROR:g}",
-            )
-        found[key] = function
+        if is_guides(value):
+            given = {name for name in problems.table("", raw) if name != key}
+            curves = read_guides(key, value, span, where, folder, problems, machine, given)
+        else:
+            curve = read_curve(value, span, where, folder, problems, constant=row.is_constant)
+            curves = {} if curve is None else {key: curve}
+        for name, function in curves.items():
+            peak = function.amplitude
+            if machine is not STAND_IN and not abs(peak) <= MAX_ERROR:
+                which = "" if name == key else f"gives {name}, which "
+                problems.add(
+                    where,
+                    f"{which}reaches {peak:g} {PARAMETERS[name].unit} within {span[0]:g} …"
+                    f" {span[1]:g}; expected at most ±{MAX_ERROR:g}",
+                )
+        found |= curves
     return ErrorSet(found)
 
 

@@ -1,10 +1,14 @@
 """Machines: bundled by name, or built from the table of a scene."""
 
+from collections.abc import Mapping, Sequence
+
 from warpspace.exceptions import ChainError, SceneError, UnknownNameError
+from warpspace.machine.axes import direction_index, is_linear
 from warpspace.machine.description import FIXED_FRAMES, Machine, build_machine, parse_chain
 from warpspace.machine.limits import MAX_SCENE_BYTES
 from warpspace.resources import assets_dir
 from warpspace.scene.files import parse_toml, read_text
+from warpspace.scene.schema import GantrySection
 from warpspace.scene.sections import Problems
 
 
@@ -82,17 +86,40 @@ def machine_of(
         ("rotation_deg", (*chain.axes, *FIXED_FRAMES)),
         ("travel", chain.axes),
         ("direction", chain.axes),
+        ("gantry", chain.axes),
     ):
         for axis in getattr(section, part):
             if axis not in known:
                 problems.unknown(f"{prefix}{part}", axis, known, "frame of this machine")
+    gantry = _gantries(section.gantry, chain.axes, f"{prefix}gantry", problems)
     return build_machine(
         chain,
         offset_mm=section.offset_mm,
         rotation_deg=section.rotation_deg,
         travel=section.travel,
         direction=section.direction,
+        gantry=gantry,
         name=name,
         title=section.title or name,
         body_dir=body_dir,
     )
+
+
+def _gantries(
+    section: Mapping[str, GantrySection], axes: Sequence[str], key: str, problems: Problems
+) -> dict[str, tuple[float, str | None]]:
+    """Read which axes stand on two guides; those that cannot are noted and left out."""
+    found: dict[str, tuple[float, str | None]] = {}
+    for axis, given in section.items():
+        if axis not in axes:  # noted already
+            continue
+        own = "xyz"[direction_index(axis)]
+        if not is_linear(axis):
+            problems.add(f"{key}.{axis}", "expected a linear axis: a rotary one has no guides")
+        elif given.across == own:
+            others = " or ".join(f'"{name}"' for name in "xyz" if name != own)
+            expected = f"is the direction of the axis itself; expected {others}"
+            problems.add(f"{key}.{axis}.across", expected, given.across)
+        else:
+            found[axis] = (given.span_mm, given.across)
+    return found

@@ -90,12 +90,17 @@ def _machine_sections(machine: Machine) -> list[str]:
         if axis.travel != default_travel(name)
     }
     direction = {name: axis.direction for name, axis in machine.axes.items() if axis.direction != 1}
+    gantry = {
+        name: {"span_mm": one.span_mm, "across": one.across}
+        for name, one in machine.gantries.items()
+    }
     return [
         _section("machine", {"title": machine.title, "chain": str(machine.chain)}),
         _section("machine.offset_mm", {k: v for k, v in offsets.items() if v != ORIGIN}),
         _section("machine.rotation_deg", {k: v for k, v in turned.items() if v != ORIGIN}),
         _section("machine.travel", travel),
         _section("machine.direction", direction),
+        _section("machine.gantry", gantry),
     ]
 
 

@@ -20,6 +20,7 @@ from warpspace.kinematics.conventions.registry import convention_names
 from warpspace.machine.limits import (
     EXAGGERATION,
     FULL_TURN_DEG,
+    GANTRY_SPAN_MM,
     MAX_ERROR,
     MAX_LENGTH_MM,
     MAX_TEXT,
@@ -113,6 +114,13 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+class GantrySection(Section):
+    """An axis on two guides."""
+
+    span_mm: Annotated[Finite, Field(ge=GANTRY_SPAN_MM[0], le=GANTRY_SPAN_MM[1])]
+    across: Literal["x", "y", "z"] | None = None
+
+
 class MachineSection(Section):
     """A machine, inline in a scene or in a file of its own."""
 
@@ -123,6 +131,7 @@ class MachineSection(Section):
     rotation_deg: dict[str, Turn] = {}
     travel: dict[str, Span] = {}
     direction: dict[str, Annotated[Literal[1, -1], BeforeValidator(_whole_number)]] = {}
+    gantry: dict[str, GantrySection] = {}
 
 
 class ConventionSection(Section):

@@ -119,6 +119,7 @@ def with_own_conventions(state: AppState) -> AppState:
     model = replace(
         state.scene.model,
         component_errors=own.model.component_errors,
+        own_component_errors=own.model.own_component_errors,
         machine=replace(state.scene.machine, axes=axes),
     )
     return _with_scene(state, replace(state.scene, model=model, reference=own.reference))
