@@ -13,6 +13,7 @@ from warpspace.machine.axes import (
     is_linear,
     sort_axes,
 )
+from warpspace.machine.body_source import BodySource
 from warpspace.machine.parameters import axis_parameters, default_keys
 
 Vector = tuple[float, float, float]
@@ -158,6 +159,10 @@ class Machine:
         end of the workpiece branch, each in the frame before it, mm.
     fixed_deg : mapping of str to tuple of float, (3,)
         Their fixed rotations, degrees, as those of axes.
+    bodies : mapping of str to BodySource
+        Bodies of frames that the description gives; all others are generated.
+    source : str
+        Where its structure is published.
     name, title : str
         Short name and full name.
     body_dir : str
@@ -171,6 +176,8 @@ class Machine:
     title: str = ""
     body_dir: str = ""
     fixed_deg: Mapping[str, Vector] = field(default_factory=dict[str, Vector])
+    bodies: Mapping[str, BodySource] = field(default_factory=dict[str, BodySource])
+    source: str = ""
 
     def axis(self, name: str) -> Axis:
         """Look up an axis by its name.
@@ -240,6 +247,7 @@ def build_machine(
     name: str = "machine",
     title: str = "",
     body_dir: str = "",
+    source: str = "",
 ) -> Machine:
     """Put a machine together from its chain and the tables that go with it.
 
@@ -256,8 +264,8 @@ def build_machine(
         Lower and upper end of each axis, mm or degrees.
     direction : mapping of str to int, optional
         +1 or −1; absent is +1.
-    name, title, body_dir : str, optional
-        Short name, full name, folder of the schematic bodies.
+    name, title, body_dir, source : str, optional
+        Short name, full name, folder of the schematic bodies, where its structure is published.
 
     Returns
     -------
@@ -283,4 +291,4 @@ def build_machine(
     }
     fixed = {frame: offsets.get(frame, ORIGIN) for frame in FIXED_FRAMES}
     turned = {frame: rotations[frame] for frame in FIXED_FRAMES if frame in rotations}
-    return Machine(parsed, axes, fixed, name, title or name, body_dir, turned)
+    return Machine(parsed, axes, fixed, name, title or name, body_dir, turned, source=source)

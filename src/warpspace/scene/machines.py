@@ -1,9 +1,13 @@
 """Machines: bundled by name, or built from the table of a scene."""
 
+from dataclasses import replace
+from pathlib import Path
+
 from warpspace.exceptions import ChainError, SceneError, UnknownNameError
 from warpspace.machine.description import FIXED_FRAMES, Machine, build_machine, parse_chain
 from warpspace.machine.limits import MAX_SCENE_BYTES
 from warpspace.resources import assets_dir
+from warpspace.scene.bodies import read_bodies
 from warpspace.scene.files import parse_toml, read_text
 from warpspace.scene.sections import Problems
 
@@ -38,14 +42,19 @@ def load_machine(name: str) -> Machine:
     path = folder / "machine.toml"
     raw = parse_toml(read_text(path, MAX_SCENE_BYTES), str(path))
     problems = Problems()
-    machine = machine_of(raw, "", name, problems, body_dir=str(folder))
+    machine = machine_of(raw, "", name, problems, body_dir=str(folder), folder=folder)
     if machine is None or problems.lines:
         raise SceneError(str(path), problems.lines)
     return machine
 
 
 def machine_of(
-    raw: object, key: str, name: str, problems: Problems, body_dir: str = ""
+    raw: object,
+    key: str,
+    name: str,
+    problems: Problems,
+    body_dir: str = "",
+    folder: Path | None = None,
 ) -> Machine | None:
     """Build a machine from its table; note problems and give None where it cannot be.
 
@@ -60,6 +69,8 @@ def machine_of(
     problems : Problems
     body_dir : str, optional
         Folder of the machine's schematic bodies.
+    folder : Path, optional
+        Folder that the names of its meshes are relative to.
     """
     expected = 'expected a machine name or a [machine] table with "chain"'
     if raw is None:
@@ -86,7 +97,7 @@ def machine_of(
         for axis in getattr(section, part):
             if axis not in known:
                 problems.unknown(f"{prefix}{part}", axis, known, "frame of this machine")
-    return build_machine(
+    machine = build_machine(
         chain,
         offset_mm=section.offset_mm,
         rotation_deg=section.rotation_deg,
@@ -95,4 +106,8 @@ def machine_of(
         name=name,
         title=section.title or name,
         body_dir=body_dir,
+        source=section.source,
     )
+    if not section.bodies:
+        return machine
+    return replace(machine, bodies=read_bodies(section.bodies, machine, folder, problems))

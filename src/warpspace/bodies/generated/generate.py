@@ -10,6 +10,7 @@ from warpspace.bodies.generated.overhead import build_overhead
 from warpspace.bodies.generated.parts import Parts
 from warpspace.bodies.generated.table import build_table
 from warpspace.bodies.mesh import Body
+from warpspace.machine.body_source import TOOL_SHAPES
 from warpspace.machine.description import Axis, Machine, Vector
 
 _LYING = 0.7
@@ -17,14 +18,12 @@ _LYING = 0.7
 _Key = tuple[str, tuple[Axis, ...], tuple[tuple[str, Vector], ...], tuple[tuple[str, Vector], ...]]
 
 
-def generate_bodies(machine: Machine, tool: str = "cutter") -> tuple[Body, ...]:
+def generate_bodies(machine: Machine) -> tuple[Body, ...]:
     """Generate the schematic bodies of a machine from its chain, offsets and travels.
 
     Parameters
     ----------
     machine : Machine
-    tool : str, optional
-        What is drawn as its tool: one of `warpspace.bodies.generated.head.TOOLS`.
 
     Returns
     -------
@@ -37,7 +36,8 @@ def generate_bodies(machine: Machine, tool: str = "cutter") -> tuple[Body, ...]:
         tuple(sorted(machine.fixed_mm.items())),
         tuple(sorted(machine.fixed_deg.items())),
     )
-    return _generate(key, tool)
+    source = machine.bodies.get("t")
+    return _generate(key, (source.shape if source else "") or TOOL_SHAPES[0])
 
 
 @lru_cache(maxsize=32)

@@ -14,7 +14,6 @@ from warpspace.bodies.schematic import Shape, box, cone, cylinder
 from warpspace.machine.description import Axis
 from warpspace.units import Array
 
-TOOLS = ("cutter", "probe", "nozzle", "wheel", "gripper")
 BASE = "R"
 _COAXIAL, _ACROSS = 0.96, 0.45
 """Cosines between axis and tool: along it above the one, across it below the other."""
