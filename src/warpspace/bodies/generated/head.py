@@ -15,6 +15,7 @@ from warpspace.machine.description import Axis
 from warpspace.units import Array
 
 BASE = "R"
+_LIGHT_TOOLS = ("probe", "nozzle", "gripper")
 _COAXIAL, _ACROSS = 0.96, 0.45
 """Cosines between axis and tool: along it above the one, across it below the other."""
 
@@ -84,7 +85,7 @@ class _Head:
         carrier = inner[-1].name if inner else BASE
         length = self._tool_length()
         self._add_tool(length)
-        width, u = 1.15 * self.u, self.u
+        width, u = (0.8 if self.tool in _LIGHT_TOOLS else 1.15) * self.u, self.u
         top = length + 1.65 * u
         tilts = [axis for axis in axes if abs(self.line(axis)[0][2]) < _COAXIAL]
         self.spindle_from = length
@@ -189,7 +190,7 @@ class _Head:
         u = self.u
         cut = min(nose + 0.75 * u, (nose + top) / 2.0)
         at = (float(self.centre[0]), float(self.centre[1]))
-        slim = 0.5 if self.tool in ("probe", "nozzle", "gripper") else 1.0
+        slim = 0.5 if self.tool in _LIGHT_TOOLS else 1.0
         nose_cone = cone(0.52 * slim * u, 0.78 * slim * u, (nose, cut))
         nose_cone.apply_translation([*at, 0.0])
         self.add("S", "spindle", METAL, nose_cone, cylinder(1.0 * slim * u, (cut, top), at))

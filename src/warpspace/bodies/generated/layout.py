@@ -17,6 +17,8 @@ UP = np.array([0.0, 0.0, 1.0])
 _SHARE_OF_VOLUME, _SMALLEST_MM = 0.2, 12.0
 _FLAT = 0.3
 """Of the longest half edge: what a volume is taken to have where no axis moves."""
+_ARMS = 0.4
+"""Of the length of all arms: half edge of the place before a robot without level axes."""
 _STEEP = 0.75
 """Cosine of an angle to a direction below which an axis counts as pointing along it."""
 
@@ -109,6 +111,23 @@ def build_layout(machine: Machine) -> Layout:
     reach = max(half.max(), 0.8 * sum(arms) if np.count_nonzero(half > 1.0) < 3 else 0.0)
     if reach < 1.0:
         reach = max(200.0, 0.3 * float(max(lengths, default=0.0)))
-    half = np.maximum(half, _FLAT * reach)
-    unit = max(_SHARE_OF_VOLUME * 2.0 * float(half.mean()), _SMALLEST_MM)
-    return Layout(machine, poses, half, unit)
+    filled = np.maximum(half, _FLAT * reach)
+    unit = max(_SHARE_OF_VOLUME * 2.0 * float(filled.mean()), _SMALLEST_MM)
+    return Layout(machine, poses, _turned(machine, poses, half, filled), unit)
+
+
+def _turned(machine: Machine, poses: dict[str, Array], half: Array, filled: Array) -> Array:
+    """Make room for a volume that an upright rotary axis spans where a level one is missing."""
+    flat = [k for k in (0, 1) if half[k] < 1.0]
+    upright = [
+        axis
+        for axis in machine.axes.values()
+        if not axis.is_linear and abs(poses[axis.name][2, axis.index]) > _STEEP
+    ]
+    if not flat or not upright:
+        return filled
+    arms = sum(float(np.hypot(*axis.offset_mm[:2])) for axis in machine.axes.values())
+    wide = float(half[:2].max()) if len(flat) == 1 else max(_ARMS * arms, float(filled[:2].max()))
+    room = filled.copy()
+    room[flat] = wide
+    return room

@@ -10,13 +10,15 @@ import numpy as np
 
 from warpspace.bodies.generated.head import BASE, Mount, head_axes
 from warpspace.bodies.generated.layout import Layout
-from warpspace.bodies.generated.parts import Parts, rod, spread, upright
+from warpspace.bodies.generated.parts import Parts, capped, rod, spread, upright
 from warpspace.bodies.generated.table import Stack
 from warpspace.bodies.mesh import DARK, LIGHT, METAL, MIDDLE
 from warpspace.bodies.schematic import Range
 from warpspace.machine.description import Axis
 from warpspace.units import Array
 
+_ARM = 0.9
+"""Thickness of an arm, in walls."""
 _LONG = 1.5
 """Ratio of travels from which a machine is a gantry on rails instead of a saddle on a wall."""
 
@@ -110,9 +112,10 @@ class _Overhead:
         u, reach = self.u, self.layout.half_travel_mm(axis)
         name, w = axis.name, self.mount.half_mm
         if rear is None and rest and not rest[0].is_linear:
-            long = top + 2.0 * reach + 2.4 * u
-            self.parts.add(name, "quill", METAL, upright(0.5 * u, (top, long), at))
-            return None, top + reach + 0.2 * u
+            arms = sum(not turning.is_linear for turning in rest)
+            first = top + reach + 0.2 * u + (arms - 1) * _ARM * u
+            self.parts.add(name, "quill", METAL, upright(0.4 * u, (top, first + reach + 1.6 * u), at))
+            return None, first
         if rear is None and any(a.is_linear and not self.layout.is_vertical(a) for a in rest):
             low, high = top + 0.5 * u, top + 1.7 * reach + 1.5 * u
             front = float(self.spine[self.j])
@@ -254,33 +257,27 @@ class _Overhead:
             hub = np.array([at[0], at[1], top + 1.2 * u])
             self.parts.add(axis.name, "hub", DARK, rod(hub - 1.4 * u * out, hub + 1.4 * u * out, 1.2 * u))
             return at, top + 2.4 * u
-        thick, span = 0.9 * u, float(np.hypot(*(line[:2] - at[:2])))
-        ends = (top, top + thick)
+        thick, span = _ARM * u, float(np.hypot(*(line[:2] - at[:2])))
+        ends = (top + 0.06 * u, top + thick)
         wide = 0.95 * u
         self.parts.add(axis.name, "arm", LIGHT, upright(wide, ends, at), upright(1.15 * wide, ends, line))
         if span > 0.5 * u:
             start = np.array([line[0], line[1], top + thick / 2.0])
             end = np.array([at[0], at[1], top + thick / 2.0])
             self.parts.add(axis.name, "arm", LIGHT, _slab(start, end, wide, 0.42 * thick))
-        # the arm before this one lies above it and reaches down onto its joint
-        self.parts.add(axis.name, "arm", LIGHT, upright(0.75 * wide, (top + thick, top + thick + 0.12 * u), line))
-        return line.copy(), top + thick + 0.12 * u
+        # the arm before this one lies below it
+        self.parts.add(axis.name, "arm", LIGHT, upright(0.75 * wide, (top, top + 0.06 * u), line))
+        return line.copy(), top - thick
 
     def _add_pedestal(self, at: Array, top: float) -> None:
-        """Add the pillar that the first arm hangs from, and its arm over the joint."""
-        u, bed = self.u, self.stack.bed_mm
-        self.parts.add(BASE, "pillar", MIDDLE, upright(1.0 * u, (top, top + 0.5 * u), at))
-        toward = at[:2] - self.layout.tip_mm[:2]
-        size = float(np.hypot(*toward))
-        away = toward / size if size > 1.0 else np.array([0.0, 1.0])
-        back = np.array([*(at[:2] + 2.6 * u * away), 0.0])
-        start, end = np.array([*at[:2], top + 0.8 * u]), np.array([*back[:2], top + 0.8 * u])
+        """Add the pedestal that the first arm turns on."""
+        u, bed, under = self.u, self.stack.bed_mm, top + _ARM * self.u
         self.parts.add(
-            BASE, "pillar", MIDDLE, _slab(start, end, 1.0 * u, 0.3 * u),
-            upright(1.0 * u, (top + 0.5 * u, top + 1.1 * u), at),
-            upright(1.0 * u, (bed, top + 1.1 * u), back), upright(1.6 * u, (bed, bed + 0.3 * u), back),
+            BASE, "pedestal", MIDDLE,
+            upright(1.15 * u, capped(bed + 0.4 * u, under), at),
+            spread({k: (float(at[k]) - 1.7 * u, float(at[k]) + 1.7 * u) for k in (0, 1)} | {2: (bed, bed + 0.4 * u)}),
         )  # fmt: skip
-        self.parts.stand(*((float(v) - 1.7 * u, float(v) + 1.7 * u) for v in back[:2]))
+        self.parts.stand(*((float(v) - 1.7 * u, float(v) + 1.7 * u) for v in at[:2]))
 
     # --- the bed side ---------------------------------------------------------------------------
 
