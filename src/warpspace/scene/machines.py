@@ -17,6 +17,12 @@ def machine_names() -> tuple[str, ...]:
     return tuple(sorted(path.parent.name for path in assets_dir().glob("machines/*/machine.toml")))
 
 
+def machine_picture(name: str) -> Path | None:
+    """Give the picture of a bundled machine; None where it has none."""
+    path = assets_dir() / "machines" / name / "picture.png"
+    return path if path.is_file() else None
+
+
 def load_machine(name: str) -> Machine:
     """Load a bundled machine.
 

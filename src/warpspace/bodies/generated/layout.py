@@ -77,8 +77,8 @@ class Layout:
         return self.poses[axis.name][:3, 3]
 
     def along(self, axis: Axis) -> int:
-        """Give the index of the axis of R that an axis is nearest to."""
-        return int(np.argmax(np.abs(self.direction(axis))))
+        """Give the index of the axis of R that an axis is nearest to; 0 or 1 unless it is vertical."""
+        return 2 if self.is_vertical(axis) else int(np.argmax(np.abs(self.direction(axis)[:2])))
 
     def is_vertical(self, axis: Axis) -> bool:
         """Tell whether an axis points up or down at home."""

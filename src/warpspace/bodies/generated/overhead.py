@@ -55,6 +55,7 @@ class _Overhead:
     def __init__(self, layout: Layout, parts: Parts, mount: Mount, stack: Stack) -> None:
         self.layout, self.parts, self.stack, self.mount = layout, parts, stack, mount
         self.u = layout.unit_mm
+        self.arm_step = _ARM * self.u
         carried = len(head_axes(layout))
         branch = layout.machine.branch("tool")
         self.axes = list(reversed(branch[: len(branch) - carried]))
@@ -90,6 +91,8 @@ class _Overhead:
         for place, axis in enumerate(self.axes):
             rest = self.axes[place + 1 :]
             if not axis.is_linear:
+                if rear is not None:
+                    at[self.j], top, rear = rear.plane, rear.high, None
                 at, top = self._add_turning(axis, at, top)
             elif self.layout.is_vertical(axis):
                 rear, top = self._add_vertical(axis, rear, rest, at, top)
@@ -114,6 +117,7 @@ class _Overhead:
         if rear is None and rest and not rest[0].is_linear:
             arms = sum(not turning.is_linear for turning in rest)
             first = top + reach + 0.2 * u + (arms - 1) * _ARM * u
+            self.arm_step = -_ARM * u
             self.parts.add(name, "quill", METAL, upright(0.4 * u, (top, first + reach + 1.6 * u), at))
             return None, first
         if rear is None and any(a.is_linear and not self.layout.is_vertical(a) for a in rest):
@@ -217,6 +221,7 @@ class _Overhead:
     def _add_beam(self, name: str, rear: _Rear, what: str, colour: tuple[int, int, int]) -> None:
         """Add a beam across behind a carriage, with its two rails."""
         u = self.u
+        rear.low = max(rear.low, float(self.high[2]) + self.layout.gap_mm)
         half = max(rear.half + rear.reach + 0.3 * u, self._clear_half() + 0.2 * u)
         i, front = self.around(half), rear.plane + 0.18 * u
         high = max(rear.low + 2.6 * u, min(rear.high, rear.low + 3.6 * u))
@@ -267,11 +272,24 @@ class _Overhead:
             self.parts.add(axis.name, "arm", LIGHT, _slab(start, end, wide, 0.42 * thick))
         # the arm before this one lies below it
         self.parts.add(axis.name, "arm", LIGHT, upright(0.75 * wide, (top, top + 0.06 * u), line))
-        return line.copy(), top - thick
+        return line.copy(), top + self.arm_step
 
     def _add_pedestal(self, at: Array, top: float) -> None:
         """Add the pedestal that the first arm turns on."""
-        u, bed, under = self.u, self.stack.bed_mm, top + _ARM * self.u
+        u, bed = self.u, self.stack.bed_mm
+        under = top + _ARM * u if self.arm_step < 0.0 else top
+        if (np.abs(at[:2] - self.layout.tip_mm[:2]) < self.layout.half_mm[:2] + 1.8 * u).all():
+            back = np.array([*at[:2], under])
+            back[self.j] = self._behind(0.0) + 1.8 * u
+            front = np.array([*at[:2], under])
+            lift = np.array([0.0, 0.0, 0.4 * u if self.arm_step > 0.0 else -0.4 * u])
+            if self.arm_step < 0.0:  # a shoulder below would cut the volume
+                lift = -lift + np.array([0.0, 0.0, _ARM * u])
+            self.parts.add(
+                BASE, "pedestal", MIDDLE, _slab(front + lift, back + lift, 1.0 * u, 0.35 * u),
+                upright(1.0 * u, (float(under), float(under + lift[2] + 0.35 * u)), front),
+            )  # fmt: skip
+            at, under = back, float(under + lift[2] + 0.35 * u)
         self.parts.add(
             BASE, "pedestal", MIDDLE,
             upright(1.15 * u, capped(bed + 0.4 * u, under), at),
@@ -345,6 +363,7 @@ class _Overhead:
         """Add a column with the two guides on its face."""
         u, bed = self.u, self.stack.bed_mm
         low = bed + (0.9 * u if foot else 0.0)
+        rear.plane = max(rear.plane, self._behind(0.0))
         i, j = self.around(1.15 * rear.half), (rear.plane, rear.plane + max(2.0 * u, 1.3 * rear.half))
         self.parts.add(name, "column", LIGHT, self.b(i, j, (low, rear.high + 0.3 * u)))
         for side in (-0.7, 0.7):

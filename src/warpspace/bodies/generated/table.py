@@ -247,8 +247,9 @@ def _add_cradle(layout: Layout, parts: Parts, stack: Stack, axis: Axis, parent: 
     """Add a cradle that tilts what is above, and on the frame before it two bearing towers."""
     u, k = layout.unit_mm, layout.along(axis)
     m, z, line = 1 - k, stack.bed_mm, layout.origin(axis)
-    inner = max(float(stack.half_mm[k]) + 0.3 * u, float(layout.half_mm[k]) + layout.gap_mm)
     middle = float(stack.centre_mm[k])
+    away = abs(float(layout.tip_mm[k]) - middle)
+    inner = max(float(stack.half_mm[k]) + 0.3 * u, away + float(layout.half_mm[k]) + layout.gap_mm)
     depth = max(0.72 * float(stack.half_mm[m]), 1.0 * u)
     plate = z - 0.65 * u
     pivot = float(line[2])
