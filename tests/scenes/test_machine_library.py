@@ -1,4 +1,4 @@
-"""The bundled machines: what each comes with, and its poses against implementations written apart."""
+"""The bundled machines: what each comes with, and its poses against other implementations."""
 
 import numpy as np
 import pytest
@@ -74,7 +74,9 @@ def test_nominal_poses_agree_with_a_product_of_scipy_rotations(name):
             for frame in (*side, *ends):
                 axis = machine.axes.get(frame)
                 offset = machine.fixed_mm.get(frame) if axis is None else axis.offset_mm
-                fixed = machine.fixed_deg.get(frame, (0, 0, 0)) if axis is None else axis.rotation_deg
+                fixed = (
+                    machine.fixed_deg.get(frame, (0, 0, 0)) if axis is None else axis.rotation_deg
+                )
                 place = place + turn.apply(offset)
                 turn = turn * Rotation.from_euler("xyz", fixed, degrees=True)
                 if axis is not None and axis.is_linear:
@@ -100,7 +102,11 @@ def test_nominal_poses_agree_with_pinocchio(name):
             axis = machine.axes[frame]
             turn = pin.rpy.rpyToMatrix(*np.deg2rad(axis.rotation_deg))
             unit = axis.direction * np.eye(3)["XYZABC".index(frame[0]) % 3]
-            kind = pin.JointModelPrismaticUnaligned if axis.is_linear else pin.JointModelRevoluteUnaligned
+            kind = (
+                pin.JointModelPrismaticUnaligned
+                if axis.is_linear
+                else pin.JointModelRevoluteUnaligned
+            )
             place = pin.SE3(turn, np.array(axis.offset_mm, dtype=float))
             parent = model.addJoint(parent, kind(unit), place, frame)
         behind = pin.SE3.Identity()
@@ -121,7 +127,7 @@ def test_nominal_poses_agree_with_pinocchio(name):
             np.testing.assert_allclose(found[frame], expected, rtol=0, atol=1e-9)
 
 
-# --- LinuxCNC, equations as printed in its sources -------------------------------------------------
+# --- LinuxCNC, equations as printed in its sources ------------------------------------------------
 
 
 @pytest.mark.parametrize("dy", [0.0, 23.0])
@@ -240,9 +246,7 @@ def _sin_cos(angle_deg):
 def test_every_parameter_of_a_library_machine_moves_or_tilts_some_point(name):
     scene, rng = load_scene(f"machine_{name}"), np.random.default_rng(9)
     machine = scene.machine
-    found = {
-        axis: rng.uniform(*machine.axes[axis].travel, 40) for axis in machine.axes
-    }
+    found = {axis: rng.uniform(*machine.axes[axis].travel, 40) for axis in machine.axes}
     coordinates = complete_coordinates(machine, found)
     point = rng.uniform(-500.0, 500.0, (40, 3))
     gains = columns(scene.model, Loop.RELATIVE, scene.parameter_keys, coordinates, point)

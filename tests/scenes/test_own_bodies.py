@@ -8,6 +8,7 @@ from warpspace import SceneError, load_scene
 from warpspace.bodies.own_meshes import check_meshes
 from warpspace.bodies.placed import load_bodies
 from warpspace.exceptions import OptionError
+from warpspace.kinematics.model import Loop
 from warpspace.picture.bodies import place_bodies, scene_motions
 from warpspace.scene.library import parse_scene
 from warpspace.scene.save import scene_to_toml
@@ -64,7 +65,7 @@ def test_a_mesh_has_its_unit_and_its_place_and_rides_on_its_axis(folder):
 
 def test_a_mesh_bends_with_the_errors(folder):
     scene = scene_of(folder, 'Z = "column.stl"\n[errors]\nEXX = 20')
-    motions = scene_motions(scene, scene.view("relative"))
+    motions = scene_motions(scene, scene.view(Loop.RELATIVE))
     part = next(p for p in place_bodies(scene, motions, 1000.0) if p.body.frame == "Z")
     shift = part.vertices_mm - part.nominal_mm
     np.testing.assert_allclose(shift, np.tile([-20.0, 0.0, 0.0], (len(shift), 1)), atol=1e-9)
@@ -96,7 +97,10 @@ def test_an_upload_keeps_the_names_says_so_and_draws_generated_bodies():
         ('X = "../out.stl"', 'bodies.X = "../out.stl": leads out of the folder'),
         ('X = "/etc/out.stl"', "leads out of the folder"),
         ('X = "parts/../../out.stl"', "leads out of the folder"),
-        ('X = "column.step"', "unknown ending; expected a mesh that ends in .stl, .obj, .ply, .glb"),
+        (
+            'X = "column.step"',
+            "unknown ending; expected a mesh that ends in .stl, .obj, .ply, .glb",
+        ),
         ('Y2 = "column.stl"', "bodies.Y2: unknown frame of this machine"),
         ("X = 3", "bodies.X = 3: expected a table"),
         ('X = { file = "column.stl", unit = "ft" }', 'expected one of "mm", "cm", "m", "in"'),

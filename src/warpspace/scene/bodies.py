@@ -35,13 +35,17 @@ def read_bodies(
             problems.unknown("bodies", frame, frames, "frame of this machine")
             continue
         where = f"bodies.{frame}"
-        section = problems.validate("body", where, {"file": value} if isinstance(value, str) else value)
+        section = problems.validate(
+            "body", where, {"file": value} if isinstance(value, str) else value
+        )
         if section is None:
             continue
         if bool(section.file) == bool(section.shape):
             problems.add(where, "expected a file, or the shape of a tool", value)
         elif section.shape and frame != "t":
-            problems.add(f"{where}.shape", "only the tool t has one; expected a file", section.shape)
+            problems.add(
+                f"{where}.shape", "only the tool t has one; expected a file", section.shape
+            )
         elif section.shape:
             found[frame] = BodySource(shape=section.shape)
         else:
@@ -53,7 +57,11 @@ def read_bodies(
 def _source(section: Any, path: str) -> BodySource:
     """Take over a checked entry."""
     return BodySource(
-        section.file, path, section.unit or "", tuple(section.offset_mm), tuple(section.rotation_deg)
+        section.file,
+        path,
+        section.unit or "",
+        tuple(section.offset_mm),
+        tuple(section.rotation_deg),
     )
 
 
@@ -71,7 +79,7 @@ def _path(file: str, where: str, folder: Path | None, problems: Problems) -> str
         path = (home / file).resolve()
         inside, there = path.is_relative_to(home), path.is_file()
     except (OSError, ValueError):
-        inside, there = True, False
+        path, inside, there = folder, True, False
     if not inside:
         problems.add(where, "leads out of the folder of this file; expected a mesh in it", file)
     elif not there:
@@ -84,8 +92,8 @@ def _path(file: str, where: str, folder: Path | None, problems: Problems) -> str
 def body_notes(machine: Machine) -> tuple[str, ...]:
     """Remark on meshes that are named and cannot be drawn, since an upload has no folder."""
     return tuple(
-        f"bodies.{frame}: {source.file} cannot be read from here (the text came without its folder);"
-        " a schematic body is drawn instead"
+        f"bodies.{frame}: {source.file} cannot be read from here (the text came without its"
+        " folder); a schematic body is drawn instead"
         for frame, source in machine.bodies.items()
         if source.file and not source.path
     )

@@ -4,8 +4,8 @@ import time
 
 import numpy as np
 import pytest
-from body_checks import assert_closed, nodes_inside, of_head
 
+from body_checks import assert_closed, nodes_inside, of_head
 from warpspace.bodies.generated.generate import generate_bodies
 from warpspace.bodies.generated.layout import build_layout
 from warpspace.field.grid import build_grid
@@ -43,9 +43,7 @@ def test_bodies_of_any_chain_are_closed_small_and_clear_of_the_volume(first):
         bodies, layout = generate_bodies(machine), build_layout(machine)
         assert {body.frame for body in bodies} >= {"R", "S", "t", *machine.axes}
         assert sum(len(body.triangles) for body in bodies) < MAX_TRIANGLES
-        sides = [
-            np.linspace(a, b, 6) for a, b in zip(layout.low_mm, layout.high_mm, strict=True)
-        ]
+        sides = [np.linspace(a, b, 6) for a, b in zip(layout.low_mm, layout.high_mm, strict=True)]
         nodes = np.stack(np.meshgrid(*sides), -1).reshape(-1, 3)
         for body in bodies:
             assert_closed(body)

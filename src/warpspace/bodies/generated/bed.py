@@ -4,7 +4,7 @@ import numpy as np
 
 from warpspace.bodies.generated.layout import Layout
 from warpspace.bodies.generated.parts import Parts
-from warpspace.bodies.generated.table import Stack
+from warpspace.bodies.generated.stack import Stack
 from warpspace.bodies.mesh import MIDDLE
 from warpspace.bodies.schematic import box
 

@@ -3,8 +3,8 @@
 from functools import lru_cache
 
 from warpspace.bodies.generated.bed import build_bed
-from warpspace.bodies.generated.horizontal import build_behind
 from warpspace.bodies.generated.head import build_head
+from warpspace.bodies.generated.horizontal import build_behind
 from warpspace.bodies.generated.layout import UP, build_layout
 from warpspace.bodies.generated.overhead import build_overhead
 from warpspace.bodies.generated.parts import Parts
@@ -47,7 +47,10 @@ def _generate(key: _Key, tool: str) -> tuple[Body, ...]:
 
     chain, axes, fixed_mm, fixed_deg = key
     machine = Machine(
-        parse_chain(chain), {axis.name: axis for axis in axes}, dict(fixed_mm), fixed_deg=dict(fixed_deg)
+        parse_chain(chain),
+        {axis.name: axis for axis in axes},
+        dict(fixed_mm),
+        fixed_deg=dict(fixed_deg),
     )
     layout = build_layout(machine)
     parts = Parts(layout.poses)

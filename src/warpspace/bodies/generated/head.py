@@ -88,9 +88,8 @@ class _Head:
         width, u = (0.8 if self.tool in _LIGHT_TOOLS else 1.15) * self.u, self.u
         top = length + 1.65 * u
         tilts = [axis for axis in axes if abs(self.line(axis)[0][2]) < _COAXIAL]
-        self.spindle_from = length
         if not tilts:
-            steps = [axis for axis in axes]
+            steps = axes
             top = max(top, self.volume_top)
             self._add_spindle(length, top)
             for axis in steps:
@@ -107,15 +106,19 @@ class _Head:
                 if first:
                     self._add_spindle(length, top)
                 self.add(
-                    axis.name, "swivel", DARK,
+                    axis.name,
+                    "swivel",
+                    DARK,
                     cylinder(1.45 * u, (top, top + 0.9 * u), (float(point[0]), float(point[1]))),
-                )  # fmt: skip
+                )
                 if not np.allclose(point[:2], self.centre, atol=0.2 * u):
                     middle, reach = (point[:2] + self.centre) / 2.0, np.abs(point[:2] - self.centre)
                     self.add(
-                        axis.name, "swivel", DARK,
+                        axis.name,
+                        "swivel",
+                        DARK,
                         block([*middle, top + 0.25 * u], [*(reach / 2.0 + 1.0 * u), 0.25 * u]),
-                    )  # fmt: skip
+                    )
                     self.centre = point[:2].copy()
                 top += 0.9 * u
             elif share < _ACROSS:
@@ -151,39 +154,54 @@ class _Head:
             ball = creation.icosphere(subdivisions=2, radius=0.12 * u)
             ball.apply_translation([0.0, 0.0, 0.12 * u])
             self.add(
-                "t", "probe", DARK, ball, cylinder(0.05 * u, (0.12 * u, 0.6 * length)),
+                "t",
+                "probe",
+                DARK,
+                ball,
+                cylinder(0.05 * u, (0.12 * u, 0.6 * length)),
                 cylinder(0.3 * u, (0.6 * length, length)),
-            )  # fmt: skip
+            )
         elif self.tool == "nozzle":
             self.add(
-                "t", "nozzle", DARK, cone(0.05 * u, 0.3 * u, (0.0, 0.35 * length)),
+                "t",
+                "nozzle",
+                DARK,
+                cone(0.05 * u, 0.3 * u, (0.0, 0.35 * length)),
                 block([0, 0, 0.55 * length], [0.4 * u, 0.4 * u, 0.2 * length]),
                 cylinder(0.15 * u, (0.75 * length, length)),
-            )  # fmt: skip
+            )
         elif self.tool == "wheel":
             radius = max(1.8 * u, 0.8 * length)
             self.add(
-                "t", "wheel", DARK,
+                "t",
+                "wheel",
+                DARK,
                 cylinder(radius, (0.0, 0.45 * length), inner=0.72 * radius),
                 cylinder(radius, (0.45 * length, 0.6 * length)),
                 cylinder(0.4 * u, (0.6 * length, length)),
-            )  # fmt: skip
+            )
         elif self.tool == "gripper":
             fingers = [
                 block([side * 0.3 * u, 0, 0.3 * length], [0.08 * u, 0.2 * u, 0.3 * length])
                 for side in (-1, 1)
             ]
             self.add(
-                "t", "gripper", DARK, *fingers,
+                "t",
+                "gripper",
+                DARK,
+                *fingers,
                 block([0, 0, 0.75 * length], [0.55 * u, 0.3 * u, 0.15 * length]),
                 cylinder(0.25 * u, (0.9 * length, length)),
-            )  # fmt: skip
+            )
         else:
             self.add(
-                "t", "tool", DARK, cylinder(0.09 * u, (0.0, 0.5 * length)),
+                "t",
+                "tool",
+                DARK,
+                cylinder(0.09 * u, (0.0, 0.5 * length)),
                 cylinder(0.22 * u, (0.5 * length, 0.8 * length)),
                 cylinder(0.34 * u, (0.8 * length, length)),
-            )  # fmt: skip
+            )
 
     def _add_spindle(self, nose: float, top: float) -> None:
         """Add the spindle between its nose and what carries it."""
@@ -211,20 +229,24 @@ class _Head:
         out = np.zeros(3)
         out[k] = 1.0
         self.add(
-            axis.name, "head", MIDDLE,
+            axis.name,
+            "head",
+            MIDDLE,
             block(centre, [half[0], half[1], (high - low) / 2.0]),
             rod(hub - 1.35 * u * out, hub + 1.35 * u * out, 0.75 * u),
-        )  # fmt: skip
+        )
         roof = pivot + 1.15 * u
         for side in (-1.0, 1.0):
             arm = hub + side * 1.65 * u * out
             size = np.array([0.75 * u, 0.75 * u, (roof - pivot) / 2.0])
             size[k] = 0.27 * u
             self.add(
-                parent, "fork", LIGHT,
+                parent,
+                "fork",
+                LIGHT,
                 block(arm + np.array([0, 0, (roof - pivot) / 2.0]), size),
                 rod(arm - 0.27 * u * out, arm + 0.27 * u * out, 0.75 * u),
-            )  # fmt: skip
+            )
         size = np.array([0.85 * u, 0.85 * u, 0.3 * u])
         size[k] = 1.92 * u
         self.add(parent, "fork", LIGHT, block([*self.centre, roof + 0.3 * u], size))
@@ -240,19 +262,28 @@ class _Head:
         self._add_spindle(nose, float(pivot[2]) - 0.9 * u)
         low = np.array([*self.centre, float(pivot[2]) - 0.9 * u])
         self.add(
-            axis.name, "head", MIDDLE,
-            rod(low, pivot, 1.15 * u), rod(pivot, pivot + 1.1 * u * line, 1.15 * u, 1.5 * u),
+            axis.name,
+            "head",
+            MIDDLE,
+            rod(low, pivot, 1.15 * u),
+            rod(pivot, pivot + 1.1 * u * line, 1.15 * u, 1.5 * u),
             rod(pivot - 0.6 * u * line, pivot, 0.75 * u, 1.15 * u),
-        )  # fmt: skip
+        )
         far = pivot + 2.0 * u * line
         self.add(parent, "wedge", LIGHT, rod(pivot + 1.1 * u * line, far, 1.5 * u))
         top = float(far[2]) + 1.5 * u
         middle = (far + np.array([*self.centre, far[2]])) / 2.0
         half = np.abs(far[:2] - self.centre) / 2.0 + 1.05 * u
         self.add(
-            parent, "wedge", LIGHT,
-            box(*((middle[i] - half[i], middle[i] + half[i]) for i in (0, 1)), (far[2] + 0.2 * u, top)),
-        )  # fmt: skip
+            parent,
+            "wedge",
+            LIGHT,
+            box(
+                (middle[0] - half[0], middle[0] + half[0]),
+                (middle[1] - half[1], middle[1] + half[1]),
+                (far[2] + 0.2 * u, top),
+            ),
+        )
         return top
 
 

@@ -8,9 +8,9 @@ import numpy as np
 from warpspace.bodies.generated.head import BASE, Mount, head_axes
 from warpspace.bodies.generated.layout import Layout
 from warpspace.bodies.generated.parts import Parts, spread
-from warpspace.bodies.generated.table import Stack
+from warpspace.bodies.generated.stack import Stack
 from warpspace.bodies.mesh import DARK, LIGHT, METAL, MIDDLE
-from warpspace.bodies.schematic import Range
+from warpspace.bodies.schematic import Range, Shape
 
 
 class _Behind:
@@ -35,7 +35,7 @@ class _Behind:
         """Give a range across about the spindle line, mm."""
         return (float(self.spine[self.i]) - half, float(self.spine[self.i]) + half)
 
-    def b(self, i: Range, j: Range, z: Range):  # noqa: ANN201
+    def b(self, i: Range, j: Range, z: Range) -> Shape:
         """Build a box from ranges across, in depth and upwards, mm."""
         return spread({self.i: i, self.j: j, 2: z})
 
@@ -57,17 +57,33 @@ class _Behind:
                 lower.append(axis.name)
             elif axis.is_linear and layout.is_vertical(axis):
                 self.parts.add(
-                    axis.name, "headstock", MIDDLE,
-                    self.b(self.around(half), self.depth(start, start + 3.6 * u), (middle - 1.3 * w, middle + 1.3 * w)),
-                    self.b(self.around(half + 0.35 * u), self.depth(start + 0.5 * u, start + 0.8 * u), (middle - 1.9 * w, middle + 1.9 * w)),
-                )  # fmt: skip
+                    axis.name,
+                    "headstock",
+                    MIDDLE,
+                    self.b(
+                        self.around(half),
+                        self.depth(start, start + 3.6 * u),
+                        (middle - 1.3 * w, middle + 1.3 * w),
+                    ),
+                    self.b(
+                        self.around(half + 0.35 * u),
+                        self.depth(start + 0.5 * u, start + 0.8 * u),
+                        (middle - 1.9 * w, middle + 1.9 * w),
+                    ),
+                )
                 half, high, column_at = half + 0.1 * u, middle + reach + 2.6 * w, start + 0.8 * u
                 frame = ""
             elif axis.is_linear and layout.along(axis) == self.j and not lower and frame:
                 self.parts.add(
-                    axis.name, "ram", LIGHT,
-                    self.b(self.around(w), self.depth(start, start + 2.0 * reach + 3.0 * u), (middle - w, middle + w)),
-                )  # fmt: skip
+                    axis.name,
+                    "ram",
+                    LIGHT,
+                    self.b(
+                        self.around(w),
+                        self.depth(start, start + 2.0 * reach + 3.0 * u),
+                        (middle - w, middle + w),
+                    ),
+                )
                 start += 0.8 * u
             else:
                 standing = axis.name
@@ -84,40 +100,82 @@ class _Behind:
             reach = layout.half_travel_mm(axis) if axis.is_linear else 0.0
             top = foot - 0.75 * u * number
             self.parts.add(
-                name, "base" if number else "column", DARK if number else LIGHT,
-                self.b(self.around(span), self.depth(column_at - 0.2 * u, column_at + deep), (top - 0.55 * u, top)),
-            )  # fmt: skip
+                name,
+                "base" if number else "column",
+                DARK if number else LIGHT,
+                self.b(
+                    self.around(span),
+                    self.depth(column_at - 0.2 * u, column_at + deep),
+                    (top - 0.55 * u, top),
+                ),
+            )
             below = levels[number + 1] if number + 1 < len(levels) else BASE
             if axis.is_linear and layout.along(axis) == self.i:
                 span += reach
                 for at in (column_at + 0.3 * u, column_at + deep - 0.5 * u):
-                    self.parts.add(below, "rails", METAL, self.b(self.around(span), self.depth(at - 0.2 * u, at + 0.2 * u), (top - 0.75 * u, top - 0.55 * u)))
+                    self.parts.add(
+                        below,
+                        "rails",
+                        METAL,
+                        self.b(
+                            self.around(span),
+                            self.depth(at - 0.2 * u, at + 0.2 * u),
+                            (top - 0.75 * u, top - 0.55 * u),
+                        ),
+                    )
             else:
                 deep += reach
                 for side in (-0.7, 0.7):
                     mid = self.around(0.0)[0] + side * span
-                    self.parts.add(below, "rails", METAL, self.b((mid - 0.2 * u, mid + 0.2 * u), self.depth(column_at - 0.2 * u, column_at + deep), (top - 0.75 * u, top - 0.55 * u)))
-        ranges = {self.i: self.around(span), self.j: self.depth(column_at - 0.2 * u, column_at + deep)}
+                    self.parts.add(
+                        below,
+                        "rails",
+                        METAL,
+                        self.b(
+                            (mid - 0.2 * u, mid + 0.2 * u),
+                            self.depth(column_at - 0.2 * u, column_at + deep),
+                            (top - 0.75 * u, top - 0.55 * u),
+                        ),
+                    )
+        ranges = {
+            self.i: self.around(span),
+            self.j: self.depth(column_at - 0.2 * u, column_at + deep),
+        }
         self.parts.stand(ranges[0], ranges[1])
 
     def _add_fixed_head(self, start: float, column_at: float, w: float, middle: float) -> None:
         """Add a head that nothing raises: a box on the column."""
         frame = self.axes[0].name if self.axes and not self.axes[0].is_linear else BASE
         self.parts.add(
-            frame, "headstock", MIDDLE,
-            self.b(self.around(1.2 * w), self.depth(start, max(column_at, start) + 1.5 * self.u), (middle - 1.2 * w, middle + 1.2 * w)),
-        )  # fmt: skip
+            frame,
+            "headstock",
+            MIDDLE,
+            self.b(
+                self.around(1.2 * w),
+                self.depth(start, max(column_at, start) + 1.5 * self.u),
+                (middle - 1.2 * w, middle + 1.2 * w),
+            ),
+        )
 
     def _add_column(self, frame: str, half: float, at: float, low: float, high: float) -> None:
         """Add two uprights on either side of the headstock, tied together above."""
         u = self.u
         for side in (-1.0, 1.0):
             ends = sorted(self.around(0.0)[0] + side * (half + edge) for edge in (0.0, 1.1 * u))
-            self.parts.add(frame, "column", LIGHT, self.b((ends[0], ends[1]), self.depth(at, at + 2.4 * u), (low, high)))
+            self.parts.add(
+                frame,
+                "column",
+                LIGHT,
+                self.b((ends[0], ends[1]), self.depth(at, at + 2.4 * u), (low, high)),
+            )
         self.parts.add(
-            frame, "column", LIGHT,
-            self.b(self.around(half + 1.1 * u), self.depth(at, at + 2.4 * u), (high, high + 0.9 * u)),
-        )  # fmt: skip
+            frame,
+            "column",
+            LIGHT,
+            self.b(
+                self.around(half + 1.1 * u), self.depth(at, at + 2.4 * u), (high, high + 0.9 * u)
+            ),
+        )
 
 
 def build_behind(layout: Layout, parts: Parts, mount: Mount, stack: Stack) -> None:

@@ -77,7 +77,7 @@ class Layout:
         return self.poses[axis.name][:3, 3]
 
     def along(self, axis: Axis) -> int:
-        """Give the index of the axis of R that an axis is nearest to; 0 or 1 unless it is vertical."""
+        """Give the index of the axis of R nearest to an axis: 2 where it is vertical."""
         return 2 if self.is_vertical(axis) else int(np.argmax(np.abs(self.direction(axis)[:2])))
 
     def is_vertical(self, axis: Axis) -> bool:
@@ -93,11 +93,15 @@ def build_layout(machine: Machine) -> Layout:
     """Place every frame of a machine at home and find its sizes."""
     home = {
         name: np.asarray(
-            sum(axis.travel) / 2.0 if axis.is_linear else min(max(0.0, axis.travel[0]), axis.travel[1])
+            sum(axis.travel) / 2.0
+            if axis.is_linear
+            else min(max(0.0, axis.travel[0]), axis.travel[1])
         )
         for name, axis in machine.axes.items()
     }
-    poses = {name: motion.nominal for name, motion in body_motions(Model(machine), {}, home).items()}
+    poses = {
+        name: motion.nominal for name, motion in body_motions(Model(machine), {}, home).items()
+    }
     half = np.zeros(3)
     spanned: set[int] = set()
     for axis in machine.axes.values():

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -83,7 +84,7 @@ def rod(start: Array, end: Array, radius: float, end_radius: float | None = None
     length = float(np.linalg.norm(end - start))
     outline = np.array([(0.0, 0.0), (radius, 0.0), (end_radius, length), (0.0, length)])
     mesh = creation.revolve(outline, sections=SIDES)
-    matrix = geometry.align_vectors([0, 0, 1], (end - start) / length)
+    matrix: Any = geometry.align_vectors([0, 0, 1], (end - start) / length)
     matrix[:3, 3] = start
     mesh.apply_transform(matrix)
     return mesh
@@ -97,3 +98,16 @@ def upright(radius: float, ends: Range, at: Array) -> Shape:
 def capped(low: float, high: float) -> Range:
     """Give a range that is never empty, mm."""
     return (low, max(high, low + 1.0))
+
+
+def bar(start: Array, end: Array, half_width: float, half_height: float) -> Shape:
+    """Build a level bar between two points of R, mm."""
+    from trimesh import creation, transformations
+
+    across = end - start
+    length = float(np.hypot(across[0], across[1]))
+    mesh = creation.box(extents=[length, 1.7 * half_width, 2.0 * half_height])
+    turn = np.arctan2(across[1], across[0])
+    mesh.apply_transform(transformations.rotation_matrix(turn, [0, 0, 1]))
+    mesh.apply_translation((start + end) / 2.0)
+    return mesh
