@@ -1,6 +1,7 @@
 """From a raw document to a scene: every section validated, everything cross-checked."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from warpspace.machine.errors import ErrorFunction, ErrorSet, Harmonics
 from warpspace.machine.limits import MAX_ERROR
 from warpspace.machine.parameters import PARAMETERS, ErrorKind
 from warpspace.machine.tolerances import TOLERANCE_CLASSES, Tolerance, ToleranceSet
+from warpspace.scene.bodies import body_notes, read_bodies
 from warpspace.scene.conventions import component_orders
 from warpspace.scene.curves import read_curve
 from warpspace.scene.guides import is_guides, read_guides
@@ -24,6 +26,7 @@ SECTIONS = (
     "title",
     "description",
     "machine",
+    "bodies",
     "convention",
     "workspace",
     "points_mm",
@@ -75,6 +78,9 @@ def build_scene(
     for key in raw:
         if key not in SECTIONS:
             problems.unknown("", key, SECTIONS, "key")
+    if machine is not None and "bodies" in raw:
+        own = read_bodies(raw["bodies"], machine, folder, problems)
+        machine = replace(machine, bodies={**machine.bodies, **own})
     machine = machine or STAND_IN
     texts = {
         key: problems.validate("text", key, raw[key])
@@ -109,6 +115,7 @@ def build_scene(
             *_travel_notes(machine, workspace),
             *_carried_notes(machine, errors),
             *_costly_notes(errors),
+            *body_notes(machine),
         ),
     )
 

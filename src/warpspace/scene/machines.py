@@ -1,12 +1,15 @@
 """Machines: bundled by name, or built from the table of a scene."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
 
 from warpspace.exceptions import ChainError, SceneError, UnknownNameError
 from warpspace.machine.axes import direction_index, is_linear
 from warpspace.machine.description import FIXED_FRAMES, Machine, build_machine, parse_chain
 from warpspace.machine.limits import MAX_SCENE_BYTES
 from warpspace.resources import assets_dir
+from warpspace.scene.bodies import read_bodies
 from warpspace.scene.files import parse_toml, read_text
 from warpspace.scene.schema import GantrySection
 from warpspace.scene.sections import Problems
@@ -15,6 +18,12 @@ from warpspace.scene.sections import Problems
 def machine_names() -> tuple[str, ...]:
     """List the bundled machines."""
     return tuple(sorted(path.parent.name for path in assets_dir().glob("machines/*/machine.toml")))
+
+
+def machine_picture(name: str) -> Path | None:
+    """Give the picture of a bundled machine; None where it has none."""
+    path = assets_dir() / "machines" / name / "picture.png"
+    return path if path.is_file() else None
 
 
 def load_machine(name: str) -> Machine:
@@ -42,14 +51,19 @@ def load_machine(name: str) -> Machine:
     path = folder / "machine.toml"
     raw = parse_toml(read_text(path, MAX_SCENE_BYTES), str(path))
     problems = Problems()
-    machine = machine_of(raw, "", name, problems, body_dir=str(folder))
+    machine = machine_of(raw, "", name, problems, body_dir=str(folder), folder=folder)
     if machine is None or problems.lines:
         raise SceneError(str(path), problems.lines)
     return machine
 
 
 def machine_of(
-    raw: object, key: str, name: str, problems: Problems, body_dir: str = ""
+    raw: object,
+    key: str,
+    name: str,
+    problems: Problems,
+    body_dir: str = "",
+    folder: Path | None = None,
 ) -> Machine | None:
     """Build a machine from its table; note problems and give None where it cannot be.
 
@@ -64,6 +78,8 @@ def machine_of(
     problems : Problems
     body_dir : str, optional
         Folder of the machine's schematic bodies.
+    folder : Path, optional
+        Folder that the names of its meshes are relative to.
     """
     expected = 'expected a machine name or a [machine] table with "chain"'
     if raw is None:
@@ -92,7 +108,7 @@ def machine_of(
             if axis not in known:
                 problems.unknown(f"{prefix}{part}", axis, known, "frame of this machine")
     gantry = _gantries(section.gantry, chain.axes, f"{prefix}gantry", problems)
-    return build_machine(
+    machine = build_machine(
         chain,
         offset_mm=section.offset_mm,
         rotation_deg=section.rotation_deg,
@@ -102,7 +118,11 @@ def machine_of(
         name=name,
         title=section.title or name,
         body_dir=body_dir,
+        source=section.source,
     )
+    if not section.bodies:
+        return machine
+    return replace(machine, bodies=read_bodies(section.bodies, machine, folder, problems))
 
 
 def _gantries(

@@ -145,8 +145,12 @@ def _recognised(scene: Scene) -> Scene:
             key: replace(axis, direction=known.axes[key].direction)
             for key, axis in machine.axes.items()
         }
-        same = replace(known, axes=machine.axes)
-        offsets = machine.fixed_mm == known.fixed_mm and machine.chain == known.chain
+        same = replace(known, axes=machine.axes, bodies=machine.bodies or known.bodies)
+        offsets = (
+            machine.fixed_mm == known.fixed_mm
+            and machine.fixed_deg == known.fixed_deg
+            and machine.chain == known.chain
+        )
         if offsets and axes == known.axes:
             return replace(scene, model=replace(scene.model, machine=same))
     return scene
