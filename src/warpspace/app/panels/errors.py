@@ -18,6 +18,7 @@ from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.ranges import Span
 from warpspace.app.state.search import find_parameters
+from warpspace.machine.axes import axis_order
 from warpspace.machine.errors import Constant
 from warpspace.machine.parameters import Parameter, parameter
 from warpspace.scene.model import Scene
@@ -199,4 +200,4 @@ def _refresh(slider: Any, span: Span) -> None:
 
 def _by_axis(row: Parameter) -> int:
     """Sort by axis; within an axis the order of the table stays."""
-    return "XYZABC".index(row.axis)
+    return axis_order(row.axis)
