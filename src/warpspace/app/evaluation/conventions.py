@@ -49,7 +49,7 @@ def reference_spans(scene: Scene) -> dict[str, Span]:
     return {
         name: Span(*(ranges.get(name) or scene.machine.axes[name].travel), 1.0)
         for name in scene.machine.axes
-        if is_linear(name)
+        if is_linear(name) or name in scene.workspace.volume_axes
     }
 
 

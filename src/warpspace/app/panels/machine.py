@@ -81,7 +81,7 @@ class MachinePanel:
         with self._home:
             self._sliders = {
                 axis: self._context.gui.add_slider(
-                    f"Machine {axis} [{'mm' if axis in linear else '°'}]",
+                    f"Machine {axis} [{state.scene.machine.axes[axis].unit}]",
                     min=span.low,
                     max=span.high,
                     step=span.step,

@@ -185,10 +185,15 @@ def slice_spans(scene: Scene) -> dict[str, Span]:
 
 
 def linear_spans(scene: Scene) -> dict[str, Span]:
-    """Give the ranges of the linear axes of a scene, mm: travels, widened by the workspace."""
+    """Give the ranges of the axes that move within the volume, mm or degrees.
+
+    These are the linear axes, and rotary ones that span the volume; travels, widened by the
+    workspace.
+    """
+    spanning = scene.workspace.volume_axes
     found: dict[str, Span] = {}
     for name in scene.machine.axes:
-        if not is_linear(name):
+        if not is_linear(name) and name not in spanning:
             continue
         low, high = scene.machine.axes[name].travel
         first, last = scene.workspace.ranges.get(name, (low, high))
