@@ -162,7 +162,10 @@ def bent(page: Page) -> None:
 def allocated(page: Page) -> None:
     """Allocate tolerances for 40 µm."""
     page.wait_for_selector("[data-value='histogram']")
-    write(page, "|E| allowed", "40")
+    box = page.get_by_label("|E| allowed [µm]", exact=True).last
+    box.fill("40")
+    box.press("Enter")
+    page.wait_for_timeout(PAUSE_MS)
     press(page, "Allocate")
     page.wait_for_selector("[data-value='allocated']")
 
