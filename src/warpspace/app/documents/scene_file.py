@@ -135,18 +135,22 @@ def _bundled(name: str) -> Scene | None:
 
 
 def _recognised(scene: Scene) -> Scene:
-    """Give a machine written inline its bodies back where only directions make it another one."""
+    """Give a machine written inline its bodies back where only its axes' ends and ways differ."""
     machine = scene.machine
     for name in machine_names():
         known = load_machine(name)
         if known.axes.keys() != machine.axes.keys():
             continue
         axes = {
-            key: replace(axis, direction=known.axes[key].direction)
+            key: replace(axis, direction=known.axes[key].direction, travel=known.axes[key].travel)
             for key, axis in machine.axes.items()
         }
         same = replace(known, axes=machine.axes)
-        offsets = machine.fixed_mm == known.fixed_mm and machine.chain == known.chain
+        offsets = (
+            machine.fixed_mm == known.fixed_mm
+            and machine.fixed_deg == known.fixed_deg
+            and machine.chain == known.chain
+        )
         if offsets and axes == known.axes:
             return replace(scene, model=replace(scene.model, machine=same))
     return scene

@@ -13,6 +13,7 @@ from warpspace.app.readouts.places import tool_point_html
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import linear_positions, linear_spans
 from warpspace.bodies.placed import load_bodies
+from warpspace.machine.axes import is_linear
 from warpspace.scene.model import Scene
 
 SWITCHES = {
@@ -81,7 +82,7 @@ class MachinePanel:
         with self._home:
             self._sliders = {
                 axis: self._context.gui.add_slider(
-                    f"Machine {axis} [{'mm' if axis in linear else '°'}]",
+                    f"Machine {axis} [{'mm' if is_linear(axis) else '°'}]",
                     min=span.low,
                     max=span.high,
                     step=span.step,
@@ -122,7 +123,11 @@ class MachinePanel:
     def show(self, picture: LivePicture) -> None:
         """Make the widgets show the state."""
         state = self._state = picture.state
-        if self._built_for is None or state.scene.machine is not self._built_for.machine:
+        before = self._built_for
+        if before is None or (before.machine, before.workspace) != (
+            state.scene.machine,
+            state.scene.workspace,
+        ):
             self._build(state)
         self._place.put(content=tool_point_html(*standing(state, machine_positions(state))))
         for name, switch in self._switches.items():

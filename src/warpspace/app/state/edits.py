@@ -120,7 +120,10 @@ def with_half_width(state: AppState, key: str, half_width: float) -> AppState:
 
 def with_scene_tolerances(state: AppState) -> AppState:
     """Go back to the tolerances of the scene."""
-    return replace(state, tolerances=state.origin.tolerances)
+    own = state.origin.tolerances
+    # an edited machine may not have all axes of the scene's
+    kept = {key: own.own[key] for key in own.own if key in state.amplitudes}
+    return replace(state, tolerances=replace(own, own=kept))
 
 
 def with_scaled_tolerances(state: AppState, keys: Collection[str], factor: float) -> AppState:

@@ -185,10 +185,14 @@ def slice_spans(scene: Scene) -> dict[str, Span]:
 
 
 def linear_spans(scene: Scene) -> dict[str, Span]:
-    """Give the ranges of the linear axes of a scene, mm: travels, widened by the workspace."""
+    """Give the ranges of the linear axes of a scene, mm: travels, widened by the workspace.
+
+    Rotary axes that span the working volume are moved like these, in degrees.
+    """
     found: dict[str, Span] = {}
+    spanning = scene.workspace.volume_axes
     for name in scene.machine.axes:
-        if not is_linear(name):
+        if not is_linear(name) and name not in spanning:
             continue
         low, high = scene.machine.axes[name].travel
         first, last = scene.workspace.ranges.get(name, (low, high))

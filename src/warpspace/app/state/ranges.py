@@ -95,9 +95,10 @@ def amplitude_spans(scene: Scene) -> dict[str, Span]:
 def position_spans(scene: Scene) -> dict[str, Span]:
     """Give the ranges of the rotary axes of a scene, degrees, by axis.
 
-    They are the travels, widened where the scene itself stands beyond.
+    They are the travels, widened where the scene itself stands beyond. An axis that spans the
+    working volume, as those of a SCARA do, stands nowhere and has none.
     """
-    at = scene.workspace.positions
+    at, spanning = scene.workspace.positions, scene.workspace.volume_axes
     return {
         axis.name: Span(
             min(axis.travel[0], at.get(axis.name, axis.travel[0])),
@@ -105,5 +106,5 @@ def position_spans(scene: Scene) -> dict[str, Span]:
             1.0,
         )
         for axis in scene.machine.axes.values()
-        if not axis.is_linear
+        if not axis.is_linear and axis.name not in spanning
     }

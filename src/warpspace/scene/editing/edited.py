@@ -19,6 +19,7 @@ from warpspace.machine.errors import ErrorSet
 from warpspace.machine.parameters import parameter
 from warpspace.machine.tolerances import ToleranceSet
 from warpspace.scene.library import parse_scene
+from warpspace.scene.machines import load_machine, machine_names
 from warpspace.scene.model import Scene
 from warpspace.scene.save import scene_to_toml
 
@@ -79,12 +80,19 @@ def same_shape(one: Machine, other: Machine) -> bool:
 
 
 def _dressed(scene: Scene, machine: Machine) -> Machine:
-    """Give a machine of other frames the name of its scene; bodies made for it suit it no more."""
+    """Name a machine after its frames: that of the library with the same ones, else its scene's.
+
+    Bodies that were made for other frames suit it no more.
+    """
     before = scene.machine
     if machine.name != before.name or machine.body_dir != before.body_dir:
         return machine  # another machine of the library
     if same_shape(before, machine):
         return machine
+    for name in machine_names():
+        known = load_machine(name)
+        if same_shape(known, machine):
+            return replace(machine, name=name, title=known.title, body_dir=known.body_dir)
     same_chain = machine.chain == before.chain
     title = machine.title if same_chain and not before.body_dir else f"Machine {machine.chain}"
     return replace(machine, name=scene.name, title=title, body_dir="")

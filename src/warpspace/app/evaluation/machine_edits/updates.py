@@ -3,8 +3,9 @@
 The changed machine lives in the state's scene; `AppState.origin` keeps the scene's own one.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
+from typing import TypeVar
 
 from warpspace.app.evaluation.machine_edits.library import library_scene
 from warpspace.app.state.app_state import AppState
@@ -20,6 +21,7 @@ from warpspace.scene.editing import numbers, structure
 from warpspace.scene.editing.edited import Edited
 from warpspace.scene.model import Scene
 
+T = TypeVar("T")
 Edit = Callable[[Scene], Edited]
 SHOWN = 30
 """Characters of what was typed that a message repeats."""
@@ -81,8 +83,7 @@ def with_changed_scene(state: AppState, scene: Scene) -> AppState:
         loaded = own
     keys = scene.parameter_keys
     amplitudes = {key: _amplitude(state, scene, key) for key in keys}
-    tolerances = state.tolerances.own.items()
-    kept = {key: value for key, value in tolerances if parameter(key).axis in scene.machine.axes}
+    kept = _of(state.tolerances.own, scene.machine.axes)
     ranges = position_spans(scene)
     stands = scene.workspace.positions
     # an axis whose position in the working volume was changed goes there
@@ -168,32 +169,30 @@ def with_own_machine(state: AppState) -> AppState:
     if own.machine == state.scene.machine and own.workspace == state.scene.workspace:
         return state
     returned = own.machine.axes.keys() - state.scene.machine.axes.keys()
-    back = ErrorSet(
-        {key: own.errors.functions[key] for key in own.errors if _axis(key) in returned}
+    changed = with_edit(
+        state, lambda scene: structure.take_machine(_joined(scene, own, returned), own)
     )
-    tolerances = {
-        key: own.tolerances.own[key] for key in own.tolerances.own if _axis(key) in returned
-    }
-    changed = with_edit(state, lambda scene: structure.take_machine(_joined(scene, own, back), own))
     if changed.scene is state.scene:
         return changed
-    together = {**changed.tolerances.own, **tolerances}
-    return replace(changed, tolerances=replace(changed.tolerances, own=together))
+    tolerances = {**_of(own.tolerances.own, returned), **changed.tolerances.own}
+    return replace(changed, tolerances=replace(changed.tolerances, own=tolerances))
 
 
-def _joined(scene: Scene, own: Scene, back: ErrorSet) -> Scene:
-    """Give a scene the errors and component errors of axes that come back."""
+def _joined(scene: Scene, own: Scene, returned: Collection[str]) -> Scene:
+    """Give a scene the errors, tolerances and component errors of axes that come back."""
     orders = {**dict(own.model.own_component_errors), **dict(scene.model.own_component_errors)}
+    tolerances = {**_of(own.tolerances.own, returned), **scene.tolerances.own}
     return replace(
         scene,
         model=replace(scene.model, own_component_errors=tuple(orders.items())),
-        errors=ErrorSet({**back.functions, **scene.errors.functions}),
+        errors=ErrorSet({**_of(own.errors.functions, returned), **scene.errors.functions}),
+        tolerances=replace(scene.tolerances, own=tolerances),
     )
 
 
-def _axis(key: str) -> str:
-    """Name the axis of a parameter."""
-    return parameter(key).axis
+def _of(table: Mapping[str, T], axes: Collection[str]) -> dict[str, T]:
+    """Give the entries whose parameters belong to some axes."""
+    return {key: value for key, value in table.items() if parameter(key).axis in axes}
 
 
 def with_word(state: AppState, word: str) -> AppState:
