@@ -22,6 +22,7 @@ from warpspace.scene.library import parse_scene
 from warpspace.scene.model import Scene
 
 FIGURES = tuple(kind.name for kind in figure_kinds())
+TWO = tuple(kind.name for kind in figure_kinds() if kind.scenes == 2)
 
 pytestmark = [pytest.mark.render, pytest.mark.usefixtures("renderer")]
 
@@ -47,7 +48,7 @@ def scene_of(name: str) -> Scene:
 
 def pair(name: str) -> list[Scene]:
     first = load_scene("dvf5000_first")
-    return [first, load_scene("dvf5000_second")] if name == "comparison" else [first]
+    return [first, load_scene("dvf5000_second")] if name in TWO else [first]
 
 
 def inside(drawing: Drawing, size: tuple[int, int]) -> None:

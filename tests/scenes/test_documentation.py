@@ -50,7 +50,7 @@ def test_readme_names_every_command():
 
     page = (ROOT / "README.md").read_text("utf-8")
     table = page[page.index("| command") : page.index("Shell completion")]
-    assert set(re.findall(r"`(\w+)`", re.sub(r"\|[^|]*\|\n", "|\n", table))) == set(cli.commands)
+    assert set(re.findall(r"`([\w-]+)`", re.sub(r"\|[^|]*\|\n", "|\n", table))) == set(cli.commands)
 
 
 def test_every_picture_that_is_linked_exists_and_every_other_picture_is_linked():
@@ -59,12 +59,15 @@ def test_every_picture_that_is_linked_exists_and_every_other_picture_is_linked()
         for page in PAGES
         for target in re.findall(r"!\[[^\]]+\]\(([^)]+\.png)\)", page.read_text("utf-8"))
     }
-    assert linked == set((ROOT / "docs" / "images").glob("*.png"))
+    machines = (ROOT / "assets" / "machines").glob("*/picture.png")
+    assert linked == {*(ROOT / "docs" / "images").glob("*.png"), *machines}
 
 
 def test_pictures_are_small():
     sizes = [path.stat().st_size for path in (ROOT / "docs" / "images").glob("*.png")]
     assert sum(sizes) < 3.5e6
+    machines = [p.stat().st_size for p in (ROOT / "assets/machines").glob("*/picture.png")]
+    assert max(machines) < 2e5
 
 
 def test_there_is_one_picture_of_every_tab():

@@ -6,7 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from warpspace.bodies.body_file import BODY_FILE, read_bodies
+from warpspace.bodies.generated.generate import generate_bodies
 from warpspace.bodies.mesh import Body
+from warpspace.bodies.own_meshes import own_meshes
 from warpspace.field.evaluate import View
 from warpspace.kinematics import transforms
 from warpspace.kinematics.bodies import BASE, BodyMotion, body_motions
@@ -18,7 +20,7 @@ from warpspace.units import Array
 
 
 def load_bodies(machine: Machine) -> tuple[Body, ...]:
-    """Read the bodies of a machine.
+    """Give the bodies of a machine.
 
     Parameters
     ----------
@@ -27,19 +29,20 @@ def load_bodies(machine: Machine) -> tuple[Body, ...]:
     Returns
     -------
     tuple of Body
-        Empty where its folder has none. Bodies of frames that the machine does not have are left
-        out.
+        Those that the machine's description names, for all other frames those of the file in its
+        folder, and where there is none those generated from the description. Bodies of frames that
+        the machine does not have are left out.
 
     Raises
     ------
     OptionError
-        If the file cannot be read.
+        If a file cannot be read.
     """
-    if not machine.body_dir:
-        return ()
     frames = {BASE, "S", "t", "w", *machine.axes}
-    bodies = read_bodies(Path(machine.body_dir) / BODY_FILE)
-    return tuple(body for body in bodies if body.frame in frames)
+    kept = read_bodies(Path(machine.body_dir) / BODY_FILE) if machine.body_dir else ()
+    own = {frame: loaded.body for frame, loaded in own_meshes(machine).items()}
+    bodies = [body for body in kept or generate_bodies(machine) if body.frame not in own]
+    return tuple(body for body in (*bodies, *own.values()) if body.frame in frames)
 
 
 def error_values_of(

@@ -8,12 +8,12 @@ from warpspace.exceptions import SceneError
 
 
 def input_files(*scenes: str) -> Iterator[Path]:
-    """Find the files that scenes are read from: their own and the CSV files these name.
+    """Find the files that scenes are read from: their own, and the CSV files and meshes these name.
 
     Parameters
     ----------
     scenes : str
-        Bundled names or paths. One that cannot be read names no CSV files; what is wrong with it
+        Bundled names or paths. One that cannot be read names no others; what is wrong with it
         is said when it is loaded.
 
     Yields
@@ -33,8 +33,18 @@ def input_files(*scenes: str) -> Iterator[Path]:
             raw = parse_toml(read_text(path, MAX_SCENE_BYTES), str(path))
         except SceneError:
             continue
-        for name in _csv_names(raw):
+        for name in (*_csv_names(raw), *_mesh_names(raw.get("bodies"))):
             yield path.parent / name
+
+
+def _mesh_names(value: object) -> Iterator[str]:
+    """Find the meshes that a table of bodies names."""
+    if not isinstance(value, dict):
+        return
+    for part in cast("dict[str, object]", value).values():
+        entry = cast("dict[str, object]", part).get("file") if isinstance(part, dict) else part
+        if isinstance(entry, str):
+            yield entry
 
 
 def _csv_names(value: object) -> Iterator[str]:

@@ -10,6 +10,7 @@ from click.shell_completion import CompletionItem
 
 from warpspace.cli.terminal import echo, escape_json
 from warpspace.exceptions import OptionError
+from warpspace.machine.axes import is_axis_name
 
 if TYPE_CHECKING:
     from warpspace.machine.description import Machine
@@ -117,7 +118,7 @@ def parse_point(text: str, axes: Collection[str], option: str = "--at") -> dict[
             value = float(number)
         except ValueError:
             value = math.nan
-        if not equals or not math.isfinite(value) or len(name) != 1:
+        if not equals or not math.isfinite(value) or not (len(name) == 1 or is_axis_name(name)):
             raise OptionError(f"{option} {text!r}: {part.strip()!r} cannot be read; {expected}")
         if name not in axes:
             known = ", ".join(axes)

@@ -1,18 +1,17 @@
 """Description of a machine: its kinematic chain, frame offsets, travels and directions."""
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from warpspace.exceptions import ChainError, UnknownNameError
+from warpspace.exceptions import UnknownNameError
 from warpspace.machine.axes import (
     LINEAR_LETTERS,
-    MAX_AXES,
     direction_index,
-    is_axis_name,
     is_linear,
-    sort_axes,
 )
+from warpspace.machine.body_source import BodySource
+from warpspace.machine.chain import Chain, parse_chain
+from warpspace.machine.gantry import Gantry, default_across
 from warpspace.machine.parameters import axis_parameters, default_keys
 
 Vector = tuple[float, float, float]
@@ -32,74 +31,6 @@ _DEFAULT_TRAVEL: Mapping[str, Range] = {
 def default_travel(axis: str) -> Range:
     """Give the travel of an axis that none is given for, mm or degrees."""
     return _DEFAULT_TRAVEL[axis[0]]
-
-
-@dataclass(frozen=True, slots=True)
-class Chain:
-    """Order of the axes from the workpiece through the frame to the tool.
-
-    Attributes
-    ----------
-    workpiece : tuple of str
-        Axes that carry the workpiece, from the frame outwards.
-    tool : tuple of str
-        Axes that carry the tool, from the frame outwards.
-    """
-
-    workpiece: tuple[str, ...]
-    tool: tuple[str, ...]
-
-    @property
-    def axes(self) -> tuple[str, ...]:
-        """All axes of the machine in the order X Y Z U V W A B C."""
-        return sort_axes({*self.workpiece, *self.tool})
-
-    def __str__(self) -> str:
-        """Write the chain in its canonical spelling, for instance ``wCBFXYZt``."""
-        return f"w{''.join(reversed(self.workpiece))}F{''.join(self.tool)}t"
-
-
-def parse_chain(text: str) -> Chain:
-    """Read a kinematic chain written from the workpiece over the frame to the tool.
-
-    Parameters
-    ----------
-    text : str
-        For instance ``wCBFXYZt``, ``(w)CBFXYZ(t)``, ``[w C' B' b X Y Z t]`` or ``wC2XFZC1t``.
-        Brackets, primes, blanks, hyphens and a small ``b`` for the frame are accepted.
-
-    Returns
-    -------
-    Chain
-
-    Raises
-    ------
-    ChainError
-        If it does not run from w to t over one frame with one to eight different axes.
-    """
-    bare = re.sub(r"[\s()\[\]{}'’′\-–_]", "", text)
-    expected = (
-        "expected w, axes (a letter of X Y Z U V W A B C and an optional digit), F (or b), axes, t;"
-        " for instance wCBFXYZt or wC2XFZC1t"
-    )
-    matched = re.fullmatch(r"[wW]((?:[A-Z][0-9]*)*?)(b|F)((?:[A-EG-Z][0-9]*)*)[tT]", bare)
-    if matched is None:
-        raise ChainError(f"chain {text!r} cannot be read; {expected}")
-    workpiece, tool = (tuple(re.findall(r"[A-Z][0-9]*", matched[side])) for side in (1, 3))
-    axes = workpiece + tool
-    unknown = sorted({name for name in axes if not is_axis_name(name)})
-    if unknown:
-        raise ChainError(f"chain {text!r} has unknown axis {', '.join(unknown)}; {expected}")
-    twice = sorted({name for name in axes if axes.count(name) > 1})
-    if twice:
-        raise ChainError(
-            f"chain {text!r} has axis {', '.join(twice)} twice; expected each name once"
-            f" (a digit tells them apart: {twice[0][0]}1, {twice[0][0]}2)"
-        )
-    if not 1 <= len(axes) <= MAX_AXES:
-        found = f"{len(axes)} axes" if axes else "no axis"
-        raise ChainError(f"chain {text!r} has {found}; expected one to eight")
-    return Chain(tuple(reversed(workpiece)), tool)
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,10 +89,16 @@ class Machine:
         end of the workpiece branch, each in the frame before it, mm.
     fixed_deg : mapping of str to tuple of float, (3,)
         Their fixed rotations, degrees, as those of axes.
+    bodies : mapping of str to BodySource
+        Bodies of frames that the description gives; all others are generated.
+    source : str
+        Where its structure is published.
     name, title : str
         Short name and full name.
     body_dir : str
         Folder with the schematic bodies, empty where there are none.
+    gantries : mapping of str to Gantry
+        Linear axes that stand on two guides.
     """
 
     chain: Chain
@@ -171,6 +108,9 @@ class Machine:
     title: str = ""
     body_dir: str = ""
     fixed_deg: Mapping[str, Vector] = field(default_factory=dict[str, Vector])
+    gantries: Mapping[str, Gantry] = field(default_factory=dict[str, Gantry])
+    bodies: Mapping[str, BodySource] = field(default_factory=dict[str, BodySource])
+    source: str = ""
 
     def axis(self, name: str) -> Axis:
         """Look up an axis by its name.
@@ -237,9 +177,11 @@ def build_machine(
     rotation_deg: Mapping[str, Vector] | None = None,
     travel: Mapping[str, Range] | None = None,
     direction: Mapping[str, int] | None = None,
+    gantry: Mapping[str, tuple[float, str | None]] | None = None,
     name: str = "machine",
     title: str = "",
     body_dir: str = "",
+    source: str = "",
 ) -> Machine:
     """Put a machine together from its chain and the tables that go with it.
 
@@ -256,8 +198,11 @@ def build_machine(
         Lower and upper end of each axis, mm or degrees.
     direction : mapping of str to int, optional
         +1 or −1; absent is +1.
-    name, title, body_dir : str, optional
-        Short name, full name, folder of the schematic bodies.
+    gantry : mapping of str to (float, str or None), optional
+        Linear axes on two guides: distance of the guides in mm, and the direction "x", "y" or "z"
+        in which they lie apart (None for the other horizontal one).
+    name, title, body_dir, source : str, optional
+        Short name, full name, folder of the schematic bodies, where its structure is published.
 
     Returns
     -------
@@ -283,4 +228,9 @@ def build_machine(
     }
     fixed = {frame: offsets.get(frame, ORIGIN) for frame in FIXED_FRAMES}
     turned = {frame: rotations[frame] for frame in FIXED_FRAMES if frame in rotations}
-    return Machine(parsed, axes, fixed, name, title or name, body_dir, turned)
+    gantries = {
+        axis: Gantry(axis, span_mm, across or default_across(axis))
+        for axis, (span_mm, across) in (gantry or {}).items()
+    }
+    names = (name, title or name, body_dir)
+    return Machine(parsed, axes, fixed, *names, turned, gantries, source=source)

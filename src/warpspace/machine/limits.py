@@ -12,6 +12,8 @@ MAX_ERROR = 1e5
 """100 mm in µm and 0.1 rad in µrad: no rigid-body model of small errors holds beyond."""
 MAX_LENGTH_MM = 1e5
 """Of coordinates, offsets, travels (mm or degrees) and phases."""
+GANTRY_SPAN_MM = (1.0, MAX_LENGTH_MM)
+"""Between the two guides of a gantry."""
 FULL_TURN_DEG = 360.0
 """Of the fixed rotation of a frame."""
 MIN_SPAN = 1e-6

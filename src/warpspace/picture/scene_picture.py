@@ -14,6 +14,7 @@ from warpspace.picture.exaggeration import Exaggeration, choose_exaggeration
 from warpspace.picture.model import Picture, coloured_values
 from warpspace.picture.size import picture_size_mm
 from warpspace.picture.traces import TraceLines, evaluate_traces
+from warpspace.picture.words import convention_value
 from warpspace.scene.model import Scene
 from warpspace.scene.pipeline import choose_view, evaluate
 from warpspace.scene.save import scene_to_toml
@@ -47,7 +48,7 @@ class ScenePicture(Picture):
         return {
             "loop": str(self.view.loop),
             "reference": "absolute" if reference is None else dict(reference),
-            "component_errors": str(self.scene.model.component_errors),
+            "component_errors": convention_value(self.scene.model),
             "model": "first order",
             "nodes": list(self.grid.shape),
             "exaggeration": self.exaggeration,
@@ -66,7 +67,7 @@ class ScenePicture(Picture):
             "reference": "absolute"
             if held is None
             else " ".join(f"{axis}={at:g}" for axis, at in held.items()),
-            "component_errors": str(self.scene.model.component_errors),
+            "component_errors": _one_text(convention_value(self.scene.model)),
             "model": "first order",
             "conditions": "; ".join(self.conditions),
             "program": f"warpspace {__version__}",
@@ -94,6 +95,13 @@ class ScenePicture(Picture):
             },
             "scene_toml": scene_to_toml(scene),
         }
+
+
+def _one_text(value: str | dict[str, str]) -> str:
+    """Spell a value that may differ between axes in one text."""
+    if isinstance(value, str):
+        return value
+    return " ".join(f"{axis}={name}" for axis, name in value.items())
 
 
 def evaluate_picture(

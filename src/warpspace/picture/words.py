@@ -3,8 +3,8 @@
 import math
 from collections.abc import Sequence
 
-from warpspace.kinematics.conventions.registry import find_convention
-from warpspace.kinematics.model import Loop
+from warpspace.kinematics.conventions.convention import Convention
+from warpspace.kinematics.model import Loop, Model
 from warpspace.picture.coordinates import MINUS, list_axes
 from warpspace.scene.model import Scene
 from warpspace.units import Array
@@ -98,9 +98,41 @@ def range_words(low: float, high: float, unit: str) -> str:
     return f"range fixed {spell_short(low)}{between}{spell_short(high)} {unit}"
 
 
+def convention_groups(model: Model) -> tuple[tuple[Convention, tuple[str, ...]], ...]:
+    """Give the conventions that axes of a machine have, each with its axes."""
+    axes = model.machine.axes
+    return tuple(
+        (model.convention(own[0]), own)
+        for name in model.convention_names
+        if (own := tuple(axis for axis in axes if model.convention(axis).name == name))
+    )
+
+
 def convention_words(scene: Scene) -> str:
-    """Say where component errors act."""
-    return find_convention(scene.model.component_errors).short_words
+    """Say where component errors act; where axes differ, those of which axes."""
+    groups = convention_groups(scene.model)
+    if len(groups) == 1:
+        return groups[0][0].short_words
+    parts = [f"{convention.place} of {' '.join(axes)}" for convention, axes in groups]
+    return f"component errors {', '.join(parts)}"
+
+
+def convention_sentences(scene: Scene) -> tuple[str, ...]:
+    """Say what the conventions of a scene mean, one sentence each."""
+    groups = convention_groups(scene.model)
+    if len(groups) == 1:
+        return (groups[0][0].sentence,)
+    return tuple(
+        f"Component errors of {', '.join(axes)} {convention.meaning} ({convention.place})."
+        for convention, axes in groups
+    )
+
+
+def convention_value(model: Model) -> str | dict[str, str]:
+    """Spell the convention as scene files do: one name, or the name of each axis."""
+    if len(model.convention_names) == 1:
+        return model.convention_names[0]
+    return {axis: model.convention(axis).name for axis in model.machine.axes}
 
 
 def quantity_words(component: str, unit: str = "µm") -> str:

@@ -1,6 +1,7 @@
 """From a raw document to a scene: every section validated, everything cross-checked."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,10 @@ from warpspace.machine.errors import ErrorFunction, ErrorSet, Harmonics
 from warpspace.machine.limits import MAX_ERROR
 from warpspace.machine.parameters import PARAMETERS, ErrorKind
 from warpspace.machine.tolerances import TOLERANCE_CLASSES, Tolerance, ToleranceSet
+from warpspace.scene.bodies import body_notes, read_bodies
 from warpspace.scene.conventions import component_orders
 from warpspace.scene.curves import read_curve
+from warpspace.scene.guides import is_guides, read_guides
 from warpspace.scene.model import Scene
 from warpspace.scene.sections import Problems
 from warpspace.scene.volume import read_workspace
@@ -23,6 +26,7 @@ SECTIONS = (
     "title",
     "description",
     "machine",
+    "bodies",
     "convention",
     "workspace",
     "points_mm",
@@ -74,6 +78,9 @@ def build_scene(
     for key in raw:
         if key not in SECTIONS:
             problems.unknown("", key, SECTIONS, "key")
+    if machine is not None and "bodies" in raw:
+        own = read_bodies(raw["bodies"], machine, folder, problems)
+        machine = replace(machine, bodies={**machine.bodies, **own})
     machine = machine or STAND_IN
     texts = {
         key: problems.validate("text", key, raw[key])
@@ -108,6 +115,7 @@ def build_scene(
             *_travel_notes(machine, workspace),
             *_carried_notes(machine, errors),
             *_costly_notes(errors),
+            *body_notes(machine),
         ),
     )
 
@@ -155,17 +163,22 @@ def _errors(
         where, row = f"errors.{key}", PARAMETERS[key]
         low, high = workspace.ranges[row.axis]
         span = (low, high) if low < high else machine.axes[row.axis].travel
-        function = read_curve(value, span, where, folder, problems, constant=row.is_constant)
-        if function is None:
-            continue
-        peak = function.amplitude
-        if machine is not STAND_IN and not abs(peak) <= MAX_ERROR:
-            problems.add(
-                where,
-                f"reaches {peak:g} {row.unit} within {span[0]:g} … {span[1]:g};"
-                f" expected at most ±{MAX_ERROR:g}",
-            )
-        found[key] = function
+        if is_guides(value):
+            given = {name for name in problems.table("", raw) if name != key}
+            curves = read_guides(key, value, span, where, folder, problems, machine, given)
+        else:
+            curve = read_curve(value, span, where, folder, problems, constant=row.is_constant)
+            curves = {} if curve is None else {key: curve}
+        for name, function in curves.items():
+            peak = function.amplitude
+            if machine is not STAND_IN and not abs(peak) <= MAX_ERROR:
+                which = "" if name == key else f"gives {name}, which "
+                problems.add(
+                    where,
+                    f"{which}reaches {peak:g} {PARAMETERS[name].unit} within {span[0]:g} …"
+                    f" {span[1]:g}; expected at most ±{MAX_ERROR:g}",
+                )
+        found |= curves
     return ErrorSet(found)
 
 

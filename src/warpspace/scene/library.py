@@ -104,7 +104,7 @@ def parse_scene(
     problems = Problems()
     given = raw.get("machine")
     if not isinstance(given, str):
-        machine = machine_of(given, "machine", name, problems)
+        machine = machine_of(given, "machine", name, problems, folder=folder)
     elif given in machine_names():
         machine = load_machine(given)
     else:

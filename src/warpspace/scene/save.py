@@ -1,11 +1,13 @@
 """Scenes back into the file format: the text reloads to the identical scene."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
 from typing import cast
 
 import tomli_w
 
 from warpspace.exceptions import SceneError
+from warpspace.machine.body_source import BodySource
 from warpspace.machine.description import ORIGIN, Machine, default_travel
 from warpspace.machine.limits import MIN_NUMBER
 from warpspace.machine.parameters import PARAMETERS, Parameter
@@ -45,6 +47,7 @@ def scene_to_toml(scene: Scene) -> str:
     parts = [tomli_w.dumps(head, multiline_strings="\r" not in scene.description)]
     if not bundled:
         parts += _machine_sections(scene.machine)
+    parts.append(_bodies_section(scene.machine))
     convention: dict[str, object] = {"component_errors": _component_errors(scene)}
     if {*scene.machine.reference_keys} & {*scene.errors, *scene.tolerances.own}:
         convention["reference_axis"] = "free"
@@ -74,9 +77,24 @@ def _is_bundled(machine: Machine) -> bool:
     if machine.name not in machine_names():
         return False
     try:
-        return load_machine(machine.name) == machine
+        known = load_machine(machine.name)
     except SceneError:
         return False
+    return replace(known, bodies=machine.bodies) == machine
+
+
+def _bodies_section(machine: Machine) -> str:
+    """Spell the bodies that are not those of the bundled machine."""
+    known = load_machine(machine.name).bodies if _is_bundled(machine) else {}
+    values: dict[str, object] = {}
+    for frame, source in machine.bodies.items():
+        if known.get(frame) == source:
+            continue
+        plain = BodySource(source.file, source.path)
+        entries = asdict(source)
+        del entries["path"]
+        values[frame] = source.file if source == plain else {k: v for k, v in entries.items() if v}
+    return _section("bodies", values)
 
 
 def _machine_sections(machine: Machine) -> list[str]:
@@ -90,12 +108,18 @@ def _machine_sections(machine: Machine) -> list[str]:
         if axis.travel != default_travel(name)
     }
     direction = {name: axis.direction for name, axis in machine.axes.items() if axis.direction != 1}
+    gantry = {
+        name: {"span_mm": one.span_mm, "across": one.across}
+        for name, one in machine.gantries.items()
+    }
+    source = {"source": machine.source} if machine.source else {}
     return [
-        _section("machine", {"title": machine.title, "chain": str(machine.chain)}),
+        _section("machine", {"title": machine.title, "chain": str(machine.chain)} | source),
         _section("machine.offset_mm", {k: v for k, v in offsets.items() if v != ORIGIN}),
         _section("machine.rotation_deg", {k: v for k, v in turned.items() if v != ORIGIN}),
         _section("machine.travel", travel),
         _section("machine.direction", direction),
+        _section("machine.gantry", gantry),
     ]
 
 

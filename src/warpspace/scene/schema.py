@@ -17,9 +17,12 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from warpspace.kinematics.conventions.registry import convention_names
+from warpspace.machine.body_source import MESH_UNITS, TOOL_SHAPES
+from warpspace.machine.curves.table import MAX_FILE_NAME
 from warpspace.machine.limits import (
     EXAGGERATION,
     FULL_TURN_DEG,
+    GANTRY_SPAN_MM,
     MAX_ERROR,
     MAX_LENGTH_MM,
     MAX_TEXT,
@@ -113,16 +116,48 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+class GantrySection(Section):
+    """An axis on two guides."""
+
+    span_mm: Annotated[Finite, Field(ge=GANTRY_SPAN_MM[0], le=GANTRY_SPAN_MM[1])]
+    across: Literal["x", "y", "z"] | None = None
+
+
 class MachineSection(Section):
     """A machine, inline in a scene or in a file of its own."""
 
     title: Text = ""
     description: Text = ""
+    source: Text = ""
     chain: Annotated[str, Field(strict=True, max_length=100)]
     offset_mm: dict[str, Point] = {}
     rotation_deg: dict[str, Turn] = {}
     travel: dict[str, Span] = {}
     direction: dict[str, Annotated[Literal[1, -1], BeforeValidator(_whole_number)]] = {}
+    gantry: dict[str, GantrySection] = {}
+    bodies: dict[str, object] = {}
+
+
+def _one_of(names: tuple[str, ...]) -> BeforeValidator:
+    """Refuse what is none of some names."""
+
+    def check(value: object) -> object:
+        if value not in names:
+            expected = ", ".join(f'"{name}"' for name in names)
+            raise PydanticCustomError("one_of", "expected one of {names}", {"names": expected})
+        return value
+
+    return BeforeValidator(check)
+
+
+class BodySection(Section):
+    """The body of one frame: a mesh with its unit and its place, or the shape of a tool."""
+
+    file: Annotated[str, Field(strict=True, max_length=MAX_FILE_NAME)] = ""
+    unit: Annotated[str, _one_of(MESH_UNITS)] | None = None
+    offset_mm: Point = (0.0, 0.0, 0.0)
+    rotation_deg: Turn = (0.0, 0.0, 0.0)
+    shape: Annotated[str, _one_of(TOOL_SHAPES)] = ""
 
 
 class ConventionSection(Section):

@@ -9,6 +9,7 @@ from warpspace.exceptions import SHOWN_PROBLEMS, near_miss
 from warpspace.scene.schema import (
     ALTERNATIVES,
     TAG_AT,
+    BodySection,
     ConventionSection,
     DefaultTolerances,
     MachineSection,
@@ -24,6 +25,7 @@ from warpspace.scene.words import location, spell_value
 _ADAPTERS: dict[str, TypeAdapter[Any]] = {
     "text": TypeAdapter(Text),
     "machine": TypeAdapter(MachineSection),
+    "body": TypeAdapter(BodySection),
     "convention": TypeAdapter(ConventionSection),
     "range": TypeAdapter(RangeSpec),
     "points_mm": TypeAdapter(PointsSection),
@@ -49,6 +51,7 @@ _FIELDS = {
     name: tuple(model.model_fields)
     for name, model in (
         ("machine", MachineSection),
+        ("body", BodySection),
         ("convention", ConventionSection),
         ("points_mm", PointsSection),
         ("tolerance", ToleranceSpec),

@@ -3,6 +3,7 @@ import pytest
 
 import warpspace
 from warpspace.bodies.body_file import BODY_FILE
+from warpspace.bodies.generated.generate import generate_bodies
 from warpspace.bodies.placed import load_bodies, place_points, view_motions
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import View, build_basis
@@ -105,9 +106,10 @@ def test_bent_tool_point_lies_in_the_deformed_grid(scene, bodies):
                 assert drawn == pytest.approx(tip + factor * 1e-3 * field.error_um, abs=1e-9)
 
 
-def test_machine_without_bodies_and_broken_file(tmp_path):
-    assert load_bodies(build_machine("wFXYZt")) == ()
-    assert load_bodies(build_machine("wFXYZt", body_dir=str(tmp_path))) == ()
+def test_machine_without_a_file_of_bodies_has_generated_ones_and_a_broken_file_is_refused(tmp_path):
+    generated = generate_bodies(build_machine("wFXYZt"))
+    assert load_bodies(build_machine("wFXYZt")) == generated
+    assert load_bodies(build_machine("wFXYZt", body_dir=str(tmp_path))) == generated
     (tmp_path / "bad").mkdir()
     (tmp_path / "bad" / BODY_FILE).write_bytes(b"not a file of arrays")
     with pytest.raises(OptionError, match="no file of machine bodies"):

@@ -78,5 +78,5 @@ def test_broken_file_is_named(tmp_path):
 
 def test_every_machine_stores_its_bodies_once():
     for folder in (assets_dir() / "machines").iterdir():
-        stored = {path.suffix for path in folder.iterdir()} - {".toml", ".py", ""}
+        stored = {path.suffix for path in folder.iterdir()} - {".toml", ".py", ".png", ""}
         assert stored <= {".glb"}, folder.name

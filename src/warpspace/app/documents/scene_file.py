@@ -145,7 +145,7 @@ def _recognised(scene: Scene) -> Scene:
             key: replace(axis, direction=known.axes[key].direction, travel=known.axes[key].travel)
             for key, axis in machine.axes.items()
         }
-        same = replace(known, axes=machine.axes)
+        same = replace(known, axes=machine.axes, bodies=machine.bodies or known.bodies)
         offsets = (
             machine.fixed_mm == known.fixed_mm
             and machine.fixed_deg == known.fixed_deg

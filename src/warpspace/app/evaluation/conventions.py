@@ -49,7 +49,7 @@ def reference_spans(scene: Scene) -> dict[str, Span]:
     return {
         name: Span(*(ranges.get(name) or scene.machine.axes[name].travel), 1.0)
         for name in scene.machine.axes
-        if is_linear(name)
+        if is_linear(name) or name in scene.workspace.volume_axes
     }
 
 
@@ -121,6 +121,7 @@ def with_own_conventions(state: AppState) -> AppState:
     model = replace(
         state.scene.model,
         component_errors=own.model.component_errors,
+        own_component_errors=own.model.own_component_errors,
         machine=replace(state.scene.machine, axes=axes),
     )
     return _with_scene(state, replace(state.scene, model=model, reference=held or None))

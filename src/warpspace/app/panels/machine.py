@@ -12,8 +12,7 @@ from warpspace.app.panels import PanelContext
 from warpspace.app.readouts.places import tool_point_html
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import linear_positions, linear_spans
-from warpspace.bodies.placed import load_bodies
-from warpspace.machine.axes import is_linear
+from warpspace.bodies.own_meshes import check_meshes
 from warpspace.scene.model import Scene
 
 SWITCHES = {
@@ -30,7 +29,7 @@ SWITCHES = {
         "Every body takes the errors before it, with the exaggeration of the box. Off: nominal.",
     ),
 }
-NO_BODIES = "This machine comes without bodies; its tool point is drawn all the same."
+OPEN_MESH = "The surface of a mesh of this machine is not closed; it is drawn as it is."
 
 
 class MachinePanel:
@@ -54,7 +53,7 @@ class MachinePanel:
             for name, (text, hint) in SWITCHES.items()
         }
         self._place = Handle(context.gui.add_html(""))
-        self._note: Any = context.gui.add_markdown(NO_BODIES, visible=False)
+        self._note: Any = context.gui.add_markdown(OPEN_MESH, visible=False)
         self._home: Any = context.gui.add_folder("Axis positions")
         self._built_for: Scene | None = None
         self._sliders: dict[str, Any] = {}
@@ -82,7 +81,7 @@ class MachinePanel:
         with self._home:
             self._sliders = {
                 axis: self._context.gui.add_slider(
-                    f"Machine {axis} [{'mm' if is_linear(axis) else '°'}]",
+                    f"Machine {axis} [{state.scene.machine.axes[axis].unit}]",
                     min=span.low,
                     max=span.high,
                     step=span.step,
@@ -132,7 +131,7 @@ class MachinePanel:
         self._place.put(content=tool_point_html(*standing(state, machine_positions(state))))
         for name, switch in self._switches.items():
             switch.show(getattr(state.machine, name))
-        self._note.visible = state.machine.shown and not load_bodies(state.scene.machine)
+        self._note.visible = state.machine.shown and bool(check_meshes(state.scene.machine))
         for axis, value in linear_positions(state.scene, state.machine).items():
             if axis in self._linear:
                 self._linear[axis].show(value)

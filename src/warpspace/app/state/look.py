@@ -185,12 +185,13 @@ def slice_spans(scene: Scene) -> dict[str, Span]:
 
 
 def linear_spans(scene: Scene) -> dict[str, Span]:
-    """Give the ranges of the linear axes of a scene, mm: travels, widened by the workspace.
+    """Give the ranges of the axes that move within the volume, mm or degrees.
 
-    Rotary axes that span the working volume are moved like these, in degrees.
+    These are the linear axes, and rotary ones that span the volume; travels, widened by the
+    workspace.
     """
-    found: dict[str, Span] = {}
     spanning = scene.workspace.volume_axes
+    found: dict[str, Span] = {}
     for name in scene.machine.axes:
         if not is_linear(name) and name not in spanning:
             continue

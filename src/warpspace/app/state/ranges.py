@@ -93,10 +93,10 @@ def amplitude_spans(scene: Scene) -> dict[str, Span]:
 
 
 def position_spans(scene: Scene) -> dict[str, Span]:
-    """Give the ranges of the rotary axes of a scene, degrees, by axis.
+    """Give the ranges of the rotary axes that the volume is drawn at, degrees, by axis.
 
-    They are the travels, widened where the scene itself stands beyond. An axis that spans the
-    working volume, as those of a SCARA do, stands nowhere and has none.
+    They are the travels, widened where the scene itself stands beyond. Rotary axes that span the
+    volume are not among them.
     """
     at, spanning = scene.workspace.positions, scene.workspace.volume_axes
     return {

@@ -14,10 +14,12 @@ def check(scene: str, *, as_json: bool) -> None:
 
     All problems of a file are reported at once, each with its key, its value and what was expected.
     """
+    from warpspace.bodies.own_meshes import check_meshes
     from warpspace.scene.library import load_scene
     from warpspace.scene.pipeline import linearisation_error_um
 
     loaded = load_scene(scene)
+    notes = (*loaded.notes, *check_meshes(loaded.machine))
     difference = linearisation_error_um(loaded, 5)
     non_zero = [key for key in loaded.errors if loaded.errors.amplitude(key) != 0.0]
     if as_json:
@@ -30,7 +32,7 @@ def check(scene: str, *, as_json: bool) -> None:
                 "parameters": len(loaded.parameter_keys),
                 "non_zero": non_zero,
                 "linearisation_error_um": difference,
-                "notes": list(loaded.notes),
+                "notes": list(notes),
             }
         )
         return
@@ -42,5 +44,5 @@ def check(scene: str, *, as_json: bool) -> None:
     count = f"{len(non_zero)} of {len(loaded.parameter_keys)} parameters not zero"
     facts.append(("errors", count + (f": {', '.join(non_zero)}" if non_zero else "")))
     facts.append(("first order", f"differs from the exact chain by at most {difference:.2g} µm"))
-    facts.extend(("note", note) for note in loaded.notes)
+    facts.extend(("note", note) for note in notes)
     print_table((Column(leads=True), Column(wraps=True)), facts)

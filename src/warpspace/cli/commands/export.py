@@ -13,6 +13,7 @@ from warpspace.cli.options import (
     scene_argument,
 )
 from warpspace.cli.progress import progress
+from warpspace.cli.tables import print_text
 from warpspace.cli.terminal import echo
 
 
@@ -59,6 +60,11 @@ def export(
             component=component,
         )
         write_export(picture, target, overwrite=force)
+    kind = next(form for form in export_formats() if form.ending == target.suffix.lower())
+    if kind.left_out:
+        echo(f"{output}: {picture.scene.machine.title}, {size_text(target)}")
+        print_text(f"  {kind.left_out}")
+        return
     echo(
         f"{output}: {picture.scene.title}, displacement drawn ×{picture.exaggeration:g},"
         f" {size_text(target)}"

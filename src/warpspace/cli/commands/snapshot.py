@@ -9,7 +9,7 @@ from warpspace.cli.file_options import check_output, output_option
 from warpspace.cli.options import scene_argument
 from warpspace.cli.terminal import echo
 from warpspace.exceptions import OptionError, UnknownNameError
-from warpspace.outputs.figures.catalogue import figure_names
+from warpspace.outputs.figures.catalogue import figure_command, figure_names
 
 
 @click.command()
@@ -33,7 +33,8 @@ def snapshot(scene: str, output: str, figure: str, *, force: bool, **options: An
     from warpspace.scene.library import load_scene
 
     if figure in figure_names(scenes=2):
-        raise OptionError(f"figure {figure!r} takes two scenes: warpspace compare A B -o FILE")
+        command = figure_command(figure) or "compare A B -o FILE"
+        raise OptionError(f"figure {figure!r} takes two scenes or more: warpspace {command}")
     if figure not in figure_names():
         raise UnknownNameError("figure", figure, figure_names())
     target = check_output(output, FIGURE_ENDINGS, force=force, scenes=[scene])

@@ -67,11 +67,13 @@ def view(
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from warpspace.app.server.doors import Access
     from warpspace.app.server.run import run_viewer
+    from warpspace.bodies.own_meshes import check_meshes
     from warpspace.cli.services import build_services
     from warpspace.scene.library import load_scene, scene_names
 
     start = _stored_start(scene) if scene.lower().endswith(".vts") else None
     shown = start.scene if start else load_scene(scene)
+    check_meshes(shown.machine)
     bundled = {name: shown if name == scene else load_scene(name) for name in scene_names()}
     run_viewer(
         shown,

@@ -13,6 +13,7 @@ from warpspace.geometry.surfaces import (
     triangulate,
 )
 from warpspace.geometry.thicken import is_thin
+from warpspace.machine.axes import is_linear
 from warpspace.outputs.drawing.annotations import draw_corners, label_isolines
 from warpspace.outputs.drawing.axes3d import draw_axes
 from warpspace.outputs.drawing.canvas import Canvas
@@ -136,9 +137,14 @@ def fit_map(
 def map_room_mm(picture: Picture) -> Array:
     """Give what of a volume is to be seen, [n, 3], mm: where it is, where it is drawn.
 
-    Around a point also half the length it is sized by: its displacement is chosen for that.
+    Around a point also half the length it is sized by: its displacement is chosen for that. Of a
+    curved volume also the box about it, which its axes run along.
     """
     points = [picture.grid.nominal_mm.reshape(-1, 3), picture.drawn_mm.reshape(-1, 3)]
+    if any(axis and not is_linear(axis) for axis in picture.grid.axes):
+        nodes = np.concatenate(points)
+        x, y, z = np.stack([nodes.min(axis=0), nodes.max(axis=0)], -1)
+        points.append(np.stack(np.meshgrid(x, y, z), -1).reshape(-1, 3))
     if not picture.grid.longest_edge_mm > 0.0:
         around = 0.5 * picture.size_mm * np.array([[-1.0], [1.0]])
         points.append(picture.grid.bounds_mm + around)

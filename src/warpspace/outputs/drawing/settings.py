@@ -1,7 +1,7 @@
 """What a figure is asked for."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from warpspace.exceptions import OptionError
@@ -16,6 +16,7 @@ from warpspace.picture.model import Picture, choose_scale
 from warpspace.picture.scene_picture import ScenePicture, evaluate_picture
 from warpspace.picture.views import VIEWS
 from warpspace.picture.words import range_words
+from warpspace.scene.concepts import ConceptPlan
 from warpspace.scene.model import Scene
 
 
@@ -46,6 +47,8 @@ class FigureSettings:
         Whether somebody chose that end: the figure then says so.
     conditions : tuple of str
         What the figure must say beside its scenes, for instance "excluded: EA0Z".
+    concepts : ConceptPlan
+        How machines are sampled that are set side by side.
 
     Raises
     ------
@@ -63,6 +66,7 @@ class FigureSettings:
     range_top: float | None = None
     range_fixed: bool = False
     conditions: tuple[str, ...] = ()
+    concepts: ConceptPlan = field(default_factory=ConceptPlan)
 
     def __post_init__(self) -> None:
         """Check the values."""

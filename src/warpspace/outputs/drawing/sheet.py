@@ -126,8 +126,10 @@ def draw_footer(
     scenes: Sequence[Scene],
     legend: Sequence[LegendEntry],
     notes: Sequence[str] = (),
+    *,
+    errors: bool = True,
 ) -> float:
-    """Draw legend, parameters, convention and provenance at the bottom.
+    """Draw legend, parameters (where `errors` is true), convention and provenance at the bottom.
 
     Returns
     -------
@@ -143,14 +145,14 @@ def draw_footer(
     canvas.text(canvas.width - margin, y, source, size=size, colour=theme.muted, ha="right")
     left = room - canvas.text_size(source, size)[0] - canvas.px(24.0)
     words = [
-        convention_words(scenes[0]),
+        " / ".join(dict.fromkeys(map(convention_words, scenes))),
         "error = actual − nominal",
         "coordinates in the machine frame R",
         *notes,
     ]
     text, size = canvas.fit(" · ".join(words), left, SIZES.small)
     canvas.text(margin, y, text, size=size, colour=theme.muted)
-    for scene in reversed(scenes):
+    for scene in reversed(scenes if errors else ()):
         y += canvas.px(25.0)
         head = "errors: " if len(scenes) == 1 else f"errors of {scene.name}: "
         shown = _as_many(canvas, head, parameter_words(scene), room)
@@ -257,6 +259,7 @@ def start_sheet(
     exact: bool,
     panel: bool = True,
     notes: Sequence[str] = (),
+    errors: bool = True,
 ) -> Sheet:
     """Start a figure and draw what surrounds its content.
 
@@ -274,6 +277,8 @@ def start_sheet(
         Whether there is a column beside the content.
     notes : sequence of str, optional
         For the last line.
+    errors : bool, optional
+        Whether the errors of the scenes are listed at the bottom.
 
     Returns
     -------
@@ -283,7 +288,7 @@ def start_sheet(
     said = " · ".join(facts)
     facts = [*facts, *(words for words in settings.conditions if words not in said)]
     top = draw_heading(canvas, title, facts)
-    bottom = draw_footer(canvas, scenes, legend, notes)
+    bottom = draw_footer(canvas, scenes, legend, notes, errors=errors)
     return Sheet(
         canvas,
         title,

@@ -30,12 +30,15 @@ class ExportFormat:
         ``"module:function"``, imported when it is written, or the function itself.
     in_app : bool
         Whether the app offers it.
+    left_out : str
+        What of a scene has no place in it; said when it is written.
     """
 
     ending: str
     about: str
     write: str | Write
     in_app: bool = True
+    left_out: str = ""
 
     def load(self) -> Write:
         """Give the function that writes it."""
@@ -68,6 +71,14 @@ for _form in (
     ExportFormat(".glb", "3-D viewers, CAD", f"{_HERE}.glb:write_glb"),
     ExportFormat(".vts", "ParaView", f"{_HERE}.vts:write_vts"),
     ExportFormat(".csv", "the field", f"{_HERE}.table:write_csv"),
+    ExportFormat(
+        ".urdf",
+        "robot simulators: joints, limits, meshes",
+        f"{_HERE}.urdf:write_urdf",
+        in_app=False,
+        left_out="errors, tolerances, conventions, gantries, working volume, functional points and"
+        " view have no place in a URDF file: the machine is nominal",
+    ),
 ):
     register_format(_form)
 

@@ -30,7 +30,11 @@ class FigureKind:
     draw : str or callable
         ``"module:function"``, imported when it is drawn, or the function itself.
     scenes : int
-        How many scenes it is drawn from.
+        How many scenes it is drawn from ...
+    most_scenes : int or None
+        ... or at most, where that may differ.
+    command : str
+        The command that draws it where `snapshot` does not.
     evidence : bool
         Whether a report shows it after the error map of a scene.
     """
@@ -40,6 +44,8 @@ class FigureKind:
     draw: str | Draw
     scenes: int = 1
     evidence: bool = False
+    most_scenes: int | None = None
+    command: str = ""
 
     def load(self) -> Draw:
         """Give the function that draws it."""
@@ -66,6 +72,12 @@ def figure_kinds() -> tuple[FigureKind, ...]:
     """List the kinds of figures."""
     load_plugins()
     return tuple(_KINDS.values())
+
+
+def figure_command(name: str) -> str:
+    """Give the command that draws a figure of several scenes; empty for any other name."""
+    load_plugins()
+    return _KINDS[name].command if name in _KINDS else ""
 
 
 def figure_names(scenes: int = 1) -> tuple[str, ...]:
@@ -129,6 +141,15 @@ for _kind in (
         "Two scenes and their difference.",
         f"{_HERE}.comparison:draw_comparison",
         scenes=2,
+        command="compare A B -o FILE",
+    ),
+    FigureKind(
+        "concepts",
+        "Machines side by side within the same tolerances.",
+        f"{_HERE}.concepts:draw_concepts",
+        scenes=2,
+        most_scenes=8,
+        command="concepts SCENE… --plot FILE",
     ),
 ):
     register_figure(_kind)
@@ -168,7 +189,9 @@ def draw_figure(
     kind = _KINDS.get(name)
     if kind is None:
         raise UnknownNameError("figure", name, tuple(_KINDS))
-    if len(scenes) != kind.scenes:
+    most = kind.most_scenes or kind.scenes
+    if not kind.scenes <= len(scenes) <= most:
         words = "one scene" if kind.scenes == 1 else "two scenes"
+        words = words if most == kind.scenes else f"{kind.scenes} to {most} scenes"
         raise OptionError(f"figure {name!r} is drawn from {words}; given {len(scenes)}")
     return kind.load()(scenes, settings or FigureSettings(), exact=exact)

@@ -65,7 +65,7 @@ def draw_machine(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bo
     placed = bodies_of(picture, exaggeration)
     facts = [
         *scene_facts(picture, exaggeration),
-        "bodies schematic, deformed and tilted like their frames" if placed else "no bodies known",
+        "bodies schematic, deformed and tilted like their frames",
     ]
     sheet = start_sheet(settings, title, facts, scenes, _legend(), exact=exact)
     canvas = sheet.canvas

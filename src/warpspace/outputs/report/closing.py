@@ -8,19 +8,17 @@ from pathlib import Path
 import numpy as np
 
 from warpspace import __version__
-from warpspace.kinematics.conventions.registry import find_convention
 from warpspace.outputs.report import sections as parts
 from warpspace.outputs.report.blocks import Block, Code, Column, Items, Section, Text, table
 from warpspace.outputs.report.clock import report_time
 from warpspace.outputs.report.review import Review
 from warpspace.outputs.report.wording import factor_words, reference_words
-from warpspace.picture.words import spell
+from warpspace.picture.words import convention_sentences, spell
 from warpspace.scene.save import scene_to_toml
 
 
 def conventions(review: Review) -> Section:
     """How to read signs, frames and factors."""
-    first = review.scenes[0].scene
     items = [
         "Error = actual − nominal. Lengths in mm, errors in µm, small angles in µrad.",
         (
@@ -37,7 +35,7 @@ def conventions(review: Review) -> Section:
             parts.prefixed(letter, reference_words(reviewed.scene))
             for letter, reviewed in parts.letters(review)
         ),
-        find_convention(first.model.component_errors).sentence,
+        *_component_errors(review),
         f"In all pictures: {factor_words(review.exaggeration)}; the dashed box is nominal.",
         "First order in the errors; over a 5 × 5 × 5 grid the exact chain (full rotations, all"
         " products) differs by at most "
@@ -50,6 +48,14 @@ def conventions(review: Review) -> Section:
         "Sampled machines have one constant value per error and point, drawn independently.",
     ]
     return parts.section("Conventions", [Items(tuple(items))])
+
+
+def _component_errors(review: Review) -> list[str]:
+    """Say where component errors act; of each scene where they differ."""
+    found = [(letter, convention_sentences(one.scene)) for letter, one in parts.letters(review)]
+    if len({sentences for _, sentences in found}) == 1:
+        return list(found[0][1])
+    return [parts.prefixed(letter, text) for letter, sentences in found for text in sentences]
 
 
 def provenance(review: Review, files: Sequence[Path]) -> Section:

@@ -1,0 +1,1 @@
+"""Bodies of any machine, generated from its description alone."""

@@ -1,0 +1,144 @@
+"""A machine as URDF: its links, joints, limits and the meshes of its bodies."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warpspace.bodies.placed import load_bodies
+from warpspace.exceptions import OptionError
+from warpspace.kinematics.transforms import placed
+from warpspace.machine.axes import direction_index
+from warpspace.machine.description import Axis, Machine
+from warpspace.outputs.files import check_target, write_atomically
+from warpspace.picture.scene_picture import ScenePicture
+from warpspace.units import Array
+
+ROOT, LINKS = "frame", {"S": "spindle", "t": "tool", "w": "workpiece"}
+MM_PER_M = 1000.0
+EFFORT, VELOCITY = 1000.0, 1.0
+"""Of every joint: URDF asks for them, machines do not say."""
+
+
+def write_urdf(picture: ScenePicture, path: str | Path, *, overwrite: bool = True) -> None:
+    """Write the machine of a scene, nominal, with a mesh beside it for each frame with bodies.
+
+    Parameters
+    ----------
+    picture : ScenePicture
+    path : str or Path
+    overwrite : bool, optional
+        Whether existing files may be replaced.
+
+    Raises
+    ------
+    OutputError
+        If a file cannot be written.
+    OptionError
+        If yourdfpy is not installed.
+    """
+    try:
+        from yourdfpy import URDF
+    except ImportError:
+        raise OptionError(
+            "URDF files need the package yourdfpy; expected it installed (pip install"
+            " 'warpspace[urdf]')"
+        ) from None
+    target, machine = Path(path), picture.scene.machine
+    meshes = _meshes(picture)
+    files = {frame: target.with_name(f"{target.stem}_{frame}.stl") for frame in meshes}
+    for file in files.values():
+        check_target(file, overwrite=overwrite)
+    robot = build_robot(machine, {frame: file.name for frame, file in files.items()})
+    for frame, file in files.items():
+        with write_atomically(file, overwrite=overwrite) as temporary:
+            meshes[frame].export(temporary, file_type="stl")
+    with write_atomically(target, overwrite=overwrite) as temporary:
+        model = URDF(robot, build_scene_graph=False, filename_handler=lambda name: name)
+        model.write_xml_file(str(temporary))
+
+
+def _meshes(picture: ScenePicture) -> dict[str, Any]:
+    """Put the bodies of each frame together, mm in that frame."""
+    import trimesh
+
+    parts: dict[str, list[Any]] = {}
+    for body in load_bodies(picture.scene.machine):
+        mesh = trimesh.Trimesh(body.vertices_mm, body.triangles, process=False)
+        parts.setdefault(body.frame, []).append(mesh)
+    return {frame: trimesh.util.concatenate(own) for frame, own in parts.items()}
+
+
+def build_robot(machine: Machine, meshes: dict[str, str]) -> Any:
+    """Build the links and joints of a machine.
+
+    Parameters
+    ----------
+    machine : Machine
+    meshes : dict of str to str
+        Frame (R, an axis, S, t or w) to the name of its mesh, mm.
+
+    Returns
+    -------
+    yourdfpy.urdf.Robot
+        Joints have the names of the axes; the links of both ends are called tool and workpiece.
+    """
+    from yourdfpy import urdf
+
+    links = [_link(ROOT, "R", meshes)]
+    joints: list[Any] = []
+    for side in ("tool", "workpiece"):
+        parent = ROOT
+        for axis in machine.branch(side):
+            child = f"link_{axis.name}"
+            links.append(_link(child, axis.name, meshes))
+            joints.append(_moving(axis, parent, child))
+            parent = child
+        for frame, offset, turn in machine.end_frames(side):
+            child = LINKS[frame]
+            links.append(_link(child, frame, meshes))
+            origin = _metres(placed(offset, turn))
+            joints.append(urdf.Joint(f"{child}_fixed", "fixed", parent, child, origin))
+            parent = child
+    name = re.sub(r"[^\w.-]+", "_", machine.name) or "machine"
+    return urdf.Robot(name, links=links, joints=joints)
+
+
+def _link(name: str, frame: str, meshes: dict[str, str]) -> Any:
+    """Build a link with the mesh of its frame."""
+    from yourdfpy import urdf
+
+    visuals: list[Any] = []
+    if frame in meshes:
+        scale = np.full(3, 1.0 / MM_PER_M)
+        geometry = urdf.Geometry(mesh=urdf.Mesh(meshes[frame], scale))
+        visuals.append(urdf.Visual(name, np.eye(4), geometry))
+    return urdf.Link(name, visuals=visuals)
+
+
+def _moving(axis: Axis, parent: str, child: str) -> Any:
+    """Build the joint of an axis."""
+    from yourdfpy import urdf
+
+    direction = np.zeros(3)
+    direction[direction_index(axis.name)] = float(axis.direction)
+    low, high = axis.travel if axis.is_linear else np.deg2rad(axis.travel).tolist()
+    if axis.is_linear:
+        low, high = low / MM_PER_M, high / MM_PER_M
+    return urdf.Joint(
+        axis.name,
+        "prismatic" if axis.is_linear else "revolute",
+        parent,
+        child,
+        _metres(placed(axis.offset_mm, axis.rotation_deg)),
+        direction,
+        limit=urdf.Limit(EFFORT, VELOCITY, float(low), float(high)),
+    )
+
+
+def _metres(pose: Array) -> Array:
+    """Give a pose in metres, [4, 4]."""
+    found = np.array(pose, dtype=float)
+    found[:3, 3] /= MM_PER_M
+    return found

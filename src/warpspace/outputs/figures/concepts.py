@@ -1,0 +1,190 @@
+"""Machines side by side within the same tolerances: one scale of length, one of colours."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from warpspace.machine.parameters import parameter
+from warpspace.outputs.drawing.canvas import Canvas
+from warpspace.outputs.drawing.content import Drawing, DrawnMap
+from warpspace.outputs.drawing.legend import LegendEntry, grid_symbol, isoline_symbol
+from warpspace.outputs.drawing.lines import split_visible
+from warpspace.outputs.drawing.map3d import draw_map
+from warpspace.outputs.drawing.panel import draw_panel
+from warpspace.outputs.drawing.projection import Projection, Rect, fit_projection
+from warpspace.outputs.drawing.settings import FigureSettings, shared_colours
+from warpspace.outputs.drawing.sheet import metadata, start_sheet
+from warpspace.outputs.drawing.style import SIZES
+from warpspace.outputs.figures.error_map import isoline_words
+from warpspace.outputs.figures.machine import bodies_of, render_placed
+from warpspace.picture.bodies import PlacedBody
+from warpspace.picture.concepts import ConceptPicture, picture_concept
+from warpspace.picture.views import view_words
+from warpspace.picture.words import LOOP_WORDS, spell, spell_count, spell_short
+from warpspace.scene.concepts import Concept, compare_concepts
+from warpspace.scene.model import Scene
+from warpspace.units import Array
+
+LETTERS = "ABCDEFGH"
+BODY_ALPHA = 0.55
+CELL_HEAD, CELL_FOOT, AXIS_LABELS = 30.0, 74.0, 50.0
+"""Room in px above a picture for its title, below it for its numbers, and for labels of axes."""
+
+
+def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
+    """Draw machines within the same tolerances side by side.
+
+    Parameters
+    ----------
+    scenes : sequence of Scene
+    settings : FigureSettings
+        Its `concepts` says how machines are sampled.
+    exact : bool
+        Whether the figure becomes pixels of its own size.
+
+    Returns
+    -------
+    Drawing
+    """
+    plan = settings.concepts
+    concepts = compare_concepts(scenes, plan, loop=settings.loop)
+    pictures = [picture_concept(concept, settings.grid) for concept in concepts]
+    scale = shared_colours(replace(settings, component="norm"), pictures)
+    pictures = [replace(picture, colours=scale) for picture in pictures]
+    placed = [bodies_of(picture, 1.0) for picture in pictures]
+    title = f"Concepts within {'their own' if plan.own_tolerances else 'the same'} tolerances"
+    first = concepts[0]
+    facts = [
+        *([] if plan.own_tolerances else [_tolerance_words(first.scene)]),
+        f"{spell_count(plan.samples)} sampled machines each, {plan.distribution}",
+        "largest |E| of each" if plan.over == "max" else "|E| at a random point of each",
+        LOOP_WORDS[first.sampled.view.loop],
+        view_words(settings.view, (2, 2, 2)),
+    ]
+    legend = [LegendEntry(grid_symbol, "working volume, RMS of |E|")]
+    if isolines := isoline_words(scale):
+        legend.append(LegendEntry(isoline_symbol, isolines))
+    drawn = [concept.scene for concept in concepts]
+    sheet = start_sheet(settings, title, facts, drawn, legend, exact=exact, errors=False)
+    canvas = sheet.canvas
+    cells = _cells(sheet.content, len(pictures))
+    rooms = [_room(canvas, cell) for cell in cells]
+    seen = [_points_mm(*pair) for pair in zip(pictures, placed, strict=True)]
+    factor = min(
+        fit_projection(settings.view, points, room).px_per_mm
+        for points, room in zip(seen, rooms, strict=True)
+    )
+    maps: list[DrawnMap] = []
+    for index, picture in enumerate(pictures):
+        projection = _centred(seen[index], rooms[index], settings.view, factor)
+        _draw_bodies(canvas, placed[index], projection, settings)
+        maps.append(
+            draw_map(
+                canvas, picture, rooms[index], settings.view, labels=False,
+                projection=projection, annotate=None, ghost=False,
+            )
+        )  # fmt: skip
+        _draw_words(canvas, cells[index], LETTERS[index], concepts[index])
+    draw_panel(
+        canvas, sheet.panel, scale, "RMS |E|  [µm]", [],
+        [(f"mean {letter}", f"{spell(one.sampled.mean_um)} µm")
+         for letter, one in zip(LETTERS, concepts, strict=False)],
+        (factor, None),
+    )  # fmt: skip
+    about = metadata(title, drawn, settings, 1.0, "concepts")
+    return Drawing(canvas.figure, title, about, tuple(maps), tuple(canvas.rects))
+
+
+def _tolerance_words(scene: Scene) -> str:
+    """Spell the tolerances that all machines have."""
+    units = {"translation": "µm", "rotation": "µrad", "squareness": "µrad"}
+    parts = [
+        f"{name} ±{spell_short(value)} {units[name]}"
+        for name, value in scene.tolerances.default.items()
+    ]
+    return ", ".join(parts)
+
+
+def _cells(rect: Rect, count: int) -> list[Rect]:
+    """Divide a box into a cell for each picture, row by row."""
+    left, bottom, right, top = rect
+    columns = min(count, max(1, round(math.sqrt(count * (right - left) / (top - bottom)))))
+    rows = math.ceil(count / columns)
+    width, height = (right - left) / columns, (top - bottom) / rows
+    return [
+        (left + c * width, top - (r + 1) * height, left + (c + 1) * width, top - r * height)
+        for r, c in (divmod(index, columns) for index in range(count))
+    ]
+
+
+def _room(canvas: Canvas, cell: Rect) -> Rect:
+    """Leave room in a cell for title, numbers and the labels of axes."""
+    left, bottom, right, top = cell
+    side = min(canvas.px(AXIS_LABELS), 0.15 * (right - left))
+    foot = min(canvas.px(CELL_FOOT + AXIS_LABELS), 0.45 * (top - bottom))
+    head = min(canvas.px(CELL_HEAD), 0.15 * (top - bottom))
+    return (left + side, bottom + foot, right - side, top - head)
+
+
+def _points_mm(picture: ConceptPicture, placed: Sequence[PlacedBody]) -> Array:
+    """Collect what is to be seen, [n, 3], mm."""
+    parts = [picture.grid.nominal_mm.reshape(-1, 3), *(part.vertices_mm for part in placed)]
+    if not picture.grid.longest_edge_mm > 0.0:
+        parts.append(picture.grid.bounds_mm + 0.5 * picture.size_mm * np.array([[-1.0], [1.0]]))
+    return np.concatenate(parts)
+
+
+def _centred(points: Array, room: Rect, view: str, px_per_mm: float) -> Projection:
+    """Give the projection of a scale that puts points into the middle of a box."""
+    fitted = fit_projection(view, points, room)
+    scaled = replace(fitted, px_per_mm=px_per_mm)
+    spots = scaled.project(points)
+    middle = (spots.min(axis=0) + spots.max(axis=0)) / 2.0
+    wanted = np.array([(room[0] + room[2]) / 2.0, (room[1] + room[3]) / 2.0])
+    return scaled.moved(wanted - middle)
+
+
+def _draw_bodies(
+    canvas: Canvas, placed: Sequence[PlacedBody], projection: Projection, settings: FigureSettings
+) -> None:
+    """Draw the machine behind its working volume."""
+    raster = render_placed(placed, settings.theme, projection)
+    if raster is None:
+        return
+    rgba = (raster.reduced() if canvas.exact else raster.rgba).copy()
+    rgba[..., 3] = (rgba[..., 3] * BODY_ALPHA).astype(np.uint8)
+    canvas.image(rgba, raster.rect, zorder=0.8)
+    edges = [edge for part in placed for edge in part.edges_mm]
+    seen = [line for edge in edges for line in split_visible(edge, projection, raster)[0]]
+    canvas.lines(seen, width=SIZES.hair, colour=canvas.theme.grid, alpha=0.75, zorder=0.9)
+
+
+def _draw_words(canvas: Canvas, cell: Rect, letter: str, concept: Concept) -> None:
+    """Write the title of a machine above its picture, its numbers below."""
+    left, bottom, right, top = cell
+    room = right - left - canvas.px(16.0)
+    x, scene, found = left + canvas.px(8.0), concept.scene, concept.sampled
+    head, size = canvas.fit(f"{letter}  {scene.title}", room, SIZES.heading, "bold")
+    canvas.text(x, top - canvas.px(4.0), head, size=size, weight="bold", va="top")
+    numbers = [
+        f"mean {spell(found.mean_um)} µm",
+        f"P95 {spell(found.p95_um)} µm",
+        f"max {spell(found.max_um)} µm",
+    ]
+    if found.probability is not None:
+        kept = 100.0 * found.probability.probability
+        numbers.append(f"{kept:.1f} % within {spell_short(found.probability.spec_um)} µm")
+    lines = (
+        f"chain {scene.machine.chain}",
+        " · ".join(numbers),
+        " · ".join(
+            f"{row.key} {100.0 * row.share:.0f} % ({parameter(row.key).name})"
+            for row in concept.leading
+        ),
+    )
+    for index, line in enumerate(reversed(lines)):
+        text, size = canvas.fit(line, room, SIZES.small)
+        y = bottom + canvas.px(10.0 + 21.0 * index)
+        canvas.text(x, y, text, size=size, colour=canvas.theme.muted)

@@ -1,0 +1,1 @@
+"""Machines from URDF files, the format of robot simulators."""
