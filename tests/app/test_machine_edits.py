@@ -2,11 +2,15 @@
 
 import numpy as np
 import pytest
+from markupsafe import Markup
 
 from warpspace.app.documents.scene_file import open_text, state_to_toml
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.machine_edits.library import machine_types
 from warpspace.app.evaluation.machine_edits.updates import with_own_machine, with_word
+from warpspace.app.panels.commands import spell_change
+from warpspace.app.readouts.machine_editor.boxes import editor_html, editor_rows
+from warpspace.app.readouts.machine_editor.types import small_picture
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.edits import (
     with_excluded,
@@ -14,8 +18,9 @@ from warpspace.app.state.edits import (
     with_scene_tolerances,
     with_typed_amplitude,
 )
-from warpspace.app.state.history import History
+from warpspace.app.state.history import History, describe_change
 from warpspace.scene.library import load_scene, parse_scene
+from warpspace.scene.machines import machine_picture
 
 LIVE = LiveModel()
 
@@ -147,6 +152,50 @@ def test_every_machine_of_the_library_can_be_taken_and_drawn(state: AppState):
         changed = with_word(state, f"type {name}")
         LIVE.evaluate(changed)
         assert changed.scene.title == state.scene.title
+
+
+def test_the_sizes_of_a_new_machine_suit_any_chain(state: AppState):
+    for chain in ("wC2XFZC1t", "wBFXYZt", "wFC1C2Zt", "wXYZFt"):
+        changed = with_word(with_word(state, f"chain {chain}"), "sizes")
+        assert str(changed.scene.machine.chain) == chain
+        assert LIVE.evaluate(changed).grid.extent_mm.max() > 100.0
+        opened, _ = open_text(state_to_toml(changed), state.scene.name, "file")
+        for part in ("model", "workspace", "tolerances", "trace_points_mm", "notes"):
+            assert getattr(opened.scene, part) == getattr(changed.scene, part)
+        assert opened.amplitudes == pytest.approx(changed.amplitudes, rel=1e-12)
+
+
+def test_undo_says_that_it_was_the_machine(state: AppState):
+    changed = with_word(state, "chain wBFXYZt").without_notes()
+    assert spell_change(describe_change(state, changed)) == "machine"
+    other = state.with_scene(load_scene("teach_tilted_c"))
+    assert spell_change(describe_change(state, other)) == "scene"
+
+
+def test_the_editor_escapes_what_was_typed_and_names_every_box(state: AppState):
+    text = editor_html(
+        state.scene,
+        lambda word: Markup(f'data-word="{word}"'),
+        lambda word: Markup(""),
+        "<script>",
+        "no <chain>",
+    )
+    assert "<script>" not in text
+    assert "no &lt;chain&gt;" in text
+    assert (
+        text.count("<input")
+        == text.count("aria-label=") - text.count("<section") - (text.count("<button")) + 1
+    )
+    assert 'data-word="left B"' in text
+    assert [row.name for row in editor_rows(state.scene)] == [*"wCBXYZSt"]
+
+
+def test_every_machine_has_a_small_picture():
+    for entry in machine_types():
+        picture = small_picture(entry.name)
+        if machine_picture(entry.name) is not None:
+            assert picture.startswith("data:image/jpeg;base64,")
+            assert len(picture) < 40_000
 
 
 def test_a_volume_spanned_by_rotary_axes_keeps_its_size():

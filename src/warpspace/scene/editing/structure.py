@@ -6,6 +6,7 @@ from warpspace.exceptions import ChainError, OptionError, UnknownNameError
 from warpspace.machine.description import Chain, parse_chain
 from warpspace.scene.editing.edited import Edited, rearranged, with_machine
 from warpspace.scene.model import Scene
+from warpspace.scene.starter.text import starter_scene
 
 MOST_CHAIN_TEXT = 100
 """Characters of a chain, as in a file."""
@@ -137,7 +138,30 @@ def take_machine(scene: Scene, library: Scene) -> Edited:
         ),
         trace_points_mm=library.trace_points_mm,
     )
-    return with_machine(points, library.machine, library.workspace)
+    machine = library.machine
+    if not machine.body_dir:  # it stands in a scene, and comes to stand in this one
+        machine = replace(machine, name=scene.name)
+    return with_machine(points, machine, library.workspace)
+
+
+def take_sizes(scene: Scene) -> Edited:
+    """Give the machine of a scene the sizes of a new one with its chain.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    Edited
+        With offsets, travels, directions, working volume and points that fit together.
+
+    Raises
+    ------
+    SceneError
+        If the scene could not be saved with it.
+    """
+    return take_machine(scene, starter_scene(scene.machine.chain))
 
 
 def _placed(scene: Scene, places: list[str]) -> Edited:

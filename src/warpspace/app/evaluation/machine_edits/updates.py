@@ -225,6 +225,8 @@ def with_word(state: AppState, word: str) -> AppState:
             if library is None:
                 return state
             return with_edit(state, lambda scene: structure.take_machine(scene, library))
+        case "sizes", [""]:
+            return with_edit(state, structure.take_sizes)
         case "own", [""]:
             return with_own_machine(state)
         case _, [frame, entry, typed] if what in NUMBERS and entry in ("0", "1", "2"):
