@@ -39,8 +39,8 @@ def is_drawn(tab: Tab, state: AppState) -> bool:
 
 def slider_names(tab: Tab) -> list[str]:
     """Labels of the sliders of the tab Machine."""
-    texts = tab.page.locator("label").all_inner_texts()
-    return [text for text in texts if text.startswith("Machine ")]
+    texts = tab.page.locator("label").all_text_contents()
+    return [text for text in texts if re.fullmatch(r"Machine \w+ \[.*\]", text)]
 
 
 def test_another_chain_is_typed_and_box_sliders_and_bodies_follow_and_undo_goes_back(tab: Tab):

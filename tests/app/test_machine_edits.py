@@ -70,6 +70,11 @@ def test_curves_that_were_scaled_stay_the_same_functions_of_the_position(state: 
     at = np.linspace(-200.0, 300.0, 5)
     shapes = [s.amplitudes[key] * s.scene.errors.shape(key, at) for s in (state, changed)]
     np.testing.assert_allclose(*shapes, rtol=1e-12)
+    assert {*changed.changed_keys} == {*state.changed_keys} == {key}
+    reset = changed.reset()
+    own = state.scene.errors.evaluate(key, at)
+    np.testing.assert_allclose(reset.amplitudes[key] * reset.scene.errors.shape(key, at), own)
+    assert reset.scene.workspace == changed.scene.workspace
 
 
 def test_the_machine_of_the_scene_comes_back_with_the_errors_of_its_axes(state: AppState):

@@ -20,9 +20,7 @@ FINE_UP_TO = 100.0
 
 def axis_span(state: AppState, key: str) -> tuple[float, float]:
     """Give the range over which the curve of a parameter runs, mm or degrees."""
-    axis = parameter(key).axis
-    low, high = state.scene.workspace.ranges[axis]
-    return (low, high) if low < high else state.scene.machine.axes[axis].travel
+    return state.scene.axis_span(parameter(key).axis)
 
 
 def curve_of(state: AppState, key: str) -> ErrorFunction:

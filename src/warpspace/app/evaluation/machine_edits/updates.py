@@ -104,7 +104,6 @@ def with_changed_scene(state: AppState, scene: Scene) -> AppState:
         scene=scene,
         loaded=loaded,
         amplitudes=amplitudes,
-        start={key: state.start.get(key, scene.errors.amplitude(key)) for key in keys},
         spans=spans,
         positions=positions,
         position_spans=ranges,
@@ -116,7 +115,9 @@ def with_changed_scene(state: AppState, scene: Scene) -> AppState:
         picked=state.picked if same_axes else None,
         lever=state.lever if state.lever in keys else "",
     )
-    return _looked_at(changed)
+    own_curves = changed.own_curves
+    start = {key: own_curves[key].amplitude if key in own_curves else 0.0 for key in keys}
+    return _looked_at(replace(changed, start=start))
 
 
 def _looked_at(state: AppState) -> AppState:

@@ -74,7 +74,7 @@ class MachineEditorPanel:
         self._typed, self._problem = (typed, "\n".join(notes)) if refused else ("", "")
         if notes and not refused:
             colour = "yellow" if store.state is not before else "red"
-            self._context.notify("Machine", "\n".join(notes), colour)
+            self._context.notify("Machine", "; ".join(notes), colour)
         if what == "type" and self._window is not None:
             self._toggle_types()
         self._write(store.state)

@@ -5,6 +5,7 @@ import io
 from collections.abc import Callable, Sequence
 from functools import cache
 
+import numpy as np
 from markupsafe import Markup
 from PIL import Image
 
@@ -15,6 +16,8 @@ from warpspace.scene.machines import machine_picture
 WIDTH_PX = 240
 """Of a small picture: it is shown smaller, sharp on fine screens too."""
 QUALITY = 80
+DRAWING = (0.0, 0.11, 0.66, 0.93)
+"""Part of a picture in which the machine is: left, upper, right and lower end."""
 
 
 def types_html(types: Sequence[MachineType], present: str, button: Callable[[str], Markup]) -> str:
@@ -48,7 +51,8 @@ def small_picture(name: str) -> str:
     if path is None:
         return ""
     with Image.open(path) as picture:
-        small = picture.convert("RGB")
+        ends = np.array(DRAWING) * np.tile(picture.size, 2)
+        small = picture.convert("RGB").crop(tuple(ends.round().astype(int).tolist()))
     small.thumbnail((WIDTH_PX, WIDTH_PX))
     buffer = io.BytesIO()
     small.save(buffer, "JPEG", quality=QUALITY)
