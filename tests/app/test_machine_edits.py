@@ -85,6 +85,17 @@ def test_the_machine_of_the_scene_comes_back_with_the_errors_of_its_axes(state: 
     assert back.loaded is None
     assert back.tolerances == state.tolerances
     assert with_own_machine(state) is state
+    other = with_word(with_word(state, "type gantry_mill"), "volume X 1 400")
+    assert other.scene.workspace != state.scene.workspace
+    assert other.changed_keys == ()
+    back = with_own_machine(other)
+    assert back.scene == state.scene
+    assert back.amplitudes == pytest.approx(state.amplitudes)
+    assert back.start == state.start
+    moved = with_typed_amplitude(other, "EAX", 2.0 * other.amplitudes["EAX"])
+    back = with_own_machine(moved)
+    assert back.scene == state.scene
+    assert back.amplitudes["EAX"] == pytest.approx(2.0 * state.amplitudes["EAX"])
 
 
 def test_undo_takes_each_change_back(state: AppState):

@@ -128,11 +128,12 @@ class AppState:
         own, present = self.origin, self.scene
         if own.workspace == present.workspace and own.machine.axes == present.machine.axes:
             return own.errors.functions
-        return {
-            key: function.for_span(present.axis_span(parameter(key).axis))
-            for key, function in own.errors.functions.items()
-            if parameter(key).axis in present.machine.axes
-        }
+        found: dict[str, ErrorFunction] = {}
+        for key, function in own.errors.functions.items():
+            if parameter(key).axis in present.machine.axes:
+                span = present.axis_span(parameter(key).axis)
+                found[key] = replace(function.for_span(span), span=span)
+        return found
 
     @property
     def active(self) -> Mapping[str, float]:

@@ -153,6 +153,8 @@ def _amplitude(state: AppState, scene: Scene, key: str) -> float:
     was, now = state.scene.errors.functions.get(key), scene.errors.functions.get(key)
     if was is None or now is None or was == now or present == 0.0 or was.amplitude == 0.0:
         return present
+    if present == was.amplitude:
+        return now.amplitude
     return now.amplitude * curve_of(state, key).amplitude / was.amplitude
 
 
@@ -170,23 +172,29 @@ def with_own_machine(state: AppState) -> AppState:
     if own.machine == state.scene.machine and own.workspace == state.scene.workspace:
         return state
     returned = own.machine.axes.keys() - state.scene.machine.axes.keys()
-    changed = with_edit(
-        state, lambda scene: structure.take_machine(_joined(scene, own, returned), own)
-    )
+    changed = with_edit(state, lambda _: structure.take_machine(_joined(state, returned), own))
     if changed.scene is state.scene:
         return changed
     tolerances = {**_of(own.tolerances.own, returned), **changed.tolerances.own}
     return replace(changed, tolerances=replace(changed.tolerances, own=tolerances))
 
 
-def _joined(scene: Scene, own: Scene, returned: Collection[str]) -> Scene:
-    """Give a scene the errors, tolerances and component errors of axes that come back."""
+def _joined(state: AppState, returned: Collection[str]) -> Scene:
+    """Give the scene of a state the errors, tolerances and component errors of axes that return.
+
+    Curves that are the scene's own, but for the working volume, become those again.
+    """
+    scene, own, own_curves = state.scene, state.origin, state.own_curves
+    functions = {
+        key: own.errors.functions[key] if own_curves.get(key) == function else function
+        for key, function in scene.errors.functions.items()
+    }
     orders = {**dict(own.model.own_component_errors), **dict(scene.model.own_component_errors)}
     tolerances = {**_of(own.tolerances.own, returned), **scene.tolerances.own}
     return replace(
         scene,
         model=replace(scene.model, own_component_errors=tuple(orders.items())),
-        errors=ErrorSet({**_of(own.errors.functions, returned), **scene.errors.functions}),
+        errors=ErrorSet({**_of(own.errors.functions, returned), **functions}),
         tolerances=replace(scene.tolerances, own=tolerances),
     )
 
