@@ -184,6 +184,7 @@ VISITS = {
     "tab_files": Visit(as_opened, "Files", share=0.4),
     "tab_view": Visit(sliced, "View"),
     "tab_machine": Visit(bent, "Machine", share=0.6),
+    "tab_machine_editor": Visit(as_opened, "Machine editor"),
     "tab_rotary_axes": Visit(as_opened, "Rotary axes", "teach_wobbling_table"),
     "tab_tolerances": Visit(allocated, "Tolerances"),
     "tab_conventions": Visit(as_opened, "Conventions"),
@@ -191,7 +192,15 @@ VISITS = {
 """File name to visit."""
 LEFT_TABS, LOWER_TABS = (
     ("Errors", "Error curve"),
-    ("Error curve", "View", "Machine", "Rotary axes", "Tolerances", "Conventions"),
+    (
+        "Error curve",
+        "View",
+        "Machine",
+        "Machine editor",
+        "Rotary axes",
+        "Tolerances",
+        "Conventions",
+    ),
 )
 
 

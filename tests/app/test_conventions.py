@@ -138,7 +138,8 @@ def test_the_panel_does_nothing_while_a_slider_moves(monkeypatch: pytest.MonkeyP
         lambda *_: calls.append("written") or f"text {len(calls)}",
     )
     panel = object.__new__(ConventionsPanel)
-    panel._scene, panel._known, panel._at, panel._asked = START.origin, {}, {}, None
+    panel._built_for = panel_module._axes_of(START)
+    panel._known, panel._at, panel._asked = {}, {}, None
     panel._context = SimpleNamespace(act=lambda step: step())
     panel._effects, panel._text = Effects(), SimpleNamespace(content="")
     panel._clicks = SimpleNamespace(attributes=None)

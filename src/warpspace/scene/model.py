@@ -63,6 +63,11 @@ class Scene:
         extra = [key for key in self.machine.allowed_keys if key in given and key not in default]
         return (*default, *extra)
 
+    def axis_span(self, axis: str) -> tuple[float, float]:
+        """Give the range over which curves of an axis run, mm or degrees: else its travel."""
+        low, high = self.workspace.ranges[axis]
+        return (low, high) if low < high else self.machine.axes[axis].travel
+
     def view(self, loop: Loop = Loop.TOOL, frame: str = "machine") -> View:
         """Give the view of the scene through a loop, with the scene's reference."""
         return View(loop, frame, self.reference)

@@ -135,14 +135,14 @@ def _bundled(name: str) -> Scene | None:
 
 
 def _recognised(scene: Scene) -> Scene:
-    """Give a machine written inline its bodies back where only directions make it another one."""
+    """Give a machine written inline its bodies back where only its axes' ends and ways differ."""
     machine = scene.machine
     for name in machine_names():
         known = load_machine(name)
         if known.axes.keys() != machine.axes.keys():
             continue
         axes = {
-            key: replace(axis, direction=known.axes[key].direction)
+            key: replace(axis, direction=known.axes[key].direction, travel=known.axes[key].travel)
             for key, axis in machine.axes.items()
         }
         same = replace(known, axes=machine.axes, bodies=machine.bodies or known.bodies)

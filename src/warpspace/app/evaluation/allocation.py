@@ -91,6 +91,7 @@ def with_allocated(state: AppState, asked: AppState, found: Allocation) -> AppSt
     """
     same = (
         state.origin is asked.origin
+        and state.amplitudes.keys() == asked.amplitudes.keys()
         and state.loop == asked.loop
         and state.tolerances == asked.tolerances
         and state.specification == asked.specification

@@ -113,16 +113,18 @@ def with_own_conventions(state: AppState) -> AppState:
     """Go back to the conventions of the scene."""
     own = state.origin
     axes = {
-        name: replace(axis, direction=own.machine.axes[name].direction)
+        name: replace(axis, direction=own.machine.axes.get(name, axis).direction)
         for name, axis in state.scene.machine.axes.items()
     }
+    # an edited machine may not have all axes of the scene's
+    held = {name: at for name, at in (own.reference or {}).items() if name in axes}
     model = replace(
         state.scene.model,
         component_errors=own.model.component_errors,
         own_component_errors=own.model.own_component_errors,
         machine=replace(state.scene.machine, axes=axes),
     )
-    return _with_scene(state, replace(state.scene, model=model, reference=own.reference))
+    return _with_scene(state, replace(state.scene, model=model, reference=held or None))
 
 
 def _with_scene(state: AppState, scene: Scene) -> AppState:

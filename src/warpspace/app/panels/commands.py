@@ -236,7 +236,11 @@ def spell_change(what: str) -> str:
         For instance "amplitudes.EAX".
     """
     words: list[str] = []
-    for path in what.split(", "):
+    paths = what.split(", ")
+    parts_of_machine = ("scene.model.machine", "scene.workspace")
+    if "scene.name" not in paths and any(path.startswith(parts_of_machine) for path in paths):
+        return "machine"
+    for path in paths:
         parts = [part.lstrip("+-") for part in path.split(".")]
         name = next((part for part in reversed(parts) if part in PARAMETERS), "")
         place = WORDS.get(parts[0], parts[-1].replace("_", " "))

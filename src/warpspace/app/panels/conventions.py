@@ -20,7 +20,6 @@ from warpspace.app.panels import PanelContext
 from warpspace.app.readouts.conventions import conventions_html
 from warpspace.app.state.app_state import AppState, start_loop
 from warpspace.app.state.picked import Picked
-from warpspace.scene.model import Scene
 
 PICKING = "Click a point of the box …"
 
@@ -48,7 +47,7 @@ class ConventionsPanel:
         )
         self._pick.on_click(lambda _: context.act(self._toggle_picking))
         self._home: Any = gui.add_folder(None)
-        self._scene: Scene | None = None
+        self._built_for: tuple[object, ...] = ()
         self._at: dict[str, Input[float]] = {}
         self._build(state)
         back = gui.add_button(
@@ -60,7 +59,7 @@ class ConventionsPanel:
         """Add a number box per linear axis of the scene's machine."""
         for bound in self._at.values():
             bound.handle.remove()
-        self._scene, self._at = state.origin, {}
+        self._at, self._built_for = {}, _axes_of(state)
         middle = state.scene.workspace.positions
         with self._home:
             for axis, span in reference_spans(state.scene).items():
@@ -99,6 +98,7 @@ class ConventionsPanel:
         return (
             Identity(state.origin),
             Identity(state.scene.model),
+            Identity(state.scene.workspace),
             state.scene.reference,
             state.loop,
             state.nodes,
@@ -107,7 +107,7 @@ class ConventionsPanel:
     def show(self, picture: LivePicture) -> None:
         """Show what is in force; the effects follow when changes pause."""
         state = picture.state
-        if state.origin is not self._scene:
+        if _axes_of(state) != self._built_for:
             self._known = {}
             self._build(state)
         reference = state.scene.reference
@@ -137,6 +137,11 @@ class ConventionsPanel:
         content = conventions_html(state, self._known, self._clicks.attributes)
         if content != self._text.content:
             self._text.content = content
+
+
+def _axes_of(state: AppState) -> tuple[object, ...]:
+    """Tell which number boxes there are: scene and ranges of its axes."""
+    return Identity(state.origin), reference_spans(state.scene)
 
 
 def _back(state: AppState) -> AppState:

@@ -35,7 +35,6 @@ from warpspace.app.state.ranges import Span
 from warpspace.app.state.typed_numbers import read_typed
 from warpspace.machine.axes import axis_order
 from warpspace.machine.parameters import PARAMETERS, Parameter, parameter
-from warpspace.scene.model import Scene
 
 BY_EFFECT = "by effect"
 
@@ -89,7 +88,7 @@ class ErrorsPanel:
             ),
             context.changed,
         )
-        self._scene: Scene | None = None
+        self._built_for: tuple[object, ...] = ()
         self._bound: dict[str, Input[float]] = {}
         self._buttons: dict[str, Any] = {}
         self._parts: list[Any] = []
@@ -133,7 +132,8 @@ class ErrorsPanel:
         keys = listed_keys(state, self._listing, self._effects)
         for part in self._parts:
             part.remove()
-        self._scene, self._bound, self._buttons, self._parts = state.origin, {}, {}, []
+        self._bound, self._buttons, self._parts = {}, {}, []
+        self._built_for = (Identity(state.origin), state.amplitudes.keys())
         self._spelt = {}
         self._found, self._looks = keys, (Identity(state.exclusions), Identity(state.spans))
         if not keys:
@@ -275,7 +275,7 @@ class ErrorsPanel:
     def show(self, picture: LivePicture) -> None:
         """Put the sliders where the state has them."""
         state = picture.state
-        if state.origin is not self._scene:
+        if (Identity(state.origin), state.amplitudes.keys()) != self._built_for:
             self._search.show("")
             self._listing = replace(self._listing, query="")
             self._build(state, picture)

@@ -122,7 +122,11 @@ class MachinePanel:
     def show(self, picture: LivePicture) -> None:
         """Make the widgets show the state."""
         state = self._state = picture.state
-        if self._built_for is None or state.scene.machine is not self._built_for.machine:
+        before = self._built_for
+        if before is None or (before.machine, before.workspace) != (
+            state.scene.machine,
+            state.scene.workspace,
+        ):
             self._build(state)
         self._place.put(content=tool_point_html(*standing(state, machine_positions(state))))
         for name, switch in self._switches.items():

@@ -189,7 +189,7 @@ class ViewPanel:
     def _add_positions(self, state: AppState) -> None:
         """Add a folder with a slider per rotary axis of the scene's machine."""
         gui = self._context.gui
-        self._built_for = state.origin
+        self._built_for = (Identity(state.origin), state.position_spans)
         with self._home:
             self._folder: Any = gui.add_folder("Rotary positions", visible=bool(state.positions))
         self._positions: dict[str, Input[float]] = {}
@@ -253,12 +253,13 @@ class ViewPanel:
             picture.exaggeration,
             (state.component, state.look.quantity, state.loop, state.nodes, state.shown),
             Identity(state.positions),
+            Identity(state.position_spans),
         )
 
     def show(self, picture: LivePicture) -> None:
         """Make the widgets show the state."""
         state = picture.state
-        if state.origin is not self._built_for:
+        if (Identity(state.origin), state.position_spans) != self._built_for:
             self._folder.remove()
             self._add_positions(state)
         self._know(state.origin)

@@ -83,6 +83,7 @@ for _tab in (
         "front",
     ),
     Tab("Machine", "settings", [f"{_HERE}.machine:MachinePanel"]),
+    Tab("Machine editor", "settings", [f"{_HERE}.machine_editor:MachineEditorPanel"]),
     Tab("Rotary axes", "settings", [f"{_HERE}.rotary_axes:RotaryAxesPanel"]),
     Tab("Tolerances", "settings", [f"{_HERE}.tolerances:TolerancesPanel"]),
     Tab("Conventions", "settings", [f"{_HERE}.conventions:ConventionsPanel"]),

@@ -17,7 +17,7 @@ from warpspace.app.state.ranges import Span, amplitude_spans, position_spans
 from warpspace.app.state.specification import Specification
 from warpspace.geometry.colour import COMPONENTS
 from warpspace.kinematics.model import Loop
-from warpspace.machine.errors import ErrorSet
+from warpspace.machine.errors import ErrorFunction, ErrorSet
 from warpspace.machine.limits import EXAGGERATION as FACTORS
 from warpspace.machine.limits import LIVE_NODES
 from warpspace.machine.parameters import parameter
@@ -123,6 +123,19 @@ class AppState:
         return self.loaded or self.scene
 
     @property
+    def own_curves(self) -> Mapping[str, ErrorFunction]:
+        """The curves of the scene as it was opened, over the present working volume."""
+        own, present = self.origin, self.scene
+        if own.workspace == present.workspace and own.machine.axes == present.machine.axes:
+            return own.errors.functions
+        found: dict[str, ErrorFunction] = {}
+        for key, function in own.errors.functions.items():
+            if parameter(key).axis in present.machine.axes:
+                span = present.axis_span(parameter(key).axis)
+                found[key] = replace(function.for_span(span), span=span)
+        return found
+
+    @property
     def active(self) -> Mapping[str, float]:
         """Amplitudes that count, µm or µrad: those that are excluded are zero."""
         return self.exclusions.effective(self.amplitudes)
@@ -199,7 +212,7 @@ class AppState:
     def reset(self, axis: str | None = None) -> "AppState":
         """Give the errors of one axis, or of all, the scene's values and curves again."""
         chosen = {k: v for k, v in self.start.items() if axis is None or parameter(k).axis == axis}
-        own, present = self.origin.errors.functions, self.scene.errors.functions
+        own, present = self.own_curves, self.scene.errors.functions
         curves = {key: function for key, function in present.items() if key not in chosen}
         curves |= {key: function for key, function in own.items() if key in chosen}
         scene = self.scene

@@ -20,9 +20,7 @@ FINE_UP_TO = 100.0
 
 def axis_span(state: AppState, key: str) -> tuple[float, float]:
     """Give the range over which the curve of a parameter runs, mm or degrees."""
-    axis = parameter(key).axis
-    low, high = state.scene.workspace.ranges[axis]
-    return (low, high) if low < high else state.scene.machine.axes[axis].travel
+    return state.scene.axis_span(parameter(key).axis)
 
 
 def curve_of(state: AppState, key: str) -> ErrorFunction:
@@ -120,7 +118,10 @@ def with_half_width(state: AppState, key: str, half_width: float) -> AppState:
 
 def with_scene_tolerances(state: AppState) -> AppState:
     """Go back to the tolerances of the scene."""
-    return replace(state, tolerances=state.origin.tolerances)
+    own = state.origin.tolerances
+    # an edited machine may not have all axes of the scene's
+    kept = {key: own.own[key] for key in own.own if key in state.amplitudes}
+    return replace(state, tolerances=replace(own, own=kept))
 
 
 def with_scaled_tolerances(state: AppState, keys: Collection[str], factor: float) -> AppState:

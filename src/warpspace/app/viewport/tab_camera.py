@@ -27,9 +27,9 @@ MOVED = 1e-3
 """How far from where it was put, as a part of its distance, a camera has been moved by hand."""
 
 
-def focus(state: AppState) -> tuple[Identity, bool]:
-    """Tell what the camera is set up for: the scene, and whether its machine is shown."""
-    return Identity(state.origin), state.machine.shown
+def focus(state: AppState) -> tuple[object, ...]:
+    """Tell what the camera is set up for: the scene, its axes, whether its machine is shown."""
+    return Identity(state.origin), state.scene.machine.chain, state.machine.shown
 
 
 class TabCamera:

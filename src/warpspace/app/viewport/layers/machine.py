@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from viser import SceneApi
 
 from warpspace.app.browser.handles import Handle
@@ -36,6 +37,7 @@ class MachineLayer:
     def __init__(self, scene: SceneApi, picture: LivePicture) -> None:
         self._scene = scene
         self._bodies: dict[str, tuple[Handle, Handle]] = {}
+        self._shapes: dict[str, NDArray[np.int32]] = {}
         self._ball: Handle | None = None
         self._label = Handle(
             scene.add_label(
@@ -78,7 +80,12 @@ class MachineLayer:
         vertices = part.vertices_mm.astype(np.float32)
         edges = part.edges_mm.astype(np.float32)
         known = self._bodies.get(name)
-        if known is not None and known[0].handle.vertices.shape == vertices.shape:
+        triangles = part.body.triangles
+        if (
+            known is not None
+            and known[0].handle.vertices.shape == vertices.shape
+            and np.array_equal(self._shapes[name], triangles)
+        ):
             mesh, lines = known
             mesh.put(visible=True)
             lines.put(visible=True)
@@ -90,7 +97,7 @@ class MachineLayer:
         mesh = self._scene.add_mesh_simple(
             f"/machine/{name}",
             vertices,
-            part.body.triangles.astype(np.uint32),
+            triangles.astype(np.uint32),
             color=part.body.colour,
             flat_shading=True,
             scale=SCENE_PER_MM,
@@ -106,6 +113,7 @@ class MachineLayer:
             scale=SCENE_PER_MM,
         )
         self._bodies[name] = (Handle(mesh), Handle(lines))
+        self._shapes[name] = triangles
 
     def _draw_tool_point(self, picture: LivePicture) -> None:
         """Mark the tool point where the deformed grid has it."""

@@ -56,7 +56,9 @@ class MovingLayer:
     def show(self, picture: LivePicture) -> None:
         """Draw a picture; where the axis itself has been moved, the rotation starts there anew."""
         before, self._picture = self._picture.state, picture
-        if before.origin is not picture.state.origin or before.positions != picture.state.positions:
+        now = picture.state
+        same = before.origin is now.origin and before.scene.machine is now.scene.machine
+        if not same or before.positions != now.positions:
             self._player.rewind()
             self._stand({})
         self._annotations.show(picture)

@@ -1,0 +1,1 @@
+"""HTML of the machine editor: its boxes, and the machines to start from."""

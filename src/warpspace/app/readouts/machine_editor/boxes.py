@@ -1,0 +1,161 @@
+"""The boxes of the machine editor as HTML: chain, and per frame all that describes it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from markupsafe import Markup
+
+from warpspace.app.readouts.html import render
+from warpspace.app.state.typed_numbers import spell_typed
+from warpspace.machine.description import FIXED_FRAMES, ORIGIN, Axis, Machine
+from warpspace.machine.limits import MAX_TYPED_NUMBER
+from warpspace.scene.model import Scene
+
+Attributes = Callable[[str], Markup]
+FIXED = {
+    "w": "workpiece, on the last frame of its side",
+    "S": "spindle, on the last frame of its side",
+    "t": "tool, in the spindle",
+}
+"""What the frames are that do not move."""
+FRAME = "F"
+
+
+@dataclass(frozen=True, slots=True)
+class Numbers:
+    """A line of number boxes.
+
+    Attributes
+    ----------
+    label, unit : str
+    what : str
+        The word that they send, without the number of the box.
+    values : tuple of str
+    names : tuple of str
+        What each is called for a screen reader.
+    """
+
+    label: str
+    unit: str
+    what: str
+    values: tuple[str, ...]
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A frame of the machine.
+
+    Attributes
+    ----------
+    name, about : str
+    axis : Axis or None
+        None for one that does not move.
+    carries : str
+        "workpiece" or "tool".
+    numbers : tuple of Numbers
+    """
+
+    name: str
+    about: str
+    axis: Axis | None
+    carries: str
+    numbers: tuple[Numbers, ...]
+
+
+def editor_html(
+    scene: Scene,
+    button: Attributes,
+    text_box: Attributes,
+    typed: str = "",
+    problem: str = "",
+) -> str:
+    """Spell the editor.
+
+    Parameters
+    ----------
+    scene : Scene
+    button, text_box : callable
+        Give the attributes of what sends a word.
+    typed : str, optional
+        A chain that was refused; it stays in its box.
+    problem : str, optional
+        Why it was refused.
+
+    Returns
+    -------
+    str
+        HTML.
+    """
+    chain = scene.machine.chain
+    return render(
+        "machine_editor",
+        chain=typed or str(chain),
+        problem=problem,
+        links=["w", *reversed(chain.workpiece), FRAME, *chain.tool, "t"],
+        axes=scene.machine.axes,
+        rows=editor_rows(scene),
+        notes=scene.notes,
+        button=button,
+        text_box=text_box,
+        longest=MAX_TYPED_NUMBER,
+    )
+
+
+def editor_rows(scene: Scene) -> list[Row]:
+    """List the frames in the order of the written chain, the workpiece first."""
+    machine = scene.machine
+    return [
+        _fixed(machine, "w", "workpiece"),
+        *(_moving(scene, name, "workpiece") for name in reversed(machine.chain.workpiece)),
+        *(_moving(scene, name, "tool") for name in machine.chain.tool),
+        *(_fixed(machine, name, "tool") for name in FIXED_FRAMES if name != "w"),
+    ]
+
+
+def _fixed(machine: Machine, name: str, carries: str) -> Row:
+    """Describe a frame that does not move."""
+    offset = machine.fixed_mm.get(name, ORIGIN)
+    turn = machine.fixed_deg.get(name, ORIGIN)
+    return Row(name, FIXED[name], None, carries, _placing(name, offset, turn))
+
+
+def _moving(scene: Scene, name: str, carries: str) -> Row:
+    """Describe an axis."""
+    axis, volume = scene.machine.axes[name], scene.workspace.ranges[name]
+    way = "moves along" if axis.is_linear else "turns about"
+    numbers = (
+        *_placing(name, axis.offset_mm, axis.rotation_deg),
+        _ends("Travel", "travel", name, axis.travel, axis.unit),
+        _ends("Volume", "volume", name, volume, axis.unit),
+    )
+    return Row(name, f"{way} {'xyz'[axis.index]}, carries the {carries}", axis, carries, numbers)
+
+
+def _placing(name: str, offset: tuple[float, ...], turn: tuple[float, ...]) -> tuple[Numbers, ...]:
+    """Spell where a frame stands in the frame before it."""
+    return (
+        Numbers(
+            "Offset",
+            "mm",
+            f"offset {name}",
+            tuple(map(spell_typed, offset)),
+            tuple(f"{direction} of the offset of {name}" for direction in "xyz"),
+        ),
+        Numbers(
+            "Rotation",
+            "°",
+            f"rotation {name}",
+            tuple(map(spell_typed, turn)),
+            tuple(f"Rotation of {name} about {direction}" for direction in "xyz"),
+        ),
+    )
+
+
+def _ends(label: str, what: str, name: str, ends: tuple[float, float], unit: str) -> Numbers:
+    """Spell both ends of a range."""
+    words = {"travel": f"travel of {name}", "volume": f"{name} in the working volume"}
+    names = tuple(f"{end} end of the {words[what]}" for end in ("Lower", "Upper"))
+    if what == "volume":
+        names = tuple(f"{end} end of {words[what]}" for end in ("Lower", "Upper"))
+    return Numbers(label, unit, f"{what} {name}", tuple(map(spell_typed, ends)), names)

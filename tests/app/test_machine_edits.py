@@ -1,0 +1,237 @@
+"""Changing the machine of a state: what is kept, what goes, what undo brings back."""
+
+import numpy as np
+import pytest
+from markupsafe import Markup
+
+from warpspace.app.documents.scene_file import open_text, state_to_toml
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.machine_edits.library import machine_types
+from warpspace.app.evaluation.machine_edits.updates import with_own_machine, with_word
+from warpspace.app.panels.commands import spell_change
+from warpspace.app.readouts.machine_editor.boxes import editor_html, editor_rows
+from warpspace.app.readouts.machine_editor.types import small_picture
+from warpspace.app.state.app_state import AppState, start_state
+from warpspace.app.state.edits import (
+    with_excluded,
+    with_half_width,
+    with_scene_tolerances,
+    with_typed_amplitude,
+)
+from warpspace.app.state.history import History, describe_change
+from warpspace.scene.library import load_scene, parse_scene
+from warpspace.scene.machines import machine_picture
+
+LIVE = LiveModel()
+
+
+@pytest.fixture
+def state() -> AppState:
+    return start_state(load_scene("dvf5000_first"))
+
+
+def test_another_chain_keeps_changed_errors_and_drops_those_of_axes_that_go(state: AppState):
+    state = with_typed_amplitude(state, "EAX", 33.0)
+    state = with_typed_amplitude(state, "EXC", 4.0)
+    state = with_half_width(state, "EAX", 7.0)
+    state = with_half_width(state, "EXC", 7.0)
+    state = with_excluded(with_excluded(state, "EAX", True), "EXC", True)
+    changed = with_word(state, "chain wBFXYZt")
+    assert str(changed.scene.machine.chain) == "wBFXYZt"
+    assert changed.amplitudes["EAX"] == 33.0
+    assert changed.tolerances.own["EAX"].half_width == 7.0
+    assert changed.exclusions.excluded == {"EAX"}
+    assert not any(key.endswith("C") for key in changed.amplitudes)
+    assert "EXC" not in changed.tolerances.own
+    assert {*changed.positions} == {"B"}
+    assert changed.origin is state.scene
+    assert any("axis C left out" in note for note in changed.notes)
+    assert with_scene_tolerances(changed).tolerances.own.keys() <= changed.amplitudes.keys()
+    LIVE.evaluate(changed)
+
+
+def test_the_box_follows_the_volume_and_the_offset(state: AppState):
+    before = LIVE.evaluate(state).grid.bounds_mm
+    low, high = state.scene.workspace.ranges["X"]
+    wider = with_word(state, f"volume X 1 {high + 50:g}")
+    grown = LIVE.evaluate(wider).grid.bounds_mm
+    np.testing.assert_allclose(grown[1] - before[1], [50.0, 0.0, 0.0], atol=1e-9)
+    z = state.scene.machine.axes["Z"].offset_mm[2]
+    higher = with_word(state, f"offset Z 2 {z + 25:g}")
+    moved = LIVE.evaluate(higher).grid.bounds_mm
+    np.testing.assert_allclose(moved - before, [[0.0, 0.0, 25.0]] * 2, atol=1e-9)
+    assert low < high
+
+
+def test_curves_that_were_scaled_stay_the_same_functions_of_the_position(state: AppState):
+    key = "EAX"
+    state = with_typed_amplitude(state, key, 2.5 * state.amplitudes[key])
+    changed = with_word(state, "volume X 1 400")
+    at = np.linspace(-200.0, 300.0, 5)
+    shapes = [s.amplitudes[key] * s.scene.errors.shape(key, at) for s in (state, changed)]
+    np.testing.assert_allclose(*shapes, rtol=1e-12)
+    assert {*changed.changed_keys} == {*state.changed_keys} == {key}
+    reset = changed.reset()
+    own = state.scene.errors.evaluate(key, at)
+    np.testing.assert_allclose(reset.amplitudes[key] * reset.scene.errors.shape(key, at), own)
+    assert reset.scene.workspace == changed.scene.workspace
+
+
+def test_the_machine_of_the_scene_comes_back_with_the_errors_of_its_axes(state: AppState):
+    changed = with_word(with_word(state, "chain wFXYZt"), "offset X 0 12")
+    assert with_word(changed, "own").scene == state.scene
+    back = with_own_machine(changed)
+    assert back.amplitudes == state.amplitudes
+    assert back.loaded is None
+    assert back.tolerances == state.tolerances
+    assert with_own_machine(state) is state
+    other = with_word(with_word(state, "type gantry_mill"), "volume X 1 400")
+    assert other.scene.workspace != state.scene.workspace
+    assert other.changed_keys == ()
+    back = with_own_machine(other)
+    assert back.scene == state.scene
+    assert back.amplitudes == pytest.approx(state.amplitudes)
+    assert back.start == state.start
+    moved = with_typed_amplitude(other, "EAX", 2.0 * other.amplitudes["EAX"])
+    back = with_own_machine(moved)
+    assert back.scene == state.scene
+    assert back.amplitudes["EAX"] == pytest.approx(2.0 * state.amplitudes["EAX"])
+
+
+def test_undo_takes_each_change_back(state: AppState):
+    history = History(state)
+    for number, word in enumerate(("left Y", "side X", "turn C", "chain wXFYt", "type scara")):
+        history = history.push(with_word(history.present, word).without_notes(), 10.0 * number)
+    while history.past:
+        history = history.undo()
+    assert history.present == state
+
+
+@pytest.mark.parametrize(
+    "word",
+    [
+        "chain wXXFt",
+        "chain ",
+        "left Q",
+        "side F",
+        "offset X 0 abc",
+        "offset X 0 1e999",
+        "volume X 0 5000",
+        "travel C 0 400",
+        "volume B 1 40",
+    ],
+)
+def test_what_cannot_be_is_refused_with_a_note_and_nothing_is_lost(state: AppState, word: str):
+    changed = with_word(state, word)
+    assert changed.without_notes() == state
+    assert len(changed.notes) == 1
+
+
+@pytest.mark.parametrize(
+    "word", ["", "own x", "type ../..", "offset X 7 1", "offset X", "turn Q", "__class__ X 0 1"]
+)
+def test_words_that_are_none_change_nothing(state: AppState, word: str):
+    assert with_word(state, word) is state
+
+
+def test_a_number_beyond_the_limits_is_clamped_and_said(state: AppState):
+    changed = with_word(state, "offset X 0 1e9")
+    assert changed.scene.machine.axes["X"].offset_mm[0] == 1e5
+    assert "clamped" in changed.notes[0]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("chain wC2XFZC1t",),
+        ("travel X 1 400", "turn C"),
+        ("offset X 0 12,5", "rotation B 0 45", "volume Z 0 -600"),
+        ("remove C", "side Y"),
+    ],
+)
+def test_a_saved_file_opens_to_the_same_state(state: AppState, words: tuple[str, ...]):
+    state = with_typed_amplitude(state, "EAX", 21.0)
+    for word in words:
+        state = with_word(state, word).without_notes()
+    opened, _ = open_text(state_to_toml(state), state.scene.name, "file")
+    assert opened.scene.machine == state.scene.machine
+    assert opened.scene.workspace == state.scene.workspace
+    assert opened.amplitudes == state.amplitudes
+    assert opened.positions == state.positions
+
+
+def test_every_machine_of_the_library_can_be_taken_and_drawn(state: AppState):
+    names = [entry.name for entry in machine_types()]
+    assert "dvf5000" in names
+    assert len(names) == len(set(names))
+    for name in names:
+        changed = with_word(state, f"type {name}")
+        LIVE.evaluate(changed)
+        assert changed.scene.title == state.scene.title
+
+
+def test_the_sizes_of_a_new_machine_suit_any_chain(state: AppState):
+    for chain in ("wC2XFZC1t", "wBFXYZt", "wFC1C2Zt", "wXYZFt"):
+        changed = with_word(with_word(state, f"chain {chain}"), "sizes")
+        assert str(changed.scene.machine.chain) == chain
+        assert LIVE.evaluate(changed).grid.extent_mm.max() > 100.0
+        opened, _ = open_text(state_to_toml(changed), state.scene.name, "file")
+        for part in ("model", "workspace", "tolerances", "trace_points_mm", "notes"):
+            assert getattr(opened.scene, part) == getattr(changed.scene, part)
+        assert opened.amplitudes == pytest.approx(changed.amplitudes, rel=1e-12)
+
+
+def test_undo_says_that_it_was_the_machine(state: AppState):
+    changed = with_word(state, "chain wBFXYZt").without_notes()
+    assert spell_change(describe_change(state, changed)) == "machine"
+    other = state.with_scene(load_scene("teach_tilted_c"))
+    assert spell_change(describe_change(state, other)) == "scene"
+
+
+def test_the_editor_escapes_what_was_typed_and_names_every_box(state: AppState):
+    text = editor_html(
+        state.scene,
+        lambda word: Markup(f'data-word="{word}"'),
+        lambda word: Markup(""),
+        "<script>",
+        "no <chain>",
+    )
+    assert "<script>" not in text
+    assert "no &lt;chain&gt;" in text
+    assert (
+        text.count("<input")
+        == text.count("aria-label=") - text.count("<section") - (text.count("<button")) + 1
+    )
+    assert 'data-word="left B"' in text
+    assert [row.name for row in editor_rows(state.scene)] == [*"wCBXYZSt"]
+
+
+def test_every_machine_has_a_small_picture():
+    for entry in machine_types():
+        picture = small_picture(entry.name)
+        if machine_picture(entry.name) is not None:
+            assert picture.startswith("data:image/jpeg;base64,")
+            assert len(picture) < 40_000
+
+
+def test_a_volume_spanned_by_rotary_axes_keeps_its_size():
+    scara = start_state(
+        parse_scene(
+            """
+[machine]
+chain = "wFC1C2Zt"
+[machine.offset_mm]
+C2 = [300, 0, 0]
+t = [200, 0, 0]
+[workspace]
+C1 = [-60, 60]
+C2 = [20, 120]
+Z = [-50, 50]
+""",
+            "scara",
+        )
+    )
+    assert LIVE.evaluate(scara).grid.shape == (21, 21, 21)
+    wider = with_word(scara, "volume C1 0 -80")
+    assert LIVE.evaluate(wider).grid.shape == (21, 21, 21)
+    assert wider.scene.workspace.ranges["C1"] == (-80.0, 60.0)

@@ -1,0 +1,298 @@
+"""Changing the machine of a scene: what stays, what goes, and that every outcome reads back."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from warpspace.exceptions import ChainError, OptionError, SceneError, WarpspaceError
+from warpspace.kinematics.chain import nominal_point
+from warpspace.kinematics.model import Loop, complete_coordinates
+from warpspace.machine.errors import Poly
+from warpspace.scene.editing.edited import Edited
+from warpspace.scene.editing.numbers import (
+    change_direction,
+    change_offset,
+    change_rotation,
+    change_travel,
+    change_volume,
+    hold_axis,
+)
+from warpspace.scene.editing.structure import (
+    change_chain,
+    move_axis,
+    remove_axis,
+    switch_side,
+    take_machine,
+)
+from warpspace.scene.library import load_scene, parse_scene, scene_names
+from warpspace.scene.model import Scene
+from warpspace.scene.save import scene_to_toml
+
+PLAIN = parse_scene(
+    """
+title = "Plain"
+[machine]
+title = "Mine"
+chain = "wBFXYZt"
+[machine.offset_mm]
+B = [0, 0, -100]
+S = [0, 0, 300]
+t = [0, 0, -80]
+[machine.rotation_deg]
+S = [0, 0, 5]
+[machine.travel]
+X = [-300, 300]
+[convention.component_errors]
+X = "after_motion"
+Y = "after_motion"
+Z = "before_motion"
+B = "before_motion"
+[workspace]
+X = [-200, 200]
+Y = [-100, 100]
+Z = [-50, 50]
+B = 10
+[points_mm]
+tool = [0, 0, -20]
+[errors]
+EXX = { ramp = 10.0 }
+EAY = { poly = [1.0, 0.01] }
+EXB = 3.0
+EA0B = 20.0
+[tolerances]
+default = { translation = 5.0, rotation = 8.0, squareness = 20.0 }
+EXB = 4.0
+EYY = 2.0
+[view]
+reference = { X = 0, Y = 0, Z = 0, B = 0 }
+""",
+    "plain",
+)
+
+
+def read_back(edited: Edited) -> Scene:
+    """The scene, having made sure that its file reads back equal."""
+    scene = edited.scene
+    read = parse_scene(scene_to_toml(scene), scene.name)
+    dressed = replace(read.machine, name=scene.machine.name, body_dir=scene.machine.body_dir)
+    assert replace(read, model=replace(read.model, machine=dressed)) == scene
+    return scene
+
+
+def test_another_chain_keeps_what_belongs_to_axes_that_stay():
+    edited = change_chain(PLAIN, "w C F X Y Z t")
+    scene = read_back(edited)
+    assert str(scene.machine.chain) == "wCFXYZt"
+    assert scene.machine.axes["X"] == PLAIN.machine.axes["X"]
+    assert scene.machine.fixed_mm == PLAIN.machine.fixed_mm
+    assert scene.machine.fixed_deg == {"S": (0.0, 0.0, 5.0)}
+    assert scene.machine.axes["C"].travel == (0.0, 360.0)
+    assert scene.workspace.ranges == {
+        "X": (-200.0, 200.0),
+        "Y": (-100.0, 100.0),
+        "Z": (-50.0, 50.0),
+        "C": (0.0, 0.0),
+    }
+    assert set(scene.errors) == {"EXX", "EAY"}
+    assert set(scene.tolerances.own) == {"EYY"}
+    assert scene.tolerances.default == PLAIN.tolerances.default
+    assert scene.reference == {"X": 0.0, "Y": 0.0, "Z": 0.0}
+    assert scene.model.convention("Z").name == "before_motion"
+    (note,) = edited.notes
+    assert note == (
+        "axis B left out and with it its errors EXB, EA0B; its tolerances EXB; its position at the"
+        " reference"
+    )
+
+
+def test_a_chain_that_cannot_be_read_is_refused_with_the_message_of_the_reader():
+    for text in ("wXXFt", "hello", "", "w" + "X" * 200, "wFt", "wA0A1A2A3A4A5A6A7A8Ft"):
+        with pytest.raises(ChainError):
+            change_chain(PLAIN, text)
+    assert change_chain(PLAIN, "w(B)F XYZ t") == Edited(PLAIN)
+
+
+def test_a_second_axis_along_one_direction_stands_still():
+    scene = read_back(change_chain(PLAIN, "wBFXYZWt"))
+    assert scene.workspace.ranges["W"] == (0.0, 0.0)
+    assert scene.workspace.volume_axes == ("X", "Y", "Z")
+
+
+def test_an_axis_in_place_of_another_spans_the_volume_with_its_travel():
+    scene = read_back(change_chain(PLAIN, "wBFUYZt"))
+    assert scene.workspace.ranges["U"] == (-250.0, 250.0)
+    assert scene.workspace.volume_axes == ("U", "Y", "Z")
+
+
+def test_an_axis_moves_along_the_chain_and_across_the_frame():
+    names = []
+    scene = PLAIN
+    for way in ("right", "right", "left", "left", "left"):
+        scene = read_back(move_axis(scene, "B", way))
+        names.append(str(scene.machine.chain))
+    assert names == ["wFBXYZt", "wFXBYZt", "wFBXYZt", "wBFXYZt", "wBFXYZt"]
+    assert scene == replace(PLAIN, model=replace(PLAIN.model, machine=scene.machine))
+    assert {*scene.errors} == {*PLAIN.errors}
+
+
+def test_an_axis_switches_sides_next_to_the_frame():
+    scene = read_back(switch_side(PLAIN, "Y"))
+    assert str(scene.machine.chain) == "wBYFXZt"
+    assert str(read_back(switch_side(scene, "Y")).machine.chain) == "wBFYXZt"
+
+
+def test_an_axis_is_taken_away_but_not_the_last_one():
+    scene = read_back(remove_axis(PLAIN, "B"))
+    assert str(scene.machine.chain) == "wFXYZt"
+    for axis in ("Y", "Z"):
+        scene = read_back(remove_axis(scene, axis))
+    with pytest.raises(OptionError, match="at least one"):
+        remove_axis(scene, "X")
+
+
+def test_an_offset_moves_the_tool_point_by_as_much():
+    scene = read_back(change_offset(PLAIN, "Y", 2, 150.0))
+    at = complete_coordinates(PLAIN.machine, {})
+    moved = nominal_point(scene.model, Loop.TOOL, at) - nominal_point(PLAIN.model, Loop.TOOL, at)
+    np.testing.assert_allclose(moved, [0.0, 0.0, 150.0], atol=1e-9)
+    for frame in ("S", "t", "w", "B"):
+        changed = read_back(change_offset(PLAIN, frame, 0, 12.5))
+        assert changed != PLAIN
+
+
+def test_a_rotation_turns_what_stands_behind_it():
+    scene = read_back(change_rotation(PLAIN, "X", 2, 90.0))
+    at = complete_coordinates(PLAIN.machine, {"X": 100.0})
+    middle = complete_coordinates(PLAIN.machine, {"X": 0.0})
+    along = nominal_point(scene.model, Loop.TOOL, at) - nominal_point(
+        scene.model, Loop.TOOL, middle
+    )
+    np.testing.assert_allclose(along, [0.0, 100.0, 0.0], atol=1e-9)
+    assert read_back(change_rotation(PLAIN, "S", 2, 0.0)).machine.fixed_deg == {}
+    assert read_back(change_rotation(PLAIN, "t", 1, 30.0)).machine.fixed_deg == {
+        "S": (0.0, 0.0, 5.0),
+        "t": (0.0, 30.0, 0.0),
+    }
+
+
+def test_a_travel_and_a_direction():
+    scene = read_back(change_travel(PLAIN, "X", 1, 150.0))
+    assert scene.machine.axes["X"].travel == (-300.0, 150.0)
+    assert any("reaches beyond the travel" in note for note in scene.notes)
+    assert scene.workspace == PLAIN.workspace
+    with pytest.raises(OptionError, match="lower end below the upper"):
+        change_travel(PLAIN, "X", 0, 300.0)
+    assert read_back(change_direction(PLAIN, "B", -1)).machine.axes["B"].direction == -1
+    with pytest.raises(OptionError):
+        change_direction(PLAIN, "B", 0)
+
+
+def test_the_working_volume_changes_and_the_curves_stay_the_same_functions():
+    scene = read_back(change_volume(PLAIN, "X", 1, 300.0))
+    assert scene.workspace.ranges["X"] == (-200.0, 300.0)
+    at = np.linspace(-200.0, 300.0, 7)
+    for key in ("EXX", "EAY"):
+        np.testing.assert_allclose(
+            scene.errors.evaluate(key, at), PLAIN.errors.evaluate(key, at), atol=1e-12
+        )
+    assert isinstance(scene.errors.functions["EXX"], Poly)
+    assert PLAIN.errors.amplitude("EXX") == 10.0
+    # the ramp from 0 to 10 µm over 400 mm goes on to 12.5 µm over 500 mm
+    assert scene.errors.amplitude("EXX") == pytest.approx(12.5)
+
+
+def test_a_range_of_equal_ends_stands_still_and_a_reversed_one_is_refused():
+    scene = read_back(change_volume(PLAIN, "Z", 0, 50.0))
+    assert scene.workspace.ranges["Z"] == (50.0, 50.0)
+    with pytest.raises(OptionError, match="working volume of Z"):
+        change_volume(PLAIN, "Z", 0, 51.0)
+    assert read_back(hold_axis(PLAIN, "B", 25.0)).workspace.ranges["B"] == (25.0, 25.0)
+
+
+def test_a_fourth_range_is_refused_as_in_a_file():
+    with pytest.raises(SceneError, match=r"workspace\.B"):
+        change_volume(PLAIN, "B", 1, 20.0)
+
+
+@pytest.mark.parametrize("value", [1e9, -math.inf, 1e300, 1e-320])
+def test_numbers_beyond_the_limits_are_clamped_and_noted(value: float):
+    edits = [
+        change_offset(PLAIN, "X", 0, value),
+        change_rotation(PLAIN, "w", 1, value),
+        change_volume(PLAIN, "X", int(value > 0), value)
+        if abs(value) > 1
+        else Edited(PLAIN, ("",)),
+    ]
+    for edited in edits:
+        read_back(edited)
+        assert len(edited.notes) == 1
+    assert abs(edits[0].scene.machine.axes["X"].offset_mm[0]) in (1e5, 0.0)
+    assert abs(edits[1].scene.machine.fixed_deg.get("w", (0, 0, 0))[1]) in (360.0, 0.0)
+
+
+def test_what_is_no_number_frame_or_end_is_refused():
+    wrong = [
+        lambda: change_offset(PLAIN, "X", 0, math.nan),
+        lambda: change_offset(PLAIN, "A", 0, 1.0),
+        lambda: change_offset(PLAIN, "X", 3, 1.0),
+        lambda: change_rotation(PLAIN, "R", 0, 1.0),
+        lambda: change_travel(PLAIN, "S", 0, 1.0),
+        lambda: change_travel(PLAIN, "X", 2, 1.0),
+        lambda: change_volume(PLAIN, "t", 0, 1.0),
+        lambda: move_axis(PLAIN, "X", "up"),
+        lambda: switch_side(PLAIN, "F"),
+    ]
+    for edit in wrong:
+        with pytest.raises(WarpspaceError):
+            edit()
+
+
+def test_a_machine_of_the_library_brings_its_volume_and_points_and_leaves_the_errors():
+    library = load_scene("dvf5000_first")
+    edited = take_machine(PLAIN, library)
+    scene = read_back(edited)
+    assert scene.machine == library.machine
+    assert scene.workspace == library.workspace
+    assert scene.model.tool_point_mm == library.model.tool_point_mm
+    assert scene.title == "Plain"
+    assert {"EXX", "EAY"} <= {*scene.errors} <= {*PLAIN.errors}
+
+
+def test_bodies_of_the_library_stay_as_long_as_the_frames_do():
+    scene = load_scene("dvf5000_first")
+    own = scene.machine.body_dir
+    assert own
+    assert read_back(change_travel(scene, "X", 1, 400.0)).machine.body_dir == own
+    moved = read_back(change_offset(scene, "X", 0, 1.0)).machine
+    assert moved.body_dir == ""
+    assert moved.name == scene.name
+    assert moved.title == f"Machine {moved.chain}"
+
+
+AXES = st.sampled_from(("X", "Y", "Z", "A", "B", "C", "C1", "U", "W", "S", "t", "w"))
+NUMBERS = st.floats(allow_nan=True, allow_infinity=True) | st.integers(-400, 400).map(float)
+CHAINS = st.tuples(st.lists(AXES, max_size=3), st.lists(AXES, max_size=3))
+EDITS = st.one_of(
+    st.tuples(st.just(change_chain), CHAINS.map(lambda c: f"w{''.join(c[0])}F{''.join(c[1])}t")),
+    st.tuples(st.just(move_axis), AXES, st.sampled_from(("left", "right"))),
+    st.tuples(st.sampled_from((switch_side, remove_axis)), AXES),
+    st.tuples(st.sampled_from((change_offset, change_rotation)), AXES, st.integers(0, 2), NUMBERS),
+    st.tuples(st.sampled_from((change_travel, change_volume)), AXES, st.integers(0, 1), NUMBERS),
+    st.tuples(st.just(take_machine), st.sampled_from(scene_names()).map(load_scene)),
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(EDITS, min_size=1, max_size=6))
+def test_whatever_is_done_gives_a_scene_that_reads_back_or_leaves_the_old_one(edits):
+    scene = PLAIN
+    for edit, *arguments in edits:
+        try:
+            edited = edit(scene, *arguments)
+        except WarpspaceError:
+            continue
+        scene = read_back(edited)
