@@ -20,6 +20,7 @@ from warpspace.picture.scene_picture import evaluate_picture
 REFUSED = {
     "slices": "does not extend along X, Y and Z; draw the error-map",
     "traces": "has no traces; expected a machine with a rotary axis",
+    "rotary": "has no traces; expected a machine with a rotary axis",
     "gains": "has no axis in it",
     "montecarlo": r"has no tolerances to sample machines from|has no axis in it",
     "ballbar": r"has no axis [XY]|the circle leaves the working volume",
@@ -27,7 +28,7 @@ REFUSED = {
 """What a figure may say instead: what it shows is not there."""
 DRAWN = ("wFXt", "wXFt", "wCFt, traces", "only X moves", "nothing moves")
 """Drawing takes a second each: a line and a point carried by either side, with traces."""
-ALWAYS = {"error-map", "orientation-map", "error-curves", "machine"}
+ALWAYS = {"error-map", "orientation-map", "error-curves", "machine", "repair"}
 
 
 def test_every_kind_of_figure_is_looked_at() -> None:

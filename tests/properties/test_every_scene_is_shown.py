@@ -29,7 +29,7 @@ from warpspace.app.readouts.summary import heading, summary
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.look import QUANTITIES, SURFACES
 from warpspace.app.state.picked import Picked
-from warpspace.app.viewport.layers.annotations import AnnotationsLayer, bar_lines
+from warpspace.app.viewport.layers.annotations import AnnotationsLayer
 from warpspace.app.viewport.layers.asked_point import AskedPointLayer
 from warpspace.app.viewport.layers.axes import AxesLayer, axes_room_mm
 from warpspace.app.viewport.layers.box import BoxLayer, ghost_dashes
@@ -124,7 +124,6 @@ def _check_finite(picture: LivePicture) -> None:
         edge_pieces(picture),
         isoline_pieces(picture),
         ghost_dashes(picture),
-        bar_lines(picture)[1],
     ):
         assert pieces.shape[1:] == (2, 3)
         assert np.isfinite(pieces).all()

@@ -2,7 +2,7 @@
 
 import pytest
 
-from warpspace.picture.words import spell, spell_factor, spell_point, spell_short
+from warpspace.picture.words import spell, spell_factor, spell_vector, spell_short
 
 
 @pytest.mark.parametrize(
@@ -24,8 +24,8 @@ def test_spell(value: float, text: str) -> None:
 
 
 def test_points_factors_and_short_numbers() -> None:
-    assert spell_point((275.0, -225.0, -51.0)) == "(275, −225, −51)"
-    assert spell_point((0.04, -0.04, 9.96)) == "(0, 0, 10)"
+    assert spell_vector((275.0, -225.0, -51.0)) == "(275, −225, −51)"
+    assert spell_vector((0.04, -0.04, 9.96)) == "(0, 0, 10)"
     assert spell_factor(1000.0) == "×1000"
     assert spell_factor(1.0) == "×1, true scale"
     assert spell_short(-2.5) == "−2.5"

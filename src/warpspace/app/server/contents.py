@@ -77,7 +77,7 @@ class PageContents:
         if self._errors is not None:
             self._errors.add_axes(state)
         below = context.gui.add_panel()
-        with below.add_tab(ERROR_CURVE):
+        with below.add_tab("Error curve"):
             curve = ErrorCurvePanel(context, state)
         below.dock_below(context.gui.main_panel)
         self._expand = below.expand

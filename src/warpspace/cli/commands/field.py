@@ -122,13 +122,14 @@ def _evaluate(
 
     if points:
         typed = [parse_point(text, scene.machine.axes) for text in points]
-        for point in typed:
-            warn_outside_travel(scene.machine, point)
         full = [
             complete_coordinates(scene.machine, point, scene.workspace.positions) for point in typed
         ]
         axes = {name: np.array([point[name] for point in full]) for name in scene.machine.axes}
-        return axes, evaluate(scene, at=axes, loop=loop, exact=exact, frame=frame), None
+        found = evaluate(scene, at=axes, loop=loop, exact=exact, frame=frame)
+        for point in typed:
+            warn_outside_travel(scene.machine, point)
+        return axes, found, None
     nodes = DEFAULT_NODES if grid is None else grid
     built = build_grid(scene.model, scene.workspace, nodes)
     axes = {

@@ -67,7 +67,7 @@ def gains(
     over_travel: bool,
     as_json: bool,
 ) -> None:
-    """Rank the error parameters of SCENE's machine by their gain.
+    """Rank the error parameters of SCENE by their gain.
 
     A gain is the displacement of the functional point per unit of an error: µm per µm or µm per
     µrad, signed at a point (--at, by default the middle of the scene's ranges). The lever from the

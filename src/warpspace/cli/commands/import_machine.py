@@ -23,7 +23,7 @@ SHOWN = 30
 )
 @force_option
 def import_machine(robot: Path, output: str, tool: str, workpiece: str, *, force: bool) -> None:
-    """Read the URDF file ROBOT as a machine and write a scene of it.
+    """Read a machine from the URDF file ROBOT into a scene.
 
     The joints between workpiece and tool become axes, their limits travels, their origins offsets
     and rotations, their shapes one mesh for each axis. What has no place is named, here and at the

@@ -9,7 +9,7 @@ from warpspace.cli.tables import Column, print_table
 @click.command()
 @json_option
 def machines(*, as_json: bool) -> None:
-    """List the bundled machines: name, chain, title, source of the structure, picture.
+    """List the bundled machines with their pictures.
 
     A scene takes one by its name, machine = "scara"; machine_NAME is the scene that shows it.
     """

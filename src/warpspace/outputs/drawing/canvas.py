@@ -37,7 +37,8 @@ class Canvas:
     factor : float
         What sizes of text and lines are multiplied by.
     rects : list of tuple of float, (4,)
-        Boxes of all text drawn so far: left, bottom, right, top.
+        Boxes of all text drawn so far, several along text that stands askew: left, bottom, right,
+        top.
     """
 
     def __init__(self, width: int, height: int, theme: Theme, *, exact: bool = True) -> None:
@@ -138,9 +139,28 @@ class Canvas:
         if halo:
             stroke = Stroke(linewidth=self.px(0.25 * size) * POINTS_PER_PX, foreground=halo)
             drawn.set_path_effects([stroke, Normal()])
-        rect = self._text_rect(x, y, self.text_size(text, size, weight), ha, va, rotation)
-        self.rects.append(rect)
+        extent = self.text_size(text, size, weight)
+        rect = self._text_rect(x, y, extent, ha, va, rotation)
+        self.rects += [rect] if rotation % 90.0 == 0.0 else self._pieces(rect, extent, rotation)
         return rect
+
+    @staticmethod
+    def _pieces(
+        rect: tuple[float, float, float, float], extent: tuple[float, float], rotation: float
+    ) -> list[tuple[float, float, float, float]]:
+        """Cover text that stands askew with boxes side by side: one around it is mostly empty."""
+        width, height = extent
+        count = max(1, math.ceil(width / height))
+        c, s = math.cos(math.radians(rotation)), math.sin(math.radians(rotation))
+        across, up = 0.5 * width / count * abs(c), 0.5 * width / count * abs(s)
+        if abs(c) >= abs(s):
+            up += 0.5 * height * abs(c)
+        else:
+            across += 0.5 * height * abs(s)
+        middle = ((rect[0] + rect[2]) / 2.0, (rect[1] + rect[3]) / 2.0)
+        along = [width * ((index + 0.5) / count - 0.5) for index in range(count)]
+        places = [(middle[0] + step * c, middle[1] + step * s) for step in along]
+        return [(x - across, y - up, x + across, y + up) for x, y in places]
 
     @staticmethod
     def _text_rect(
