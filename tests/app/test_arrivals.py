@@ -10,6 +10,7 @@ from viser import _messages as messages
 from warpspace.app.browser.arrivals import CARRIER, MOST_KNOWN, Arrivals
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import start_state
+from warpspace.app.viewport.camera import CameraMemory
 from warpspace.app.viewport.tab_camera import TabCamera
 from warpspace.scene.library import load_scene
 
@@ -97,6 +98,8 @@ def fitted(image_width: int, page_width: float | None) -> np.ndarray:
     picture = LiveModel().evaluate(start_state(load_scene("dvf5000_first")))
     tab = TabCamera(SimpleNamespace(camera=camera))  # pyright: ignore[reportArgumentType]
     tab.page_width = page_width
+    # viser's camera has arrays, this one what it was given
+    tab.remember = lambda: CameraMemory((0.0,) * 3, (0.0,) * 3, (0.0,) * 3, 0.8)
     tab.fit(picture)
     return camera.position
 

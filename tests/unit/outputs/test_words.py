@@ -2,7 +2,7 @@
 
 import pytest
 
-from warpspace.picture.words import spell, spell_factor, spell_vector, spell_short
+from warpspace.picture.words import spell, spell_factor, spell_short, spell_vector
 
 
 @pytest.mark.parametrize(
