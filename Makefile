@@ -13,7 +13,7 @@ DEV_STAMP := $(VENV)/.installed-dev
 PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help view test coverage lint format bench screenshots clean system-packages
+.PHONY: help view test proofs coverage lint format bench screenshots clean system-packages
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
@@ -21,11 +21,14 @@ help: ## list the targets
 view: $(RUN_STAMP) ## open the app (make view SCENE=teach_squareness ARGS="--port 8080")
 	$(BIN)/warpspace view $(SCENE) $(ARGS)
 
-test: system-packages $(DEV_STAMP) ## install what is missing, then lint, type-check and test everything
+test: system-packages $(DEV_STAMP) ## install what is missing, then lint, type-check and test
 	$(MAKE) --no-print-directory lint
 	bash .ci/tests.sh
 
-coverage: system-packages $(DEV_STAMP) ## run all tests and say which lines none of them reaches
+proofs: system-packages $(DEV_STAMP) ## run the slow proofs: kills, hostile messages, the largest page
+	$(BIN)/python -m pytest -m proof --durations=10 $(ARGS)
+
+coverage: system-packages $(DEV_STAMP) ## run the tests and say which lines none of them reaches
 	rm -f .coverage
 	bash .ci/tests.sh --cov --cov-append --cov-report=
 	$(BIN)/python -m coverage report

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.browser
 PICTURE = LiveModel().evaluate(start_state(load_scene("dvf5000_first")))
-SIZES = [(1024, 768), (1600, 1000), (3840, 2160)]
+LARGEST = pytest.param((3840, 2160), marks=pytest.mark.proof)
+SIZES = [(1024, 768), (1600, 1000), LARGEST]
 PHONE = (390, 844)
 BOXES = """() => {
   const box = part => {

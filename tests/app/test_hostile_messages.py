@@ -219,7 +219,7 @@ async def send_all(app: App, messages: list[bytes]) -> None:
         socket.transport.abort()
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 def test_ten_thousand_hostile_messages_leave_an_honest_tab_served(app: App) -> None:
     async def run() -> tuple[list[float], float]:
         async with Tab(app) as honest, Tab(app) as hostile:
@@ -345,7 +345,7 @@ async def come_and_go(app: App, times: int) -> None:
         await asyncio.gather(*(way(app) for way in ways[begin : begin + 8]))
 
 
-@pytest.mark.slow
+@pytest.mark.proof
 def test_two_hundred_connections_that_vanish_leave_nothing_behind(app: App) -> None:
     # libraries are loaded, viser's pool has its threads, and the heap its size for so many at once
     asyncio.run(come_and_go(app, CONNECTIONS))

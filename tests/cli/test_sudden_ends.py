@@ -96,6 +96,7 @@ def run_again(folder: Path) -> None:
     assert again.wait(60) == 0, (folder / "log").read_text()
 
 
+@pytest.mark.proof
 def test_a_hundred_kills_leave_nothing(tmp_path: Path) -> None:
     chance = random.Random(11)
     for number in range(100):
