@@ -102,7 +102,7 @@ def test_words_of_a_scene_are_never_run(browser: Any) -> None:
         Viewer(scene) as viewer,
         browser.new_context(viewport={"width": 1024, "height": 768}) as context,
     ):
-        tab = Tab(context.new_page(), viewer, "&tour=on")
+        tab = Tab(context.new_page(), viewer, "&tour=on", everything=False)
         page = tab.page
         tab.until(lambda: page.locator("#warpspace-tour").count() == 1)
         assert words in page.inner_text("#warpspace-tour")
@@ -122,6 +122,6 @@ def test_words_of_a_scene_are_never_run(browser: Any) -> None:
 
 @pytest.mark.parametrize("query", ["&tour=off", "&tour=on"])
 def test_the_address_says_whether_there_is_a_tour(open_tab: Callable[..., Tab], query: str) -> None:
-    tab = open_tab(query=query)
+    tab = open_tab(query=query, everything=False)
     tab.page.wait_for_timeout(500)
     assert tab.page.locator("#warpspace-tour").count() == (query == "&tour=on")

@@ -67,10 +67,8 @@ def served() -> Iterator[Served]:
 
 
 def number_box(page: "Page", label: str) -> Any:
-    """Number box of the slider whose label begins with a word."""
-    find = """label => [...document.querySelectorAll('label')]
-        .find(l => l.textContent.startsWith(label))?.getAttribute('for')"""
-    return page.locator(f"[id='{page.evaluate(find, label)}'] ~ div input")
+    """Number box of an error."""
+    return page.locator(f"input[data-number='{label}']")
 
 
 def maximum(page: "Page") -> str:
@@ -122,7 +120,7 @@ def test_killed_server_is_said_and_its_tab_restored(
     assert "Not restored: what Undo and Redo could go back to;" in said
     assert number_box(page, "EAX").input_value() == "12"
     page.screenshot(path=str(tmp_path / "back.png"))
-    page.get_by_role("button", name="Close").click()
+    page.get_by_role("button", name="Close", exact=True).click()
     assert page.locator(BOX).count() == 0
 
     # Undo goes to what the server was started with, Redo back again

@@ -134,7 +134,7 @@
   // from the search box to the number of the first error that was found, once it is there
   const toFound = tries => {
     const panel = search()?.closest("[data-dock-group]") ?? document.body;
-    const boxes = all(".mantine-Slider-root ~ .mantine-NumberInput-root input", panel)
+    const boxes = all("input[data-number]", panel)
       .filter(input => input.checkVisibility());
     if (boxes.length && !tries) { boxes[0].focus(); boxes[0].select(); }
     else if (tries) setTimeout(toFound, 100, tries - 1);
