@@ -147,7 +147,10 @@
       const close = all(".mantine-Modal-content button").find(b => b.innerText.trim() === "Close");
       if (close) close.click();
       else if (isWritten(at) && at.getAttribute("aria-expanded") !== "true"
-        && !at.closest("[role=dialog]")) at.blur();
+        && !at.closest("[role=dialog]")) {
+        at.dataset.left = "1";
+        at.blur();
+      }
     } else if (event.key === "/" && plain && !isWritten(at)) {
       event.preventDefault();
       find();

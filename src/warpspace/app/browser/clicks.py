@@ -19,11 +19,11 @@ SCRIPT = f"""(() => {{
     __viserMutable.sendMessage({{
       type: "GuiUpdateMessage", uuid, updates: {{value: clicks.latest.join("\\n")}},
     }});
-    // the answer replaces the part: what had the focus keeps it
+    // the answer replaces the part: what had the focus keeps it, unless Esc has left it
     const watch = new MutationObserver(() => {{
       if (part.isConnected) return;
       watch.disconnect();
-      if (document.activeElement === document.body)
+      if (document.activeElement === document.body && !part.dataset.left)
         document.querySelector(`[data-word="${{CSS.escape(word)}}"]`)?.focus({{
           preventScroll: true }});
     }});
