@@ -105,11 +105,11 @@ def test_rows_of_the_budget_are_edited_excluded_and_show_their_lever(tab: Tab) -
     tab.page.keyboard.press("ArrowRight")
     tab.until(lambda: tab.state().amplitudes["EB0Z"] != START.amplitudes["EB0Z"])
     tab.page.get_by_role("button", name="Reset", exact=True).click()
-    tab.page.get_by_role("button", name="Exclude EA0Z").click()
+    tab.page.get_by_role("button", name="Exclude EA0Z", exact=True).click()
     without = LIVE.evaluate(with_excluded(START, "EA0Z", True)).statistics.max_um
     tab.until(lambda: tab.state().exclusions.excluded == {"EA0Z"})
     tab.until(lambda: abs(tab.number("max") - without) < 0.006)
-    tab.page.get_by_role("button", name="Include EA0Z").click()
+    tab.page.get_by_role("button", name="Include EA0Z", exact=True).click()
     check_budget(tab, WORST)
 
 
