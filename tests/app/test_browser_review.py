@@ -119,7 +119,7 @@ def test_only_by_keyboard_keeps_the_focus_and_is_undone(tab: Tab) -> None:
         tab.until(lambda pressed=pressed: tab.page.evaluate(focus) == [word, pressed])
     press(tab, "Control+z")
     shows(tab, START)
-    tab.until(lambda: tab.page.locator("button[aria-pressed='true']").count() == 0)
+    tab.until(lambda: tab.page.locator(".ws-error button[aria-pressed='true']").count() == 0)
 
 
 def test_the_curve_of_a_row_comes_into_view(tab: Tab) -> None:
@@ -169,7 +169,7 @@ def test_undo_and_redo_of_everything(tab: Tab) -> None:
     tab.until(lambda: tab.page.get_by_text("E_x", exact=False).count() > 0)
     tab.page.wait_for_timeout(300)
     press(tab, "Control+z")
-    tab.until(lambda: tab.page.get_by_text("Undone: colour").count() > 0)
+    tab.until(lambda: tab.page.get_by_text("Undone: component").count() > 0)
     shows(tab, moved)
     tab.page.get_by_role("button", name="Undo").click()
     # the whole drag is one step
