@@ -357,7 +357,8 @@ def test_the_palette_and_the_help_list_what_there_is(tab: Tab) -> None:
     tab.until(lambda: tab.page.get_by_text("Keys and help").is_visible())
     for words in ("Ctrl + Shift + Z", "Camera to the operator's side", "Command palette"):
         assert tab.page.get_by_text(words).first.is_visible()
-    tab.page.locator(".mantine-Modal-content").get_by_role("button", name="Close", exact=True).click()
+    shown = tab.page.locator(".mantine-Modal-content")
+    shown.get_by_role("button", name="Close", exact=True).click()
     tab.until(lambda: tab.page.get_by_text("Keys and help").count() == 0)
 
 
