@@ -29,7 +29,6 @@ from warpspace.units import MICROMETRE, Array
 
 PIECE = 2
 """Samples of a trace in one piece of one colour."""
-"""Axes whose bodies stand around the traces; the other bodies would hide them."""
 FADED = 0.55
 
 
@@ -75,7 +74,7 @@ def draw_traces(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     scale = choose_scale([values], settings.component, end=settings.range_top)
     picture = evaluate_picture(scene, grid=2, loop="workpiece", exaggeration=factor)
     turning = [axis.name for axis in scene.machine.axes.values() if not axis.is_linear]
-    placed = bodies_of(picture, factor, only=(*turning, "w"))
+    placed = bodies_of(picture, factor, only=(*turning, "w"))  # others would hide the traces
     title = f"Traces of the rotary axes: {scene.title}"
     facts = [
         fact for fact in scene_facts(picture, factor) if not fact.startswith(("working", "2 "))

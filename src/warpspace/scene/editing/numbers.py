@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.field.grid import Workspace
-from warpspace.machine.description import FIXED_FRAMES, ORIGIN, Machine
+from warpspace.machine.description import FIXED_FRAMES, ORIGIN, Axis, Machine
 from warpspace.machine.limits import FULL_TURN_DEG, MAX_LENGTH_MM, MIN_NUMBER, MIN_SPAN
 from warpspace.scene.editing.edited import Edited, checked
 from warpspace.scene.model import Scene
@@ -38,8 +38,8 @@ def change_offset(scene: Scene, frame: str, index: int, value: float) -> Edited:
     machine = scene.machine
     if _is_axis(machine, frame):
         axis = machine.axes[frame]
-        moved = replace(axis, offset_mm=_with_entry(axis.offset_mm, index, kept))
-        return _with_machine(scene, replace(machine, axes={**machine.axes, frame: moved}), notes)
+        moved = _with_entry(axis.offset_mm, index, kept)
+        return _with_axis(scene, replace(axis, offset_mm=moved), notes)
     offset = _with_entry(machine.fixed_mm.get(frame, ORIGIN), index, kept)
     return _with_machine(
         scene, replace(machine, fixed_mm={**machine.fixed_mm, frame: offset}), notes
@@ -69,8 +69,8 @@ def change_rotation(scene: Scene, frame: str, index: int, value: float) -> Edite
     machine = scene.machine
     if _is_axis(machine, frame):
         axis = machine.axes[frame]
-        turned = replace(axis, rotation_deg=_with_entry(axis.rotation_deg, index, kept))
-        return _with_machine(scene, replace(machine, axes={**machine.axes, frame: turned}), notes)
+        turned = _with_entry(axis.rotation_deg, index, kept)
+        return _with_axis(scene, replace(axis, rotation_deg=turned), notes)
     rotation = _with_entry(machine.fixed_deg.get(frame, ORIGIN), index, kept)
     rest = {name: machine.fixed_deg[name] for name in machine.fixed_deg if name != frame}
     fixed = rest if rotation == ORIGIN else {**rest, frame: rotation}
@@ -95,15 +95,15 @@ def change_travel(scene: Scene, axis: str, end: int, value: float) -> Edited:
     UnknownNameError, OptionError
         If there is no such axis, the value is no number, or the travel would be empty.
     """
-    machine, unit = scene.machine, scene.machine.axis(axis).unit
+    present = scene.machine.axis(axis)
+    unit = present.unit
     kept, notes = _clamped(f"{_end(end)} end of the travel of {axis}", value, MAX_LENGTH_MM, unit)
-    low, high = _with_entry(machine.axes[axis].travel, end, kept)
+    low, high = _with_entry(present.travel, end, kept)
     if high - low < MIN_SPAN:
         raise OptionError(
             f"travel of {axis} {low:g} … {high:g} {unit}; expected the lower end below the upper"
         )
-    moved = replace(machine.axes[axis], travel=(low, high))
-    return _with_machine(scene, replace(machine, axes={**machine.axes, axis: moved}), notes)
+    return _with_axis(scene, replace(present, travel=(low, high)), notes)
 
 
 def change_direction(scene: Scene, axis: str, direction: int) -> Edited:
@@ -114,11 +114,10 @@ def change_direction(scene: Scene, axis: str, direction: int) -> Edited:
     UnknownNameError, OptionError
         If there is no such axis or direction.
     """
-    machine, present = scene.machine, scene.machine.axis(axis)
+    present = scene.machine.axis(axis)
     if direction not in (1, -1):
         raise OptionError(f"direction of {axis} {direction}; expected 1 or −1")
-    moved = replace(present, direction=direction)
-    return _with_machine(scene, replace(machine, axes={**machine.axes, axis: moved}))
+    return _with_axis(scene, replace(present, direction=direction))
 
 
 def change_volume(scene: Scene, axis: str, end: int, value: float) -> Edited:
@@ -170,6 +169,12 @@ def hold_axis(scene: Scene, axis: str, value: float) -> Edited:
     kept, notes = _clamped(f"position of {axis}", value, MAX_LENGTH_MM, unit)
     workspace = Workspace({**scene.workspace.ranges, axis: (kept, kept)})
     return _checked(scene, replace(scene, workspace=workspace), notes)
+
+
+def _with_axis(scene: Scene, axis: Axis, notes: tuple[str, ...] = ()) -> Edited:
+    """Give a scene a machine with one of its axes changed."""
+    axes = {**scene.machine.axes, axis.name: axis}
+    return _with_machine(scene, replace(scene.machine, axes=axes), notes)
 
 
 def _with_machine(scene: Scene, machine: Machine, notes: tuple[str, ...] = ()) -> Edited:
