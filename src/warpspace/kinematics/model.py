@@ -75,6 +75,14 @@ class Model:
         """Names of the conventions that axes of the machine have, each once."""
         return tuple(dict.fromkeys(self.convention(axis).name for axis in self.machine.axes))
 
+    @property
+    def convention_value(self) -> str | dict[str, str]:
+        """The convention as scene files spell it: one name, or the name of each axis."""
+        names = self.convention_names
+        if len(names) == 1:
+            return names[0]
+        return {axis: self.convention(axis).name for axis in self.machine.axes}
+
 
 def batch_shape(coordinates: Coordinates) -> tuple[int, ...]:
     """Give the batch shape that the positions of all axes broadcast to."""

@@ -227,7 +227,8 @@ def build_machine(
         for axis in parsed.axes
     }
     fixed = {frame: offsets.get(frame, ORIGIN) for frame in FIXED_FRAMES}
-    turned = {frame: rotations[frame] for frame in FIXED_FRAMES if frame in rotations}
+    turned = {frame: rotations.get(frame, ORIGIN) for frame in FIXED_FRAMES}
+    turned = {frame: angles for frame, angles in turned.items() if angles != ORIGIN}
     gantries = {
         axis: Gantry(axis, span_mm, across or default_across(axis))
         for axis, (span_mm, across) in (gantry or {}).items()

@@ -14,7 +14,6 @@ from warpspace.picture.exaggeration import Exaggeration, choose_exaggeration
 from warpspace.picture.model import Picture, coloured_values
 from warpspace.picture.size import picture_size_mm
 from warpspace.picture.traces import TraceLines, evaluate_traces
-from warpspace.picture.words import convention_value
 from warpspace.scene.model import Scene
 from warpspace.scene.pipeline import choose_view, evaluate
 from warpspace.scene.save import scene_to_toml
@@ -48,7 +47,7 @@ class ScenePicture(Picture):
         return {
             "loop": str(self.view.loop),
             "reference": "absolute" if reference is None else dict(reference),
-            "component_errors": convention_value(self.scene.model),
+            "component_errors": self.scene.model.convention_value,
             "model": "first order",
             "nodes": list(self.grid.shape),
             "exaggeration": self.exaggeration,
@@ -67,7 +66,7 @@ class ScenePicture(Picture):
             "reference": "absolute"
             if held is None
             else " ".join(f"{axis}={at:g}" for axis, at in held.items()),
-            "component_errors": _one_text(convention_value(self.scene.model)),
+            "component_errors": _one_text(self.scene.model.convention_value),
             "model": "first order",
             "conditions": "; ".join(self.conditions),
             "program": f"warpspace {__version__}",

@@ -128,13 +128,6 @@ def convention_sentences(scene: Scene) -> tuple[str, ...]:
     )
 
 
-def convention_value(model: Model) -> str | dict[str, str]:
-    """Spell the convention as scene files do: one name, or the name of each axis."""
-    if len(model.convention_names) == 1:
-        return model.convention_names[0]
-    return {axis: model.convention(axis).name for axis in model.machine.axes}
-
-
 def quantity_words(component: str, unit: str = "µm") -> str:
     """Say what the colours of a map of position errors mean."""
     return f"|E|  [{unit}]" if component == "norm" else f"{component} component of E  [{unit}]"

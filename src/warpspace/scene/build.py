@@ -139,10 +139,11 @@ def _known_parameters(
         else:
             known[key] = value
         if key in refused:
+            reference = PARAMETERS[key].axis
             usual = [name for name in machine.parameter_keys if PARAMETERS[name].is_constant]
             problems.add(
                 f"{section}.{key}",
-                f"is zero by definition of the frame, {key[3]} being the reference axis"
+                f"is zero by definition of the frame, {reference} being the reference axis"
                 f'{near_miss(key, usual)} ([convention] reference_axis = "free" allows it)',
                 value,
             )
@@ -254,12 +255,12 @@ def _carried_notes(machine: Machine, errors: ErrorSet) -> tuple[str, ...]:
         own = direction_index(row.axis)
         if row.direction == own:
             continue
-        other = "XYZ"[3 - row.direction - own]
         branches = (machine.chain.tool, machine.chain.workpiece)
-        shared = next((branch for branch in branches if {row.axis, other} <= {*branch}), None)
-        if shared and shared.index(other) > shared.index(row.axis):
-            notes.append(
-                f"errors.{key} turns {other} as well, which rides on {row.axis}: the angle"
-                f" between them stays, the pair turns as a whole"
-            )
+        branch = next(branch for branch in branches if row.axis in branch)
+        notes += [
+            f"errors.{key} turns {other} as well, which rides on {row.axis}: the angle"
+            f" between them stays, the pair turns as a whole"
+            for other in branch[branch.index(row.axis) + 1 :]
+            if is_linear(other) and direction_index(other) == 3 - row.direction - own
+        ]
     return tuple(notes)

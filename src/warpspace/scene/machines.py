@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 
 from warpspace.exceptions import ChainError, SceneError, UnknownNameError
@@ -26,8 +27,9 @@ def machine_picture(name: str) -> Path | None:
     return path if path.is_file() else None
 
 
+@lru_cache(maxsize=64)
 def load_machine(name: str) -> Machine:
-    """Load a bundled machine.
+    """Load a bundled machine; its file is read once.
 
     Parameters
     ----------

@@ -52,8 +52,5 @@ def repaired(scene: Scene, adjust: Mapping[str, float]) -> Scene:
     """Give a scene with some errors adjusted: new amplitudes by key, µm or µrad."""
     errors = scene.errors
     for key, value in adjust.items():
-        axis = parameter(key).axis
-        low, high = scene.workspace.ranges[axis]
-        span = (low, high) if low < high else scene.machine.axes[axis].travel
-        errors = errors.with_amplitude(key, value, span)
+        errors = errors.with_amplitude(key, value, scene.axis_span(parameter(key).axis))
     return replace(scene, title=f"{scene.title}, repaired"[:MAX_TEXT], errors=errors)

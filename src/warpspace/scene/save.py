@@ -38,17 +38,17 @@ def scene_to_toml(scene: Scene) -> str:
     to the last bit. One thing the format cannot say is a ramp over another range than that of its
     axis in the working volume; it is written as the polynomial it is.
     """
-    bundled = _is_bundled(scene.machine)
+    known = _bundled(scene.machine)
     head: dict[str, object] = {"title": scene.title}
-    if bundled:
+    if known is not None:
         head["machine"] = scene.machine.name
     if scene.description:
         head["description"] = scene.description
     parts = [tomli_w.dumps(head, multiline_strings="\r" not in scene.description)]
-    if not bundled:
+    if known is None:
         parts += _machine_sections(scene.machine)
-    parts.append(_bodies_section(scene.machine))
-    convention: dict[str, object] = {"component_errors": _component_errors(scene)}
+    parts.append(_bodies_section(scene.machine, known))
+    convention: dict[str, object] = {"component_errors": scene.model.convention_value}
     if {*scene.machine.reference_keys} & {*scene.errors, *scene.tolerances.own}:
         convention["reference_axis"] = "free"
     parts.append(_section("convention", convention))
@@ -72,23 +72,22 @@ def scene_to_toml(scene: Scene) -> str:
     return "\n".join(part for part in parts if part)
 
 
-def _is_bundled(machine: Machine) -> bool:
-    """Tell whether naming a machine is enough."""
+def _bundled(machine: Machine) -> Machine | None:
+    """Give the bundled machine that need only be named; None where there is none such."""
     if machine.name not in machine_names():
-        return False
+        return None
     try:
         known = load_machine(machine.name)
     except SceneError:
-        return False
-    return replace(known, bodies=machine.bodies) == machine
+        return None
+    return known if replace(known, bodies=machine.bodies) == machine else None
 
 
-def _bodies_section(machine: Machine) -> str:
+def _bodies_section(machine: Machine, known: Machine | None) -> str:
     """Spell the bodies that are not those of the bundled machine."""
-    known = load_machine(machine.name).bodies if _is_bundled(machine) else {}
     values: dict[str, object] = {}
     for frame, source in machine.bodies.items():
-        if known.get(frame) == source:
+        if known is not None and known.bodies.get(frame) == source:
             continue
         plain = BodySource(source.file, source.path)
         entries = asdict(source)
@@ -123,14 +122,6 @@ def _machine_sections(machine: Machine) -> list[str]:
     ]
 
 
-def _component_errors(scene: Scene) -> object:
-    """Spell the convention, or which axis has which."""
-    model = scene.model
-    if len(model.convention_names) == 1:
-        return model.convention_names[0]
-    return {axis: model.convention(axis).name for axis in scene.machine.axes}
-
-
 def _errors_section(scene: Scene) -> str:
     """Spell the error functions, each with its thesis symbol and unit behind it."""
     values = {key: _function(scene, key) for key in scene.errors}
@@ -139,14 +130,8 @@ def _errors_section(scene: Scene) -> str:
 
 def _function(scene: Scene, key: str) -> object:
     """Spell one error function."""
-    return scene.errors.functions[key].for_span(_span(scene, key)).to_toml()
-
-
-def _span(scene: Scene, key: str) -> tuple[float, float]:
-    """Range that the reader will give the function of a parameter."""
-    axis = PARAMETERS[key].axis
-    low, high = scene.workspace.ranges[axis]
-    return (low, high) if low < high else scene.machine.axes[axis].travel
+    span = scene.axis_span(PARAMETERS[key].axis)
+    return scene.errors.functions[key].for_span(span).to_toml()
 
 
 def _tolerances_section(scene: Scene) -> str:

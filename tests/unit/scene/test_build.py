@@ -237,3 +237,19 @@ def test_two_ranges_along_one_direction_are_refused() -> None:
 def test_bad_rotations_and_conventions_are_named(old: str, new: str, problem: str) -> None:
     with pytest.raises(SceneError, match=problem):
         parse_scene(NUTATING.replace(old, new), "n")
+
+
+def test_messages_name_axes_with_a_digit() -> None:
+    text = 'title = "d"\n[machine]\nchain = "wFX1Yt"\n[errors]\nEA0X1 = 5.0\n'
+    with pytest.raises(SceneError, match="X1 being the reference axis"):
+        parse_scene(text, "d")
+    text = 'title = "d"\n[machine]\nchain = "wFY1X1t"\n[errors]\nEC0Y1 = 5.0\n'
+    (note,) = parse_scene(text, "d").notes
+    assert note.startswith("errors.EC0Y1 turns X1 as well, which rides on Y1")
+
+
+def test_a_rotation_of_zero_is_none() -> None:
+    text = 'title = "z"\n[machine]\nchain = "wFXt"\nrotation_deg = { t = [0, 0, 0] }\n'
+    scene = parse_scene(text, "z")
+    assert scene.machine.fixed_deg == {}
+    assert parse_scene(scene_to_toml(scene), "z") == scene

@@ -28,6 +28,7 @@ from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.viewport.camera import CameraMemory
 from warpspace.exceptions import OptionError
 from warpspace.machine.limits import MAX_PACKED_TEXT
+from warpspace.scene.editing.edited import same_shape
 from warpspace.scene.library import load_scene, parse_scene, scene_names
 from warpspace.scene.machines import load_machine, machine_names
 from warpspace.scene.model import Scene
@@ -139,19 +140,13 @@ def _recognised(scene: Scene) -> Scene:
     machine = scene.machine
     for name in machine_names():
         known = load_machine(name)
-        if known.axes.keys() != machine.axes.keys():
-            continue
-        axes = {
-            key: replace(axis, direction=known.axes[key].direction, travel=known.axes[key].travel)
-            for key, axis in machine.axes.items()
-        }
-        same = replace(known, axes=machine.axes, bodies=machine.bodies or known.bodies)
-        offsets = (
-            machine.fixed_mm == known.fixed_mm
-            and machine.fixed_deg == known.fixed_deg
-            and machine.chain == known.chain
-        )
-        if offsets and axes == known.axes:
+        if same_shape(known, machine):
+            same = replace(
+                known,
+                axes=machine.axes,
+                bodies=machine.bodies or known.bodies,
+                gantries=machine.gantries or known.gantries,
+            )
             return replace(scene, model=replace(scene.model, machine=same))
     return scene
 

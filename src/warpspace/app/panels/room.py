@@ -16,7 +16,6 @@ from warpspace.app.readouts.room import buttons, strip
 from warpspace.app.readouts.summary import heading
 from warpspace.app.state.app_state import AppState
 from warpspace.app.viewport.layers import SCENE_PER_MM
-from warpspace.bodies.placed import load_bodies
 from warpspace.picture.isoline_labels import isoline_labels
 from warpspace.picture.words import spell_factor, spell_short
 from warpspace.units import Array
@@ -67,8 +66,7 @@ class RoomPanel:
             "strip": strip(picture),
             "buttons": buttons(
                 ghost=picture.state.machine.ghost,
-                there=not picture.state.machine.shown
-                and bool(load_bodies(picture.state.scene.machine)),
+                there=not picture.state.machine.shown,
                 attributes=self._clicks.button(MACHINE),
             ),
         }
