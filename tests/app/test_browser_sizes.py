@@ -233,7 +233,7 @@ def test_page_style_survives_the_collapse_of_the_left_column(tab: Tab) -> None:
 def ghosts(tab: Tab) -> bool:
     """Whether the ghost of the machine is drawn."""
     return tab.page.evaluate(
-        "() => { const body = window.__viserMutable.nodeRefFromName['/ghost_machine/body0'];"
+        "() => { const [body] = window.__viserMutable.nodeRefFromName['/ghost_machine'].children;"
         " return !!body && body.visible; }"
     )
 

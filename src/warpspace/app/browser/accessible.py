@@ -1,6 +1,5 @@
 """Names for screen readers, keys that act wherever the focus is, and what of viser is hidden."""
 
-import json
 from functools import cache
 from importlib.resources import files
 
@@ -40,7 +39,4 @@ def tab_script(name: str) -> str:
     name : str
         The word on the tab.
     """
-    return front_script(name) + (
-        f"""[...document.querySelectorAll('[role="tab"]')]
-  .find(tab => tab.textContent.trim() === {json.dumps(name)})?.focus();"""
-    )
+    return front_script(name, focus=True)

@@ -48,7 +48,7 @@ def split_script(share: float = ERRORS_SHARE) -> str:
 }})();"""
 
 
-def front_script(name: str) -> str:
+def front_script(name: str, *, focus: bool = False) -> str:
     """Write the script that brings a tab of a panel to the front.
 
     viser has no call for it, and its tabs follow the pointer only.
@@ -57,10 +57,14 @@ def front_script(name: str) -> str:
     ----------
     name : str
         The word on the tab.
+    focus : bool, optional
+        Whether the tab is given the focus, too.
     """
+    give = "tab?.focus();" if focus else ""
     return f"""(() => {{
   const tab = [...document.querySelectorAll('[role="tab"]')]
     .find(tab => tab.textContent.trim() === {json.dumps(name)});
+  {give}
   if (!tab || tab.getAttribute("aria-selected") === "true") return;
   const {{ x, y }} = tab.getBoundingClientRect();
   for (const what of ["pointerdown", "pointerup"])

@@ -7,9 +7,10 @@ itself keeps the panels dimmed and connects anew every second while the page is 
 import json
 from collections.abc import Sequence
 
+from warpspace.app.browser.address import PARAMETER as LINK_PARAMETER
+from warpspace.app.browser.address import STORAGE_KEY as LINK_KEY
+
 STORAGE_KEY = "warpspace-kept"
-LINK_KEY, LINK_PARAMETER = "warpspace-link", "view"
-"""As in `address.py`: a link that was not opened yet comes before what is kept."""
 STYLE = (
     "position:fixed;left:50%;top:34%;transform:translateX(-50%);z-index:1000;max-width:480px;"
     "width:calc(100vw - 48px);box-sizing:border-box;padding:16px 20px;border-radius:10px;"

@@ -16,7 +16,7 @@
     <section class="ws-room-strip" data-room="strip" aria-label="Colours and numbers"></section></div>`;
   const part = name => root.querySelector(`.ws-room-${name}`);
   const view = () => window.__viserMutable;
-  const sheet = () => document.querySelector(
+  const sheet = () => innerWidth > PHONE_PX ? null : document.querySelector(
     'div[style*="position: fixed"][style*="bottom: 0px"][style*="min-height: 3.5em"]');
 
   const roundDown = value => {
@@ -129,8 +129,8 @@
     const foot = part("foot").getBoundingClientRect(), head = part("head").getBoundingClientRect();
     const covered = below && below.height ? rect.bottom - below.top : 0;
     const size = [rect.width, rect.height, covered].map(Math.round).join();
-    if (size === told || !state.html.head) return;
     clearTimeout(timer);
+    if (size === told || !state.html.head) return;
     timer = setTimeout(() => {
       told = size;
       const top = Math.max(0, head.bottom - rect.top);

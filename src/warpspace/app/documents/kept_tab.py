@@ -6,7 +6,13 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from warpspace.app.documents.received_files import safe_name
-from warpspace.app.documents.scene_file import open_link, open_text, state_to_link, state_to_toml
+from warpspace.app.documents.scene_file import (
+    MAX_LINK,
+    named_link,
+    open_link,
+    open_text,
+    state_to_toml,
+)
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.comparison import Comparison
 from warpspace.app.viewport.camera import CameraMemory
@@ -62,8 +68,9 @@ def kept_text(state: AppState, camera: CameraMemory | None, known: Sequence[Scen
     for whole in (state,) if alone == state else (state, alone):
         with suppress(OptionError):
             kept = {NAME: whole.scene.name, FILE: state_to_toml(whole, camera)}
-            with suppress(OptionError):
-                kept[LINK] = state_to_link(whole, camera, known)
+            link = named_link(whole, camera, known)
+            if link and len(link) <= MAX_LINK:
+                kept[LINK] = link
             if whole is not state:
                 kept[ALONE] = "yes"
             text = json.dumps(kept)

@@ -171,23 +171,37 @@ def state_to_link(state: AppState, camera: CameraMemory | None, known: Iterable[
     OptionError
         If the scene, or what it is compared with, is too large for a link.
     """
-    find = _among(known)
-    link = _write(state, camera, find)
-    if not link.startswith(f"{SCENE}="):
-        link = _packed(state.scene.name, state_to_toml(state, camera))
-    else:
-        link += _behind(comparison_line(state.comparison, lambda side: _write(side, None, find)))
+    link = named_link(state, camera, known) or _packed(
+        state.scene.name, state_to_toml(state, camera)
+    )
     if len(link) > MAX_LINK:
         raise OptionError("this is too large for a link; save it as a file instead")
     return link
 
 
+def named_link(state: AppState, camera: CameraMemory | None, known: Iterable[Scene]) -> str:
+    """Spell a state of a scene that others have as well as a link of any length, else as nothing.
+
+    See `state_to_link` for the parameters.
+    """
+    find = _among(known)
+    link = _write_named(state, camera, find)
+    if not link:
+        return ""
+    return link + _behind(comparison_line(state.comparison, lambda side: _write(side, None, find)))
+
+
 def _write(state: AppState, camera: CameraMemory | None, find: Find) -> str:
     """Spell a state without its comparison as a link of any length."""
+    return _write_named(state, camera, find) or _packed(state.scene.name, _with_view(state, camera))
+
+
+def _write_named(state: AppState, camera: CameraMemory | None, find: Find) -> str:
+    """Spell a state of a known scene by its name, without its comparison; any other as nothing."""
     plain = state.loaded is None and state.tolerances == state.scene.tolerances
-    if plain and find(state.scene.name) == state.scene:
-        return urlencode({SCENE: state.scene.name}) + _behind(settings_line(state, camera))
-    return _packed(state.scene.name, _with_view(state, camera))
+    if not plain or find(state.scene.name) != state.scene:
+        return ""
+    return urlencode({SCENE: state.scene.name}) + _behind(settings_line(state, camera))
 
 
 def _among(known: Iterable[Scene]) -> Find:

@@ -8,6 +8,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from dataclasses import replace
 
 from viser import ClientHandle, GuiApi, ViserServer
 
@@ -15,6 +16,7 @@ from warpspace.app.browser.page import Page
 from warpspace.app.documents.scene_list import SceneList
 from warpspace.app.documents.services import Services
 from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.state.app_state import AppState
 from warpspace.app.state.picked import Picked
 from warpspace.app.state.store import StateStore, Update
 from warpspace.app.viewport.camera import CameraMemory
@@ -125,6 +127,35 @@ class PanelContext:
         """Put the camera somewhere with what is shown next."""
         self.camera.wanted = memory
         self._wake.set()
+
+    def show_opened(
+        self, opened: AppState, camera: CameraMemory | None, *, whole: bool = True
+    ) -> str:
+        """Show an opened state from its camera.
+
+        Parameters
+        ----------
+        opened : AppState
+        camera : CameraMemory or None
+        whole : bool, optional
+            Whether its comparison is taken over, too; else the present one stays.
+
+        Returns
+        -------
+        str
+            Title of the scene that left the list for it; empty where none did.
+        """
+        # here, since not every opened scene is drawn where many follow each other
+        _, dropped = self.scenes.add(opened.origin)
+
+        def update(now: AppState) -> AppState:
+            if camera is not None:
+                # with this change, not before it: another scene places the camera anew
+                self.look_from(camera)
+            return opened if whole else replace(opened, comparison=now.comparison)
+
+        self.post(update)
+        return dropped
 
     def fit_view(self, view: str | None = None, lens: bool | None = None) -> None:
         """Put the camera to a named view (the last one by default), or change its lens."""

@@ -155,18 +155,10 @@ class FilesPanel:
     def _show(self, opened: AppState, camera: CameraMemory | None, *, whole: bool = True) -> None:
         """Show an opened state from its camera; beside a plain scene the comparison stays."""
         # here, since not every opened scene is drawn where many follow each other
-        _, dropped = self._context.scenes.add(opened.origin)
+        dropped = self._context.show_opened(opened, camera, whole=whole)
         if dropped:
             text = f"The newest {MOST_OPENED} opened scenes are kept; {dropped} left the list."
             self._context.notify("Scenes", text, "gray")
-
-        def update(now: AppState) -> AppState:
-            if camera is not None:
-                # with this change, not before it: another scene places the camera anew
-                self._context.look_from(camera)
-            return opened if whole else replace(opened, comparison=now.comparison)
-
-        self._context.post(update)
 
     def _save(self) -> None:
         """Send the state as a scene file."""

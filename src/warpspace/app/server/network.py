@@ -10,7 +10,6 @@ import socket
 from warpspace.app.server.doors import plain_address
 from warpspace.exceptions import OptionError
 
-DEFAULT_HOST = "127.0.0.1"
 DEFAULT_PORT = 8080
 PORTS_TRIED = 100
 MAX_PORT = 65535

@@ -120,10 +120,7 @@ class TabKeeper:
         except WarpspaceError as error:
             self._say(REFUSED_TITLE, REFUSED.format(error))
             return
-        self._context.scenes.add(found.state.origin)
-        if found.camera is not None:
-            self._context.look_from(found.camera)
-        self._context.post(lambda _: found.state)
+        self._context.show_opened(found.state, found.camera)
         self._say(RESTORED_TITLE, RESTORED, MISSING.format("; ".join(found.missing)))
 
     def _say(self, title: str, *lines: str) -> None:

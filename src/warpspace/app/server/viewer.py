@@ -199,10 +199,10 @@ class Viewer:
     def _end_left(self) -> None:
         """End the sessions whose connection is gone, should viser fail to say so."""
         while not self._ended.wait(WATCH_S):
-            connected = self._server.get_clients()
             with self._lock:
-                left = self._sessions.keys() - connected.keys()
-            for client_id in left:
+                known = set(self._sessions)
+            # asked for afterwards: a tab that connects meanwhile is no known one
+            for client_id in known - self._server.get_clients().keys():
                 self._end(client_id)
 
     def _end(self, client_id: int) -> None:

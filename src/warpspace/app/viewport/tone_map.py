@@ -74,8 +74,3 @@ def line_colour(rgb: Rgb) -> Rgb:
     linear = np.clip(inverse_tone_map(np.array(rgb, dtype=np.uint8)), 0.0, 1.0)
     r, g, b = (int(value) for value in np.rint(linear_to_srgb(linear.astype(float)) * 255.0))
     return r, g, b
-
-
-def line_vertex_colours(srgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Give the bytes for lines with a colour per end, [..., 3]; the client takes them as linear."""
-    return np.rint(np.clip(inverse_tone_map(srgb), 0.0, 1.0) * 255.0).astype(np.uint8)

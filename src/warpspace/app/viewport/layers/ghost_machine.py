@@ -1,15 +1,11 @@
 """The machine as a ghost around its working volume: it tells what the box is a part of."""
 
-from typing import Any
-
-import numpy as np
 from viser import SceneApi
 
-from warpspace.app.browser.handles import Handle
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import nominal_bodies
-from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes
+from warpspace.app.viewport.layers.body_meshes import BodyMeshes, DrawnBody
 from warpspace.app.viewport.tone_map import Rgb
 
 OPACITY = 0.12
@@ -28,8 +24,7 @@ class GhostMachineLayer:
     """
 
     def __init__(self, scene: SceneApi, picture: LivePicture) -> None:
-        self._scene = scene
-        self._parts: list[Handle] = []
+        self._bodies = BodyMeshes(scene, "/ghost_machine", edge_px=0.8, opacity=OPACITY)
         self._drawn_for: tuple[object, ...] = ()
         self.show(picture)
 
@@ -44,37 +39,21 @@ class GhostMachineLayer:
             Identity(state.machine.linear_mm),
             Identity(state.positions),
         )
-        if on and drawn_for != self._drawn_for:
+        if not on:
+            self._bodies.draw((), EDGE)
+            self._drawn_for = ()
+        elif drawn_for != self._drawn_for:
             self._drawn_for = drawn_for
-            self._draw(picture)
-        for part in self._parts:
-            part.put(visible=on)
-
-    def _draw(self, picture: LivePicture) -> None:
-        """Build the bodies anew."""
-        for part in self._parts:
-            part.handle.remove()
-        dark = picture.state.shown.dark
-        edge = colour_bytes(DARK_EDGE if dark else EDGE)
-        self._parts = []
-        for number, part in enumerate(nominal_bodies(picture)):
-            mesh: Any = self._scene.add_mesh_simple(
-                f"/ghost_machine/body{number}",
-                part.nominal_mm.astype(np.float32),
-                part.body.triangles.astype(np.uint32),
-                color=DARK_GHOST if dark else GHOST,
-                opacity=OPACITY,
-                flat_shading=True,
-                scale=SCENE_PER_MM,
-                cast_shadow=False,
-                receive_shadow=False,
-            )
-            lines: Any = self._scene.add_line_segments(
-                f"/ghost_machine/edges{number}",
-                part.nominal_edges_mm.astype(np.float32),
-                edge,
-                thickness=0.8,
-                thickness_units="screen",
-                scale=SCENE_PER_MM,
-            )
-            self._parts += [Handle(mesh), Handle(lines)]
+            dark = state.shown.dark
+            colour = DARK_GHOST if dark else GHOST
+            bodies = [
+                DrawnBody(
+                    part.body.name,
+                    part.nominal_mm,
+                    part.nominal_edges_mm,
+                    part.body.triangles,
+                    colour,
+                )
+                for part in nominal_bodies(picture)
+            ]
+            self._bodies.draw(bodies, DARK_EDGE if dark else EDGE)

@@ -1,20 +1,18 @@
 """The schematic machine: bodies in quiet greys, and the tool point in the deformed grid."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from viser import SceneApi
 
 from warpspace.app.browser.handles import Handle
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import drawn_bodies, tool_point
 from warpspace.app.evaluation.palette import palette
-from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes
+from warpspace.app.viewport.layers import SCENE_PER_MM
 from warpspace.app.viewport.layers.adding import add_ball
+from warpspace.app.viewport.layers.body_meshes import BodyMeshes, DrawnBody
 from warpspace.app.viewport.tone_map import Rgb
-from warpspace.picture.bodies import PlacedBody
 from warpspace.picture.marks import spell_micrometres
 
 EDGE: Rgb = (70, 78, 90)
@@ -36,8 +34,7 @@ class MachineLayer:
 
     def __init__(self, scene: SceneApi, picture: LivePicture) -> None:
         self._scene = scene
-        self._bodies: dict[str, tuple[Handle, Handle]] = {}
-        self._shapes: dict[str, NDArray[np.int32]] = {}
+        self._bodies = BodyMeshes(scene, "/machine", edge_px=0.9)
         self._ball: Handle | None = None
         self._label = Handle(
             scene.add_label(
@@ -65,55 +62,19 @@ class MachineLayer:
         if self._ball is not None:
             self._ball.put(visible=look.shown)
         placed = drawn_bodies(picture, self._turned) if look.shown or self._turned else ()
-        for name in set(self._bodies) - {part.body.name for part in placed}:
-            for part in self._bodies[name]:
-                part.put(visible=False)
-        edge = colour_bytes(DARK_EDGE if picture.state.shown.dark else EDGE)
-        for part in placed:
-            self._draw_body(part, edge)
+        bodies = [
+            DrawnBody(
+                part.body.name,
+                part.vertices_mm,
+                part.edges_mm,
+                part.body.triangles,
+                part.body.colour,
+            )
+            for part in placed
+        ]
+        self._bodies.draw(bodies, DARK_EDGE if picture.state.shown.dark else EDGE)
         if look.shown:
             self._draw_tool_point(picture)
-
-    def _draw_body(self, part: PlacedBody, edge: Any) -> None:
-        """Add a body, or move its vertices where they have changed."""
-        name = part.body.name
-        vertices = part.vertices_mm.astype(np.float32)
-        edges = part.edges_mm.astype(np.float32)
-        known = self._bodies.get(name)
-        triangles = part.body.triangles
-        if (
-            known is not None
-            and known[0].handle.vertices.shape == vertices.shape
-            and np.array_equal(self._shapes[name], triangles)
-        ):
-            mesh, lines = known
-            mesh.put(visible=True)
-            lines.put(visible=True)
-            if not np.array_equal(mesh.handle.vertices, vertices):
-                mesh.put(vertices=vertices)
-                lines.put(points=edges)
-            lines.put(colors=edge)
-            return
-        mesh = self._scene.add_mesh_simple(
-            f"/machine/{name}",
-            vertices,
-            triangles.astype(np.uint32),
-            color=part.body.colour,
-            flat_shading=True,
-            scale=SCENE_PER_MM,
-            cast_shadow=False,
-            receive_shadow=False,
-        )
-        lines = self._scene.add_line_segments(
-            f"/machine/{name}_edges",
-            edges,
-            edge,
-            thickness=0.9,
-            thickness_units="screen",
-            scale=SCENE_PER_MM,
-        )
-        self._bodies[name] = (Handle(mesh), Handle(lines))
-        self._shapes[name] = triangles
 
     def _draw_tool_point(self, picture: LivePicture) -> None:
         """Mark the tool point where the deformed grid has it."""
