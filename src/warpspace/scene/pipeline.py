@@ -101,8 +101,10 @@ def choose_view(scene: Scene, loop: Loop | str, frame: str = "machine") -> View:
     return scene.view(Loop(loop), frame)
 
 
-def grid_basis(scene: Scene, grid: Grid, view: View | None = None) -> ErrorBasis:
-    """Compute the response of every node of a grid to every parameter of a scene.
+def grid_basis(
+    scene: Scene, grid: Grid, view: View | None = None, keys: Sequence[str] | None = None
+) -> ErrorBasis:
+    """Compute the response of every node of a grid to parameters of a scene.
 
     Parameters
     ----------
@@ -110,6 +112,8 @@ def grid_basis(scene: Scene, grid: Grid, view: View | None = None) -> ErrorBasis
     grid : Grid
     view : View, optional
         The tool loop by default.
+    keys : sequence of str, optional
+        All parameters of the scene by default.
 
     Returns
     -------
@@ -118,7 +122,7 @@ def grid_basis(scene: Scene, grid: Grid, view: View | None = None) -> ErrorBasis
     basis = build_basis(
         scene.model,
         scene.errors,
-        scene.parameter_keys,
+        scene.parameter_keys if keys is None else keys,
         grid.coordinates,
         view or scene.view(),
         grid.point_mm,

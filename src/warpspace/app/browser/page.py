@@ -56,9 +56,7 @@ class Page:
 
     def report(self, error: Exception) -> None:
         """Tell the user of this tab what went wrong."""
-        known = isinstance(error, WarpspaceError)
-        text = str(error) if known else f"{type(error).__name__}: {error}"
-        self.notify("That did not work", text, "red")
+        self.notify("That did not work", error_words(error), "red")
 
 
 def style_script(name: str, css: str) -> str:
@@ -85,3 +83,8 @@ def style_script(name: str, css: str) -> str:
   sheet.textContent = {json.dumps(css)};
   document.head.append(sheet);
 }})();"""
+
+
+def error_words(error: Exception) -> str:
+    """Say what went wrong; of what nobody foresaw its kind as well."""
+    return str(error) if isinstance(error, WarpspaceError) else f"{type(error).__name__}: {error}"

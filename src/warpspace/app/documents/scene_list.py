@@ -68,3 +68,8 @@ class SceneList(Mapping[str, Scene]):
             title = f"{own} ({number})"
             number += 1
         return title
+
+
+def dropped_words(title: str) -> str:
+    """Say that a scene has left the list."""
+    return f"The newest {MOST_OPENED} opened scenes are kept; {title} left the list."

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from urllib.parse import urlencode
 
-from warpspace.app.evaluation.compare import scene_side
+from warpspace.app.evaluation.compare import plain_state, scene_side
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.comparison import BEFORE, NOBODY, PRESENT, SHOWN, Comparison, Side
 from warpspace.exceptions import OptionError
@@ -98,7 +98,7 @@ def with_comparison(state: AppState, pairs: Mapping[str, str], read: Read) -> Ap
     if PINNED in given:
         before = read(given[PINNED])
         notes = (*notes, *(f"{BEFORE}: {note}" for note in before.notes))
-        plain = replace(before, comparison=Comparison(), picked=None, lever="", notes=())
+        plain = replace(plain_state(before), notes=())
         given_title = given.get("pinned.title", "")
         title = TITLE + given_title.removeprefix(OLD_TITLE).removeprefix(TITLE)
         pinned = Side(title[:LONGEST_TITLE], plain)

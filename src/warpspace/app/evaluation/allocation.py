@@ -8,6 +8,7 @@ import numpy as np
 from warpspace.analysis.allocation import Allocation, Ensemble, Progress, Wish, allocate
 from warpspace.analysis.draws import Distribution, Draws
 from warpspace.analysis.montecarlo import Plan
+from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.specification import read_costs
 from warpspace.machine.tolerances import Tolerance
@@ -99,7 +100,7 @@ def with_allocated(state: AppState, asked: AppState, found: Allocation) -> AppSt
     if not same:
         note = "tolerances or limit were changed while tolerances were allocated: allocate again"
         return replace(state, notes=(*state.notes, note))
-    return replace(state, tolerances=state.tolerances.with_half_widths(found.tolerances))
+    return edits.with_half_widths(state, found.tolerances)
 
 
 def _draws(state: AppState, ensemble: Ensemble) -> Draws:

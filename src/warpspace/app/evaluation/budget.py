@@ -8,7 +8,7 @@ import numpy as np
 from warpspace.analysis.explain import Explanation, explain
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.edits import axis_span
+from warpspace.app.state.edits import curve_of
 from warpspace.app.state.picked import Picked
 from warpspace.field.grid import Grid
 from warpspace.geometry.deform import deform
@@ -19,7 +19,7 @@ from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, nominal_point
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
-from warpspace.machine.errors import Constant, ErrorSet
+from warpspace.machine.errors import ErrorSet
 from warpspace.picture.axis_motion import is_moved
 from warpspace.picture.mesh import thick_map
 from warpspace.units import Array
@@ -156,14 +156,7 @@ def _denser(samples: Array) -> Array:
 
 def active_errors(state: AppState) -> ErrorSet:
     """Give the error set with the amplitudes that count in a state."""
-    functions = state.scene.errors.functions
-    return ErrorSet(
-        {
-            key: (functions.get(key) or Constant(axis_span(state, key))).with_amplitude(value)
-            for key, value in state.active.items()
-            if value != 0.0
-        }
-    )
+    return ErrorSet({key: curve_of(state, key) for key, value in state.active.items() if value})
 
 
 def answer(state: AppState, picked: Picked, exaggeration: float) -> Answer:

@@ -72,8 +72,12 @@ def pinned_side(state: AppState) -> Side[AppState]:
     title = state.scene.title or state.scene.name
     if edited:
         title += f" · {edited} changed"
-    plain = replace(state, comparison=Comparison(), picked=None, lever="")
-    return Side(f"{BEFORE}: {title}", plain)
+    return Side(f"{BEFORE}: {title}", plain_state(state))
+
+
+def plain_state(state: AppState) -> AppState:
+    """Give a state as the side of a comparison: with none of its own, and nothing asked about."""
+    return replace(state, comparison=Comparison(), picked=None, lever="")
 
 
 def compare_pictures(single: Callable[[AppState], LivePicture], state: AppState) -> LivePicture:
@@ -169,7 +173,10 @@ def with_sides(state: AppState, a: Side[AppState], b: Side[AppState] | None) -> 
 
 def with_pin(state: AppState) -> AppState:
     """Pin what is steered as the state before (A); what is steered from then on is B, after."""
-    pinned = pinned_side(state)
-    return replace(
-        state, comparison=replace(state.comparison, a=pinned, b=Side(), shown="b", pinned=pinned)
-    )
+    return with_before(state, pinned_side(state))
+
+
+def with_before(state: AppState, side: Side[AppState]) -> AppState:
+    """Take a side as the state before (A); what is steered is B, after, and drawn."""
+    comparison = replace(state.comparison, a=side, b=Side(), shown="b", pinned=side)
+    return replace(state, comparison=comparison)

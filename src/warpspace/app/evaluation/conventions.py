@@ -11,16 +11,14 @@ import numpy as np
 
 from warpspace.app.state.app_state import AppState, start_loop
 from warpspace.app.state.ranges import Span
-from warpspace.field.evaluate import View, build_basis
 from warpspace.field.grid import Grid, build_grid
 from warpspace.kinematics.conventions.registry import convention_names
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
 from warpspace.scene.model import Scene
+from warpspace.scene.pipeline import grid_basis
 from warpspace.units import Array
 
-NODES = 7
-"""Nodes per axis at which the effect of a choice is worked out."""
 OWN = "own"
 """The scene's own conventions, among the choices that are compared with them."""
 Reference = Mapping[str, float] | None
@@ -85,7 +83,9 @@ def with_reference(state: AppState, at: Reference) -> AppState:
         wanted = float(at.get(name, before.get(name, 0.0)))
         kept[name] = span.clamp(wanted, before.get(name, 0.0))
         if kept[name] != wanted:
-            notes = (*notes, f"reference {name} = {wanted:g} mm: clamped to {kept[name]:g} mm")
+            unit = state.scene.machine.axes[name].unit
+            note = f"reference {name} = {wanted:g} {unit}: clamped to {kept[name]:g} {unit}"
+            notes = (*notes, note)
     scene = replace(state.scene, reference=kept)
     return replace(_with_scene(state, scene), notes=notes)
 
@@ -259,7 +259,4 @@ def _grid(state: AppState) -> Grid:
 
 def _response(state: AppState, keys: tuple[str, ...]) -> Array:
     """Respond to some amplitudes over the grid of the result, [K, nx, ny, nz, 3]."""
-    scene, grid = state.scene, _grid(state)
-    view = View(loop=state.loop, reference=scene.reference)
-    basis = build_basis(scene.model, scene.errors, keys, grid.coordinates, view, grid.point_mm)
-    return basis.position
+    return grid_basis(state.scene, _grid(state), state.scene.view(state.loop), keys).position

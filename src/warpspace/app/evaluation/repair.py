@@ -7,16 +7,16 @@ import numpy as np
 
 from warpspace.analysis.repair import Objective, RepairPlan, Repairs, find_repairs
 from warpspace.app.evaluation.cache import Identity
+from warpspace.app.evaluation.compare import plain_state, with_before
+from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.comparison import Comparison, Side
-from warpspace.app.state.ranges import amplitude_span
-from warpspace.field.evaluate import build_basis
+from warpspace.app.state.comparison import Side
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import Loop
-from warpspace.machine.limits import MAX_ERROR
 from warpspace.machine.parameters import parameter
 from warpspace.picture.words import spell
 from warpspace.scene.model import Scene
+from warpspace.scene.pipeline import grid_basis
 
 BEFORE = "before repair"
 
@@ -55,15 +55,7 @@ class Question:
         scene: Scene = self.scene.thing
         grid = build_grid(scene.model, scene.workspace.moved(dict(self.positions)), self.nodes)
         keys = tuple(key for key, _ in self.amplitudes)
-        basis = build_basis(
-            scene.model,
-            scene.errors,
-            keys,
-            grid.coordinates,
-            scene.view(self.loop),
-            grid.point_mm,
-        )
-        basis = replace(basis, nominal_mm=grid.nominal_mm)
+        basis = grid_basis(scene, grid, scene.view(self.loop), keys)
         plan = RepairPlan(self.objective, any_error=self.any_error, limit=self.limit)
         return find_repairs(basis, grid, np.array([value for _, value in self.amplitudes]), plan)
 
@@ -86,35 +78,21 @@ def ask(state: AppState, objective: Objective, *, any_error: bool, limit: float)
 def with_adjusted(state: AppState, adjust: Mapping[str, float]) -> AppState:
     """Give some errors other amplitudes, µm or µrad; their sliders grow where that is needed."""
     for key, value in adjust.items():
-        if key not in state.amplitudes:
-            continue
-        kept = min(max(value, -MAX_ERROR), MAX_ERROR)
-        span = state.spans[key]
-        if not span.low <= kept <= span.high:
-            span = amplitude_span(key, kept, state.scene.tolerances.get(key))
-        state = replace(
-            state,
-            amplitudes={**state.amplitudes, key: kept},
-            spans={**state.spans, key: span},
-        )
+        if key in state.amplitudes:
+            state = edits.with_typed_amplitude(state, key, value)
     return state
 
 
 def with_preview(state: AppState, adjust: Mapping[str, float]) -> AppState:
     """Compare what is steered with the same after a repair, and draw the latter."""
-    plain = replace(state, comparison=Comparison(), picked=None, lever="")
-    after = Side(_after_words(adjust), with_adjusted(plain, adjust))
+    after = Side(_after_words(adjust), with_adjusted(plain_state(state), adjust))
     comparison = replace(state.comparison, a=Side(), b=after, shown="b")
     return replace(state, comparison=comparison)
 
 
 def with_repair(state: AppState, adjust: Mapping[str, float]) -> AppState:
     """Apply a repair; the state before it stays as the other side of a comparison."""
-    plain = replace(state, comparison=Comparison(), picked=None, lever="")
-    before = Side(BEFORE, plain)
-    repaired = with_adjusted(state, adjust)
-    comparison = replace(state.comparison, a=before, b=Side(), shown="b", pinned=before)
-    return replace(repaired, comparison=comparison)
+    return with_adjusted(with_before(state, Side(BEFORE, plain_state(state))), adjust)
 
 
 def _after_words(adjust: Mapping[str, float]) -> str:

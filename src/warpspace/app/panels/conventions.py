@@ -56,7 +56,7 @@ class ConventionsPanel:
         back.on_click(lambda _: context.post(_back))
 
     def _build(self, state: AppState) -> None:
-        """Add a number box per linear axis of the scene's machine."""
+        """Add a number box per axis that moves within the volume."""
         for bound in self._at.values():
             bound.handle.remove()
         self._at, self._built_for = {}, _axes_of(state)
@@ -64,7 +64,7 @@ class ConventionsPanel:
         with self._home:
             for axis, span in reference_spans(state.scene).items():
                 box = self._context.gui.add_number(
-                    f"Reference {axis} [mm]",
+                    f"Reference {axis} [{state.scene.machine.axes[axis].unit}]",
                     initial_value=float((state.scene.reference or middle).get(axis, 0.0)),
                     min=span.low,
                     max=span.high,

@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any
 
 from warpspace.app.browser.address import listen_script, show_script
+from warpspace.app.browser.page import error_words
 from warpspace.app.browser.uploads import Uploads, size_message, size_script
 from warpspace.app.browser.viser_private import dom_id
 from warpspace.app.documents import links
@@ -15,7 +16,7 @@ from warpspace.app.documents import received_files as incoming
 from warpspace.app.documents import scene_file as document
 from warpspace.app.documents.export_request import build_request, exported_words, file_stem
 from warpspace.app.documents.jobs import Jobs, Progress
-from warpspace.app.documents.scene_list import MOST_OPENED
+from warpspace.app.documents.scene_list import dropped_words
 from warpspace.app.documents.services import CancelledError
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
@@ -157,8 +158,7 @@ class FilesPanel:
         # here, since not every opened scene is drawn where many follow each other
         dropped = self._context.show_opened(opened, camera, whole=whole)
         if dropped:
-            text = f"The newest {MOST_OPENED} opened scenes are kept; {dropped} left the list."
-            self._context.notify("Scenes", text, "gray")
+            self._context.notify("Scenes", dropped_words(dropped), "gray")
 
     def _save(self) -> None:
         """Send the state as a scene file."""
@@ -272,9 +272,8 @@ class FilesPanel:
             return
         if not isinstance(error, WarpspaceError):
             logger.error("%s", name, exc_info=error)
-        known = isinstance(error, WarpspaceError)
-        text = str(error) if known else f"{type(error).__name__}: {error}"
-        self._context.notify(name if name == "Not opened" else f"{name}: failed", text, "red")
+        title = name if name == "Not opened" else f"{name}: failed"
+        self._context.notify(title, error_words(error), "red")
 
     def read(self, state: AppState) -> AppState:
         """Nothing to take over."""

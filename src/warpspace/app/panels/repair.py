@@ -32,12 +32,7 @@ KEPT_BYTES, ANSWER_BYTES = 10_000_000, 100_000
 """All answers that are kept, and about what one takes with its scene."""
 
 
-def _new_store() -> Cache[Repairs]:
-    """Make the store of answers."""
-    return Cache(KEPT_BYTES)
-
-
-ANSWERS = _new_store()
+ANSWERS: Cache[Repairs] = Cache(KEPT_BYTES)
 """Answers for all sessions together: pages that show the same ask the same."""
 
 
@@ -175,7 +170,7 @@ class RepairPanel:
 
     def _refuse(self, text: str) -> None:
         """Say why there is no answer."""
-        self._answered = None
+        self._answered, self._seen = None, False
         self._text.put(content=message(text, "repair problem", small=True))
 
     def _clicked(self, word: str) -> None:

@@ -6,7 +6,7 @@ from typing import Any
 
 from warpspace.app.browser.handles import Handle, Input
 from warpspace.app.browser.viser_private import dom_id
-from warpspace.app.documents.scene_list import MOST_OPENED
+from warpspace.app.documents.scene_list import dropped_words
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
@@ -242,8 +242,7 @@ class ViewPanel:
         if options != tuple(self._scene.handle.options):
             self._scene.handle.options = options
         if dropped:
-            text = f"The newest {MOST_OPENED} opened scenes are kept; {dropped} left the list."
-            self._context.notify("Scenes", text, "gray")
+            self._context.notify("Scenes", dropped_words(dropped), "gray")
 
     def concerns(self, picture: LivePicture) -> tuple[object, ...]:
         """Give what the widgets show."""

@@ -37,7 +37,7 @@ def with_curve(state: AppState, key: str, function: ErrorFunction) -> AppState:
     state : AppState
     key : str
     function : ErrorFunction
-        Checked, see `warpspace.app.state.curve_text.parse_shape`.
+        Checked, see `warpspace.app.state.curve_text.read_curve`.
 
     Returns
     -------
@@ -54,17 +54,22 @@ def with_curve(state: AppState, key: str, function: ErrorFunction) -> AppState:
     if function == curve_of(state, key):
         return state
     amplitude = function.amplitude
-    span = state.spans[key]
-    if not span.low <= amplitude <= span.high:
-        span = amplitude_span(key, amplitude, state.scene.tolerances.get(key))
     errors = ErrorSet({**state.scene.errors.functions, key: function})
     return replace(
         state,
         scene=replace(state.scene, errors=errors),
         loaded=state.origin,
         amplitudes={**state.amplitudes, key: amplitude},
-        spans={**state.spans, key: span},
+        spans={**state.spans, key: _grown_span(state, key, amplitude)},
     )
+
+
+def _grown_span(state: AppState, key: str, amplitude: float) -> Span:
+    """Give the range of a slider: the present one, or a wider one that holds an amplitude."""
+    span = state.spans[key]
+    if span.low <= amplitude <= span.high:
+        return span
+    return amplitude_span(key, amplitude, state.scene.tolerances.get(key))
 
 
 def with_typed_amplitude(state: AppState, key: str, value: float) -> AppState:
@@ -75,10 +80,8 @@ def with_typed_amplitude(state: AppState, key: str, value: float) -> AppState:
     """
     if key not in state.amplitudes:
         return state.with_amplitude(key, value)
-    span = state.spans[key]
-    if math.isfinite(value) and not span.low <= value <= span.high:
-        span = amplitude_span(key, value, state.scene.tolerances.get(key))
-        state = replace(state, spans={**state.spans, key: span})
+    if math.isfinite(value):
+        state = replace(state, spans={**state.spans, key: _grown_span(state, key, value)})
     return state.with_amplitude(key, value)
 
 

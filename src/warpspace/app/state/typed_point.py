@@ -86,9 +86,10 @@ def with_typed_point(state: AppState, text: str) -> AppState:
         if axis in typed:
             at[axis] = span.clamp(typed[axis], at[axis])
             if at[axis] != typed[axis]:
+                unit = state.scene.machine.axes[axis].unit
                 note = (
-                    f"{axis} = {typed[axis]:g} mm is outside the travel, {span.low:g} to"
-                    f" {span.high:g} mm; clamped to {at[axis]:g} mm"
+                    f"{axis} = {typed[axis]:g} {unit} is outside the travel, {span.low:g} to"
+                    f" {span.high:g} {unit}; clamped to {at[axis]:g} {unit}"
                 )
                 notes = (*notes, note)
     return replace(state, picked=Picked(at), notes=notes)

@@ -5,6 +5,7 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 from warpspace.app.browser.handles import Input
+from warpspace.app.browser.page import error_words
 from warpspace.app.documents.jobs import Jobs, Progress
 from warpspace.app.documents.services import CancelledError
 from warpspace.app.panels import PanelContext
@@ -141,8 +142,6 @@ class AllocationPart:
         if isinstance(error, CancelledError):
             self._context.notify("Cancelled", "The tolerances stay as they were.", "gray")
             return
-        known = isinstance(error, WarpspaceError)
-        if not known:
+        if not isinstance(error, WarpspaceError):
             logger.error("%s", name, exc_info=error)
-        text = str(error) if known else f"{type(error).__name__}: {error}"
-        self._context.notify("Not allocated", text, "red")
+        self._context.notify("Not allocated", error_words(error), "red")

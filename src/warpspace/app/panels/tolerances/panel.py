@@ -33,14 +33,7 @@ WITHIN, OUTSIDE, LIMIT = "#4a7ab5", "#c9863a", "#d6336c"
 CHART_HEIGHT = 150
 SCALES = {"÷ 1.5": 1.0 / 1.5, "− 5 %": 0.95, "+ 5 %": 1.05, "× 1.5": 1.5}
 """What the buttons for all tolerances multiply them by."""
-
-
-def _new_store() -> "Cache[Ensemble]":
-    """Make the store of ensembles."""
-    return Cache(KEPT_BYTES)
-
-
-ENSEMBLES = _new_store()
+ENSEMBLES: "Cache[Ensemble]" = Cache(KEPT_BYTES)
 """Sampled machines before their tolerances are known, for all sessions together."""
 
 

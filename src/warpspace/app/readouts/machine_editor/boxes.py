@@ -154,8 +154,6 @@ def _placing(name: str, offset: tuple[float, ...], turn: tuple[float, ...]) -> t
 
 def _ends(label: str, what: str, name: str, ends: tuple[float, float], unit: str) -> Numbers:
     """Spell both ends of a range."""
-    words = {"travel": f"travel of {name}", "volume": f"{name} in the working volume"}
-    names = tuple(f"{end} end of the {words[what]}" for end in ("Lower", "Upper"))
-    if what == "volume":
-        names = tuple(f"{end} end of {words[what]}" for end in ("Lower", "Upper"))
+    words = {"travel": f"the travel of {name}", "volume": f"{name} in the working volume"}
+    names = tuple(f"{end} end of {words[what]}" for end in ("Lower", "Upper"))
     return Numbers(label, unit, f"{what} {name}", tuple(map(spell_typed, ends)), names)
