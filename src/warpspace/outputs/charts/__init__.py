@@ -1,5 +1,6 @@
 """Charts: gain bars, histograms, polar plots. matplotlib figures without pyplot or a display."""
 
+from warpspace.outputs.charts.calibration import calibration_chart
 from warpspace.outputs.charts.circle import ballbar_chart
 from warpspace.outputs.charts.gains import contributions_chart, gains_chart
 from warpspace.outputs.charts.histogram import montecarlo_chart
@@ -9,6 +10,7 @@ from warpspace.outputs.charts.repair import repair_chart
 __all__ = [
     "CHART_ENDINGS",
     "ballbar_chart",
+    "calibration_chart",
     "contributions_chart",
     "gains_chart",
     "montecarlo_chart",

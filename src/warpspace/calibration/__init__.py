@@ -1,0 +1,6 @@
+"""Errors of a machine out of measured data: what the data say, and what they cannot tell apart."""
+
+from warpspace.calibration.calibrate import Calibration, Request, calibrate
+from warpspace.calibration.readings import Readings, read_readings
+
+__all__ = ["Calibration", "Readings", "Request", "calibrate", "read_readings"]

@@ -1,0 +1,1 @@
+"""The kinds of measurement a calibration takes, one module each."""

@@ -1,0 +1,169 @@
+"""What every kind of measurement is and can: columns, readings, and what the model predicts."""
+
+from abc import ABC, abstractmethod
+from typing import ClassVar
+
+import numpy as np
+
+from warpspace.calibration.readings import Readings
+from warpspace.calibration.table import ReadingTable
+from warpspace.machine.axes import sort_axes
+from warpspace.scene.model import Scene
+from warpspace.units import Array
+
+
+class Kind(ABC):
+    """A kind of measurement.
+
+    The model of a reading is a function of the error of the tool point relative to the workpiece,
+    given in the nominal workpiece frame, and of a few numbers that nobody knows: where a sphere or
+    a station stands, by how much a session is shifted.
+
+    Attributes
+    ----------
+    name : str
+        As ``--kind`` takes it.
+    words : str
+        What it is, for lists and help.
+    columns : str
+        Columns of its file.
+    """
+
+    name: ClassVar[str]
+    words: ClassVar[str]
+    columns: ClassVar[str]
+
+    @abstractmethod
+    def fits(self, table: ReadingTable, scene: Scene) -> bool:
+        """Tell whether a file has the columns of this kind, and of no other."""
+
+    @abstractmethod
+    def read(self, table: ReadingTable, scene: Scene) -> Readings:
+        """Give the readings of a file.
+
+        Raises
+        ------
+        SceneError
+            If a column is missing or holds what cannot be.
+        """
+
+    @abstractmethod
+    def unknowns(self, readings: Readings) -> tuple[str, ...]:
+        """Name what the set-up leaves unknown, each in mm, for instance ``sphere x``."""
+
+    @abstractmethod
+    def start(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:
+        """Give values of the unknowns to begin with, [m], mm."""
+
+    @abstractmethod
+    def predict(
+        self, readings: Readings, error_mm: Array, unknowns: tuple[str, ...], values: Array
+    ) -> Array:
+        """Give the readings that errors would lead to.
+
+        Parameters
+        ----------
+        readings : Readings
+        error_mm : ndarray, [n, 3], mm
+        unknowns : tuple of str, (m,)
+        values : ndarray, [m], mm
+
+        Returns
+        -------
+        ndarray, [n, d], mm
+        """
+
+    @abstractmethod
+    def derivatives(
+        self, readings: Readings, error_mm: Array, unknowns: tuple[str, ...], values: Array
+    ) -> tuple[Array, Array]:
+        """Differentiate the prediction.
+
+        Parameters
+        ----------
+        readings : Readings
+        error_mm : ndarray, [n, 3], mm
+        unknowns : tuple of str, (m,)
+        values : ndarray, [m], mm
+
+        Returns
+        -------
+        by_error : ndarray, [n, d, 3]
+        by_unknown : ndarray, [n, d, m]
+        """
+
+    def automatic_keys(self, readings: Readings, scene: Scene) -> tuple[str, ...]:
+        """List the parameters that ``--fit auto`` looks for, the likelier first."""
+        del readings
+        return scene.parameter_keys
+
+
+class Placed(Kind):
+    """A kind whose readings are ± the error plus the place of something, one place per session."""
+
+    place: ClassVar[str]
+    sign: ClassVar[float]
+
+    def unknowns(self, readings: Readings) -> tuple[str, ...]:
+        """Name three coordinates per session."""
+        return tuple(
+            f"{self._head(session)} {letter}"
+            for session in dict.fromkeys(readings.session)
+            for letter in "xyz"
+        )
+
+    def start(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:
+        """Begin with the means of the sessions."""
+        member = self._members(readings, unknowns)
+        total = np.einsum("ndm,nd->m", member, readings.observed_mm)
+        return total / np.maximum(member.sum(axis=(0, 1)), 1.0)
+
+    def predict(
+        self, readings: Readings, error_mm: Array, unknowns: tuple[str, ...], values: Array
+    ) -> Array:
+        """Add ± the error to the place."""
+        return self.sign * error_mm + self._members(readings, unknowns) @ values
+
+    def derivatives(
+        self, readings: Readings, error_mm: Array, unknowns: tuple[str, ...], values: Array
+    ) -> tuple[Array, Array]:
+        """Give ± one, and which place a reading belongs to."""
+        del error_mm, values
+        by_error = np.broadcast_to(self.sign * np.eye(3), (len(readings), 3, 3))
+        return by_error, self._members(readings, unknowns)
+
+    def _head(self, session: str) -> str:
+        """Name the place of a session."""
+        return f"{self.place} {session}".strip()
+
+    def _members(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:
+        """Tell which unknown each component of each reading has, [n, 3, m]."""
+        member = np.zeros((len(readings), 3, len(unknowns)))
+        index = {name: at for at, name in enumerate(unknowns)}
+        for row, session in enumerate(readings.session):
+            for component, letter in enumerate("xyz"):
+                at = index.get(f"{self._head(session)} {letter}")
+                if at is not None:
+                    member[row, component, at] = 1.0
+        return member
+
+
+def head_keys(readings: Readings, scene: Scene) -> tuple[str, ...]:
+    """List location, orientation and zero errors of the rotary axes that move in the readings.
+
+    The last rotary axis on the side of the tool has the offset of the tool point as well: constant
+    component translations, which turn with it. Its length comes before the zero positions, what
+    leads sideways last.
+    """
+    moving = [
+        name
+        for name in sort_axes(scene.machine.axes)
+        if not scene.machine.axes[name].is_linear and np.ptp(readings.coordinates[name]) > 1e-9
+    ]
+    constants = [f"E{letter}0{axis}" for letter in "XYZABC" for axis in moving]
+    usual = [key for key in constants if key in scene.parameter_keys]
+    others = [key for key in constants if key not in usual]
+    last = [axis.name for axis in scene.machine.branch("tool") if axis.name in moving][-1:]
+    length = [f"EZ{axis}" for axis in last]
+    sideways = [f"E{letter}{axis}" for letter in "XY" for axis in last]
+    return (*usual, *length, *others, *sideways)

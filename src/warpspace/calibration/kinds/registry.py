@@ -1,0 +1,46 @@
+"""The kinds of measurement there are. A new one is a module beside this and a line below."""
+
+from collections.abc import Mapping
+
+from warpspace.calibration.kinds.kind import Kind
+from warpspace.calibration.kinds.lengths import Lengths
+from warpspace.calibration.kinds.points import Points
+from warpspace.calibration.kinds.sphere import Sphere
+from warpspace.calibration.kinds.sphere_tcp import SphereTcp
+from warpspace.calibration.table import ReadingTable
+from warpspace.exceptions import SceneError, UnknownNameError
+from warpspace.scene.model import Scene
+
+KINDS: Mapping[str, Kind] = {
+    kind.name: kind for kind in (Points(), Sphere(), SphereTcp(), Lengths())
+}
+"""By name."""
+
+
+def find_kind(name: str) -> Kind:
+    """Look up a kind.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is none of that name.
+    """
+    if name not in KINDS:
+        raise UnknownNameError("kind of measurement", name, KINDS)
+    return KINDS[name]
+
+
+def recognise(table: ReadingTable, scene: Scene) -> Kind:
+    """Tell the kind of a file by its columns.
+
+    Raises
+    ------
+    SceneError
+        If no kind has such columns.
+    """
+    found = next((kind for kind in KINDS.values() if kind.fits(table, scene)), None)
+    if found is None:
+        there = ", ".join((*table.labels, *table.columns))
+        kinds = "; ".join(f"{kind.name}: {kind.columns}" for kind in KINDS.values())
+        raise SceneError(table.source, [f"has columns {there}; expected those of a kind: {kinds}"])
+    return found

@@ -1,0 +1,270 @@
+"""Calibration against the public sphere measurements, and against errors that were planted."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from warpspace.calibration import Request, calibrate, read_readings
+from warpspace.calibration.candidates import candidates
+from warpspace.calibration.circles import circles_of
+from warpspace.calibration.kinds.points import VIEW, nominal_tip
+from warpspace.calibration.next_best import next_best
+from warpspace.calibration.rank import spell_rank
+from warpspace.calibration.readings import Readings, find_data
+from warpspace.calibration.table import read_table
+from warpspace.field.evaluate import evaluate_exact
+from warpspace.machine.errors import Constant, ErrorSet, Ramp
+from warpspace.scene.library import load_scene
+
+FORK = load_scene("fork_head_bc")
+HEAD = {"EX0B": 60.0, "EA0B": -140.0, "EA0C": 90.0, "EB0C": -70.0, "EC0B": 210.0, "EZB": -250.0}
+
+
+def sphere_circles(axis: str):
+    table = read_table(find_data("tcp_off.csv"))
+    return [circle for circle in circles_of(table, FORK) if circle.axis == axis]
+
+
+def test_circle_about_b_with_tcp_off() -> None:
+    """Least-squares circle through run b1 in X–Z."""
+    (circle,) = sphere_circles("B")
+    assert (circle.plane, circle.sessions, circle.count) == ("XZ", ("b1",), 5)
+    assert circle.radius_mm == pytest.approx(308.963734, abs=5e-7)
+    assert circle.centre_mm == pytest.approx((305.669816, -589.742446), abs=5e-7)
+    assert circle.against
+
+
+def test_circles_about_c_with_tcp_off() -> None:
+    """Opposite readings of C lie symmetric to the centre: half their distance is the radius."""
+    one, two, both = sphere_circles("C")
+    assert [circle.sessions for circle in (one, two, both)] == [("c1",), ("c2",), ("c1", "c2")]
+    across = np.hypot(278.915280 - 332.451531, 326.726812 - 325.422646) / 2.0
+    assert one.radius_mm == pytest.approx(across, abs=0.04)
+    for circle in (one, two, both):
+        assert not circle.against
+        assert circle.plane == "XY"
+        assert circle.radius_mm == pytest.approx(26.748, abs=0.0005)
+
+
+def test_tcp_on_falls_from_278_to_below_78_micrometres() -> None:
+    readings = read_readings("tcp_on.csv", FORK)
+    assert readings.kind == "sphere-tcp"
+    found = calibrate(FORK, [readings])
+    spread = readings.observed_mm - readings.observed_mm.mean(axis=0)
+    assert found.rms_before_mm == pytest.approx(np.sqrt(np.mean(np.sum(spread**2, axis=1))))
+    assert found.rms_before_mm == pytest.approx(0.278, abs=0.0005)
+    assert found.rms_after_mm < 0.078
+
+
+def test_tcp_on_by_linear_algebra_written_apart() -> None:
+    """Places of B, zero of B and length of the tool, as columns that are written out here."""
+    readings = read_readings("tcp_on.csv", FORK)
+    found = calibrate(FORK, [readings], Request(keys=("EX0B", "EY0B", "EB0B", "EZB")))
+    rows = []
+    for b, c in np.deg2rad(
+        np.stack([readings.coordinates["B"], readings.coordinates["C"]], axis=-1)
+    ):
+        turn_c = np.array([[np.cos(c), -np.sin(c), 0], [np.sin(c), np.cos(c), 0], [0, 0, 1]])
+        turn_b = np.array([[np.cos(b), 0, np.sin(b)], [0, 1, 0], [-np.sin(b), 0, np.cos(b)]])
+        tip = turn_c @ turn_b @ [-0.66, -26.72, -308.96]
+        about_b = np.cross(turn_c[:, 1], tip)
+        rows.append(
+            np.column_stack(
+                [np.eye(3), -turn_c[:, 0], -turn_c[:, 1], -about_b, -(turn_c @ turn_b)[:, 2]]
+            )
+        )
+    system = np.vstack(rows)
+    values, *_ = np.linalg.lstsq(system, readings.observed_mm.ravel(), rcond=None)
+    left = (readings.observed_mm.ravel() - system @ values).reshape(-1, 3)
+    assert found.rms_after_mm == pytest.approx(np.sqrt(np.mean(np.sum(left**2, axis=1))), rel=1e-3)
+    assert found.rms_after_mm == pytest.approx(0.0777, abs=0.0001)
+    wanted = 1e3 * values[[3, 4, 6]], 1e6 * values[5]
+    by_key = {one.key: one.value for one in found.parameters}
+    assert [by_key[key] for key in ("EX0B", "EY0B", "EZB")] == pytest.approx(wanted[0], rel=5e-3)
+    assert by_key["EB0B"] == pytest.approx(wanted[1], rel=5e-3)
+
+
+def test_poses_left_out_are_predicted(tmp_path: Path) -> None:
+    lines = find_data("tcp_on.csv").read_text(encoding="utf-8").splitlines()
+    rows = [line for line in lines if not line.startswith("#")]
+    wide = [row for row in rows[1:] if row.startswith(("30,", "-30,"))]
+    near = [row for row in rows[1:] if row not in wide]
+    files = []
+    for name, part in (("near.csv", near), ("wide.csv", wide)):
+        (tmp_path / name).write_text("\n".join([rows[0], *part]), encoding="utf-8")
+        files.append(read_readings(str(tmp_path / name), FORK))
+    assert (len(near), len(wide)) == (15, 8)
+    found = calibrate(FORK, files[:1], predict=files[1:])
+    assert found.rms_predicted_before_mm == pytest.approx(0.447, abs=0.001)
+    assert found.rms_predicted_after_mm is not None
+    assert found.rms_predicted_after_mm < 0.3 * found.rms_predicted_before_mm
+
+
+def planted(errors: dict[str, float], kind: str, poses: dict[str, np.ndarray], noise=0.0, seed=0):
+    """Readings that the exact model gives with errors planted."""
+    functions = {}
+    for key, value in errors.items():
+        axis = key[-1]
+        linear = FORK.machine.axes[axis].is_linear and key[2] != "0"
+        curve = (Ramp if linear else Constant)(FORK.axis_span(axis))
+        functions[key] = curve.with_amplitude(value)
+    count = len(next(iter(poses.values())))
+    coordinates = {
+        name: np.asarray(poses.get(name, np.zeros(count)), float) for name in FORK.machine.axes
+    }
+    error = evaluate_exact(FORK.model, ErrorSet(functions), coordinates, VIEW).error_um * 1e-3
+    error = error + noise * np.random.default_rng(seed).standard_normal(error.shape)
+    tip = nominal_tip(FORK, coordinates)
+    place = np.array([1.0, -2.0, 3.0])
+    observed = error if kind == "points" else tip.mean(axis=0) + place - error
+    if kind == "lengths":
+        station = np.array([900.0, -400.0, 100.0])
+        observed = np.linalg.norm(tip + error - station, axis=-1)[:, None] - 12.5
+    return Readings(
+        kind,
+        coordinates,
+        tip,
+        observed,
+        None,
+        ("a",) * count if kind != "points" else ("",) * count,
+        tuple(range(count)),
+        "planted",
+    )
+
+
+def sphere_poses() -> dict[str, np.ndarray]:
+    b, c = (values.ravel() for values in np.meshgrid([-60, -25, 0, 40, 75], [0, 70, 160, 250]))
+    return {
+        "B": b,
+        "C": c,
+        "X": np.full(20, 350.0),
+        "Y": np.full(20, 300.0),
+        "Z": np.full(20, -700.0),
+    }
+
+
+def volume_poses(count: int = 60) -> dict[str, np.ndarray]:
+    draw = np.random.default_rng(4).uniform
+    spans = {**FORK.workspace.ranges, "B": (-60.0, 60.0), "C": (-180.0, 180.0)}
+    return {name: draw(*span, count) for name, span in spans.items()}
+
+
+@pytest.mark.parametrize("kind", ["sphere-tcp", "points", "lengths"])
+def test_planted_errors_are_found_to_a_thousandth(kind: str) -> None:
+    poses = sphere_poses() if kind == "sphere-tcp" else volume_poses()
+    found = calibrate(FORK, [planted(HEAD, kind, poses)], Request(keys=tuple(HEAD)))
+    assert [one.identifiable for one in found.parameters] == [True] * len(HEAD)
+    for one in found.parameters:
+        assert one.value == pytest.approx(HEAD[one.key], rel=1e-3)
+    assert found.rms_after_mm < 1e-6 * found.rms_before_mm
+
+
+def test_large_errors_are_found_by_the_exact_model() -> None:
+    large = {"EA0C": 20_000.0, "EC0B": -15_000.0, "EX0B": 5_000.0}
+    found = calibrate(FORK, [planted(large, "points", volume_poses())], Request(keys=tuple(large)))
+    assert {one.key: one.value for one in found.parameters} == pytest.approx(large, rel=1e-6)
+
+
+def test_all_errors_of_linear_axes_are_found_from_points() -> None:
+    errors = {"EXX": 12.0, "EBY": -20.0, "EAZ": 15.0, "EC0Y": 23.0, "EA0Z": -31.0, "EB0Z": 9.0}
+    found = calibrate(FORK, [planted(errors, "points", volume_poses(200))])
+    by_key = {one.key: one for one in found.parameters}
+    for key, value in errors.items():
+        assert by_key[key].value == pytest.approx(value, rel=1e-3)
+    # a slope of straightness is a squareness by another name
+    alike = next(group for group in found.rank.confounded if group[0] == "EXY")
+    assert "EC0Y" in alike
+    assert any("the slope of EXY" in words for words in spell_rank(found.rank, found.slopes))
+    assert found.rms_after_mm < 1e-6 * found.rms_before_mm
+
+
+@pytest.mark.proof
+def test_intervals_hold_in_95_percent_of_a_thousand_trials() -> None:
+    poses, hits, total = sphere_poses(), 0, 0
+    clean = planted(HEAD, "sphere-tcp", poses)
+    for seed in range(1000):
+        draw = np.random.default_rng(seed)
+        noisy = replace(
+            clean, observed_mm=clean.observed_mm + 1e-3 * draw.standard_normal((len(clean), 3))
+        )
+        for one in calibrate(FORK, [noisy], Request(keys=tuple(HEAD))).parameters:
+            assert one.interval is not None
+            hits += one.interval[0] <= HEAD[one.key] <= one.interval[1]
+            total += 1
+    assert hits / total == pytest.approx(0.95, abs=0.02)
+
+
+def test_intervals_hold_in_a_few_trials() -> None:
+    poses, hits = sphere_poses(), 0
+    clean = planted(HEAD, "sphere-tcp", poses)
+    for seed in range(40):
+        draw = np.random.default_rng(seed)
+        noisy = replace(
+            clean, observed_mm=clean.observed_mm + 1e-3 * draw.standard_normal((len(clean), 3))
+        )
+        for one in calibrate(FORK, [noisy], Request(keys=tuple(HEAD))).parameters:
+            assert one.interval is not None
+            hits += one.interval[0] <= HEAD[one.key] <= one.interval[1]
+    assert 0.88 <= hits / (40 * len(HEAD)) <= 1.0
+
+
+def test_one_outlier_is_named_and_hardly_moves_a_robust_fit() -> None:
+    clean = planted(HEAD, "sphere-tcp", sphere_poses(), noise=1e-3)
+    observed = clean.observed_mm.copy()
+    observed[7] += [0.4, -0.3, 0.2]
+    spoilt = replace(clean, observed_mm=observed)
+    plain = calibrate(FORK, [spoilt], Request(keys=tuple(HEAD)))
+    robust = calibrate(FORK, [spoilt], Request(keys=tuple(HEAD), robust=True))
+
+    def off(found) -> float:
+        return sum(abs(one.value - HEAD[one.key]) for one in found.parameters)
+
+    assert 7 in robust.fitted[0].outliers
+    assert off(robust) < 0.1 * off(plain)
+
+
+def test_uncertainties_weigh_the_readings() -> None:
+    """Two constant groups: the weighted mean, and its standard uncertainty."""
+    count = 8
+    poses = {"X": np.linspace(150.0, 550.0, count), "Y": np.full(count, 300.0)}
+    base = planted({}, "points", poses)
+    values = np.repeat([0.010, 0.020], 4)
+    sigma = np.repeat([0.001, 0.003], 4)
+    observed = np.column_stack([values, np.zeros((count, 2))])
+    readings = replace(base, observed_mm=observed, sigma_mm=sigma)
+    found = calibrate(FORK, [readings], Request(keys=("EXX:constant",)))
+    weight = 1.0 / sigma**2
+    (one,) = found.parameters
+    assert one.value == pytest.approx(1e3 * np.sum(weight * values) / np.sum(weight))
+    assert one.standard_uncertainty == pytest.approx(1e3 / np.sqrt(np.sum(weight)))
+
+
+def test_what_looks_alike_is_said() -> None:
+    readings = planted({}, "sphere-tcp", sphere_poses())
+    keys = ("EZB", "EX0B", "EC0B", "EC0C", "EX0C", "EZ0C", "EZ0B", "EXX:constant")
+    rank = calibrate(FORK, [replace(readings, session=("",) * 20)], Request(keys=keys)).rank
+    assert ("EC0C", "EC0B") in rank.confounded
+    assert {("EX0C",), ("EZ0C",), ("EZ0B",), ("EXX",)} < set(rank.confounded)
+    assert rank.rank == 3
+    assert rank.is_identifiable("EX0B")
+    assert not rank.is_identifiable("EC0B")
+
+
+def test_predicted_covariance_of_the_next_measurement_is_the_one_obtained() -> None:
+    keys = tuple(HEAD)
+    first = planted(HEAD, "sphere-tcp", sphere_poses(), noise=1e-3)
+    broad = replace(FORK, tolerances=type(FORK.tolerances)({}, {}))
+    found = calibrate(broad, [first], Request(keys=keys))
+    choice = [one for one in candidates(FORK) if one.readings.kind == "points"][27:34]
+    (step,) = next_best(broad, [first], found, 1, choice, noise_mm=1e-3)
+    chosen = step.candidate.readings
+    second = planted(HEAD, "points", dict(chosen.coordinates), noise=1e-3, seed=2)
+    sigma = {"sigma_mm": np.full(len(first), 1e-3)}, {"sigma_mm": np.full(len(second), 1e-3)}
+    both = calibrate(
+        broad, [replace(first, **sigma[0]), replace(second, **sigma[1])], Request(keys=keys)
+    )
+    got, said = (np.sqrt(np.diag(matrix)) for matrix in (both.covariance, step.covariance))
+    assert said == pytest.approx(got, rel=0.05)
+    assert step.map_after_um < step.map_before_um
