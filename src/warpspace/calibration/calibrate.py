@@ -1,14 +1,15 @@
 """Calibration: least squares of the errors of a machine to readings, and what is left."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import OptimizeResult, least_squares
 from scipy.stats import t as student
 
 from warpspace.calibration.rank import Rank, find_rank
 from warpspace.calibration.readings import Readings
+from warpspace.calibration.results import Calibration, Found, Request, Residuals
+from warpspace.calibration.solve import MAD, Solved, covariance_of, solve
 from warpspace.calibration.stack import Stack, named, rms_mm
 from warpspace.calibration.terms import Terms, automatic, build_terms
 from warpspace.exceptions import OptionError
@@ -16,136 +17,8 @@ from warpspace.machine.limits import MAX_ERROR, MAX_TEXT
 from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM, Array
 
-ROBUST_SCALE = 1.345
-"""Standard deviations at which the soft L1 loss begins to trust a reading less."""
-MAD = 1.4826
-"""Standard deviation of a normal distribution per median absolute deviation."""
 OUTLIER = 4.0
 """Robust standard deviations beyond which a reading is named."""
-MOST_ROUNDS = 20
-"""Times that a robust fit weighs its readings anew."""
-
-
-@dataclass(frozen=True, slots=True)
-class Request:
-    """What is asked of a calibration.
-
-    Attributes
-    ----------
-    keys : tuple of str or None
-        Parameters to find, each with ``:constant`` or ``:ramp`` behind it on request; None for
-        those that the kinds of readings suggest and the data determine.
-    robust : bool
-        Whether readings far off count less (soft L1 loss).
-    priors : bool
-        Whether the tolerances of the scene count as knowledge: a uniform distribution each.
-    """
-
-    keys: tuple[str, ...] | None = None
-    robust: bool = False
-    priors: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Found:
-    """One parameter after a calibration.
-
-    Attributes
-    ----------
-    key : str
-    before, value : float, µm or µrad
-    standard_uncertainty : float or None, µm or µrad
-        None where the readings do not determine it.
-    interval : tuple of float, (2,), or None
-        95 % interval.
-    identifiable : bool
-        Whether the readings determine it without holding another parameter.
-    """
-
-    key: str
-    before: float
-    value: float
-    standard_uncertainty: float | None
-    interval: tuple[float, float] | None
-    identifiable: bool
-
-
-@dataclass(frozen=True, slots=True)
-class Residuals:
-    """What one file of readings leaves.
-
-    Attributes
-    ----------
-    readings : Readings
-    before_mm, after_mm : ndarray, [n, d], mm
-        Observed − predicted: with the errors of the scene, and with those found.
-    outliers : tuple of int
-        Rows that lie further off than the others let expect.
-    """
-
-    readings: Readings
-    before_mm: Array
-    after_mm: Array
-    outliers: tuple[int, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Calibration:
-    """A calibrated machine.
-
-    Attributes
-    ----------
-    scene : Scene
-        With the errors found.
-    parameters : tuple of Found
-    rank : Rank
-    slopes : frozenset of str
-        Parameters of which a slope was looked for.
-    keys : tuple of str, (k,)
-        Parameters of `correlation`.
-    correlation : ndarray, [k, k]
-    covariance : ndarray, [k, k], µm and µrad
-    unknowns : mapping of str to float, mm
-        What the set-up left unknown, as found.
-    fitted, predicted : tuple of Residuals
-    rms_before_mm, rms_after_mm : float, mm
-        Of the residual vectors that were fitted.
-    rms_predicted_before_mm, rms_predicted_after_mm : float or None, mm
-    sigma_mm : float, mm
-        Standard deviation of one component, from the residuals; of a weight of one where
-        uncertainties are given.
-    freedom : int
-        Components less what was fitted.
-    notes : tuple of str
-    """
-
-    scene: Scene
-    parameters: tuple[Found, ...]
-    rank: Rank
-    slopes: frozenset[str]
-    keys: tuple[str, ...]
-    correlation: Array
-    covariance: Array
-    unknowns: Mapping[str, float]
-    fitted: tuple[Residuals, ...]
-    predicted: tuple[Residuals, ...]
-    rms_before_mm: float
-    rms_after_mm: float
-    rms_predicted_before_mm: float | None
-    rms_predicted_after_mm: float | None
-    sigma_mm: float
-    freedom: int
-    notes: tuple[str, ...] = field(default=())
-
-
-@dataclass(frozen=True, slots=True)
-class _Solved:
-    """A solution: amplitudes, unknowns, and the weighted derivatives there."""
-
-    amplitudes: Array
-    unknown: Array
-    weighted: Array
-    trust: Array
 
 
 def calibrate(
@@ -191,19 +64,19 @@ def calibrate(
     terms = build_terms(scene, automatic(scene, sets) if request.keys is None else request.keys)
     if not terms.keys:
         raise OptionError("no axis moves whose errors could be found; expected --fit KEYS")
-    begin = _solve(stack, terms.only(()), request)
+    begin = solve(stack, terms.only(()), request)
     rank = _rank(stack, terms, begin.unknown)
     prior = _prior(scene, terms.keys) if request.priors else None
     free = terms.keys if prior is not None else rank.kept
     _check_count(stack, rank, len(free), prior is not None)
-    solved = _solve(stack, terms.only(free), request, prior, begin.unknown)
+    solved = solve(stack, terms.only(free), request, prior, begin.unknown)
     before = stack.residuals(terms, terms.start, begin.unknown)
     part = terms.only(free)
     after = stack.residuals(part, solved.amplitudes, solved.unknown)
     used = stack.size + (len(free) if prior is not None else 0)
     freedom = used - len(free) - len(stack.unknowns)
     sigma = _sigma(stack, after, freedom)
-    covariance = _covariance(solved, len(free)) * (1.0 if stack.has_uncertainties else sigma**2)
+    covariance = covariance_of(solved, len(free)) * (1.0 if stack.has_uncertainties else sigma**2)
     errors = part.errors_with(solved.amplitudes)
     _check_size(part, solved.amplitudes)
     fitted_scene = replace(scene, title=f"{scene.title}, calibrated"[:MAX_TEXT], errors=errors)
@@ -243,70 +116,6 @@ def _weighed(
     ]
     note = f"readings without u_um are taken as ± {UM_PER_MM * width:.3g} µm: what a fit leaves"
     return weighed, (note,)
-
-
-def _solve(
-    stack: Stack,
-    terms: Terms,
-    request: Request,
-    prior: tuple[Array, Array] | None = None,
-    unknown: Array | None = None,
-) -> _Solved:
-    """Minimise the weighted residuals over amplitudes and unknowns."""
-    weights = np.concatenate(stack.weights())
-    count = len(terms.keys)
-    start = np.concatenate([terms.start, stack.start() if unknown is None else unknown])
-    if not len(start):
-        return _Solved(start, start, np.zeros((stack.size, 0)), np.ones(stack.size))
-
-    def missed(values: Array) -> Array:
-        rows = stack.residuals(terms, values[:count], values[count:])
-        return np.concatenate([row.ravel() for row in rows]) * weights
-
-    def slopes(values: Array) -> Array:
-        by_parameter, by_unknown = stack.derivatives(terms, values[:count], values[count:])
-        return -weights[:, None] * np.hstack([np.vstack(by_parameter), np.vstack(by_unknown)])
-
-    trust = np.ones(stack.size)
-
-    def function(values: Array) -> Array:
-        rows = np.sqrt(trust) * missed(values)
-        return rows if prior is None else np.append(rows, (values[:count] - prior[0]) / prior[1])
-
-    def jacobian(values: Array) -> Array:
-        rows = np.sqrt(trust)[:, None] * slopes(values)
-        if prior is None:
-            return rows
-        own = np.hstack([np.diag(1.0 / prior[1]), np.zeros((count, len(values) - count))])
-        return np.vstack([rows, own])
-
-    for _ in range(MOST_ROUNDS if request.robust else 1):
-        scale = np.linalg.norm(jacobian(start), axis=0)
-        found: OptimizeResult = least_squares(
-            function,
-            start,
-            jac=jacobian,  # pyright: ignore[reportArgumentType]
-            x_scale=1.0 / np.where(scale > 0.0, scale, 1.0),
-            xtol=1e-10,
-            ftol=1e-13,
-            gtol=1e-13,
-            max_nfev=200,
-        )
-        if not found.success:
-            raise OptionError(
-                f"the fit does not converge ({found.message}); expected readings near to the model."
-                " Leave out outliers (--robust), or look for fewer parameters (--fit KEYS)"
-            )
-        moved = float(np.abs((found.x - start) * scale).max(initial=0.0))
-        start = found.x
-        if not request.robust:
-            break
-        rows = missed(start)
-        unit = max(MAD * float(np.median(np.abs(rows))), 1e-12)
-        trust = 1.0 / np.sqrt(1.0 + (rows / (ROBUST_SCALE * unit)) ** 2)
-        if moved < 1e-9 * unit:
-            break
-    return _Solved(start[:count], start[count:], jacobian(start), trust)
 
 
 def _rank(stack: Stack, terms: Terms, unknown: Array) -> Rank:
@@ -350,15 +159,6 @@ def _sigma(stack: Stack, after: Sequence[Array], freedom: int) -> float:
     return float(np.sqrt(np.sum(rows**2) / max(freedom, 1)))
 
 
-def _covariance(solved: _Solved, count: int) -> Array:
-    """Give the covariance of the parameters for a weight of one, [K, K]."""
-    scale = np.linalg.norm(solved.weighted, axis=0)
-    scale = np.where(scale > 0.0, scale, 1.0)
-    triangle = np.linalg.qr(solved.weighted / scale, mode="r")
-    inverse = np.linalg.pinv(triangle) / scale[:, None]
-    return (inverse @ inverse.T)[:count, :count]
-
-
 def _correlation(covariance: Array) -> Array:
     """Give correlations out of a covariance."""
     width = np.sqrt(np.diag(covariance))
@@ -370,7 +170,7 @@ def _found(
     terms: Terms,
     part: Terms,
     rank: Rank,
-    solved: _Solved,
+    solved: Solved,
     covariance: Array,
     freedom: int,
     stack: Stack,
@@ -420,8 +220,8 @@ def _predict(
     part: Terms,
     predict: Sequence[Readings],
     stack: Stack,
-    begin: _Solved,
-    solved: _Solved,
+    begin: Solved,
+    solved: Solved,
     request: Request,
 ) -> tuple[tuple[Residuals, ...], tuple[str, ...]]:
     """Predict readings that were not fitted; set-ups that were not fitted are placed by them."""
@@ -434,11 +234,11 @@ def _predict(
     notes: tuple[str, ...] = ()
     before, after = dict(known_before), dict(known_after)
     if new:
-        own_before = _solve(held, terms.only(()), request).unknown
+        own_before = solve(held, terms.only(()), request).unknown
         fixed = replace(
             part, keys=(), start=np.zeros(0), errors=part.errors_with(solved.amplitudes)
         )
-        own_after = _solve(held, fixed, request).unknown
+        own_after = solve(held, fixed, request).unknown
         before |= {k: v for k, v in named(held.unknowns, own_before).items() if k in new}
         after |= {k: v for k, v in named(held.unknowns, own_after).items() if k in new}
         notes = (f"predicted readings place their own set-up: {', '.join(new)}",)

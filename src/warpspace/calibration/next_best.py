@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpspace.calibration.calibrate import Calibration
 from warpspace.calibration.candidates import Candidate, candidates
 from warpspace.calibration.rank import find_rank
 from warpspace.calibration.readings import Readings
+from warpspace.calibration.results import Calibration
 from warpspace.calibration.stack import Stack
 from warpspace.calibration.terms import Terms, build_terms
 from warpspace.exceptions import OptionError

@@ -7,8 +7,13 @@ import numpy as np
 
 from warpspace.units import Array
 
-BLIND = 1e-7
-"""Share of its own effect below which what is left of a parameter counts as nothing."""
+BLIND = 2e-4
+"""Share of its own effect below which what is left of a parameter counts as nothing.
+
+With less, noise of a thousandth makes values that no machine has.
+"""
+SHARE = 1e-3
+"""Of a combination, below which a parameter is not named as part of it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,9 +98,7 @@ def _partners(
     if np.linalg.norm(target) <= BLIND:
         return ()
     shares, *_ = np.linalg.lstsq(columns, target, rcond=None)
-    return tuple(
-        keys[one] for one, share in zip(kept, shares, strict=True) if abs(share) > 1e3 * BLIND
-    )
+    return tuple(keys[one] for one, share in zip(kept, shares, strict=True) if abs(share) > SHARE)
 
 
 def _orthonormal(columns: Array) -> Array:

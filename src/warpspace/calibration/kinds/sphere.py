@@ -8,7 +8,14 @@ import numpy as np
 from warpspace.calibration.circles import circles_of
 from warpspace.calibration.kinds.kind import Placed, head_keys
 from warpspace.calibration.kinds.points import nominal_tip
-from warpspace.calibration.kinds.sphere_tcp import READ, has_centres, rotary_axes, spread_mm
+from warpspace.calibration.kinds.sphere_tcp import (
+    READ,
+    has_centres,
+    places,
+    rotary_axes,
+    solve_linear,
+    spread_mm,
+)
 from warpspace.calibration.kinds.sphere_tcp import SPREAD_MM as TCP_SPREAD_MM
 from warpspace.calibration.readings import (
     Readings,
@@ -63,10 +70,11 @@ class Sphere(Placed):
                 )
                 notes = (*notes, note)
         tip = nominal_tip(scene, coordinates)
+        nominal = solve_linear(scene, coordinates, places(tip, table), table.source)
         readings = Readings(
             self.name,
-            coordinates,
-            tip,
+            nominal,
+            nominal_tip(scene, nominal),
             tip,
             uncertainties_mm(table),
             sessions(table),

@@ -50,7 +50,7 @@ class SphereTcp(Placed):
         check_poses({name: coordinates[name] for name in rotary}, table.source)
         hint = "Were they measured with TCP correction off (--kind sphere), or in another unit?"
         check_spread(spread_mm(table), SPREAD_MM, table.source, hint)
-        coordinates = _solve_linear(scene, coordinates, observed, table.source)
+        coordinates = solve_linear(scene, coordinates, places(observed, table), table.source)
         return Readings(
             self.name,
             coordinates,
@@ -86,11 +86,43 @@ def spread_mm(table: ReadingTable) -> float:
     return max(float(np.ptp(observed[group], axis=0).max()) for group in groups)
 
 
-def _solve_linear(
+def places(observed_mm: Array, table: ReadingTable) -> Array:
+    """Give the mean centre of the session of each reading, [n, 3], mm.
+
+    Errors are evaluated where the axes stand nominally. Positions that held the reading itself
+    would let an error of scale explain any reading.
+    """
+    labels = np.array(sessions(table))
+    means = {name: observed_mm[labels == name].mean(axis=0) for name in dict.fromkeys(labels)}
+    return np.stack([means[name] for name in labels])
+
+
+def solve_linear(
     scene: Scene, coordinates: dict[str, Array], target_mm: Array, source: str
 ) -> dict[str, Array]:
     """Find the positions of the linear axes that nominally bring the tool point to a target.
 
+    Parameters
+    ----------
+    scene : Scene
+    coordinates : dict of str to ndarray, [n], mm or degrees
+        All axes; those of linear axes are replaced.
+    target_mm : ndarray, [n, 3], mm
+        In the workpiece frame.
+    source : str
+        File, for messages.
+
+    Returns
+    -------
+    dict of str to ndarray, [n], mm or degrees
+
+    Raises
+    ------
+    SceneError
+        If the machine does not reach a target.
+
+    Notes
+    -----
     The nominal tool point is an affine function of them at given rotary positions.
     """
     one_per_direction: dict[int, str] = {}

@@ -21,10 +21,10 @@ from warpspace.cli.terminal import echo
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from warpspace.calibration.calibrate import Calibration, Residuals
     from warpspace.calibration.circles import Circle
     from warpspace.calibration.next_best import Step
     from warpspace.calibration.readings import Readings
+    from warpspace.calibration.results import Calibration, Residuals
     from warpspace.scene.model import Scene
 
 ENDINGS = (".toml",)
@@ -94,11 +94,11 @@ def calibrate(
     column u_um (standard uncertainty) are weighted by it. A column session, or run, tells set-ups
     apart: each has its own place of the sphere or the station, or its own shift.
     """
-    from warpspace.calibration.calibrate import Request
     from warpspace.calibration.calibrate import calibrate as find
     from warpspace.calibration.circles import circles_of
     from warpspace.calibration.next_best import next_best, separating
     from warpspace.calibration.readings import find_data, read_readings
+    from warpspace.calibration.results import Request
     from warpspace.calibration.table import read_table
     from warpspace.calibration.terms import read_keys
     from warpspace.scene.library import load_scene

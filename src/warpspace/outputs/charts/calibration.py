@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from warpspace.calibration.calibrate import Calibration, Found, Residuals
+from warpspace.calibration.results import Calibration, Found, Residuals
 from warpspace.machine.parameters import parameter
 from warpspace.outputs.charts.paper import (
     SMALL,
