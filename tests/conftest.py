@@ -26,10 +26,11 @@ hypothesis.settings.register_profile("ci", deadline=None, derandomize=True)
 hypothesis.settings.load_profile("ci" if IN_CI else "local")
 
 CHROMIUM_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-# Software WebGL, and no calls home.
+# Software WebGL, the page around it put together without it, and no calls home.
 CHROMIUM_ARGS = (
     "--no-sandbox",
     "--use-angle=swiftshader",
+    "--disable-gpu-compositing",
     "--enable-unsafe-swiftshader",
     "--disable-quic",
     "--no-first-run",

@@ -3,11 +3,14 @@
 import base64
 import json
 from collections.abc import Callable, Iterator
+from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
+from app.frames import draw, new_visitor
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
@@ -39,6 +42,20 @@ VERTICES = """() => {
     if (o.isMesh && o.geometry.attributes.color) {
       const p = o.geometry.attributes.position, c = o.geometry.attributes.color;
       found = [pack(p.array), pack(c.array)];
+    }
+  });
+  return found;
+}"""
+DRAWN = """name => {
+  const node = window.__viserMutable.nodeRefFromName[name];
+  let found = null;
+  if (node) node.traverse(o => {
+    if (!found && o.geometry && o.visible) {
+      const at = o.geometry.attributes;
+      const seen = at.instanceStart ? at.instanceStart.data.array : at.position.array;
+      let shown = true;
+      for (let up = o; up; up = up.parent) shown = shown && up.visible;
+      if (shown) found = Array.from(seen);
     }
   });
   return found;
@@ -120,6 +137,11 @@ class Tab:
         wanted = drawn_nodes(session._live.evaluate(start))
         self.until(lambda: session.state == start and self.shows(wanted))
 
+    def screenshot(self) -> np.ndarray:
+        """Draw the page as it is now, and give its pixels, [height, width, 3]."""
+        draw(self.page)
+        return np.asarray(Image.open(BytesIO(self.page.screenshot())).convert("RGB")).astype(int)
+
     def _listen(self, message: Any) -> None:
         if message.type == "error" and not any(word in message.text for word in HARMLESS):
             self.errors.append(message.text)
@@ -162,6 +184,11 @@ class Tab:
             and drawn.shape == vertices.shape
             and np.allclose(drawn, vertices, atol=1e-3)
         )
+
+    def drawn(self, name: str) -> np.ndarray | None:
+        """Points of a node that is shown, [n, 3]; None where it is hidden or absent."""
+        found = self.page.evaluate(DRAWN, name)
+        return None if found is None else np.reshape(found, (-1, 3))
 
     def text(self, value: str) -> str:
         """A number on the page, as it is spelt."""
@@ -248,8 +275,8 @@ def open_page(
     everything: bool = True,
 ) -> Tab:
     """Open the app as a visitor of its own; `query` goes into the address."""
-    context = browser.new_context(viewport={"width": size[0], "height": size[1]})
-    return Tab(context.new_page(), viewer, query, everything=everything)
+    page = new_visitor(browser, size).new_page()
+    return Tab(page, viewer, query, everything=everything)
 
 
 @pytest.fixture(scope="session")
@@ -306,6 +333,8 @@ def tab(
         tab.page.context.close()
     elif request.node.stash.get(FAILED, False) or tab.errors:
         kept_tabs.pop().page.context.close()
+    else:
+        draw(tab.page)  # what the test has left can be drawn
     assert tab.errors == []
 
 

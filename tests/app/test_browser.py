@@ -1,11 +1,9 @@
 """The app in a real Chromium: what a user does, and what is then on the screen."""
 
 from collections.abc import Callable
-from io import BytesIO
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from app.conftest import Tab, drawn_nodes
 from warpspace.app.evaluation.evaluate import LiveModel
@@ -50,9 +48,7 @@ def test_first_screen(tab: Tab) -> None:
 
 
 def test_mesh_is_drawn_in_the_colours_of_the_bar(tab: Tab) -> None:
-    tab.page.wait_for_timeout(1500)
-    screen = np.asarray(Image.open(BytesIO(tab.page.screenshot())).convert("RGB")).astype(int)
-    middle = screen[250:750, 500:1100].reshape(-1, 3)
+    middle = tab.screenshot()[250:750, 500:1100].reshape(-1, 3)
     green = (middle[:, 1] > middle[:, 0] + 40) & (middle[:, 2] > middle[:, 0])
     assert green.mean() > 0.2
 

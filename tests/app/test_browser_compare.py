@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from app.conftest import SCENES, Tab, drawn_nodes
+from app.frames import new_visitor
 from warpspace.app.browser.address import PARAMETER
 from warpspace.app.documents import links
 from warpspace.app.documents.scene_file import open_text, state_to_toml
@@ -49,7 +50,7 @@ def follow(viewer: Viewer, browser: "Browser") -> Iterator[Callable[[str], Tab]]
     opened: list[tuple[BrowserContext, Tab]] = []
 
     def open_link(link: str) -> Tab:
-        context = browser.new_context(viewport={"width": 1280, "height": 720})
+        context = new_visitor(browser)
         context.add_init_script(LISTEN)
         query = f"&{PARAMETER}={links.pack(link)}#"
         opened.append((context, Tab(context.new_page(), viewer, query)))

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from app.conftest import SCENES, Tab, wait_until_open
+from app.frames import new_visitor
 from warpspace.app.server.viewer import Viewer
 
 pytestmark = pytest.mark.browser
@@ -29,7 +30,7 @@ def tabs_heard(page: Any) -> set[str]:
 
 
 def test_the_tour_is_shown_once_and_keeps_the_keys_to_itself(viewer: Viewer, browser: Any) -> None:
-    with browser.new_context(viewport={"width": 1280, "height": 720}) as context:
+    with new_visitor(browser) as context:
         page = context.new_page()
         page.goto(viewer.url)
         page.wait_for_selector("#warpspace-tour", timeout=60_000)
@@ -100,7 +101,7 @@ def test_words_of_a_scene_are_never_run(browser: Any) -> None:
     scene = replace(SCENES[0], title=f"T {words}", description=f"D {words}")
     with (
         Viewer(scene) as viewer,
-        browser.new_context(viewport={"width": 1024, "height": 768}) as context,
+        new_visitor(browser, (1024, 768)) as context,
     ):
         tab = Tab(context.new_page(), viewer, "&tour=on", everything=False)
         page = tab.page

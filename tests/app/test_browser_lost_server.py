@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from app.conftest import Tab, open_page, wait_until_open
+from app.frames import new_visitor
 from warpspace.app.server.viewer import Viewer
 from warpspace.scene.library import load_scene
 
@@ -85,7 +86,7 @@ def wait_for_maximum(page: "Page", wanted: str) -> None:
 def test_killed_server_is_said_and_its_tab_restored(
     served: Served, browser: "Browser", tmp_path: Path
 ) -> None:
-    page = browser.new_context(viewport={"width": 1280, "height": 720}).new_page()
+    page = new_visitor(browser).new_page()
     page.goto(f"{served.url}/?fixedDpr=1")
     wait_until_open(page)
     opened = maximum(page)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from app.conftest import TIDY, Tab, wait_until_open
+from app.frames import new_visitor
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import start_state
@@ -96,9 +97,7 @@ def settled(tab: Tab) -> list[float]:
 def sized(viewer: Viewer, browser: "Browser", request: pytest.FixtureRequest) -> Iterator[Tab]:
     """A page of one size."""
     width, height = request.param
-    context = browser.new_context(
-        viewport={"width": width, "height": height}, device_scale_factor=1
-    )
+    context = new_visitor(browser, (width, height), device_scale_factor=1)
     context.set_default_timeout(60_000)
     tab = Tab(context.new_page(), viewer)
     yield tab
@@ -232,10 +231,7 @@ def test_page_style_survives_the_collapse_of_the_left_column(tab: Tab) -> None:
 
 def ghosts(tab: Tab) -> bool:
     """Whether the ghost of the machine is drawn."""
-    return tab.page.evaluate(
-        "() => { const [body] = window.__viserMutable.nodeRefFromName['/ghost_machine'].children;"
-        " return !!body && body.visible; }"
-    )
+    return tab.drawn("/ghost_machine/R_bed") is not None
 
 
 @pytest.mark.own_page
@@ -293,13 +289,9 @@ def test_isolines_carry_few_values_on_plates_that_suit_the_page(tab: Tab) -> Non
 @pytest.fixture
 def phone(viewer: Viewer, browser: "Browser") -> Iterator[Tab]:
     """A page on a phone."""
-    context = browser.new_context(
-        viewport={"width": PHONE[0], "height": PHONE[1]},
-        device_scale_factor=1,
-        is_mobile=True,
-        has_touch=True,
-    )
-    tab = Tab(context.new_page(), viewer)
+    context = new_visitor(browser, PHONE, device_scale_factor=1, is_mobile=True, has_touch=True)
+    # the sheet of panels folds by itself, and what is in it is not there then
+    tab = Tab(context.new_page(), viewer, everything=False)
     yield tab
     context.close()
     assert tab.errors == []

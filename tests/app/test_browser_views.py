@@ -1,11 +1,9 @@
 """Views, machine and rotary table in a real Chromium: what a user does, what is then drawn."""
 
 from dataclasses import replace
-from io import BytesIO
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from app.conftest import Tab
 from warpspace.app.evaluation.evaluate import LiveModel
@@ -22,20 +20,6 @@ from warpspace.scene.library import load_scene
 pytestmark = pytest.mark.browser
 LIVE = LiveModel()
 START = start_state(load_scene("dvf5000_first"))
-DRAWN = """name => {
-  const node = window.__viserMutable.nodeRefFromName[name];
-  let found = null;
-  if (node) node.traverse(o => {
-    if (!found && o.geometry && o.visible) {
-      const at = o.geometry.attributes;
-      const seen = at.instanceStart ? at.instanceStart.data.array : at.position.array;
-      let shown = true;
-      for (let up = o; up; up = up.parent) shown = shown && up.visible;
-      if (shown) found = Array.from(seen);
-    }
-  });
-  return found;
-}"""
 PLACE = """name => {
   const node = window.__viserMutable.nodeRefFromName[name];
   if (!node) return null;
@@ -49,15 +33,9 @@ def looking(**changes):
     return replace(START, look=replace(START.look, **changes))
 
 
-def drawn(tab: Tab, name: str) -> np.ndarray | None:
-    """Points of a node that is shown, [n, 3], mm; None where it is hidden or absent."""
-    found = tab.page.evaluate(DRAWN, name)
-    return None if found is None else np.reshape(found, (-1, 3))
-
-
 def ends(tab: Tab, name: str, pieces: np.ndarray) -> bool:
     """Whether a node of lines has these pieces."""
-    found = drawn(tab, name)
+    found = tab.drawn(name)
     return (
         found is not None
         and found.size == pieces.size
@@ -90,16 +68,16 @@ def test_surface_cut_slices_and_lines(tab: Tab) -> None:
     look = looking(surface="slices").look.with_slice("X", 4.0, slice_spans(START.scene)["X"])
     moved = LIVE.evaluate(replace(START, look=look))
     tab.until(lambda: tab.shows(map_mesh(moved).vertices_mm))
-    assert drawn(tab, "/box/grid") is not None
+    assert tab.drawn("/box/grid") is not None
     tab.choose("Show as", "grid lines only")
-    tab.until(lambda: drawn(tab, "/box/grid") is None)
+    tab.until(lambda: tab.drawn("/box/grid") is None)
     tab.choose("Show as", "surface")
     tab.until(lambda: tab.shows(map_mesh(LIVE.evaluate(START)).vertices_mm))
-    tab.until(lambda: drawn(tab, "/box/grid") is not None)
+    tab.until(lambda: tab.drawn("/box/grid") is not None)
 
 
 def test_isolines_arrows_worst_point_and_bars(tab: Tab) -> None:
-    assert drawn(tab, "/box/isolines") is None
+    assert tab.drawn("/box/isolines") is None
     tick(tab, "Isolines")
     picture = LIVE.evaluate(looking(isolines=True))
     tab.until(lambda: ends(tab, "/box/isolines", isoline_pieces(picture)))
@@ -107,8 +85,8 @@ def test_isolines_arrows_worst_point_and_bars(tab: Tab) -> None:
     arrows = corner_arrows(
         picture.grid.shape, picture.grid.nominal_mm, picture.field.error_um, picture.exaggeration
     )
-    tab.until(lambda: drawn(tab, "/marks/arrows") is not None)
-    found = drawn(tab, "/marks/arrows")
+    tab.until(lambda: tab.drawn("/marks/arrows") is not None)
+    found = tab.drawn("/marks/arrows")
     for start, end in zip(arrows.start_mm, arrows.end_mm, strict=True):
         for at in (start, end):
             assert np.linalg.norm(found - at, axis=-1).min() < 0.01
@@ -190,7 +168,7 @@ def test_pixels_have_the_colours_of_the_bar(tab: Tab) -> None:
         "() => { const r = document.querySelector('canvas').getBoundingClientRect();"
         " return [r.left, r.top, r.width, r.height]; }"
     )
-    screen = np.asarray(Image.open(BytesIO(tab.page.screenshot())).convert("RGB")).astype(int)
+    screen = tab.screenshot()
     # inner nodes of the front face, projected
     nodes = picture.drawn_mm[2:-2, 0, 2:-2].reshape(-1, 3) * SCENE_PER_MM
     values = picture.values[2:-2, 0, 2:-2].reshape(-1)
@@ -225,12 +203,12 @@ def machine_vertices(state) -> dict[str, np.ndarray]:
 
 def test_machine_moves_bends_and_carries_the_tool_point(tab: Tab) -> None:
     go(tab, "Machine")
-    assert drawn(tab, "/machine/R_bed") is None
+    assert tab.drawn("/machine/R_bed") is None
     tick(tab, "Machine bodies")
     state = replace(START, machine=START.machine.switched(shown=True))
 
     def stands(state) -> bool:
-        found = {name: drawn(tab, f"/machine/{name}") for name in machine_vertices(state)}
+        found = {name: tab.drawn(f"/machine/{name}") for name in machine_vertices(state)}
         return all(
             at is not None and at.shape == wanted.shape and np.allclose(at, wanted, atol=2e-3)
             for at, wanted in zip(found.values(), machine_vertices(state).values(), strict=True)
@@ -254,7 +232,7 @@ def test_machine_moves_bends_and_carries_the_tool_point(tab: Tab) -> None:
     tab.until(lambda: stands(straight))
     assert not stands(state)
     tick(tab, "Machine bodies")
-    tab.until(lambda: drawn(tab, "/machine/R_bed") is None)
+    tab.until(lambda: tab.drawn("/machine/R_bed") is None)
 
 
 def test_circles_in_numbers_for_chosen_points_and_positions(tab: Tab) -> None:
@@ -288,7 +266,7 @@ def settled(tab: Tab) -> tuple[object, str]:
     last: tuple[object, str] = (None, "")
     for _ in range(10):
         tab.page.wait_for_timeout(1500)
-        now = (drawn(tab, "/machine/C_table"), tab.text("turning"))
+        now = (tab.drawn("/machine/C_table"), tab.text("turning"))
         if last[0] is not None and np.array_equal(now[0], last[0]) and now[1] == last[1]:
             break
         last = now
@@ -300,21 +278,21 @@ def test_rotation_plays_pauses_and_stops_with_its_session(tab: Tab) -> None:
     go(tab, "Machine")
     tick(tab, "Machine bodies")
     go(tab, "Rotary axes")
-    tab.until(lambda: drawn(tab, "/machine/C_table") is not None)
-    still = drawn(tab, "/machine/C_table")
+    tab.until(lambda: tab.drawn("/machine/C_table") is not None)
+    still = tab.drawn("/machine/C_table")
     tab.page.get_by_role("button", name="Play rotation").click()
     tab.until(lambda: tab.page.locator("[data-value='turning']").count() > 0)
-    tab.until(lambda: not np.allclose(drawn(tab, "/machine/C_table"), still, atol=1.0))
-    assert drawn(tab, "/rotation/actual") is not None
+    tab.until(lambda: not np.allclose(tab.drawn("/machine/C_table"), still, atol=1.0))
+    assert tab.drawn("/rotation/actual") is not None
     tab.page.get_by_role("button", name="Pause rotation").click()
     # steps on their way still arrive on a busy machine; then nothing moves for five steps' time
     paused, where = settled(tab)
     tab.page.wait_for_timeout(600)
-    assert np.array_equal(drawn(tab, "/machine/C_table"), paused)
+    assert np.array_equal(tab.drawn("/machine/C_table"), paused)
     assert tab.text("turning") == where
     tab.page.get_by_role("button", name="Stop", exact=True).click()
-    tab.until(lambda: np.allclose(drawn(tab, "/machine/C_table"), still, atol=1e-3))
-    tab.until(lambda: drawn(tab, "/rotation/actual") is None)
+    tab.until(lambda: np.allclose(tab.drawn("/machine/C_table"), still, atol=1e-3))
+    tab.until(lambda: tab.drawn("/rotation/actual") is None)
     tab.page.get_by_role("button", name="Play rotation").click()
     stage = tab.session.context.stage
     tab.until(lambda: stage.playing)

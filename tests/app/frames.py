@@ -1,0 +1,45 @@
+"""Frames of a page that are drawn when a test asks for one, and not sixty times a second.
+
+Software rendering takes a quarter of a second for a frame, on all cores. What tests read (vertices,
+colours, places, the camera, the page around them) is in three.js' scene whether it is drawn or not;
+so draw calls do nothing until `draw` asks for a frame. All else runs as in any page: the frames
+themselves, matrices, uploads to WebGL, shaders.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, BrowserContext, Page
+
+WHEN_ASKED = """(() => {
+  const drawing = WebGL2RenderingContext.prototype;
+  for (const name of ["clear", "drawArrays", "drawElements", "drawRangeElements",
+      "drawArraysInstanced", "drawElementsInstanced"]) {
+    const draw = drawing[name];
+    drawing[name] = function (...what) { if (window.testDraws) draw.apply(this, what); };
+  }
+})()"""
+DRAW = """() => new Promise(done => {
+  const { canvas, requestRender } = window.__viserMutable;
+  window.testDraws = true;
+  requestRender();
+  // three.js' own callback was there before
+  requestAnimationFrame(() => {
+    window.testDraws = false;
+    done(canvas.getContext("webgl2").getError());
+  });
+})"""
+
+
+def new_visitor(
+    browser: "Browser", size: tuple[int, int] = (1280, 720), **options: Any
+) -> "BrowserContext":
+    """Give a visitor whose pages draw when they are asked to; options as of `new_context`."""
+    context = browser.new_context(viewport={"width": size[0], "height": size[1]}, **options)
+    context.add_init_script(WHEN_ASKED)
+    return context
+
+
+def draw(page: "Page") -> None:
+    """Draw one frame of a page of `new_visitor`; it stays on the screen until the next."""
+    assert page.evaluate(DRAW) == 0, "WebGL reports an error"
