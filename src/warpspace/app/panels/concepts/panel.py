@@ -33,6 +33,7 @@ FEW = (
     " each? Choose two machines or more, then press Compare. Tolerances are those of A."
 )
 READY = "Press Compare: it takes some seconds, and pictures follow."
+HOW = "Tolerances, place and loop"
 STALE = "Machines, tolerances or settings have changed since: press Compare for new numbers."
 
 
@@ -76,25 +77,26 @@ class ConceptsPanel:
             ),
             self._note_settings,
         )
-        self._tolerances = self._list(
-            "Tolerances",
-            TOLERANCES,
-            "Half widths by class, as in the scene of A; or what each scene says itself.",
-        )
-        self._over = self._list(
-            "Evaluated at",
-            OVERS,
-            "|E| at a random point of each sampled"
-            " machine, or its largest over the working volume.",
-        )
-        self._loop = self._list(
-            "Loop", LOOPS, "Tool against workpiece counts the axes of both sides."
-        )
         self._start: Any = gui.add_button(
             "Compare", hint="Sample machines of each within tolerance. It runs beside the page."
         )
         self._start.on_click(lambda _: context.act(self._compare))
         self._work.add_progress()
+        with gui.add_folder(HOW, expand_by_default=False):
+            self._tolerances = self._list(
+                "Tolerances",
+                TOLERANCES,
+                "Half widths by class, as in the scene of A; or what each scene says itself.",
+            )
+            self._over = self._list(
+                "Evaluated at",
+                OVERS,
+                "|E| at a random point of each sampled"
+                " machine, or its largest over the working volume.",
+            )
+            self._loop = self._list(
+                "Loop", LOOPS, "Tool against workpiece counts the axes of both sides."
+            )
         self._text = Handle(gui.add_html(""))
         self._sheet: Any = gui.add_button(
             "Picture of all (PNG)",
