@@ -247,6 +247,7 @@ def test_without_a_renderer_nothing_is_written(tmp_path: Path, monkeypatch) -> N
         (("-o", "a.html", "--spec-um", "-1"), "specification"),
         (("-o", "a.html", "--samples", "0"), "samples"),
         (("-o", "a.html", "--grid", "1"), "grid"),
+        (("-o", "a.html", "--concepts", "machine_trunion"), "machine_trunion"),
         (("-o", "a.html", "--exaggeration", "0"), "exaggeration"),
         (("dvf5000_first", "dvf5000_first", "-o", "a.html"), "expected one, or two"),
     ],

@@ -18,14 +18,13 @@ from warpspace.app.readouts.summary import colour_stops
 from warpspace.app.state.concept_choice import Chosen, ConceptChoice
 from warpspace.geometry.colour import ColourScale
 from warpspace.machine.limits import MOST_CONCEPTS
-from warpspace.picture.words import LOOP_WORDS, spell_short
+from warpspace.picture.words import LOOP_WORDS, spell_short, tolerance_words
 
 if TYPE_CHECKING:
     from warpspace.app.evaluation.concepts import Answer
     from warpspace.scene.concepts import Concept
 
 Button = Callable[[str], Markup]
-TOLERANCE_UNITS = {"translation": "µm", "rotation": "µrad", "squareness": "µrad"}
 NUMBERS = {"mean": "mean_um", "P95": "p95_um", "max": "max_um"}
 """Word on a column to field of `MonteCarlo`."""
 MARGIN_PX = 6
@@ -142,15 +141,11 @@ def concepts_html(
 def _about(found: "Answer") -> list[str]:
     """Say how machines were compared."""
     question, first = found.question, found.concepts[0]
-    default = first.scene.tolerances.default
     return [
         f"{thousands(first.sampled.plan.samples)} machines of each",
         "each within its own tolerances"
         if question.own_tolerances
-        else ", ".join(
-            f"{name} ±{spell_short(value)} {TOLERANCE_UNITS[name]}"
-            for name, value in default.items()
-        ),
+        else tolerance_words(first.scene.tolerances),
         LOOP_WORDS[first.sampled.view.loop],
         "largest |E| of each" if question.over == "max" else "|E| at a random point of each",
     ]

@@ -23,7 +23,7 @@ from warpspace.outputs.figures.machine import bodies_of, render_placed
 from warpspace.picture.bodies import PlacedBody
 from warpspace.picture.concepts import ConceptPicture, picture_concept
 from warpspace.picture.views import view_words
-from warpspace.picture.words import LOOP_WORDS, spell, spell_count, spell_short
+from warpspace.picture.words import LOOP_WORDS, spell, spell_count, spell_short, tolerance_words
 from warpspace.scene.concepts import LETTERS, Concept, compare_concepts
 from warpspace.scene.model import Scene
 from warpspace.units import Array
@@ -66,7 +66,7 @@ def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: b
     title = f"Concepts within {'their own' if plan.own_tolerances else 'the same'} tolerances"
     first = concepts[0]
     facts = [
-        *([] if plan.own_tolerances else [_tolerance_words(first.scene)]),
+        *([] if plan.own_tolerances else [tolerance_words(first.scene.tolerances)]),
         f"{spell_count(plan.samples)} sampled machines each, {plan.distribution}",
         "largest |E| of each" if plan.over == "max" else "|E| at a random point of each",
         LOOP_WORDS[first.sampled.view.loop],
@@ -143,16 +143,6 @@ def _draw_machines(
             )
         )  # fmt: skip
     return tuple(maps), factor
-
-
-def _tolerance_words(scene: Scene) -> str:
-    """Spell the tolerances that all machines have."""
-    units = {"translation": "µm", "rotation": "µrad", "squareness": "µrad"}
-    parts = [
-        f"{name} ±{spell_short(value)} {units[name]}"
-        for name, value in scene.tolerances.default.items()
-    ]
-    return ", ".join(parts)
 
 
 def _cells(rect: Rect, count: int) -> list[Rect]:
