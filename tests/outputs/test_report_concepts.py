@@ -5,10 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner
 
 from warpspace import load_scene
-from warpspace.cli.commands.report import report
 from warpspace.exceptions import OptionError, RenderError
 from warpspace.outputs.report import ReportSettings, write_report
 from warpspace.outputs.report.blocks import Picture, Table, Text
@@ -73,15 +71,3 @@ def test_too_many_machines_are_refused_before_anything_is_drawn(tmp_path: Path) 
         write_report([FIRST], tmp_path / "a.html", SETTINGS, concepts=[OTHERS[0]] * 8)
     assert list(tmp_path.iterdir()) == []
     assert compare_with([FIRST], (), SETTINGS) == ()
-
-
-@pytest.mark.render
-@pytest.mark.usefixtures("renderer")
-def test_the_command_writes_the_section(tmp_path: Path) -> None:
-    target = tmp_path / "a.html"
-    options = ("--grid", "5", "--samples", "2000", "--concepts", "machine_printer_3d")
-    result = CliRunner().invoke(report, ["teach_squareness", "-o", str(target), *options])
-    assert result.exit_code == 0, result.output
-    page = target.read_text(encoding="utf-8")
-    assert "Concepts side by side" in page
-    assert "wYFZXt" in page
