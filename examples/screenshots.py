@@ -170,6 +170,17 @@ def allocated(page: Page) -> None:
     page.wait_for_selector("[data-value='allocated']")
 
 
+def side_by_side(page: Page) -> None:
+    """Compare three machines of the library."""
+    press(page, "Choose machines …")
+    for title in ("Trunnion A-C machining centre", "Rotary table C with a swivel head B"):
+        page.locator(".ws-choice button", has_text=title).first.click()
+        page.wait_for_timeout(PAUSE_MS)
+    press(page, "Done")
+    press(page, "Compare")
+    page.wait_for_selector(".ws-concepts img", timeout=60_000)
+
+
 VISITS = {
     "app": Visit(as_opened),
     "app_dark": Visit(dark),
@@ -181,6 +192,7 @@ VISITS = {
     "tab_repair": Visit(repaired, "Repair"),
     "tab_sensitivities": Visit(by_effect, "Sensitivities"),
     "tab_compare": Visit(compared, "Compare"),
+    "tab_concepts": Visit(side_by_side, "Concepts", share=0.9),
     "tab_files": Visit(as_opened, "Files", share=0.4),
     "tab_view": Visit(sliced, "View"),
     "tab_machine": Visit(bent, "Machine", share=0.6),

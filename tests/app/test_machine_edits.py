@@ -1,24 +1,32 @@
 """Changing the machine of a state: what is kept, what goes, what undo brings back."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+import trimesh
 from markupsafe import Markup
 
 from warpspace.app.documents.scene_file import open_text, state_to_toml
 from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.machine_edits.guides import guide_errors
 from warpspace.app.evaluation.machine_edits.library import machine_types
 from warpspace.app.evaluation.machine_edits.updates import with_own_machine, with_word
 from warpspace.app.panels.commands import spell_change
 from warpspace.app.readouts.machine_editor.boxes import editor_html, editor_rows
 from warpspace.app.readouts.machine_editor.types import small_picture
+from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.edits import (
+    with_curve,
     with_excluded,
     with_half_width,
     with_scene_tolerances,
     with_typed_amplitude,
 )
 from warpspace.app.state.history import History, describe_change
+from warpspace.bodies.placed import load_bodies
+from warpspace.machine.errors import Constant, Ramp
 from warpspace.scene.library import load_scene, parse_scene
 from warpspace.scene.machines import machine_picture
 
@@ -235,3 +243,85 @@ Z = [-50, 50]
     wider = with_word(scara, "volume C1 0 -80")
     assert LIVE.evaluate(wider).grid.shape == (21, 21, 21)
     assert wider.scene.workspace.ranges["C1"] == (-80.0, 60.0)
+
+
+def test_a_gantry_is_made_its_guides_are_set_and_their_distance_keeps_them(state: AppState):
+    made = with_word(state, "gantry X")
+    gantry = made.scene.machine.gantries["X"]
+    assert (gantry.span_mm, gantry.across) == (450.0, "y")  # as far as Y travels
+    made = with_typed_amplitude(with_typed_amplitude(made, "EXX", 0.0), "ECX", 0.0)
+    one = with_word(with_word(made, "guide X 0 4"), "guide X 1 13")
+    # by hand: the second guide, at +225 mm in y, is 9 µm ahead, which turns X about −z
+    assert one.amplitudes["EXX"] == pytest.approx(8.5)
+    assert one.amplitudes["ECX"] == pytest.approx(-9.0 / 450.0 * 1000.0)
+    assert guide_errors(one, "X") == pytest.approx((4.0, 13.0))
+    nearer = with_word(one, "span X 0 225")
+    assert guide_errors(nearer, "X") == pytest.approx((4.0, 13.0))
+    assert nearer.amplitudes["ECX"] == pytest.approx(-40.0)
+    turned = with_word(one, "across X")
+    assert turned.scene.machine.gantries["X"].across == "z"
+    assert with_word(one, "gantry X").scene.machine.gantries == {}
+    opened, _ = open_text(state_to_toml(nearer), "own", "own.toml")
+    assert opened.scene.machine.gantries == nearer.scene.machine.gantries
+    assert guide_errors(opened, "X") == pytest.approx((4.0, 13.0))
+
+
+def test_guides_share_the_curve_of_the_axis_and_other_curves_are_said(state: AppState):
+    made = with_word(state, "gantry Y")
+    ramp = Ramp(edits.axis_span(made, "EYY"), 8.0)
+    made = with_curve(with_typed_amplitude(made, "ECY", 0.0), "EYY", ramp)
+    pair = with_word(made, "guide Y 1 12")
+    assert guide_errors(pair, "Y") == pytest.approx((8.0, 12.0))
+    assert edits.curve_of(pair, "ECY").evaluate(np.array([-225.0])) == pytest.approx(0.0)
+    other = with_curve(pair, "ECY", Constant(ramp.span, 5.0))
+    assert guide_errors(other, "Y") is None
+    refused = with_word(other, "guide Y 0 1")
+    assert "different curves" in refused.notes[-1]
+    assert refused.amplitudes == other.amplitudes
+
+
+@pytest.mark.parametrize(
+    ("word", "said"),
+    [
+        ("gantry B", "rotary axis"),
+        ("gantry Q", "Q"),
+        ("span X 0 1800", "gantry"),
+        ("across X", "gantry"),
+        ("mesh X", "body"),
+        ("guide X 0 1", ""),
+        ("guide X 7 1", ""),
+    ],
+)
+def test_words_about_guides_and_meshes_that_are_not_there_change_nothing(state, word, said):
+    changed = with_word(state, word)
+    assert changed.scene is state.scene
+    assert said in " ".join(changed.notes)
+
+
+def test_spans_are_clamped_and_what_is_no_number_is_said(state: AppState):
+    made = with_word(state, "gantry X")
+    assert with_word(made, "span X 0 -5").scene.machine.gantries["X"].span_mm == 1.0
+    assert "clamped" in with_word(made, "span X 0 1e30").notes[-1]
+    for word in ("span X 0 wide", "guide X 0 nan"):
+        assert "expected a number" in with_word(made, word).notes[-1]
+
+
+def test_meshes_of_the_scene_are_listed_without_their_folder_and_go(tmp_path: Path):
+    trimesh.creation.box(extents=(20.0, 30.0, 40.0)).export(tmp_path / "pillar.stl")
+    path = tmp_path / "own.toml"
+    text = state_to_toml(start_state(load_scene("machine_c_frame_mill")))
+    mesh = '{ file = "pillar.stl", unit = "cm", offset_mm = [0, 0, 50] }'
+    path.write_text(f"{text}\n[bodies]\nX = {mesh}\n", encoding="utf-8")
+    state = start_state(load_scene(path))
+    html = editor_html(state.scene, Markup, Markup)
+    assert "pillar.stl · cm · offset 0, 0, 50 mm" in html
+    assert str(tmp_path) not in html
+    moved = with_word(state, "offset X 2 150")
+    assert moved.scene.machine.bodies == state.scene.machine.bodies
+    assert not any("cannot be read" in note for note in moved.scene.notes)
+    gone = with_word(state, "mesh X")
+    assert "X" not in gone.scene.machine.bodies
+    assert "pillar.stl" not in editor_html(gone.scene, Markup, Markup)
+    shown = {body.name for body in load_bodies(gone.scene.machine)}
+    assert "X_pillar" not in shown
+    assert "X_pillar" in {body.name for body in load_bodies(moved.scene.machine)}

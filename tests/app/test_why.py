@@ -12,8 +12,9 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.readouts.budget import answer_html
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.history import History
+from warpspace.app.state.picked import Picked
 from warpspace.kinematics.model import Loop
-from warpspace.scene.library import load_scene
+from warpspace.scene.library import load_scene, scene_names
 
 LIVE = LiveModel()
 START = start_state(load_scene("dvf5000_first"))
@@ -118,3 +119,17 @@ def test_picking_and_choosing_are_undone() -> None:
     assert history.undo().undo().present.picked is None
     assert with_lever(history.present, "EC0Y").lever == ""
     assert with_lever(START, "<script>").lever == ""
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_a_node_is_asked_about_where_it_is_drawn(name: str) -> None:
+    picture = LiveModel().evaluate(replace(start_state(load_scene(name)), nodes=3))
+    grid = picture.grid
+    for node in np.ndindex(grid.shape):
+        at = {
+            axis: float(np.broadcast_to(v, grid.shape)[node])
+            for axis, v in grid.coordinates.items()
+        }
+        found = answer(picture.state, Picked(at), picture.exaggeration)
+        shown = found.explanation.nominal_mm + found.shift_mm
+        assert shown == pytest.approx(grid.nominal_mm[node], abs=1e-9)

@@ -65,6 +65,19 @@ def test_a_mesh_that_is_read_is_never_replaced(warpspace, tmp_path: Path) -> Non
     assert not (tmp_path / "mill.toml").exists()
 
 
+def test_an_export_never_replaces_a_mesh_of_its_scene(warpspace, tmp_path: Path) -> None:
+    mesh = tmp_path / "mill_Z.stl"
+    trimesh.creation.box(extents=(20.0, 30.0, 40.0)).export(mesh)
+    before, scene = mesh.read_bytes(), tmp_path / "own.toml"
+    assert warpspace("new-machine", "wFXZt", "-o", scene).status == 0
+    scene.write_text(f'{scene.read_text(encoding="utf-8")}\n[bodies]\nZ = "mill_Z.stl"\n', "utf-8")
+    robot = tmp_path / "mill.urdf"
+    warpspace("export", scene, "-o", robot, "--grid", "3", "--force").refused("is read")
+    assert mesh.read_bytes() == before
+    assert {file.name for file in tmp_path.iterdir()} == {"own.toml", "mill_Z.stl"}
+    assert warpspace("export", scene, "-o", tmp_path / "other.urdf", "--grid", "3").status == 0
+
+
 @pytest.mark.parametrize(
     ("content", "said"),
     [(None, "no such file"), (b"\xff\xfe", "UTF-8"), (b"", "XML"), (b"<a/>", "expected <robot>")],

@@ -111,7 +111,10 @@ def test_more_than_two_scenes_and_none() -> None:
 def both(renderer: str) -> "Report":
     """The report of two scenes with figures for a page, and a stand-in for the interactive view."""
     scenes = [load_scene("dvf5000_first"), load_scene("dvf5000_second")]
-    return build_report(scenes, FAST, embed=lambda scene, **_: f"<p>{scene.title}</p>")
+    other = [load_scene("machine_printer_3d")]
+    return build_report(
+        scenes, FAST, embed=lambda scene, **_: f"<p>{scene.title}</p>", concepts=other
+    )
 
 
 @pytest.mark.render
@@ -126,6 +129,7 @@ def test_every_part_is_there(both: "Report") -> None:
         "Errors and tolerances",
         "How errors arrive at the point",
         "What the tolerances promise",
+        "Concepts side by side",
         "Conventions",
         "Provenance",
     ]
@@ -138,7 +142,7 @@ def test_every_part_is_there(both: "Report") -> None:
         assert not table.marks or len(table.marks) == len(table.rows)
     assert sum(isinstance(b, Embedded) for b in both.sections[1].blocks) == 2
     names = {picture.name for picture in both.pictures}
-    assert {"error-map", "gains", "montecarlo", "variance"} <= names
+    assert {"error-map", "gains", "montecarlo", "variance", "concepts"} <= names
 
 
 @pytest.mark.render
@@ -247,6 +251,7 @@ def test_without_a_renderer_nothing_is_written(tmp_path: Path, monkeypatch) -> N
         (("-o", "a.html", "--spec-um", "-1"), "specification"),
         (("-o", "a.html", "--samples", "0"), "samples"),
         (("-o", "a.html", "--grid", "1"), "grid"),
+        (("-o", "a.html", "--concepts", "machine_trunion"), "machine_trunion"),
         (("-o", "a.html", "--exaggeration", "0"), "exaggeration"),
         (("dvf5000_first", "dvf5000_first", "-o", "a.html"), "expected one, or two"),
     ],

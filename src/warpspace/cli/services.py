@@ -1,15 +1,21 @@
 """What the app has the outputs do: figures in a process of their own, exports in memory."""
 
 import threading
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from warpspace.app.documents.services import CancelledError, Request, Services
+from warpspace.app.documents.services import CancelledError, ConceptRequest, Request, Services
 from warpspace.exceptions import OptionError
 from warpspace.outputs.exports.formats import export_formats
 from warpspace.outputs.exports.formats import write_export as write
 from warpspace.outputs.figures.catalogue import figure_kinds
 from warpspace.picture.words import range_words
+from warpspace.scene.model import Scene
+
+if TYPE_CHECKING:
+    from warpspace.outputs.drawing.settings import FigureSettings
 
 MOST_RENDERERS = 2
 """Figures drawn at the same time for all tabs together."""
@@ -22,6 +28,7 @@ def build_services() -> Services:
     return Services(
         draw_figure,
         write_export,
+        draw_concepts,
         figures=tuple((kind.name, kind.caption) for kind in figure_kinds() if kind.scenes == 1),
         exports=tuple((form.ending, form.about) for form in export_formats() if form.in_app),
     )
@@ -50,7 +57,6 @@ def draw_figure(request: Request, cancelled: threading.Event) -> bytes:
         If it cannot be drawn here.
     """
     from warpspace.outputs.drawing.settings import FigureSettings
-    from warpspace.outputs.worker import FigureWorker
 
     settings = FigureSettings(
         component=request.component,
@@ -80,6 +86,48 @@ def draw_figure(request: Request, cancelled: threading.Event) -> bytes:
     if name == "orientation-map":
         # the lean of the needles has a factor of its own
         settings = replace(settings, exaggeration="auto")
+    return _render(name, scenes, settings, cancelled)
+
+
+def draw_concepts(request: ConceptRequest, cancelled: threading.Event) -> bytes:
+    """Draw machines side by side as a PNG.
+
+    Parameters
+    ----------
+    request : ConceptRequest
+    cancelled : threading.Event
+        Ends the renderer when set.
+
+    Returns
+    -------
+    bytes
+
+    Raises
+    ------
+    CancelledError
+        If it was cancelled.
+    RenderError
+        If it cannot be drawn here.
+    """
+    from warpspace.outputs.drawing.settings import FigureSettings
+
+    settings = FigureSettings(dark=request.dark, loop=request.loop, concepts=request.plan)
+    if request.strip_px is not None:
+        width, height = request.strip_px
+        size = (width, height * len(request.scenes))
+        settings = replace(settings, size=size, strip=True)
+    return _render("concepts", request.scenes, settings, cancelled)
+
+
+def _render(
+    name: str,
+    scenes: Sequence[Scene],
+    settings: "FigureSettings",
+    cancelled: threading.Event,
+) -> bytes:
+    """Draw a figure in a process of its own, which ends when that is cancelled."""
+    from warpspace.outputs.worker import FigureWorker
+
     while not _renderers.acquire(timeout=POLL_S):
         if cancelled.is_set():
             raise CancelledError("cancelled while waiting for a renderer")

@@ -216,18 +216,31 @@ def build_grid(
         coordinates[name] = np.linspace(low, high, counts[index]).reshape(along)
     full = (shape[0], shape[1], shape[2])
     point = np.broadcast_to(nominal_point(model, Loop.TOOL, coordinates), (*full, 3)).copy()
-    seen = _seen_from_workpiece(model, coordinates, positions, point, axes)
+    seen = seen_from_workpiece(model, coordinates, workspace, point)
     return Grid(coordinates, full, seen, point, axes)
 
 
-def _seen_from_workpiece(
-    model: Model,
-    coordinates: Coordinates,
-    middle: Mapping[str, float],
-    point_mm: Array,
-    axes: VolumeAxes,
+def seen_from_workpiece(
+    model: Model, coordinates: Coordinates, workspace: Workspace, point_mm: Array
 ) -> Array:
-    """Move points with the axes that carry the workpiece back to the middle of their ranges."""
+    """Move points with the axes that carry the workpiece back to the middle of their ranges.
+
+    Parameters
+    ----------
+    model : Model
+    coordinates : mapping of str to ndarray, [...], mm or degrees
+        Where the axes stand.
+    workspace : Workspace
+        Linear axes that carry the workpiece go back, and rotary ones that span this volume.
+    point_mm : ndarray, [..., 3], mm
+        In R.
+
+    Returns
+    -------
+    ndarray, [..., 3], mm
+        Where they are drawn; see `Grid.nominal_mm`.
+    """
+    axes, middle = workspace.volume_axes, workspace.positions
     branch = model.machine.branch("workpiece")
     carrying = [axis.name for axis in branch if axis.is_linear or axis.name in axes]
     if not carrying:

@@ -92,6 +92,8 @@ MAX_FIGURE_AREA_PX = 64_000_000
 ANIMATION_FRAMES = (2, 600)
 SAMPLES = (1, 1_000_000_000)
 """Machines of a Monte Carlo run."""
+MOST_CONCEPTS = 8
+"""Machines that are set side by side."""
 REPAIR_COUNT = (1, 12)
 """Adjustments in one set of a repair."""
 REPAIR_NODES = (2, 41)

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from warpspace.kinematics.conventions.convention import Convention
 from warpspace.kinematics.model import Loop, Model
+from warpspace.machine.tolerances import ToleranceSet
 from warpspace.picture.coordinates import MINUS, list_axes
 from warpspace.scene.model import Scene
 from warpspace.units import Array
@@ -16,6 +17,8 @@ LOOP_WORDS = {
     Loop.WORKPIECE: "workpiece loop",
     Loop.RELATIVE: "tool relative to workpiece",
 }
+
+TOLERANCE_UNITS = {"translation": "µm", "rotation": "µrad", "squareness": "µrad"}
 
 
 def spell(value: float, digits: int = 3) -> str:
@@ -45,6 +48,14 @@ def spell(value: float, digits: int = 3) -> str:
 def spell_signed(value: float, digits: int = 3) -> str:
     """Spell a change with its sign: ``+3.24``, ``−17.1``, ``0``."""
     return ("+" if value > 0.0 else "") + spell(value, digits)
+
+
+def tolerance_words(tolerances: ToleranceSet) -> str:
+    """Spell the half widths of the classes of parameters."""
+    return ", ".join(
+        f"{name} ±{spell_short(value)} {TOLERANCE_UNITS[name]}"
+        for name, value in tolerances.default.items()
+    )
 
 
 def spell_short(value: float) -> str:

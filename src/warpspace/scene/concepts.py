@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from string import ascii_uppercase
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from warpspace.field.evaluate import build_basis
 from warpspace.field.grid import Grid
 from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import ErrorSet
+from warpspace.machine.limits import MOST_CONCEPTS
 from warpspace.machine.parameters import parameter
 from warpspace.machine.tolerances import TOLERANCE_CLASSES, ToleranceSet
 from warpspace.scene import verbs
@@ -24,6 +26,8 @@ from warpspace.units import Array
 
 NAMED = 3
 """Errors that are named of each machine."""
+LETTERS = ascii_uppercase[:MOST_CONCEPTS]
+"""What the machines are called, in their order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +46,8 @@ class ConceptPlan:
         Whether the normal distribution ends at the limits.
     over : Over or str
         |E| at one random point of each sampled machine, or its largest over the volume.
+    workers : int or None
+        Threads that sample; None for one per core. The numbers are the same.
     """
 
     limit_um: float | None = None
@@ -51,6 +57,7 @@ class ConceptPlan:
     distribution: Distribution | str = Distribution.UNIFORM
     clip: bool = False
     over: Over | str = Over.SAMPLED
+    workers: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +121,9 @@ def compare_concepts(
     for scene in with_equal_tolerances(scenes, own=plan.own_tolerances):
         view = choose_view(scene, loop)
         draws = verbs.scene_draws(scene, view.loop, plan.distribution, clip=plan.clip)
-        settings = sampling.Plan(plan.samples, plan.seed, plan.over, spec_um=plan.limit_um)
+        settings = sampling.Plan(
+            plan.samples, plan.seed, plan.over, spec_um=plan.limit_um, workers=plan.workers
+        )
         settings.check()
         if not draws.variance.any():
             problem = f"tolerances: none of the {view.loop} loop has a width; expected one above 0"

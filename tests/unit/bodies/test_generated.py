@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from body_checks import assert_closed, nodes_inside, of_head
+from body_checks import assert_closed, components, nodes_inside, of_head
 from warpspace.bodies.generated.generate import generate_bodies
 from warpspace.bodies.generated.layout import build_layout
 from warpspace.field.grid import build_grid
@@ -120,3 +120,48 @@ def test_bodies_are_generated_fast_and_kept():
     bodies = generate_bodies(machine)
     assert time.process_time() - start < 0.1
     assert generate_bodies(build_machine("wCAFXYZt", travel={"X": (-251.0, 251.0)})) is bodies
+
+
+def slant_lathe(degrees: float):
+    """A lathe whose carriage Z and slide X lie on a bed that slopes up to the rear."""
+    tilt = {45.0: (90.0, -45.0, 90.0), 90.0: (90.0, 0.0, 90.0)}[degrees]
+    return build_machine(
+        "wC1FZXt",
+        offset_mm={"Z": (300.0, 160.0, 160.0)},
+        rotation_deg={"C1": (180.0, -90.0, 0.0), "Z": tilt, "t": (0.0, 90.0, 0.0)},
+        travel={"X": (0.0, 250.0), "Z": (0.0, 500.0)},
+    )
+
+
+def test_bodies_of_a_slant_bed_follow_its_slides_and_stand_on_a_level_floor():
+    machine = slant_lathe(45.0)
+    bodies = {body.name: body for body in generate_bodies(machine)}
+    for name in ("X_ram", "Z_column"):  # built of boxes: along their slides, not along R
+        for shape in components(bodies[name], bodies[name].vertices_mm):
+            np.testing.assert_allclose(np.abs(shape.face_normals).max(axis=1), 1.0, atol=1e-9)
+    wedge = components(bodies["R_bed"], bodies["R_bed"].vertices_mm)[-1]
+    floor = wedge.face_normals[:, 2] < -0.999
+    assert wedge.area_faces[floor].sum() > 100.0**2
+    assert wedge.bounds[0, 2] == pytest.approx(bodies["R_bed"].vertices_mm[:, 2].min())
+    # the bed itself slopes by 45 degrees
+    slab = components(bodies["R_bed"], bodies["R_bed"].vertices_mm)[0]
+    up = slab.face_normals @ np.array([0.0, -1.0, 1.0]) / np.sqrt(2.0)
+    assert up.max() == pytest.approx(1.0)
+    for body in bodies.values():
+        assert_closed(body)
+
+
+@pytest.mark.parametrize("name", machine_names())
+def test_machines_of_the_library_are_built_along_r(name):
+    np.testing.assert_array_equal(build_layout(load_machine(name)).slant, np.eye(3))
+
+
+def test_only_slides_that_are_square_and_leave_tables_level_make_a_slant():
+    skew = build_machine("wFXYZt", rotation_deg={"Y": (0.0, 0.0, 30.0)})
+    tilted_table = build_machine("wCFXYZt", rotation_deg={"X": (45.0, 0.0, 0.0)})
+    for machine in (skew, tilted_table, slant_lathe(90.0)):
+        np.testing.assert_array_equal(build_layout(machine).slant, np.eye(3))
+    slant = build_layout(build_machine("wFXYZt", rotation_deg={"X": (30.0, 0.0, 0.0)})).slant
+    cosine, sine = np.cos(np.radians(30.0)), 0.5
+    expected = [[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]]
+    np.testing.assert_allclose(slant, expected, atol=1e-12)

@@ -3,10 +3,14 @@
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from warpspace.exceptions import WarpspaceError
 from warpspace.geometry.colour import ColourScale
 from warpspace.scene.model import Scene
+
+if TYPE_CHECKING:
+    from warpspace.scene.concepts import ConceptPlan
 
 
 class CancelledError(WarpspaceError):
@@ -81,6 +85,30 @@ class Request:
 
 
 @dataclass(frozen=True, slots=True)
+class ConceptRequest:
+    """Machines that are to be drawn side by side.
+
+    Attributes
+    ----------
+    scenes : tuple of Scene
+    plan : ConceptPlan
+        How they are sampled.
+    loop : str
+    dark : bool
+        Light ink on a dark ground.
+    strip_px : tuple of int, (2,), or None
+        Width and height of each picture where they are wanted alone, one below the other; None for
+        a sheet with words and numbers.
+    """
+
+    scenes: tuple[Scene, ...]
+    plan: "ConceptPlan"
+    loop: str
+    dark: bool
+    strip_px: tuple[int, int] | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Services:
     """Work the app cannot do itself; None where nobody does it.
 
@@ -91,6 +119,8 @@ class Services:
         cancelled, another `WarpspaceError` where it cannot be drawn.
     write_export : callable or None
         Takes a request and an ending (".glb", ".csv"); gives the file's content.
+    draw_concepts : callable or None
+        As `draw_figure`, of machines side by side.
     figures : tuple of (str, str)
         Names of the figures of one scene, and what each shows.
     exports : tuple of (str, str)
@@ -99,5 +129,6 @@ class Services:
 
     draw_figure: Callable[[Request, threading.Event], bytes] | None = None
     write_export: Callable[[Request, str], bytes] | None = None
+    draw_concepts: Callable[[ConceptRequest, threading.Event], bytes] | None = None
     figures: tuple[tuple[str, str], ...] = ()
     exports: tuple[tuple[str, str], ...] = ()

@@ -10,7 +10,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.edits import curve_of
 from warpspace.app.state.picked import Picked
-from warpspace.field.grid import Grid
+from warpspace.field.grid import Grid, seen_from_workpiece
 from warpspace.geometry.deform import deform
 from warpspace.geometry.pick import pick_point, pick_surface
 from warpspace.geometry.surfaces import Index, outer_surface
@@ -185,22 +185,12 @@ def answer(state: AppState, picked: Picked, exaggeration: float) -> Answer:
         pose = branch_pose(model, side, coordinates)
         point = transforms.apply(pose, np.asarray(picked.point_mm))
     found = explain(model, active_errors(state), coordinates, state.scene.view(loop), point)
-    shift = np.zeros(3) if picked.point_mm is not None else _shift_mm(state, at, point)
+    shift = np.zeros(3)
+    if picked.point_mm is None:
+        volume = state.scene.workspace.moved(state.positions)
+        shift = seen_from_workpiece(model, coordinates, volume, point) - point
     drawn = deform(found.nominal_mm + shift, found.error_um, exaggeration)
     return Answer(at, loop, found, shift, drawn)
-
-
-def _shift_mm(state: AppState, at: Mapping[str, float], point: Array) -> Array:
-    """Tell how far from its place in R a node is drawn (see `Grid.nominal_mm`), [3], mm."""
-    model, middle = state.scene.model, state.scene.workspace.positions
-    carrying = [axis.name for axis in model.machine.branch("workpiece") if axis.is_linear]
-    if not carrying:
-        return np.zeros(3)
-    here = {name: np.asarray(value) for name, value in at.items()}
-    home = {**here, **{name: np.asarray(middle.get(name, 0.0)) for name in carrying}}
-    there = transforms.inverse(branch_pose(model, "workpiece", here))
-    moved = branch_pose(model, "workpiece", home) @ there
-    return transforms.apply(moved, point) - point
 
 
 def with_picked(state: AppState, picked: Picked | None) -> AppState:

@@ -71,6 +71,7 @@ for _tab in (
     Tab("Repair", "results", [f"{_HERE}.repair:RepairPanel"]),
     Tab("Sensitivities", "results", [f"{_HERE}.sensitivities:SensitivitiesPanel"]),
     Tab("Compare", "results", [f"{_HERE}.compare:ComparePanel"]),
+    Tab("Concepts", "results", [f"{_HERE}.concepts:ConceptsPanel"]),
     Tab("Files", "results", [f"{_HERE}.files:FilesPanel"]),
     Tab(
         "View",

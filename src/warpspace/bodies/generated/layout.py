@@ -1,13 +1,15 @@
 """What generated bodies are laid out around: the home position, the working volume, and sizes.
 
 Everything is built where the machine stands at home, in R: linear axes in the middle of their
-travel, rotary axes at zero or as near as their travel allows.
+travel, rotary axes at zero or as near as their travel allows. A machine whose slides are turned
+against R is built upright, its frames being turned back (see `slant`).
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
+from warpspace.bodies.generated.slant import find_slant
 from warpspace.kinematics.bodies import body_motions
 from warpspace.kinematics.model import Model
 from warpspace.machine.description import Axis, Machine
@@ -36,12 +38,15 @@ class Layout:
         Half edges of the working volume along the axes of R.
     unit_mm : float
         Thickness of a wall; every other size of a body is a multiple of it.
+    slant : ndarray, [3, 3]
+        What everything above is turned by in R: the unit matrix, but for a slanted machine.
     """
 
     machine: Machine
     poses: dict[str, Array]
     half_mm: Array
     unit_mm: float
+    slant: Array
 
     @property
     def tip_mm(self) -> Array:
@@ -102,6 +107,10 @@ def build_layout(machine: Machine) -> Layout:
     poses = {
         name: motion.nominal for name, motion in body_motions(Model(machine), {}, home).items()
     }
+    slant = find_slant(machine, poses)
+    upright = np.eye(4)
+    upright[:3, :3] = slant.T
+    poses = {name: upright @ pose for name, pose in poses.items()}
     half = np.zeros(3)
     spanned: set[int] = set()
     for axis in machine.axes.values():
@@ -117,7 +126,7 @@ def build_layout(machine: Machine) -> Layout:
         reach = max(200.0, 0.3 * float(max(lengths, default=0.0)))
     filled = np.maximum(half, _FLAT * reach)
     unit = max(_SHARE_OF_VOLUME * 2.0 * float(filled.mean()), _SMALLEST_MM)
-    return Layout(machine, poses, _turned(machine, poses, half, filled), unit)
+    return Layout(machine, poses, _turned(machine, poses, half, filled), unit, slant)
 
 
 def _turned(machine: Machine, poses: dict[str, Array], half: Array, filled: Array) -> Array:

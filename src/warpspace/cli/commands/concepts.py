@@ -29,9 +29,6 @@ from warpspace.exceptions import OptionError
 if TYPE_CHECKING:
     from warpspace.scene.concepts import Concept, ConceptPlan
 
-MOST = 8
-LETTERS = "ABCDEFGH"
-
 
 @click.command()
 @scene_argument("scenes", metavar="SCENE…", nargs=-1, required=True)
@@ -91,13 +88,14 @@ def concepts(
     absolute: no point is held still, whatever a scene says. `warpspace montecarlo` and
     `warpspace contributions` give more of each machine.
     """
+    from warpspace.machine.limits import MOST_CONCEPTS
     from warpspace.outputs.drawing.settings import FigureSettings
     from warpspace.outputs.files import write_atomically
     from warpspace.scene.concepts import ConceptPlan, compare_concepts
     from warpspace.scene.library import load_scene
 
-    if len(scenes) > MOST:
-        raise OptionError(f"{len(scenes)} scenes; expected at most {MOST}")
+    if len(scenes) > MOST_CONCEPTS:
+        raise OptionError(f"{len(scenes)} scenes; expected at most {MOST_CONCEPTS}")
     check_targets(*scenes, force=force, plot=plot, csv_path=csv_path)
     plan = ConceptPlan(limit_um, own_tolerances, samples, seed, distribution, clip, over)
     settings = FigureSettings(size=parse_size(size), loop=loop, concepts=plan)
@@ -203,6 +201,8 @@ def _safe(text: str) -> str:
 
 def _print(found: "Sequence[Concept]", plan: "ConceptPlan", loop: str) -> None:
     """Print a line for each machine, and what was compared."""
+    from warpspace.scene.concepts import LETTERS
+
     if plan.own_tolerances:
         tolerances = "each with its own tolerances"
     else:

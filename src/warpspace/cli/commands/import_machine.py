@@ -30,7 +30,8 @@ def import_machine(robot: Path, output: str, tool: str, workpiece: str, *, force
     top of the scene. `warpspace export SCENE -o FILE.urdf` is the way back.
     """
     from warpspace.bodies.urdf_meshes import frame_meshes
-    from warpspace.outputs.files import check_target, write_atomically
+    from warpspace.outputs.files import write_atomically
+    from warpspace.outputs.mesh_files import mesh_files, write_meshes
     from warpspace.scene.build import SECTIONS
     from warpspace.scene.library import parse_scene
     from warpspace.scene.urdf.left_out import left_out
@@ -42,17 +43,13 @@ def import_machine(robot: Path, output: str, tool: str, workpiece: str, *, force
     loaded, others = read_robot(robot)
     found = place_robot(loaded, str(robot), tool, workpiece)
     meshes, unread, read = frame_meshes(loaded, found.frame_of, robot.parent)
-    files = {frame: target.with_name(f"{target.stem}_{frame}.stl") for frame in meshes}
-    for file in files.values():
-        check_target(file, overwrite=force, inputs=read)
+    files = mesh_files(target, meshes, overwrite=force, inputs=read)
     notes = [*found.notes, *unread, *left_out(loaded, others, found.frame_of)]
     sections: frozenset[str] = frozenset(SECTIONS)
     names = {frame: file.name for frame, file in files.items() if "bodies" in sections}
     text = imported_text(found.machine, robot.name, notes, names)
     scene = parse_scene(text, target.stem, output)
-    for frame, file in files.items():
-        with write_atomically(file, overwrite=force) as temporary:
-            meshes[frame].export(temporary, file_type="stl")
+    write_meshes(files, meshes, overwrite=force)
     with write_atomically(target, overwrite=force) as temporary:
         temporary.write_text(text, encoding="utf-8")
     axes = len(scene.machine.axes)

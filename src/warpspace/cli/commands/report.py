@@ -23,6 +23,13 @@ from warpspace.cli.terminal import echo
 @click.command()
 @scene_argument("scenes", nargs=-1, required=True)
 @output_option("File to write: .html (with interactive 3-D views) or .pdf.")
+@click.option(
+    "--concepts",
+    multiple=True,
+    metavar="SCENE",
+    help="Another machine to set beside those of the report, within the tolerances of the first;"
+    " may be given several times.",
+)
 @specification_option
 @samples_option
 @distribution_option
@@ -34,6 +41,7 @@ from warpspace.cli.terminal import echo
 def report(
     scenes: tuple[str, ...],
     output: str,
+    concepts: tuple[str, ...],
     spec_um: float | None,
     samples: int,
     distribution: str,
@@ -47,8 +55,9 @@ def report(
     """Write the design review of one SCENE or two.
 
     Two stand side by side. First a page with the verdict, then the evidence: maps, contributions at
-    the worst point, errors and tolerances, gains, Monte Carlo, conventions and provenance. The file
-    needs no network.
+    the worst point, errors and tolerances, gains, Monte Carlo, conventions and provenance. With
+    --concepts also a table and pictures of machines side by side, as `warpspace concepts` has them.
+    The file needs no network.
     """
     from warpspace.cli.exports import embed_view
     from warpspace.exceptions import OptionError
@@ -56,7 +65,7 @@ def report(
     from warpspace.outputs.report.build import ENDINGS
     from warpspace.scene.library import load_scene, scene_path
 
-    target = check_output(output, ENDINGS, force=force, scenes=scenes)
+    target = check_output(output, ENDINGS, force=force, scenes=(*scenes, *concepts))
     if len(scenes) > 2:
         raise OptionError(f"report: {len(scenes)} scenes; expected one, or two to compare")
     settings = ReportSettings(
@@ -69,13 +78,15 @@ def report(
         distribution=distribution,
     )
     loaded = [load_scene(scene) for scene in scenes]
+    others = [load_scene(scene) for scene in concepts]
     with progress("writing the review"):
         write_report(
             loaded,
             target,
             settings,
             embed=embed_view,
-            files=[scene_path(scene) for scene in scenes],
+            concepts=others,
+            files=[scene_path(scene) for scene in (*scenes, *concepts)],
             overwrite=force,
         )
     titles = " and ".join(scene.title for scene in loaded)

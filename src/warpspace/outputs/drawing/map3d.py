@@ -46,6 +46,7 @@ def draw_map(
     projection: Projection | None = None,
     annotate: Annotate | None = draw_corners,
     ghost: bool = True,
+    axes: bool = True,
 ) -> DrawnMap:
     """Draw a bent volume.
 
@@ -64,6 +65,8 @@ def draw_map(
         Draws what stands out of the surface; corner displacements by default.
     ghost : bool, optional
         Whether the nominal volume is drawn.
+    axes : bool, optional
+        Whether axes with numbers are drawn around it.
 
     Returns
     -------
@@ -87,7 +90,8 @@ def draw_map(
     draw_lone_line(canvas, picture, projection, taken)
     if ghost:
         _draw_ghost(canvas, picture, projection, raster, taken)
-    draw_axes(canvas, picture.grid.nominal_mm, nodes, projection, taken, titles=labels)
+    if axes:
+        draw_axes(canvas, picture.grid.nominal_mm, nodes, projection, taken, titles=labels)
     taken.add_rects(canvas.rects[start:])
     if annotate is not None:
         annotate(canvas, picture, projection, raster, taken, rect if labels else None)

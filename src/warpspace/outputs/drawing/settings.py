@@ -49,6 +49,9 @@ class FigureSettings:
         What the figure must say beside its scenes, for instance "excluded: EA0Z".
     concepts : ConceptPlan
         How machines are sampled that are set side by side.
+    strip : bool
+        Whether machines side by side are pictures alone, one below the other, each as high as the
+        others: for a page that has words and colour bar of its own.
 
     Raises
     ------
@@ -67,6 +70,7 @@ class FigureSettings:
     range_fixed: bool = False
     conditions: tuple[str, ...] = ()
     concepts: ConceptPlan = field(default_factory=ConceptPlan)
+    strip: bool = False
 
     def __post_init__(self) -> None:
         """Check the values."""

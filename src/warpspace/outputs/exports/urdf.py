@@ -11,7 +11,8 @@ from warpspace.exceptions import OptionError
 from warpspace.kinematics.transforms import placed
 from warpspace.machine.axes import direction_index
 from warpspace.machine.description import Axis, Machine
-from warpspace.outputs.files import check_target, write_atomically
+from warpspace.outputs.files import write_atomically
+from warpspace.outputs.mesh_files import mesh_files, write_meshes
 from warpspace.picture.scene_picture import ScenePicture
 from warpspace.units import Array
 
@@ -34,7 +35,7 @@ def write_urdf(picture: ScenePicture, path: str | Path, *, overwrite: bool = Tru
     Raises
     ------
     OutputError
-        If a file cannot be written.
+        If a file cannot be written, or one would replace a mesh that the scene reads.
     OptionError
         If yourdfpy is not installed.
     """
@@ -47,13 +48,10 @@ def write_urdf(picture: ScenePicture, path: str | Path, *, overwrite: bool = Tru
         ) from None
     target, machine = Path(path), picture.scene.machine
     meshes = _meshes(picture)
-    files = {frame: target.with_name(f"{target.stem}_{frame}.stl") for frame in meshes}
-    for file in files.values():
-        check_target(file, overwrite=overwrite)
+    read = [Path(source.path) for source in machine.bodies.values() if source.path]
+    files = mesh_files(target, meshes, overwrite=overwrite, inputs=read)
     robot = build_robot(machine, {frame: file.name for frame, file in files.items()})
-    for frame, file in files.items():
-        with write_atomically(file, overwrite=overwrite) as temporary:
-            meshes[frame].export(temporary, file_type="stl")
+    write_meshes(files, meshes, overwrite=overwrite)
     with write_atomically(target, overwrite=overwrite) as temporary:
         model = URDF(robot, build_scene_graph=False, filename_handler=lambda name: name)
         model.write_xml_file(str(temporary))

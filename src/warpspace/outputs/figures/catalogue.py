@@ -6,6 +6,7 @@ from pkgutil import resolve_name
 from typing import TYPE_CHECKING
 
 from warpspace.exceptions import OptionError, UnknownNameError
+from warpspace.machine.limits import MOST_CONCEPTS
 from warpspace.plugins import load_plugins
 
 if TYPE_CHECKING:
@@ -148,7 +149,7 @@ for _kind in (
         "Machines side by side within the same tolerances.",
         f"{_HERE}.concepts:draw_concepts",
         scenes=2,
-        most_scenes=8,
+        most_scenes=MOST_CONCEPTS,
         command="concepts SCENE… --plot FILE",
     ),
 ):

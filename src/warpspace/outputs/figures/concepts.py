@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from warpspace.geometry.colour import ColourScale
 from warpspace.machine.parameters import parameter
 from warpspace.outputs.drawing.canvas import Canvas
 from warpspace.outputs.drawing.content import Drawing, DrawnMap
@@ -15,22 +16,31 @@ from warpspace.outputs.drawing.map3d import draw_map
 from warpspace.outputs.drawing.panel import draw_panel
 from warpspace.outputs.drawing.projection import Projection, Rect, fit_projection
 from warpspace.outputs.drawing.settings import FigureSettings, shared_colours
-from warpspace.outputs.drawing.sheet import metadata, start_sheet
+from warpspace.outputs.drawing.sheet import metadata, new_canvas, start_sheet
 from warpspace.outputs.drawing.style import SIZES
 from warpspace.outputs.figures.error_map import isoline_words
 from warpspace.outputs.figures.machine import bodies_of, render_placed
 from warpspace.picture.bodies import PlacedBody
 from warpspace.picture.concepts import ConceptPicture, picture_concept
 from warpspace.picture.views import view_words
-from warpspace.picture.words import LOOP_WORDS, spell, spell_count, spell_short
-from warpspace.scene.concepts import Concept, compare_concepts
+from warpspace.picture.words import LOOP_WORDS, spell, spell_count, spell_short, tolerance_words
+from warpspace.scene.concepts import LETTERS, Concept, compare_concepts
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
-LETTERS = "ABCDEFGH"
 BODY_ALPHA = 0.55
 CELL_HEAD, CELL_FOOT, AXIS_LABELS = 30.0, 74.0, 50.0
 """Room in px above a picture for its title, below it for its numbers, and for labels of axes."""
+STRIP_MARGIN = 0.05
+"""Room around a picture that stands alone, by the shorter side of its cell."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Machine:
+    """A machine to be drawn: its volume, its bodies."""
+
+    picture: ConceptPicture
+    placed: tuple[PlacedBody, ...]
 
 
 def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
@@ -48,16 +58,15 @@ def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: b
     -------
     Drawing
     """
+    if settings.strip:
+        return _draw_strip(scenes, settings, exact=exact)
     plan = settings.concepts
     concepts = compare_concepts(scenes, plan, loop=settings.loop)
-    pictures = [picture_concept(concept, settings.grid) for concept in concepts]
-    scale = shared_colours(replace(settings, component="norm"), pictures)
-    pictures = [replace(picture, colours=scale) for picture in pictures]
-    placed = [bodies_of(picture, 1.0) for picture in pictures]
+    machines, scale = _machines(concepts, settings)
     title = f"Concepts within {'their own' if plan.own_tolerances else 'the same'} tolerances"
     first = concepts[0]
     facts = [
-        *([] if plan.own_tolerances else [_tolerance_words(first.scene)]),
+        *([] if plan.own_tolerances else [tolerance_words(first.scene.tolerances)]),
         f"{spell_count(plan.samples)} sampled machines each, {plan.distribution}",
         "largest |E| of each" if plan.over == "max" else "|E| at a random point of each",
         LOOP_WORDS[first.sampled.view.loop],
@@ -69,24 +78,11 @@ def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: b
     drawn = [concept.scene for concept in concepts]
     sheet = start_sheet(settings, title, facts, drawn, legend, exact=exact, errors=False)
     canvas = sheet.canvas
-    cells = _cells(sheet.content, len(pictures))
+    cells = _cells(sheet.content, len(machines))
     rooms = [_room(canvas, cell) for cell in cells]
-    seen = [_points_mm(*pair) for pair in zip(pictures, placed, strict=True)]
-    factor = min(
-        fit_projection(settings.view, points, room).px_per_mm
-        for points, room in zip(seen, rooms, strict=True)
-    )
-    maps: list[DrawnMap] = []
-    for index, picture in enumerate(pictures):
-        projection = _centred(seen[index], rooms[index], settings.view, factor)
-        _draw_bodies(canvas, placed[index], projection, settings)
-        maps.append(
-            draw_map(
-                canvas, picture, rooms[index], settings.view, labels=False,
-                projection=projection, annotate=None, ghost=False,
-            )
-        )  # fmt: skip
-        _draw_words(canvas, cells[index], LETTERS[index], concepts[index])
+    maps, factor = _draw_machines(canvas, machines, rooms, settings)
+    for letter, cell, concept in zip(LETTERS, cells, concepts, strict=False):
+        _draw_words(canvas, cell, letter, concept)
     draw_panel(
         canvas, sheet.panel, scale, "RMS |E|  [µm]", [],
         [(f"mean {letter}", f"{spell(one.sampled.mean_um)} µm")
@@ -94,17 +90,59 @@ def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: b
         (factor, None),
     )  # fmt: skip
     about = metadata(title, drawn, settings, 1.0, "concepts")
-    return Drawing(canvas.figure, title, about, tuple(maps), tuple(canvas.rects))
+    return Drawing(canvas.figure, title, about, maps, tuple(canvas.rects))
 
 
-def _tolerance_words(scene: Scene) -> str:
-    """Spell the tolerances that all machines have."""
-    units = {"translation": "µm", "rotation": "µrad", "squareness": "µrad"}
-    parts = [
-        f"{name} ±{spell_short(value)} {units[name]}"
-        for name, value in scene.tolerances.default.items()
+def _draw_strip(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
+    """Draw the pictures alone, one below the other; no machine is sampled for that."""
+    plan = replace(settings.concepts, samples=1)
+    machines, _ = _machines(compare_concepts(scenes, plan, loop=settings.loop), settings)
+    canvas = new_canvas(settings, exact=exact)
+    width, height = float(canvas.width), canvas.height / len(machines)
+    margin = STRIP_MARGIN * min(width, height)
+    rooms = [
+        (margin, top - height + margin, width - margin, top - margin)
+        for top in (canvas.height - height * index for index in range(len(machines)))
     ]
-    return ", ".join(parts)
+    maps, _ = _draw_machines(canvas, machines, rooms, settings)
+    title = "Concepts"
+    about = metadata(title, scenes, settings, 1.0, "concepts")
+    return Drawing(canvas.figure, title, about, maps, tuple(canvas.rects))
+
+
+def _machines(
+    concepts: Sequence[Concept], settings: FigureSettings
+) -> tuple[list[_Machine], ColourScale]:
+    """Evaluate what is drawn of machines, and the colours they share."""
+    pictures = [picture_concept(concept, settings.grid) for concept in concepts]
+    scale = shared_colours(replace(settings, component="norm"), pictures)
+    pictures = [replace(picture, colours=scale) for picture in pictures]
+    return [_Machine(picture, bodies_of(picture, 1.0)) for picture in pictures], scale
+
+
+def _draw_machines(
+    canvas: Canvas,
+    machines: Sequence[_Machine],
+    rooms: Sequence[Rect],
+    settings: FigureSettings,
+) -> tuple[tuple[DrawnMap, ...], float]:
+    """Draw machines into their rooms in one scale; give the maps and the px of a mm."""
+    seen = [_points_mm(machine.picture, machine.placed) for machine in machines]
+    factor = min(
+        fit_projection(settings.view, points, room).px_per_mm
+        for points, room in zip(seen, rooms, strict=True)
+    )
+    maps: list[DrawnMap] = []
+    for machine, points, room in zip(machines, seen, rooms, strict=True):
+        projection = _centred(points, room, settings.view, factor)
+        _draw_bodies(canvas, machine.placed, projection, settings)
+        maps.append(
+            draw_map(
+                canvas, machine.picture, room, settings.view, labels=False,
+                projection=projection, annotate=None, ghost=False, axes=not settings.strip,
+            )
+        )  # fmt: skip
+    return tuple(maps), factor
 
 
 def _cells(rect: Rect, count: int) -> list[Rect]:

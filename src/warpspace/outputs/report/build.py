@@ -17,6 +17,7 @@ from warpspace.outputs.report.blocks import (
 )
 from warpspace.outputs.report.clock import report_time
 from warpspace.outputs.report.closing import conventions, provenance
+from warpspace.outputs.report.concepts import compare_with, concept_section
 from warpspace.outputs.report.figures import ReportFigures
 from warpspace.outputs.report.promises import sampling_blocks
 from warpspace.outputs.report.repair import repair_section
@@ -45,6 +46,7 @@ def write_report(
     settings: ReportSettings | None = None,
     *,
     embed: Embed | None = None,
+    concepts: Sequence[Scene] = (),
     files: Sequence[Path] = (),
     overwrite: bool = True,
 ) -> Report:
@@ -59,6 +61,8 @@ def write_report(
     settings : ReportSettings, optional
     embed : callable, optional
         Builds the interactive view of a scene; without it the page has none.
+    concepts : sequence of Scene, optional
+        Other machines, set beside those of the scenes within the tolerances of the first one.
     files : sequence of Path, optional
         Files the scenes were read from; their hashes are printed.
     overwrite : bool, optional
@@ -77,11 +81,18 @@ def write_report(
         If this system cannot draw.
     OptionError
         If there are none or more than two scenes, or a setting is out of range.
+    SceneError
+        If machines are to be compared and tolerances are missing.
     """
     target = check_target(path, ENDINGS, overwrite=overwrite)
     page = target.suffix.lower() == ".html"
     report = build_report(
-        scenes, settings, form="svg" if page else "pdf", embed=embed if page else None, files=files
+        scenes,
+        settings,
+        form="svg" if page else "pdf",
+        embed=embed if page else None,
+        concepts=concepts,
+        files=files,
     )
     if page:
         from warpspace.outputs.report.page import render_html
@@ -102,6 +113,7 @@ def build_report(
     *,
     form: str = "svg",
     embed: Embed | None = None,
+    concepts: Sequence[Scene] = (),
     files: Sequence[Path] = (),
 ) -> Report:
     """Put the report of one scene or two together; see `write_report` for the parameters.
@@ -113,6 +125,7 @@ def build_report(
     form : str, optional
         Format of the figures: "svg" or "pdf".
     embed : callable, optional
+    concepts : sequence of Scene, optional
     files : sequence of Path, optional
 
     Returns
@@ -123,7 +136,9 @@ def build_report(
 
     if form not in ("svg", "pdf"):
         raise OptionError(f"figures of a report as {form!r}; expected svg or pdf")
-    review = build_review(tuple(scenes), settings or ReportSettings())
+    settings = settings or ReportSettings()
+    review = build_review(tuple(scenes), settings)
+    compared = compare_with(scenes, concepts, settings)
     with FigureWorker() as worker:
         painter = ReportFigures(worker, review, form)
         found = [
@@ -135,6 +150,7 @@ def build_report(
             _errors(review),
             _gains(review, painter),
             _samplings(review, painter),
+            *([concept_section(compared, painter, settings)] if compared else []),
             conventions(review),
             provenance(review, files),
         ]

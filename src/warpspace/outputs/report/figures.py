@@ -11,6 +11,7 @@ from warpspace.outputs.report.blocks import Block, Picture, Text
 from warpspace.outputs.report.review import Review, Reviewed
 from warpspace.outputs.report.wording import factor_words
 from warpspace.picture.traces import trace_lines
+from warpspace.scene.concepts import ConceptPlan
 from warpspace.scene.model import Scene
 
 if TYPE_CHECKING:
@@ -92,6 +93,17 @@ class ReportFigures:
             return self._map("repair", [reviewed.scene], caption)
         except WarpspaceError as error:
             return Text(f"{caption} {error}", "note")
+
+    def concepts(
+        self, scenes: Sequence[Scene], plan: ConceptPlan, loop: str, caption: str
+    ) -> Picture:
+        """Draw machines side by side."""
+        from warpspace.outputs.drawing.settings import FigureSettings
+
+        grid = self._review.settings.grid
+        settings = FigureSettings(loop=loop, grid=grid, concepts=plan)
+        data = self._worker.render("concepts", scenes, settings, self._form)
+        return Picture("concepts", caption, data, self._form)
 
     def gains(self, reviewed: Reviewed, prefix: str) -> Block | None:
         """Bars of the gains; none where the loop has no axis."""

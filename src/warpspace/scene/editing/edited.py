@@ -18,6 +18,7 @@ from warpspace.machine.description import (
 from warpspace.machine.errors import ErrorSet
 from warpspace.machine.parameters import parameter
 from warpspace.machine.tolerances import ToleranceSet
+from warpspace.scene.bodies import body_notes
 from warpspace.scene.library import parse_scene
 from warpspace.scene.machines import load_machine, machine_names
 from warpspace.scene.model import Scene
@@ -66,7 +67,11 @@ def checked(scene: Scene, changed: Scene, notes: tuple[str, ...] = ()) -> Edited
     machine = _dressed(scene, changed.machine)
     changed = replace(changed, model=replace(changed.model, machine=machine))
     read = parse_scene(scene_to_toml(changed), scene.name, "machine")
-    return Edited(replace(read, model=replace(read.model, machine=machine)), notes)
+    # the text is read without its folder: what that says of meshes is true of others only
+    unread = body_notes(read.machine)
+    remarks = (*(note for note in read.notes if note not in unread), *body_notes(machine))
+    model = replace(read.model, machine=machine)
+    return Edited(replace(read, model=model, notes=remarks), notes)
 
 
 def same_shape(one: Machine, other: Machine) -> bool:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from typing import TypeVar
 
+from warpspace.app.evaluation.machine_edits.guides import with_guide_error, with_same_guides
 from warpspace.app.evaluation.machine_edits.library import library_scene
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.edits import curve_of
@@ -17,9 +18,10 @@ from warpspace.exceptions import WarpspaceError
 from warpspace.machine.errors import ErrorSet
 from warpspace.machine.parameters import parameter
 from warpspace.machine.tolerances import ToleranceSet
-from warpspace.scene.editing import numbers, structure
+from warpspace.scene.editing import numbers, parts, structure
 from warpspace.scene.editing.edited import Edited
 from warpspace.scene.model import Scene
+from warpspace.units import MICROMETRE
 
 T = TypeVar("T")
 Edit = Callable[[Scene], Edited]
@@ -30,6 +32,7 @@ NUMBERS: Mapping[str, Callable[[Scene, str, int, float], Edited]] = {
     "rotation": numbers.change_rotation,
     "travel": numbers.change_travel,
     "volume": numbers.change_volume,
+    "span": lambda scene, axis, _, value: parts.change_span(scene, axis, value),
 }
 """What is set by a frame, the number of an entry, and a value."""
 UNCHANGED = "the machine stays as it was"
@@ -212,12 +215,13 @@ def with_word(state: AppState, word: str) -> AppState:
     state : AppState
     word : str
         For instance "chain wCBFXYZt", "left B", "side X", "turn C", "remove A", "type scara",
-        "offset X 2 150" (z of X's offset, mm), "travel X 1 300" (upper end). Anything, since it
-        comes from a browser.
+        "offset X 2 150" (z of X's offset, mm), "travel X 1 300" (upper end), "gantry X",
+        "across X", "span X 0 1800" (mm), "guide X 1 12" (of the second guide, µm), "mesh X" (away
+        with it). Anything, since it comes from a browser.
     """
     what, _, rest = word.partition(" ")
-    parts = rest.split(" ", maxsplit=2)
-    match what, parts:
+    words = rest.split(" ", maxsplit=2)
+    match what, words:
         case "chain", _:
             return with_edit(state, lambda scene: structure.change_chain(scene, rest))
         case (("left" | "right"), [axis]):
@@ -234,6 +238,14 @@ def with_word(state: AppState, word: str) -> AppState:
             if library is None:
                 return state
             return with_edit(state, lambda scene: structure.take_machine(scene, library))
+        case "gantry", [axis]:
+            return with_edit(state, lambda scene: parts.switch_gantry(scene, axis))
+        case "across", [axis]:
+            return with_edit(state, lambda scene: parts.turn_gantry(scene, axis))
+        case "mesh", [frame]:
+            return with_edit(state, lambda scene: parts.remove_mesh(scene, frame))
+        case "guide", [axis, ("0" | "1") as guide, typed] if axis in state.scene.machine.gantries:
+            return _with_guide(state, axis, int(guide), typed)
         case "sizes", [""]:
             return with_edit(state, structure.take_sizes)
         case "own", [""]:
@@ -250,10 +262,24 @@ def _with_number(state: AppState, what: str, frame: str, entry: int, typed: str)
     unit = {"offset": "mm", "rotation": "°"}.get(what) or ("mm" if axis is None else axis.unit)
     value = read_typed(typed, unit)
     if value is None:
-        text = typed if len(typed) <= SHOWN else f"{typed[:SHOWN]}…"
-        return _noted(state, f"{what} of {frame} = “{text}”; expected a number in {unit}")
+        return _no_number(state, f"{what} of {frame}", typed, unit)
     change = NUMBERS[what]
-    return with_edit(state, lambda scene: change(scene, frame, entry, value))
+    changed = with_edit(state, lambda scene: change(scene, frame, entry, value))
+    return with_same_guides(state, changed, frame) if what == "span" else changed
+
+
+def _with_guide(state: AppState, axis: str, guide: int, typed: str) -> AppState:
+    """Set the positioning error of a guide that was typed."""
+    value = read_typed(typed, MICROMETRE)
+    if value is None:
+        return _no_number(state, f"guide {guide + 1} of {axis}", typed, MICROMETRE)
+    return with_guide_error(state, axis, guide, value)
+
+
+def _no_number(state: AppState, what: str, typed: str, unit: str) -> AppState:
+    """Note that what was typed is no number."""
+    text = typed if len(typed) <= SHOWN else f"{typed[:SHOWN]}…"
+    return _noted(state, f"{what} = “{text}”; expected a number in {unit}")
 
 
 def _noted(state: AppState, *notes: str) -> AppState:

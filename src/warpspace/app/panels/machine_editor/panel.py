@@ -8,6 +8,7 @@ from warpspace.app.browser.clicks import Clicks
 from warpspace.app.browser.handles import Handle
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.evaluation.machine_edits.guides import guide_errors
 from warpspace.app.evaluation.machine_edits.library import machine_types
 from warpspace.app.evaluation.machine_edits.updates import UNCHANGED, with_word
 from warpspace.app.panels.context import PanelContext
@@ -87,7 +88,7 @@ class MachineEditorPanel:
     def concerns(self, picture: LivePicture) -> tuple[object, ...]:
         """Give what the boxes show."""
         scene = picture.state.scene
-        return Identity(scene.machine), Identity(scene.workspace)
+        return Identity(scene.machine), Identity(scene.workspace), *_guides(picture.state).items()
 
     def show(self, picture: LivePicture) -> None:
         """Write the boxes; a chain that was refused stays until the machine is another one."""
@@ -97,6 +98,16 @@ class MachineEditorPanel:
         """Write chain and boxes; what is the same already is not sent."""
         problem = self._problem.removesuffix(f"; {UNCHANGED}")
         text = editor_html(
-            state.scene, self._clicks.button, self._clicks.text_box, self._typed, problem
+            state.scene,
+            self._clicks.button,
+            self._clicks.text_box,
+            self._typed,
+            problem,
+            _guides(state),
         )
         self._boxes.put(content=text)
+
+
+def _guides(state: AppState) -> dict[str, tuple[float, float] | None]:
+    """Give the errors of the guides of each gantry, µm."""
+    return {axis: guide_errors(state, axis) for axis in state.scene.machine.gantries}

@@ -1,17 +1,21 @@
 """The boxes of the machine editor as HTML: chain, and per frame all that describes it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from markupsafe import Markup
 
 from warpspace.app.readouts.html import render
 from warpspace.app.state.typed_numbers import spell_typed
+from warpspace.machine.body_source import BodySource
 from warpspace.machine.description import FIXED_FRAMES, ORIGIN, Axis, Machine
+from warpspace.machine.gantry import Gantry
 from warpspace.machine.limits import MAX_TYPED_NUMBER
+from warpspace.scene.editing.parts import own_bodies
 from warpspace.scene.model import Scene
 
 Attributes = Callable[[str], Markup]
+Guides = tuple[float, float] | None
 FIXED = {
     "w": "workpiece, on the last frame of its side",
     "S": "spindle, on the last frame of its side",
@@ -69,6 +73,7 @@ def editor_html(
     text_box: Attributes,
     typed: str = "",
     problem: str = "",
+    guides: Mapping[str, Guides] | None = None,
 ) -> str:
     """Spell the editor.
 
@@ -81,6 +86,8 @@ def editor_html(
         A chain that was refused; it stays in its box.
     problem : str, optional
         Why it was refused.
+    guides : mapping of str to (float, float) or None, µm, optional
+        Positioning errors of the guides of each gantry; None where one number tells too little.
 
     Returns
     -------
@@ -94,7 +101,9 @@ def editor_html(
         problem=problem,
         links=["w", *reversed(chain.workpiece), FRAME, *chain.tool, "t"],
         axes=scene.machine.axes,
-        rows=editor_rows(scene),
+        rows=editor_rows(scene, guides or {}),
+        gantries=scene.machine.gantries,
+        bodies=[_body(frame, source) for frame, source in own_bodies(scene.machine).items()],
         notes=scene.notes,
         button=button,
         text_box=text_box,
@@ -102,13 +111,13 @@ def editor_html(
     )
 
 
-def editor_rows(scene: Scene) -> list[Row]:
+def editor_rows(scene: Scene, guides: Mapping[str, Guides] | None = None) -> list[Row]:
     """List the frames in the order of the written chain, the workpiece first."""
-    machine = scene.machine
+    machine, known = scene.machine, guides or {}
     return [
         _fixed(machine, "w", "workpiece"),
-        *(_moving(scene, name, "workpiece") for name in reversed(machine.chain.workpiece)),
-        *(_moving(scene, name, "tool") for name in machine.chain.tool),
+        *(_moving(scene, name, "workpiece", known) for name in reversed(machine.chain.workpiece)),
+        *(_moving(scene, name, "tool", known) for name in machine.chain.tool),
         *(_fixed(machine, name, "tool") for name in FIXED_FRAMES if name != "w"),
     ]
 
@@ -120,7 +129,7 @@ def _fixed(machine: Machine, name: str, carries: str) -> Row:
     return Row(name, FIXED[name], None, carries, _placing(name, offset, turn))
 
 
-def _moving(scene: Scene, name: str, carries: str) -> Row:
+def _moving(scene: Scene, name: str, carries: str, guides: Mapping[str, Guides]) -> Row:
     """Describe an axis."""
     axis, volume = scene.machine.axes[name], scene.workspace.ranges[name]
     way = "moves along" if axis.is_linear else "turns about"
@@ -128,8 +137,37 @@ def _moving(scene: Scene, name: str, carries: str) -> Row:
         *_placing(name, axis.offset_mm, axis.rotation_deg),
         _ends("Travel", "travel", name, axis.travel, axis.unit),
         _ends("Volume", "volume", name, volume, axis.unit),
+        *_guides(scene.machine.gantries.get(name), guides.get(name)),
     )
     return Row(name, f"{way} {'xyz'[axis.index]}, carries the {carries}", axis, carries, numbers)
+
+
+def _guides(gantry: Gantry | None, errors: Guides) -> tuple[Numbers, ...]:
+    """Spell the distance between two guides, and their errors where one number tells each."""
+    if gantry is None:
+        return ()
+    axis = gantry.axis
+    names = (f"Distance between the guides of {axis}",)
+    span = Numbers("Guides apart", "mm", f"span {axis}", (spell_typed(gantry.span_mm),), names)
+    if errors is None:
+        return (span,)
+    told = tuple(f"Positioning error of the {one} guide of {axis}" for one in ("first", "second"))
+    typed = tuple(spell_typed(round(value, 9)) for value in errors)
+    return span, Numbers("Each off by", "µm", f"guide {axis}", typed, told)
+
+
+def _body(frame: str, source: BodySource) -> tuple[str, str]:
+    """Say where the body of a frame comes from; of a file its name alone, never its folder."""
+    if source.shape:
+        return frame, f"shape {source.shape}"
+    words = [source.file, source.unit or "unit of its format"]
+    for label, values, unit in (
+        ("offset", source.offset_mm, "mm"),
+        ("turned", source.rotation_deg, "°"),
+    ):
+        if any(values):
+            words.append(f"{label} {', '.join(map(spell_typed, values))} {unit}")
+    return frame, " · ".join(words)
 
 
 def _placing(name: str, offset: tuple[float, ...], turn: tuple[float, ...]) -> tuple[Numbers, ...]:

@@ -1,0 +1,189 @@
+"""Machines side by side as HTML: numbers, pictures in one scale, and what can be chosen."""
+
+import base64
+import io
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from string import ascii_uppercase
+from typing import TYPE_CHECKING
+
+import numpy as np
+from markupsafe import Markup
+from PIL import Image, ImageChops
+
+from warpspace.app.readouts.html import render
+from warpspace.app.readouts.machine_editor.types import small_picture
+from warpspace.app.readouts.numbers import thousands
+from warpspace.app.readouts.summary import colour_stops
+from warpspace.app.state.concept_choice import Chosen, ConceptChoice
+from warpspace.geometry.colour import ColourScale
+from warpspace.machine.limits import MOST_CONCEPTS
+from warpspace.picture.words import LOOP_WORDS, spell_short, tolerance_words
+
+if TYPE_CHECKING:
+    from warpspace.app.evaluation.concepts import Answer
+    from warpspace.scene.concepts import Concept
+
+Button = Callable[[str], Markup]
+NUMBERS = {"mean": "mean_um", "P95": "p95_um", "max": "max_um"}
+"""Word on a column to field of `MonteCarlo`."""
+MARGIN_PX = 6
+"""Paper that is kept above and below a picture."""
+
+
+@dataclass(frozen=True, slots=True)
+class Offer:
+    """A machine that can be chosen.
+
+    Attributes
+    ----------
+    word : str
+        What its button sends.
+    chosen : Chosen
+    chain : str
+    """
+
+    word: str
+    chosen: Chosen
+    chain: str
+
+
+def offers_html(offers: Sequence[Offer], choice: ConceptChoice, button: Button) -> str:
+    """Spell what can be chosen: machines of the library with their pictures, then other scenes.
+
+    Parameters
+    ----------
+    offers : sequence of Offer
+    choice : ConceptChoice
+    button : callable
+        Gives the attributes of a button that sends a word.
+
+    Returns
+    -------
+    str
+        HTML.
+    """
+    return render(
+        "concept_offers",
+        offers=[
+            (offer, small_picture(offer.chosen.picture) if offer.chosen.picture else "")
+            for offer in offers
+        ],
+        held=choice.holds,
+        most=MOST_CONCEPTS,
+        count=len(choice.machines),
+        button=button,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class ConceptRow:
+    """A chosen machine.
+
+    Attributes
+    ----------
+    title : str
+    opens : bool
+        Whether it can be opened: what is steered is open already.
+    concept : Concept or None
+        Its numbers; None before it is compared.
+    picture : str
+        A data address; empty before it is drawn.
+    """
+
+    title: str
+    opens: bool
+    concept: "Concept | None" = None
+    picture: str = ""
+
+
+def concepts_html(
+    rows: Sequence[ConceptRow], found: "Answer | None", note: str, button: Button
+) -> str:
+    """Spell the chosen machines side by side, as far as they are compared.
+
+    Parameters
+    ----------
+    rows : sequence of ConceptRow
+    found : Answer or None
+        The last comparison.
+    note : str
+        What is to be done next, or what went wrong.
+    button : callable
+        Gives the attributes of a button: "open 0" or "remove 0" for the first machine.
+
+    Returns
+    -------
+    str
+        HTML.
+    """
+    lettered = list(zip(ascii_uppercase, rows, strict=False))
+    known = [row.concept for row in rows if row.concept is not None]
+    best: dict[str, float] = {}
+    for name in NUMBERS.values() if known else ():
+        best[name] = min(float(getattr(concept.sampled, name)) for concept in known)
+    return render(
+        "concepts",
+        rows=lettered,
+        compared=[(letter, row.concept) for letter, row in lettered if row.concept is not None],
+        numbers=NUMBERS,
+        best=best,
+        note=note,
+        found=found,
+        colours=colour_stops(diverging=False),
+        about=[] if found is None else _about(found),
+        drawn=any(row.picture for row in rows),
+        ticks=[] if found is None else _ticks(found.scale),
+        button=button,
+    )
+
+
+def _about(found: "Answer") -> list[str]:
+    """Say how machines were compared."""
+    question, first = found.question, found.concepts[0]
+    return [
+        f"{thousands(first.sampled.plan.samples)} machines of each",
+        "each within its own tolerances"
+        if question.own_tolerances
+        else tolerance_words(first.scene.tolerances),
+        LOOP_WORDS[first.sampled.view.loop],
+        "largest |E| of each" if question.over == "max" else "|E| at a random point of each",
+    ]
+
+
+def _ticks(scale: ColourScale) -> list[tuple[float, str]]:
+    """Place the ticks of a colour bar, per cent of its length."""
+    span = scale.high - scale.low
+    return [(100.0 * (tick - scale.low) / span, spell_short(tick)) for tick in scale.ticks]
+
+
+def cut_strip(png: bytes, count: int) -> list[str]:
+    """Cut pictures that stand one below the other apart.
+
+    Parameters
+    ----------
+    png : bytes
+    count : int
+        How many there are, all equally high.
+
+    Returns
+    -------
+    list of str
+        A data address each, as wide as the strip; empty paper above and below is cut away, so that
+        all stay in one scale.
+    """
+    with Image.open(io.BytesIO(png)) as opened:
+        strip = opened.convert("RGB")
+    height = strip.height // count
+    found: list[str] = []
+    for index in range(count):
+        cell = strip.crop((0, index * height, strip.width, (index + 1) * height))
+        paper = Image.new("RGB", cell.size, cell.getpixel((0, 0)))
+        ends = ImageChops.difference(cell, paper).getbbox()
+        if ends is not None:
+            top, bottom = np.clip([ends[1] - MARGIN_PX, ends[3] + MARGIN_PX], 0, height).tolist()
+            cell = cell.crop((0, top, cell.width, bottom))
+        buffer = io.BytesIO()
+        cell.quantize(64).save(buffer, "PNG", optimize=True)
+        found.append(f"data:image/png;base64,{base64.b64encode(buffer.getvalue()).decode()}")
+    return found
