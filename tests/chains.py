@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from hypothesis import strategies as st
 
-from warpspace.kinematics.chain import exact_error
 from warpspace.kinematics.conventions.registry import convention_names
+from warpspace.kinematics.deviation import exact_error
 from warpspace.kinematics.model import Loop, Model
 from warpspace.machine.axes import AXIS_NAMES, MAX_AXES, is_linear
 from warpspace.machine.description import FIXED_FRAMES, Chain, build_machine

@@ -14,14 +14,16 @@ from warpspace.scene.model import Scene
 HALF_TRAVEL = st.sampled_from([1e-3, 0.5, 40.0, 275.0, 3000.0])
 PLACES = st.sampled_from([-300.0, -0.25, 0.0, 12.5, 1000.0])
 POINTS = st.lists(PLACES, min_size=3, max_size=3)
+HALF_TURN = st.sampled_from([0.0, 0.0, 0.5, 90.0])
+ALONG = dict(zip("XYZUVW", "XYZXYZ", strict=True))
 MOVES = st.sampled_from([True, True, False])
 SIZES = st.sampled_from([-8000.0, -12.5, -1e-6, 0.0, 3.0, 40.0])
 
 
 @st.composite
-def scenes(draw: st.DrawFn) -> Scene:
+def scenes(draw: st.DrawFn, *, everything: bool = False) -> Scene:
     """Scenes that `check` accepts."""
-    text = draw(scene_texts())
+    text = draw(scene_texts(everything=everything))
     try:
         return parse_scene(text, "random")
     except SceneError:
@@ -29,23 +31,31 @@ def scenes(draw: st.DrawFn) -> Scene:
 
 
 @st.composite
-def scene_texts(draw: st.DrawFn) -> str:
-    """Texts of scene files, nearly all of them valid."""
+def scene_texts(draw: st.DrawFn, *, everything: bool = False) -> str:
+    """Texts of scene files, nearly all valid; on request with gantries and curved volumes."""
     chain = draw(chains())
     offsets = {frame: draw(POINTS) for frame in chain.axes if draw(st.booleans())}
     directions = {axis: -1 for axis in chain.axes if draw(st.booleans())}
     parts = ['title = "random"', "[machine]", f'chain = "{chain}"']
     parts += ["[machine.offset_mm]", *_rows(offsets), "[machine.direction]", *_rows(directions)]
+    linear = [axis for axis in chain.axes if is_linear(axis)]
+    guided = [axis for axis in linear if everything and draw(st.booleans())]
+    parts += ["[machine.gantry]", *(f"{axis} = {{ span_mm = 1800 }}" for axis in guided)]
     middles = {axis: draw(PLACES) for axis in chain.axes}
     ranges: dict[str, object] = {}
     for axis in chain.axes:
         half = draw(HALF_TRAVEL) if is_linear(axis) and draw(MOVES) else 0.0
+        if everything and not is_linear(axis):
+            half = draw(HALF_TURN)
         at = middles[axis]
         ranges[axis] = [at - half, at + half] if half else at
     traced = draw(st.lists(POINTS, max_size=2))
     points = {"tool": draw(POINTS), "workpiece": draw(POINTS), "traces": traced}
     parts += ["[workspace]", *_rows(ranges), "[points_mm]", *_rows(points)]
-    parts += ["[errors]", *(f"{key} = {draw(curves(key))}" for key in draw(_some_keys(chain)))]
+    errors = {key: draw(curves(key)) for key in draw(_some_keys(chain))}
+    guides = "{ guides = [{ ramp = 4 }, { table = [[-300, 0.0], [300, 9.0]] }] }"
+    errors |= {f"E{ALONG[axis[0]]}{axis}": guides for axis in guided}
+    parts += ["[errors]", *_rows(errors)]
     if draw(st.booleans()):
         widths = "{ translation = 10, rotation = 20, squareness = 25 }"
         parts += ["[tolerances]", f"default = {widths}"]

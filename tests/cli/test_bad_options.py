@@ -32,6 +32,9 @@ OPTIONS = {
     "csv of no name": (("--csv", ""), "is a folder"),
     "csv is a device": (("--csv", "/dev/null"), "/dev/null: is no regular file"),
     "csv with a long name": (("--csv", "x" * 300), "cannot be written", "too long"),
+    "field in no format": (("-o", "x.txt"), "unknown ending '.txt'", ".parquet", ".npz", ".vts"),
+    "points as a grid": (("--at", "X=1", "-o", "x.vts"), "x.vts", "holds a grid", ".parquet"),
+    "field in no folder": (("-o", "nowhere/x.parquet"), "nowhere/x.parquet", "does not exist"),
     "unknown option": (("--girds", "5"), "--girds"),
     "option without value": (("--grid",), "--grid"),
 }

@@ -14,6 +14,9 @@ EXX = { csv = "measured.csv", column = "error" }
 """
 WRITERS = {
     "field": (("field", "{scene}", "--grid", "3", "--csv"), "x.csv"),
+    "field parquet": (("field", "{scene}", "--grid", "3", "-o"), "x.parquet"),
+    "field npz": (("field", "{scene}", "--grid", "3", "-o"), "x.npz"),
+    "field vts": (("field", "{scene}", "--grid", "3", "-o"), "x.vts"),
     "gains csv": (("gains", "{scene}", "--csv"), "x.csv"),
     "gains plot": (("gains", "{scene}", "--plot"), "x.svg"),
     "montecarlo": (("montecarlo", "{scene}", "--samples", "200", "--plot"), "x.svg"),

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from chains import MAX_LINEAR_MM, MAX_OFFSET_MM, models, positions
 from warpspace.field.evaluate import View, evaluate_exact, evaluate_first_order
 from warpspace.kinematics import transforms
-from warpspace.kinematics.chain import branch_pose, exact_error, nominal_point
+from warpspace.kinematics.chain import branch_pose, nominal_point
+from warpspace.kinematics.deviation import exact_error
 from warpspace.kinematics.firstorder import jacobian
 from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import Constant, ErrorSet

@@ -9,7 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from chains import central_differences
-from warpspace.kinematics.chain import exact_error, nominal_point
+from warpspace.kinematics.chain import nominal_point
+from warpspace.kinematics.deviation import exact_error
 from warpspace.kinematics.firstorder import jacobian
 from warpspace.kinematics.model import Loop, Model
 from warpspace.machine.description import Machine, build_machine

@@ -1,7 +1,9 @@
 """The public names of the package."""
 
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -23,6 +25,21 @@ def test_import_loads_nothing_heavy() -> None:
     code = f"import sys, warpspace; print([n for n in {heavy.split()} if n in sys.modules])"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"
+
+
+def test_import_loads_the_standard_library_and_one_file() -> None:
+    """What costs time at the start of a program is what is imported."""
+    code = "import sys; old = {*sys.modules}; import warpspace; print(*{*sys.modules} - old)"
+    command = [sys.executable, "-S", "-c", code]
+    path = str(Path(warpspace.__file__).parents[1])
+    found = subprocess.run(
+        command, capture_output=True, text=True, check=True, env={**os.environ, "PYTHONPATH": path}
+    )
+    loaded = found.stdout.split()
+    assert "warpspace" in loaded
+    assert [name for name in loaded if name.split(".")[0] not in sys.stdlib_module_names] == [
+        "warpspace"
+    ]
 
 
 def test_help_of_the_command_line_loads_no_numerics_and_no_renderer() -> None:

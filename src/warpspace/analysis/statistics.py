@@ -91,21 +91,20 @@ def statistics(field: ErrorField, axes: Mapping[str, Array] | None = None) -> St
     OptionError
         If the field has no point.
     """
+    shape = field.norm_um.shape
     norm = field.norm_um.reshape(-1)
     if norm.size == 0:
         raise OptionError("statistics of no points; expected at least one")
     worst = int(np.argmax(norm))
-    x, y, z = (float(value) for value in field.nominal_mm.reshape(-1, 3)[worst])
+    place = np.unravel_index(worst, shape)
+    x, y, z = (float(value) for value in field.nominal_mm[place])
     return Statistics(
         float(norm.mean()),
         float(np.sqrt(norm @ norm / norm.size)),
         _percentile(norm, P95 * (norm.size - 1)),
         float(norm[worst]),
         (x, y, z),
-        {
-            name: float(np.broadcast_to(value, field.norm_um.shape).reshape(-1)[worst])
-            for name, value in (axes or {}).items()
-        },
+        {name: float(np.broadcast_to(value, shape)[place]) for name, value in (axes or {}).items()},
     )
 
 

@@ -1,22 +1,27 @@
-"""Errors at given coordinates, to first order and exactly."""
+"""Errors at given coordinates, to first order and exactly.
+
+Fields of many points are evaluated in pieces that stay in the processor's cache. An error is asked
+for its values at the coordinates of a piece, and for nothing else: values of one axis are an array
+over that axis, so that only sums and products are as large as the grid; values of several axes are
+an array over these.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import reduce
 
 import numpy as np
 
 from warpspace.field.basis import ErrorBasis, ErrorField
+from warpspace.field.pieces import cut, cut_all, is_small, pieces
 from warpspace.kinematics import transforms
-from warpspace.kinematics.chain import branch_pose, exact_error, nominal_point
+from warpspace.kinematics.chain import branch_pose, nominal_point
+from warpspace.kinematics.components import join, rotate, split, split_rows, subtract
+from warpspace.kinematics.deviation import LoopLinks, build_links, solve_links
 from warpspace.kinematics.firstorder import jacobian
 from warpspace.kinematics.model import Coordinates, Loop, Model, batch_shape
 from warpspace.machine.errors import ErrorSet
 from warpspace.machine.parameters import parameter
 from warpspace.units import Array
-
-MAX_RESPONSES = 3_000_000
-"""Responses (parameters × points) that are held at a time where no basis is asked for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,25 +174,7 @@ def evaluate_exact(
     -------
     ErrorField
     """
-    view = view or View()
-    point = nominal_point(model, view.loop, coordinates) if point_mm is None else point_mm
-    values = error_values(model, errors, coordinates)
-    error, orientation = exact_error(model, view.loop, coordinates, values, point)
-    reference = _reference_point(model, view, coordinates)
-    if reference is not None:
-        held, held_point = reference
-        held_values = error_values(model, errors, held)
-        error = error - exact_error(model, view.loop, held, held_values, held_point)[0]
-    rotation = _result_rotation(model, view, coordinates)
-    if rotation is not None:
-        error = transforms.rotate(rotation, error)
-        orientation = transforms.rotate(rotation, orientation)
-    shape = np.broadcast_shapes((*batch_shape(coordinates), 3), error.shape, point.shape)
-    return ErrorField(
-        np.broadcast_to(point, shape),
-        np.broadcast_to(error, shape),
-        np.broadcast_to(orientation, shape),
-    )
+    return _evaluate(model, errors, coordinates, view or View(), point_mm, exact=True)
 
 
 def evaluate_first_order(
@@ -199,24 +186,45 @@ def evaluate_first_order(
 ) -> ErrorField:
     """Evaluate the field with the first-order model; see `evaluate_exact` for the parameters.
 
-    The basis of a large batch is built for a few parameters at a time, so that memory stays small.
+    The same numbers as the basis gives for the amplitudes of the set, without its memory.
     """
-    keys = tuple(key for key in errors if parameter(key).axis in model.machine.axes)
-    size = int(np.prod(batch_shape(coordinates))) if point_mm is None else point_mm.size // 3
-    together = max(1, MAX_RESPONSES // max(size, 1))
-    fields = (
-        build_basis(model, errors, part, coordinates, view, point_mm).evaluate(
-            amplitudes_of(errors, part)
-        )
-        for part in (keys[at : at + together] for at in range(0, max(len(keys), 1), together))
-    )
-    return reduce(_sum, fields)
+    return _evaluate(model, errors, coordinates, view or View(), point_mm, exact=False)
 
 
-def _sum(one: ErrorField, other: ErrorField) -> ErrorField:
-    """Add the errors of two fields over the same points."""
-    return ErrorField(
-        one.nominal_mm,
-        one.error_um + other.error_um,
-        one.orientation_urad + other.orientation_urad,
-    )
+def _evaluate(
+    model: Model,
+    errors: ErrorSet,
+    coordinates: Coordinates,
+    view: View,
+    point_mm: Array | None,
+    *,
+    exact: bool,
+) -> ErrorField:
+    """Evaluate the field piece by piece, straight into the arrays of the result."""
+    point = nominal_point(model, view.loop, coordinates) if point_mm is None else point_mm
+    shape = (*np.broadcast_shapes(batch_shape(coordinates), point.shape[:-1]), 3)
+    error, orientation = np.empty(shape), np.empty(shape)
+    reference = _reference_point(model, view, coordinates)
+    if reference is None:
+        fixed = np.zeros(3)
+    else:
+        held, held_point = reference
+        fixed = _evaluate(model, errors, held, View(view.loop), held_point, exact=exact).error_um
+
+    def steps(at: Coordinates) -> LoopLinks:
+        return build_links(model, at, error_values(model, errors, at), exact=exact)
+
+    # A grid has few positions of each axis: what depends on these alone is worked out once.
+    links = steps(coordinates) if is_small(coordinates.values()) else None
+    for piece in pieces(shape[:-1]):
+        at = {name: cut(values, piece) for name, values in coordinates.items()}
+        here = steps(at) if links is None else cut_all(links, piece)
+        nodes = (*piece, slice(None))
+        found, tilt = solve_links(here, view.loop, split(cut(point, nodes)), exact=exact)
+        found = subtract(found, split(cut(fixed, nodes)))
+        rotation = _result_rotation(model, view, at)
+        if rotation is not None:
+            found, tilt = (rotate(split_rows(rotation), vectors) for vectors in (found, tilt))
+        join(found, error[nodes])
+        join(tilt, orientation[nodes])
+    return ErrorField(np.broadcast_to(point, shape), error, orientation)

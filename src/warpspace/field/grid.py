@@ -8,8 +8,9 @@ from operator import index as whole_number
 import numpy as np
 
 from warpspace.exceptions import OptionError
-from warpspace.kinematics import transforms
-from warpspace.kinematics.chain import branch_pose, nominal_point
+from warpspace.field.pieces import cut, pieces
+from warpspace.kinematics.chain import carry_inwards, carry_outwards, nominal_point
+from warpspace.kinematics.components import join, split
 from warpspace.kinematics.model import Coordinates, Loop, Model
 from warpspace.machine.axes import direction_index, is_linear, sort_axes
 from warpspace.machine.limits import GRID_NODES
@@ -246,5 +247,11 @@ def seen_from_workpiece(
     if not carrying:
         return point_mm
     home = {**coordinates, **{name: np.asarray(middle.get(name, 0.0)) for name in carrying}}
-    there = transforms.inverse(branch_pose(model, "workpiece", coordinates))
-    return transforms.apply(branch_pose(model, "workpiece", home) @ there, point_mm)
+    seen = np.empty_like(point_mm)
+    for piece in pieces(point_mm.shape[:-1]):
+        nodes = (*piece, slice(None))
+        here = {name: cut(values, piece) for name, values in coordinates.items()}
+        there = {name: cut(values, piece) for name, values in home.items()}
+        point = carry_outwards(model, "workpiece", here, split(point_mm[nodes]))
+        join(carry_inwards(model, "workpiece", there, point), seen[nodes])
+    return seen

@@ -8,9 +8,9 @@ the vector ε.
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from warpspace.kinematics import transforms
+from warpspace.kinematics import components, transforms
+from warpspace.kinematics.components import Triple
 from warpspace.kinematics.conventions.convention import AxisFrames
 from warpspace.kinematics.model import (
     TOOL_AXIS,
@@ -20,7 +20,7 @@ from warpspace.kinematics.model import (
 )
 from warpspace.machine.axes import DIRECTIONS
 from warpspace.machine.description import Axis, Vector
-from warpspace.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM, URAD_PER_RAD, Array
+from warpspace.units import MM_PER_UM, RAD_PER_URAD, Array
 
 ErrorValues = Mapping[str, Array]
 """Parameter key to values at the coordinates, [...], µm or µrad."""
@@ -137,9 +137,8 @@ def nominal_point(model: Model, loop: Loop, coordinates: Coordinates) -> Array:
     ndarray, [..., 3], mm
     """
     if loop is Loop.WORKPIECE:
-        pose = branch_pose(model, "workpiece", coordinates)
-        return transforms.apply(pose, model.workpiece_point_mm)
-    return transforms.apply(branch_pose(model, "tool", coordinates), model.tool_point_mm)
+        return point_in_branch(model, "workpiece", coordinates, model.workpiece_point_mm)
+    return point_in_branch(model, "tool", coordinates, model.tool_point_mm)
 
 
 def tool_axis(model: Model, coordinates: Coordinates) -> Array:
@@ -147,73 +146,37 @@ def tool_axis(model: Model, coordinates: Coordinates) -> Array:
     return transforms.rotate(branch_pose(model, "tool", coordinates)[..., :3, :3], TOOL_AXIS)
 
 
-def exact_error(
-    model: Model,
-    loop: Loop,
-    coordinates: Coordinates,
-    values: ErrorValues,
-    point_mm: ArrayLike,
-) -> tuple[Array, Array]:
-    """Evaluate the error of a loop with full rotations and all products.
-
-    Parameters
-    ----------
-    model : Model
-    loop : Loop
-    coordinates : mapping of str to ndarray, [...], mm or degrees
-    values : mapping of str to ndarray, [...], µm or µrad
-        Errors at the coordinates.
-    point_mm : array_like, [..., 3], mm
-        Nominal point in R, which the tool and the workpiece point share.
-
-    Returns
-    -------
-    error_um : ndarray, [..., 3], µm
-        Position error in R, actual − nominal; for the relative loop tool minus workpiece.
-    orientation_urad : ndarray, [..., 3], µrad
-        Rotation vector that takes the nominal tool axis to the actual one; it has no part about
-        the tool axis itself.
-    """
-    point = np.asarray(point_mm, dtype=float)
-    nominal_axis = tool_axis(model, coordinates)
-    moved = {side: np.eye(4) for side in ("tool", "workpiece")}
-    for side in moved:
-        if loop in (Loop.RELATIVE, Loop(side)):
-            actual = branch_pose(model, side, coordinates, values)
-            moved[side] = actual @ transforms.inverse(branch_pose(model, side, coordinates))
-    tool, workpiece = moved["tool"], moved["workpiece"]
-    if loop is Loop.WORKPIECE:
-        shift, actual_axis = _shift(workpiece, point), _turned(workpiece, nominal_axis)
-        rotation = _between(nominal_axis, actual_axis)
-    else:
-        shift = _shift(tool, point) - _shift(workpiece, point)
-        rotation = _between(_turned(workpiece, nominal_axis), _turned(tool, nominal_axis))
-    shape = np.broadcast_shapes(shift.shape, rotation.shape, point.shape)
-    return (
-        np.broadcast_to(shift * UM_PER_MM, shape).copy(),
-        np.broadcast_to(rotation * URAD_PER_RAD, shape).copy(),
-    )
-
-
-def _shift(moved: Array, point: Array) -> Array:
-    """Displacement of a point by a small rigid motion, without cancellation of large numbers."""
-    return transforms.rotate(moved[..., :3, :3] - np.eye(3), point) + moved[..., :3, 3]
-
-
-def _turned(moved: Array, direction: Array) -> Array:
-    """Turn directions by the rotation part of a transformation."""
-    return transforms.rotate(moved[..., :3, :3], direction)
-
-
-def _between(start: Array, end: Array) -> Array:
-    """Rotation vector that takes one unit vector to another the short way, rad, [..., 3]."""
-    cross = np.cross(start, end)
-    sine = np.linalg.norm(cross, axis=-1, keepdims=True)
-    cosine = np.sum(start * end, axis=-1, keepdims=True)
-    angle = np.arctan2(sine, cosine)
-    return cross * np.where(sine > 0.0, angle / np.where(sine > 0.0, sine, 1.0), 1.0)
-
-
 def point_in_branch(model: Model, side: str, coordinates: Coordinates, point: Vector) -> Array:
-    """Give the nominal position in R of a point of the tool or workpiece frame, [..., 3], mm."""
-    return transforms.apply(branch_pose(model, side, coordinates), point)
+    """Give the nominal position in R of a point of the tool or workpiece frame, [..., 3], mm.
+
+    The point is taken inwards axis by axis, which over a grid costs little: a linear axis changes
+    what it moves along, and no more.
+    """
+    carried = components.split(np.array(point, dtype=float))
+    for _, offset, rotation in reversed(model.machine.end_frames(side)):
+        carried = components.move(transforms.placed(offset, rotation), carried)
+    axes = [np.shape(coordinates[axis.name]) for axis in model.machine.branch(side)]
+    out = np.empty((*np.broadcast_shapes(*axes), 3))
+    components.join(carry_inwards(model, side, coordinates, carried), out)
+    return out
+
+
+def carry_inwards(model: Model, side: str, coordinates: Coordinates, point_mm: Triple) -> Triple:
+    """Take a point from the frame behind the last axis of a branch to R, components, mm."""
+    for axis in reversed(model.machine.branch(side)):
+        point_mm = components.move(_nominal_step(axis, coordinates), point_mm)
+    return point_mm
+
+
+def carry_outwards(model: Model, side: str, coordinates: Coordinates, point_mm: Triple) -> Triple:
+    """Take a point from R to the frame behind the last axis of a branch, components, mm."""
+    for axis in model.machine.branch(side):
+        back = transforms.inverse(_nominal_step(axis, coordinates))
+        point_mm = components.move(back, point_mm)
+    return point_mm
+
+
+def _nominal_step(axis: Axis, coordinates: Coordinates) -> Array:
+    """Offset and motion of an axis, [..., 4, 4]."""
+    place = transforms.placed(axis.offset_mm, axis.rotation_deg)
+    return place @ motion(axis, coordinates[axis.name])

@@ -153,7 +153,7 @@ def jacobian(
 
     Notes
     -----
-    First order in all errors; `warpspace.kinematics.chain.exact_error` has all of them.
+    First order in all errors; `warpspace.kinematics.deviation.exact_error` has all of them.
     """
     point = np.asarray(point_mm, dtype=float)
     shape = np.broadcast_shapes((*batch_shape(coordinates), 3), point.shape)

@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Any
 
 from warpspace import __version__
+from warpspace.field.evaluate import View
 from warpspace.field.grid import DEFAULT_NODES, build_grid
 from warpspace.geometry.colour import ColourScale
 from warpspace.kinematics.model import Loop
@@ -59,18 +60,9 @@ class ScenePicture(Picture):
     @property
     def remarks(self) -> dict[str, str]:
         """What a table says of every row: scene, loop, reference, convention and the like."""
-        held = self.scene.reference
-        return {
-            "scene": self.scene.name,
-            "loop": str(self.view.loop),
-            "reference": "absolute"
-            if held is None
-            else " ".join(f"{axis}={at:g}" for axis, at in held.items()),
-            "component_errors": _one_text(self.scene.model.convention_value),
-            "model": "first order",
-            "conditions": "; ".join(self.conditions),
-            "program": f"warpspace {__version__}",
-        }
+        found = field_remarks(self.scene, self.view)
+        program = found.pop("program")
+        return {**found, "conditions": "; ".join(self.conditions), "program": program}
 
     @cached_property
     def provenance(self) -> dict[str, Any]:
@@ -94,6 +86,21 @@ class ScenePicture(Picture):
             },
             "scene_toml": scene_to_toml(scene),
         }
+
+
+def field_remarks(scene: Scene, view: View, *, exact: bool = False) -> dict[str, str]:
+    """Say what a field belongs to, in words: scene, loop, reference, convention, program."""
+    held = view.reference
+    return {
+        "scene": scene.name,
+        "loop": str(view.loop),
+        "reference": "absolute"
+        if held is None
+        else " ".join(f"{axis}={at:g}" for axis, at in held.items()),
+        "component_errors": _one_text(scene.model.convention_value),
+        "model": "exact chain" if exact else "first order",
+        "program": f"warpspace {__version__}",
+    }
 
 
 def _one_text(value: str | dict[str, str]) -> str:

@@ -64,14 +64,33 @@ def evaluate(
     if at is not None and grid is not None:
         raise OptionError("give either points (at) or a grid, not both")
     view = choose_view(scene, loop, frame)
-    solve = evaluate_exact if exact else evaluate_first_order
     if at is not None:
+        solve = evaluate_exact if exact else evaluate_first_order
         given = complete_coordinates(scene.machine, at, scene.workspace.positions)
         _check_magnitude(scene, given)
         return solve(scene.model, scene.errors, given, view)
     nodes = build_grid(scene.model, scene.workspace, DEFAULT_NODES if grid is None else grid)
-    field = solve(scene.model, scene.errors, nodes.coordinates, view, nodes.point_mm)
-    return replace(field, nominal_mm=nodes.nominal_mm)
+    return evaluate_grid(scene, nodes, view, exact=exact)
+
+
+def evaluate_grid(scene: Scene, grid: Grid, view: View, *, exact: bool = False) -> ErrorField:
+    """Evaluate the error field of a scene over a grid that is there already.
+
+    Parameters
+    ----------
+    scene : Scene
+    grid : Grid
+    view : View
+    exact : bool, optional
+
+    Returns
+    -------
+    ErrorField
+        Of the shape of the grid; its nominal points are where the nodes are drawn.
+    """
+    solve = evaluate_exact if exact else evaluate_first_order
+    field = solve(scene.model, scene.errors, grid.coordinates, view, grid.point_mm)
+    return replace(field, nominal_mm=grid.nominal_mm)
 
 
 def _check_magnitude(scene: Scene, coordinates: Coordinates) -> None:

@@ -7,12 +7,12 @@ from warpspace.kinematics.chain import (
     branch_frames,
     branch_pose,
     error_transform,
-    exact_error,
     motion,
     nominal_point,
     point_in_branch,
     tool_axis,
 )
+from warpspace.kinematics.deviation import exact_error
 from warpspace.kinematics.model import ComponentErrors, Loop, Model
 from warpspace.machine.description import build_machine
 

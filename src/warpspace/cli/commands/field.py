@@ -1,11 +1,19 @@
 """Command `field`: errors at points, or over the grid of the working volume."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from warpspace.cli.file_options import check_targets, csv_option, force_option
+from warpspace.cli.file_options import (
+    check_output,
+    check_targets,
+    csv_option,
+    force_option,
+    output_option,
+    size_text,
+)
 from warpspace.cli.options import (
     at_option,
     grid_option,
@@ -22,6 +30,7 @@ from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
     from warpspace.field.basis import ErrorField
+    from warpspace.field.evaluate import View
     from warpspace.field.grid import Grid
     from warpspace.scene.model import Scene
     from warpspace.units import Array
@@ -45,6 +54,9 @@ POINTS_AT_ONCE = 5000
     help="Frame of the resulting vectors.",
 )
 @csv_option
+@output_option(
+    "Write all points to this file: .parquet, .npz, .csv or, of a grid, .vts.", required=False
+)
 @force_option
 @json_option
 def field(
@@ -54,6 +66,7 @@ def field(
     loop: str,
     frame: str,
     csv_path: str | None,
+    output: str | None,
     *,
     force: bool,
     exact: bool,
@@ -69,23 +82,36 @@ def field(
     from warpspace.analysis.statistics import statistics, volume_statistics
     from warpspace.picture.coordinates import own_axes, spell_at, spell_point
     from warpspace.scene.library import load_scene
+    from warpspace.scene.pipeline import choose_view
 
     if points and grid is not None:
         raise OptionError("--at and --grid exclude each other; give one of them")
     check_targets(scene, force=force, csv_path=csv_path)
+    if output is not None:
+        _check_output(output, scene, force=force, points=bool(points))
     loaded = load_scene(scene)
+    view = choose_view(loaded, loop, frame)
     with progress("evaluating", silent=as_json):
-        axes, result, nodes = _evaluate(loaded, points, grid, loop=loop, frame=frame, exact=exact)
-    plain = statistics(result, axes)
-    summary = plain if nodes is None else volume_statistics(result, nodes)
-    if csv_path is not None:
-        from warpspace.outputs.exports.table import write_field_csv
+        axes, result, nodes = _evaluate(loaded, points, grid, view, exact=exact)
+        plain = statistics(result, axes)
+        summary = plain if nodes is None else volume_statistics(result, nodes)
+    files = [path for path in (csv_path, output) if path is not None]
+    if files:
+        from warpspace.outputs.exports.fields import FieldRecord, write_field
+        from warpspace.picture.scene_picture import field_remarks
 
-        write_field_csv(csv_path, axes, result, overwrite=force)
+        about = {**field_remarks(loaded, view, exact=exact), "frame": frame}
+        with progress("writing", silent=as_json):
+            for path in files:
+                write_field(FieldRecord(axes, result, about), path, overwrite=force)
     if as_json:
         found = {"statistics": asdict(summary)}
         if nodes is not None:
             found["statistics_nodes"] = asdict(plain)
+        if output is not None:
+            size = {"output": output, "points_written": result.norm_um.size}
+            click.echo(spell_json({**size, **found}))
+            return
         _print_json(axes, result, found)
         return
     print_text(f"{loaded.title} · {loop} loop · {'exact' if exact else 'first order'}")
@@ -101,24 +127,31 @@ def field(
     worst = own_axes(loaded, summary.max_at_axes)
     print_text(f"  max at {spell_point(worst, summary.max_at_mm)} mm")
     print_text(f"  --at {spell_at(worst)}")
+    for path in files:
+        print_text(f"  {path}: {size_text(Path(path))}")
+
+
+def _check_output(output: str, scene: str, *, force: bool, points: bool) -> None:
+    """Refuse a file that cannot be written, or cannot hold what it is to hold."""
+    from warpspace.outputs.exports.fields import FIELD_ENDINGS, GRID_ENDINGS
+
+    target = check_output(output, FIELD_ENDINGS, force=force, scenes=(scene,))
+    if points and target.suffix.lower() in GRID_ENDINGS:
+        others = ", ".join(ending for ending in FIELD_ENDINGS if ending not in GRID_ENDINGS)
+        raise OptionError(
+            f"{output}: a {target.suffix} file holds a grid, --at gives points; expected {others}"
+        )
 
 
 def _evaluate(
-    scene: "Scene",
-    points: tuple[str, ...],
-    grid: int | None,
-    *,
-    loop: str,
-    frame: str,
-    exact: bool,
-) -> "tuple[dict[str, Array], ErrorField, Grid | None]":
-    """Evaluate at the points given or over the grid; axis positions and field, both flat."""
+    scene: "Scene", points: tuple[str, ...], grid: int | None, view: "View", *, exact: bool
+) -> "tuple[Mapping[str, Array], ErrorField, Grid | None]":
+    """Evaluate at the points given or over the grid; axis positions broadcast to the field."""
     import numpy as np
 
-    from warpspace.field.basis import ErrorField
     from warpspace.field.grid import DEFAULT_NODES, build_grid
     from warpspace.kinematics.model import complete_coordinates
-    from warpspace.scene.pipeline import evaluate
+    from warpspace.scene.pipeline import evaluate, evaluate_grid
 
     if points:
         typed = [parse_point(text, scene.machine.axes) for text in points]
@@ -126,27 +159,17 @@ def _evaluate(
             complete_coordinates(scene.machine, point, scene.workspace.positions) for point in typed
         ]
         axes = {name: np.array([point[name] for point in full]) for name in scene.machine.axes}
-        found = evaluate(scene, at=axes, loop=loop, exact=exact, frame=frame)
+        found = evaluate(scene, at=axes, loop=view.loop, exact=exact, frame=view.frame)
         for point in typed:
             warn_outside_travel(scene.machine, point)
         return axes, found, None
     nodes = DEFAULT_NODES if grid is None else grid
     built = build_grid(scene.model, scene.workspace, nodes)
-    axes = {
-        name: np.broadcast_to(value, built.shape).reshape(-1)
-        for name, value in built.coordinates.items()
-    }
-    found = evaluate(scene, grid=nodes, loop=loop, exact=exact, frame=frame)
-    flat = ErrorField(
-        found.nominal_mm.reshape(-1, 3),
-        found.error_um.reshape(-1, 3),
-        found.orientation_urad.reshape(-1, 3),
-    )
-    return axes, flat, built
+    return built.coordinates, evaluate_grid(scene, built, view, exact=exact), built
 
 
 def _print_json(
-    axes: "dict[str, Array]", result: "ErrorField", found: "Mapping[str, Mapping[str, object]]"
+    axes: "Mapping[str, Array]", result: "ErrorField", found: "Mapping[str, Mapping[str, object]]"
 ) -> None:
     """Print the JSON object piece by piece: a million points are never held as one text."""
     import numpy as np
@@ -157,13 +180,19 @@ def _print_json(
     if not all(np.isfinite(values).all() for values in arrays):
         raise OptionError("the field has points whose error is no number; JSON cannot hold them")
     click.echo('{"points": [', nl=False)
+    nominal, error, orientation = (
+        values.reshape(-1, 3)
+        for values in (result.nominal_mm, result.error_um, result.orientation_urad)
+    )
+    positions = {
+        name: np.broadcast_to(values, result.norm_um.shape).reshape(-1)
+        for name, values in axes.items()
+    }
     for start in range(0, result.norm_um.size, POINTS_AT_ONCE):
         part = slice(start, start + POINTS_AT_ONCE)
         rows = _rows(
-            {name: values[part] for name, values in axes.items()},
-            ErrorField(
-                result.nominal_mm[part], result.error_um[part], result.orientation_urad[part]
-            ),
+            {name: values[part] for name, values in positions.items()},
+            ErrorField(nominal[part], error[part], orientation[part]),
         )
         click.echo((", " if start else "") + spell_json(rows)[1:-1], nl=False)
     click.echo(
@@ -193,7 +222,7 @@ def _rows(axes: "dict[str, Array]", result: "ErrorField") -> list[dict[str, obje
     ]
 
 
-def _list_points(axes: "dict[str, Array]", result: "ErrorField", units: "Sequence[str]") -> None:
+def _list_points(axes: "Mapping[str, Array]", result: "ErrorField", units: "Sequence[str]") -> None:
     """Print the first points, one line each."""
     listed = min(result.norm_um.size, MAX_LISTED)
     errors, tilts = result.error_um.tolist(), result.orientation_urad.tolist()
@@ -221,4 +250,4 @@ def _list_points(axes: "dict[str, Array]", result: "ErrorField", units: "Sequenc
     ]
     print_table(columns, rows)
     if result.norm_um.size > MAX_LISTED:
-        print_text(f"  … {result.norm_um.size - MAX_LISTED} more; --csv or --json has all")
+        print_text(f"  … {result.norm_um.size - MAX_LISTED} more; -o, --csv or --json has all")

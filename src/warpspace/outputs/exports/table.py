@@ -1,23 +1,12 @@
-"""Error fields as CSV: a header with units in the names, one row a point."""
+"""The field of a picture as CSV: a header with units in the names, one row a point."""
 
-import csv
-import io
-from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
-
-from warpspace.field.basis import ErrorField
-from warpspace.machine.axes import is_linear
+from warpspace.outputs.exports.fields import FieldRecord, write_numbers_csv
 from warpspace.outputs.files import write_atomically
 from warpspace.picture.scene_picture import ScenePicture
-from warpspace.units import Array
 
-COLUMNS = (
-    *("R_x_mm", "R_y_mm", "R_z_mm", "error_x_um", "error_y_um", "error_z_um", "norm_um"),
-    *("orientation_x_urad", "orientation_y_urad", "orientation_z_urad"),
-)
-_NUMBER = "%.9g"
+_FORMULA = ("=", "+", "-", "@")
 
 
 def write_csv(picture: ScenePicture, path: str | Path, *, overwrite: bool = True) -> None:
@@ -40,64 +29,11 @@ def write_csv(picture: ScenePicture, path: str | Path, *, overwrite: bool = True
     Behind the numbers every row says what it belongs to (scene, loop, reference, convention,
     program), so that tables of several scenes can be put under each other.
     """
-    grid = picture.grid
-    axes = {
-        name: np.broadcast_to(value, grid.shape).reshape(-1)
-        for name, value in grid.coordinates.items()
+    record = FieldRecord(picture.grid.coordinates, picture.field)
+    # no spreadsheet takes a text for a formula
+    remarks = {
+        name: f"'{text}" if text.startswith(_FORMULA) else text
+        for name, text in picture.remarks.items()
     }
-    write_field_csv(path, axes, picture.field, remarks=picture.remarks, overwrite=overwrite)
-
-
-def write_field_csv(
-    path: str | Path,
-    axes: Mapping[str, Array],
-    field: ErrorField,
-    *,
-    remarks: Mapping[str, str] | None = None,
-    overwrite: bool = True,
-) -> None:
-    """Write axis positions, nominal points in R, errors and orientation, one row a point.
-
-    Parameters
-    ----------
-    path : str or Path
-    axes : mapping of str to ndarray, [n], mm or degrees
-    field : ErrorField
-        Of n points, whatever their shape.
-    remarks : mapping of str to str, optional
-        Columns that say the same in every row.
-    overwrite : bool, optional
-        Whether an existing file may be replaced.
-
-    Raises
-    ------
-    OutputError
-        If the file cannot be written.
-    """
-    table = np.column_stack(
-        [
-            *axes.values(),
-            field.nominal_mm.reshape(-1, 3),
-            field.error_um.reshape(-1, 3),
-            field.norm_um.reshape(-1),
-            field.orientation_urad.reshape(-1, 3),
-        ]
-    )
-    names = [f"axis_{name}_{'mm' if is_linear(name) else 'deg'}" for name in axes]
-    remarks = remarks or {}
-    row = ",".join([_NUMBER] * table.shape[1])
-    tail = "".join("," + _quoted(text) for text in remarks.values()) + "\n"
-    with (
-        write_atomically(path, overwrite=overwrite) as temporary,
-        temporary.open("w", encoding="utf-8", newline="") as file,
-    ):
-        file.write(",".join([*names, *COLUMNS, *remarks]) + "\n")
-        file.writelines(row % tuple(values) + tail for values in table.tolist())
-
-
-def _quoted(text: str) -> str:
-    """Spell a text as one CSV field; no spreadsheet takes it for a formula."""
-    line = io.StringIO()
-    safe = f"'{text}" if text[:1] in ("=", "+", "-", "@") else text
-    csv.writer(line, lineterminator="").writerow([safe])
-    return line.getvalue()
+    with write_atomically(path, overwrite=overwrite) as temporary:
+        write_numbers_csv(record, temporary, remarks)

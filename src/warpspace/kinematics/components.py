@@ -1,0 +1,137 @@
+"""Vectors and matrices as tuples of their components, each an array over as few axes as it needs.
+
+Over a grid a component that varies along one axis is held once for all nodes along the others, and
+one that never varies is a plain float: zeros and ones then cost nothing. Batches of any shape that
+broadcasts go together, and no array ends with a short dimension, which numpy is slow at.
+"""
+
+from collections.abc import Iterable
+from typing import TypeAlias
+
+from warpspace.units import Array
+
+Number: TypeAlias = Array | float
+"""One component, [...]; a float where it is the same everywhere."""
+Triple: TypeAlias = tuple[Number, Number, Number]
+"""Components of a vector along x, y and z."""
+Rows: TypeAlias = tuple[Triple, Triple, Triple]
+"""Rows of a matrix of three by three."""
+
+ZERO: Triple = (0.0, 0.0, 0.0)
+ZERO_ROWS: Rows = (ZERO, ZERO, ZERO)
+
+
+def triple(values: Iterable[Number]) -> Triple:
+    """Give three components as a tuple."""
+    x, y, z = values
+    return x, y, z
+
+
+def split(vectors: Array) -> Triple:
+    """Split vectors, [..., 3], into components; one that never varies becomes a float."""
+    return triple(_plain(vectors[..., index]) for index in range(3))
+
+
+def split_rows(matrices: Array) -> Rows:
+    """Split matrices, [..., 3, 3], into components; one that never varies becomes a float."""
+    x, y, z = (split(matrices[..., index, :]) for index in range(3))
+    return x, y, z
+
+
+def join(components: Iterable[Number], out: Array) -> None:
+    """Write components into vectors, [..., 3]."""
+    for index, values in enumerate(components):
+        out[..., index] = values
+
+
+def plus(one: Number, other: Number) -> Number:
+    """Add two components."""
+    if isinstance(one, float) and one == 0.0:
+        return other
+    if isinstance(other, float) and other == 0.0:
+        return one
+    return one + other
+
+
+def times(one: Number, other: Number) -> Number:
+    """Multiply two components."""
+    for first, second in ((one, other), (other, one)):
+        if isinstance(first, float) and first in (0.0, 1.0):
+            return second if first else 0.0
+    return one * other
+
+
+def dot(one: Triple, other: Triple) -> Number:
+    """Scalar product of two vectors."""
+    x, y, z = map(times, one, other)
+    return plus(plus(x, y), z)
+
+
+def add(one: Triple, other: Triple) -> Triple:
+    """Add two vectors."""
+    return triple(map(plus, one, other))
+
+
+def subtract(one: Triple, other: Triple) -> Triple:
+    """Subtract one vector from another."""
+    return add(one, scale(-1.0, other))
+
+
+def scale(factor: Number, vector: Triple) -> Triple:
+    """Multiply a vector by a number."""
+    return triple(times(factor, value) for value in vector)
+
+
+def cross(one: Triple, other: Triple) -> Triple:
+    """Vector product of two vectors."""
+    (a, b, c), (x, y, z) = one, scale(-1.0, other)
+    u, v, w = other
+    return (
+        plus(times(b, w), times(c, y)),
+        plus(times(c, u), times(a, z)),
+        plus(times(a, v), times(b, x)),
+    )
+
+
+def rotate(rows: Rows, vector: Triple) -> Triple:
+    """Multiply a matrix by a vector."""
+    return triple(dot(row, vector) for row in rows)
+
+
+def move(transform: Array, point: Triple) -> Triple:
+    """Take a point from child to parent coordinates by a transformation, [..., 4, 4]."""
+    turned = rotate(split_rows(transform[..., :3, :3]), point)
+    return add(turned, split(transform[..., :3, 3]))
+
+
+def multiply(one: Rows, other: Rows) -> Rows:
+    """Multiply two matrices."""
+    columns = transpose(other)
+    x, y, z = (triple(dot(row, column) for column in columns) for row in one)
+    return x, y, z
+
+
+def add_rows(one: Rows, other: Rows) -> Rows:
+    """Add two matrices."""
+    x, y, z = map(add, one, other)
+    return x, y, z
+
+
+def subtract_rows(one: Rows, other: Rows) -> Rows:
+    """Subtract one matrix from another."""
+    x, y, z = map(subtract, one, other)
+    return x, y, z
+
+
+def transpose(rows: Rows) -> Rows:
+    """Swap rows and columns."""
+    (a, b, c), (d, e, f), (g, h, i) = rows
+    return (a, d, g), (b, e, h), (c, f, i)
+
+
+def _plain(values: Array) -> Number:
+    """Give a float for values that are all the same."""
+    if not values.size:
+        return values
+    first = values.flat[0]
+    return float(first) if (values == first).all() else values
