@@ -55,6 +55,11 @@ class ErrorSet:
         """Iterate over the keys that are given."""
         return iter(self.functions)
 
+    @property
+    def has_directions(self) -> bool:
+        """Whether any error depends on the direction of travel."""
+        return any(function.has_directions for function in self.functions.values())
+
     def arguments(self, key: str) -> tuple[str, ...]:
         """List the axes whose positions one error depends on; none where it is constant or zero."""
         function = self.functions.get(key)

@@ -115,9 +115,25 @@ class ErrorFunction(ABC):
         return self.with_amplitude(1.0).evaluate_at(axis, coordinates, direction)
 
     @property
+    def has_directions(self) -> bool:
+        """Whether it depends on the direction of travel."""
+        return False
+
+    @property
     def lines(self) -> tuple[tuple[str, "ErrorFunction"], ...]:
         """Curves along the axis of the error that show it in a chart, each with its words."""
         return (("", self),)
+
+    def without_axes(self, positions: Mapping[str, float]) -> "ErrorFunction":
+        """Give the curve that is left where axes stand still for good.
+
+        Parameters
+        ----------
+        positions : mapping of str to float, mm or degrees
+            Where each of the axes stands that are gone; the axis of the error is not among them.
+        """
+        del positions
+        return self
 
     @property
     def parts(self) -> tuple["ErrorFunction", ...]:

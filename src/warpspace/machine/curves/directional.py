@@ -70,6 +70,11 @@ class Directional(ErrorFunction):
         )
 
     @property
+    def has_directions(self) -> bool:
+        """It does."""
+        return True
+
+    @property
     def lines(self) -> tuple[tuple[str, ErrorFunction], ...]:
         """The curves of both directions."""
         pairs = (("forward", self.forward), ("backward", self.backward))
@@ -93,6 +98,11 @@ class Directional(ErrorFunction):
         """The amplitude of the curve whose one is larger, forward where they are alike."""
         there, back = self.forward.amplitude, self.backward.amplitude
         return back if math.isnan(back) or abs(back) > abs(there) else there
+
+    def without_axes(self, positions: Mapping[str, float]) -> ErrorFunction:
+        """Give both curves without the axes."""
+        there, back = (one.without_axes(positions) for one in (self.forward, self.backward))
+        return replace(self, forward=there, backward=back)
 
     @property
     def kinks(self) -> tuple[float, ...]:

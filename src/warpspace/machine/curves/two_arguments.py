@@ -101,6 +101,11 @@ class TwoArguments(ErrorFunction):
         values = self._bilinear(np.array(at), np.asarray(other))
         return Table(self.span, tuple(zip(at, values.tolist(), strict=True)))
 
+    def without_axes(self, positions: Mapping[str, float]) -> ErrorFunction:
+        """Give the section where the other axis stands, if it is gone."""
+        other = self.axes[1]
+        return self.section(positions[other]) if other in positions else self
+
     @property
     def lines(self) -> tuple[tuple[str, ErrorFunction], ...]:
         """Sections at the first, the middle and the last position of the other axis."""

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from warpspace.analysis.uncertain import FieldUncertainty
 from warpspace.field.basis import ErrorField
 from warpspace.machine.axes import is_linear
 from warpspace.outputs.files import write_atomically
@@ -17,6 +18,10 @@ COLUMNS = (
     *("R_x_mm", "R_y_mm", "R_z_mm", "error_x_um", "error_y_um", "error_z_um", "norm_um"),
     *("orientation_x_urad", "orientation_y_urad", "orientation_z_urad"),
 )
+UNCERTAIN_COLUMNS = tuple(
+    f"uncertainty_{name.removeprefix('error_')}" for name in COLUMNS if not name.startswith("R_")
+)
+"""Of standard uncertainties (k = 1), behind those of the field."""
 _NUMBER = "%.9g"
 
 
@@ -54,6 +59,7 @@ def write_field_csv(
     field: ErrorField,
     *,
     remarks: Mapping[str, str] | None = None,
+    uncertainty: FieldUncertainty | None = None,
     overwrite: bool = True,
 ) -> None:
     """Write axis positions, nominal points in R, errors and orientation, one row a point.
@@ -66,6 +72,8 @@ def write_field_csv(
         Of n points, whatever their shape.
     remarks : mapping of str to str, optional
         Columns that say the same in every row.
+    uncertainty : FieldUncertainty, optional
+        Standard uncertainty of each point, in columns of its own.
     overwrite : bool, optional
         Whether an existing file may be replaced.
 
@@ -74,15 +82,17 @@ def write_field_csv(
     OutputError
         If the file cannot be written.
     """
-    table = np.column_stack(
-        [
-            *axes.values(),
-            field.nominal_mm.reshape(-1, 3),
-            field.error_um.reshape(-1, 3),
-            field.norm_um.reshape(-1),
-            field.orientation_urad.reshape(-1, 3),
-        ]
-    )
+    parts = [
+        *axes.values(),
+        field.nominal_mm.reshape(-1, 3),
+        field.error_um.reshape(-1, 3),
+        field.norm_um.reshape(-1),
+        field.orientation_urad.reshape(-1, 3),
+    ]
+    if uncertainty is not None:
+        parts += [uncertainty.error_um, uncertainty.norm_um, uncertainty.orientation_urad]
+    table = np.column_stack(parts)
+    columns = COLUMNS if uncertainty is None else (*COLUMNS, *UNCERTAIN_COLUMNS)
     names = [f"axis_{name}_{'mm' if is_linear(name) else 'deg'}" for name in axes]
     remarks = remarks or {}
     row = ",".join([_NUMBER] * table.shape[1])
@@ -91,7 +101,7 @@ def write_field_csv(
         write_atomically(path, overwrite=overwrite) as temporary,
         temporary.open("w", encoding="utf-8", newline="") as file,
     ):
-        file.write(",".join([*names, *COLUMNS, *remarks]) + "\n")
+        file.write(",".join([*names, *columns, *remarks]) + "\n")
         file.writelines(row % tuple(values) + tail for values in table.tolist())
 
 
