@@ -9,7 +9,7 @@ from markupsafe import Markup
 from warpspace import load_scene
 from warpspace.app.browser.arrangement import split_script
 from warpspace.app.browser.clicks import LONGEST_WORD, MOST_CLICKS, SCRIPT, read_clicks
-from warpspace.app.panels.view import COMPONENT_NAMES, component_of
+from warpspace.app.panels.view_words import COMPONENT_NAMES, component_of
 from warpspace.app.readouts.error_controls import error_controls, with_switched
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import start_state

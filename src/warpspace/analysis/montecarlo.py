@@ -21,6 +21,7 @@ from warpspace.analysis.draws import Draws
 from warpspace.analysis.nodes import Over, node_gains, reduce_nodes
 from warpspace.analysis.points import (
     Cylinder,
+    Places,
     choose_cylinder,
     extreme_places,
     random_places,
@@ -161,7 +162,36 @@ def montecarlo(
     """
     view, plan = view or View(), plan or Plan()
     plan.check()
-    job = _job(model, draws, workspace, view, plan)
+    job = build_job(
+        model,
+        workspace,
+        view,
+        plan,
+        draws.draw,
+        lambda places: node_gains(model, draws.keys, view, places),
+    )
+    return collect(job, draws, view, plan, progress)
+
+
+def collect(
+    job: Job, draws: Draws, view: View, plan: Plan, progress: Progress | None = None
+) -> MonteCarlo:
+    """Sample machines with a job and collect the distribution of their |E|.
+
+    Parameters
+    ----------
+    job : callable
+        See `build_job`.
+    draws : Draws
+        What the result says was drawn.
+    view : View
+    plan : Plan
+    progress : callable, optional
+
+    Returns
+    -------
+    MonteCarlo
+    """
     stream = Stream(plan.samples, plan.spec_um)
     for values in sample_chunks(job, plan):
         stream.add(values)
@@ -223,24 +253,48 @@ def sample_chunks(job: Job, plan: Plan) -> Iterator[Array]:
             executor.shutdown(wait=False, cancel_futures=True)
 
 
-def _job(model: Model, draws: Draws, workspace: Workspace, view: View, plan: Plan) -> Job:
-    """Build what a chunk of machines goes through."""
+def build_job(
+    model: Model,
+    workspace: Workspace,
+    view: View,
+    plan: Plan,
+    draw: Job,
+    gains_at: Callable[[Places], Array],
+) -> Job:
+    """Build what a chunk of machines goes through.
+
+    Parameters
+    ----------
+    model : Model
+    workspace : Workspace
+    view : View
+    plan : Plan
+    draw : callable
+        Takes a random generator and a number n, gives values of machines, [n, K].
+    gains_at : callable
+        Gives what one unit of each value does at places, [3, K, N], µm.
+
+    Returns
+    -------
+    callable
+        Takes a random generator and a number n, gives |E| of machines, [n], µm.
+    """
     cylinder = choose_cylinder(model, plan.cylinder) if view.loop is Loop.WORKPIECE else None
     over = Over(plan.over)
     if over is Over.SAMPLED:
 
         def one_point_each(rng: np.random.Generator, count: int) -> Array:
-            amplitudes = draws.draw(rng, count)
+            values = draw(rng, count)
             places = random_places(model, view.loop, workspace, cylinder, rng, count)
-            gains = node_gains(model, draws.keys, view, places)
-            return np.sqrt(sum((np.einsum("nk,kn->n", amplitudes, gain) ** 2) for gain in gains))
+            gains = gains_at(places)
+            return np.sqrt(sum((np.einsum("nk,kn->n", values, gain) ** 2) for gain in gains))
 
         return one_point_each
     find = extreme_places if over is Over.MAX else spread_places
     places = find(model, view.loop, workspace, cylinder, plan.nodes)
-    gains = node_gains(model, draws.keys, view, places)
+    gains = gains_at(places)
 
     def all_points_each(rng: np.random.Generator, count: int) -> Array:
-        return reduce_nodes(draws.draw(rng, count), gains, over, places.weights)
+        return reduce_nodes(draw(rng, count), gains, over, places.weights)
 
     return all_points_each

@@ -1,6 +1,7 @@
 """|E| of many machines at many nodes: the matrix products behind sampling."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from enum import StrEnum
 
 import numpy as np
@@ -9,6 +10,7 @@ from warpspace.analysis.points import Places
 from warpspace.field.evaluate import View, build_basis
 from warpspace.kinematics.model import Model
 from warpspace.machine.errors import ErrorSet
+from warpspace.machine.travel import TravelDirection
 from warpspace.units import Array
 
 BLOCK_MULTIPLICATIONS = 900_000
@@ -38,6 +40,7 @@ def node_gains(model: Model, keys: Sequence[str], view: View, places: Places) ->
     ndarray, [3, K, N], µm per µm or µrad
         One contiguous matrix per component of E.
     """
+    model = replace(model, direction=TravelDirection.MEAN)  # gains have none
     basis = build_basis(model, ErrorSet(), keys, places.coordinates, view, places.point_mm)
     flat = basis.position.reshape(len(keys), -1, 3)
     return np.ascontiguousarray(np.moveaxis(flat, -1, 0))

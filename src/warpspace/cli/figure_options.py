@@ -9,6 +9,7 @@ from warpspace.cli.file_options import force_option
 from warpspace.cli.options import (
     Decorator,
     component_option,
+    direction_option,
     exaggeration_option,
     grid_option,
     loop_option,
@@ -46,6 +47,7 @@ def figure_options(size: str = "1600x1200") -> Decorator:
             help="Width and height of the picture in px.",
         ),
         loop_option,
+        direction_option,
         grid_option(),
         click.option("--dark", is_flag=True, help="Light ink on a dark ground."),
         force_option,

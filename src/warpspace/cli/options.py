@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 LOOPS = ("tool", "workpiece", "relative")
+DIRECTIONS = ("mean", "forward", "backward", "difference")
 COMPONENTS = ("norm", "x", "y", "z")
 
 
@@ -52,6 +53,12 @@ loop_option = click.option(
     default="tool",
     show_default=True,
     help="Structural loop: tool point, workpiece point, or tool relative to workpiece.",
+)
+direction_option = click.option(
+    "--direction",
+    type=click.Choice(DIRECTIONS),
+    help="Direction of travel for errors that depend on it: their mean, forward, backward, or the"
+    " difference forward − backward, which maps the reversal.  [what the scene says]",
 )
 component_option = click.option(
     "--component",

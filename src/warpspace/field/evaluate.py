@@ -7,7 +7,7 @@ an array over these.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from warpspace.kinematics.firstorder import jacobian
 from warpspace.kinematics.model import Coordinates, Loop, Model, batch_shape
 from warpspace.machine.errors import ErrorSet
 from warpspace.machine.parameters import parameter
+from warpspace.machine.travel import TravelDirection
 from warpspace.units import Array
 
 
@@ -55,11 +56,12 @@ def error_values(model: Model, errors: ErrorSet, coordinates: Coordinates) -> di
     Returns
     -------
     dict of str to ndarray, [...], µm or µrad
-        Parameters whose axis the machine does not have are left out.
+        In the direction of travel of the model. Parameters whose axis the machine does not have are
+        left out.
     """
     axes = model.machine.axes
     return {
-        key: errors.evaluate(key, coordinates[parameter(key).axis])
+        key: errors.evaluate_at(key, coordinates, model.direction)
         for key in errors
         if parameter(key).axis in axes
     }
@@ -139,9 +141,8 @@ def _shaped_jacobian(
     """Jacobian with the unit curve of each parameter folded in, [K, ..., 3] twice."""
     position, orientation = jacobian(model, view.loop, keys, coordinates, point)
     for index, key in enumerate(keys):
-        function = errors.functions.get(key)
-        if function is not None:
-            shape = function.shape(coordinates[parameter(key).axis])[..., None]
+        if key in errors.functions or model.direction == TravelDirection.DIFFERENCE:
+            shape = errors.shape_at(key, coordinates, model.direction)[..., None]
             position[index] *= shape
             orientation[index] *= shape
     return position, orientation
@@ -173,8 +174,21 @@ def evaluate_exact(
     Returns
     -------
     ErrorField
+        Where the model looks at the difference of both directions of travel, the field forward
+        minus that backward.
     """
-    return _evaluate(model, errors, coordinates, view or View(), point_mm, exact=True)
+    view = view or View()
+    if model.direction == TravelDirection.DIFFERENCE:
+        there, back = (
+            evaluate_exact(replace(model, direction=way), errors, coordinates, view, point_mm)
+            for way in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
+        )
+        return ErrorField(
+            there.nominal_mm,
+            there.error_um - back.error_um,
+            there.orientation_urad - back.orientation_urad,
+        )
+    return _evaluate(model, errors, coordinates, view, point_mm, exact=True)
 
 
 def evaluate_first_order(

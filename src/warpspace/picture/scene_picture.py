@@ -15,6 +15,7 @@ from warpspace.picture.exaggeration import Exaggeration, choose_exaggeration
 from warpspace.picture.model import Picture, coloured_values
 from warpspace.picture.size import picture_size_mm
 from warpspace.picture.traces import TraceLines, evaluate_traces
+from warpspace.picture.words import direction_words
 from warpspace.scene.model import Scene
 from warpspace.scene.pipeline import choose_view, evaluate
 from warpspace.scene.save import scene_to_toml
@@ -164,6 +165,6 @@ def evaluate_picture(
         component=component,
         quantity=quantity,
         colours=colours,
-        conditions=tuple(conditions),
+        conditions=(*direction_words(scene), *conditions),
         scene=scene,
     )

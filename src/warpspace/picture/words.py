@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from warpspace.kinematics.conventions.convention import Convention
 from warpspace.kinematics.model import Loop, Model
 from warpspace.machine.tolerances import ToleranceSet
+from warpspace.machine.travel import DIRECTION_WORDS, TravelDirection
 from warpspace.picture.coordinates import MINUS, list_axes
 from warpspace.scene.model import Scene
 from warpspace.units import Array
@@ -126,6 +127,13 @@ def convention_words(scene: Scene) -> str:
         return groups[0][0].short_words
     parts = [f"{convention.place} of {' '.join(axes)}" for convention, axes in groups]
     return f"component errors {', '.join(parts)}"
+
+
+def direction_words(scene: Scene) -> tuple[str, ...]:
+    """Say for which direction of travel errors are drawn; nothing where none depends on it."""
+    if not scene.errors.has_directions and scene.model.direction == TravelDirection.MEAN:
+        return ()
+    return (DIRECTION_WORDS[TravelDirection(scene.model.direction)],)
 
 
 def convention_sentences(scene: Scene) -> tuple[str, ...]:

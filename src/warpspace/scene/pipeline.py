@@ -18,6 +18,7 @@ from warpspace.field.evaluate import (
 from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid
 from warpspace.kinematics.model import Coordinates, Loop, complete_coordinates
 from warpspace.machine.parameters import parameter
+from warpspace.machine.travel import TravelDirection
 from warpspace.scene.model import Scene
 from warpspace.scene.schema import MAX_ERROR
 
@@ -103,6 +104,28 @@ def _check_magnitude(scene: Scene, coordinates: Coordinates) -> None:
                 f"{key} reaches {peak:.3g} {row.unit} at the positions given for {row.axis};"
                 f" expected at most ±{MAX_ERROR:g}"
             )
+
+
+def in_direction(scene: Scene, direction: str | None) -> Scene:
+    """Give a scene whose errors are looked at for a direction of travel.
+
+    Parameters
+    ----------
+    scene : Scene
+    direction : str or None
+        One of `TravelDirection`; None for that of the scene.
+
+    Raises
+    ------
+    OptionError
+        If there is no such direction.
+    """
+    if direction is None:
+        return scene
+    if direction not in [*TravelDirection]:
+        known = ", ".join(TravelDirection)
+        raise OptionError(f"direction {direction!r}; expected one of {known}")
+    return replace(scene, model=replace(scene.model, direction=TravelDirection(direction)))
 
 
 def choose_view(scene: Scene, loop: Loop | str, frame: str = "machine") -> View:

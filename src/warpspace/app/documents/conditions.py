@@ -3,7 +3,7 @@
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.picture.comparison import conditions_of_both
-from warpspace.picture.words import exclusion_words, range_words
+from warpspace.picture.words import direction_words, exclusion_words, range_words
 
 
 def state_conditions(state: AppState) -> tuple[str, ...]:
@@ -29,6 +29,11 @@ def state_conditions(state: AppState) -> tuple[str, ...]:
     return ()
 
 
+def all_conditions(state: AppState) -> tuple[str, ...]:
+    """Say the direction of travel, and which errors do not take part."""
+    return (*direction_words(state.scene), *state_conditions(state))
+
+
 def picture_conditions(picture: LivePicture) -> tuple[str, ...]:
     """Say all that a file of a picture must say; of a difference for both sides.
 
@@ -41,10 +46,10 @@ def picture_conditions(picture: LivePicture) -> tuple[str, ...]:
     tuple of str
     """
     if picture.is_difference and picture.compared is not None:
-        a, b = (state_conditions(side) for side in picture.compared.sides)
+        a, b = (all_conditions(side) for side in picture.compared.sides)
         found = conditions_of_both(a, b)
     else:
-        found = state_conditions(picture.drawn_state)
+        found = all_conditions(picture.drawn_state)
     return (*found, *range_conditions(picture))
 
 

@@ -15,6 +15,7 @@ from warpspace.field.grid import Grid, build_grid
 from warpspace.kinematics.conventions.registry import convention_names
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
+from warpspace.machine.travel import TravelDirection
 from warpspace.scene.model import Scene
 from warpspace.scene.pipeline import grid_basis
 from warpspace.units import Array
@@ -56,6 +57,14 @@ def with_component_errors(state: AppState, order: str) -> AppState:
     if order not in convention_names():
         return state
     model = replace(state.scene.model, component_errors=order, own_component_errors=())
+    return _with_scene(state, replace(state.scene, model=model))
+
+
+def with_travel(state: AppState, direction: str) -> AppState:
+    """Look at errors for another direction of travel; an unknown one changes nothing."""
+    if direction not in [*TravelDirection]:
+        return state
+    model = replace(state.scene.model, direction=TravelDirection(direction))
     return _with_scene(state, replace(state.scene, model=model))
 
 
@@ -122,6 +131,7 @@ def with_own_conventions(state: AppState) -> AppState:
         state.scene.model,
         component_errors=own.model.component_errors,
         own_component_errors=own.model.own_component_errors,
+        direction=own.model.direction,
         machine=replace(state.scene.machine, axes=axes),
     )
     return _with_scene(state, replace(state.scene, model=model, reference=held or None))

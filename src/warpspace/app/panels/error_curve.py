@@ -2,15 +2,13 @@
 
 from typing import Any
 
-import numpy as np
-from viser import uplot
-
 from warpspace.app.browser.handles import Input
 from warpspace.app.browser.viser_private import dom_id
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
-from warpspace.app.readouts.chart_text import chart_text, describe_curve
+from warpspace.app.readouts.chart_text import chart_text, describe_curve, measured_words
 from warpspace.app.readouts.charts import add_chart, chart_axis
+from warpspace.app.readouts.curve_chart import SERIES, curve_data
 from warpspace.app.readouts.html import message
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
@@ -18,20 +16,22 @@ from warpspace.app.state.curve_text import (
     convert_shape,
     kind_titles,
     read_curve,
-    sample_curve,
     shape_kind,
     spell_rows,
 )
 from warpspace.exceptions import OptionError
 from warpspace.machine.curves.registry import curve_kind
 from warpspace.machine.errors import Constant, ErrorFunction
+from warpspace.machine.measurement import Measurement
 from warpspace.machine.parameters import Parameter, parameter
 
-CURVE_COLOUR = "#4a7ab5"
-ZERO_COLOUR = "#9aa3af"
 CHART_HEIGHT = 128
 LABEL_WIDTH = 76
 """Room for the labels, which stand beside their controls here, CSS pixels."""
+
+
+Drawn = tuple[ErrorFunction, ErrorFunction | None, Measurement | None]
+"""A curve, its standard uncertainty and its readings."""
 
 
 class ErrorCurvePanel:
@@ -51,7 +51,7 @@ class ErrorCurvePanel:
         self._keys = tuple(state.amplitudes)
         # what the numbers stand for, and what is drawn
         self._written: ErrorFunction | None = None
-        self._drawn: ErrorFunction | None = None
+        self._drawn: Drawn | None = None
         self._which: Input[str] = Input(
             gui.add_dropdown(
                 "Error",
@@ -64,11 +64,8 @@ class ErrorCurvePanel:
         self._words: Any = gui.add_html("")
         self._chart: Any = add_chart(
             gui,
-            _chart_data(None, (0.0, 1.0)),
-            (
-                uplot.Series(label="error", stroke=CURVE_COLOUR, width=2),
-                uplot.Series(label="zero", stroke=ZERO_COLOUR, width=1),
-            ),
+            curve_data(None, (0.0, 1.0)),
+            SERIES,
             CHART_HEIGHT,
         )
         self._kind: Input[str] = Input(
@@ -150,14 +147,19 @@ class ErrorCurvePanel:
         function = edits.curve_of(state, self._key)
         if function != self._written:
             self._write(function, row)
-        if function != self._drawn:
-            self._draw(function, row, state)
+        scene = state.scene
+        drawn = (function, scene.uncertainty.get(row.key), scene.measured.get(row.key))
+        if drawn != self._drawn:
+            self._drawn = drawn
+            self._draw(drawn, row, state)
 
     def _write(self, function: ErrorFunction, row: Parameter) -> None:
         """Write kind and numbers of a curve."""
         self._written = function
         kind = shape_kind(function)
         kinds = (Constant.title,) if row.is_constant else kind_titles()
+        if not function.edited_as_rows:
+            kinds = (*kinds, kind)
         if self._kind.handle.options != kinds:
             self._kind.handle.options = kinds
         self._kind.show(kind)
@@ -165,13 +167,15 @@ class ErrorCurvePanel:
         self._rows.show(spell_rows(function))
         self._problem.content = ""
 
-    def _draw(self, function: ErrorFunction, row: Parameter, state: AppState) -> None:
-        """Draw the curve along the travel."""
-        self._drawn = function
+    def _draw(self, drawn: Drawn, row: Parameter, state: AppState) -> None:
+        """Draw the curve along the travel, with what is known of its measurement."""
         unit = state.scene.machine.axes[row.axis].unit
-        self._chart.data = at, value, _ = _chart_data(function, edits.axis_span(state, row.key))
+        function, *own = drawn
+        span = edits.axis_span(state, row.key)
+        self._chart.data = at, value, *_ = curve_data(function, span, *own)
         self._words.content = chart_text(
             describe_curve(f"{row.key}, {row.name}", row.unit, unit, at, value)
+            + measured_words(*own)
         )
         self._chart.axes = (
             chart_axis(f"{row.axis} [{unit}]", 34),
@@ -208,11 +212,3 @@ def _rows_hint(kind: str) -> str:
         f"{text[0].upper()}{text[1:]}. Blanks, tabs or semicolons between numbers, decimal point or"
         " comma, or cells pasted from a spreadsheet; q in mm or degrees."
     )
-
-
-def _chart_data(
-    function: ErrorFunction | None, span: tuple[float, float]
-) -> tuple[np.ndarray, ...]:
-    """Give position, value and zero for the chart."""
-    at, value = sample_curve(function, span)
-    return at, value, np.zeros(at.shape)

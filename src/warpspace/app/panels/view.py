@@ -1,72 +1,29 @@
 """The view panel: scene, exaggeration, component, loop, density, rotary positions, switches."""
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 from warpspace.app.browser.handles import Handle, Input
 from warpspace.app.browser.viser_private import dom_id
 from warpspace.app.documents.scene_list import dropped_words
 from warpspace.app.evaluation.cache import Identity
+from warpspace.app.evaluation.conventions import with_travel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
+from warpspace.app.panels.view_words import (
+    COMPONENT_NAMES,
+    LOOP_NAMES,
+    SWITCHES,
+    Names,
+    component_of,
+)
 from warpspace.app.readouts.help import about_scene
 from warpspace.app.state.app_state import EXAGGERATION, NODES, TRUE_SCALE, AppState
-from warpspace.kinematics.model import Loop
+from warpspace.machine.travel import DIRECTION_WORDS, TravelDirection
 from warpspace.scene.model import Scene
-
-COMPONENT_NAMES = {
-    "position": {"norm": "|E| length", "x": "E_x", "y": "E_y", "z": "E_z"},
-    "orientation": {
-        "norm": "|φ| tilt of the tool axis",
-        "x": "φ_x tilt about x",
-        "y": "φ_y tilt about y",
-        "z": "φ_z tilt about z",
-    },
-}
-"""What the components are called, for each quantity that can be coloured."""
-LOOP_NAMES = {
-    Loop.TOOL.value: "tool point",
-    Loop.WORKPIECE.value: "workpiece point",
-    Loop.RELATIVE.value: "tool relative to workpiece",
-}
-SWITCHES = {
-    "traces": ("Rotary traces", "Circles and arcs of the table: nominal light, actual dark."),
-    "ghost": ("Nominal box", "The working volume without errors, dashed."),
-    "grid_lines": ("Grid lines", "Lines of the grid on the deformed box."),
-    "axes": ("Axes", "Coordinates of the machine in mm."),
-    "dark": ("Dark mode", "Light lines on a dark ground; the colours of the map stay."),
-}
 
 UNSEEN = "position:absolute!important;width:1px!important;overflow:hidden;clip-path:inset(50%)"
 """Style of what only screen readers are to find."""
-
-
-class _Names:
-    """Words shown for the values of a dropdown, both ways."""
-
-    def __init__(self, shown: Mapping[str, str]) -> None:
-        self._shown = dict(shown)
-        self._value = {text: value for value, text in shown.items()}
-
-    @property
-    def options(self) -> tuple[str, ...]:
-        return tuple(self._value)
-
-    def text(self, value: str) -> str:
-        return self._shown.get(value, value)
-
-    def value(self, text: str) -> str:
-        return self._value.get(text, text)
-
-
-def component_of(text: str) -> str:
-    """Give the component that a name stands for, whatever is coloured meanwhile; else the text."""
-    for names in COMPONENT_NAMES.values():
-        for component, name in names.items():
-            if name == text:
-                return component
-    return text
 
 
 class ViewPanel:
@@ -104,13 +61,25 @@ class ViewPanel:
             ),
             changed,
         )
-        self._loops = _Names(LOOP_NAMES)
+        self._loops = Names(LOOP_NAMES)
         self._loop: Input[str] = Input(
             gui.add_dropdown(
                 "Structural loop",
                 self._loops.options,
                 initial_value=self._loops.text(state.loop),
                 hint="Structural loop: whose error deforms the box.",
+            ),
+            changed,
+        )
+        self._ways = Names(DIRECTION_WORDS)
+        self._way: Input[str] = Input(
+            gui.add_dropdown(
+                "Direction of travel",
+                self._ways.options,
+                initial_value=self._ways.text(state.scene.model.direction),
+                visible=_has_directions(state),
+                hint="Of errors that depend on it. The reversal is what is left when each position"
+                " is reached from both sides.",
             ),
             changed,
         )
@@ -217,10 +186,13 @@ class ViewPanel:
         elif log is not None:
             state = state.with_exaggeration(_from_log(log))
         component, loop, nodes = self._component.poll(), self._loop.poll(), self._nodes.poll()
+        way = self._way.poll()
         if component is not None:
             state = state.with_component(component_of(component))
         if loop is not None:
             state = state.with_loop(self._loops.value(loop))
+        if way is not None:
+            state = with_travel(state, self._ways.value(way))
         if nodes is not None:
             state = state.with_nodes(nodes)
         for axis, bound in self._positions.items():
@@ -251,6 +223,7 @@ class ViewPanel:
             Identity(state.origin),
             picture.exaggeration,
             (state.component, state.look.quantity, state.loop, state.nodes, state.shown),
+            (state.scene.model.direction, _has_directions(state)),
             Identity(state.positions),
             Identity(state.position_spans),
         )
@@ -268,6 +241,9 @@ class ViewPanel:
         self._log.show(max(round(math.log10(picture.exaggeration), 2), 0.0))
         self._show_component(state)
         self._loop.show(self._loops.text(state.loop))
+        self._way.show(self._ways.text(state.scene.model.direction))
+        if self._way.handle.visible != _has_directions(state):
+            self._way.handle.visible = _has_directions(state)
         self._nodes.show(float(state.nodes))
         for axis, bound in self._positions.items():
             bound.show(state.positions[axis])
@@ -281,6 +257,12 @@ class ViewPanel:
         if dropdown.options != options:
             dropdown.options = options
         self._component.show(names[state.component])
+
+
+def _has_directions(state: AppState) -> bool:
+    """Tell whether there is a direction of travel to choose."""
+    scene = state.scene
+    return scene.errors.has_directions or scene.model.direction != TravelDirection.MEAN
 
 
 def _from_log(log: float) -> float:

@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.app.readouts.html import render
+from warpspace.machine.curves.curve import ErrorFunction
+from warpspace.machine.measurement import Measurement
 from warpspace.picture.words import spell
 from warpspace.units import Array
 
@@ -52,6 +54,16 @@ def describe_curve(name: str, unit: str, along: str, at: Array, value: Array) ->
         if word.endswith("with") or place not in places[:2]
     ]
     return f"Chart of {name}: " + ", ".join(said)
+
+
+def measured_words(uncertainty: ErrorFunction | None, measurement: Measurement | None) -> str:
+    """Say what is known of the measurement of an error, behind the words of its curve."""
+    parts: list[str] = []
+    if uncertainty is not None:
+        parts.append(f"standard uncertainty up to {spell(abs(uncertainty.amplitude))}")
+    if measurement is not None:
+        parts.append(f"{measurement.count} readings in {len(measurement.runs)} runs")
+    return "".join(f", {part}" for part in parts)
 
 
 def describe_histogram(

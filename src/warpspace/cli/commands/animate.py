@@ -30,6 +30,7 @@ def animate(
     motion: str,
     frames: int,
     fps: float,
+    direction: str | None,
     *,
     force: bool,
     **options: Any,
@@ -41,10 +42,11 @@ def animate(
     from warpspace.outputs.animation.pictures import AnimationSettings
     from warpspace.outputs.animation.write import ENDINGS, write_animation
     from warpspace.scene.library import load_scene
+    from warpspace.scene.pipeline import in_direction
 
     check_output(output, ENDINGS, force=force, scenes=[scene])
     settings = AnimationSettings(motion, frames, fps, parse_settings(**options))
-    loaded = load_scene(scene)
+    loaded = in_direction(load_scene(scene), direction)
     with progress("drawing", frames, "pictures") as bar:
         write_animation(loaded, output, settings, overwrite=force, progress=bar.advance)
     echo(f"{output}: {frames} pictures, {frames / fps:.1f} s")

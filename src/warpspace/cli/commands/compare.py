@@ -26,7 +26,14 @@ if TYPE_CHECKING:
 @figure_options()
 @json_option
 def compare(
-    first: str, second: str, output: str | None, *, force: bool, as_json: bool, **options: Any
+    first: str,
+    second: str,
+    output: str | None,
+    direction: str | None,
+    *,
+    force: bool,
+    as_json: bool,
+    **options: Any,
 ) -> None:
     """Compare the errors of two scenes; the change is B − A.
 
@@ -40,12 +47,13 @@ def compare(
     from warpspace.picture.comparison import scene_change, statistics_change
     from warpspace.picture.scene_picture import evaluate_picture
     from warpspace.scene.library import load_scene
+    from warpspace.scene.pipeline import in_direction
 
     target = None
     if output is not None:
         target = check_output(output, FIGURE_ENDINGS, force=force, scenes=[first, second])
     settings = parse_settings(**options)
-    scenes = [load_scene(first), load_scene(second)]
+    scenes = [in_direction(load_scene(name), direction) for name in (first, second)]
     with progress("evaluating", silent=as_json):
         pictures = [evaluate_picture(s, grid=settings.grid, loop=settings.loop) for s in scenes]
     compared = [*pictures, scene_change(pictures[0], pictures[1])]

@@ -6,6 +6,7 @@ from warpspace.cli.exports import export_formats, write_export
 from warpspace.cli.file_options import check_output, force_option, output_option, size_text
 from warpspace.cli.options import (
     component_option,
+    direction_option,
     exaggeration_option,
     grid_option,
     loop_option,
@@ -29,6 +30,7 @@ def _formats_help() -> str:
 @grid_option()
 @component_option
 @loop_option
+@direction_option
 @force_option
 def export(
     scene: str,
@@ -37,6 +39,7 @@ def export(
     grid: int,
     component: str,
     loop: str,
+    direction: str | None,
     *,
     force: bool,
 ) -> None:
@@ -47,13 +50,14 @@ def export(
     """
     from warpspace.picture.scene_picture import evaluate_picture
     from warpspace.scene.library import load_scene
+    from warpspace.scene.pipeline import in_direction
 
     target = check_output(
         output, [form.ending for form in export_formats()], force=force, scenes=[scene]
     )
     with progress("writing"):
         picture = evaluate_picture(
-            load_scene(scene),
+            in_direction(load_scene(scene), direction),
             exaggeration=parse_exaggeration(exaggeration),
             grid=grid,
             loop=loop,

@@ -16,6 +16,7 @@ from warpspace.cli.file_options import (
 )
 from warpspace.cli.options import (
     at_option,
+    direction_option,
     grid_option,
     json_option,
     loop_option,
@@ -29,6 +30,7 @@ from warpspace.cli.tables import Column, number_columns, print_table, print_text
 from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
+    from warpspace.analysis.uncertain import FieldUncertainty
     from warpspace.field.basis import ErrorField
     from warpspace.field.evaluate import View
     from warpspace.field.grid import Grid
@@ -45,6 +47,13 @@ POINTS_AT_ONCE = 5000
 @at_option
 @grid_option(None)
 @loop_option
+@direction_option
+@click.option(
+    "--uncertainty",
+    "uncertain",
+    is_flag=True,
+    help="Also what the standard uncertainties of SCENE's errors give (k = 1, first order).",
+)
 @click.option("--exact", is_flag=True, help="Full rotations and all products, not the first order.")
 @click.option(
     "--frame",
@@ -65,11 +74,13 @@ def field(
     grid: int | None,
     loop: str,
     frame: str,
+    direction: str | None,
     csv_path: str | None,
     output: str | None,
     *,
     force: bool,
     exact: bool,
+    uncertain: bool,
     as_json: bool,
 ) -> None:
     """Evaluate the errors of SCENE at points or over a grid.
@@ -81,18 +92,24 @@ def field(
 
     from warpspace.analysis.statistics import statistics, volume_statistics
     from warpspace.picture.coordinates import own_axes, spell_at, spell_point
+    from warpspace.picture.words import direction_words
     from warpspace.scene.library import load_scene
-    from warpspace.scene.pipeline import choose_view
+    from warpspace.scene.pipeline import choose_view, in_direction
+    from warpspace.scene.uncertainty import evaluate_uncertainty, flat_uncertainty
 
     if points and grid is not None:
         raise OptionError("--at and --grid exclude each other; give one of them")
     check_targets(scene, force=force, csv_path=csv_path)
     if output is not None:
         _check_output(output, scene, force=force, points=bool(points))
-    loaded = load_scene(scene)
+    loaded = in_direction(load_scene(scene), direction)
     view = choose_view(loaded, loop, frame)
+    spread = None
     with progress("evaluating", silent=as_json):
         axes, result, nodes = _evaluate(loaded, points, grid, view, exact=exact)
+        if uncertain:
+            at = axes if points else None
+            spread = evaluate_uncertainty(loaded, at=at, grid=grid, loop=loop, frame=frame)
         plain = statistics(result, axes)
         summary = plain if nodes is None else volume_statistics(result, nodes)
     files = [path for path in (csv_path, output) if path is not None]
@@ -103,7 +120,8 @@ def field(
         about = {**field_remarks(loaded, view, exact=exact), "frame": frame}
         with progress("writing", silent=as_json):
             for path in files:
-                write_field(FieldRecord(axes, result, about), path, overwrite=force)
+                write_field(FieldRecord(axes, result, about, spread), path, overwrite=force)
+    spread = None if spread is None else flat_uncertainty(spread)
     if as_json:
         found = {"statistics": asdict(summary)}
         if nodes is not None:
@@ -112,16 +130,23 @@ def field(
             size = {"output": output, "points_written": result.norm_um.size}
             click.echo(spell_json({**size, **found}))
             return
-        _print_json(axes, result, found)
+        _print_json(axes, result, found, spread)
         return
-    print_text(f"{loaded.title} · {loop} loop · {'exact' if exact else 'first order'}")
+    words = (f"{loop} loop", *direction_words(loaded), "exact" if exact else "first order")
+    print_text(" · ".join((loaded.title, *words)))
     if points:
-        _list_points(axes, result, [loaded.machine.axes[name].unit for name in axes])
+        units = [loaded.machine.axes[name].unit for name in axes]
+        _list_points(axes, result, units, spread)
     over = "" if nodes is None else ", over the volume"
     print_text(
         f"  {result.norm_um.size} points{over}: mean {summary.mean_um:.2f},"
         f" RMS {summary.rms_um:.2f}, P95 {summary.p95_um:.2f}, max {summary.max_um:.2f} µm"
     )
+    if spread is not None:
+        print_text(
+            f"  standard uncertainty of |E|: mean {spread.norm_um.mean():.2f},"
+            f" max {spread.norm_um.max():.2f} µm"
+        )
     if nodes is not None:
         print_text(f"  each node counted once: mean {plain.mean_um:.2f} µm")
     worst = own_axes(loaded, summary.max_at_axes)
@@ -169,7 +194,10 @@ def _evaluate(
 
 
 def _print_json(
-    axes: "Mapping[str, Array]", result: "ErrorField", found: "Mapping[str, Mapping[str, object]]"
+    axes: "Mapping[str, Array]",
+    result: "ErrorField",
+    found: "Mapping[str, Mapping[str, object]]",
+    spread: "FieldUncertainty | None",
 ) -> None:
     """Print the JSON object piece by piece: a million points are never held as one text."""
     import numpy as np
@@ -194,6 +222,10 @@ def _print_json(
             {name: values[part] for name, values in positions.items()},
             ErrorField(nominal[part], error[part], orientation[part]),
         )
+        for index, row in enumerate(rows if spread is not None else (), start=start):
+            row["uncertainty_um"] = spread.error_um[index].tolist()
+            row["uncertainty_norm_um"] = float(spread.norm_um[index])
+            row["uncertainty_urad"] = spread.orientation_urad[index].tolist()
         click.echo((", " if start else "") + spell_json(rows)[1:-1], nl=False)
     click.echo(
         "]" + "".join(f', "{name}": {spell_json(part)}' for name, part in found.items()) + "}"
@@ -222,7 +254,12 @@ def _rows(axes: "dict[str, Array]", result: "ErrorField") -> list[dict[str, obje
     ]
 
 
-def _list_points(axes: "Mapping[str, Array]", result: "ErrorField", units: "Sequence[str]") -> None:
+def _list_points(
+    axes: "Mapping[str, Array]",
+    result: "ErrorField",
+    units: "Sequence[str]",
+    spread: "FieldUncertainty | None",
+) -> None:
     """Print the first points, one line each."""
     listed = min(result.norm_um.size, MAX_LISTED)
     errors, tilts = result.error_um.tolist(), result.orientation_urad.tolist()
@@ -236,6 +273,7 @@ def _list_points(axes: "Mapping[str, Array]", result: "ErrorField", units: "Sequ
         *number_columns(("in R x", "y", "z"), "mm"),
         *number_columns(("error x", "y", "z", "|E|"), "µm"),
         *number_columns(("tilt x", "y", "z"), "µrad"),
+        *number_columns(() if spread is None else ("u x", "y", "z", "u |E|"), "µm"),
     )
     rows = [
         (
@@ -245,9 +283,15 @@ def _list_points(axes: "Mapping[str, Array]", result: "ErrorField", units: "Sequ
             *(f"{value:+.3f}" for value in errors[index]),
             f"{result.norm_um[index]:.3f}",
             *(f"{value:+.3f}" for value in tilts[index]),
+            *(() if spread is None else _spelled(spread, index)),
         )
         for index in range(listed)
     ]
     print_table(columns, rows)
     if result.norm_um.size > MAX_LISTED:
         print_text(f"  … {result.norm_um.size - MAX_LISTED} more; -o, --csv or --json has all")
+
+
+def _spelled(spread: "FieldUncertainty", index: int) -> list[str]:
+    """Spell the standard uncertainty of one point."""
+    return [f"{value:.3f}" for value in (*spread.error_um[index], spread.norm_um[index])]

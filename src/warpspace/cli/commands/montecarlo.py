@@ -4,6 +4,7 @@ import math
 from typing import TYPE_CHECKING
 
 import click
+from click.core import ParameterSource
 
 from warpspace.cli.file_options import check_targets, force_option, plot_option
 from warpspace.cli.options import (
@@ -24,11 +25,13 @@ from warpspace.cli.sampling_options import (
     specification_option,
 )
 from warpspace.cli.tables import print_text
+from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
     from warpspace.analysis.montecarlo import MonteCarlo
     from warpspace.scene.model import Scene
 
+SOURCES = ("tolerances", "uncertainty")
 OVER = ("sampled", "max", "mean")
 
 
@@ -50,6 +53,15 @@ OVER = ("sampled", "max", "mean")
 )
 @cylinder_option
 @click.option(
+    "--from",
+    "source",
+    type=click.Choice(SOURCES),
+    default="tolerances",
+    show_default=True,
+    help="Machines within the tolerances; or what the measured machine may be: the errors of SCENE,"
+    " each off by its standard uncertainty.",
+)
+@click.option(
     "--workers", type=int, help="Threads; the result does not depend on it.  [one per core]"
 )
 @plot_option("histogram")
@@ -65,6 +77,7 @@ def montecarlo(
     loop: str,
     over: str,
     cylinder: str | None,
+    source: str,
     workers: int | None,
     plot: str | None,
     *,
@@ -80,35 +93,53 @@ def montecarlo(
     axes at their place in the scene. Workpiece loop: points uniform in the volume of the largest
     workpiece, its rotary axes uniform over their travel.
 
+    With --from uncertainty the errors of SCENE keep their curves, and each is off by one number
+    times its standard uncertainty along the axis: normal, or uniform with the same standard
+    uncertainty where --distribution says so.
+
     Quantiles are exact up to a million samples; beyond, from a histogram with steps of 0.002 %.
     """
+    from warpspace.analysis.montecarlo import Plan
     from warpspace.scene import verbs
     from warpspace.scene.library import load_scene
+    from warpspace.scene.uncertainty import uncertain_montecarlo
 
     check_targets(scene, force=force, plot=plot)
+    if source == "uncertainty" and clip:
+        raise OptionError("--clip is for tolerances: an uncertainty has no limits; leave it out")
     loaded = load_scene(scene)
     size = parse_cylinder(cylinder)
     with progress("sampling", max(samples, 0), "machines", silent=as_json) as bar:
-        result = verbs.montecarlo(
-            loaded,
-            samples=samples,
-            seed=seed,
-            distribution=distribution,
-            clip=clip,
-            loop=loop,
-            over=over,
-            grid=grid,
-            spec_um=spec_um,
-            cylinder=size,
-            workers=workers,
-            progress=bar.advance,
-        )
+        if source == "uncertainty":
+            plan = Plan(samples, seed, over, grid, spec_um, size, workers)
+            result = uncertain_montecarlo(
+                loaded,
+                plan,
+                loop=loop,
+                distribution=_chosen(distribution) or "normal",
+                progress=bar.advance,
+            )
+        else:
+            result = verbs.montecarlo(
+                loaded,
+                samples=samples,
+                seed=seed,
+                distribution=distribution,
+                clip=clip,
+                loop=loop,
+                over=over,
+                grid=grid,
+                spec_um=spec_um,
+                cylinder=size,
+                workers=workers,
+                progress=bar.advance,
+            )
     if plot is not None:
-        _plot(plot, loaded, result, force=force)
+        _plot(plot, loaded, result, source, force=force)
     if as_json:
-        print_json(result_json(result))
+        print_json({**result_json(result), "from": source})
         return
-    _print(loaded, result)
+    _print(loaded, result, source)
 
 
 def result_json(result: "MonteCarlo") -> dict[str, object]:
@@ -140,7 +171,13 @@ def result_json(result: "MonteCarlo") -> dict[str, object]:
     return found
 
 
-def describe(result: "MonteCarlo") -> str:
+def _chosen(distribution: str) -> str:
+    """Give the distribution that a user has named; empty where it is the one unless said."""
+    said = click.get_current_context().get_parameter_source("distribution")
+    return "" if said is ParameterSource.DEFAULT else distribution
+
+
+def describe(result: "MonteCarlo", source: str = "tolerances") -> str:
     """Say in one line what was sampled."""
     what = {
         "sampled": "|E| at one random point each",
@@ -150,6 +187,8 @@ def describe(result: "MonteCarlo") -> str:
     drawn = str(result.draws.distribution)
     if drawn == "normal":
         drawn = "normal, 3σ = half width" + (", clipped" if result.draws.clip else "")
+    if source == "uncertainty":
+        drawn = f"standard uncertainties, {result.draws.distribution}"
     return (
         f"{result.view.loop} loop · {result.plan.samples:,} machines, {what} · {drawn} ·"
         f" seed {result.plan.seed}"
@@ -166,24 +205,25 @@ def printed_value(scene: "Scene", result: "MonteCarlo") -> float | None:
     return float(found) if found and here and str(result.plan.over) == "sampled" else None
 
 
-def _plot(path: str, scene: "Scene", result: "MonteCarlo", *, force: bool) -> None:
+def _plot(path: str, scene: "Scene", result: "MonteCarlo", source: str, *, force: bool) -> None:
     """Draw the histogram."""
     from warpspace.outputs.charts import montecarlo_chart, write_chart
 
-    chart = montecarlo_chart(result, scene.title, describe(result), printed_value(scene, result))
+    printed = printed_value(scene, result) if source == "tolerances" else None
+    chart = montecarlo_chart(result, scene.title, describe(result, source), printed)
     write_chart(chart, path, overwrite=force)
 
 
-def _print(scene: "Scene", result: "MonteCarlo") -> None:
+def _print(scene: "Scene", result: "MonteCarlo", source: str) -> None:
     """Print the numbers."""
     from warpspace.analysis.contributions import expected_square
 
-    print_text(f"{scene.title} · {describe(result)}")
+    print_text(f"{scene.title} · {describe(result, source)}")
     print_text(
         f"  mean {result.mean_um:.2f}, mode {result.mode_um:.1f}, median {result.median_um:.2f},"
         f" P95 {result.p95_um:.2f}, P99 {result.p99_um:.2f}, max {result.max_um:.2f} µm"
     )
-    if str(result.plan.over) == "sampled":
+    if source == "tolerances" and str(result.plan.over) == "sampled":
         variance, offset = expected_square(
             scene.model, result.draws, scene.workspace, result.view, result.plan
         )
@@ -191,7 +231,7 @@ def _print(scene: "Scene", result: "MonteCarlo") -> None:
             f"  RMS  {result.rms_um:.2f} µm sampled, {math.sqrt(variance.sum() + offset):.2f} µm"
             " from trace(J Σ Jᵀ) without sampling"
         )
-    if (value := printed_value(scene, result)) is not None:
+    if source == "tolerances" and (value := printed_value(scene, result)) is not None:
         print_text(f"  the thesis prints {value:g} µm (table 4-8; see `warpspace thesis`)")
     if (kept := result.probability) is not None:
         print_text(
@@ -203,6 +243,9 @@ def _print(scene: "Scene", result: "MonteCarlo") -> None:
         for key, width in zip(result.draws.keys, result.draws.half_width, strict=True)
         if width == 0.0
     ]
+    if source == "uncertainty":
+        print_text(f"  {len(result.draws.keys) - len(held)} errors with an uncertainty")
+        return
     note = f"; held at their centre: {', '.join(held)}" if held else ""
     print_text(f"  {len(result.draws.keys) - len(held)} parameters drawn{note}")
     if not result.exact_quantiles:

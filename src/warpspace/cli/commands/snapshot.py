@@ -23,7 +23,9 @@ from warpspace.outputs.figures.catalogue import figure_command, figure_names
     help=f"What to draw: {', '.join(figure_names())}.",
 )
 @figure_options()
-def snapshot(scene: str, output: str, figure: str, *, force: bool, **options: Any) -> None:
+def snapshot(
+    scene: str, output: str, figure: str, direction: str | None, *, force: bool, **options: Any
+) -> None:
     """Draw an error map, or another figure, of SCENE.
 
     The picture carries its exaggeration, scale bars, statistics and provenance. It is the same,
@@ -31,6 +33,7 @@ def snapshot(scene: str, output: str, figure: str, *, force: bool, **options: An
     """
     from warpspace.outputs.drawing.style import FIGURE_ENDINGS
     from warpspace.scene.library import load_scene
+    from warpspace.scene.pipeline import in_direction
 
     if figure in figure_names(scenes=2):
         command = figure_command(figure) or "compare A B -o FILE"
@@ -39,6 +42,6 @@ def snapshot(scene: str, output: str, figure: str, *, force: bool, **options: An
         raise UnknownNameError("figure", figure, figure_names())
     target = check_output(output, FIGURE_ENDINGS, force=force, scenes=[scene])
     settings = parse_settings(**options)
-    loaded = load_scene(scene)
+    loaded = in_direction(load_scene(scene), direction)
     draw_figure_file(figure, [loaded], settings, target, force=force)
     echo(f"wrote {output}")

@@ -135,9 +135,8 @@ def evaluate_for(
         quantity=quantity,
     )
     scale = shared_colours(settings, [picture])
-    return replace(
-        picture, colours=scale, conditions=(*settings.conditions, *range_facts(settings, scale))
-    )
+    conditions = (*picture.conditions, *settings.conditions, *range_facts(settings, scale))
+    return replace(picture, colours=scale, conditions=conditions)
 
 
 def range_facts(settings: FigureSettings, scale: ColourScale) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from warpspace.analysis.uncertain import FieldUncertainty
 from warpspace.exceptions import OptionError
 from warpspace.field.basis import ErrorField
 from warpspace.field.grid import DIMENSIONS
@@ -36,11 +37,14 @@ class FieldRecord:
         Of points in a batch of any shape; of a grid for a VTS file.
     about : mapping of str to str
         Scene, loop, reference, convention, program.
+    uncertainty : FieldUncertainty or None
+        Standard uncertainty (k = 1) of each point, in columns of its own.
     """
 
     axes: Mapping[str, Array]
     field: ErrorField
     about: Mapping[str, str] = attribute(default_factory=dict[str, str])
+    uncertainty: FieldUncertainty | None = None
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -57,6 +61,11 @@ class FieldRecord:
         vectors = {"R_{}_mm": self.field.nominal_mm, "error_{}_um": self.field.error_um}
         tilts = {"orientation_{}_urad": self.field.orientation_urad}
         found |= _by_component(vectors) | {"norm_um": self.field.norm_um} | _by_component(tilts)
+        if self.uncertainty is not None:
+            found |= _by_component({"uncertainty_{}_um": self.uncertainty.error_um})
+            found["uncertainty_norm_um"] = self.uncertainty.norm_um
+            tilts = {"uncertainty_orientation_{}_urad": self.uncertainty.orientation_urad}
+            found |= _by_component(tilts)
         return found
 
     def blocks(self) -> Iterator[dict[str, Array]]:
@@ -160,13 +169,18 @@ def _write_parquet(record: FieldRecord, path: Path) -> None:
 
 def _arrays(record: FieldRecord) -> dict[str, Array]:
     """Arrays of a field by name, units in the names."""
-    found = record.field
-    return {
+    found, spread = record.field, record.uncertainty
+    arrays = {
         "nominal_mm": found.nominal_mm,
         "error_um": found.error_um,
         "norm_um": found.norm_um,
         "orientation_urad": found.orientation_urad,
     }
+    if spread is not None:
+        arrays["uncertainty_um"] = spread.error_um
+        arrays["uncertainty_norm_um"] = spread.norm_um
+        arrays["uncertainty_orientation_urad"] = spread.orientation_urad
+    return arrays
 
 
 def _write_npz(record: FieldRecord, path: Path) -> None:

@@ -21,12 +21,15 @@ from warpspace.outputs.drawing.sheet import (
     start_sheet,
 )
 from warpspace.outputs.drawing.style import FONT, SIZES, Theme
+from warpspace.outputs.figures.curve_lines import draw_error, line_legend
 from warpspace.scene.model import Scene
 from warpspace.units import MICROMETRE, MICRORADIAN
 
 SAMPLES = 361
 WIDTHS = (4.4, 2.8, 1.5)
 """Of the three curves of a panel: those drawn later are thinner, so that none hides another."""
+DOT = 5.0
+"""Size of a reading."""
 KINDS = (("XYZ", MICROMETRE, "translation"), ("ABC", MICRORADIAN, "rotation"))
 
 
@@ -54,7 +57,7 @@ def draw_curves(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
         reference_words(scene) if scene.reference else "",
         _left_out_words(scene, panels),
     ]
-    legend = _legend(banded=bool(scene.tolerances))
+    legend = [*_legend(banded=bool(scene.tolerances)), *line_legend(scene)]
     sheet = start_sheet(
         settings, title, [fact for fact in facts if fact], scenes, legend, exact=exact, panel=False
     )
@@ -102,7 +105,10 @@ def _panels(scene: Scene) -> list[Panel]:
     given = [
         panel
         for panel in every
-        if any(scene.errors.amplitude(key) != 0.0 for key in keys(panel) if key in scene.errors)
+        if any(
+            (key in scene.errors and scene.errors.amplitude(key) != 0.0) or key in scene.measured
+            for key in keys(panel)
+        )
     ]
     return given or [
         panel
@@ -172,6 +178,13 @@ def _draw_curves(
         axes.plot(
             at, values, color=colour, linewidth=canvas.px(width) * POINTS_PER_PX,
             alpha=0.55 if zero else 1.0, zorder=2.0 if zero else 3.0,
+        )  # fmt: skip
+        reach = max(
+            reach,
+            draw_error(
+                axes, scene, key, at, colour, canvas.px(WIDTHS[number]) * POINTS_PER_PX,
+                canvas.px(DOT) * POINTS_PER_PX,
+            ),
         )  # fmt: skip
         names.append((key, colour))
     reach = 1.12 * reach or 1.0
@@ -270,9 +283,7 @@ def _legend(*, banded: bool) -> list[LegendEntry]:
     ]
     if banded:
         entries.append(
-            LegendEntry(
-                _band_symbol, "tolerance, in the colour of a curve where it is for that one only"
-            )
+            LegendEntry(_band_symbol, "tolerance, in the colour of a curve if it has its own")
         )
     return entries
 

@@ -125,7 +125,9 @@ def with_machine(scene: Scene, machine: Machine, workspace: Workspace | None = N
         If its file could not be read.
     """
     gone = [axis for axis in scene.machine.axes if axis not in machine.axes]
-    errors = ErrorSet(_kept(scene.errors.functions, machine))
+    still = {axis: scene.workspace.positions[axis] for axis in gone}
+    kept = _kept(scene.errors.functions, machine)
+    errors = ErrorSet({key: function.without_axes(still) for key, function in kept.items()})
     tolerances = ToleranceSet(scene.tolerances.default, _kept(scene.tolerances.own, machine))
     reference = scene.reference
     if reference is not None:
@@ -139,6 +141,8 @@ def with_machine(scene: Scene, machine: Machine, workspace: Workspace | None = N
         errors=errors,
         tolerances=tolerances,
         reference=reference,
+        uncertainty=_kept(scene.uncertainty, machine),
+        measured=_kept(scene.measured, machine),
     )
     return checked(scene, changed, tuple(_left_out(scene, gone)))
 
@@ -216,6 +220,12 @@ def _left_out(scene: Scene, gone: Collection[str]) -> list[str]:
         own = [key for key in scene.tolerances.own if parameter(key).axis == axis]
         parts = [f"its errors {', '.join(errors)}"] if errors else []
         parts += [f"its tolerances {', '.join(own)}"] if own else []
+        second = [
+            key
+            for key in scene.errors
+            if parameter(key).axis not in gone and axis in scene.errors.arguments(key)
+        ]
+        parts += [f"how {', '.join(second)} depends on it"] if second else []
         parts += ["its position at the reference"] if axis in (scene.reference or {}) else []
         what = f" and with it {'; '.join(parts)}" if parts else ""
         notes.append(f"axis {axis} left out{what}")

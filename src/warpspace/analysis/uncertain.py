@@ -1,0 +1,148 @@
+"""What the standard uncertainty of measured errors does to the field, and to |E|.
+
+The uncertainties of different errors are taken as independent; that of one error as one number
+for its whole curve, which the errors of a calibration are: a reading that is too large at one
+position is so at the next one. At one point without a reference this makes no difference.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from warpspace.analysis.draws import SIGMAS, Distribution, Draws
+from warpspace.analysis.montecarlo import MonteCarlo, Plan, Progress, build_job, collect
+from warpspace.analysis.points import Places
+from warpspace.field.evaluate import View, amplitudes_of, build_basis, evaluate_first_order
+from warpspace.field.grid import Workspace
+from warpspace.kinematics.model import Coordinates, Model
+from warpspace.machine.curves.curve import ErrorFunction
+from warpspace.machine.errors import ErrorSet
+from warpspace.units import Array
+
+Uncertainties = Mapping[str, ErrorFunction]
+"""Standard uncertainty (k = 1) along its axis, by key of the error."""
+
+
+@dataclass(frozen=True, slots=True)
+class FieldUncertainty:
+    """Standard uncertainty (k = 1) of a field.
+
+    Attributes
+    ----------
+    error_um : ndarray, [..., 3], µm
+        Of each component of the position error.
+    norm_um : ndarray, [...], µm
+        Of its length: along the error, or of the vector as a whole where the error is zero.
+    orientation_urad : ndarray, [..., 3], µrad
+    """
+
+    error_um: Array
+    norm_um: Array
+    orientation_urad: Array
+
+
+def field_uncertainty(
+    model: Model,
+    errors: ErrorSet,
+    uncertainty: Uncertainties,
+    coordinates: Coordinates,
+    view: View | None = None,
+    point_mm: Array | None = None,
+) -> FieldUncertainty:
+    """Propagate standard uncertainties of errors to a field, to first order.
+
+    Parameters
+    ----------
+    model : Model
+    errors : ErrorSet
+        Gives the direction of the error, along which the uncertainty of its length counts.
+    uncertainty : mapping of str to ErrorFunction
+    coordinates : mapping of str to ndarray, [...], mm or degrees
+    view : View, optional
+        With a reference, the uncertainty of the difference to it.
+    point_mm : ndarray, [..., 3], mm, optional
+        Nominal points in R; by default the functional point of the loop.
+
+    Returns
+    -------
+    FieldUncertainty
+
+    Notes
+    -----
+    Root of the sum of (gain × standard uncertainty)² over the errors (GUM, 5.1.2).
+    """
+    nominal = evaluate_first_order(model, errors, coordinates, view, point_mm)
+    length = nominal.norm_um[..., None]
+    along = np.where(length > 0.0, nominal.error_um / np.where(length > 0.0, length, 1.0), 0.0)
+    own = ErrorSet(uncertainty)
+    position, tilt = np.zeros(nominal.error_um.shape), np.zeros(nominal.error_um.shape)
+    norm = np.zeros(nominal.norm_um.shape)
+    for key in uncertainty:
+        one = build_basis(model, own, (key,), coordinates, view, point_mm)
+        (amplitude,) = amplitudes_of(own, (key,))
+        part = amplitude * one.position[0]
+        position += part**2
+        tilt += (amplitude * one.orientation[0]) ** 2
+        norm += np.sum(part * along, axis=-1) ** 2
+    whole = np.sum(position, axis=-1)
+    norm = np.where(length[..., 0] > 0.0, norm, whole)
+    return FieldUncertainty(np.sqrt(position), np.sqrt(norm), np.sqrt(tilt))
+
+
+def uncertain_montecarlo(
+    model: Model,
+    errors: ErrorSet,
+    uncertainty: Uncertainties,
+    workspace: Workspace,
+    view: View | None = None,
+    plan: Plan | None = None,
+    distribution: Distribution = Distribution.NORMAL,
+    progress: Progress | None = None,
+) -> MonteCarlo:
+    """Sample what the machine may be: its measured errors, each off by its uncertainty.
+
+    Parameters
+    ----------
+    model : Model
+    errors : ErrorSet
+        As measured.
+    uncertainty : mapping of str to ErrorFunction
+        Those of axes that are not in the loop do nothing.
+    workspace : Workspace
+    view : View, optional
+    plan : Plan, optional
+    distribution : Distribution, optional
+        Normal, or uniform with the same standard uncertainty.
+    progress : callable, optional
+        Called with the number of machines done since the last call.
+
+    Returns
+    -------
+    MonteCarlo
+        Its draws have the amplitudes of the errors as centres and three standard uncertainties,
+        or √3 of them where uniform, as half widths.
+    """
+    view, plan = view or View(), plan or Plan()
+    plan.check()
+    own = ErrorSet(uncertainty)
+    keys = tuple(own)
+    widths = {Distribution.NORMAL: SIGMAS, Distribution.UNIFORM: np.sqrt(3.0)}
+    size = np.full(len(keys), widths[distribution])
+    unit = Draws(keys, np.zeros(len(keys)), size, distribution)
+
+    def responses(places: Places) -> Array:
+        """Responses to one standard uncertainty each, and the nominal error last, [3, K + 1, N]."""
+        basis = build_basis(model, own, keys, places.coordinates, view, places.point_mm)
+        parts = amplitudes_of(own, keys)[:, None, None] * basis.position.reshape(len(keys), -1, 3)
+        nominal = evaluate_first_order(model, errors, places.coordinates, view, places.point_mm)
+        both = np.concatenate([parts, nominal.error_um.reshape(1, -1, 3)])
+        return np.ascontiguousarray(np.moveaxis(both, -1, 0))
+
+    def machines(rng: np.random.Generator, count: int) -> Array:
+        return np.column_stack([unit.draw(rng, count), np.ones(count)])
+
+    job = build_job(model, workspace, view, plan, machines, responses)
+    centre = amplitudes_of(errors, keys)
+    drawn = Draws(keys, centre, size * np.abs(amplitudes_of(own, keys)), distribution)
+    return collect(job, drawn, view, plan, progress)
