@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpspace.bench.circle import fit_circle_readings
-from warpspace.bench.kinds.circular import DEFAULT_POINTS, Circular, plane_axes
-from warpspace.bench.readings import simulate
+from warpspace.bench.kinds.circular import DEFAULT_POINTS, Circular
+from warpspace.bench.planes import find_plane, plane_axes
+from warpspace.bench.readings import RELATIVE, simulate
 from warpspace.field.evaluate import evaluate_first_order
-from warpspace.bench.readings import RELATIVE
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
@@ -101,12 +101,13 @@ def ballbar(
         If the circle cannot be run in the working volume of the scene.
     """
     test = Circular(plane=plane, radius_mm=radius_mm, at=centre or {}, points=points)
-    first, second, key, _ = plane_axes(scene, plane)
+    key = plane_axes(scene.machine, plane)[2]
     plan = test.plan(scene)
     fit = fit_circle_readings(plan, simulate(scene, plan, exact=False))
     stand = test.stand(scene)
     middle = evaluate_first_order(scene.model, scene.errors, stand, RELATIVE).error_um
-    there = [float(middle[..., "XYZ".index(name)]) for name in (first, second)]
+    found = find_plane(scene.model, stand, plane)
+    there = [float(middle @ vector) for vector in (found.along, found.up)]
     back = fit.radial_um[points:][::-1]
     return Ballbar(
         plane,

@@ -8,11 +8,11 @@ import numpy as np
 
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import DataColumn, Table
-from warpspace.bench.kinds.circular import PLANES, plane_axes
 from warpspace.bench.options import check_count, option
 from warpspace.bench.outcome import Chart, Curve, Outcome, Quantity
 from warpspace.bench.placing import following_axes, relative_point
 from warpspace.bench.plan import Plan, build_plan
+from warpspace.bench.planes import PLANES, axis_vector, find_plane, plane_axes
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.chain import nominal_point
 from warpspace.kinematics.model import Loop
@@ -90,8 +90,8 @@ class BallPlate(BenchTest):
         return self._lay(scene, given["position"], given["row"], given["column"]), readings
 
     def _lay(self, scene: Scene, number: Array, row: Array, column: Array) -> Plan:
-        """Lay the plan: one site a ball, readings along x, y and z of R."""
-        first, second = plane_axes(scene, self.plane)[:2]
+        """Lay the plan: one site a ball, readings along the three linear axes."""
+        first, second, _ = plane_axes(scene.machine, self.plane)
         names = following_axes(scene.model)
         third = next(name for name in names if name not in (first, second))
         stand, model = self.stand(scene), self.model(scene)
@@ -107,13 +107,16 @@ class BallPlate(BenchTest):
         }
         count = len(number)
         point = np.broadcast_to(nominal_point(model, Loop.TOOL, coordinates), (count, 3))
-        seen = np.broadcast_to(relative_point(model, coordinates), (count, 3))
+        axes = np.stack([axis_vector(model, stand, name) for name in names], -1)
+        seen = np.broadcast_to(relative_point(model, coordinates), (count, 3)) @ axes
+        sign = find_plane(model, stand, self.plane).sign
         marks = {"position": number, "row": row, "column": column}
+        marks["gain_sign"] = np.full(count, sign)
         marks |= {f"seen_{axis}_mm": seen[:, index] for index, axis in enumerate("xyz")}
         return build_plan(
             coordinates,
             point,
-            np.repeat(np.eye(3), count, axis=0),
+            np.repeat(axes.T, count, axis=0),
             place=f"plate in {self.plane} · {third} "
             + ", ".join(f"{value:g}" for value in heights)
             + f" · {self.place_words(scene, names)}",
@@ -139,7 +142,8 @@ class BallPlate(BenchTest):
     def evaluate(self, plan: Plan, readings: Array) -> Outcome:
         """Take what is left of each position, its scales and squareness, and errors of distances."""
         rest = left_over(plan, readings)
-        first, second, key, sign = PLANES[self.plane]
+        first, second, key = PLANES[self.plane]
+        sign = float(plan.marks["gain_sign"][0])
         seen = np.stack([plan.marks[f"seen_{axis}_mm"] for axis in "xyz"], -1)[: len(rest)]
         number = plan.marks["position"][: len(rest)]
         columns = ["XYZ".index(name) for name in (first, second)]

@@ -14,6 +14,7 @@ from warpspace.bench.options import check_count, option
 from warpspace.bench.outcome import Chart, Curve, Outcome, Quantity
 from warpspace.bench.placing import relative_point
 from warpspace.bench.plan import Plan, build_plan
+from warpspace.bench.planes import PLANES, find_plane, plane_axes
 from warpspace.exceptions import OptionError
 from warpspace.field.grid import Workspace
 from warpspace.kinematics.chain import nominal_point
@@ -22,16 +23,10 @@ from warpspace.machine.axes import is_linear
 from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM_URAD, Array
 
-PLANES: Mapping[str, tuple[str, str, str, float]] = {
-    # plane: its axes, the squareness between them, and the sign of the gain: a positive angle turns
-    # the second axis by the right-hand rule, towards −x for Y about z, towards +x for Z about y,
-    # towards −y for Z about x.
-    "XY": ("X", "Y", "EC0Y", -1.0),
-    "XZ": ("X", "Z", "EB0Z", 1.0),
-    "YZ": ("Y", "Z", "EA0Z", -1.0),
-}
 DEFAULT_POINTS, MIN_POINTS, MAX_POINTS = 360, 8, 100_000
 TURN = 360.0
+ALIKE_UM = 1e-6
+"""Runs that differ by less are drawn as one."""
 SENSES = {1.0: "counter-clockwise", -1.0: "clockwise"}
 
 
@@ -96,12 +91,13 @@ class Circular(BenchTest):
         if self.rotary:
             wanted = FollowedCircle(self.rotary, self.radius_mm, self.bar, self.at)
             return lay_followed(scene, self.model(scene), wanted, angle_deg, sense)
-        first, second, key, sign = plane_axes(scene, self.plane)
+        first, second, _ = plane_axes(scene.machine, self.plane)
         if not 0.0 < self.radius_mm < np.inf:
             raise OptionError(f"radius: {self.radius_mm:g} mm; expected above 0")
         model, stand = self.model(scene), self.stand(scene)
         middle = {name: float(value) for name, value in stand.items()}
         check_circle(scene.workspace, middle, (first, second), self.radius_mm, angle_deg)
+        plane = find_plane(model, stand, self.plane)
         theta = np.deg2rad(angle_deg)
         coordinates = {
             **stand,
@@ -124,9 +120,9 @@ class Circular(BenchTest):
             + ", ".join(f"{name} {value:g}" for name, value in middle.items()),
             marks={
                 "angle_deg": angle_deg, "sense": sense,
-                "along": outward[:, "XYZ".index(first)], "up": outward[:, "XYZ".index(second)],
+                "along": outward @ plane.along, "up": outward @ plane.up,
                 "radius_mm": np.full(count, self.radius_mm),
-                "gain_sign": np.full(count, sign),
+                "gain_sign": np.full(count, plane.sign),
             },
             site=np.arange(count), against=np.full(count, count), length_mm=self.radius_mm,
             travel={
@@ -134,8 +130,8 @@ class Circular(BenchTest):
                 second: np.append(np.cos(ahead) * sense, 0.0),
             },
             setup={
-                f"centre_{first}_um": outward[:, "XYZ".index(first)],
-                f"centre_{second}_um": outward[:, "XYZ".index(second)],
+                f"centre_{first}_um": outward @ plane.along,
+                f"centre_{second}_um": outward @ plane.up,
                 "bar_um": np.ones(count),
             },
             path=(np.arange(count),),
@@ -160,7 +156,7 @@ class Circular(BenchTest):
         quantities.append(Quantity("radius_um", "mean radius − nominal", radius, "µm"))
         details: dict[str, object] = {}
         if fit.squareness_urad is not None and not self.rotary:
-            first, second, key, _ = PLANES[self.plane]
+            first, second, key = PLANES[self.plane]
             quantities += [
                 Quantity("squareness_urad", f"squareness {key}", fit.squareness_urad, "µrad"),
                 Quantity(
@@ -180,19 +176,20 @@ class Circular(BenchTest):
         for run in runs:
             fit = fit_circle_readings(run.plan, run.readings)
             angle, sense = run.plan.marks["angle_deg"], run.plan.marks["sense"]
+            alike = not run.is_measured and (fit.hysteresis_um or 0.0) < ALIKE_UM
             for row, (sign, word) in enumerate(SENSES.items()):
                 chosen = sense == sign
-                if not chosen.any():
+                if not chosen.any() or (alike and row):
                     continue
                 order = np.argsort(angle[chosen], kind="stable")
                 x, y = angle[chosen][order], fit.radial_um[chosen][order]
                 if is_full(angle[chosen]) and not run.is_measured:
                     x, y = np.append(x, x[0] + TURN), np.append(y, y[0])
                 style = "dots" if run.is_measured else "line"
-                curves.append(Curve(run.named(word), x, y, row, style))
+                curves.append(Curve(run.named("both ways round" if alike else word), x, y, row, style))
         fit = fit_circle_readings(runs[0].plan, runs[0].readings)
         if fit.squareness_urad is not None and not self.rotary:
-            curves.append(self._squareness(fit))
+            curves.append(self._squareness(fit, runs[0].plan))
         return (
             Chart(
                 "polar", self._title(), "angle [°]", "radial deviation [µm]", tuple(curves), (),
@@ -206,31 +203,13 @@ class Circular(BenchTest):
             return f"{self.bar} deviation along the circle about {self.rotary}"
         return f"{self.plane} plane, 0° at +{self.plane[0]}, 90° at +{self.plane[1]}"
 
-    def _squareness(self, fit: CircleFit) -> Curve:
+    def _squareness(self, fit: CircleFit, plan: Plan) -> Curve:
         """Draw what mean radius and squareness alone would give."""
         angle = np.linspace(0.0, TURN, 181)
-        sign = PLANES[self.plane][3]
+        sign = float(plan.marks["gain_sign"][0])
         half = sign * (fit.squareness_urad or 0.0) * self.radius_mm * UM_PER_MM_URAD / 2.0
         y = fit.radius_um + half * np.sin(2.0 * np.deg2rad(angle))
         return Curve("mean radius and squareness alone", angle, y, 2, "dashed")
-
-
-def plane_axes(scene: Scene, plane: str) -> tuple[str, str, str, float]:
-    """Look up the axes of a plane and the squareness between them.
-
-    Raises
-    ------
-    OptionError
-        If there is no such plane, or the machine lacks one of its axes.
-    """
-    if plane not in PLANES:
-        raise OptionError(f"plane {plane!r}; expected one of {', '.join(PLANES)}")
-    for name in PLANES[plane][:2]:
-        if name not in scene.machine.axes:
-            raise OptionError(
-                f"plane {plane}: the machine {scene.machine.chain} has no axis {name}"
-            )
-    return PLANES[plane]
 
 
 def check_circle(

@@ -8,11 +8,11 @@ import numpy as np
 
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import DataColumn, Table
-from warpspace.bench.kinds.circular import PLANES
 from warpspace.bench.options import check_count, option
 from warpspace.bench.outcome import Chart, Curve, Outcome, Quantity
 from warpspace.bench.placing import following_axes, relative_point
 from warpspace.bench.plan import Plan, build_plan
+from warpspace.bench.planes import PLANES, find_plane
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.chain import nominal_point
 from warpspace.kinematics.model import Loop
@@ -211,6 +211,10 @@ class Diagonals(BenchTest):
         zero = {
             f"zero_{name}_um": (index == number).astype(float) for number, name in enumerate(names)
         }
+        for plane, (_, _, key) in PLANES.items():
+            found = find_plane(model, self.stand(scene), plane)
+            product = (along @ found.along) * (along @ found.up)
+            marks[key] = 1e-3 * found.sign * product[index]
         ends = np.flatnonzero(np.diff(index, append=-1) != 0) + 1
         return build_plan(
             coordinates,
@@ -340,16 +344,10 @@ def _squareness(plan: Plan, names: Sequence[str], lengths: Array) -> dict[str, f
     start = {name: np.flatnonzero(plan.marks["diagonal"] == i) for i, name in enumerate(names)}
     if any(len(rows) == 0 for rows in start.values()):
         return {}
-    vectors = np.array(
-        [plan.direction[rows[0]] * np.ptp(plan.marks["position_mm"][rows]) for rows in start.values()]
-    )
-    size = np.linalg.norm(vectors, axis=-1)
-    columns: list[Array] = []
-    keys: list[str] = []
-    for plane, (_, _, key, sign) in PLANES.items():
-        first, second = ("XYZ".index(letter) for letter in plane)
-        columns.append(sign * 1e-3 * vectors[:, first] * vectors[:, second] / size)
-        keys.append(key)
+    size = np.array([np.ptp(plan.marks["position_mm"][rows]) for rows in start.values()])
+    first = [rows[0] for rows in start.values()]
+    keys = [key for _, _, key in PLANES.values()]
+    columns = [plan.marks[key][first] * size for key in keys]
     if len(names) == len(BODY):
         design = np.stack([np.ones(len(names)), *columns], -1)
     else:

@@ -8,12 +8,12 @@ import numpy as np
 
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import DataColumn, Table
-from warpspace.bench.kinds.circular import PLANES, plane_axes
 from warpspace.bench.kinds.straightness import check_across, line_plan, mean_by_position
 from warpspace.bench.lines import REFERENCES, WORDS, ReferenceLine, reference_lines
 from warpspace.bench.options import check_count, option
 from warpspace.bench.outcome import Chart, Curve, Outcome, Quantity
 from warpspace.bench.plan import Plan
+from warpspace.bench.planes import PLANES, Plane, find_plane, plane_axes
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
@@ -44,7 +44,7 @@ class Squareness(BenchTest):
     def plan(self, scene: Scene) -> Plan:
         """Run the first axis there and back, then the second."""
         check_count("--points", self.points, 3, 10_000)
-        axes = plane_axes(scene, self.plane)[:2]
+        axes = plane_axes(scene.machine, self.plane)[:2]
         positions = [np.linspace(*scene.axis_span(axis), self.points) for axis in axes]
         return self._lay(
             scene,
@@ -55,7 +55,7 @@ class Squareness(BenchTest):
 
     def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
         """Run the positions of a file; ``line`` names the axis."""
-        axes = plane_axes(scene, self.plane)[:2]
+        axes = plane_axes(scene.machine, self.plane)[:2]
         problems = [
             f"line {int(line)}, line: {word!r}; expected {axes[0]} or {axes[1]} (--plane {self.plane})"
             for line, word in zip(table.lines, table.words["line"], strict=True)
@@ -76,18 +76,18 @@ class Squareness(BenchTest):
 
     def _lay(self, scene: Scene, which: Array, position: Array, way: Array) -> Plan:
         """Join the plans of both lines; `which` is 0 for all of the first, then 1."""
-        axes = plane_axes(scene, self.plane)[:2]
+        plane = find_plane(self.model(scene), self.stand(scene), self.plane)
         parts: list[Plan] = []
-        for index, axis in enumerate(axes):
+        for index, axis in enumerate((plane.first, plane.second)):
             check_across(self, scene, axis)
             chosen = which == index
-            across = np.eye(3)["XYZ".index(axes[1 - index])]
+            across = (plane.up, plane.along)[index]
             parts.append(line_plan(self, scene, axis, across, position[chosen], way[chosen]))
-        return _join(*parts, self.plane)
+        return _join(*parts, plane)
 
     def evaluate(self, plan: Plan, readings: Array) -> Outcome:
         """Take the angle between the reference lines of both axes."""
-        key, sign = PLANES[self.plane][2:]
+        key, sign = PLANES[self.plane][2], float(plan.marks["gain_sign"][0])
         lines = _lines(plan, readings)
         quantities: list[Quantity] = []
         for name in REFERENCES:
@@ -110,7 +110,7 @@ class Squareness(BenchTest):
             for run in runs:
                 chosen = run.plan.marks["line"] == index
                 position, mean = mean_by_position(
-                    run.plan.marks["position_mm"][chosen], run.readings[chosen]
+                    run.plan.marks["along_mm"][chosen], run.readings[chosen]
                 )
                 level = mean.mean()
                 style = "dots" if run.is_measured else "line"
@@ -124,7 +124,7 @@ class Squareness(BenchTest):
             other = self.plane[1 - index]
             charts.append(
                 Chart(
-                    "lines", f"{axis} runs, deviation along {other}", f"{axis} [mm]",
+                    "lines", f"{axis} runs, deviation along {other}", f"along {axis} [mm]",
                     "deviation [µm]", tuple(curves),
                 )
             )  # fmt: skip
@@ -136,16 +136,16 @@ def _lines(plan: Plan, readings: Array) -> list[dict[str, ReferenceLine]]:
     found: list[dict[str, ReferenceLine]] = []
     for index in (0.0, 1.0):
         chosen = plan.marks["line"] == index
-        position, mean = mean_by_position(plan.marks["position_mm"][chosen], readings[chosen])
+        position, mean = mean_by_position(plan.marks["along_mm"][chosen], readings[chosen])
         found.append(reference_lines(position, mean))
     return found
 
 
-def _join(first: Plan, second: Plan, plane: str) -> Plan:
+def _join(first: Plan, second: Plan, plane: Plane) -> Plan:
     """Put two plans one behind the other; the square may be turned, and each line has its zero."""
     n, m = first.readings, second.readings
     one, two = np.repeat([1.0, 0.0], [n, m]), np.repeat([0.0, 1.0], [n, m])
-    position = np.concatenate([first.marks["position_mm"], second.marks["position_mm"]])
+    along = np.concatenate([first.marks["along_mm"], second.marks["along_mm"]])
     travel = {
         name: np.concatenate([plan.travel.get(name, np.zeros(plan.readings)) for plan in (first, second)])
         for name in (*first.travel, *second.travel)
@@ -163,15 +163,19 @@ def _join(first: Plan, second: Plan, plane: str) -> Plan:
         np.ones(n + m),
         np.full(n + m, np.inf),
         {
-            "position_mm": position,
+            "position_mm": np.concatenate(
+                [first.marks["position_mm"], second.marks["position_mm"]]
+            ),
+            "along_mm": along,
+            "gain_sign": np.full(n + m, plane.sign),
             "way": np.concatenate([first.marks["way"], second.marks["way"]]),
             "line": two,
         },
         {
-            f"zero_{plane[0]}_um": one,
-            f"zero_{plane[1]}_um": two,
-            "turned_urad": (one - two) * position * 1e-3,
+            f"zero_{plane.first}_um": one,
+            f"zero_{plane.second}_um": two,
+            "turned_urad": (one - two) * along * 1e-3,
         },
-        f"{plane} · {first.place}",
+        f"{plane.first}{plane.second} · {first.place}",
         (np.arange(n), np.arange(n, n + m)),
     )

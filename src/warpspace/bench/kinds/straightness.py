@@ -13,14 +13,12 @@ from warpspace.bench.options import check_count, option
 from warpspace.bench.outcome import Chart, Curve, Outcome, Quantity
 from warpspace.bench.placing import linear_axis, motion_direction
 from warpspace.bench.plan import Plan, build_plan
+from warpspace.bench.planes import axis_vector
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.chain import nominal_point
 from warpspace.kinematics.model import Loop
-from warpspace.machine.axes import direction_index
 from warpspace.scene.model import Scene
 from warpspace.units import Array
-
-STYLES = ("dashed", "line", "thin")
 
 
 def line_plan(
@@ -43,14 +41,17 @@ def line_plan(
     coordinates = {**test.stand(scene), axis: position}
     count = len(position)
     point = np.broadcast_to(nominal_point(model, Loop.TOOL, coordinates), (count, 3))
+    stand = test.stand(scene)
+    forth = motion_direction(model, stand, axis) @ axis_vector(model, stand, axis)
+    along = float(np.sign(forth)) * position
     return build_plan(
         coordinates,
         point,
         across,
         place=f"{axis} · {test.place_words(scene, [axis])}",
-        marks={"position_mm": position, "way": way},
+        marks={"position_mm": position, "along_mm": along, "way": way},
         travel={axis: way},
-        setup={"zero_um": np.ones(count), "tilt_urad": position * 1e-3},
+        setup={"zero_um": np.ones(count), "tilt_urad": along * 1e-3},
     )
 
 
@@ -81,15 +82,16 @@ class Straightness(BenchTest):
         DataColumn("deviation_um"),
     )
     axis: str = option("", "axis", "Linear axis that runs; the first one by default.")
-    across: str = option(
-        "", "choice", "Direction that is sensed; the next one by default.", choices=("x", "y", "z")
+    across: str | None = option(
+        None, "choice", "Direction that is sensed; the next one by default.", choices=("x", "y", "z")
     )
     points: int = option(21, "count", "Positions along the axis.")
 
     def directions(self, scene: Scene) -> tuple[str, int]:
         """Give the axis that runs, and which of x, y, z is sensed."""
         axis = linear_axis(scene.machine, self.axis)
-        own = direction_index(axis)
+        vector = axis_vector(scene.model, self.stand(scene), axis)
+        own = int(np.argmax(np.abs(vector)))
         if self.across and "xyz".index(self.across) == own:
             raise OptionError(
                 f"--across {self.across} is the direction of {axis}; expected one across it"
@@ -122,7 +124,7 @@ class Straightness(BenchTest):
 
     def evaluate(self, plan: Plan, readings: Array) -> Outcome:
         """Take straightness against the three reference lines."""
-        position, mean = mean_by_position(plan.marks["position_mm"], readings)
+        position, mean = mean_by_position(plan.marks["along_mm"], readings)
         found = reference_lines(position, mean)
         quantities = [
             Quantity(f"{name}_um", f"straightness, {WORDS[name]}", line.deviation_um, "µm")
@@ -140,7 +142,7 @@ class Straightness(BenchTest):
         """Draw the deviations about the least-squares line, with the other two lines."""
         curves: list[Curve] = []
         for run in runs:
-            position, mean = mean_by_position(run.plan.marks["position_mm"], run.readings)
+            position, mean = mean_by_position(run.plan.marks["along_mm"], run.readings)
             lines = reference_lines(position, mean)
             level = lines["least_squares"].at(position)
             style = "dots" if run.is_measured else "line"
@@ -153,7 +155,7 @@ class Straightness(BenchTest):
         across = "xyz"[int(np.argmax(np.abs(runs[0].plan.direction[0])))]
         return (
             Chart(
-                "lines", f"Straightness of {axis} in {across}", f"{axis} [mm]", "deviation [µm]",
+                "lines", f"Straightness of {axis} in {across}", f"along {axis} [mm]", "deviation [µm]",
                 tuple(curves), (), "About the least-squares line.",
             ),
         )  # fmt: skip
