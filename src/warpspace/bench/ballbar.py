@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpspace.bench.circle import fit_circle_readings
+from warpspace.bench.evaluation.circle import fit_circle_readings
 from warpspace.bench.kinds.circular import DEFAULT_POINTS, Circular
-from warpspace.bench.planes import find_plane, plane_axes
+from warpspace.bench.paths.planes import find_plane, plane_axes
 from warpspace.bench.readings import RELATIVE, simulate
 from warpspace.field.evaluate import evaluate_first_order
 from warpspace.scene.model import Scene

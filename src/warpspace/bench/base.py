@@ -69,7 +69,9 @@ class BenchTest(ABC):
     words: ClassVar[str]
     columns: ClassVar[tuple[DataColumn, ...]]
     at: Mapping[str, float] = option(
-        None, "point", "Where axes stand that the test does not move; what the scene says for others."
+        None,
+        "point",
+        "Where axes stand that the test does not move; what the scene says for others.",
     )
     tool_extension_mm: float = option(
         0.0, "number", "How much longer than the scene's the tool or probe is.", unit="mm"

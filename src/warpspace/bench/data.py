@@ -223,7 +223,8 @@ def unit_notes(measured: Array, model: Array, unit: str) -> tuple[str, ...]:
     elif spread > 0.0 and expected > FACTOR * spread:
         coarser = "mm" if unit == "µm" else "mrad"
         notes.append(
-            f"the readings spread over {spread:.3g} {unit}, the model gives {expected / spread:,.0f}"
-            f" times as much ({expected:.3g} {unit}): are they in {coarser}? expected {unit}"
+            f"the readings spread over {spread:.3g} {unit}, the model gives"
+            f" {expected / spread:,.0f} times as much ({expected:.3g} {unit}): are they in"
+            f" {coarser}? expected {unit}"
         )
     return tuple(notes)

@@ -73,7 +73,7 @@ def options_of(test: type) -> tuple[TestOption, ...]:
         for entry in fields(test)
         if entry.metadata
     ]
-    return tuple([*found[SHARED:], *found[:SHARED]])
+    return (*found[SHARED:], *found[:SHARED])
 
 
 SHARED = 2

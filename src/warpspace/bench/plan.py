@@ -11,6 +11,8 @@ from warpspace.units import Array
 Whole = NDArray[np.intp]
 NONE = -1
 """In place of the site that a reading is taken against: none."""
+DEPENDENT = 1e-9
+"""Share of a column of the set-up that others do not give, below which it is left out."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +115,22 @@ def build_plan(
         np.broadcast_to(np.asarray(gain, dtype=float), (count,)),
         np.broadcast_to(np.asarray(length_mm, dtype=float), (count,)),
         marks or {},
-        setup or {},
+        _independent(setup or {}),
         place,
         (np.arange(sites),) if path is None else path,
     )
+
+
+def _independent(setup: Mapping[str, Array]) -> dict[str, Array]:
+    """Leave out what the unknowns before it give as well, or what gives no reading at all."""
+    kept: dict[str, Array] = {}
+    basis: list[Array] = []
+    for name, column in setup.items():
+        rest = column.astype(float)
+        for vector in basis:
+            rest = rest - (vector @ rest) * vector
+        size = float(np.linalg.norm(rest))
+        if size > DEPENDENT * np.sqrt(len(column)):
+            kept[name] = column
+            basis.append(rest / size)
+    return kept

@@ -112,9 +112,7 @@ def respond(scene: Scene, plan: Plan, keys: Sequence[str] | None = None) -> Resp
     position = np.zeros((len(chosen), len(plan.point_mm), 3))
     for rows, errors in _by_travel(scene.errors, plan):
         coordinates = {name: values[rows] for name, values in plan.coordinates.items()}
-        basis = build_basis(
-            scene.model, errors, chosen, coordinates, RELATIVE, plan.point_mm[rows]
-        )
+        basis = build_basis(scene.model, errors, chosen, coordinates, RELATIVE, plan.point_mm[rows])
         share = np.array([_share(scene.errors, errors, key) for key in chosen])
         position[:, rows] = basis.position * share[:, None, None]
     along = np.sum(_differences(plan, position) * plan.direction, axis=-1)
@@ -140,7 +138,10 @@ def _by_travel(errors: ErrorSet, plan: Plan) -> Iterator[tuple[Array, ErrorSet]]
     ways = np.stack([np.sign(plan.travel[axis]) for axis in axes], axis=-1)
     found, number = np.unique(ways, axis=0, return_inverse=True)
     for index, way in enumerate(found):
-        yield every[number.reshape(-1) == index], _travelling(errors, dict(zip(axes, way, strict=True)))
+        yield (
+            every[number.reshape(-1) == index],
+            _travelling(errors, dict(zip(axes, way, strict=True))),
+        )
 
 
 def _depends_on_travel(errors: ErrorSet, axis: str) -> bool:

@@ -38,7 +38,7 @@ def unregister_test(name: str) -> None:
     del _TESTS[name]
 
 
-def test_names() -> tuple[str, ...]:
+def bench_names() -> tuple[str, ...]:
     """List the names of all tests."""
     load_plugins()
     return tuple(_TESTS)

@@ -73,7 +73,9 @@ def run_test(
     if data is None:
         plan = test.plan(scene)
         readings = simulate(scene, plan, exact=exact)
-        return BenchResult(test, scene, (Run("model", plan, readings, test.evaluate(plan, readings)),))
+        return BenchResult(
+            test, scene, (Run("model", plan, readings, test.evaluate(plan, readings)),)
+        )
     table = read_table(data, test.data_columns(scene))
     plan, measured = test.plan_data(scene, table)
     readings = simulate(scene, plan, exact=exact)

@@ -8,11 +8,12 @@ import numpy as np
 
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import DataColumn, Table
+from warpspace.bench.evaluation.layout import round_factor
 from warpspace.bench.options import check_count, option
 from warpspace.bench.outcome import Chart, Curve, Outcome, Quantity
-from warpspace.bench.placing import following_axes, relative_point
+from warpspace.bench.paths.placing import following_axes, relative_point
+from warpspace.bench.paths.planes import PLANES, axis_vector, find_plane, plane_axes
 from warpspace.bench.plan import Plan, build_plan
-from warpspace.bench.planes import PLANES, axis_vector, find_plane, plane_axes
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.chain import nominal_point
 from warpspace.kinematics.model import Loop
@@ -32,8 +33,10 @@ class BallPlate(BenchTest):
     standard: ClassVar[str] = "ISO 10360-2, ASME B89.4.10360.2 (artefact)"
     words: ClassVar[str] = (
         "A plate with a grid of balls (or holes) lies in a plane of the machine and is measured in"
-        " several positions along the third axis. In each the six ways in which the plate can lie are"
-        " fitted; what is left are errors of the machine. An affine fit gives the scales of both axes"
+        " several positions along the third axis. In each the six ways in which the plate can"
+        " lie are"
+        " fitted; what is left are errors of the machine. An affine fit gives the scales of"
+        " both axes"
         " and their squareness; the largest error of a distance between any two balls is what"
         " acceptance tests ask for."
     )
@@ -71,7 +74,11 @@ class BallPlate(BenchTest):
         """Measure the balls of a file; position, row and column count from 1."""
         problems: list[str] = []
         given: dict[str, Array] = {}
-        for name, most in (("position", self.positions), ("row", self.balls), ("column", self.balls)):
+        for name, most in (
+            ("position", self.positions),
+            ("row", self.balls),
+            ("column", self.balls),
+        ):
             values = table[name]
             wrong = (values != np.round(values)) | (values < 1) | (values > most)
             problems += [
@@ -140,7 +147,7 @@ class BallPlate(BenchTest):
         return (low + high) / 2.0 + pitch * (index - (self.balls - 1) / 2.0)
 
     def evaluate(self, plan: Plan, readings: Array) -> Outcome:
-        """Take what is left of each position, its scales and squareness, and errors of distances."""
+        """Take what is left of each position, its scales, squareness and errors of distances."""
         rest = left_over(plan, readings)
         first, second, key = PLANES[self.plane]
         sign = float(plan.marks["gain_sign"][0])
@@ -171,7 +178,8 @@ class BallPlate(BenchTest):
             return float(np.mean([float(str(row[name])) for row in rows]))
 
         quantities = (
-            Quantity("length_error_um", "largest error of a distance", worst("length_error_um"), "µm"),
+            Quantity("length_error_um", "largest error of a distance",
+                     worst("length_error_um"), "µm"),
             Quantity("squareness_urad", f"squareness {key}, mean", mean("squareness_urad"), "µrad"),
             *(
                 Quantity(f"scale_{axis}_um_per_m", f"scale of {axis}, mean",
@@ -185,8 +193,6 @@ class BallPlate(BenchTest):
 
     def charts(self, runs: Sequence[Run]) -> tuple[Chart, ...]:
         """Draw the plate of each position, deviations exaggerated."""
-        from warpspace.bench.drawing import round_factor
-
         first, second = PLANES[self.plane][:2]
         columns = ["XYZ".index(name) for name in (first, second)]
         largest = max(float(np.abs(left_over(run.plan, run.readings)).max()) for run in runs)
@@ -224,7 +230,7 @@ def left_over(plan: Plan, readings: Array) -> Array:
 
 
 def _lying(number: Array, seen: Array) -> dict[str, Array]:
-    """Readings that each way of lying gives in each position: three shifts, three small turns."""
+    """Give the readings of each way of lying in each position: three shifts, three small turns."""
     found: dict[str, Array] = {}
     for index in np.unique(number):
         inside = (number == index).astype(float)

@@ -7,14 +7,14 @@ from typing import ClassVar
 import numpy as np
 
 from warpspace.bench.base import BenchTest, Run
-from warpspace.bench.circle import CircleFit, fit_circle_readings, is_full
 from warpspace.bench.data import DataColumn, Table
-from warpspace.bench.following import FollowedCircle, lay_followed
+from warpspace.bench.evaluation.circle import CircleFit, fit_circle_readings, is_full
 from warpspace.bench.options import check_count, option
 from warpspace.bench.outcome import Chart, Curve, Outcome, Quantity
-from warpspace.bench.placing import relative_point
+from warpspace.bench.paths.following import FollowedCircle, lay_followed
+from warpspace.bench.paths.placing import relative_point
+from warpspace.bench.paths.planes import PLANES, find_plane, plane_axes
 from warpspace.bench.plan import Plan, build_plan
-from warpspace.bench.planes import PLANES, find_plane, plane_axes
 from warpspace.exceptions import OptionError
 from warpspace.field.grid import Workspace
 from warpspace.kinematics.chain import nominal_point
@@ -149,9 +149,7 @@ class Circular(BenchTest):
                 Quantity(f"circular_deviation_{word}_um", f"G, {SENSES[sense]}", value, "µm")
             )
         if fit.hysteresis_um is not None:
-            quantities.append(
-                Quantity("hysteresis_um", "hysteresis H", fit.hysteresis_um, "µm")
-            )
+            quantities.append(Quantity("hysteresis_um", "hysteresis H", fit.hysteresis_um, "µm"))
         radius = fit.radius_um
         quantities.append(Quantity("radius_um", "mean radius − nominal", radius, "µm"))
         details: dict[str, object] = {}
@@ -186,7 +184,9 @@ class Circular(BenchTest):
                 if is_full(angle[chosen]) and not run.is_measured:
                     x, y = np.append(x, x[0] + TURN), np.append(y, y[0])
                 style = "dots" if run.is_measured else "line"
-                curves.append(Curve(run.named("both ways round" if alike else word), x, y, row, style))
+                curves.append(
+                    Curve(run.named("both ways round" if alike else word), x, y, row, style)
+                )
         fit = fit_circle_readings(runs[0].plan, runs[0].readings)
         if fit.squareness_urad is not None and not self.rotary:
             curves.append(self._squareness(fit, runs[0].plan))

@@ -7,13 +7,13 @@ from typing import ClassVar
 import numpy as np
 
 from warpspace.bench.base import BenchTest, Run
-from warpspace.bench.circle import fit_circle_readings
 from warpspace.bench.data import DataColumn, Table
-from warpspace.bench.following import ball_columns, travels
+from warpspace.bench.evaluation.circle import fit_circle_readings
 from warpspace.bench.options import check_count, option
-from warpspace.bench.orienting import orient
 from warpspace.bench.outcome import Chart, Curve, Outcome, Quantity
-from warpspace.bench.placing import ball_point, check_travel, follow
+from warpspace.bench.paths.following import ball_columns, travels
+from warpspace.bench.paths.orienting import orient
+from warpspace.bench.paths.placing import ball_point, check_travel, follow
 from warpspace.bench.plan import Plan, build_plan
 from warpspace.exceptions import OptionError
 from warpspace.kinematics import transforms
@@ -31,8 +31,10 @@ class ConeFrustum(BenchTest):
     title: ClassVar[str] = "Cone frustum"
     standard: ClassVar[str] = "ISO 10791-7, M3; ISO 10791-6 (with a ball bar)"
     words: ClassVar[str] = (
-        "The tool runs round a cone that stands tilted on the table, its axis along the flank, so that"
-        " three linear and two rotary axes move at once. A ball bar from the middle of the circle, or"
+        "The tool runs round a cone that stands tilted on the table, its axis along the flank,"
+        " so that"
+        " three linear and two rotary axes move at once. A ball bar from the middle of the"
+        " circle, or"
         " the roundness of the machined cone, gives the radial deviation: circularity about the"
         " least-squares centre."
     )
@@ -42,7 +44,9 @@ class ConeFrustum(BenchTest):
     )
     radius_mm: float = option(50.0, "number", "Radius of the circle.", unit="mm")
     half_apex_deg: float = option(15.0, "number", "Half the apex angle of the cone.", unit="°")
-    tilt_deg: float = option(10.0, "number", "Tilt of its base, about y of the workpiece.", unit="°")
+    tilt_deg: float = option(
+        10.0, "number", "Tilt of its base, about y of the workpiece.", unit="°"
+    )
     centre: tuple[float, float, float] | None = option(
         None, "vector", "Middle of the circle in the workpiece frame, x,y,z in mm; by default that"
         " of the working volume.", unit="mm",
@@ -70,7 +74,8 @@ class ConeFrustum(BenchTest):
             raise OptionError(f"--radius {self.radius_mm:g} mm; expected above 0")
         if not 0.0 <= self.half_apex_deg < 90.0 or not -90.0 < self.tilt_deg < 90.0:
             raise OptionError(
-                f"--half-apex {self.half_apex_deg:g}, --tilt {self.tilt_deg:g}; expected 0 to 90 and"
+                f"--half-apex {self.half_apex_deg:g}, --tilt {self.tilt_deg:g}; expected 0 to"
+                f" 90 and"
                 " -90 to 90 degrees"
             )
         model, stand = self.model(scene), self.stand(scene)
@@ -89,7 +94,9 @@ class ConeFrustum(BenchTest):
         coordinates = follow(model, coordinates, middle + self.radius_mm * outward)
         check_travel(scene, coordinates, "the cone")
         pose = np.asarray(branch_pose(model, "workpiece", coordinates))
-        direction = transforms.rotate(np.broadcast_to(pose, (len(theta), 4, 4))[..., :3, :3], outward)
+        direction = transforms.rotate(
+            np.broadcast_to(pose, (len(theta), 4, 4))[..., :3, :3], outward
+        )
         columns = ball_columns(model, coordinates)
         spelled = ", ".join(f"{value:.4g}" for value in middle)
         return build_plan(

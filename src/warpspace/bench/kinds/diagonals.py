@@ -8,38 +8,24 @@ import numpy as np
 
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import DataColumn, Table
+from warpspace.bench.evaluation.diagonal import (
+    KINDS,
+    diagonal_names,
+    diagonal_signs,
+    means_along,
+    squareness_of_diagonals,
+    steps_by_axis,
+)
 from warpspace.bench.options import check_count, option
 from warpspace.bench.outcome import Chart, Curve, Outcome, Quantity
-from warpspace.bench.placing import following_axes, relative_point
+from warpspace.bench.paths.placing import following_axes, relative_point
+from warpspace.bench.paths.planes import PLANES, find_plane
 from warpspace.bench.plan import Plan, build_plan
-from warpspace.bench.planes import PLANES, find_plane
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.chain import nominal_point
 from warpspace.kinematics.model import Loop
 from warpspace.scene.model import Scene
 from warpspace.units import Array
-
-BODY = ("PPP", "NPP", "PNP", "PPN")
-"""Which way x, y and z run: P upwards, N downwards."""
-KINDS = ("body", "face", "step")
-
-
-def diagonal_names(kind: str) -> tuple[str, ...]:
-    """List the diagonals of a kind: ``NPP``, or ``XY:NP`` for those of a face."""
-    if kind == "face":
-        return tuple(f"{plane}:{way}" for plane in PLANES for way in ("PP", "NP"))
-    return BODY
-
-
-def diagonal_signs(name: str) -> Array:
-    """Give which way x, y and z run along a diagonal, [3]: +1, −1, or 0 where one stands."""
-    plane, colon, ways = name.partition(":")
-    if not colon:
-        return np.array([1.0 if way == "P" else -1.0 for way in plane])
-    signs = np.zeros(3)
-    for axis, way in zip(plane, ways, strict=True):
-        signs["XYZ".index(axis)] = 1.0 if way == "P" else -1.0
-    return signs
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +80,7 @@ class Diagonals(BenchTest):
         number = np.array([names.index(word) for word in given], dtype=float)
         if self.kind == "step":
             return self._step_data(scene, table, number)
-        corners, lengths = self._box(scene, names)
+        _, lengths = self._box(scene, names)
         share = table["position_mm"] / lengths[number.astype(int)]
         for index in np.unique(number).astype(int):
             chosen = number == index
@@ -169,7 +155,7 @@ class Diagonals(BenchTest):
         return self._plan(scene, positions, signs, index, marks)
 
     def _step_data(self, scene: Scene, table: Table, number: Array) -> tuple[Plan, Array]:
-        """Put the readings of step diagonals in order: all steps of each diagonal, from its start."""
+        """Put the readings of step diagonals in order: all steps of each, from its start."""
         plan = self._steps(scene)
         names = diagonal_names("step")
         values: list[Array] = []
@@ -244,7 +230,7 @@ class Diagonals(BenchTest):
             chosen = number == index
             if not chosen.any():
                 continue
-            there = _means(position[chosen], way[chosen], readings[chosen])
+            there = means_along(position[chosen], way[chosen], readings[chosen])
             lengths[index] = there["mean"][-1] - there["mean"][0]
             row: dict[str, object] = {
                 "diagonal": name,
@@ -256,7 +242,7 @@ class Diagonals(BenchTest):
             if "reversal" in there:
                 row["B_um"] = float(np.abs(there["reversal"]).max())
             if self.kind == "step":
-                row["by_axis_um"] = _by_axis(plan.marks["axis"][chosen], readings[chosen])
+                row["by_axis_um"] = steps_by_axis(plan.marks["axis"][chosen], readings[chosen])
             rows.append(row)
         found = lengths[np.isfinite(lengths)]
         quantities = [
@@ -268,9 +254,11 @@ class Diagonals(BenchTest):
         ]  # fmt: skip
         if any("B_um" in row for row in rows):
             quantities.append(Quantity("B_um", "largest reversal B", _largest(rows, "B_um"), "µm"))
-        squareness = _squareness(plan, names, lengths)
+        squareness = squareness_of_diagonals(plan, names, lengths)
         quantities += [
-            Quantity(f"squareness_{key}_urad", f"squareness {key} that it looks like", value, "µrad")
+            Quantity(
+                f"squareness_{key}_urad", f"squareness {key} that it looks like", value, "µrad"
+            )
             for key, value in squareness.items()
         ]
         return Outcome(tuple(quantities), {"diagonals": rows})
@@ -284,7 +272,9 @@ class Diagonals(BenchTest):
             for index, name in enumerate(names):
                 for way, word in ((1.0, ""), (-1.0, " back")):
                     chosen = (marks["diagonal"] == index) & (marks["way"] == way)
-                    if not chosen.any() or (way < 0.0 and not run.is_measured and _alike(run, index)):
+                    if not chosen.any() or (
+                        way < 0.0 and not run.is_measured and _alike(run, index)
+                    ):
                         continue
                     style = "dots" if run.is_measured else ("line" if way > 0.0 else "dashed")
                     x, y = marks["position_mm"][chosen], run.readings[chosen]
@@ -307,51 +297,6 @@ def _alike(run: Run, index: int) -> bool:
     return len(there) == len(back) and bool(np.abs(there - back[::-1]).max(initial=0.0) < 1e-9)
 
 
-def _means(position: Array, way: Array, readings: Array) -> dict[str, Array]:
-    """Take the mean at each position: of each direction, of both, and their difference."""
-    places, index = np.unique(np.round(position, 3), return_inverse=True)
-    sums = np.zeros((2, len(places)))
-    counts = np.zeros((2, len(places)))
-    for row, sign in enumerate((1.0, -1.0)):
-        np.add.at(sums[row], index.reshape(-1)[way == sign], readings[way == sign])
-        np.add.at(counts[row], index.reshape(-1)[way == sign], 1.0)
-    ways = [sums[row] / counts[row] for row in (0, 1) if (counts[row] > 0.0).all()]
-    if not ways:
-        ways = [sums.sum(axis=0) / counts.sum(axis=0)]
-    found = {"all": np.concatenate(ways), "mean": np.mean(ways, axis=0)}
-    if len(ways) == 2:
-        found["reversal"] = ways[0] - ways[1]
-    return found
-
-
-def _by_axis(axis: Array, readings: Array) -> dict[str, float]:
-    """Add up what the steps of each axis contribute along a step diagonal, µm."""
-    steps = np.diff(readings, prepend=readings[:1])
-    return {name: float(steps[axis == index].sum()) for index, name in enumerate("XYZ")}
-
-
 def _largest(rows: Sequence[dict[str, object]], key: str) -> float:
     """Largest of a number over the diagonals."""
     return max(float(str(row[key])) for row in rows if key in row)
-
-
-def _squareness(plan: Plan, names: Sequence[str], lengths: Array) -> dict[str, float]:
-    """Squareness errors that the lengths of diagonals look like, µrad.
-
-    A squareness of γ between axes of lengths a and b changes a diagonal of length L by ±γ·a·b/L;
-    what all diagonals have in common is scale.
-    """
-    start = {name: np.flatnonzero(plan.marks["diagonal"] == i) for i, name in enumerate(names)}
-    if any(len(rows) == 0 for rows in start.values()):
-        return {}
-    size = np.array([np.ptp(plan.marks["position_mm"][rows]) for rows in start.values()])
-    first = [rows[0] for rows in start.values()]
-    keys = [key for _, _, key in PLANES.values()]
-    columns = [plan.marks[key][first] * size for key in keys]
-    if len(names) == len(BODY):
-        design = np.stack([np.ones(len(names)), *columns], -1)
-    else:
-        faces = np.kron(np.eye(3), np.ones((2, 1)))
-        design = np.concatenate([faces, np.stack(columns, -1)], axis=-1)
-    solution = np.linalg.lstsq(design, lengths, rcond=None)[0]
-    return dict(zip(keys, solution[-3:].tolist(), strict=True))

@@ -10,7 +10,7 @@ from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import DataColumn, Table
 from warpspace.bench.options import check_count, option
 from warpspace.bench.outcome import Band, Chart, Curve, Outcome, Quantity
-from warpspace.bench.placing import axis_line, motion_direction
+from warpspace.bench.paths.placing import axis_line, motion_direction
 from warpspace.bench.plan import Plan, build_plan
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.kinematics.chain import nominal_point
@@ -202,7 +202,9 @@ class Positioning(BenchTest):
                     continue
                 x, mean = found.target[kept], found.mean[row, kept]
                 style = "dots" if run.is_measured else "line"
-                curves.append(Curve(run.named("both directions" if alike else word), x, mean, row, style))
+                curves.append(
+                    Curve(run.named("both directions" if alike else word), x, mean, row, style)
+                )
                 spread = COVERAGE * found.deviation[row, kept]
                 if run.is_measured:
                     bands.append(Band(f"{word} ±2s", x, mean - spread, mean + spread, row))

@@ -7,11 +7,11 @@ from typing import ClassVar
 import numpy as np
 
 from warpspace.bench.base import BenchTest, Run
-from warpspace.bench.circle import is_full
 from warpspace.bench.data import DataColumn, Table
+from warpspace.bench.evaluation.circle import is_full
 from warpspace.bench.options import check_count, option
 from warpspace.bench.outcome import Chart, Curve, Outcome, Quantity
-from warpspace.bench.placing import ball_point, axis_line, rotary_axis
+from warpspace.bench.paths.placing import axis_line, ball_point, rotary_axis
 from warpspace.bench.plan import Plan, build_plan
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose
@@ -60,10 +60,13 @@ class RotaryAxis(BenchTest):
     standard: ClassVar[str] = "ISO 230-7"
     words: ClassVar[str] = (
         "Sensors at two heights read an artefact on the axis while it turns: two radial, two tilt,"
-        " one axial deviation, and the angular one against an encoder; the linear axes stand. Radial"
+        " one axial deviation, and the angular one against an encoder; the linear axes stand."
+        " Radial"
         " and tilt error motion are taken towards a point that turns with the axis, about the"
-        " least-squares centre; axial and angular about their means. The mean of the readings over a"
-        " full turn is the axis average line: where the axis is and how it leans, as the place of the"
+        " least-squares centre; axial and angular about their means. The mean of the readings"
+        " over a"
+        " full turn is the axis average line: where the axis is and how it leans, as the place"
+        " of the"
         " test sees it."
     )
     columns: ClassVar[tuple[DataColumn, ...]] = (
@@ -103,7 +106,9 @@ class RotaryAxis(BenchTest):
         line = axis_line(model, stand, axis)
         height = self.height_mm
         if height is None:
-            tool = transforms.apply(branch_pose(model, "workpiece", stand), ball_point(model, stand))
+            tool = transforms.apply(
+                branch_pose(model, "workpiece", stand), ball_point(model, stand)
+            )
             height = float((tool - line.origin_mm) @ line.direction)
         count = len(angle_deg)
         base = np.broadcast_to(line.origin_mm + height * line.direction, (count, 3))
@@ -160,9 +165,9 @@ class RotaryAxis(BenchTest):
         names = (*keys, *(f"E{turn}0{axis}" for turn in turns))
         units = ("µm", "µm", "µrad", "µrad")
         for name, word, value, unit in zip(names, words, found.average_line, units, strict=True):
-            word = word.replace("x", "#").replace("y", frame[1]).replace("#", frame[0])
+            spelled = word.replace("x", "#").replace("y", frame[1]).replace("#", frame[0])
             suffix = "um" if unit == "µm" else "urad"
-            quantities.append(Quantity(f"{name}_{suffix}", f"{word} ({name})", value, unit))
+            quantities.append(Quantity(f"{name}_{suffix}", f"{spelled} ({name})", value, unit))
         details: dict[str, object] = {"angle_deg": found.angle_deg.tolist()}
         for name in ("radial", "axial", "tilt", "angular"):
             details[f"{name}_motion"] = getattr(found, name).tolist()
@@ -172,7 +177,12 @@ class RotaryAxis(BenchTest):
         """Draw the polar plots of the four motions."""
         axis = runs[0].plan.place.partition(" ")[0]
         charts: list[Chart] = []
-        for name, unit in (("radial", "µm"), ("tilt", "µrad"), ("axial", "µm"), ("angular", "µrad")):
+        for name, unit in (
+            ("radial", "µm"),
+            ("tilt", "µrad"),
+            ("axial", "µm"),
+            ("angular", "µrad"),
+        ):
             curves: list[Curve] = []
             for run in runs:
                 found = motions(run.plan, run.readings)
@@ -182,7 +192,9 @@ class RotaryAxis(BenchTest):
                 style = "dots" if run.is_measured else "line"
                 curves.append(Curve(run.named(f"{name} error motion"), x, y, 0, style))
             title = f"{axis}: {name}"
-            charts.append(Chart("polar", title, f"{axis} [°]", f"deviation [{unit}]", tuple(curves)))
+            charts.append(
+                Chart("polar", title, f"{axis} [°]", f"deviation [{unit}]", tuple(curves))
+            )
         return tuple(charts)
 
 
@@ -230,7 +242,7 @@ def once_mean(values: Array, theta: Array) -> float:
 
 
 def _eccentricity(theta: Array) -> dict[str, Array]:
-    """Readings that an eccentric or leaning artefact gives: it turns with the axis."""
+    """Give the readings of an eccentric or leaning artefact: it turns with the axis."""
     zero, cosine, sine = np.zeros_like(theta), np.cos(theta), np.sin(theta)
     one = np.ones_like(theta)
     return {

@@ -8,10 +8,10 @@ import numpy as np
 
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import DataColumn, Table
-from warpspace.bench.following import ball_columns, default_ball, followed, reachable, travels
 from warpspace.bench.options import check_count, option
 from warpspace.bench.outcome import Chart, Curve, Outcome, Quantity
-from warpspace.bench.placing import rotary_axis
+from warpspace.bench.paths.following import ball_columns, default_ball, followed, reachable, travels
+from warpspace.bench.paths.placing import rotary_axis
 from warpspace.bench.plan import Plan, build_plan
 from warpspace.kinematics.chain import branch_pose
 from warpspace.scene.model import Scene
@@ -29,10 +29,13 @@ class Sphere(BenchTest):
     standard: ClassVar[str] = "ISO 10791-6, tests AK, BK, CK"
     words: ClassVar[str] = (
         "A ball stands on the table, three sensors on the tool (or the other way round) read where"
-        " it is along x, y and z. A rotary axis turns; the linear axes follow, so that nominally the"
+        " it is along x, y and z. A rotary axis turns; the linear axes follow, so that"
+        " nominally the"
         " tool stays on the ball. Readings are tool minus ball, in R or, with --frame workpiece, in"
-        " directions that turn with the table. The range of each is what the standard asks for; with"
-        " the ball's place fitted (it is never known as well) the ranges that are left are given too."
+        " directions that turn with the table. The range of each is what the standard asks"
+        " for; with"
+        " the ball's place fitted (it is never known as well) the ranges that are left are"
+        " given too."
     )
     columns: ClassVar[tuple[DataColumn, ...]] = (
         DataColumn("angle_deg", "number"),
@@ -42,8 +45,8 @@ class Sphere(BenchTest):
     )
     axis: str = option("", "axis", "Rotary axis that turns; the last one by default.")
     ball: tuple[float, float, float] | None = option(
-        None, "vector", "Centre of the ball in the workpiece frame, x,y,z in mm; by default one that"
-        " can be reached.", unit="mm",
+        None, "vector", "Centre of the ball in the workpiece frame, x,y,z in mm; by default one"
+        " that can be reached.", unit="mm",
     )  # fmt: skip
     start: float | None = option(
         None, "number", "First position of the axis; as far as the others can follow.", unit="°"

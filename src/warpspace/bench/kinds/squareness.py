@@ -8,12 +8,12 @@ import numpy as np
 
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import DataColumn, Table
+from warpspace.bench.evaluation.lines import REFERENCES, WORDS, ReferenceLine, reference_lines
 from warpspace.bench.kinds.straightness import check_across, line_plan, mean_by_position
-from warpspace.bench.lines import REFERENCES, WORDS, ReferenceLine, reference_lines
 from warpspace.bench.options import check_count, option
 from warpspace.bench.outcome import Chart, Curve, Outcome, Quantity
+from warpspace.bench.paths.planes import PLANES, Plane, find_plane, plane_axes
 from warpspace.bench.plan import Plan
-from warpspace.bench.planes import PLANES, Plane, find_plane, plane_axes
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
@@ -29,7 +29,8 @@ class Squareness(BenchTest):
         "A probe runs along both arms of a square (or a laser along two lines made square by a"
         " pentaprism): each axis moves, the deviation across it is read. The angle between the"
         " reference lines of both is the squareness error, in the sign of EC0Y, EB0Z or EA0Z:"
-        " positive where the second axis is turned by the right-hand rule against the first. End-point,"
+        " positive where the second axis is turned by the right-hand rule against the first."
+        " End-point,"
         " least-squares and minimum-zone lines may differ. The square itself is taken as perfect."
     )
     columns: ClassVar[tuple[DataColumn, ...]] = (
@@ -57,7 +58,8 @@ class Squareness(BenchTest):
         """Run the positions of a file; ``line`` names the axis."""
         axes = plane_axes(scene.machine, self.plane)[:2]
         problems = [
-            f"line {int(line)}, line: {word!r}; expected {axes[0]} or {axes[1]} (--plane {self.plane})"
+            f"line {int(line)}, line: {word!r}; expected {axes[0]} or {axes[1]} (--plane"
+            f" {self.plane})"
             for line, word in zip(table.lines, table.words["line"], strict=True)
             if word not in axes
         ]
@@ -118,7 +120,13 @@ class Squareness(BenchTest):
                 if run is runs[-1]:
                     lines = reference_lines(position, mean)
                     curves += [
-                        Curve(WORDS[name], position, lines[name].at(position) - level, 1 + row, "dashed")
+                        Curve(
+                            WORDS[name],
+                            position,
+                            lines[name].at(position) - level,
+                            1 + row,
+                            "dashed",
+                        )
                         for row, name in enumerate(REFERENCES)
                     ]
             other = self.plane[1 - index]
@@ -147,7 +155,9 @@ def _join(first: Plan, second: Plan, plane: Plane) -> Plan:
     one, two = np.repeat([1.0, 0.0], [n, m]), np.repeat([0.0, 1.0], [n, m])
     along = np.concatenate([first.marks["along_mm"], second.marks["along_mm"]])
     travel = {
-        name: np.concatenate([plan.travel.get(name, np.zeros(plan.readings)) for plan in (first, second)])
+        name: np.concatenate(
+            [plan.travel.get(name, np.zeros(plan.readings)) for plan in (first, second)]
+        )
         for name in (*first.travel, *second.travel)
     }
     return Plan(

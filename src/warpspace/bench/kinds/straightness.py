@@ -8,12 +8,12 @@ import numpy as np
 
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import DataColumn, Table
-from warpspace.bench.lines import WORDS, reference_lines
+from warpspace.bench.evaluation.lines import WORDS, reference_lines
 from warpspace.bench.options import check_count, option
 from warpspace.bench.outcome import Chart, Curve, Outcome, Quantity
-from warpspace.bench.placing import linear_axis, motion_direction
+from warpspace.bench.paths.placing import linear_axis, motion_direction
+from warpspace.bench.paths.planes import axis_vector
 from warpspace.bench.plan import Plan, build_plan
-from warpspace.bench.planes import axis_vector
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.chain import nominal_point
 from warpspace.kinematics.model import Loop
@@ -73,7 +73,8 @@ class Straightness(BenchTest):
         "A probe on the tool runs along a straight edge, or a laser with a straightness optic is"
         " used: the axis moves, the deviation across it is read. Straightness is the height of the"
         " deviations about the line through the end points, the least-squares line, and the two"
-        " parallel lines of least distance (minimum zone). How the edge lies is no error: a squareness"
+        " parallel lines of least distance (minimum zone). How the edge lies is no error: a"
+        " squareness"
         " error does not count."
     )
     columns: ClassVar[tuple[DataColumn, ...]] = (
@@ -83,7 +84,10 @@ class Straightness(BenchTest):
     )
     axis: str = option("", "axis", "Linear axis that runs; the first one by default.")
     across: str | None = option(
-        None, "choice", "Direction that is sensed; the next one by default.", choices=("x", "y", "z")
+        None,
+        "choice",
+        "Direction that is sensed; the next one by default.",
+        choices=("x", "y", "z"),
     )
     points: int = option(21, "count", "Positions along the axis.")
 
@@ -155,7 +159,8 @@ class Straightness(BenchTest):
         across = "xyz"[int(np.argmax(np.abs(runs[0].plan.direction[0])))]
         return (
             Chart(
-                "lines", f"Straightness of {axis} in {across}", f"along {axis} [mm]", "deviation [µm]",
+                "lines", f"Straightness of {axis} in {across}", f"along {axis} [mm]",
+                "deviation [µm]",
                 tuple(curves), (), "About the least-squares line.",
             ),
         )  # fmt: skip

@@ -28,9 +28,9 @@ class TestTable(MutableMapping[str, click.Command]):
         self._built: dict[str, click.Command] = {}
 
     def _names(self) -> tuple[str, ...]:
-        from warpspace.bench.registry import test_names
+        from warpspace.bench.registry import bench_names
 
-        return test_names()
+        return bench_names()
 
     def __getitem__(self, name: str) -> click.Command:
         """Build the command of a test."""
@@ -69,16 +69,22 @@ def test_(context: click.Context, *, listing: bool) -> None:
     """
     if context.invoked_subcommand is None:
         if not listing:
-            raise click.UsageError("Missing argument 'NAME'; `warpspace test --list` has the names.")
+            raise click.UsageError(
+                "Missing argument 'NAME'; `warpspace test --list` has the names."
+            )
         _list()
 
 
 def _list() -> None:
     """Print the tests there are."""
-    from warpspace.bench.registry import find_test, test_names
+    from warpspace.bench.registry import bench_names, find_test
 
-    columns = (Column("name", leads=True), Column("standard", wraps=True), Column("what", wraps=True))
-    tests = [find_test(name) for name in test_names()]
+    columns = (
+        Column("name", leads=True),
+        Column("standard", wraps=True),
+        Column("what", wraps=True),
+    )
+    tests = [find_test(name) for name in bench_names()]
     print_table(columns, [(test.name, test.standard, test.title) for test in tests], indent=0)
 
 
@@ -201,7 +207,9 @@ def _vector(text: str, flag: str) -> tuple[float, ...]:
         numbers = tuple(float(part) for part in parts)
     except ValueError:
         numbers = ()
-    if len(numbers) != 3 or not all(math.isfinite(number) and abs(number) <= 1e5 for number in numbers):
+    if len(numbers) != 3 or not all(
+        math.isfinite(number) and abs(number) <= 1e5 for number in numbers
+    ):
         raise OptionError(f"{flag} {text!r}; expected three numbers in mm, for instance 100,0,50")
     return numbers
 

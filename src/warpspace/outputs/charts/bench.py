@@ -6,8 +6,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from warpspace.bench.evaluation.layout import PolarLayout, lay_polar
 from warpspace.bench.outcome import Chart, Curve, Outcome
-from warpspace.bench.polar import PolarLayout, lay_polar
 from warpspace.bench.run import BenchResult
 from warpspace.outputs.charts.paper import SMALL, TEXT, ground, quiet, sheet, style
 
@@ -37,7 +37,9 @@ def bench_chart(result: BenchResult, title: str | None = None) -> Figure:
     height = 0.85 + rows * ROW_IN + foot
     with style():
         heading = title or f"{result.test.title} · {result.scene.title}"
-        figure, top = sheet(width, height, heading, f"{result.test.standard} · {result.model.plan.place}")
+        figure, top = sheet(
+            width, height, heading, f"{result.test.standard} · {result.model.plan.place}"
+        )
         for number, chart in enumerate(charts):
             row, column = divmod(number, columns)
             left = column * CHART_IN / width
@@ -138,7 +140,8 @@ def _polar(axes: Axes, chart: Chart) -> None:
         if value != 0.0:
             axes.text(0.0, radius, f"{value:+g}", size=SMALL - 2.0, color=ground().muted,
                       ha="center", va="center",
-                      bbox={"facecolor": ground().paper, "edgecolor": "none", "pad": 0.4})  # fmt: skip
+                      bbox={"facecolor": ground().paper, "edgecolor": "none", "pad": 0.4},
+            )  # fmt: skip
     for degrees in (0, 90, 180, 270):
         x, y = np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))
         axes.plot([0.0, x], [0.0, y], color=ground().faint, linewidth=0.8)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpspace.bench.placing import motion_direction
+from warpspace.bench.paths.placing import motion_direction
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.chain import branch_frames
 from warpspace.kinematics.model import Coordinates, Model

@@ -1,6 +1,7 @@
 """Reference lines of straightness and squareness: end points, least squares, minimum zone."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -101,6 +102,4 @@ def _hull_slopes(x: Array, y: Array, sign: float = 1.0) -> list[float]:
                 break
             hull.pop()
         hull.append((px, py))
-    return [
-        sign * (by - ay) / (bx - ax) for (ax, ay), (bx, by) in zip(hull, hull[1:], strict=False)
-    ]
+    return [sign * (by - ay) / (bx - ax) for (ax, ay), (bx, by) in pairwise(hull)]

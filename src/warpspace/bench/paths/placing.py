@@ -165,9 +165,7 @@ def follow(model: Model, coordinates: Mapping[str, Array], target_mm: Array) -> 
         return nominal_point(model, Loop.TOOL, at) - target
 
     away = gap(start)
-    moves = np.stack(
-        [gap({**start, name: start[name] + 1.0}) - away for name in names], axis=-1
-    )
+    moves = np.stack([gap({**start, name: start[name] + 1.0}) - away for name in names], axis=-1)
     if np.abs(np.linalg.det(moves)).min() < FLAT:
         raise OptionError(
             f"{', '.join(names)} move in one plane in some pose and cannot follow the point"

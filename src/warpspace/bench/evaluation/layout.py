@@ -1,5 +1,6 @@
-"""Polar charts laid out: the same for the app and for figures."""
+"""Charts laid out: the same for the app and for figures."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,7 +61,13 @@ def lay_polar(chart: Chart) -> PolarLayout:
         radius = BASE + per_unit * curve.y
         curves.append(np.stack([radius * np.cos(theta), radius * np.sin(theta)], axis=-1))
     unit = "µrad" if "µrad" in chart.y_label else "µm"
-    rings = tuple(
-        (step * ring, BASE + per_unit * step * ring) for step in range(-RINGS, RINGS + 1)
-    )
+    rings = tuple((step * ring, BASE + per_unit * step * ring) for step in range(-RINGS, RINGS + 1))
     return PolarLayout(ring, unit, rings, tuple(curves))
+
+
+def round_factor(most: float) -> float:
+    """Give the largest of 1, 2, 5 × 10ⁿ that is not above a number."""
+    if not most > 0.0 or not math.isfinite(most):
+        return 1.0
+    decade = 10.0 ** math.floor(math.log10(most))
+    return decade * next(step for step in (5.0, 2.0, 1.0) if step * decade <= most * (1.0 + 1e-9))

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from warpspace.bench.placing import (
+from warpspace.bench.paths.placing import (
     axis_line,
     ball_point,
     check_travel,

@@ -53,7 +53,8 @@ def orient(
     if len(names) < 2:
         raise OptionError(
             f"the machine {machine.chain} has {len(names)} rotary"
-            f" {'axis' if len(names) == 1 else 'axes'}; expected two to turn the tool along the cone"
+            f" {'axis' if len(names) == 1 else 'axes'}; expected two to turn the tool along"
+            f" the cone"
         )
     names = names[:2]
     limits = np.array([machine.axes[name].travel for name in names])
