@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from warpspace.bench.ballbar import ballbar
+    from warpspace.bench.run import run_test
     from warpspace.exceptions import SceneError, WarpspaceError
     from warpspace.field.basis import ErrorField
     from warpspace.outputs.exports.multiblock import to_pyvista
@@ -17,7 +19,6 @@ if TYPE_CHECKING:
     from warpspace.scene.pipeline import evaluate
     from warpspace.scene.verbs import (
         allocate,
-        ballbar,
         contributions,
         gains,
         measured,
@@ -32,10 +33,11 @@ _HOME = {
     "WarpspaceError": "warpspace.exceptions",
     "evaluate": "warpspace.scene.pipeline",
     "allocate": "warpspace.scene.verbs",
-    "ballbar": "warpspace.scene.verbs",
+    "ballbar": "warpspace.bench.ballbar",
     "contributions": "warpspace.scene.verbs",
     "gains": "warpspace.scene.verbs",
     "measured": "warpspace.scene.verbs",
+    "run_test": "warpspace.bench.run",
     "montecarlo": "warpspace.scene.verbs",
     "thesis": "warpspace.scene.verbs",
     "to_pyvista": "warpspace.outputs.exports.multiblock",
@@ -57,6 +59,7 @@ __all__ = [
     "load_scene",
     "measured",
     "montecarlo",
+    "run_test",
     "scene_names",
     "thesis",
     "to_pyvista",

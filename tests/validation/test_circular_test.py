@@ -49,6 +49,7 @@ def test_a_long_x_axis_is_an_ellipse_along_x() -> None:
 
 def test_both_directions_trace_the_same() -> None:
     found = warpspace.ballbar(warpspace.load_scene("dvf5000_first"), plane="XY", radius_mm=150)
+    assert found.both_alike
     np.testing.assert_allclose(found.clockwise_um[1:], found.radial_um[1:][::-1])
     assert found.clockwise_um[0] == found.radial_um[0]
 

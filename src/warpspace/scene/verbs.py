@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 
 from warpspace.analysis import allocation as allocating
-from warpspace.analysis import ballbar as circles
 from warpspace.analysis import contributions as shares
 from warpspace.analysis import gains as levers
 from warpspace.analysis import measured as machines
@@ -201,40 +200,6 @@ def contributions(
     plan = sampling.Plan(seed=seed, cylinder=cylinder)
     plan.check()
     return shares.variance_contributions(scene.model, draws, scene.workspace, view, plan, sobol)
-
-
-def ballbar(
-    scene: Scene,
-    *,
-    plane: str,
-    radius_mm: float,
-    centre: Mapping[str, float] | None = None,
-    points: int = circles.DEFAULT_POINTS,
-) -> circles.Ballbar:
-    """Run the circular test of ISO 230-4 on the errors of a scene.
-
-    Parameters
-    ----------
-    scene : Scene
-    plane : str
-        "XY", "XZ" or "YZ".
-    radius_mm : float, mm
-    centre : mapping of str to float, mm or degrees, optional
-        Axis positions; the middle of the working volume where absent.
-    points : int, optional
-
-    Returns
-    -------
-    Ballbar
-
-    Raises
-    ------
-    OptionError, UnknownNameError
-        If the circle cannot be run in the working volume of the scene.
-    """
-    return circles.ballbar(
-        scene.model, scene.errors, scene.workspace, plane, radius_mm, centre, points
-    )
 
 
 def measured(

@@ -45,12 +45,12 @@ def ballbar(
     The squareness comes out of the sin 2φ part, in the sign of EC0Y, EB0Z or EA0Z. Angular errors
     along the way look like squareness to a ball bar, and count.
     """
-    from warpspace.scene import verbs
+    from warpspace.bench.ballbar import ballbar as run
     from warpspace.scene.library import load_scene
 
     check_targets(scene, force=force, plot=plot)
     loaded = load_scene(scene)
-    result = verbs.ballbar(
+    result = run(
         loaded,
         plane=plane,
         radius_mm=radius,

@@ -5,8 +5,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from warpspace.analysis.ballbar import Ballbar
 from warpspace.analysis.distribution import round_width
+from warpspace.bench.ballbar import Ballbar
 from warpspace.outputs.charts.paper import SMALL, TEXT, ground, key_colour, sheet, style
 from warpspace.units import Array
 

@@ -6,6 +6,7 @@ from matplotlib.figure import Figure
 
 from warpspace import __version__
 from warpspace.analysis.gains import DEFAULT_SHARE
+from warpspace.bench.ballbar import ballbar
 from warpspace.outputs.charts import ballbar_chart, gains_chart, montecarlo_chart
 from warpspace.outputs.charts.paper import on_ground
 from warpspace.outputs.drawing.content import Drawing
@@ -48,7 +49,7 @@ def draw_montecarlo(scenes: Sequence[Scene], settings: FigureSettings, *, exact:
 def draw_ballbar(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
     """Draw the circular test of ISO 230-4 on a scene."""
     scene = scenes[0]
-    result = verbs.ballbar(scene, plane=PLANE, radius_mm=RADIUS_MM)
+    result = ballbar(scene, plane=PLANE, radius_mm=RADIUS_MM)
     middle = ", ".join(f"{name} {value:g}" for name, value in result.centre.items())
     title = f"Circular test: {scene.title}"
     where = f"{PLANE} plane · radius {RADIUS_MM:g} mm · centre {middle}"

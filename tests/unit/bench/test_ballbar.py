@@ -36,12 +36,6 @@ def test_unknown_axis_of_the_centre() -> None:
 
 
 def test_plane_the_machine_does_not_have() -> None:
-    from warpspace.analysis.ballbar import ballbar
-    from warpspace.field.grid import Workspace
-    from warpspace.kinematics.model import Model
-    from warpspace.machine.description import build_machine
-    from warpspace.machine.errors import ErrorSet
-
-    model = Model(build_machine("wFXt"))
-    with pytest.raises(OptionError, match="has no axis Y"):
-        ballbar(model, ErrorSet(), Workspace({"X": (-1.0, 1.0)}), "XY", 0.5)
+    scene = warpspace.load_scene("machine_scara")
+    with pytest.raises(OptionError, match="has no axis X"):
+        warpspace.ballbar(scene, plane="XY", radius_mm=0.5)

@@ -1,0 +1,1 @@
+"""What readings of several tests have in common: circles, reference lines, diagonals, layouts."""

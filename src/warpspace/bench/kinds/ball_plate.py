@@ -1,0 +1,280 @@
+"""Ball plate: a grid of balls measured in several positions, as on measuring machines."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from warpspace.bench.base import BenchTest, Run
+from warpspace.bench.data import DataColumn, Table
+from warpspace.bench.evaluation.layout import round_factor
+from warpspace.bench.options import check_count, option
+from warpspace.bench.outcome import Chart, Curve, Outcome, Quantity
+from warpspace.bench.paths.placing import following_axes, relative_point
+from warpspace.bench.paths.planes import PLANES, axis_vector, find_plane, plane_axes
+from warpspace.bench.plan import Plan, build_plan
+from warpspace.exceptions import OptionError
+from warpspace.kinematics.chain import nominal_point
+from warpspace.kinematics.model import Loop
+from warpspace.scene.model import Scene
+from warpspace.units import UM_PER_MM, Array
+
+SHOWN = 0.35
+"""Share of the pitch that the largest deviation is drawn with, at most."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BallPlate(BenchTest):
+    """Balls of a plate in one plane, at several heights."""
+
+    name: ClassVar[str] = "ball-plate"
+    title: ClassVar[str] = "Ball plate"
+    standard: ClassVar[str] = "ISO 10360-2, ASME B89.4.10360.2 (artefact)"
+    words: ClassVar[str] = (
+        "A plate with a grid of balls (or holes) lies in a plane of the machine and is measured in"
+        " several positions along the third axis. In each the six ways in which the plate can"
+        " lie are"
+        " fitted; what is left are errors of the machine. An affine fit gives the scales of"
+        " both axes"
+        " and their squareness; the largest error of a distance between any two balls is what"
+        " acceptance tests ask for."
+    )
+    columns: ClassVar[tuple[DataColumn, ...]] = (
+        DataColumn("position", "number"),
+        DataColumn("row", "number"),
+        DataColumn("column", "number"),
+        DataColumn("x_um"),
+        DataColumn("y_um"),
+        DataColumn("z_um"),
+    )
+    plane: str = option("XY", "choice", "Plane of the plate.", choices=tuple(PLANES))
+    balls: int = option(5, "count", "Balls along each side.")
+    pitch_mm: float | None = option(
+        None, "number", "Distance of the balls; by default the plate fills the range.", unit="mm"
+    )
+    positions: int = option(3, "count", "Positions of the plate along the third axis.")
+
+    def plan(self, scene: Scene) -> Plan:
+        """Measure every ball in every position."""
+        number, row, column = self._grid()
+        return self._lay(scene, number, row, column)
+
+    def _grid(self) -> tuple[Array, Array, Array]:
+        """Give position, row and column of every ball, row by row."""
+        check_count("--balls", self.balls, 2, 50)
+        check_count("--positions", self.positions, 1, 50)
+        grid = np.meshgrid(
+            np.arange(self.positions), np.arange(self.balls), np.arange(self.balls), indexing="ij"
+        )
+        number, row, column = (part.reshape(-1).astype(float) for part in grid)
+        return number, row, column
+
+    def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
+        """Measure the balls of a file; position, row and column count from 1."""
+        problems: list[str] = []
+        given: dict[str, Array] = {}
+        for name, most in (
+            ("position", self.positions),
+            ("row", self.balls),
+            ("column", self.balls),
+        ):
+            values = table[name]
+            wrong = (values != np.round(values)) | (values < 1) | (values > most)
+            problems += [
+                f"line {int(line)}, {name}: {value:g}; expected a whole number from 1 to {most}"
+                f" (--{'positions' if name == 'position' else 'balls'} {most})"
+                for line, value in zip(table.lines[wrong], values[wrong], strict=True)
+            ]
+            given[name] = values - 1.0
+        for index in np.unique(given["position"]):
+            balls = int((given["position"] == index).sum())
+            if balls < 4 and not problems:
+                problems.append(f"position {index + 1:g}: {balls} balls; expected at least 4")
+        if problems:
+            raise table.refuse(*problems)
+        readings = np.concatenate([table["x_um"], table["y_um"], table["z_um"]])
+        return self._lay(scene, given["position"], given["row"], given["column"]), readings
+
+    def _lay(self, scene: Scene, number: Array, row: Array, column: Array) -> Plan:
+        """Lay the plan: one site a ball, readings along the three linear axes."""
+        first, second, _ = plane_axes(scene.machine, self.plane)
+        names = following_axes(scene.model)
+        third = next(name for name in names if name not in (first, second))
+        stand, model = self.stand(scene), self.model(scene)
+        low, high = scene.workspace.ranges[third]
+        heights = np.linspace(low, high, self.positions)
+        if self.positions == 1:
+            heights = np.array([float(stand[third])])
+        coordinates = {
+            **stand,
+            first: self._side(scene, first, column),
+            second: self._side(scene, second, row),
+            third: heights[number.astype(int)],
+        }
+        count = len(number)
+        point = np.broadcast_to(nominal_point(model, Loop.TOOL, coordinates), (count, 3))
+        axes = np.stack([axis_vector(model, stand, name) for name in names], -1)
+        seen = np.broadcast_to(relative_point(model, coordinates), (count, 3)) @ axes
+        sign = find_plane(model, stand, self.plane).sign
+        marks = {"position": number, "row": row, "column": column}
+        marks["gain_sign"] = np.full(count, sign)
+        marks |= {f"seen_{axis}_mm": seen[:, index] for index, axis in enumerate("xyz")}
+        return build_plan(
+            coordinates,
+            point,
+            np.repeat(axes.T, count, axis=0),
+            place=f"plate in {self.plane} · {third} "
+            + ", ".join(f"{value:g}" for value in heights)
+            + f" · {self.place_words(scene, names)}",
+            marks={name: np.tile(values, 3) for name, values in marks.items()},
+            site=np.tile(np.arange(count), 3),
+            setup=_lying(number, seen),
+            path=tuple(np.flatnonzero(number == index) for index in np.unique(number)),
+        )
+
+    def _side(self, scene: Scene, name: str, index: Array) -> Array:
+        """Give the positions of an axis at balls along one side."""
+        low, high = scene.workspace.ranges[name]
+        if not low < high:
+            raise OptionError(f"a ball plate needs a range of {name} in [workspace]")
+        pitch = (high - low) / (self.balls - 1) if self.pitch_mm is None else self.pitch_mm
+        if not 0.0 < pitch <= (high - low) / (self.balls - 1) + 1e-9:
+            raise OptionError(
+                f"--pitch {pitch:g} mm: {self.balls} balls take {pitch * (self.balls - 1):g} mm,"
+                f" {name} has {high - low:g} mm"
+            )
+        return (low + high) / 2.0 + pitch * (index - (self.balls - 1) / 2.0)
+
+    def evaluate(self, plan: Plan, readings: Array) -> Outcome:
+        """Take what is left of each position, its scales, squareness and errors of distances."""
+        rest = left_over(plan, readings)
+        first, second, key = PLANES[self.plane]
+        sign = float(plan.marks["gain_sign"][0])
+        seen = np.stack([plan.marks[f"seen_{axis}_mm"] for axis in "xyz"], -1)[: len(rest)]
+        number = plan.marks["position"][: len(rest)]
+        columns = ["XYZ".index(name) for name in (first, second)]
+        rows: list[dict[str, object]] = []
+        for index in np.unique(number):
+            chosen = number == index
+            part, place = rest[chosen], seen[chosen][:, columns]
+            scale_1, scale_2, angle = _affine(place, part[:, columns])
+            rows.append(
+                {
+                    "position": int(index) + 1,
+                    "rms_um": float(np.sqrt(np.mean(np.sum(part**2, axis=-1)))),
+                    f"scale_{first}_um_per_m": scale_1,
+                    f"scale_{second}_um_per_m": scale_2,
+                    "squareness_urad": sign * angle,
+                    "flatness_um": float(np.ptp(part[:, 3 - sum(columns)])),
+                    "length_error_um": _length_error(seen[chosen], part),
+                }
+            )
+
+        def worst(name: str) -> float:
+            return max((float(str(row[name])) for row in rows), key=abs)
+
+        def mean(name: str) -> float:
+            return float(np.mean([float(str(row[name])) for row in rows]))
+
+        quantities = (
+            Quantity("length_error_um", "largest error of a distance",
+                     worst("length_error_um"), "µm"),
+            Quantity("squareness_urad", f"squareness {key}, mean", mean("squareness_urad"), "µrad"),
+            *(
+                Quantity(f"scale_{axis}_um_per_m", f"scale of {axis}, mean",
+                         mean(f"scale_{axis}_um_per_m"), "µm/m")
+                for axis in (first, second)
+            ),
+            Quantity("flatness_um", "largest height of the plate", worst("flatness_um"), "µm"),
+            Quantity("rms_um", "RMS of a position, mean", mean("rms_um"), "µm"),
+        )  # fmt: skip
+        return Outcome(quantities, {"positions": rows, "squareness_key": key})
+
+    def charts(self, runs: Sequence[Run]) -> tuple[Chart, ...]:
+        """Draw the plate of each position, deviations exaggerated."""
+        first, second = PLANES[self.plane][:2]
+        columns = ["XYZ".index(name) for name in (first, second)]
+        largest = max(float(np.abs(left_over(run.plan, run.readings)).max()) for run in runs)
+        marks = runs[0].plan.marks
+        count = runs[0].plan.readings // 3
+        seen = np.stack([marks[f"seen_{axis}_mm"] for axis in "xyz"], -1)[:count][:, columns]
+        pitch = float(np.ptp(seen, axis=0).min()) / max(self.balls - 1, 1)
+        factor = round_factor(SHOWN * pitch * UM_PER_MM / largest) if largest > 1e-6 else 1.0
+        charts: list[Chart] = []
+        for index in np.unique(marks["position"]):
+            chosen = marks["position"][:count] == index
+            ball_row = marks["row"][:count][chosen]
+            ball_column = marks["column"][:count][chosen]
+            curves = list(_net("nominal", seen[chosen], ball_row, ball_column, 5, "thin"))
+            for run in runs:
+                rest = left_over(run.plan, run.readings)[chosen][:, columns]
+                moved = seen[chosen] + factor * rest / UM_PER_MM
+                style = "dots" if run.is_measured else "line"
+                curves += _net(run.named("actual"), moved, ball_row, ball_column, 0, style)
+            charts.append(
+                Chart(
+                    "plane", f"Position {int(index) + 1}", f"{first.lower()} [mm]",
+                    f"{second.lower()} [mm]", tuple(curves), (),
+                    f"Deviations {factor:,.0f} × exaggerated.",
+                )
+            )  # fmt: skip
+        return tuple(charts)
+
+
+def left_over(plan: Plan, readings: Array) -> Array:
+    """Give the deviations of the balls once the place of the plate is fitted, [b, 3], µm."""
+    design = np.stack(list(plan.setup.values()), -1)
+    rest = readings - design @ np.linalg.lstsq(design, readings, rcond=None)[0]
+    return rest.reshape(3, -1).T
+
+
+def _lying(number: Array, seen: Array) -> dict[str, Array]:
+    """Give the readings of each way of lying in each position: three shifts, three small turns."""
+    found: dict[str, Array] = {}
+    for index in np.unique(number):
+        inside = (number == index).astype(float)
+        middle = seen[number == index].mean(axis=0)
+        arm = (seen - middle) * inside[:, None] * 1e-3
+        for axis, letter in enumerate("xyz"):
+            shift = np.zeros((len(seen), 3))
+            shift[:, axis] = inside
+            turn = np.cross(np.eye(3)[axis], arm)
+            found[f"position_{int(index) + 1}_{letter}_um"] = shift.T.reshape(-1)
+            found[f"position_{int(index) + 1}_about_{letter}_urad"] = turn.T.reshape(-1)
+    return found
+
+
+def _affine(place: Array, deviation: Array) -> tuple[float, float, float]:
+    """Fit scales in µm/m and the angle between both directions in µrad, [b, 2] each."""
+    design = np.column_stack([np.ones(len(place)), place])
+    first, second = np.linalg.lstsq(design, deviation, rcond=None)[0].T
+    # A positive angle here moves points of the first direction along + with the second one.
+    return float(first[1] * 1e3), float(second[2] * 1e3), float((first[2] + second[1]) * 1e3)
+
+
+def _length_error(seen: Array, deviation: Array) -> float:
+    """Largest error of the distance of two balls, with its sign, µm."""
+    one, other = np.triu_indices(len(seen), 1)
+    apart = seen[one] - seen[other]
+    length = np.linalg.norm(apart, axis=-1)
+    error = np.sum((deviation[one] - deviation[other]) * apart, axis=-1) / length
+    return float(error[np.argmax(np.abs(error))])
+
+
+def _net(
+    name: str, place: Array, row: Array, column: Array, colour: int, style: str
+) -> tuple[Curve, ...]:
+    """Give the rows and columns of a plate as curves; the first one has the name."""
+    if style == "dots":
+        return (Curve(name, place[:, 0], place[:, 1], colour, "dots"),)
+    curves: list[Curve] = []
+    for lines, along in ((row, column), (column, row)):
+        for value in np.unique(lines):
+            chosen = np.flatnonzero(lines == value)
+            chosen = chosen[np.argsort(along[chosen], kind="stable")]
+            kind = "thin" if style == "thin" else "line"
+            curves.append(
+                Curve("" if curves else name, place[chosen, 0], place[chosen, 1], colour, kind)
+            )
+    return tuple(curves)

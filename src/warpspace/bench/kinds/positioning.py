@@ -1,0 +1,263 @@
+"""Positioning of an axis: accuracy, repeatability and reversal (ISO 230-2)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from warpspace.bench.base import BenchTest, Run
+from warpspace.bench.data import DataColumn, Table
+from warpspace.bench.options import check_count, option
+from warpspace.bench.outcome import Band, Chart, Curve, Outcome, Quantity
+from warpspace.bench.paths.placing import axis_line, motion_direction
+from warpspace.bench.plan import Plan, build_plan
+from warpspace.exceptions import OptionError, UnknownNameError
+from warpspace.kinematics.chain import nominal_point
+from warpspace.kinematics.model import Loop
+from warpspace.machine.axes import is_linear
+from warpspace.scene.model import Scene
+from warpspace.units import Array
+
+LEVER_MM = 1000.0
+"""Between the two points that an angle is read at: 1 µm there is 1 µrad."""
+COVERAGE = 2.0
+"""k of ISO 230-2."""
+FORWARD, BACKWARD = 1.0, -1.0
+ALIKE = 1e-6
+"""Means that differ by less, µm or µrad, are drawn as one."""
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Means and standard deviations at the targets, NaN where an axis did not come that way.
+
+    Attributes
+    ----------
+    target : ndarray, [t], mm or degrees
+    mean : ndarray, [2, t], µm or µrad
+        Forward and backward.
+    deviation : ndarray, [2, t], µm or µrad
+        Estimated standard deviation; 0 for the one run of a model.
+    """
+
+    target: Array
+    mean: Array
+    deviation: Array
+
+
+def target_statistics(target: Array, way: Array, readings: Array) -> Statistics:
+    """Take the mean and the standard deviation of the readings at each target in each direction."""
+    targets, index = np.unique(np.round(target, 6), return_inverse=True)
+    mean = np.full((2, len(targets)), np.nan)
+    deviation = np.full((2, len(targets)), np.nan)
+    for row, sign in enumerate((FORWARD, BACKWARD)):
+        for column in range(len(targets)):
+            values = readings[(way == sign) & (index.reshape(-1) == column)]
+            if len(values):
+                mean[row, column] = values.mean()
+                deviation[row, column] = values.std(ddof=1) if len(values) > 1 else 0.0
+    return Statistics(targets, mean, deviation)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Positioning(BenchTest):
+    """Positioning of one axis, both directions."""
+
+    name: ClassVar[str] = "positioning"
+    title: ClassVar[str] = "Positioning accuracy"
+    standard: ClassVar[str] = "ISO 230-2"
+    words: ClassVar[str] = (
+        "One axis runs to targets along its range, upwards and back; a laser interferometer, a"
+        " rotary encoder or an autocollimator reads where the tool is against the workpiece. Means"
+        " and ±2s bands of both directions give accuracy A, systematic deviation E, mean deviation"
+        " M, repeatability R and reversal B. The readings hold what the axis does at this place:"
+        " angular errors on the lever to the measuring line count in."
+    )
+    columns: ClassVar[tuple[DataColumn, ...]] = (
+        DataColumn("run", "number"),
+        DataColumn("direction", "sign"),
+        DataColumn("target_mm", "number"),
+        DataColumn("deviation_um"),
+    )
+    axis: str = option("", "axis", "Axis that runs; the first one by default.")
+    targets: int = option(11, "count", "Targets along the range.")
+    start: float | None = option(None, "number", "First target, mm or degrees; the range's end.")
+    end: float | None = option(None, "number", "Last target, mm or degrees; the range's other end.")
+
+    def own_axis(self, scene: Scene) -> str:
+        """Give the axis that runs."""
+        axes = scene.machine.axes
+        if self.axis and self.axis not in axes:
+            raise UnknownNameError("axis", self.axis, axes)
+        return self.axis or next(iter(axes))
+
+    def data_columns(self, scene: Scene) -> tuple[DataColumn, ...]:
+        """Give the columns of data: degrees and microradians for a rotary axis."""
+        if is_linear(self.own_axis(scene)):
+            return self.columns
+        return (*self.columns[:2], DataColumn("target_deg", "number"), DataColumn("deviation_urad"))
+
+    def plan(self, scene: Scene) -> Plan:
+        """Run the targets upwards and downwards, once."""
+        check_count("--targets", self.targets, 2, 10_000)
+        axis = self.own_axis(scene)
+        low, high = scene.axis_span(axis)
+        low = low if self.start is None else self.start
+        high = high if self.end is None else self.end
+        if not low < high:
+            raise OptionError(f"targets from {low:g} to {high:g}; expected start below end")
+        targets = np.linspace(low, high, self.targets)
+        way = np.repeat([FORWARD, BACKWARD], self.targets)
+        return self._lay(scene, np.concatenate([targets, targets[::-1]]), way, np.ones(len(way)))
+
+    def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
+        """Run the targets of a file; refuse what statistics cannot be taken of."""
+        linear = is_linear(self.own_axis(scene))
+        target = table["target_mm" if linear else "target_deg"]
+        readings = table["deviation_um" if linear else "deviation_urad"]
+        unit = "mm" if linear else "°"
+        problems: list[str] = []
+        targets = np.unique(np.round(target, 6))
+        if len(targets) < 2:
+            problems.append(f"has {len(targets)} target; expected at least 2 (ISO 230-2 takes 5)")
+        for sign, word in ((FORWARD, "+"), (BACKWARD, "-")):
+            chosen = table["direction"] == sign
+            if not chosen.any():
+                continue
+            for value in targets:
+                runs = int(np.sum(chosen & (np.abs(target - value) < 1e-5)))
+                if runs < 2:
+                    problems.append(
+                        f"target {value:g} {unit}, direction {word}: {runs} readings; expected at"
+                        " least 2 runs (ISO 230-2 takes 5)"
+                    )
+        if problems:
+            raise table.refuse(*problems)
+        return self._lay(scene, target, table["direction"], table["run"]), readings
+
+    def _lay(self, scene: Scene, target: Array, way: Array, run: Array) -> Plan:
+        """Lay the plan through targets."""
+        axis, model = self.own_axis(scene), self.model(scene)
+        coordinates = {**self.stand(scene), axis: target}
+        marks = {"target": target, "way": way, "run": run}
+        place = f"{axis} · {self.place_words(scene, [axis])}"
+        zero = {"zero_um" if is_linear(axis) else "zero_urad": np.ones(len(target))}
+        count = len(target)
+        if is_linear(axis):
+            point = np.broadcast_to(nominal_point(model, Loop.TOOL, coordinates), (count, 3))
+            direction = motion_direction(model, coordinates, axis)
+            return build_plan(
+                coordinates, point, direction, place=place, marks=marks,
+                travel={axis: way}, setup=zero,
+            )  # fmt: skip
+        line = axis_line(model, coordinates, axis)
+        sign = line.sign * scene.machine.axes[axis].direction
+        origin = np.broadcast_to(line.origin_mm, (count, 3))
+        twice = {
+            name: np.tile(np.broadcast_to(values, (count,)), 2)
+            for name, values in coordinates.items()
+        }
+        both = np.arange(count)
+        return build_plan(
+            twice, np.concatenate([origin, origin + LEVER_MM * line.across]),
+            sign * np.broadcast_to(line.upright, (count, 3)), place=place, marks=marks,
+            site=both + count, against=both, gain=1000.0 / LEVER_MM,
+            travel={axis: np.tile(way, 2)}, setup=zero, path=(both,),
+        )  # fmt: skip
+
+    def evaluate(self, plan: Plan, readings: Array) -> Outcome:
+        """Take A, E, M, R and B of both directions together, and of each."""
+        found = target_statistics(plan.marks["target"], plan.marks["way"], readings)
+        unit = "µm" if "zero_um" in plan.setup else "µrad"
+        suffix = "um" if unit == "µm" else "urad"
+        quantities = [
+            Quantity(f"{key}_{suffix}", name, value, unit)
+            for key, name, value in _numbers(found)
+            if np.isfinite(value)
+        ]
+        return Outcome(tuple(quantities), {"targets": _target_rows(found, unit)})
+
+    def charts(self, runs: Sequence[Run]) -> tuple[Chart, ...]:
+        """Draw the means of both directions with their bands over the targets."""
+        curves: list[Curve] = []
+        bands: list[Band] = []
+        note = ""
+        plan = runs[0].plan
+        linear = "zero_um" in plan.setup
+        unit = "µm" if linear else "µrad"
+        for run in runs:
+            shift = 0.0
+            if not run.is_measured and len(runs) > 1:  # the zero of an instrument is arbitrary
+                shift = float(runs[-1].readings.mean() - run.readings.mean())
+                note = f"Model shifted by {shift:+.2f} {unit}: the zero of the readings is free."
+            marks = run.plan.marks
+            found = target_statistics(marks["target"], marks["way"], run.readings + shift)
+            alike = not run.is_measured and np.ptp(found.mean, axis=0).max() < ALIKE
+            for row, word in enumerate(("forward", "backward")):
+                if alike and row:
+                    continue
+                kept = np.isfinite(found.mean[row])
+                if not kept.any():
+                    continue
+                x, mean = found.target[kept], found.mean[row, kept]
+                style = "dots" if run.is_measured else "line"
+                curves.append(
+                    Curve(run.named("both directions" if alike else word), x, mean, row, style)
+                )
+                spread = COVERAGE * found.deviation[row, kept]
+                if run.is_measured:
+                    bands.append(Band(f"{word} ±2s", x, mean - spread, mean + spread, row))
+        axis = plan.place.partition(" ")[0]
+        return (
+            Chart(
+                "lines", f"Positioning of {axis}", f"{axis} [{'mm' if linear else '°'}]",
+                f"deviation [{unit}]", tuple(curves), tuple(bands), note,
+            ),
+        )  # fmt: skip
+
+
+def _numbers(found: Statistics) -> list[tuple[str, str, float]]:
+    """Give key, words and value of every number; NaN where a direction is missing."""
+    mean, spread = found.mean, COVERAGE * found.deviation
+    both = not np.isnan(mean).any()
+    reversal = mean[0] - mean[1]
+    upper, lower = mean + spread, mean - spread
+    repeat = 2.0 * spread
+    at_target = np.maximum(spread.sum(axis=0) + np.abs(reversal), repeat.max(axis=0))
+    rows: list[tuple[str, str, float]] = []
+    if both:
+        rows += [
+            ("A", "bidirectional accuracy A", float(upper.max() - lower.min())),
+            ("E", "bidirectional systematic deviation E", float(np.ptp(mean))),
+            ("M", "mean bidirectional deviation M", float(np.ptp(mean.mean(axis=0)))),
+            ("R", "bidirectional repeatability R", float(at_target.max())),
+            ("B", "reversal B", float(np.abs(reversal).max())),
+            ("B_mean", "mean reversal", float(reversal.mean())),
+        ]
+    for row, word in enumerate(("forward", "backward")):
+        if np.isnan(mean[row]).any():
+            continue
+        rows += [
+            (f"A_{word}", f"accuracy A, {word}", float(upper[row].max() - lower[row].min())),
+            (f"E_{word}", f"systematic deviation E, {word}", float(np.ptp(mean[row]))),
+            (f"R_{word}", f"repeatability R, {word}", float(repeat[row].max())),
+        ]
+    return rows
+
+
+def _target_rows(found: Statistics, unit: str) -> list[dict[str, float]]:
+    """Spell the statistics of each target."""
+    suffix = "um" if unit == "µm" else "urad"
+    place = "target_mm" if unit == "µm" else "target_deg"
+    rows: list[dict[str, float]] = []
+    for index, target in enumerate(found.target):
+        row = {place: float(target)}
+        for way, word in enumerate(("forward", "backward")):
+            if np.isfinite(found.mean[way, index]):
+                row[f"mean_{word}_{suffix}"] = float(found.mean[way, index])
+                row[f"s_{word}_{suffix}"] = float(found.deviation[way, index])
+        if np.isfinite(found.mean[:, index]).all():
+            row[f"reversal_{suffix}"] = float(found.mean[0, index] - found.mean[1, index])
+        rows.append(row)
+    return rows

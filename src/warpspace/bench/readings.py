@@ -1,0 +1,173 @@
+"""Readings that a test would take on the model: exactly, and as a linear function of the errors."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from warpspace.bench.plan import NONE, Plan
+from warpspace.field.evaluate import View, build_basis, evaluate_exact
+from warpspace.kinematics.model import Loop
+from warpspace.machine.errors import ErrorFunction, ErrorSet
+from warpspace.machine.parameters import parameter
+from warpspace.scene.model import Scene
+from warpspace.units import UM_PER_MM, Array
+
+RELATIVE = View(Loop.RELATIVE)
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """Readings as a linear function of the errors: ``readings = matrix @ amplitudes``.
+
+    Attributes
+    ----------
+    keys : tuple of str, (K,)
+    amplitudes : ndarray, [K], µm or µrad
+        Those of the scene.
+    matrix : ndarray, [m, K]
+        Reading in µm (angles: µrad) per µm or µrad of amplitude; the curve of each parameter along
+        its axis is folded in, as in an `ErrorBasis`.
+    """
+
+    keys: tuple[str, ...]
+    amplitudes: Array
+    matrix: Array
+
+    @property
+    def readings(self) -> Array:
+        """Readings for the amplitudes of the scene, [m]."""
+        return self.matrix @ self.amplitudes
+
+
+def simulate(scene: Scene, plan: Plan, *, exact: bool = True) -> Array:
+    """Take the readings of a plan on the model of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    plan : Plan
+    exact : bool, optional
+        Full rotations, all products, and the true length of a bar; else the first order.
+
+    Returns
+    -------
+    ndarray, [m], µm (angles: µrad)
+    """
+    if not exact:
+        return respond(scene, plan).readings
+    return sense(plan, site_errors(scene, plan))
+
+
+def site_errors(scene: Scene, plan: Plan) -> Array:
+    """Evaluate the error of the tool against the workpiece at every site, exactly, [n, 3], µm."""
+    found = np.zeros((len(plan.point_mm), 3))
+    for rows, errors in _by_travel(scene.errors, plan):
+        coordinates = {name: values[rows] for name, values in plan.coordinates.items()}
+        field = evaluate_exact(scene.model, errors, coordinates, RELATIVE, plan.point_mm[rows])
+        found[rows] = field.error_um
+    return found
+
+
+def sense(plan: Plan, error_um: Array) -> Array:
+    """Give what the sensors of a plan read of the errors of its sites.
+
+    Parameters
+    ----------
+    plan : Plan
+    error_um : ndarray, [n, 3], µm
+
+    Returns
+    -------
+    ndarray, [m], µm (angles: µrad)
+    """
+    shift = _differences(plan, error_um)
+    along = np.sum(shift * plan.direction, axis=-1)
+    bars = np.isfinite(plan.length_mm)
+    if bars.any():
+        length = plan.length_mm[bars] * UM_PER_MM
+        squared = np.sum(shift[bars] ** 2, axis=-1)
+        actual = np.sqrt(length**2 + 2.0 * length * along[bars] + squared)
+        along[bars] = (2.0 * length * along[bars] + squared) / (actual + length)
+    return plan.gain * along
+
+
+def respond(scene: Scene, plan: Plan, keys: Sequence[str] | None = None) -> Response:
+    """Give the readings of a plan as a linear function of the errors of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        Gives the curve of each parameter, and the amplitudes about which nothing is expanded: the
+        first order is that about a machine without errors.
+    plan : Plan
+    keys : sequence of str, optional
+        Parameters; all of the scene by default.
+
+    Returns
+    -------
+    Response
+    """
+    chosen = tuple(scene.parameter_keys if keys is None else keys)
+    position = np.zeros((len(chosen), len(plan.point_mm), 3))
+    for rows, errors in _by_travel(scene.errors, plan):
+        coordinates = {name: values[rows] for name, values in plan.coordinates.items()}
+        basis = build_basis(scene.model, errors, chosen, coordinates, RELATIVE, plan.point_mm[rows])
+        share = np.array([_share(scene.errors, errors, key) for key in chosen])
+        position[:, rows] = basis.position * share[:, None, None]
+    along = np.sum(_differences(plan, position) * plan.direction, axis=-1)
+    amplitudes = np.array([scene.errors.amplitude(key) for key in chosen], dtype=float)
+    return Response(chosen, amplitudes, (along * plan.gain).T)
+
+
+def _differences(plan: Plan, values: Array) -> Array:
+    """Take the values of sites against each other, [..., n, 3] to [..., m, 3]."""
+    shift = values[..., plan.site, :].copy()
+    held = plan.against != NONE
+    shift[..., held, :] -= values[..., plan.against[held], :]
+    return shift
+
+
+def _by_travel(errors: ErrorSet, plan: Plan) -> Iterator[tuple[Array, ErrorSet]]:
+    """Split the sites by the directions in which axes have come; the errors that act there."""
+    every = np.arange(len(plan.point_mm))
+    axes = [axis for axis in plan.travel if _depends_on_travel(errors, axis)]
+    if not axes:
+        yield every, errors
+        return
+    ways = np.stack([np.sign(plan.travel[axis]) for axis in axes], axis=-1)
+    found, number = np.unique(ways, axis=0, return_inverse=True)
+    for index, way in enumerate(found):
+        yield (
+            every[number.reshape(-1) == index],
+            _travelling(errors, dict(zip(axes, way, strict=True))),
+        )
+
+
+def _depends_on_travel(errors: ErrorSet, axis: str) -> bool:
+    """Tell whether any error of an axis depends on the direction it has come in."""
+    return any(
+        parameter(key).axis == axis and hasattr(function, "forward")
+        for key, function in errors.functions.items()
+    )
+
+
+def _travelling(errors: ErrorSet, way: Mapping[str, float]) -> ErrorSet:
+    """Give the errors of axes that have come in a direction; standing ones keep their mean."""
+
+    def chosen(key: str, function: ErrorFunction) -> ErrorFunction:
+        sign = way.get(parameter(key).axis, 0.0)
+        if not sign:
+            return function
+        return getattr(function, "forward" if sign > 0.0 else "backward", function)
+
+    return ErrorSet({key: chosen(key, function) for key, function in errors.functions.items()})
+
+
+def _share(errors: ErrorSet, acting: ErrorSet, key: str) -> float:
+    """Amplitude of the curve that acts, by that of the whole: 1 unless the direction matters."""
+    whole, part = errors.functions.get(key), acting.functions.get(key)
+    if whole is None or part is None or whole is part:
+        return 1.0
+    amplitude = whole.amplitude
+    return part.amplitude / amplitude if amplitude else 1.0

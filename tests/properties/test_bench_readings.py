@@ -1,0 +1,47 @@
+"""Readings are linear in small errors: the response of every test against the exact chain."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from warpspace.bench.readings import respond, simulate
+from warpspace.bench.registry import bench_names, find_test
+from warpspace.machine.errors import ErrorSet
+from warpspace.machine.parameters import parameter
+from warpspace.scene.library import load_scene
+
+SCENES = ("dvf5000_first", "machine_head_head_ca", "machine_trunnion_on_cross_table")
+SMALL = {"circular": {"points": 12}, "cone-frustum": {"points": 12}, "ball-plate": {"balls": 3}}
+
+
+@pytest.mark.parametrize("scene_name", SCENES)
+@pytest.mark.parametrize("name", bench_names())
+def test_response_is_the_derivative_of_the_exact_readings(scene_name: str, name: str) -> None:
+    scene = load_scene(scene_name)
+    test = find_test(name)(**SMALL.get(name, {}))
+    plan = test.plan(scene)
+    keys = scene.parameter_keys
+    response = respond(scene, plan, keys)
+    assert response.matrix.shape == (plan.readings, len(keys))
+    np.testing.assert_allclose(response.readings, simulate(scene, plan, exact=False))
+    for column, key in enumerate(keys):
+        span = scene.axis_span(parameter(key).axis)
+        functions = scene.errors.functions
+        shape = ErrorSet({key: functions[key]} if key in functions else {})
+        one, other = (
+            simulate(replace(scene, errors=shape.with_amplitude(key, size, span)), plan)
+            for size in (0.5, -0.5)
+        )
+        np.testing.assert_allclose(one - other, response.matrix[:, column], atol=2e-7)
+
+
+@pytest.mark.parametrize("name", bench_names())
+def test_set_up_gives_readings_of_its_own(name: str) -> None:
+    plan = find_test(name)(**SMALL.get(name, {})).plan(load_scene("dvf5000_first"))
+    design = np.stack(list(plan.setup.values()), -1)
+    assert design.shape[0] == plan.readings
+    assert np.linalg.matrix_rank(design) == design.shape[1]
+    for values in (*plan.marks.values(), *plan.travel.values(), *plan.coordinates.values()):
+        assert np.isfinite(values).all()
+    np.testing.assert_allclose(np.linalg.norm(plan.direction, axis=-1), 1.0)

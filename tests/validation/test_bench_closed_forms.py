@@ -1,0 +1,369 @@
+"""Each single error alone gives the known figure of each test, to 1e-6 relative, first order."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from bench_scenes import scene_with
+from warpspace.bench.base import BenchTest
+from warpspace.bench.kinds.ball_plate import BallPlate
+from warpspace.bench.kinds.circular import Circular
+from warpspace.bench.kinds.cone_frustum import ConeFrustum
+from warpspace.bench.kinds.diagonals import Diagonals
+from warpspace.bench.kinds.positioning import Positioning
+from warpspace.bench.kinds.rotary_axis import RotaryAxis
+from warpspace.bench.kinds.sphere import Sphere
+from warpspace.bench.kinds.squareness import Squareness
+from warpspace.bench.kinds.straightness import Straightness
+from warpspace.bench.readings import simulate
+from warpspace.bench.run import Run
+from warpspace.machine.curves.curve import ErrorFunction
+from warpspace.machine.errors import Constant, Harmonics, Poly, Table
+from warpspace.scene.model import Scene
+
+EXACT = {"rel": 1e-6, "abs": 1e-9}
+
+
+def run(scene: Scene, test: BenchTest, *, exact: bool = False) -> Run:
+    plan = test.plan(scene)
+    readings = simulate(scene, plan, exact=exact)
+    return Run("model", plan, readings, test.evaluate(plan, readings))
+
+
+@dataclass(frozen=True)
+class Backlash(ErrorFunction):
+    """A constant that depends on the direction of travel, as curves by direction do."""
+
+    value: float = 0.0
+
+    @property
+    def forward(self) -> Constant:
+        return Constant(self.span, self.value / 2.0)
+
+    @property
+    def backward(self) -> Constant:
+        return Constant(self.span, -self.value / 2.0)
+
+    @property
+    def amplitude(self) -> float:
+        return self.value / 2.0
+
+    def evaluate(self, position):
+        return np.zeros(np.shape(position))
+
+    def scaled(self, factor):
+        return Backlash(self.span, self.value * factor)
+
+    forms = ()
+    row_words = title = name = "backlash"
+
+    @classmethod
+    def read(cls, *arguments):
+        raise NotImplementedError
+
+    def to_toml(self):
+        raise NotImplementedError
+
+    def describe(self, *arguments):
+        return ""
+
+    def slider_words(self, *arguments):
+        return ""
+
+    @classmethod
+    def from_rows(cls, *arguments):
+        raise NotImplementedError
+
+    def rows(self):
+        return ()
+
+    @classmethod
+    def from_curve(cls, *arguments):
+        raise NotImplementedError
+
+
+# --- positioning ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("axis", ["X", "Y", "Z"])
+def test_positioning_of_a_ramp(axis: str) -> None:
+    found = run(scene_with(**{f"E{axis}{axis}": ("ramp", 11.0)}), Positioning(axis=axis)).outcome
+    for key in ("A_um", "E_um", "M_um", "A_forward_um", "E_backward_um"):
+        assert found[key] == pytest.approx(11.0, **EXACT)
+    assert found["R_um"] == found["B_um"] == 0.0
+
+
+def test_positioning_of_rotary_axes() -> None:
+    for axis, key in (("C", "ECC"), ("B", "EBB")):
+        scene = scene_with(**{key: Harmonics((0.0, 360.0), ((1, 20.0, 0.0),))})
+        found = run(scene, Positioning(axis=axis, targets=361, start=0.0, end=30.0))
+        low = 20.0 * np.cos(np.deg2rad(30.0))
+        assert found.outcome["E_urad"] == pytest.approx(20.0 - low, **EXACT)
+        assert found.readings[0] == pytest.approx(20.0, **EXACT)
+
+
+def test_abbe_error_of_positioning() -> None:
+    # a pitch ramp of 10 µrad on the lever from the X frame down to the tool point
+    scene = scene_with(EBX=("ramp", 10.0))
+    short = run(scene, Positioning(axis="X")).outcome["E_um"]
+    longer = run(scene, Positioning(axis="X", tool_extension_mm=100.0)).outcome["E_um"]
+    assert longer - short == pytest.approx(1.0, **EXACT)
+
+
+@pytest.mark.parametrize("exact", [True, False])
+def test_backlash_is_the_reversal(exact: bool) -> None:
+    scene = scene_with(EXX=Backlash((0.0, 1.0), 6.0))
+    found = run(scene, Positioning(axis="X"), exact=exact).outcome
+    assert found["B_um"] == found["R_um"] == found["A_um"] == pytest.approx(6.0, **EXACT)
+    assert found["M_um"] == pytest.approx(0.0, abs=1e-9)
+    assert found["B_mean_um"] == pytest.approx(6.0, **EXACT)
+
+
+# --- circular -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("plane", "key"), [("XY", "EC0Y"), ("XZ", "EB0Z"), ("YZ", "EA0Z")])
+def test_squareness_is_an_ellipse_at_45_degrees(plane: str, key: str) -> None:
+    found = run(scene_with(**{key: 30.0}), Circular(plane=plane, radius_mm=150.0, points=360))
+    assert found.outcome["squareness_urad"] == pytest.approx(30.0, **EXACT)
+    assert found.outcome["circular_deviation_um"] == pytest.approx(4.5, **EXACT)
+    angle = found.plan.marks["angle_deg"]
+    assert angle[np.argmax(np.abs(found.readings))] % 90.0 == pytest.approx(45.0)
+
+
+LAYOUTS = {
+    "dvf5000_nominal": (20.0, 20.0, 20.0),
+    # an axis that carries the other one turns it with it: no squareness between the two
+    "machine_c_frame_mill": (0.0, 20.0, 20.0),
+    "machine_printer_3d": (20.0, 0.0, 20.0),
+    "machine_lathe_mill": (20.0, 0.0, 0.0),
+}
+
+
+@pytest.mark.parametrize("scene", LAYOUTS)
+@pytest.mark.parametrize("number", range(3))
+def test_squareness_of_every_layout_is_the_same_in_every_test(scene: str, number: int) -> None:
+    plane, key = (("XY", "EC0Y"), ("XZ", "EB0Z"), ("YZ", "EA0Z"))[number]
+    seen = pytest.approx(LAYOUTS[scene][number], **EXACT)
+    bent = scene_with(scene, **{key: 20.0})
+    assert run(bent, Circular(plane=plane, radius_mm=60.0)).outcome["squareness_urad"] == seen
+    square = run(bent, Squareness(plane=plane)).outcome
+    for line in ("end_points", "least_squares", "minimum_zone"):
+        assert square[f"{line}_urad"] == seen
+    assert run(bent, BallPlate(plane=plane)).outcome["squareness_urad"] == seen
+    for kind in ("body", "face"):
+        assert run(bent, Diagonals(kind=kind)).outcome[f"squareness_{key}_urad"] == seen
+
+
+def test_backlash_steps_on_the_circle() -> None:
+    # +3 µm while X moves upwards, −3 µm while downwards: ±3·cos φ on the two halves
+    found = run(scene_with(EXX=Backlash((0.0, 1.0), 6.0)), Circular(radius_mm=100.0, points=360))
+    marks = found.plan.marks
+    forward = -np.sin(np.deg2rad(marks["angle_deg"]) + 1e-9 * marks["sense"]) * marks["sense"] > 0.0
+    expected = np.where(forward, 3.0, -3.0) * np.cos(np.deg2rad(marks["angle_deg"]))
+    np.testing.assert_allclose(found.readings, expected, atol=1e-9)
+    # where X turns back both runs have come alike; a degree further on they differ most
+    assert found.outcome["hysteresis_um"] == pytest.approx(6.0 * np.cos(np.deg2rad(1.0)), **EXACT)
+
+
+def test_partial_arcs() -> None:
+    bent = scene_with(EC0Y=30.0)
+    half = run(bent, Circular(radius_mm=150.0, start_deg=0.0, end_deg=180.0, points=181)).outcome
+    assert half["squareness_urad"] == pytest.approx(30.0, **EXACT)
+    quarter = run(bent, Circular(radius_mm=150.0, start_deg=0.0, end_deg=90.0, points=91)).outcome
+    assert not any(quantity.key == "squareness_urad" for quantity in quarter.quantities)
+
+
+def test_circle_that_follows_a_rotary_axis() -> None:
+    # a table that runs out by 5 µm along x in R is seen by the radial bar as −5·cos θ,
+    # by the tangential one as +5·sin θ; an axial bar sees EA0C · R · sin θ
+    for bar, expected in (
+        ("radial", lambda t: -5.0 * np.cos(t)),
+        ("tangential", lambda t: 5.0 * np.sin(t)),
+    ):
+        found = run(scene_with(EX0C=5.0), Circular(rotary="C", bar=bar, radius_mm=100.0))
+        theta = np.deg2rad(found.plan.marks["angle_deg"])
+        np.testing.assert_allclose(found.readings, expected(theta), atol=1e-9)
+    found = run(scene_with(EA0C=20.0), Circular(rotary="C", bar="axial", radius_mm=100.0))
+    theta = np.deg2rad(found.plan.marks["angle_deg"])
+    np.testing.assert_allclose(found.readings, -20.0 * 0.1 * np.sin(theta), atol=1e-9)
+
+
+# --- diagonals ------------------------------------------------------------------------------------
+
+
+def test_body_diagonals_differ_by_squareness() -> None:
+    # edges 550 × 450 × 400: γ·a·b/L each way
+    length = np.linalg.norm([550.0, 450.0, 400.0])
+    found = run(scene_with(EC0Y=40.0), Diagonals())
+    change = 40e-3 * 550.0 * 450.0 / length
+    rows = {
+        row["diagonal"]: row["length_deviation_um"] for row in found.outcome.details["diagonals"]
+    }
+    assert rows["PPP"] == pytest.approx(-change, **EXACT)
+    assert rows["PPN"] == pytest.approx(-change, **EXACT)
+    assert rows["NPP"] == pytest.approx(change, **EXACT)
+    assert rows["PNP"] == pytest.approx(change, **EXACT)
+    assert found.outcome["length_difference_um"] == pytest.approx(2.0 * change, **EXACT)
+
+
+def test_face_diagonals_and_scale() -> None:
+    found = run(scene_with(EXX=("ramp", 11.0)), Diagonals(kind="face"))
+    rows = {row["diagonal"]: row for row in found.outcome.details["diagonals"]}
+    share = 550.0 / np.hypot(550.0, 450.0)
+    assert rows["XY:PP"]["length_deviation_um"] == pytest.approx(11.0 * share, **EXACT)
+    assert rows["XY:NP"]["length_deviation_um"] == pytest.approx(11.0 * share, **EXACT)
+    assert rows["YZ:PP"]["length_deviation_um"] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_step_diagonals_tell_the_axes_apart() -> None:
+    length = np.linalg.norm([550.0, 450.0, 400.0])
+    found = run(scene_with(EYY=("ramp", 9.0)), Diagonals(kind="step"))
+    for row in found.outcome.details["diagonals"]:
+        assert row["by_axis_um"]["X"] == pytest.approx(0.0, abs=1e-9)
+        assert row["by_axis_um"]["Y"] == pytest.approx(9.0 * 450.0 / length, **EXACT)
+
+
+def test_backlash_along_diagonals() -> None:
+    length = np.linalg.norm([550.0, 450.0, 400.0])
+    found = run(scene_with(EXX=Backlash((0.0, 1.0), 6.0)), Diagonals()).outcome
+    assert found["B_um"] == pytest.approx(6.0 * 550.0 / length, **EXACT)
+
+
+# --- straightness ---------------------------------------------------------------------------------
+
+
+def test_parabola_has_the_same_straightness_by_every_line() -> None:
+    scene = scene_with(EYX=Poly((-275.0, 275.0), (0.0, 0.0, 1e-4)))
+    found = run(scene, Straightness(axis="X", across="y")).outcome
+    for name in ("end_points", "least_squares", "minimum_zone"):
+        assert found[f"{name}_um"] == pytest.approx(1e-4 * 275.0**2, **EXACT)
+
+
+def test_reference_lines_of_a_kink() -> None:
+    # three points 0, 0, 8: the middle one lies 4 below the line through the ends
+    scene = scene_with(EZX=Table((-275.0, 275.0), ((-275.0, 0.0), (0.0, 0.0), (275.0, 8.0))))
+    found = run(scene, Straightness(axis="X", across="z", points=3))
+    assert found.outcome["end_points_um"] == pytest.approx(4.0, **EXACT)
+    assert found.outcome["minimum_zone_um"] == pytest.approx(4.0, **EXACT)
+    assert found.outcome["least_squares_um"] == pytest.approx(4.0, **EXACT)
+    slope = found.outcome.details["slope_urad"]
+    for name in ("end_points", "minimum_zone", "least_squares"):
+        assert slope[name] == pytest.approx(8.0 / 0.55, **EXACT)
+
+
+def test_squareness_is_no_straightness() -> None:
+    found = run(scene_with(EC0Y=50.0), Straightness(axis="Y", across="x")).outcome
+    assert max(quantity.value for quantity in found.quantities) < 1e-9
+
+
+# --- rotary axis ----------------------------------------------------------------------------------
+
+
+def test_error_motions_of_a_table() -> None:
+    wave = Harmonics((0.0, 360.0), ((2, 3.0, 0.0),))
+    assert run(scene_with(EZC=wave), RotaryAxis()).outcome["axial_um"] == pytest.approx(
+        6.0, **EXACT
+    )
+    turn = run(scene_with(ECC=wave), RotaryAxis()).outcome
+    assert turn["angular_urad"] == pytest.approx(6.0, **EXACT)
+    assert turn["radial_um"] == pytest.approx(0.0, abs=1e-9)
+    # a radial error along x of the moving table is 3·cos 2θ towards the point that turns with it
+    assert run(scene_with(EXC=wave), RotaryAxis()).outcome["radial_um"] == pytest.approx(
+        6.0, **EXACT
+    )
+    assert run(scene_with(EBC=wave), RotaryAxis()).outcome["tilt_urad"] == pytest.approx(
+        6.0, **EXACT
+    )
+
+
+@pytest.mark.parametrize(("axis", "keys"), [
+    ("C", ("EX0C_um", "EY0C_um", "EA0C_urad", "EB0C_urad")),
+    ("B", ("EZ0B_um", "EX0B_um", "EC0B_urad", "EA0B_urad")),
+])  # fmt: skip
+def test_axis_average_line_of_a_table(axis: str, keys: tuple[str, ...]) -> None:
+    for key in keys:
+        scene = scene_with(**{key.partition("_")[0]: 7.0})
+        found = run(scene, RotaryAxis(axis=axis, height_mm=0.0)).outcome
+        for other in keys:
+            assert found[other] == pytest.approx(7.0 if other == key else 0.0, **EXACT)
+        for name in ("radial_um", "axial_um", "tilt_urad", "angular_urad"):
+            assert found[name] == pytest.approx(0.0, abs=1e-9)
+
+
+# --- sphere ---------------------------------------------------------------------------------------
+
+
+def test_tilted_c_on_the_r_test() -> None:
+    # the ball at radius 100, height 60 above the axis' origin: α·h along y, −α·R·sin θ along z
+    found = run(scene_with(EA0C=25.0), Sphere(axis="C", ball=(100.0, 0.0, 60.0)))
+    theta = np.deg2rad(found.plan.marks["angle_deg"][:73])
+    x, y, z = found.readings.reshape(3, -1)
+    np.testing.assert_allclose(x, 0.0, atol=1e-9)
+    np.testing.assert_allclose(y, 25.0 * 0.06, rtol=1e-6)
+    np.testing.assert_allclose(z, -25.0 * 0.1 * np.sin(theta), atol=1e-9)
+    assert found.outcome["z_um"] == pytest.approx(5.0, **EXACT)
+
+
+def test_location_of_c_on_the_r_test() -> None:
+    found = run(scene_with(EX0C=8.0), Sphere(axis="C", ball=(100.0, 0.0, 60.0)))
+    x, y, _ = found.readings.reshape(3, -1)
+    np.testing.assert_allclose(x, -8.0, rtol=1e-9)
+    np.testing.assert_allclose(y, 0.0, atol=1e-9)
+    turned = run(
+        scene_with(EX0C=8.0), Sphere(axis="C", ball=(100.0, 0.0, 60.0), frame="workpiece")
+    ).outcome
+    assert turned["x_um"] == pytest.approx(16.0, **EXACT)
+
+
+def test_a_ball_that_stands_elsewhere_is_fitted_away() -> None:
+    test = Sphere(axis="C", ball=(100.0, 0.0, 60.0))
+    scene = scene_with()
+    plan = test.plan(scene)
+    design = np.stack(list(plan.setup.values()), -1)
+    found = test.evaluate(plan, design @ np.array([3.0, -2.0, 5.0]))
+    assert found["rms_fitted_um"] == pytest.approx(0.0, abs=1e-9)
+    np.testing.assert_allclose(found.details["ball_um"], [3.0, -2.0, 5.0])
+
+
+# --- ball plate and cone --------------------------------------------------------------------------
+
+
+def test_ball_plate_of_a_ramp_and_of_a_roll() -> None:
+    found = run(scene_with(EXX=("ramp", 11.0)), BallPlate()).outcome
+    assert found["scale_X_um_per_m"] == pytest.approx(20.0, **EXACT)
+    assert found["length_error_um"] == pytest.approx(11.0, **EXACT)
+    # squareness of the vertical axis does not show in a level plate
+    for key in ("EA0Z", "EB0Z"):
+        level = run(scene_with(**{key: 30.0}), BallPlate()).outcome
+        assert level["length_error_um"] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_cone_of_a_scale_and_of_a_squareness_in_the_level_plane() -> None:
+    # a cone that stands level and is no cone at all is a circle: γ·R of circular deviation
+    level = ConeFrustum(half_apex_deg=0.0, tilt_deg=0.0, radius_mm=100.0)
+    found = run(scene_with(EC0Y=30.0), level).outcome
+    assert found["circular_deviation_um"] == pytest.approx(3.0, **EXACT)
+    # axial errors of the table move the circle of a level cone out of its plane only
+    level = ConeFrustum(half_apex_deg=10.0, tilt_deg=0.0, radius_mm=50.0)
+    assert run(scene_with(EZC=5.0), level).outcome["circular_deviation_um"] < 1e-9
+
+
+def test_tool_stands_along_the_flank_of_the_cone() -> None:
+    from warpspace.kinematics import transforms
+    from warpspace.kinematics.chain import branch_pose, tool_axis
+
+    scene = scene_with()
+    test = ConeFrustum(half_apex_deg=15.0, tilt_deg=30.0, radius_mm=40.0)
+    plan = test.plan(scene)
+    pose = branch_pose(scene.model, "workpiece", plan.coordinates)
+    axis = transforms.rotate(
+        np.swapaxes(pose[..., :3, :3], -1, -2), tool_axis(scene.model, plan.coordinates)
+    )
+    normal = np.array([np.sin(np.deg2rad(30.0)), 0.0, np.cos(np.deg2rad(30.0))])
+    np.testing.assert_allclose(axis @ normal, np.cos(np.deg2rad(15.0)), atol=1e-9)
+    outward = transforms.rotate(np.swapaxes(pose[..., :3, :3], -1, -2), plan.direction)
+    np.testing.assert_allclose(
+        np.sum(axis * outward, axis=-1), -np.sin(np.deg2rad(15.0)), atol=1e-9
+    )
