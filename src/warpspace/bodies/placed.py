@@ -16,6 +16,7 @@ from warpspace.kinematics.model import Coordinates, Loop, Model, complete_coordi
 from warpspace.machine.description import Machine
 from warpspace.machine.errors import ErrorSet
 from warpspace.machine.parameters import parameter
+from warpspace.machine.travel import TravelDirection
 from warpspace.units import Array
 
 
@@ -46,7 +47,10 @@ def load_bodies(machine: Machine) -> tuple[Body, ...]:
 
 
 def error_values_of(
-    errors: ErrorSet, amplitudes: Mapping[str, float], coordinates: Coordinates
+    errors: ErrorSet,
+    amplitudes: Mapping[str, float],
+    coordinates: Coordinates,
+    direction: str = TravelDirection.MEAN,
 ) -> dict[str, float]:
     """Evaluate error curves at one position, with amplitudes of their own.
 
@@ -56,6 +60,8 @@ def error_values_of(
         Gives the curve of each parameter along its axis.
     amplitudes : mapping of str to float, µm or µrad
     coordinates : mapping of str to ndarray, [], mm or degrees
+    direction : str, optional
+        Direction of travel, one of `TravelDirection`.
 
     Returns
     -------
@@ -66,9 +72,7 @@ def error_values_of(
         axis = parameter(key).axis
         if amplitude == 0.0 or axis not in coordinates:
             continue
-        function = errors.functions.get(key)
-        shape = 1.0 if function is None else float(function.shape(coordinates[axis]))
-        found[key] = amplitude * shape
+        found[key] = amplitude * float(errors.shape_at(key, coordinates, direction))
     return found
 
 
@@ -99,14 +103,15 @@ def view_motions(
     """
     view = view or View()
     coordinates = complete_coordinates(model.machine, positions)
-    values = error_values_of(errors, amplitudes, coordinates)
+    values = error_values_of(errors, amplitudes, coordinates, model.direction)
     motions = body_motions(model, values, coordinates)
     turn, shift = np.zeros(3), np.zeros(3)
     if view.loop is Loop.RELATIVE:
         turn, shift = motions["w"].rotation_rad, motions["w"].displacement_mm
     if view.reference is not None:
         held = complete_coordinates(model.machine, {**positions, **view.reference})
-        there = body_motions(model, error_values_of(errors, amplitudes, held), held)
+        values = error_values_of(errors, amplitudes, held, model.direction)
+        there = body_motions(model, values, held)
         shift = shift + _held_displacement(model, there, view.loop)
     return {
         name: BodyMotion(m.nominal, m.rotation_rad - turn, m.displacement_mm - shift)

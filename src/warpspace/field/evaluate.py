@@ -1,7 +1,7 @@
 """Errors at given coordinates, to first order and exactly."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
@@ -13,6 +13,7 @@ from warpspace.kinematics.firstorder import jacobian
 from warpspace.kinematics.model import Coordinates, Loop, Model, batch_shape
 from warpspace.machine.errors import ErrorSet
 from warpspace.machine.parameters import parameter
+from warpspace.machine.travel import TravelDirection
 from warpspace.units import Array
 
 MAX_RESPONSES = 3_000_000
@@ -50,11 +51,12 @@ def error_values(model: Model, errors: ErrorSet, coordinates: Coordinates) -> di
     Returns
     -------
     dict of str to ndarray, [...], µm or µrad
-        Parameters whose axis the machine does not have are left out.
+        In the direction of travel of the model. Parameters whose axis the machine does not have are
+        left out.
     """
     axes = model.machine.axes
     return {
-        key: errors.evaluate(key, coordinates[parameter(key).axis])
+        key: errors.evaluate_at(key, coordinates, model.direction)
         for key in errors
         if parameter(key).axis in axes
     }
@@ -134,9 +136,8 @@ def _shaped_jacobian(
     """Jacobian with the unit curve of each parameter folded in, [K, ..., 3] twice."""
     position, orientation = jacobian(model, view.loop, keys, coordinates, point)
     for index, key in enumerate(keys):
-        function = errors.functions.get(key)
-        if function is not None:
-            shape = function.shape(coordinates[parameter(key).axis])[..., None]
+        if key in errors.functions or model.direction == TravelDirection.DIFFERENCE:
+            shape = errors.shape_at(key, coordinates, model.direction)[..., None]
             position[index] *= shape
             orientation[index] *= shape
     return position, orientation
@@ -168,8 +169,16 @@ def evaluate_exact(
     Returns
     -------
     ErrorField
+        Where the model looks at the difference of both directions of travel, the field forward
+        minus that backward.
     """
     view = view or View()
+    if model.direction == TravelDirection.DIFFERENCE:
+        there, back = (
+            evaluate_exact(replace(model, direction=way), errors, coordinates, view, point_mm)
+            for way in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
+        )
+        return _sum(there, ErrorField(back.nominal_mm, -back.error_um, -back.orientation_urad))
     point = nominal_point(model, view.loop, coordinates) if point_mm is None else point_mm
     values = error_values(model, errors, coordinates)
     error, orientation = exact_error(model, view.loop, coordinates, values, point)

@@ -11,6 +11,7 @@ from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.kinematics.conventions.convention import Convention
 from warpspace.kinematics.conventions.registry import find_convention
 from warpspace.machine.description import ORIGIN, Machine, Vector
+from warpspace.machine.travel import TravelDirection
 from warpspace.units import Array
 
 Coordinates = Mapping[str, Array]
@@ -59,6 +60,7 @@ class Model:
     tool_point_mm: Vector = ORIGIN
     workpiece_point_mm: Vector = ORIGIN
     own_component_errors: tuple[tuple[str, str], ...] = ()
+    direction: str = TravelDirection.MEAN
 
     def convention(self, axis: str) -> Convention:
         """Give the convention for the component errors of an axis.

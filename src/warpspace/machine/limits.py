@@ -38,7 +38,9 @@ MAX_TERMS = 64
 """Harmonics of one curve."""
 MAX_ORDER = 1000
 MAX_POINTS = 100_000
-"""Points of a table, rows of a CSV file."""
+"""Points of a table, values of a table over two axes, rows of a CSV file, readings of an error."""
+MAX_RUNS = 1000
+"""Runs of one measured error."""
 MAX_CURVE_ROWS = 2000
 """Rows of a curve that may be edited or pasted in the app."""
 MAX_CURVE_TEXT = 80_000

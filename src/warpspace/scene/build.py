@@ -9,7 +9,7 @@ from warpspace.exceptions import SceneError, near_miss
 from warpspace.field.grid import Workspace
 from warpspace.kinematics.model import Model
 from warpspace.machine.axes import direction_index, is_linear
-from warpspace.machine.description import Machine, build_machine
+from warpspace.machine.description import Machine, Range, build_machine
 from warpspace.machine.errors import ErrorFunction, ErrorSet, Harmonics
 from warpspace.machine.limits import MAX_ERROR
 from warpspace.machine.parameters import PARAMETERS, ErrorKind
@@ -18,6 +18,7 @@ from warpspace.scene.bodies import body_notes, read_bodies
 from warpspace.scene.conventions import component_orders
 from warpspace.scene.curves import read_curve
 from warpspace.scene.guides import is_guides, read_guides
+from warpspace.scene.measurements import read_measurements, read_uncertainties
 from warpspace.scene.model import Scene
 from warpspace.scene.sections import Problems
 from warpspace.scene.volume import read_workspace
@@ -32,6 +33,8 @@ SECTIONS = (
     "points_mm",
     "errors",
     "tolerances",
+    "uncertainty",
+    "measured",
     "view",
 )
 MANY_COSINES = 10_000_000
@@ -93,13 +96,25 @@ def build_scene(
     workspace = read_workspace(problems.table("workspace", raw.get("workspace")), machine, problems)
     fixed = getattr(convention, "reference_axis", "free") == "fixed"
     refused = machine.reference_keys if fixed else ()
-    errors = _errors(raw.get("errors"), machine, refused, workspace, folder, problems)
+    spans = _spans(machine, workspace)
+    errors = _errors(raw.get("errors"), machine, refused, spans, folder, problems)
     tolerances = _tolerances(raw.get("tolerances"), machine, refused, problems)
+    uncertainty = read_uncertainties(
+        _known_parameters(raw.get("uncertainty"), "uncertainty", machine, refused, problems),
+        spans,
+        folder,
+        problems,
+    )
+    measured = read_measurements(
+        _known_parameters(raw.get("measured"), "measured", machine, refused, problems),
+        folder,
+        problems,
+    )
     reference = _reference(view, workspace, problems)
     order, own_orders = component_orders(convention, machine, problems)
     if problems.lines:
         raise SceneError(source, problems.lines)
-    model = Model(machine, order, points.tool, points.workpiece, own_orders)
+    model = Model(machine, order, points.tool, points.workpiece, own_orders, convention.direction)
     return Scene(
         name=name,
         title=texts.get("title") or name,
@@ -117,6 +132,8 @@ def build_scene(
             *_costly_notes(errors),
             *body_notes(machine),
         ),
+        uncertainty=uncertainty,
+        measured=measured,
     )
 
 
@@ -150,11 +167,19 @@ def _known_parameters(
     return known
 
 
+def _spans(machine: Machine, workspace: Workspace) -> dict[str, Range]:
+    """Give the range over which curves of each axis run, see `Scene.axis_span`."""
+    return {
+        name: (low, high) if low < high else machine.axes[name].travel
+        for name, (low, high) in workspace.ranges.items()
+    }
+
+
 def _errors(
     raw: object,
     machine: Machine,
     refused: Sequence[str],
-    workspace: Workspace,
+    spans: Mapping[str, Range],
     folder: Path | None,
     problems: Problems,
 ) -> ErrorSet:
@@ -162,13 +187,21 @@ def _errors(
     found: dict[str, ErrorFunction] = {}
     for key, value in _known_parameters(raw, "errors", machine, refused, problems).items():
         where, row = f"errors.{key}", PARAMETERS[key]
-        low, high = workspace.ranges[row.axis]
-        span = (low, high) if low < high else machine.axes[row.axis].travel
+        span = spans[row.axis]
         if is_guides(value):
             given = {name for name in problems.table("", raw) if name != key}
             curves = read_guides(key, value, span, where, folder, problems, machine, given)
         else:
-            curve = read_curve(value, span, where, folder, problems, constant=row.is_constant)
+            curve = read_curve(
+                value,
+                span,
+                where,
+                folder,
+                problems,
+                constant=row.is_constant,
+                axis=row.axis,
+                axes=machine.axes,
+            )
             curves = {} if curve is None else {key: curve}
         for name, function in curves.items():
             peak = function.amplitude
@@ -237,7 +270,8 @@ def _travel_notes(machine: Machine, workspace: Workspace) -> tuple[str, ...]:
 
 def _costly_notes(errors: ErrorSet) -> tuple[str, ...]:
     """Remark on harmonics that take long to evaluate: many terms with short waves."""
-    waves = [curve for curve in errors.functions.values() if isinstance(curve, Harmonics)]
+    curves = [part for curve in errors.functions.values() for part in curve.parts]
+    waves = [curve for curve in curves if isinstance(curve, Harmonics)]
     if sum(curve.cosines for curve in waves) <= MANY_COSINES:
         return ()
     terms = sum(len(curve.terms) for curve in waves)

@@ -3,9 +3,9 @@
 import csv
 import math
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TextIO
+from typing import TextIO, TypeVar
 
 from warpspace.exceptions import SceneError, near_miss
 from warpspace.machine.limits import MAX_CSV_BYTES, MAX_CSV_COLUMNS, MAX_CSV_LINE, MAX_CSV_LINES
@@ -14,6 +14,7 @@ from warpspace.scene.words import spell_value
 
 _MAX_LINES_OF_ROW = 20
 """Lines that one row may take, where its texts hold line breaks."""
+T = TypeVar("T")
 Row = tuple[int, list[str]]
 """Number of the line that a row ends on, and its fields."""
 
@@ -45,10 +46,37 @@ def read_csv_column(
         holds something that is no finite number, or its positions do not ascend.
     """
     source = str(path)
+    return read_csv_rows(
+        path, max_rows, lambda rows: _points(rows, column, limit, source, max_rows)
+    )
+
+
+def read_csv_rows(path: Path, max_rows: int, read: Callable[[Iterator[Row]], T]) -> T:
+    """Open a CSV file and have its rows read.
+
+    Parameters
+    ----------
+    path : Path
+    max_rows : int
+        Largest number of rows accepted below the header.
+    read : callable
+        Takes the rows that are not empty, the header first.
+
+    Returns
+    -------
+    object
+        What `read` gives.
+
+    Raises
+    ------
+    SceneError
+        If the file cannot be read or is no CSV, or what `read` raises.
+    """
+    source = str(path)
     check_file(path, MAX_CSV_BYTES, source)
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            return _points(_rows(file, source, max_rows), column, limit, source, max_rows)
+            return read(_rows(file, source, max_rows))
     except UnicodeDecodeError:
         read_text(path, MAX_CSV_BYTES)  # names the byte
         raise
@@ -107,7 +135,7 @@ def _points(
     points: list[tuple[float, float]] = []
     _, first = next(rows, (0, []))
     header = [name.strip() for name in first]
-    index = _column(header, column, source) if header else 0
+    index = find_column(header, column, source) if header else 0
     for line, row in rows:
         try:
             points.append(_point(line, row, len(header), index, limit, points, source))
@@ -120,7 +148,7 @@ def _points(
     return points
 
 
-def _column(header: list[str], column: str, source: str) -> int:
+def find_column(header: list[str], column: str, source: str) -> int:
     """Find the column, behind the first one."""
     if header[1:].count(column) == 1:
         return header.index(column, 1)
@@ -142,7 +170,7 @@ def _point(
     if len(row) != columns:
         problem = f"has {len(row)} fields; expected {columns} as in the header"
         raise SceneError(source, [f"line {line} {problem}"])
-    position, value = (_number(source, line, row[at]) for at in (0, index))
+    position, value = (csv_number(source, line, row[at]) for at in (0, index))
     if before and position <= before[-1][0]:
         problem = f"position {position:g} after {before[-1][0]:g}; expected ascending positions"
         raise SceneError(source, [f"line {line}: {problem}"])
@@ -152,7 +180,7 @@ def _point(
     return position, value
 
 
-def _number(source: str, line: int, text: str) -> float:
+def csv_number(source: str, line: int, text: str) -> float:
     """Read one finite number of a CSV file."""
     try:
         value = float(text)

@@ -1,5 +1,6 @@
 """From the raw value of an error in a scene file to its curve; each kind of curve reads its own."""
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import cast
 
@@ -21,6 +22,8 @@ def read_curve(
     problems: Problems,
     *,
     constant: bool = False,
+    axis: str = "",
+    axes: Collection[str] = (),
 ) -> ErrorFunction | None:
     """Read the curve of an error.
 
@@ -38,6 +41,10 @@ def read_curve(
         What was found so far.
     constant : bool, optional
         Whether only a number is allowed.
+    axis : str, optional
+        The axis of the error, for curves that name axes.
+    axes : collection of str, optional
+        All axes of the machine.
 
     Returns
     -------
@@ -46,8 +53,19 @@ def read_curve(
     """
     before = len(problems.lines)
     # A constant must be a number: the file that a table names need not be read.
-    reader = ValueReader(_no_points if constant else _csv_columns(folder))
-    curve = _read(raw, span, where, problems, reader)
+    columns = _no_points if constant else _csv_columns(folder)
+
+    def read(value: object, place: str) -> ErrorFunction | None:
+        """Read a curve, and the curves within it."""
+        reader = ValueReader(
+            columns,
+            axis=axis,
+            axes=axes,
+            curve=lambda inner, path: read(inner, location(place, path)),
+        )
+        return _read(value, span, place, problems, reader)
+
+    curve = read(raw, where)
     if constant and not is_number(raw) and len(problems.lines) == before:
         problems.add(where, "is constant along its axis; expected a number", raw)
     return curve if len(problems.lines) == before else None
@@ -59,6 +77,9 @@ def _read(
     """Read a number or a table and note what is wrong with it."""
     if is_number(raw):
         curve, table, form = Constant.read(raw, span, reader), {}, ()
+    elif raw is MISSING:
+        problems.add(where, "is missing")
+        return None
     else:
         table = cast("dict[str, object]", raw) if isinstance(raw, dict) else {}
         found = find_form(table)

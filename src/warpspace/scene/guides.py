@@ -78,7 +78,15 @@ def read_guides(
         problems.add(f"{where}.{KEY}", "expected [first guide, second guide]", pair)
         return {}
     curves = [
-        read_curve(entry, span, f"{where}.{KEY}[{index}]", folder, problems)
+        read_curve(
+            entry,
+            span,
+            f"{where}.{KEY}[{index}]",
+            folder,
+            problems,
+            axis=axis,
+            axes=machine.axes,
+        )
         for index, entry in enumerate(entries)
     ]
     first, second = curves

@@ -7,7 +7,8 @@ from warpspace.field.evaluate import View
 from warpspace.field.grid import Workspace
 from warpspace.kinematics.model import Loop, Model
 from warpspace.machine.description import Machine, Vector
-from warpspace.machine.errors import ErrorSet
+from warpspace.machine.errors import ErrorFunction, ErrorSet
+from warpspace.machine.measurement import Measurement
 from warpspace.machine.parameters import default_keys
 from warpspace.machine.tolerances import ToleranceSet
 
@@ -36,6 +37,10 @@ class Scene:
         Axis coordinates of the point held still; None is absolute.
     notes : tuple of str
         Remarks on the scene that are no errors.
+    uncertainty : mapping of str to ErrorFunction
+        Standard uncertainty (k = 1) of errors along their axes by key, µm or µrad, never negative.
+    measured : mapping of str to Measurement
+        Readings that errors were made from, by key.
     """
 
     name: str
@@ -49,6 +54,8 @@ class Scene:
     reference: Mapping[str, float] | None = None
     description: str = ""
     notes: tuple[str, ...] = ()
+    uncertainty: Mapping[str, ErrorFunction] = field(default_factory=dict[str, ErrorFunction])
+    measured: Mapping[str, Measurement] = field(default_factory=dict[str, Measurement])
 
     @property
     def machine(self) -> Machine:
@@ -59,7 +66,7 @@ class Scene:
     def parameter_keys(self) -> tuple[str, ...]:
         """Keys of the machine's default parameters and of any other constant the scene gives."""
         default = default_keys(self.machine.chain.axes)
-        given = [*self.errors, *self.tolerances.own]
+        given = [*self.errors, *self.tolerances.own, *self.uncertainty]
         extra = [key for key in self.machine.allowed_keys if key in given and key not in default]
         return (*default, *extra)
 

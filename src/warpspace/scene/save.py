@@ -12,6 +12,7 @@ from warpspace.machine.description import ORIGIN, Machine, default_travel
 from warpspace.machine.limits import MIN_NUMBER
 from warpspace.machine.parameters import PARAMETERS, Parameter
 from warpspace.machine.tolerances import Tolerance
+from warpspace.machine.travel import TravelDirection
 from warpspace.scene.machines import load_machine, machine_names
 from warpspace.scene.model import Scene
 
@@ -51,6 +52,8 @@ def scene_to_toml(scene: Scene) -> str:
     convention: dict[str, object] = {"component_errors": scene.model.convention_value}
     if {*scene.machine.reference_keys} & {*scene.errors, *scene.tolerances.own}:
         convention["reference_axis"] = "free"
+    if scene.model.direction != TravelDirection.MEAN:
+        convention["direction"] = str(scene.model.direction)
     parts.append(_section("convention", convention))
     ranges = {
         axis: low if low == high else [low, high]
@@ -64,6 +67,11 @@ def scene_to_toml(scene: Scene) -> str:
     }
     parts.append(_section("points_mm", points))
     parts += [_errors_section(scene), _tolerances_section(scene)]
+    uncertain = {key: function.to_toml() for key, function in scene.uncertainty.items()}
+    parts.append(_section("uncertainty", uncertain, PARAMETERS))
+    for key, measurement in scene.measured.items():
+        runs = [asdict(run) for run in measurement.runs]
+        parts.append(_section(f"measured.{key}", {"runs": runs}))
     view = {
         "exaggeration": "auto" if scene.exaggeration is None else scene.exaggeration,
         "reference": "absolute" if scene.reference is None else scene.reference,

@@ -31,6 +31,7 @@ from warpspace.machine.limits import (
     MIN_NUMBER,
     MIN_SPAN,
 )
+from warpspace.machine.travel import TravelDirection
 
 
 def _entries(spelling: str) -> BeforeValidator:
@@ -168,6 +169,7 @@ class ConventionSection(Section):
         Discriminator(lambda value: "table" if isinstance(value, dict) else "word"),
     ] = "after_motion"
     reference_axis: Literal["fixed", "free"] = "fixed"
+    direction: Annotated[str, _one_of(tuple(TravelDirection))] = TravelDirection.MEAN.value
 
 
 class PointsSection(Section):

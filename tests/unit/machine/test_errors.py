@@ -4,7 +4,17 @@ import numpy as np
 import pytest
 
 from warpspace.exceptions import UnknownNameError
-from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet, Harmonics, Poly, Ramp, Table
+from warpspace.machine.errors import (
+    Constant,
+    Directional,
+    ErrorFunction,
+    ErrorSet,
+    Harmonics,
+    Poly,
+    Ramp,
+    Table,
+    TwoArguments,
+)
 
 SPAN = (-200.0, 200.0)
 TURN = (0.0, 360.0)
@@ -15,6 +25,10 @@ FUNCTIONS = [
     Poly(SPAN, (1.0, 0.0, 0.0005)),
     Harmonics(TURN, ((1.0, 3.0, 0.0), (2.0, -4.0, 90.0))),
     Table(SPAN, ((-200.0, -20.0), (0.0, 4.0), (200.0, 12.0))),
+    TwoArguments(
+        SPAN, ("X", "Z"), ((-200.0, 0.0, 200.0), (0.0, 10.0)), ((1.0, 2.0), (3.0, -9.0), (4.0, 5.0))
+    ),
+    Directional(SPAN, Constant(SPAN, 3.0), Poly(SPAN, (1.0, 0.0, 0.0005))),
 ]
 
 

@@ -9,7 +9,16 @@ from warpspace.app.state.app_state import start_state
 from warpspace.app.state.curve_text import convert_shape, parse_shape, shape_kind, spell_rows
 from warpspace.app.state.edits import axis_span, curve_of, with_curve, with_typed_amplitude
 from warpspace.machine.curves.registry import curve_kinds
-from warpspace.machine.errors import Constant, ErrorFunction, Harmonics, Poly, Ramp, Table
+from warpspace.machine.errors import (
+    Constant,
+    Directional,
+    ErrorFunction,
+    Harmonics,
+    Poly,
+    Ramp,
+    Table,
+    TwoArguments,
+)
 from warpspace.machine.parameters import parameter
 
 ZERO = start_state(load_scene("dvf5000_nominal"), nodes=3)
@@ -75,6 +84,19 @@ def test_every_kind_can_be_entered_for_every_error_that_is_zero(key: str, kind: 
             Harmonics((0.0, 360.0), ((2.0, 0.0, 0.0), (3.0, 0.0, 45.0))),
             Harmonics((0.0, 360.0), ((2.0, 11.0, 0.0), (3.0, 0.0, 45.0))),
         ),
+        (
+            TwoArguments(SPAN, ("X", "Z"), ((-1.0, 0.0, 3.0), (0.0, 5.0)), ((0.0, 0.0),) * 3),
+            TwoArguments(
+                SPAN,
+                ("X", "Z"),
+                ((-1.0, 0.0, 3.0), (0.0, 5.0)),
+                ((0.0, 0.0), (2.75, 2.75), (11.0, 11.0)),
+            ),
+        ),
+        (
+            Directional(SPAN, Constant(SPAN, 0.0), Ramp(SPAN, 0.0)),
+            Directional(SPAN, Constant(SPAN, 11.0), Ramp(SPAN, 11.0)),
+        ),
         # a term that is zero by itself cannot carry the amplitude
         (
             Harmonics((0.0, 360.0), ((0.0, 0.0, 90.0),)),
@@ -105,4 +127,4 @@ def test_a_curve_that_is_taken_to_zero_keeps_its_shape_while_it_is_open(text: st
 
 
 def test_all_kinds_are_tried() -> None:
-    assert {kind.title for kind in curve_kinds()} == {*ENTERED}
+    assert {kind.title for kind in curve_kinds() if kind.edited_as_rows} == {*ENTERED}

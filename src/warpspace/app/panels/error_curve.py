@@ -158,6 +158,8 @@ class ErrorCurvePanel:
         self._written = function
         kind = shape_kind(function)
         kinds = (Constant.title,) if row.is_constant else kind_titles()
+        if not function.edited_as_rows:
+            kinds = (*kinds, kind)
         if self._kind.handle.options != kinds:
             self._kind.handle.options = kinds
         self._kind.show(kind)

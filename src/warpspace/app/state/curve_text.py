@@ -33,8 +33,8 @@ class EnteredCurve:
 
 
 def kind_titles() -> tuple[str, ...]:
-    """List what the kinds of curve are called, simplest first."""
-    return tuple(kind.title for kind in curve_kinds())
+    """List what the kinds of curve are called that people can write, simplest first."""
+    return tuple(kind.title for kind in curve_kinds() if kind.edited_as_rows)
 
 
 def shape_kind(function: ErrorFunction | None) -> str:
@@ -45,10 +45,13 @@ def shape_kind(function: ErrorFunction | None) -> str:
 def spell_rows(function: ErrorFunction | None) -> str:
     """Write the numbers of a function as the rows that `read_curve` reads.
 
-    A measured table with more rows than may be edited is thinned out.
+    A measured table with more rows than may be edited is thinned out; of a kind that cannot be
+    written as rows it is said where it comes from.
     """
     if function is None:
         return "0"
+    if not function.edited_as_rows:
+        return function.row_words
     rows = function.rows()
     if len(rows) > MAX_CURVE_ROWS:
         rows = [rows[i] for i in np.linspace(0, len(rows) - 1, MAX_CURVE_ROWS).astype(int)]

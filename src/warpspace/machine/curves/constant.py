@@ -26,6 +26,11 @@ class Constant(ErrorFunction):
         """Give the value at every position."""
         return np.full(np.shape(position), self.value)
 
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        """No axis: it does not vary."""
+        return ()
+
     def scaled(self, factor: float) -> Self:
         """Give the constant times a factor."""
         return replace(self, value=self.value * factor)

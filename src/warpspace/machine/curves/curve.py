@@ -6,7 +6,7 @@ largest value (with its sign) of anything else.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar, Self
@@ -14,12 +14,16 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from warpspace.machine.curves.reading import ValueReader
+from warpspace.machine.travel import TravelDirection
 from warpspace.units import Array
 
 SPAN_SAMPLES = 721
 """Positions at which the peak of a curve is looked for: every half degree of a turn."""
 NEGLIGIBLE = 1e-12
 """Peak in µm or µrad below which a curve counts as zero: no number may be divided by it."""
+
+OWN = "own"
+"""Stands for the axis of the error among the arguments of a curve that does not know its name."""
 
 Span = tuple[float, float]
 """Lower and upper end of an axis range, mm or degrees."""
@@ -45,12 +49,15 @@ class ErrorFunction(ABC):
         The tables that spell it in a scene file, each by its keys; none where it is a number.
     row_words : str
         How its numbers are written as rows.
+    edited_as_rows : bool
+        Whether people can write its numbers as rows; if not, it comes from files.
     """
 
     name: ClassVar[str]
     title: ClassVar[str]
     forms: ClassVar[tuple[tuple[str, ...], ...]]
     row_words: ClassVar[str]
+    edited_as_rows: ClassVar[bool] = True
     span: Span
 
     @abstractmethod
@@ -65,6 +72,57 @@ class ErrorFunction(ABC):
         -------
         ndarray, [...], µm or µrad
         """
+
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        """Axes whose positions it depends on: `OWN` for that of its error; empty for a constant."""
+        return (OWN,)
+
+    def evaluate_at(
+        self,
+        axis: str,
+        coordinates: Mapping[str, Array],
+        direction: str = TravelDirection.MEAN,
+    ) -> Array:
+        """Give the error where all axes stand somewhere, reached in a direction of travel.
+
+        Parameters
+        ----------
+        axis : str
+            Axis of the error.
+        coordinates : mapping of str to ndarray, [...], mm or degrees
+            Broadcastable positions of all axes that the curve depends on.
+        direction : str, optional
+            One of `TravelDirection`.
+
+        Returns
+        -------
+        ndarray, [...], µm or µrad
+            Of the shape that the positions of its arguments broadcast to; the axis of the error is
+            one of them.
+        """
+        if direction == TravelDirection.DIFFERENCE:
+            return np.zeros(np.shape(coordinates[axis]))
+        return self.evaluate(coordinates[axis])
+
+    def shape_at(
+        self,
+        axis: str,
+        coordinates: Mapping[str, Array],
+        direction: str = TravelDirection.MEAN,
+    ) -> Array:
+        """Give `evaluate_at` for an amplitude of one; of a zero curve that of the `grown` one."""
+        return self.with_amplitude(1.0).evaluate_at(axis, coordinates, direction)
+
+    @property
+    def lines(self) -> tuple[tuple[str, "ErrorFunction"], ...]:
+        """Curves along the axis of the error that show it in a chart, each with its words."""
+        return (("", self),)
+
+    @property
+    def parts(self) -> tuple["ErrorFunction", ...]:
+        """The curves that it is put together from; itself where it is one curve."""
+        return (self,)
 
     @abstractmethod
     def scaled(self, factor: float) -> Self:

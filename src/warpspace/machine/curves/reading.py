@@ -1,18 +1,24 @@
 """Checks of the raw values that a scene file spells for a curve, each problem with its place."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
-from typing import cast
+from itertools import pairwise
+from typing import TYPE_CHECKING, cast
 
 from warpspace.exceptions import SceneError
 from warpspace.machine.limits import MIN_NUMBER
+
+if TYPE_CHECKING:
+    from warpspace.machine.curves.curve import ErrorFunction
 
 Path = tuple[int | str, ...]
 """Keys and indices below the error, for instance ``("table", 3, 0)``."""
 Points = Sequence[tuple[float, float]]
 CsvColumn = Callable[[str, str], Points]
 """Reads axis positions and one column, by file and name of the column; may raise SceneError."""
+ReadCurve = Callable[[object, Path], "ErrorFunction | None"]
+"""Reads a curve within a curve, by its raw value and its place; None where problems were noted."""
 MISSING = object()
 """Stands where a table has not all keys of its form."""
 
@@ -48,11 +54,32 @@ class ValueReader:
     ----------
     csv_column : callable, optional
         Reads a column of a CSV file; without it CSV files are refused.
+    axis : str, optional
+        The axis of the error, for curves that name axes.
+    axes : collection of str, optional
+        All axes of the machine.
+    curve : callable, optional
+        Reads a curve within a curve; without it there are none.
+
+    Attributes
+    ----------
+    findings : list of Finding
+        What was noted.
+    axis : str
+    axes : tuple of str
     """
 
-    def __init__(self, csv_column: CsvColumn | None = None) -> None:
+    def __init__(
+        self,
+        csv_column: CsvColumn | None = None,
+        *,
+        axis: str = "",
+        axes: Collection[str] = (),
+        curve: ReadCurve | None = None,
+    ) -> None:
         self.findings: list[Finding] = []
-        self._csv_column = csv_column
+        self.axis, self.axes = axis, tuple(axes)
+        self._csv_column, self._curve = csv_column, curve
 
     def note(self, path: Path, text: str, value: object = ...) -> None:
         """Note a problem; of a missing value, that it is missing."""
@@ -120,6 +147,39 @@ class ValueReader:
         elif len(value) > longest:
             self.note(path, f"expected at most {longest} characters", value)
         return value
+
+    def table(self, value: object, path: Path, known: Collection[str]) -> dict[str, object]:
+        """Read a table with exactly so many keys; what is missing stands as `MISSING`."""
+        if not isinstance(value, dict):
+            self.note(path, "expected a table", value)
+            return {}
+        found = cast("dict[str, object]", value)
+        for key in found:
+            if key not in known:
+                self.note((*path, key), f"unknown key; expected {', '.join(known)}")
+        return {**dict.fromkeys(known, MISSING), **found}
+
+    def ascending(
+        self, value: object, path: Path, most: int, limit: tuple[float, float]
+    ) -> tuple[float, ...]:
+        """Read a list of ascending numbers between limits."""
+        before = len(self.findings)
+        found = tuple(
+            self.number(entry, (*path, index), *limit)
+            for index, entry in enumerate(self.entries(value, path, most))
+        )
+        for number, (low, high) in enumerate(pairwise(found), start=2):
+            if len(self.findings) == before and not low < high:
+                text = f"entry {number} is {high:g} after {low:g}; expected ascending positions"
+                self.note(path, text)
+        return found
+
+    def curve(self, value: object, path: Path) -> "ErrorFunction | None":
+        """Read a curve within this one; None where problems were noted."""
+        if self._curve is None:
+            self.note(path, "expected a number", value)
+            return None
+        return self._curve(value, path)
 
     def csv_points(self, file: str, column: str) -> Points:
         """Read a column of a CSV file; nothing where a problem was noted before."""

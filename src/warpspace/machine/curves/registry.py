@@ -5,10 +5,12 @@ from collections.abc import Mapping
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.machine.curves.constant import Constant
 from warpspace.machine.curves.curve import ErrorFunction
+from warpspace.machine.curves.directional import Directional
 from warpspace.machine.curves.harmonics import Harmonics
 from warpspace.machine.curves.poly import Poly
 from warpspace.machine.curves.ramp import Ramp
 from warpspace.machine.curves.table import Table
+from warpspace.machine.curves.two_arguments import TwoArguments
 from warpspace.plugins import load_plugins
 
 CurveKind = type[ErrorFunction]
@@ -16,7 +18,7 @@ Form = tuple[str, ...]
 """Keys of the table that spells a curve in a scene file."""
 
 _KINDS: dict[str, CurveKind] = {
-    kind.name: kind for kind in (Constant, Ramp, Poly, Harmonics, Table)
+    kind.name: kind for kind in (Constant, Ramp, Poly, Harmonics, Table, TwoArguments, Directional)
 }
 """By name, in the order of lists: simplest first."""
 
