@@ -1,7 +1,7 @@
 """The correction that a machine needs: by how much its axes are moved so that no error is left."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from warpspace.machine.errors import ErrorSet
 from warpspace.scene.model import Scene
 from warpspace.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM, URAD_PER_RAD, Array
 
-STEPS = 3
+STEPS = 2
 """Newton steps: an error grows by a hundred-thousandth of the correction at most."""
 SMALL_MM, SMALL_DEG = 1e-2, 1e-3
 """Moves by which the response of the tool to an axis is measured."""
@@ -230,6 +230,11 @@ class Wanted:
         """Round values to the resolution."""
         step = self.resolution
         return np.round(values / step) * step if step else np.asarray(values)
+
+    def toward(self, direction: str) -> "Wanted":
+        """Give what is wanted for one direction of travel, "forward" or "backward"."""
+        model = replace(self.corrector.model, direction=direction)
+        return replace(self, corrector=replace(self.corrector, model=model))
 
     def corrections(self, places: Mapping[str, Array]) -> dict[str, Array]:
         """Give the corrections of all axes on a grid of places along the axes of the volume.

@@ -17,6 +17,7 @@ from warpspace.formats.numbers import check_position, read_number, read_whole, s
 from warpspace.formats.source import Source
 from warpspace.formats.table_errors import errors_of
 from warpspace.formats.terms import HELD, Line, Tables
+from warpspace.machine.travel import TravelDirection
 
 MOST_POINTS = 256
 DIGITS = 6
@@ -147,10 +148,13 @@ def write(wanted: Wanted) -> Files:
         if axis not in wanted.corrector.axes or axis not in JOINTS:
             continue
         places = wanted.places(axis)
-        values = wanted.round(wanted.averaged([axis])[axis])
+        ways = (TravelDirection.FORWARD, TravelDirection.BACKWARD)
+        forward, backward = (
+            wanted.round(wanted.toward(way).averaged([axis])[axis]).tolist() for way in ways
+        )
         files[f"_{axis}.comp"] = "".join(
-            f"{spell(q, DIGITS)} {spell(value, DIGITS)} {spell(value, DIGITS)}\n"
-            for q, value in zip(places.tolist(), values.tolist(), strict=True)
+            f"{spell(q, DIGITS)} {spell(there, DIGITS)} {spell(back, DIGITS)}\n"
+            for q, there, back in zip(places.tolist(), forward, backward, strict=True)
         )
         lines += [
             f"[JOINT_{JOINTS.index(axis)}]",

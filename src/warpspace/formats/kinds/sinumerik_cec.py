@@ -204,7 +204,7 @@ def _spelled(
         *lines,
         f"${PREFIX}_INPUT_AXIS[{index}]=({along})",
         f"${PREFIX}_OUTPUT_AXIS[{index}]=({target})",
-        f"${PREFIX}_STEP[{index}]={step!r}",
+        f"${PREFIX}_STEP[{index}]={float(step)!r}",
         f"${PREFIX}_MIN[{index}]={float(places[0])!r}",
         f"${PREFIX}_MAX[{index}]={float(places[-1])!r}",
         f"${PREFIX}_DIRECTION[{index}]=0",

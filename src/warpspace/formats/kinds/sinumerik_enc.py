@@ -119,7 +119,7 @@ def write(wanted: Wanted) -> Files:
         ]
         step = (places[-1] - places[0]) / (len(places) - 1)
         body += [
-            f"${PREFIX}_STEP[0,{axis}]={step!r}",
+            f"${PREFIX}_STEP[0,{axis}]={float(step)!r}",
             f"${PREFIX}_MIN[0,{axis}]={float(places[0])!r}",
             f"${PREFIX}_MAX[0,{axis}]={float(places[-1])!r}",
             f"${PREFIX}_IS_MODULO[0,{axis}]=0",
