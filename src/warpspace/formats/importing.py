@@ -4,14 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from warpspace.exceptions import OptionError
 from warpspace.formats.kind import Format, ReadOptions
 from warpspace.formats.measured import Imported
 from warpspace.formats.refused import refuse_unknown
 from warpspace.formats.registry import find_format, recognise
-from warpspace.formats.source import Source, read_source, source_of_bytes
+from warpspace.formats.source import MAX_BYTES, Source, read_source, source_of_bytes
 from warpspace.scene.files import check_file
-from warpspace.formats.source import MAX_BYTES
-from warpspace.exceptions import OptionError
 
 MOST_FILES = 64
 HEAD_BYTES = 16

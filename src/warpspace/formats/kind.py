@@ -138,7 +138,7 @@ def resolve_axis(name: str, source: Source, line: int | None, options: ReadOptio
         if len(axis) == 1 or given:
             return axis
     expected = f"expected X Y Z U V W A B C; --axis {bare or 'NAME'}=AXIS says which one it is"
-    source.refuse(f"axis {bare!r} is not known; {expected}", line)
+    raise source.problem(f"axis {bare!r} is not known; {expected}", line)
 
 
 def _candidates(bare: str) -> list[str]:

@@ -76,7 +76,9 @@ class Series:
     @property
     def values(self) -> Array:
         """Mean bidirectional error, [n], µm or µrad (x̄ᵢ); the mean of what there is otherwise."""
-        means = [found for way in (FORWARD, BACKWARD, BOTH) if (found := self.mean(way)) is not None]
+        means = [
+            found for way in (FORWARD, BACKWARD, BOTH) if (found := self.mean(way)) is not None
+        ]
         return np.mean(means, axis=0)
 
     @property
@@ -86,7 +88,7 @@ class Series:
         return None if forward is None or backward is None else forward - backward
 
     def deviation(self, direction: int) -> Array | None:
-        """Give the estimator of the standard deviation in a direction, [n] (sᵢ); None below 2 runs."""
+        """Estimate the standard deviation in a direction, [n] (sᵢ); None below two runs."""
         found = self._runs(direction)
         return np.nanstd(found, axis=0, ddof=1) if len(found) > 1 else None
 

@@ -31,7 +31,9 @@ UNKNOWN = (
         (".xlsx", ".xls", ".ods"),
         (b"PK\x03\x04", b"\xd0\xcf\x11\xe0"),
     ),
-    Unknown("a PDF", "export the numbers as CSV from the program that wrote it", (".pdf",), (b"%PDF",)),
+    Unknown(
+        "a PDF", "export the numbers as CSV from the program that wrote it", (".pdf",), (b"%PDF",)
+    ),
     Unknown(
         "a capture of a laser interferometer whose structure is not published",
         "export the deviations as .rtl or as CSV",
@@ -53,7 +55,7 @@ UNKNOWN = (
         (".tab", ".kinematics", ".knc"),
     ),
     Unknown(
-        "a volumetric error map of a coordinate measuring machine, whose structure is not published",
+        "an error map of a coordinate measuring machine, whose structure is not published",
         "export its error curves as CSV",
         (".vec", ".cmp", ".map"),
     ),

@@ -58,8 +58,12 @@ class Source:
         ------
         SceneError
         """
+        raise self.problem(problem, line)
+
+    def problem(self, problem: str, line: int | None = None) -> SceneError:
+        """Give the exception that refuses the file, see `refuse`."""
         where = "" if line is None else f"line {line}: "
-        raise SceneError(self.name, [where + problem])
+        return SceneError(self.name, [where + problem])
 
     def shown(self, line: int) -> str:
         """Give a line as a message shows it; its number counts from 1."""

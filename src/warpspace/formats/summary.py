@@ -103,7 +103,8 @@ def _of_series(one: Series) -> Summary:
         float(values.min()),
         float(values.max()),
         None if reversal is None else float(reversal.mean()),
-        None if repeatability is None or np.isnan(repeatability).all() else float(
-            np.nanmax(repeatability)),
+        None
+        if repeatability is None or np.isnan(repeatability).all()
+        else float(np.nanmax(repeatability)),
         max(one.uncertainty) if one.uncertainty else None,
     )

@@ -44,9 +44,7 @@ def errors_of(tables: Tables, name: str, source: Source, options: ReadOptions) -
     machine = options.machine
     lines = [term for term in tables.terms if isinstance(term, Line)]
     series = [_series(key, parts, machine) for key, parts in _by_key(lines, source).items()]
-    planes = [
-        _plane(term, machine, source) for term in tables.terms if isinstance(term, Product)
-    ]
+    planes = [_plane(term, machine, source) for term in tables.terms if isinstance(term, Product)]
     notes = list(tables.notes)
     for term in tables.terms:
         if isinstance(term, Grid3):

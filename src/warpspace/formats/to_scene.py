@@ -81,10 +81,7 @@ def plain_scene(found: Imported) -> Scene:
             f"the errors are of {', '.join(found.axes)}; expected --machine: how {other[0]} stands"
             " in a machine is not in the files"
         )
-    spans: dict[str, tuple[float, float]] = {}
-    for axis, (low, high) in _ranges(found).items():
-        if high - low > MIN_SPAN:
-            spans[axis] = (low, high)
+    spans = {axis: ends for axis, ends in _ranges(found).items() if ends[1] - ends[0] > MIN_SPAN}
     travel = "".join(f"{axis} = [{low!r}, {high!r}]\n" for axis, (low, high) in spans.items())
     text = f'title = "imported"\n[machine]\nchain = "wFXYZt"\n[machine.travel]\n{travel}'
     return parse_scene(text, "imported")
@@ -133,9 +130,7 @@ def into_scene(reading: Reading, base: Scene | None, title: str, name: str) -> I
     uncertainty, measured = _measured(found, base)
     model, said = _convention(found, base)
     said_by = [*reading.found.assumed, *notes, *said, *found.notes]
-    description = "\n".join(
-        [f"Imported from {name} ({reading.format.name}).", *said_by]
-    )[:MAX_TEXT]
+    description = "\n".join([f"Imported from {name} ({reading.format.name}).", *said_by])[:MAX_TEXT]
     scene = replace(
         base,
         model=model,
@@ -234,14 +229,14 @@ def _curve(one: Series, base: Scene) -> ErrorFunction:
     span = base.axis_span(parameter(one.key).axis)
     forward, backward = one.forward, one.backward
     if forward is not None and backward is not None and np.any(forward != backward):
-        there, back = (_table(span, one.positions, values.tolist()) for values in (forward, backward))
+        there, back = (
+            _table(span, one.positions, values.tolist()) for values in (forward, backward)
+        )
         return Directional(span, there, back)
     return _table(span, one.positions, one.values.tolist())
 
 
-def _table(
-    span: tuple[float, float], at: Sequence[float], values: Sequence[float]
-) -> Table:
+def _table(span: tuple[float, float], at: Sequence[float], values: Sequence[float]) -> Table:
     """Build a table."""
     return Table(span, tuple(zip(at, values, strict=True)))
 

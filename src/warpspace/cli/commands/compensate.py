@@ -118,8 +118,7 @@ def compensate(
     if sweep is not None:
         _run_sweep(loaded, plan, kinds, _counts(sweep), plot, force=force, as_json=as_json)
         return
-    assert output is not None
-    _run(scene, loaded, plan, output, plot, force=force, as_json=as_json)
+    _run(scene, loaded, plan, output or "", plot, force=force, as_json=as_json)
 
 
 def _run(
@@ -141,8 +140,9 @@ def _run(
     with progress("compensating", silent=as_json):
         found = run(scene, plan)
     targets = {
-        add: main if not add else check_output(
-            str(main.with_name(f"{main.stem}{add}")), (), force=force, scenes=[name])
+        add: main
+        if not add
+        else check_output(str(main.with_name(f"{main.stem}{add}")), (), force=force, scenes=[name])
         for add in found.files
     }
     if len(set(targets.values())) < len(targets):

@@ -1,5 +1,6 @@
 """Command `import`: measured errors and tables of controllers into a scene."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -88,6 +89,8 @@ def import_(
         )
         reading = read_errors(open_files(files), options, format_name or "")
         what = files[0].name if len(files) == 1 else f"{files[0].name} and {len(files) - 1} more"
+        if base is not None and (title or not scenes):
+            base = replace(base, title=title or files[0].stem, name=target.stem)
         made = into_scene(reading, base, title or files[0].stem, what)
     kind = reading.format
     how = "recognised" if reading.recognised else "as told"

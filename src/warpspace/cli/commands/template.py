@@ -1,5 +1,7 @@
 """Command `template`: a table of measured errors to fill in."""
 
+from itertools import pairwise
+
 import click
 
 from warpspace.cli.file_options import check_output, force_option, output_option
@@ -22,7 +24,7 @@ def template(axis: str, output: str | None, positions: str | None, *, force: boo
     Its header names the six errors of the axis and their uncertainties with their units; columns
     that are not needed may be left out.
     """
-    from warpspace.formats.kinds.csv_own import template as spelled
+    from warpspace.formats.parts.csv_writing import template as spelled
     from warpspace.machine.axes import is_axis_name
     from warpspace.outputs.files import write_atomically
 
@@ -49,6 +51,6 @@ def _positions(text: str | None) -> tuple[float, ...]:
         found = ()
     if not 2 <= len(found) <= 1000 or not all(abs(q) <= 1e5 for q in found):
         raise OptionError(f"--positions {text!r}; expected 2 to 1000 numbers with commas between")
-    if any(high <= low for low, high in zip(found, found[1:], strict=False)):
+    if any(high <= low for low, high in pairwise(found)):
         raise OptionError(f"--positions {text!r}; expected ascending positions")
     return found

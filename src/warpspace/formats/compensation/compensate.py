@@ -1,4 +1,4 @@
-"""A compensation from a scene to the controller and back: written, read again, evaluated, applied."""
+"""A compensation from a scene to the controller and back: written, read, evaluated, applied."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -9,18 +9,14 @@ from warpspace.analysis.statistics import Statistics, volume_statistics
 from warpspace.exceptions import OptionError
 from warpspace.field.basis import ErrorField
 from warpspace.field.grid import Grid, build_grid
-from warpspace.formats.compensation.wanted import (
-    Corrector,
-    Wanted,
-    build_corrector,
-    field_after,
-)
+from warpspace.formats.compensation.corrector import Corrector, build_corrector, field_after
+from warpspace.formats.compensation.wanted import Wanted
+from warpspace.formats.importing import Reading
 from warpspace.formats.kind import SIGNS, Format, ReadOptions
 from warpspace.formats.measured import Imported
 from warpspace.formats.registry import find_format
 from warpspace.formats.source import Source, source_of_text
 from warpspace.formats.to_scene import into_scene
-from warpspace.formats.importing import Reading
 from warpspace.kinematics.model import Coordinates
 from warpspace.machine.errors import ErrorSet
 from warpspace.machine.travel import TravelDirection
@@ -28,7 +24,7 @@ from warpspace.scene.model import Scene
 from warpspace.units import Array
 
 NODES = 28
-"""Nodes per axis that what is left is evaluated at: they fall between the points of usual tables."""
+"""Nodes per axis that what is left is evaluated at: between the points of usual tables."""
 RESOLUTION = (0.0, 0.1)
 """mm or degrees."""
 WAYS = {TravelDirection.FORWARD: 1, TravelDirection.BACKWARD: -1}
@@ -113,7 +109,9 @@ class Compensation:
         return volume_statistics(self.after, self.grid)
 
 
-def table_points(kind: Format, scene: Scene, asked: int | Mapping[str, int] | None) -> dict[str, int]:
+def table_points(
+    kind: Format, scene: Scene, asked: int | Mapping[str, int] | None
+) -> dict[str, int]:
     """Give the points of a table along each axis of the volume.
 
     Raises
@@ -160,7 +158,9 @@ def compensate(scene: Scene, plan: Plan, nodes: int = NODES) -> Compensation:
     """
     kind = find_format(plan.format)
     if kind.write is None:
-        raise OptionError(f"{kind.name} is read only; `warpspace formats` lists what can be written")
+        raise OptionError(
+            f"{kind.name} is read only; `warpspace formats` lists what can be written"
+        )
     if plan.orientation and not kind.orientation:
         raise OptionError(f"--orientation: {kind.name} corrects the position only")
     low, high = RESOLUTION
@@ -175,8 +175,10 @@ def compensate(scene: Scene, plan: Plan, nodes: int = NODES) -> Compensation:
     wanted = Wanted(scene, corrector, points, plan.resolution, plan.sign, plan.stem)
     files = kind.write(wanted)
     grid = build_grid(scene.model, scene.workspace, nodes)
-    sources = [source_of_text(text, f"{plan.stem}{add}{'' if add else kind.endings[0]}")
-               for add, text in files.items()]
+    sources = [
+        source_of_text(text, f"{plan.stem}{add}{'' if add else kind.endings[0]}")
+        for add, text in files.items()
+    ]
     controller = _read_back(kind, sources, wanted)
     reference = _reference(scene)
     before = field_after(corrector, grid.coordinates, {}, grid.nominal_mm, reference, {})
@@ -197,7 +199,7 @@ def compensate(scene: Scene, plan: Plan, nodes: int = NODES) -> Compensation:
         before,
         after,
         str(corrector.loop),
-        corrector.axes,
+        corrector.moved,
         controller.assumed,
         controller.notes,
     )

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from warpspace.analysis.statistics import Statistics
+from warpspace.exceptions import OptionError
 from warpspace.formats.compensation.compensate import Compensation, Plan, compensate
 from warpspace.formats.registry import find_format, formats
-from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 
 POINTS = (3, 5, 9, 17)

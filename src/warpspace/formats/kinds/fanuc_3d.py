@@ -15,7 +15,7 @@ from warpspace.exceptions import OptionError
 from warpspace.formats.compensation.wanted import Wanted
 from warpspace.formats.kind import CORRECTION, Files, Format, ReadOptions, resolve_axis
 from warpspace.formats.measured import Imported, merge
-from warpspace.formats.numbers import check_position, read_number, read_whole, unit_factor, MM_PER
+from warpspace.formats.numbers import MM_PER, check_position, read_number, read_whole, unit_factor
 from warpspace.formats.source import Source
 from warpspace.formats.table_errors import errors_of
 from warpspace.formats.terms import Grid3, Tables
@@ -79,7 +79,9 @@ def _grid(source: Source, options: ReadOptions) -> Grid3:
             source.refuse(f"{len(parts)} columns; expected {len(HEADINGS)}", number)
         read_whole(parts[0], source, number, "point", count, count)
         place = [
-            check_position(read_number(part, source, number, "position"), source, number, "position")
+            check_position(
+                read_number(part, source, number, "position"), source, number, "position"
+            )
             for part in parts[1:4]
         ]
         counts = [
@@ -101,8 +103,10 @@ def _grid(source: Source, options: ReadOptions) -> Grid3:
     for places, axis in zip(along, "XYZ", strict=True):
         steps = np.diff(places)
         if np.ptp(steps) > STEP_SHARE * steps.max():
-            source.refuse(f"steps of {steps.min():g} to {steps.max():g} mm along {axis}; expected"
-                          " equal steps, as the control has")
+            source.refuse(
+                f"steps of {steps.min():g} to {steps.max():g} mm along {axis}; expected"
+                " equal steps, as the control has"
+            )
     order = np.lexsort(table[:, :3].T[::-1])
     ordered = table[order].reshape(*shape, 6)
     first, second, third = (resolve_axis(axis, source, None, options) for axis in "XYZ")
@@ -128,7 +132,7 @@ def read(sources: Sequence[Source], options: ReadOptions) -> Imported:
 def write(wanted: Wanted) -> Files:
     """Write the grid; the magnification grows until every correction fits."""
     axes = ("X", "Y", "Z")
-    if tuple(wanted.axes) != axes or not set(axes) <= set(wanted.corrector.axes):
+    if tuple(wanted.axes) != axes or not set(axes) <= set(wanted.corrector.moved):
         raise OptionError(
             f"fanuc-3d corrects X, Y and Z over a volume of X, Y and Z; that of the scene is of"
             f" {', '.join(wanted.axes)}"
@@ -155,9 +159,8 @@ def write(wanted: Wanted) -> Files:
         ",".join(HEADINGS),
     ]
     # the first axis runs fastest, as compensation points are numbered
-    point = 0
-    for k, j, i in np.ndindex(*(len(places[axis]) for axis in reversed(axes))):
-        point += 1
+    shape = [len(places[axis]) for axis in reversed(axes)]
+    for point, (k, j, i) in enumerate(np.ndindex(*shape), start=1):
         at = [places[axis][index] for axis, index in zip(axes, (i, j, k), strict=True)]
         spelled = [f"{q:.6f}".rstrip("0").rstrip(".") for q in at]
         lines.append(",".join([str(point), *spelled, *map(str, counts[i, j, k].tolist())]))

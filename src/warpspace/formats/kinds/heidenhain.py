@@ -26,6 +26,10 @@ SIGN = (
     "values are errors, which the control takes back (TNC 360 Technical Manual, page 4-24: the"
     " table follows the error curve); --sign correction says otherwise"
 )
+TRAVEL = (
+    "BACKLASH is the value for travel in the negative direction, positions beyond the table take its"
+    " end values"
+)
 POSITION, BACKLASH, NUMBER, ACTIVE = "AXISPOS", "BACKLASH", "NR", "ACTIVE"
 WIDTH = 12
 Cells = dict[str, str]
@@ -112,7 +116,8 @@ def _looked_up(source: Source, axes: dict[str, list[str]], options: ReadOptions)
         return resolve_axis(options.axis, source, None, options)
     if len(last) == 1 and last in "XYZUVWABC":
         return resolve_axis(last, source, None, options)
-    source.refuse("does not say over which axis; expected its .CMA file beside it, or --axis X")
+    expected = "expected its .CMA file beside it, or --axis X"
+    raise source.problem(f"does not say over which axis; {expected}")
 
 
 def _lines(source: Source, along: str, options: ReadOptions) -> list[Line]:
@@ -134,8 +139,11 @@ def _lines(source: Source, along: str, options: ReadOptions) -> list[Line]:
         if all(not cells[column] for _, cells in rows):
             continue
         target = resolve_axis(column, source, rows[0][0], options)
-        known = [(q, _value(cells[column], source, line, column))
-                 for q, (line, cells) in zip(places, rows, strict=True) if cells[column]]
+        known = [
+            (q, _value(cells[column], source, line, column))
+            for q, (line, cells) in zip(places, rows, strict=True)
+            if cells[column]
+        ]
         at, found = np.array(known).T
         values = factor * np.interp(places, at, found)
         backward: tuple[float, ...] = ()
@@ -184,9 +192,7 @@ def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
         for line in _lines(source, _looked_up(source, axes, options), options)
     ]
     said = f"sign: {options.sign}" if options.sign else SIGN
-    extra = ("BACKLASH is the value for travel in the negative direction, positions beyond the"
-             " table take its end values",)
-    return Tables(tuple(terms), (said, *extra))
+    return Tables(tuple(terms), (said, TRAVEL))
 
 
 def read(sources: Sequence[Source], options: ReadOptions) -> Imported:
@@ -199,7 +205,7 @@ def write(wanted: Wanted) -> Files:
     stem = wanted.stem.upper()
     files: dict[str, str] = {}
     mean = {axis: float(value) for axis, value in wanted.averaged([]).items()}
-    targets = wanted.corrector.axes
+    targets = wanted.corrector.moved
     for axis in wanted.axes:
         places = wanted.places(axis)
         values = wanted.averaged([axis])

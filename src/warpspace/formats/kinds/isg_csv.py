@@ -6,14 +6,15 @@ rows of comments begin with //; two arguments make an error of two axes.
 
 import re
 from collections.abc import Sequence
+from itertools import pairwise
 
 from warpspace.formats.compensation.wanted import Wanted
 from warpspace.formats.kind import Files, Format, ReadOptions
-from warpspace.formats.kinds import volumetric
-from warpspace.formats.kinds.csv_own import plane_of
-from warpspace.formats.kinds.parametric import sampled, table_of
 from warpspace.formats.measured import BOTH, Imported, Plane, Run, Series, merge
 from warpspace.formats.numbers import check_error, check_position, read_number, spell
+from warpspace.formats.parts import volumetric
+from warpspace.formats.parts.parametric import sampled, table_of
+from warpspace.formats.parts.planes import plane_of
 from warpspace.formats.source import Source
 from warpspace.machine.limits import MAX_POINTS
 from warpspace.machine.parameters import parameter
@@ -112,8 +113,9 @@ def _read_block(source: Source, block: Block) -> Imported:
     if len(arguments) == 2:
         planes = tuple(_plane(source, key, arguments, rows) for key in keys)
         return Imported(NAME, planes=planes, notes=notes)
-    return Imported(NAME, tuple(_series(source, key, arguments[0], rows) for key in keys),
-                    notes=notes)
+    return Imported(
+        NAME, tuple(_series(source, key, arguments[0], rows) for key in keys), notes=notes
+    )
 
 
 def _constants(
@@ -151,7 +153,7 @@ def _series(
     source: Source, key: str, argument: str, rows: list[tuple[int, dict[str, float]]]
 ) -> Series:
     """Read an error over its axis."""
-    for (_, before), (number, row) in zip(rows, rows[1:], strict=False):
+    for (_, before), (number, row) in pairwise(rows):
         if row[argument] <= before[argument]:
             found = f"{argument} {row[argument]:g} after {before[argument]:g}"
             source.refuse(f"{found}; expected ascending positions", number)
@@ -182,17 +184,20 @@ def write(wanted: Wanted) -> Files:
         blocks.append("\n".join(["\t".join(names), "\t".join(values)]))
     for axis in dict.fromkeys(parameter(one.key).axis for one in held.series):
         own = [one for one in held.series if parameter(one.key).axis == axis]
-        table = table_of([Series(o.key, o.positions, (Run(1, BOTH, tuple(o.values.tolist())),))
-                          for o in own])
+        table = table_of(
+            [Series(o.key, o.positions, (Run(1, BOTH, tuple(o.values.tolist())),)) for o in own]
+        )
         lines = ["\t".join([axis, *table.keys])]
         for position, _, values in table.rows:
-            scaled = [spell(value / volumetric.factor_of(key), DIGITS)
-                      for key, value in zip(table.keys, values, strict=True)]
+            scaled = [
+                spell(value / volumetric.factor_of(key), DIGITS)
+                for key, value in zip(table.keys, values, strict=True)
+            ]
             lines.append("\t".join([repr(position), *scaled]))
         blocks.append("\n".join(lines))
     for plane in held.planes:
         own, other = plane.axes
-        lines = ["\t".join([other, own, plane.key])]
+        lines = [f"{other}\t{own}\t{plane.key}"]
         for j, second in enumerate(plane.second):
             for i, first in enumerate(plane.first):
                 value = spell(plane.values[i][j] / volumetric.factor_of(plane.key), DIGITS)

@@ -9,10 +9,10 @@ from collections.abc import Sequence
 
 from warpspace.formats.compensation.wanted import Wanted
 from warpspace.formats.kind import Files, Format, ReadOptions
-from warpspace.formats.kinds import volumetric
-from warpspace.formats.kinds.parametric import sampled
 from warpspace.formats.measured import BOTH, Imported, Run, Series, merge
 from warpspace.formats.numbers import check_error, check_position, read_number
+from warpspace.formats.parts import volumetric
+from warpspace.formats.parts.parametric import sampled
 from warpspace.formats.source import Source
 from warpspace.machine.limits import MAX_POINTS
 from warpspace.machine.parameters import parameter
@@ -122,11 +122,15 @@ def write(wanted: Wanted) -> Files:
     """Write the errors of a scene; those of two axes have no place and are left out."""
     held = sampled(wanted)
     lines = [f"// {wanted.scene.title}".replace("\n", " "), "// mm, rad, degrees; variant Vendor"]
-    lines += [f"// {plane.key} over {' and '.join(plane.axes)}: has no place here, left out"
-              for plane in held.planes]
+    lines += [
+        f"// {plane.key} over {' and '.join(plane.axes)}: has no place here, left out"
+        for plane in held.planes
+    ]
     for key, value in held.constants.items():
-        lines += [f"[{volumetric.file_name(key)}]",
-                  f"VALUE = {value / volumetric.factor_of(key):.{DIGITS}f}"]
+        lines += [
+            f"[{volumetric.file_name(key)}]",
+            f"VALUE = {value / volumetric.factor_of(key):.{DIGITS}f}",
+        ]
     for one in held.series:
         lines += [f"[{one.key}]", "Gridpoints = {"]
         scale = volumetric.factor_of(one.key)

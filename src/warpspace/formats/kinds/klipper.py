@@ -12,15 +12,15 @@ import numpy as np
 
 from warpspace.formats.compensation.wanted import Wanted
 from warpspace.formats.kind import Files, Format, ReadOptions, resolve_axis
-from warpspace.formats.kinds.skew import (
+from warpspace.formats.measured import BOTH, Imported, Run, Series, merge
+from warpspace.formats.numbers import RAD_TO_URAD, read_number
+from warpspace.formats.parts.skew import (
     PLANES,
     factor_of,
     fitted_factors,
     skew_lengths,
     skew_term,
 )
-from warpspace.formats.measured import BOTH, Imported, Run, Series, merge
-from warpspace.formats.numbers import RAD_TO_URAD, read_number
 from warpspace.formats.source import Source
 from warpspace.formats.table_errors import errors_of
 from warpspace.formats.terms import Tables
@@ -96,16 +96,24 @@ def _twist(source: Source, options: ReadOptions) -> Imported | None:
     heights = [read_number(part, source, line, "z_compensations") for part in text.split(",")]
     ends: list[float] = []
     for key in ("start_x", "end_x"):
-        named = next((name for name in (f"compensation_{key}", f"calibrate_{key}", key)
-                      if name in twist), None)
+        named = next(
+            (name for name in (f"compensation_{key}", f"calibrate_{key}", key) if name in twist),
+            None,
+        )
         if named is None:
             source.refuse(f"[axis_twist_compensation] has no calibrate_{key}", line)
         ends.append(read_number(twist[named][1], source, twist[named][0], named))
     if len(heights) < 2 or ends[1] <= ends[0]:
         found = f"{len(heights)} z_compensations from {ends[0]:g} to {ends[1]:g}"
         source.refuse(f"{found}; expected two or more along a range", line)
-    probe = next((name for name in ("probe", "bltouch", "beacon", "cartographer", "smart_effector")
-                  if "y_offset" in sections.get(name, {})), None)
+    probe = next(
+        (
+            name
+            for name in ("probe", "bltouch", "beacon", "cartographer", "smart_effector")
+            if "y_offset" in sections.get(name, {})
+        ),
+        None,
+    )
     if probe is None:
         expected = "expected y_offset in [probe]: without it a height tells no twist"
         source.refuse(f"[axis_twist_compensation] without a probe; {expected}", line)
@@ -118,12 +126,12 @@ def _twist(source: Source, options: ReadOptions) -> Imported | None:
     places = np.linspace(*ends, len(heights))
     values = np.array(heights) / offset * RAD_TO_URAD
     run = Run(1, BOTH, tuple(values.tolist()))
-    assumed = (
+    said = (
         f"the heights that the probe is off by, {offset:g} mm behind the nozzle, are taken for"
-        " roll of X; their mean is not in the file",
+        " roll of X; their mean is not in the file"
     )
     series = Series("EAX", tuple(places.tolist()), (run,))
-    return Imported(FORMAT.name, (series,), units=("mm",), assumed=assumed)
+    return Imported(FORMAT.name, (series,), units=("mm",), assumed=(said,))
 
 
 def read(sources: Sequence[Source], options: ReadOptions) -> Imported:

@@ -145,7 +145,7 @@ def write(wanted: Wanted) -> Files:
     files: dict[str, str] = {}
     lines = [f"# {wanted.scene.title}".replace("\n", " ")]
     for axis in wanted.axes:
-        if axis not in wanted.corrector.axes or axis not in JOINTS:
+        if axis not in wanted.corrector.moved or axis not in JOINTS:
             continue
         places = wanted.places(axis)
         ways = (TravelDirection.FORWARD, TravelDirection.BACKWARD)

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 
 from warpspace.formats.compensation.wanted import Wanted
 from warpspace.formats.kind import Files, Format, ReadOptions, resolve_axis
-from warpspace.formats.kinds.skew import MOST, PLANES, factor_of, fitted_factors, skew_term
 from warpspace.formats.measured import Imported, merge
 from warpspace.formats.numbers import read_number, spell
+from warpspace.formats.parts.skew import MOST, PLANES, factor_of, fitted_factors, skew_term
 from warpspace.formats.source import Source
 from warpspace.formats.table_errors import errors_of
 from warpspace.formats.terms import Tables
@@ -50,9 +50,8 @@ def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
                 found[plane] = settings["SKEW_FACTOR"][1]
             elif {"DIAG_AC", "DIAG_BD"} <= settings.keys() and ("SIDE_AD" in settings or side):
                 line, ac = settings["DIAG_AC"]
-                ad = settings.get("SIDE_AD") or side
-                assert ad is not None
-                lengths = (ac, settings["DIAG_BD"][1], ad[1])
+                _, ad = settings.get("SIDE_AD") or side or (line, 0.0)
+                lengths = (ac, settings["DIAG_BD"][1], ad)
                 found[plane] = factor_of(lengths, source, line, plane)
             else:
                 line = next(iter(settings.values()))[0]
@@ -81,8 +80,10 @@ def write(wanted: Wanted) -> Files:
         for letter, plane in zip("IJK", PLANES, strict=True)
     ]
     title = wanted.scene.title.replace("\n", " ")
-    return {"": f"; {title}\n; SKEW_CORRECTION_FOR_Z and SKEW_CORRECTION_GCODE must be enabled\n"
-                f"M852 {' '.join(words)}\n"}
+    return {
+        "": f"; {title}\n; SKEW_CORRECTION_FOR_Z and SKEW_CORRECTION_GCODE must be enabled\n"
+        f"M852 {' '.join(words)}\n"
+    }
 
 
 FORMAT = Format(

@@ -115,7 +115,7 @@ def _axis(source: Source, sections: dict[str, Lines], options: ReadOptions) -> s
         matched = _KEY.fullmatch(text)
         if matched and matched[1].strip().lower() == "axis" and matched[2].strip():
             return resolve_axis(matched[2].split()[0], source, number, options)
-    source.refuse("does not name its axis; expected --axis X")
+    raise source.problem("does not name its axis; expected --axis X")
 
 
 def _read_one(source: Source, options: ReadOptions) -> Imported:
@@ -162,8 +162,9 @@ def _read_one(source: Source, options: ReadOptions) -> Imported:
     air = [text for _, text in sections.get("ENVIRONMENT", [])]
     notes = (f"environment: {'; '.join(air)}",) if air else ()
     assumed = (INFERRED, *((ONE_WAY,) if one_way else ()))
-    return Imported(NAME, (series,), units=("mm", "µm"), assumed=assumed,
-                    notes=(*source.notes, *notes))
+    return Imported(
+        NAME, (series,), units=("mm", "µm"), assumed=assumed, notes=(*source.notes, *notes)
+    )
 
 
 def read(sources: Sequence[Source], options: ReadOptions) -> Imported:

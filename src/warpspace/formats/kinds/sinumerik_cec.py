@@ -12,9 +12,9 @@ import numpy as np
 
 from warpspace.formats.compensation.wanted import Wanted
 from warpspace.formats.kind import ERROR, Files, Format, ReadOptions, resolve_axis
-from warpspace.formats.kinds import sinumerik_text as text
 from warpspace.formats.measured import Imported, merge
 from warpspace.formats.numbers import read_whole
+from warpspace.formats.parts import sinumerik_text as text
 from warpspace.formats.source import Source
 from warpspace.formats.table_errors import errors_of
 from warpspace.formats.terms import HELD, MODULO, Line, Product, Tables, Term
@@ -32,6 +32,8 @@ SIGN = (
     " manual says of $AA_ENC_COMP; it does not say so of $AN_CEC: try it on the machine, or give"
     " --sign correction"
 )
+MOST_PRODUCTS = 3
+"""Pairs of tables for one axis over two others."""
 LEAST_MM = 1e-5
 """A product of tables below it is not worth two tables."""
 
@@ -136,7 +138,7 @@ def read(sources: Sequence[Source], options: ReadOptions) -> Imported:
 def write(wanted: Wanted) -> Files:
     """Write tables of every axis over every axis, and products of two where they help."""
     tables: list[tuple[str, str, Array, int]] = []
-    for target in wanted.corrector.axes:
+    for target in wanted.corrector.moved:
         tables += _tables_for(wanted, target)
         if len(tables) > MOST_TABLES:
             break
@@ -167,13 +169,14 @@ def _tables_for(wanted: Wanted, target: str) -> list[tuple[str, str, Array, int]
             both = wanted.averaged([first, second])[target]
             rest = factor * _interaction(both)
             left, sizes, right = np.linalg.svd(rest)
-            if sizes[0] * np.abs(left[:, 0]).max() * np.abs(right[0]).max() < LEAST_MM:
-                continue
-            one, other = left[:, 0] * np.sqrt(sizes[0]), right[0] * np.sqrt(sizes[0])
-            # both tables also act by themselves: their axis' own table takes that back
-            along[first] = along[first] - factor * one
-            along[second] = along[second] - factor * other
-            products += [(first, target, one, 1), (second, target, other, 0)]
+            for rank, size in enumerate(sizes[:MOST_PRODUCTS].tolist()):
+                one, other = left[:, rank] * np.sqrt(size), right[rank] * np.sqrt(size)
+                if np.abs(one).max() * np.abs(other).max() < LEAST_MM:
+                    break
+                # both tables also act by themselves: their axis' own table takes that back
+                along[first] = along[first] - factor * one
+                along[second] = along[second] - factor * other
+                products += [(first, target, one, 1), (second, target, other, 0)]
     own = [(axis, target, factor * values, 0) for axis, values in along.items()]
     kept = [table for table in own if np.abs(table[2]).max() > LEAST_MM / 100.0]
     return [*kept, *products]
@@ -181,12 +184,16 @@ def _tables_for(wanted: Wanted, target: str) -> list[tuple[str, str, Array, int]
 
 def _interaction(both: Array) -> Array:
     """Take out of a table of two axes what depends on one of them alone, [n1, n2]."""
-    shares = [np.ones(count) for count in both.shape]
-    for share in shares:
-        share[[0, -1]] = 0.5
-        share /= share.sum()
-    first, second = both @ shares[1], shares[0] @ both
-    return both - first[:, None] - second + shares[0] @ first
+    one, other = (_shares(count) for count in both.shape)
+    first, second = both @ other, one @ both
+    return both - first[:, None] - second + one @ first
+
+
+def _shares(count: int) -> Array:
+    """Give the share of an axis that belongs to each of its points, trapezoidal, [n]."""
+    shares = np.ones(count)
+    shares[[0, -1]] = 0.5
+    return shares / shares.sum()
 
 
 def _spelled(

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 
 from warpspace.formats.compensation.wanted import Wanted
 from warpspace.formats.kind import ERROR, Files, Format, ReadOptions, resolve_axis
-from warpspace.formats.kinds import sinumerik_text as text
 from warpspace.formats.measured import Imported, merge
+from warpspace.formats.parts import sinumerik_text as text
 from warpspace.formats.source import Source
 from warpspace.formats.table_errors import errors_of
 from warpspace.formats.terms import HELD, MODULO, Line, Tables
@@ -73,7 +73,9 @@ def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
                     found = f"{what}: ${PREFIX}_{setting} is missing"
                     source.refuse(f"{found} (is the file cut off?)", table.line)
             if any(term.source == axis for term in terms):
-                source.refuse(f"{what}: {axis} has a table already; expected one an axis", table.line)
+                source.refuse(
+                    f"{what}: {axis} has a table already; expected one an axis", table.line
+                )
             step, start, end = (table.settings[part] for part in ("STEP", "MIN", "MAX"))
             places = text.places_of(start, end, step, source, what, table.line)
             values = text.filled(table.values, len(places), source, what, table.line)
@@ -107,7 +109,7 @@ def write(wanted: Wanted) -> Files:
         f"; {SIGN if not wanted.sign else 'sign: ' + wanted.sign}",
     ]
     for axis in wanted.axes:
-        if axis not in wanted.corrector.axes:
+        if axis not in wanted.corrector.moved:
             continue
         places = wanted.places(axis)
         values = wanted.factor(ERROR) * wanted.averaged([axis])[axis]

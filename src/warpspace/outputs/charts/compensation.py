@@ -47,8 +47,12 @@ def compensation_chart(found: Compensation, title: str, subtitle: str) -> Figure
         figure, top = sheet(WIDTH_IN, height, title, subtitle, top_in=1.0)
         axes = np.atleast_2d(figure.subplots(max(len(planes), 1), len(columns), squeeze=False))
         figure.subplots_adjust(
-            left=0.075, right=0.93, top=top - 0.25 / height, bottom=0.6 / height,
-            wspace=0.42, hspace=0.34,
+            left=0.075,
+            right=0.93,
+            top=top - 0.25 / height,
+            bottom=0.6 / height,
+            wspace=0.42,
+            hspace=0.34,
         )
         for row, plane in zip(axes, planes, strict=False):
             for column, (words, field, largest) in zip(row, columns, strict=True):
@@ -78,13 +82,15 @@ def _slice(
     grid = found.grid
     names = grid.axes
     at = [_along(found, index) for index in (across, up)]
-    mesh = axes.pcolormesh(at[0], at[1], values.T, cmap="viridis", vmin=0.0, vmax=largest,
-                           shading="gouraud")
+    mesh = axes.pcolormesh(
+        at[0], at[1], values.T, cmap="viridis", vmin=0.0, vmax=largest, shading="gouraud"
+    )
     axes.set_xlabel(f"{names[across]} [{_unit(names[across])}]", fontsize=SMALL)
     axes.set_ylabel(f"{names[up]} [{_unit(names[up])}]", fontsize=SMALL)
     still = f"{names[rest]} {_along(found, rest)[worst[rest]]:.4g}" if names[rest] else ""
-    axes.text(0.02, 0.97, still, transform=axes.transAxes, va="top", fontsize=SMALL - 1.0,
-              color="white")
+    axes.text(
+        0.02, 0.97, still, transform=axes.transAxes, va="top", fontsize=SMALL - 1.0, color="white"
+    )
     axes.tick_params(labelsize=SMALL - 1.0)
     bar = axes.figure.colorbar(mesh, ax=axes, fraction=0.05, pad=0.03)
     bar.ax.tick_params(labelsize=SMALL - 1.5)
@@ -92,12 +98,12 @@ def _slice(
 
 
 def _unit(axis: str) -> str:
-    """Unit of the position of an axis."""
+    """Give the unit of the position of an axis."""
     return "mm" if axis[:1] in "XYZUVW" else "°"
 
 
 def _along(found: Compensation, index: int) -> Array:
-    """Positions of the nodes along one direction of the grid."""
+    """Give the positions of the nodes along one direction of the grid."""
     name = found.grid.axes[index]
     return np.ravel(found.grid.coordinates[name]) if name else np.zeros(1)
 
@@ -126,10 +132,24 @@ def sweep_chart(before: Statistics, steps: Sequence[Step], title: str) -> Figure
             sizes = [max(step.numbers, 1) for step in own]
             colour = colours[number % len(colours)]
             marker = "o" if number < len(colours) else "s"
-            axes.plot(sizes, [max(step.after.max_um, LEAST_UM) for step in own], color=colour,
-                      marker=marker, markersize=4.5, linewidth=1.6, label=kind)
-            axes.plot(sizes, [max(step.after.mean_um, LEAST_UM) for step in own], color=colour,
-                      marker=marker, markersize=3.0, linewidth=1.0, linestyle=(0, (2, 2)))
+            axes.plot(
+                sizes,
+                [max(step.after.max_um, LEAST_UM) for step in own],
+                color=colour,
+                marker=marker,
+                markersize=4.5,
+                linewidth=1.6,
+                label=kind,
+            )
+            axes.plot(
+                sizes,
+                [max(step.after.mean_um, LEAST_UM) for step in own],
+                color=colour,
+                marker=marker,
+                markersize=3.0,
+                linewidth=1.0,
+                linestyle=(0, (2, 2)),
+            )
         axes.axhline(before.max_um, color=ground().ink, linewidth=1.0)
         axes.axhline(before.mean_um, color=ground().ink, linewidth=0.8, linestyle=(0, (2, 2)))
         axes.set_xscale("log")
@@ -138,8 +158,13 @@ def sweep_chart(before: Statistics, steps: Sequence[Step], title: str) -> Figure
         axes.set_ylabel("left: |E| [µm]", fontsize=TEXT)
         quiet(axes, "both")
         figure.legend(loc="upper left", bbox_to_anchor=(0.74, top), frameon=False, fontsize=TEXT)
-        notes = ("solid: largest", "dashed: mean over the volume", "black: before",
-                 f"  max {before.max_um:.2f} µm", f"  mean {before.mean_um:.2f} µm")
+        notes = (
+            "solid: largest",
+            "dashed: mean over the volume",
+            "black: before",
+            f"  max {before.max_um:.2f} µm",
+            f"  mean {before.mean_um:.2f} µm",
+        )
         for index, text in enumerate(notes):
             figure.text(0.75, 0.3 - 0.038 * index, text, size=SMALL, color=ground().muted)
         return figure

@@ -102,7 +102,6 @@ def table_of(series: Sequence[Series]) -> Rows:
             values = one.values if mean is None else mean
             columns.append(np.interp(at, one.positions, values))
         rows += [
-            (float(q), way, tuple(float(column[i]) for column in columns))
-            for i, q in enumerate(at)
+            (float(q), way, tuple(float(column[i]) for column in columns)) for i, q in enumerate(at)
         ]
     return Rows(tuple(one.key for one in series), tuple(rows), directed)

@@ -118,9 +118,7 @@ def _with_wave(found: Imported, key: str, cosine: float, sine: float) -> Importe
     present = next((one for one in found.series if one.key == key), None)
     if present is None:
         phase = math.degrees(math.atan2(sine, cosine))
-        return replace(
-            found, curves={**found.curves, key: {"harmonics": [[1, size, phase]]}}
-        )
+        return replace(found, curves={**found.curves, key: {"harmonics": [[1, size, phase]]}})
     low, high = present.positions[0], present.positions[-1]
     fine = np.arange(low, high, FINE_DEG) if high > low else np.array([low])
     at = np.union1d(present.positions, fine)

@@ -74,9 +74,7 @@ def assignments(source: Source, names: Sequence[str]) -> Iterator[Assignment]:
         yield Assignment(number, name, parts, value.strip())
 
 
-def places_of(
-    start: float, end: float, step: float, source: Source, what: str, line: int
-) -> Array:
+def places_of(start: float, end: float, step: float, source: Source, what: str, line: int) -> Array:
     """Give the interpolation points of a table.
 
     Raises

@@ -1,8 +1,9 @@
 """Skew factors of printer firmware: Klipper and Marlin evaluate them alike.
 
-Klipper, klippy/extras/skew_correction.py, a port of Marlin's planner: of the diagonals AC and BD and
-the side AD of a printed part, with side = √(2·AC² + 2·BD² − 4·AD²) / 2, the factor is
-tan(π/2 − acos((AC² − side² − AD²) / (2·side·AD))); x is moved by −y·XY − z·(XZ − XY·YZ), y by −z·YZ.
+Klipper, klippy/extras/skew_correction.py, a port of Marlin's planner: of the diagonals AC and BD
+and the side AD of a printed part, with side = √(2·AC² + 2·BD² − 4·AD²) / 2, the factor is
+tan(π/2 − acos((AC² − side² − AD²) / (2·side·AD))); x is moved by −y·XY − z·(XZ − XY·YZ), and y by
+−z·YZ.
 """
 
 import math
@@ -30,7 +31,9 @@ def skew_factor(ac: float, bd: float, ad: float) -> float:
         If there is no such parallelogram.
     """
     side = math.sqrt(2.0 * ac * ac + 2.0 * bd * bd - 4.0 * ad * ad) / 2.0
-    return math.tan(math.pi / 2.0 - math.acos((ac * ac - side * side - ad * ad) / (2.0 * side * ad)))
+    return math.tan(
+        math.pi / 2.0 - math.acos((ac * ac - side * side - ad * ad) / (2.0 * side * ad))
+    )
 
 
 def skew_lengths(factor: float) -> tuple[float, float, float]:
@@ -49,12 +52,10 @@ def factor_of(lengths: tuple[float, float, float], source: Source, line: int, wh
     """
     ac, bd, ad = lengths
     try:
-        if min(lengths) <= 0.0:
-            raise ValueError
-        return skew_factor(ac, bd, ad)
-    except ValueError:
+        return skew_factor(*(math.sqrt(length) ** 2 for length in lengths))
+    except (ValueError, ZeroDivisionError):
         found = f"{what}: AC {ac:g}, BD {bd:g}, AD {ad:g} mm are no parallelogram"
-        source.refuse(f"{found}; expected two diagonals and a side", line)
+        raise source.problem(f"{found}; expected two diagonals and a side", line) from None
 
 
 def skew_term(factors: Mapping[str, float]) -> Affine:
