@@ -1,0 +1,56 @@
+"""Command `template`: a table of measured errors to fill in."""
+
+from itertools import pairwise
+
+import click
+
+from warpspace.cli.file_options import check_output, force_option, output_option
+from warpspace.cli.terminal import echo
+from warpspace.exceptions import OptionError
+
+
+@click.command()
+@click.argument("axis")
+@output_option("CSV file to write.  [standard output]", required=False)
+@click.option(
+    "--positions",
+    metavar="Q1,Q2,…",
+    help="Positions of its rows, in mm or degrees.  [-250 … 250, a turn for a rotary axis]",
+)
+@force_option
+def template(axis: str, output: str | None, positions: str | None, *, force: bool) -> None:
+    """Write a table for the measured errors of AXIS, for `warpspace import`.
+
+    Its header names the six errors of the axis and their uncertainties with their units; columns
+    that are not needed may be left out.
+    """
+    from warpspace.formats.parts.csv_writing import template as spelled
+    from warpspace.machine.axes import is_axis_name
+    from warpspace.outputs.files import write_atomically
+
+    name = axis.strip().upper()
+    if not is_axis_name(name):
+        raise OptionError(f"axis {axis!r}; expected a name such as X, C or C2")
+    text = spelled(name, _positions(positions))
+    if output is None:
+        click.echo(text, nl=False)
+        return
+    target = check_output(output, (".csv",), force=force)
+    with write_atomically(target, overwrite=force) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    echo(f"wrote {output}")
+
+
+def _positions(text: str | None) -> tuple[float, ...]:
+    """Read positions as a user types them."""
+    if text is None:
+        return ()
+    try:
+        found = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        found = ()
+    if not 2 <= len(found) <= 1000 or not all(abs(q) <= 1e5 for q in found):
+        raise OptionError(f"--positions {text!r}; expected 2 to 1000 numbers with commas between")
+    if any(high <= low for low, high in pairwise(found)):
+        raise OptionError(f"--positions {text!r}; expected ascending positions")
+    return found

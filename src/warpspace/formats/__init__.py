@@ -1,0 +1,1 @@
+"""Files of measuring instruments and controllers: read to errors, written as compensation."""

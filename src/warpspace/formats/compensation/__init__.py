@@ -1,0 +1,1 @@
+"""What a controller needs, and what is left after it."""

@@ -1,0 +1,112 @@
+"""What a table is to correct: the corrections at its points, averaged where it has fewer axes."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from warpspace.formats.compensation.corrector import Corrector
+from warpspace.scene.model import Scene
+from warpspace.units import Array
+
+OTHER_NODES = 9
+"""Positions of the other axes that a table of one axis is averaged over."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What a table is to correct, and how fine it may be.
+
+    Attributes
+    ----------
+    scene : Scene
+    corrector : Corrector
+    points : mapping of str to int
+        Points of the table along each axis of the volume.
+    resolution : float
+        Smallest step of a value, mm or degrees; 0 for as many digits as are printed.
+    sign : str
+        What the values are: "error" or "correction"; empty for what the format's manual says.
+    stem : str
+        Name of the files to write, without an ending.
+    """
+
+    scene: Scene
+    corrector: Corrector
+    points: Mapping[str, int]
+    resolution: float = 0.0
+    sign: str = ""
+    stem: str = "compensation"
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Axes that span the volume, in the order of the machine."""
+        spanning = self.scene.workspace.volume_axes
+        return tuple(axis for axis in self.scene.machine.axes if axis in spanning)
+
+    def places(self, axis: str) -> Array:
+        """Give the positions of a table along an axis, equal steps over the working volume."""
+        return np.linspace(*self.scene.workspace.ranges[axis], self.points[axis])
+
+    def factor(self, usual: str) -> float:
+        """Give the factor from a correction to a number of the table."""
+        return -1.0 if (self.sign or usual) == "error" else 1.0
+
+    def round(self, values: Array) -> Array:
+        """Round values to the resolution."""
+        step = self.resolution
+        return np.round(values / step) * step if step else np.asarray(values)
+
+    def toward(self, direction: str) -> "Wanted":
+        """Give what is wanted for one direction of travel, "forward" or "backward"."""
+        model = replace(self.corrector.model, direction=direction)
+        return replace(self, corrector=replace(self.corrector, model=model))
+
+    def corrections(self, places: Mapping[str, Array]) -> dict[str, Array]:
+        """Give the corrections of all axes on a grid of places along the axes of the volume.
+
+        Parameters
+        ----------
+        places : mapping of str to ndarray, (n,)
+
+        Returns
+        -------
+        dict of str to ndarray, [n1, n2, …]
+            In the order of `axes`.
+        """
+        still = self.scene.workspace.positions
+        meshed = np.meshgrid(*(places[axis] for axis in self.axes), indexing="ij")
+        coordinates = {name: np.asarray(still[name]) for name in self.scene.machine.axes}
+        coordinates |= dict(zip(self.axes, meshed, strict=True))
+        return self.corrector.moves(coordinates)
+
+    def averaged(self, kept: Sequence[str]) -> dict[str, Array]:
+        """Give the corrections over some axes, averaged over the volume along all others.
+
+        Parameters
+        ----------
+        kept : sequence of str
+            In the order of `axes`.
+
+        Returns
+        -------
+        dict of str to ndarray, [n1, …]
+            By corrected axis: the table of these axes that leaves the smallest RMS.
+        """
+        places = {
+            axis: self.places(axis)
+            if axis in kept
+            else np.linspace(*self.scene.workspace.ranges[axis], OTHER_NODES)
+            for axis in self.axes
+        }
+        weights = np.ones(OTHER_NODES)
+        weights[[0, -1]] = 0.5
+        weights /= weights.sum()
+        found = self.corrections(places)
+        for index in reversed(range(len(self.axes))):
+            if self.axes[index] not in kept:
+                found = {
+                    axis: np.tensordot(value, weights, axes=([index], [0]))
+                    for axis, value in found.items()
+                }
+        return found

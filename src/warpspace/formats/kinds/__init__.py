@@ -1,0 +1,1 @@
+"""The formats, one module each; `warpspace.formats.registry` lists them."""

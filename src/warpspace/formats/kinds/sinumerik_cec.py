@@ -1,0 +1,237 @@
+"""SINUMERIK sag and angularity compensation, `$AN_CEC`: one axis corrected over another.
+
+Siemens SINUMERIK 840D sl/828D, Function Manual Extended Functions (03/2013, 6FC5397-1BP40-3BA1),
+K3, pages 243 to 264: linear between equidistant points, end values held, or repeated with the
+modulo function; tables for one direction of travel; the product of two tables is added.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from warpspace.formats.compensation.wanted import Wanted
+from warpspace.formats.kind import ERROR, Files, Format, ReadOptions, resolve_axis
+from warpspace.formats.measured import Imported, merge
+from warpspace.formats.numbers import read_whole
+from warpspace.formats.parts import sinumerik_text as text
+from warpspace.formats.source import Source
+from warpspace.formats.table_errors import errors_of
+from warpspace.formats.terms import HELD, MODULO, Line, Product, Tables, Term
+from warpspace.units import Array
+
+PREFIX = "AN_CEC"
+AXES = ("INPUT_AXIS", "OUTPUT_AXIS")
+NUMBERS = ("STEP", "MIN", "MAX")
+SWITCHES = ("DIRECTION", "MULT_BY_TABLE", "IS_MODULO")
+NAMES = (PREFIX, *(f"{PREFIX}_{name}" for name in (*AXES, *NUMBERS, *SWITCHES)))
+MOST_TABLES = 62
+"""Twice the axes of an NC (manual, "Compensation table index")."""
+SIGN = (
+    "a positive value makes the corrected axis move in the negative direction, as page 238 of the"
+    " manual says of $AA_ENC_COMP; it does not say so of $AN_CEC: try it on the machine, or give"
+    " --sign correction"
+)
+MOST_PRODUCTS = 3
+"""Pairs of tables for one axis over two others."""
+LEAST_MM = 1e-5
+"""A product of tables below it is not worth two tables."""
+
+
+@dataclass
+class _Table:
+    """What a file says of one table."""
+
+    line: int
+    values: dict[int, float] = field(default_factory=dict[int, float])
+    axes: dict[str, str] = field(default_factory=dict[str, str])
+    numbers: dict[str, float] = field(default_factory=dict[str, float])
+    switches: dict[str, int] = field(default_factory=dict[str, int])
+
+
+def recognise(head: str, name: str) -> bool:
+    """Tell it by its variables."""
+    del name
+    return f"${PREFIX}" in head
+
+
+def _tables(source: Source) -> dict[int, _Table]:
+    """Collect the tables of a file by their index."""
+    found: dict[int, _Table] = {}
+    for one in text.assignments(source, NAMES):
+        plain = one.name == PREFIX
+        if len(one.indices) != (2 if plain else 1):
+            expected = "[table, point]" if plain else "[table]"
+            source.refuse(f"${one.name}[{', '.join(one.indices)}]; expected {expected}", one.line)
+        index = text.index_of(one.indices[0], source, one.line)
+        if index >= MOST_TABLES:
+            source.refuse(f"table {index}; expected at most {MOST_TABLES - 1}", one.line)
+        table = found.setdefault(index, _Table(one.line))
+        setting = one.name.removeprefix(f"{PREFIX}_")
+        if plain:
+            point = text.index_of(one.indices[1], source, one.line)
+            value = text.number_of(one, source)
+            text.set_once(table.values, point, value, source, one.line, f"table {index}")
+        elif setting in AXES:
+            table.axes[setting] = text.name_of(one.value, source, one.line)
+        elif setting in NUMBERS:
+            table.numbers[setting] = text.number_of(one, source)
+        else:
+            low, high = (-1, 1) if setting == "DIRECTION" else (0, MOST_TABLES)
+            table.switches[setting] = read_whole(
+                one.value, source, one.line, f"${one.name}", low, high
+            )
+    if not found:
+        source.refuse(f"has no ${PREFIX}; expected tables of this variable")
+    return found
+
+
+def _line(table: _Table, index: int, source: Source, options: ReadOptions) -> Line:
+    """Build one table as the controller evaluates it."""
+    what = f"table {index}"
+    for setting in (*AXES, *NUMBERS):
+        if setting not in table.axes and setting not in table.numbers:
+            found = f"{what}: ${PREFIX}_{setting}[{index}] is missing"
+            source.refuse(f"{found} (is the file cut off?)", table.line)
+    along, target = (
+        resolve_axis(table.axes[setting], source, table.line, options) for setting in AXES
+    )
+    step, start, end = (table.numbers[setting] for setting in NUMBERS)
+    places = text.places_of(start, end, step, source, what, table.line)
+    values = text.filled(table.values, len(places), source, what, table.line)
+    factor = options.factor(ERROR)
+    return Line(
+        along,
+        target,
+        tuple(places.tolist()),
+        tuple(factor * value for value in values),
+        MODULO if table.switches.get("IS_MODULO") else HELD,
+        direction=table.switches.get("DIRECTION", 0),
+    )
+
+
+def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
+    """Read the tables as the controller holds them."""
+    terms: list[Term] = []
+    for source in sources:
+        tables = _tables(source)
+        lines = {index: _line(one, index, source, options) for index, one in tables.items()}
+        terms += lines.values()
+        for index, table in tables.items():
+            other = table.switches.get("MULT_BY_TABLE", 0) - 1
+            if other < 0:
+                continue
+            if other not in lines:
+                found = f"table {index} is multiplied by table number {other + 1}"
+                source.refuse(f"{found}, which the file does not have", table.line)
+            terms.append(Product(lines[index], lines[other], options.factor(ERROR)))
+    said = f"sign: {options.sign}" if options.sign else SIGN
+    return Tables(tuple(terms), (said, "lengths mm, angles degrees (metric system)"))
+
+
+def read(sources: Sequence[Source], options: ReadOptions) -> Imported:
+    """Read the errors that the tables correct."""
+    parts = [errors_of(read_tables([one], options), FORMAT.name, one, options) for one in sources]
+    return merge(parts)
+
+
+def write(wanted: Wanted) -> Files:
+    """Write tables of every axis over every axis, and products of two where they help."""
+    tables: list[tuple[str, str, Array, int]] = []
+    for target in wanted.corrector.moved:
+        tables += _tables_for(wanted, target)
+        if len(tables) > MOST_TABLES:
+            break
+    body = [
+        f"; written by warpspace for {wanted.scene.title}".replace("\n", " "),
+        f"; {SIGN if not wanted.sign else 'sign: ' + wanted.sign}",
+    ]
+    for index, (along, target, values, number) in enumerate(tables[:MOST_TABLES]):
+        # a product points to a table by its place among those of one target
+        body += _spelled(wanted, index, along, target, values, number)
+    return text.archive("NC_CEC", body)
+
+
+def _tables_for(wanted: Wanted, target: str) -> list[tuple[str, str, Array, int]]:
+    """Give the tables that correct one axis: axis looked up, corrected axis, values, factor table.
+
+    The last entry is how many tables further the other factor of a product stands, 0 for none.
+    """
+    factor = wanted.factor(ERROR)
+    axes = wanted.axes
+    mean = float(wanted.averaged([])[target])
+    along = {axis: wanted.averaged([axis])[target] - mean for axis in axes}
+    home = target if target in axes else axes[0]
+    along[home] = along[home] + mean
+    products: list[tuple[str, str, Array, int]] = []
+    for i, first in enumerate(axes):
+        for second in axes[i + 1 :]:
+            both = wanted.averaged([first, second])[target]
+            rest = factor * _interaction(both)
+            left, sizes, right = np.linalg.svd(rest)
+            for rank, size in enumerate(sizes[:MOST_PRODUCTS].tolist()):
+                one, other = left[:, rank] * np.sqrt(size), right[rank] * np.sqrt(size)
+                if np.abs(one).max() * np.abs(other).max() < LEAST_MM:
+                    break
+                # both tables also act by themselves: their axis' own table takes that back
+                along[first] = along[first] - factor * one
+                along[second] = along[second] - factor * other
+                products += [(first, target, one, 1), (second, target, other, 0)]
+    own = [(axis, target, factor * values, 0) for axis, values in along.items()]
+    kept = [table for table in own if np.abs(table[2]).max() > LEAST_MM / 100.0]
+    return [*kept, *products]
+
+
+def _interaction(both: Array) -> Array:
+    """Take out of a table of two axes what depends on one of them alone, [n1, n2]."""
+    one, other = (_shares(count) for count in both.shape)
+    first, second = both @ other, one @ both
+    return both - first[:, None] - second + one @ first
+
+
+def _shares(count: int) -> Array:
+    """Give the share of an axis that belongs to each of its points, trapezoidal, [n]."""
+    shares = np.ones(count)
+    shares[[0, -1]] = 0.5
+    return shares / shares.sum()
+
+
+def _spelled(
+    wanted: Wanted, index: int, along: str, target: str, values: Array, number: int
+) -> list[str]:
+    """Spell one table."""
+    places = wanted.places(along)
+    step = (places[-1] - places[0]) / (len(places) - 1)
+    lines = [f"; MD18342 $MN_MM_CEC_MAX_POINTS[{index}] = {len(places)}"]
+    lines += [
+        f"${PREFIX}[{index},{point}]={text.value_text(value)}"
+        for point, value in enumerate(wanted.round(values).tolist())
+    ]
+    return [
+        *lines,
+        f"${PREFIX}_INPUT_AXIS[{index}]=({along})",
+        f"${PREFIX}_OUTPUT_AXIS[{index}]=({target})",
+        f"${PREFIX}_STEP[{index}]={float(step)!r}",
+        f"${PREFIX}_MIN[{index}]={float(places[0])!r}",
+        f"${PREFIX}_MAX[{index}]={float(places[-1])!r}",
+        f"${PREFIX}_DIRECTION[{index}]=0",
+        f"${PREFIX}_MULT_BY_TABLE[{index}]={index + number + 1 if number else 0}",
+        f"${PREFIX}_IS_MODULO[{index}]=0",
+    ]
+
+
+FORMAT = Format(
+    name="sinumerik-cec",
+    title="SINUMERIK $AN_CEC, sag and angularity compensation",
+    source="Siemens, SINUMERIK 840D sl Function Manual Extended Functions, K3, 6FC5397-1BP40-3BA1",
+    endings=(".ini", ".spf", ".mpf", ".arc", ".txt"),
+    holds="displacements of any axis over any axis, by direction of travel, and products of two",
+    units="mm, degrees",
+    grid="equal steps along the axis looked up",
+    limits="62 tables, as many points as MD18342 keeps; end values held, or modulo",
+    recognise=recognise,
+    read=read,
+    tables=read_tables,
+    write=write,
+    orientation=True,
+)

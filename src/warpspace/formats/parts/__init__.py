@@ -1,0 +1,1 @@
+"""What several formats share, and the parts of large ones."""

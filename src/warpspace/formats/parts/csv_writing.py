@@ -1,0 +1,78 @@
+"""Measurement tables written: one to fill in, and those of the errors of a scene."""
+
+from collections.abc import Sequence
+
+from warpspace.formats.compensation.wanted import Wanted
+from warpspace.formats.kind import Files
+from warpspace.formats.measured import BACKWARD, FORWARD
+from warpspace.formats.numbers import spell
+from warpspace.formats.parts.csv_header import DIRECTION, RUN
+from warpspace.formats.parts.parametric import sampled, table_of
+from warpspace.machine.axes import is_linear
+from warpspace.machine.parameters import parameter
+
+
+def template(axis: str, places: Sequence[float] = ()) -> str:
+    """Write a table to fill in for an axis."""
+    linear = is_linear(axis)
+    keys = [f"E{letter}{axis}" for letter in "XYZABC"]
+    spans = places or ((-250, -125, 0, 125, 250) if linear else (0, 90, 180, 270, 360))
+    unit = {key: "urad" if parameter(key).is_rotation else "um" for key in keys}
+    header = [
+        f"{axis} [{'mm' if linear else 'deg'}]",
+        RUN,
+        DIRECTION,
+        *(f"{key} [{unit[key]}]" for key in keys),
+        *(f"u({key}) [{unit[key]}]" for key in keys),
+    ]
+    lines = [
+        f"# Errors of the {axis} axis: actual - nominal, a row a position of a run.",
+        "# Units stand in brackets and may be changed: um mm nm in, urad mrad rad arcsec deg.",
+        "# run: 1, 2, 3 …; direction: + towards growing positions, - towards falling ones.",
+        "# u(…): standard uncertainties (k = 1). Columns that are not needed may be left out.",
+        *(f"# {key}: {parameter(key).name}" for key in keys),
+        ",".join(header),
+    ]
+    blank = "," * (2 * len(keys))
+    for direction, ordered in (("+", spans), ("-", tuple(reversed(spans)))):
+        lines += [f"{q:g},1,{direction}{blank}" for q in ordered]
+    return "\n".join(lines) + "\n"
+
+
+def write(wanted: Wanted) -> Files:
+    """Write the errors of a scene: constants in the main file, one file an axis beside it."""
+    held = sampled(wanted)
+    digits = 6
+    files: dict[str, str] = {}
+    if held.constants:
+        keys = list(held.constants)
+        units = ["urad" if parameter(key).is_rotation else "um" for key in keys]
+        head = ",".join(f"{key} [{unit}]" for key, unit in zip(keys, units, strict=True))
+        files["_constant.csv"] = (
+            head + "\n" + ",".join(spell(held.constants[key], digits) for key in keys) + "\n"
+        )
+    for axis in dict.fromkeys(parameter(one.key).axis for one in held.series):
+        rows = table_of([one for one in held.series if parameter(one.key).axis == axis])
+        unit = "mm" if is_linear(axis) else "deg"
+        heads = [f"{key} [{'urad' if parameter(key).is_rotation else 'um'}]" for key in rows.keys]
+        lines = [",".join([f"{axis} [{unit}]", *([DIRECTION] if rows.directed else []), *heads])]
+        for position, way, values in rows.rows:
+            told = [{FORWARD: "+", BACKWARD: "-"}.get(way, "")] if rows.directed else []
+            lines.append(",".join([repr(position), *told, *(spell(v, digits) for v in values)]))
+        files[f"_{axis}.csv"] = "\n".join(lines) + "\n"
+    for plane in held.planes:
+        unit = "urad" if parameter(plane.key).is_rotation else "um"
+        units = ["mm" if is_linear(axis) else "deg" for axis in plane.axes]
+        heads = [f"{axis} [{one}]" for axis, one in zip(plane.axes, units, strict=True)]
+        lines = [",".join([*heads, f"{plane.key} [{unit}]"])]
+        for i, first in enumerate(plane.first):
+            lines += [
+                f"{first!r},{second!r},{spell(plane.values[i][j], digits)}"
+                for j, second in enumerate(plane.second)
+            ]
+        files[f"_{plane.key}.csv"] = "\n".join(lines) + "\n"
+    names = list(files)
+    if not names:
+        return {"": "EXX [um]\n0.0\n"}
+    files[""] = files.pop(names[0])
+    return files

@@ -1,0 +1,296 @@
+"""From imported errors to a scene: each error a curve, its runs and uncertainties beside it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from warpspace.exceptions import OptionError, SceneError
+from warpspace.formats.importing import Reading
+from warpspace.formats.measured import BACKWARD, FORWARD, Imported, Plane, Series
+from warpspace.machine.axes import is_linear
+from warpspace.machine.curves.constant import Constant
+from warpspace.machine.curves.curve import ErrorFunction
+from warpspace.machine.curves.directional import Directional
+from warpspace.machine.curves.table import Table
+from warpspace.machine.curves.two_arguments import TwoArguments
+from warpspace.machine.errors import ErrorSet
+from warpspace.machine.limits import MAX_POINTS, MAX_SCENE_BYTES, MAX_TEXT, MIN_SPAN
+from warpspace.machine.measurement import Measurement, Run
+from warpspace.machine.parameters import parameter
+from warpspace.scene.curves import read_curve
+from warpspace.scene.library import load_scene, parse_scene
+from warpspace.scene.machines import machine_names
+from warpspace.scene.model import Scene
+from warpspace.scene.save import scene_to_toml
+from warpspace.scene.sections import Problems
+
+MEASURED = ("csv", "rtl")
+"""Formats whose runs are readings, which are kept with the scene."""
+LEEWAY = 1e-6
+"""mm or degrees by which a position may lie beyond the travel."""
+SIGNS = {FORWARD: "+", BACKWARD: "-"}
+
+
+@dataclass(frozen=True)
+class ImportedScene:
+    """A scene with imported errors.
+
+    Attributes
+    ----------
+    scene : Scene
+    text : str
+        Its file.
+    notes : tuple of str
+        What was left out, replaced or assumed for it.
+    """
+
+    scene: Scene
+    text: str
+    notes: tuple[str, ...]
+
+
+def base_scene(machine: str) -> Scene:
+    """Give the scene that errors are imported into: of a machine of the library, or a scene.
+
+    Parameters
+    ----------
+    machine : str
+        Name of a bundled machine, or name or path of a scene.
+
+    Raises
+    ------
+    SceneError
+    """
+    if machine in machine_names():
+        return parse_scene(f'title = "{machine}"\nmachine = "{machine}"\n', machine)
+    return load_scene(machine)
+
+
+def plain_scene(found: Imported) -> Scene:
+    """Give a machine of X, Y and Z for errors that name none.
+
+    Raises
+    ------
+    OptionError
+        If the errors are of other axes.
+    """
+    other = [axis for axis in found.axes if axis not in ("X", "Y", "Z")]
+    if other:
+        raise OptionError(
+            f"the errors are of {', '.join(found.axes)}; expected --machine: how {other[0]} stands"
+            " in a machine is not in the files"
+        )
+    spans = {axis: ends for axis, ends in _ranges(found).items() if ends[1] - ends[0] > MIN_SPAN}
+    travel = "".join(f"{axis} = [{low!r}, {high!r}]\n" for axis, (low, high) in spans.items())
+    text = f'title = "imported"\n[machine]\nchain = "wFXYZt"\n[machine.travel]\n{travel}'
+    return parse_scene(text, "imported")
+
+
+def into_scene(reading: Reading, base: Scene | None, title: str, name: str) -> ImportedScene:
+    """Put imported errors into a scene.
+
+    Parameters
+    ----------
+    reading : Reading
+    base : Scene or None
+        Errors of the same parameters are replaced, all others stay. None for a machine of X, Y, Z.
+    title : str
+        Of the scene, where there is none.
+    name : str
+        What the files are called in messages.
+
+    Returns
+    -------
+    ImportedScene
+
+    Raises
+    ------
+    SceneError
+        If the machine lacks an axis or a parameter, a position lies outside its travel, or the
+        scene would be too large.
+    OptionError
+        If a machine must be named.
+    """
+    found = reading.found
+    notes: list[str] = []
+    if base is None:
+        base = plain_scene(found)
+        base = replace(base, title=title[:MAX_TEXT])
+        notes.append("no machine named: X, Y and Z carry the tool, travels are those of the data")
+    _check_keys(found, base, name)
+    _check_travel(found, base, name)
+    curves = _curves(found, base, name)
+    replaced = [key for key in curves if key in base.errors]
+    if replaced:
+        notes.append(f"replaced: {', '.join(replaced)}")
+    kept = [key for key in base.errors if key not in curves]
+    if kept:
+        notes.append(f"kept from {base.name}: {', '.join(kept)}")
+    uncertainty, measured = _measured(found, base)
+    model, said = _convention(found, base)
+    said_by = [*reading.found.assumed, *notes, *said, *found.notes]
+    description = "\n".join([f"Imported from {name} ({reading.format.name}).", *said_by])[:MAX_TEXT]
+    scene = replace(
+        base,
+        model=model,
+        errors=ErrorSet({**base.errors.functions, **curves}),
+        uncertainty={**_without(base.uncertainty, curves), **uncertainty},
+        measured={**_without(base.measured, curves), **measured},
+        description=description,
+    )
+    text = scene_to_toml(scene)
+    if len(text.encode()) > MAX_SCENE_BYTES:
+        size = len(text.encode()) / 1e6
+        found_text = f"gives a scene of {size:.1f} MB"
+        raise SceneError(name, [f"{found_text}; expected at most {MAX_SCENE_BYTES / 1e6:.1f} MB"])
+    parsed = parse_scene(text, base.name, name)
+    return ImportedScene(parsed, text, (*notes, *said))
+
+
+def _without(table: object, curves: dict[str, ErrorFunction]) -> dict[str, object]:
+    """Give the entries of parameters that are not imported."""
+    return {key: value for key, value in dict(table).items() if key not in curves}  # type: ignore[call-overload]
+
+
+def _check_keys(found: Imported, base: Scene, name: str) -> None:
+    """Refuse parameters that the machine does not have."""
+    machine = base.machine
+    problems = [
+        f"{key}: the machine {machine.chain} has no axis {parameter(key).axis}"
+        for key in found.keys
+        if parameter(key).axis not in machine.axes
+    ]
+    problems += [
+        f"{plane.key}: the machine {machine.chain} has no axis {axis}"
+        for plane in found.planes
+        for axis in plane.axes
+        if axis not in machine.axes
+    ]
+    if problems:
+        raise SceneError(name, list(dict.fromkeys(problems)))
+
+
+def _ranges(found: Imported) -> dict[str, tuple[float, float]]:
+    """Give the range of positions of each axis."""
+    at: dict[str, list[float]] = {}
+    for one in found.series:
+        at.setdefault(parameter(one.key).axis, []).extend(one.positions)
+    for plane in found.planes:
+        for axis, places in zip(plane.axes, (plane.first, plane.second), strict=True):
+            at.setdefault(axis, []).extend(places)
+    return {axis: (min(places), max(places)) for axis, places in at.items()}
+
+
+def _check_travel(found: Imported, base: Scene, name: str) -> None:
+    """Refuse positions that the machine does not reach."""
+    problems: list[str] = []
+    for axis, (low, high) in _ranges(found).items():
+        one = base.machine.axes[axis]
+        if not is_linear(axis) and one.travel[1] - one.travel[0] >= 360.0 - LEEWAY:
+            continue
+        if low < one.travel[0] - LEEWAY or high > one.travel[1] + LEEWAY:
+            unit = f" {one.unit}" if is_linear(axis) else one.unit
+            problems.append(
+                f"positions of {axis} {low:g} … {high:g}{unit} reach beyond its travel"
+                f" {one.travel[0]:g} … {one.travel[1]:g}{unit}; expected positions within it (is it"
+                " the right machine, are the units right?)"
+            )
+    if problems:
+        raise SceneError(name, problems)
+
+
+def _curves(found: Imported, base: Scene, name: str) -> dict[str, ErrorFunction]:
+    """Build the curve of each error."""
+    curves: dict[str, ErrorFunction] = {}
+    for key, value in found.constants.items():
+        curves[key] = Constant(base.axis_span(parameter(key).axis), value)
+    for one in found.series:
+        if one.key in curves:
+            raise SceneError(name, [f"{one.key} is given twice; expected each error once"])
+        curves[one.key] = _curve(one, base)
+    for plane in found.planes:
+        if plane.key in curves:
+            raise SceneError(name, [f"{plane.key} is given twice; expected each error once"])
+        curves[plane.key] = _surface(plane, base, name)
+    problems = Problems()
+    for key, value in found.curves.items():
+        span = base.axis_span(parameter(key).axis)
+        curve = read_curve(value, span, key, None, problems, axis=parameter(key).axis)
+        if curve is not None:
+            curves[key] = curve
+    if problems.lines:
+        raise SceneError(name, problems.lines)
+    return curves
+
+
+def _curve(one: Series, base: Scene) -> ErrorFunction:
+    """Build the curve of an error along its axis: by direction where both were measured."""
+    span = base.axis_span(parameter(one.key).axis)
+    forward, backward = one.forward, one.backward
+    if forward is not None and backward is not None and np.any(forward != backward):
+        there, back = (
+            _table(span, one.positions, values.tolist()) for values in (forward, backward)
+        )
+        return Directional(span, there, back)
+    return _table(span, one.positions, one.values.tolist())
+
+
+def _table(span: tuple[float, float], at: Sequence[float], values: Sequence[float]) -> Table:
+    """Build a table."""
+    return Table(span, tuple(zip(at, values, strict=True)))
+
+
+def _surface(plane: Plane, base: Scene, name: str) -> ErrorFunction:
+    """Build a table over two axes."""
+    if len(plane.first) * len(plane.second) > MAX_POINTS:
+        found = f"{plane.key} has {len(plane.first)} × {len(plane.second)} values"
+        raise SceneError(name, [f"{found}; expected at most {MAX_POINTS:,}"])
+    span = base.axis_span(parameter(plane.key).axis)
+    return TwoArguments(span, plane.axes, (plane.first, plane.second), plane.values)
+
+
+def _measured(
+    found: Imported, base: Scene
+) -> tuple[dict[str, ErrorFunction], dict[str, Measurement]]:
+    """Give uncertainties, and the runs of what was measured."""
+    uncertainty: dict[str, ErrorFunction] = {
+        key: Constant(base.axis_span(parameter(key).axis), value)
+        for key, value in found.uncertainty.items()
+    }
+    measured: dict[str, Measurement] = {}
+    for one in found.series:
+        if one.uncertainty:
+            span = base.axis_span(parameter(one.key).axis)
+            uncertainty[one.key] = _table(span, one.positions, one.uncertainty)
+        if found.format in MEASURED and len(one.runs) > 1:
+            measured[one.key] = Measurement(
+                tuple(
+                    Run(
+                        SIGNS.get(run.direction, ""),
+                        tuple(
+                            (q, value)
+                            for q, value in zip(one.positions, run.values, strict=True)
+                            if not np.isnan(value)
+                        ),
+                    )
+                    for run in one.runs
+                )
+            )
+    return uncertainty, measured
+
+
+def _convention(found: Imported, base: Scene) -> tuple[object, list[str]]:
+    """Give the axes of imported component errors the convention of their file."""
+    model = base.model
+    own = dict(model.own_component_errors)
+    said: list[str] = []
+    axes = dict.fromkeys(
+        parameter(key).axis for key in found.keys if not parameter(key).is_constant
+    )
+    for axis in axes:
+        wanted = found.convention.get("linear" if is_linear(axis) else "rotary", "")
+        if wanted and model.convention(axis).name != wanted:
+            own[axis] = wanted
+            said.append(f"component errors of {axis}: {wanted}, as the file has them")
+    return replace(model, own_component_errors=tuple(own.items())), said
