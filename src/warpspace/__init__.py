@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from warpspace.scene.library import load_scene, scene_names
     from warpspace.scene.model import Scene
     from warpspace.scene.pipeline import evaluate
+    from warpspace.scene.sweeps import sweep
     from warpspace.scene.verbs import (
         allocate,
         ballbar,
@@ -37,6 +38,7 @@ _HOME = {
     "gains": "warpspace.scene.verbs",
     "measured": "warpspace.scene.verbs",
     "montecarlo": "warpspace.scene.verbs",
+    "sweep": "warpspace.scene.sweeps",
     "thesis": "warpspace.scene.verbs",
     "to_pyvista": "warpspace.outputs.exports.multiblock",
     "load_scene": "warpspace.scene.library",
@@ -58,6 +60,7 @@ __all__ = [
     "measured",
     "montecarlo",
     "scene_names",
+    "sweep",
     "thesis",
     "to_pyvista",
 ]

@@ -86,7 +86,9 @@ class Case:
                 amplitudes = draws.draw(rng, count)
                 places = random_places(model, loop, workspace, cylinder, rng, count)
                 gains = node_gains(model, draws.keys, view, places)
-                return np.sqrt(sum((np.einsum("nk,kn->n", amplitudes, gain) ** 2) for gain in gains))
+                return np.sqrt(
+                    sum((np.einsum("nk,kn->n", amplitudes, gain) ** 2) for gain in gains)
+                )
 
             return one_point_each
         find = extreme_places if over is Over.MAX else spread_places

@@ -14,10 +14,10 @@ Result = TypeVar("Result")
 
 def run_in_order(
     function: Callable[[Unpack[Given]], Result],
-    tasks: Iterable[tuple[Unpack[Given]]],
+    tasks: Iterable[tuple[*Given]],
     executor: Executor | None,
     in_flight: int,
-) -> Iterator[tuple[tuple[Unpack[Given]], Result]]:
+) -> Iterator[tuple[tuple[*Given], Result]]:
     """Run a function for every task; tasks and results come out in the order of the tasks.
 
     Parameters
@@ -45,7 +45,7 @@ def run_in_order(
         for task in tasks:
             yield task, function(*task)
         return
-    pending: deque[tuple[tuple[Unpack[Given]], Future[Result]]] = deque()
+    pending: deque[tuple[tuple[*Given], Future[Result]]] = deque()
     try:
         for task in tasks:
             if len(pending) >= in_flight:
@@ -74,7 +74,7 @@ def threads(workers: int) -> Generator[Executor | None]:
 def _submit(
     executor: Executor,
     function: Callable[[Unpack[Given]], Result],
-    task: tuple[Unpack[Given]],
+    task: tuple[*Given],
 ) -> "Future[Result]":
     """Give a task to the executor."""
     try:
@@ -84,8 +84,8 @@ def _submit(
 
 
 def _oldest(
-    pending: "deque[tuple[tuple[Unpack[Given]], Future[Result]]]",
-) -> tuple[tuple[Unpack[Given]], Result]:
+    pending: "deque[tuple[tuple[*Given], Future[Result]]]",
+) -> tuple[tuple[*Given], Result]:
     """Wait for the oldest task; it stays in the row until it is done, so that it can be stopped."""
     task, future = pending[0]
     try:

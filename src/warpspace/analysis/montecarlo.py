@@ -227,7 +227,7 @@ def _sent_tasks(cases: Iterable[Case], take: Take | None) -> Iterator[_Task]:
             yield case, first, min(first + size, blocks), take is not None, None
 
 
-def _run(case: Case, first: int, end: int, keep: bool, job: Job | None) -> Part | MonteCarlo:  # noqa: FBT001 - a task is a tuple
+def _run(case: Case, first: int, end: int, keep: bool, job: Job | None) -> Part | MonteCarlo:
     """Do a task; a case that is one task is evaluated to its end, which is much less to send."""
     part = sample_blocks(case, first, end, keep=keep, job=job)
     if keep or job is not None or case.plan.blocks > LEAST_BLOCKS:

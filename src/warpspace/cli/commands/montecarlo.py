@@ -1,11 +1,27 @@
 """Command `montecarlo`: the volumetric error of machines drawn from a scene's tolerances."""
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import click
 
-from warpspace.cli.file_options import check_targets, force_option, plot_option
+from warpspace.cli.file_options import (
+    check_targets,
+    force_option,
+    output_option,
+    plot_option,
+)
+from warpspace.cli.fleets import (
+    PRINTED,
+    cells,
+    columns,
+    describe_run,
+    find_scenes,
+    load_each,
+    row,
+)
+from warpspace.cli.machine_table import check_machine_table, machine_table
 from warpspace.cli.options import (
     grid_option,
     json_option,
@@ -13,6 +29,7 @@ from warpspace.cli.options import (
     print_json,
     scene_argument,
 )
+from warpspace.cli.pools import find_workers, scheduler_option, workers_option
 from warpspace.cli.progress import progress
 from warpspace.cli.sampling_options import (
     clip_option,
@@ -23,17 +40,19 @@ from warpspace.cli.sampling_options import (
     seed_option,
     specification_option,
 )
-from warpspace.cli.tables import print_text
+from warpspace.cli.tables import print_table, print_text
+from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
     from warpspace.analysis.montecarlo import MonteCarlo
     from warpspace.scene.model import Scene
+    from warpspace.scene.sweeps import SweepPoint
 
 OVER = ("sampled", "max", "mean")
 
 
 @click.command()
-@scene_argument()
+@scene_argument("scenes", metavar="SCENE…", nargs=-1, required=True)
 @samples_option
 @seed_option
 @grid_option(11, "for --over max|mean")
@@ -49,14 +68,14 @@ OVER = ("sampled", "max", "mean")
     help="|E| at one random point per machine, or its largest or mean over a machine's points.",
 )
 @cylinder_option
-@click.option(
-    "--workers", type=int, help="Threads; the result does not depend on it.  [one per core]"
-)
+@workers_option
+@scheduler_option
 @plot_option("histogram")
+@output_option("|E| of every machine as a table: .parquet or .csv.", required=False)
 @force_option
 @json_option
 def montecarlo(
-    scene: str,
+    scenes: Sequence[str],
     samples: int,
     seed: int,
     grid: int,
@@ -66,7 +85,9 @@ def montecarlo(
     over: str,
     cylinder: str | None,
     workers: int | None,
+    scheduler: str | None,
     plot: str | None,
+    output: str | None,
     *,
     force: bool,
     clip: bool,
@@ -74,7 +95,8 @@ def montecarlo(
 ) -> None:
     """Show how large |E| gets on machines within tolerance.
 
-    Machines are sampled from the tolerances of SCENE; |E| is the length of the error in µm.
+    Machines are sampled from the tolerances of each SCENE (a folder stands for the scenes in it;
+    several are printed as a table); |E| is the length of the error in µm.
     Each parameter is drawn once per machine and holds everywhere; a component error is the value it
     has at the point looked at. Tool and relative loop: points uniform in the working volume, rotary
     axes at their place in the scene. Workpiece loop: points uniform in the volume of the largest
@@ -82,33 +104,66 @@ def montecarlo(
 
     Quantiles are exact up to a million samples; beyond, from a histogram with steps of 0.002 %.
     """
-    from warpspace.scene import verbs
-    from warpspace.scene.library import load_scene
+    from warpspace.analysis.plan import Plan
+    from warpspace.scene.sweeps import sweep
 
-    check_targets(scene, force=force, plot=plot)
-    loaded = load_scene(scene)
-    size = parse_cylinder(cylinder)
-    with progress("sampling", max(samples, 0), "machines", silent=as_json) as bar:
-        result = verbs.montecarlo(
-            loaded,
-            samples=samples,
-            seed=seed,
-            distribution=distribution,
-            clip=clip,
-            loop=loop,
-            over=over,
-            grid=grid,
-            spec_um=spec_um,
-            cylinder=size,
-            workers=workers,
-            progress=bar.advance,
+    names = find_scenes(scenes)
+    check_targets(*names, force=force, plot=plot)
+    if plot is not None and len(names) > 1:
+        raise OptionError("--plot draws one machine; expected one scene")
+    plan = Plan(samples, seed, over, grid, spec_um, parse_cylinder(cylinder), None)
+    plan.check()
+    check_machine_table(output, names, samples, force=force)
+    total = samples * len(names)
+    loaded = load_each(names)
+    with (
+        find_workers(scheduler, workers, total) as found,
+        progress("sampling", total, "machines", silent=as_json) as bar,
+        machine_table(output, names, force=force) as take,
+    ):
+        points = list(
+            sweep(
+                loaded,
+                plan=plan,
+                distribution=distribution,
+                clip=clip,
+                loop=loop,
+                executor=found.executor,
+                workers=found.number,
+                progress=bar.advance,
+                take=take,
+            )
         )
+    first = points[0]
     if plot is not None:
-        _plot(plot, loaded, result, force=force)
-    if as_json:
-        print_json(result_json(result))
-        return
-    _print(loaded, result)
+        _plot(plot, first.scene, first.sampled, force=force)
+    if as_json and len(points) == 1:
+        print_json(result_json(first.sampled))
+    elif as_json:
+        print_json({"scenes": [_named_json(point) for point in points]})
+    elif len(points) == 1:
+        _print(first.scene, first.sampled)
+    else:
+        _print_fleet(points, spec_um)
+    if output is not None and not as_json:
+        print_text(f"wrote {output}")
+
+
+def _named_json(point: "SweepPoint") -> dict[str, object]:
+    """Spell the result of one scene among others."""
+    return {
+        "scene": point.scene.name,
+        "title": point.scene.title,
+        **result_json(point.sampled),
+    }
+
+
+def _print_fleet(points: "Sequence[SweepPoint]", spec_um: float | None) -> None:
+    """Print a line for each scene."""
+    print_text(describe_run(points[0].sampled))
+    print_table(columns((), spec_um), [cells(row(point), ()) for point in points[:PRINTED]])
+    if len(points) > PRINTED:
+        print_text(f"… and {len(points) - PRINTED:,} scenes more; --json prints all")
 
 
 def result_json(result: "MonteCarlo") -> dict[str, object]:
