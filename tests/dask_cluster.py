@@ -5,6 +5,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 SERVE = """
 import sys
@@ -20,19 +21,18 @@ if __name__ == "__main__":
 
 
 @contextmanager
-def dask_cluster(workers: int, folder: str) -> Iterator[str]:
+def dask_cluster(workers: int, folder: Path) -> Iterator[str]:
     """Start a scheduler and workers; give the address. Their files lie in a folder."""
-    path = os.path.join(folder, "serve.py")
-    with open(path, "w", encoding="utf-8") as file:
-        file.write(SERVE)
+    path = folder / "serve.py"
+    path.write_text(SERVE, encoding="utf-8")
     process = subprocess.Popen(
-        [sys.executable, path, str(workers)],
+        [sys.executable, str(path), str(workers)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         text=True,
         cwd=folder,
-        env={**os.environ, "DASK_TEMPORARY_DIRECTORY": folder},
+        env={**os.environ, "DASK_TEMPORARY_DIRECTORY": str(folder)},
     )
     assert process.stdin is not None
     assert process.stdout is not None

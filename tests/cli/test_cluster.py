@@ -29,7 +29,7 @@ RUN = (
 
 @pytest.fixture(scope="module")
 def scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    with dask_cluster(2, str(tmp_path_factory.mktemp("dask"))) as address:
+    with dask_cluster(2, tmp_path_factory.mktemp("dask")) as address:
         yield address
 
 
@@ -88,7 +88,7 @@ def test_a_worker_killed_half_way_changes_nothing(tmp_path: Path) -> None:
     scene = package.load_scene("dvf5000_general")
     alone = package.montecarlo(scene, samples=samples, seed=4, spec_um=40.0)
     with (
-        dask_cluster(3, str(tmp_path)) as address,
+        dask_cluster(3, tmp_path) as address,
         distributed.Client(address, set_as_default=False) as client,
     ):
         killed: list[int] = []
@@ -114,7 +114,7 @@ def test_a_worker_killed_half_way_changes_nothing(tmp_path: Path) -> None:
     assert found.histogram.counts.tolist() == alone.histogram.counts.tolist()
 
 
-# --- processes of this machine ---------------------------------------------------------------------
+# --- processes of this machine -------------------------------------------------------------------
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
@@ -171,6 +171,6 @@ def test_a_run_that_is_interrupted_leaves_no_process_and_no_file(tmp_path: Path)
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=20)
     assert process.returncode == 130
-    assert said.decode() == "warpspace: interrupted\n"
+    assert said.decode().strip() == "warpspace: interrupted"
     assert psutil.wait_procs(children, 10)[1] == []
     assert list(tmp_path.iterdir()) == []
