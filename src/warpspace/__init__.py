@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from warpspace.scene.library import load_scene, scene_names
     from warpspace.scene.model import Scene
     from warpspace.scene.pipeline import evaluate
+    from warpspace.scene.sweeps import sweep
     from warpspace.scene.verbs import (
         allocate,
         contributions,
@@ -39,6 +40,7 @@ _HOME = {
     "measured": "warpspace.scene.verbs",
     "run_test": "warpspace.bench.run",
     "montecarlo": "warpspace.scene.verbs",
+    "sweep": "warpspace.scene.sweeps",
     "thesis": "warpspace.scene.verbs",
     "to_pyvista": "warpspace.outputs.exports.multiblock",
     "load_scene": "warpspace.scene.library",
@@ -61,6 +63,7 @@ __all__ = [
     "montecarlo",
     "run_test",
     "scene_names",
+    "sweep",
     "thesis",
     "to_pyvista",
 ]

@@ -31,6 +31,10 @@ class OutputError(WarpspaceError):
     """A file that could not be written."""
 
 
+class WorkersLostError(WarpspaceError):
+    """Processes or machines that computed and are gone."""
+
+
 class UnknownNameError(WarpspaceError):
     """A name that is not among the known ones.
 

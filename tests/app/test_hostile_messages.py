@@ -1,222 +1,37 @@
 """Clients that send anything and vanish at any time: others are served, nothing is left behind."""
 
 import asyncio
-import contextlib
 import itertools
 import logging
-import os
-import re
-import secrets
-import socket as sockets
-import subprocess
-import sys
 import time
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
-import msgspec.msgpack
-import psutil
 import pytest
-import viser
-import websockets
-import zstandard
 
 from app.first_camera import CAMERA
+from app.raw_client import (
+    App,
+    Tab,
+    come_and_go,
+    nonsense,
+    pack,
+    running_app,
+    send_all,
+    steadily,
+    upload,
+)
 from warpspace.app.browser.incoming import may_pass, may_set
 from warpspace.app.server.repeated_lines import RepeatedLines
 
 MESSAGES = 10_000
 CONNECTIONS = 200
-pack = msgspec.msgpack.encode
-
-
-class App:
-    """The app in a process of its own."""
-
-    def __init__(self, url: str, process: psutil.Process, log: Path) -> None:
-        self.url, self._process, self._log = url, process, log
-
-    @property
-    def threads(self) -> int:
-        return self._process.num_threads()
-
-    @property
-    def memory_mb(self) -> float:
-        return self._process.memory_info().rss / 1e6
-
-    @property
-    def log(self) -> list[str]:
-        return self._log.read_text("utf-8").splitlines()
-
-    def settles(self, threads: int, seconds: float = 15.0) -> int:
-        """Give how many threads there are once they are no more than so many, or time is over."""
-        until = time.monotonic() + seconds
-        while self.threads > threads and time.monotonic() < until:
-            time.sleep(0.1)
-        return self.threads
 
 
 @pytest.fixture
 def app(tmp_path: Path) -> Iterator[App]:
-    with sockets.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    command = [sys.executable, "-m", "warpspace", "view", "--no-browser", "--port", str(port)]
-    log = tmp_path / "log"
-    with log.open("wb") as stream:
-        # what the C library keeps for threads that have ended, up to 64 MB each, is not counted
-        environment = {**os.environ, "MALLOC_ARENA_MAX": "2"}
-        process = subprocess.Popen(command, stdout=stream, stderr=stream, env=environment)
-    try:
-        for _ in range(300):
-            with contextlib.suppress(OSError):
-                sockets.create_connection(("127.0.0.1", port), 1).close()
-                break
-            time.sleep(0.1)
-        yield App(f"ws://127.0.0.1:{port}", psutil.Process(process.pid), log)
-    finally:
-        process.terminate()
-        process.wait(10)
-
-
-class Tab:
-    """A tab without a browser: learns its widgets, drags a slider, sees the mean change."""
-
-    def __init__(self, app: App) -> None:
-        self._app = app
-        self.widgets: dict[str, str] = {}
-        self.mean = ""
-        self.notices: list[str] = []
-        self.is_open = False
-
-    async def __aenter__(self) -> "Tab":
-        self.socket = await dial(self._app)
-        self._reader = asyncio.create_task(self._read())
-        await self.socket.send(pack(CAMERA))
-        await until(lambda: self.is_open and self.mean != "", 30.0)
-        return self
-
-    async def __aexit__(self, *_: object) -> None:
-        self._reader.cancel()
-        self.socket.transport.abort()
-
-    async def answer_s(self, value: float) -> float:
-        """Move a slider; give how long it takes until the mean is another."""
-        before, began = self.mean, time.perf_counter()
-        await self.socket.send(update(self.widgets["EAX"], {"value": value}))
-        await until(lambda: self.mean != before, 20.0)
-        return time.perf_counter() - began
-
-    async def _read(self) -> None:
-        with contextlib.suppress(websockets.ConnectionClosed):
-            async for raw in self.socket:
-                assert isinstance(raw, bytes)
-                size, packed = (int.from_bytes(raw[at : at + 8], "little") for at in (0, 8))
-                text = zstandard.ZstdDecompressor().decompress(
-                    raw[16 : 16 + packed], max_output_size=size
-                )
-                for message in msgspec.msgpack.decode(text)["messages"]:
-                    await self._take(message)
-
-    async def _take(self, message: dict[str, Any]) -> None:
-        part = message.get("props") or message.get("updates") or {}
-        if message["type"].startswith("Notification"):
-            self.notices.append(str(message))
-        if isinstance(part.get("label"), str):
-            self.widgets.setdefault(part["label"].split(" ")[0], message["uuid"])
-        if 'data-value="mean"' in str(part.get("content")):
-            self.mean = re.findall(r'data-value="mean"[^>]*>([^<]*)<', part["content"])[0]
-        if message["type"] == "RunJavascriptMessage":
-            self.is_open |= 'dataset.warpspace = "open"' in message["source"]
-            asked = re.search(r'uuid: "([^"]+)", updates: \{ value: "(\d+)"', message["source"])
-            if asked is not None:
-                await self.socket.send(update(asked[1], {"value": asked[2]}))
-
-
-async def dial(app: App) -> websockets.ClientConnection:
-    return await websockets.connect(
-        app.url,
-        subprotocols=[f"viser-v{viser.__version__}"],  # pyright: ignore[reportArgumentType]
-        max_size=None,
-        compression=None,
-    )
-
-
-async def until(fine: Callable[[], bool], seconds: float) -> None:
-    end = time.monotonic() + seconds
-    while not fine():
-        assert time.monotonic() < end, f"did not come true within {seconds:g} s"
-        await asyncio.sleep(0.005)
-
-
-def update(uuid: object, updates: object) -> bytes:
-    return pack({"type": "GuiUpdateMessage", "uuid": uuid, "updates": updates})
-
-
-def camera(**fields: object) -> bytes:
-    return pack({**CAMERA, **fields})
-
-
-def nonsense(widgets: list[str]) -> list[bytes]:
-    """One message of every kind that the app has no use for."""
-    nan, huge = float("nan"), 10**18
-    values = [
-        [],
-        {},
-        None,
-        "x",
-        nan,
-        float("inf"),
-        huge,
-        -1e300,
-        b"\0",
-        [1] * 99,
-        [[[]]],
-        "9" * 9999,
-    ]
-    names = ["uuid", "parent_container_id", "props", "removed", "update_cb", "gui_api", "value_"]
-    known = [update(uuid, {name: []}) for uuid in widgets for name in names]
-    known += [update(uuid, {"value": value}) for uuid in widgets for value in values]
-    known += [update(uuid, {"value": 1.0, "uuid": "x"}) for uuid in widgets]
-    return [
-        *known,
-        *(update(uuid, {"value": 1.0}) for uuid in ([], {}, None, 7, "unknown", "x" * 99_999)),
-        *(update(widgets[0], updates) for updates in ([], None, "x", {"value": "x" * 2_000_000})),
-        *(camera(position=value) for value in ((nan,) * 3, (1e300,) * 3, (0.0,) * 9, "x", None)),
-        camera(fov=nan), camera(image_width=huge), camera(image_height=-5), camera(extra=1),
-        pack({"type": "ScenePointerMessage", "event_type": "click"}),
-        pack({"type": "ScenePointerMessage", "event_type": "click", "ray_origin": None,
-              "ray_direction": [nan] * 3, "screen_pos": [], "modifier": {}}),
-        pack({"type": "SceneNodeClickMessage", "name": []}),
-        pack({"type": "SceneNodeDragMessage", "name": "/box", "phase": 3}),
-        pack({"type": "GuiFormDirtyMessage", "uuid": "x" * 1000}),
-        pack({"type": "GuiFormSubmitMessage", "uuid": []}),
-        pack({"type": "GuiButtonHoldMessage", "uuid": widgets[0], "frequency": nan}),
-        pack({"type": "CommandTriggerMessage", "uuid": {}}),
-        pack({"type": "FileTransferStartUpload", "source_component_uuid": widgets[0],
-              "transfer_uuid": [], "filename": 3, "mime_type": None, "part_count": -1,
-              "size_bytes": huge}),
-        pack({"type": "FileTransferPart", "source_component_uuid": None, "transfer_uuid": "no",
-              "part_index": -1, "content": "text"}),
-        pack({"type": "GetRenderResponseMessage", "payload": [], "render_uuid": 1}),
-        pack({"type": "ShareUrlRequest"}), pack({"type": "RunJavascriptMessage", "source": "x"}),
-        pack({"type": []}), pack({"type": "Message"}), pack({}), pack([]), pack(None), pack("type"),
-        b"", b"\xc1", b"\xff" * 100, b"\x91" * 100_000, b"\x82\xa4type\xdd\xff\xff\xff\xff",
-        camera()[:-9], secrets.token_bytes(1000),
-    ]  # fmt: skip
-
-
-async def send_all(app: App, messages: list[bytes]) -> None:
-    """Send messages as fast as they are taken, over a new connection where the last was closed."""
-    waiting = iter(messages)
-    for message in waiting:
-        socket = await dial(app)
-        with contextlib.suppress(websockets.ConnectionClosed):
-            await socket.send(message)
-            for later in waiting:
-                await socket.send(later)
-        socket.transport.abort()
+    with running_app(tmp_path) as running:
+        yield running
 
 
 @pytest.mark.proof
@@ -250,17 +65,6 @@ def test_ten_thousand_hostile_messages_leave_an_honest_tab_served(app: App) -> N
     assert len(app.log) < 12, "\n".join(app.log[:40])
 
 
-def upload(button: str, name: str, content: bytes) -> list[bytes]:
-    """Give the messages by which a page uploads a file."""
-    return [
-        pack({"type": "FileTransferStartUpload", "source_component_uuid": button,
-              "transfer_uuid": name, "filename": f"{name}.toml", "mime_type": "",
-              "part_count": 1, "size_bytes": len(content)}),
-        pack({"type": "FileTransferPart", "source_component_uuid": button, "transfer_uuid": name,
-              "part_index": 0, "content": content}),
-    ]  # fmt: skip
-
-
 def test_others_are_answered_while_the_worst_files_that_are_allowed_are_read(app: App) -> None:
     points = ",".join(f"[{index},{index % 7}]" for index in range(240_000))
     files = [
@@ -288,61 +92,6 @@ def test_others_are_answered_while_the_worst_files_that_are_allowed_are_read(app
     taken, growth = asyncio.run(run())
     assert max(taken) < 1.0, [round(seconds, 2) for seconds in taken]
     assert growth < 200.0
-
-
-async def steadily(socket: websockets.ClientConnection, messages: list[bytes]) -> None:
-    """Send messages no faster than a client may, so that the connection is kept."""
-    for begin in range(0, len(messages), 30):
-        for message in messages[begin : begin + 30]:
-            await socket.send(message)
-        await asyncio.sleep(0.12)
-
-
-async def say_nothing(app: App) -> None:
-    (await dial(app)).transport.abort()
-
-
-async def not_even_shake_hands(app: App) -> None:
-    _, writer = await asyncio.open_connection(*app.url[5:].split(":"))
-    writer.close()
-    await writer.wait_closed()
-
-
-async def leave_at_once(app: App) -> None:
-    socket = await dial(app)
-    await socket.send(pack(CAMERA))
-    socket.transport.abort()
-
-
-async def leave_in_the_middle(app: App) -> None:
-    socket = await dial(app)
-    await socket.send(pack(CAMERA))
-    with contextlib.suppress(TimeoutError):
-        async with asyncio.timeout(0.3):
-            while True:
-                await socket.recv()
-    socket.transport.abort()
-
-
-async def break_the_clean_up(app: App) -> None:
-    """Name the attributes that viser relies on when a connection ends, then leave."""
-    async with Tab(app) as tab:
-        for uuid, name in itertools.product(
-            list(tab.widgets.values())[:60], ("parent_container_id", "uuid", "gui_api")
-        ):
-            await tab.socket.send(update(uuid, {name: []}))
-
-
-WAYS: tuple[Callable[[App], Awaitable[None]], ...] = (
-    say_nothing, not_even_shake_hands, leave_at_once, leave_in_the_middle, break_the_clean_up,
-)  # fmt: skip
-
-
-async def come_and_go(app: App, times: int) -> None:
-    """Open connections, eight at once, and let them vanish in every way."""
-    ways = [way for way, _ in zip(itertools.cycle(WAYS), range(times), strict=False)]
-    for begin in range(0, times, 8):
-        await asyncio.gather(*(way(app) for way in ways[begin : begin + 8]))
 
 
 @pytest.mark.proof

@@ -1,6 +1,7 @@
 """The distribution of a sampled quantity, collected as a stream in bounded memory."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,6 +53,80 @@ class Probability:
     high: float
 
 
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Some blocks of samples, as little of them as a stream needs.
+
+    Attributes
+    ----------
+    count : int
+        How many samples.
+    sums, square_sums : tuple of float
+        Of each block in order; added up one by one, so that grouping blocks does not change a bit.
+    largest : float, µm
+    within : int
+        Samples not above the specification.
+    values : ndarray, [count], or None, µm
+        The samples themselves.
+    bins, counts : ndarray of int, [n], or None
+        Bins of the fine histogram that are not empty, ascending, and their counts.
+    """
+
+    count: int
+    sums: tuple[float, ...]
+    square_sums: tuple[float, ...]
+    largest: float
+    within: int
+    values: Array | None
+    bins: NDArray[np.uint32] | None
+    counts: NDArray[np.int64] | None
+
+
+def summarise(
+    blocks: Iterable[Array], spec_um: float | None = None, *, keep: bool, count: bool
+) -> Part:
+    """Summarise blocks of samples.
+
+    Parameters
+    ----------
+    blocks : iterable of ndarray, [n], µm
+        At least one.
+    spec_um : float, optional
+        A specification; samples not above it are counted.
+    keep : bool
+        Whether the samples are kept.
+    count : bool
+        Whether they are counted in the bins of the fine histogram.
+    """
+    sums: list[float] = []
+    squares: list[float] = []
+    kept: list[Array] = []
+    fine = np.zeros(_BINS + 2, dtype=np.int64) if count else None
+    number, within, largest = 0, 0, 0.0
+    for values in blocks:
+        sums.append(float(values.sum()))
+        squares.append(float(values @ values))
+        number += len(values)
+        largest = max(largest, float(values.max()))
+        within += 0 if spec_um is None else int(np.count_nonzero(values <= spec_um))
+        if fine is not None:
+            bins, counts = np.unique(_fine_bins(values), return_counts=True)
+            fine[bins] += counts
+        if keep:
+            kept.append(values)
+    filled = None if fine is None else np.flatnonzero(fine)
+    return Part(
+        number,
+        tuple(sums),
+        tuple(squares),
+        largest,
+        within,
+        np.concatenate(kept) if keep else None,
+        None if filled is None else filled.astype(np.uint32),
+        None if fine is None or filled is None else fine[filled],
+    )
+
+
 class Stream:
     """Collects samples that are not negative.
 
@@ -73,19 +148,21 @@ class Stream:
 
     def add(self, values: Array) -> None:
         """Take in samples, [n], µm."""
-        if self._values is not None:
-            self._values[self.count : self.count + len(values)] = values
-        if self._fine is not None:
-            with np.errstate(divide="ignore"):
-                position = np.log(values / LOWEST_UM) / math.log1p(RELATIVE_STEP)
-            index = np.clip(np.floor(position) + 1.0, 0, _BINS + 1).astype(np.int64)
-            self._fine += np.bincount(index, minlength=_BINS + 2)
-        self.count += len(values)
-        self._sum += float(values.sum())
-        self._sum_squares += float(values @ values)
-        self._largest = max(self._largest, float(values.max()))
-        if self.spec_um is not None:
-            self._within += int(np.count_nonzero(values <= self.spec_um))
+        exact = self.exact_quantiles
+        self.merge(summarise([values], self.spec_um, keep=exact, count=not exact))
+
+    def merge(self, part: Part) -> None:
+        """Take in blocks of samples that were summarised, in their order."""
+        if self._values is not None and part.values is not None:
+            self._values[self.count : self.count + part.count] = part.values
+        if self._fine is not None and part.bins is not None:
+            self._fine[part.bins] += part.counts
+        self.count += part.count
+        for block, squares in zip(part.sums, part.square_sums, strict=True):
+            self._sum += block
+            self._sum_squares += squares
+        self._largest = max(self._largest, part.largest)
+        self._within += part.within
 
     @property
     def mean_um(self) -> float:
@@ -173,6 +250,13 @@ def round_width(least: float) -> float:
         return 1.0
     decade = 10.0 ** math.floor(math.log10(least))
     return decade * next(step for step in (1.0, 2.0, 5.0, 10.0) if step * decade >= least)
+
+
+def _fine_bins(values: Array) -> NDArray[np.int64]:
+    """Find the bin of the fine histogram that each sample lies in."""
+    with np.errstate(divide="ignore"):
+        position = np.log(values / LOWEST_UM) / math.log1p(RELATIVE_STEP)
+    return np.clip(np.floor(position) + 1.0, 0, _BINS + 1).astype(np.int64)
 
 
 def _fine_centres() -> Array:

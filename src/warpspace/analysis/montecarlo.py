@@ -3,93 +3,58 @@
 Every parameter is drawn once per machine and holds everywhere: a component error is the value it
 has at the point looked at, as in the thesis, not a curve along its axis.
 
-Samples come in chunks of fixed size, each with a random stream of its own (`SeedSequence.spawn`),
-and are put together in order: the same seed gives the same numbers whatever the number of workers,
-and memory does not grow with the number of samples.
+Samples come in blocks, each with a random stream of its own, and are put together in order: the
+same seed gives the same numbers whatever runs them, threads, processes or a cluster, and memory
+does not grow with the number of samples.
 """
 
 import os
-from collections import deque
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Executor
 from dataclasses import dataclass
 
-import numpy as np
-
-from warpspace.analysis.distribution import Histogram, Probability, Stream
+from warpspace.analysis.cases import LEAST_BLOCKS, Case, Job, sample_blocks
+from warpspace.analysis.distribution import Histogram, Part, Probability, Stream
 from warpspace.analysis.draws import Draws
-from warpspace.analysis.nodes import Over, node_gains, reduce_nodes
-from warpspace.analysis.points import (
-    Cylinder,
-    Places,
-    choose_cylinder,
-    extreme_places,
-    random_places,
-    spread_places,
+from warpspace.analysis.engine import run_in_order, threads
+from warpspace.analysis.plan import (
+    BLOCK,
+    DEFAULT_NODES,
+    DEFAULT_SAMPLES,
+    MAX_SAMPLES,
+    MIN_SAMPLES,
+    Plan,
 )
-from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import View
 from warpspace.field.grid import Workspace
-from warpspace.kinematics.model import Loop, Model
-from warpspace.machine.limits import SAMPLES
+from warpspace.kinematics.model import Model
+from warpspace.machine.limits import LOCAL_WORKERS
 from warpspace.units import Array
 
-DEFAULT_SAMPLES = 100_000
-MIN_SAMPLES, MAX_SAMPLES = SAMPLES
-DEFAULT_NODES = 11
-CHUNK = 8192
-"""Machines per random stream; part of what a seed means, so not to be changed lightly."""
-MAX_WORKERS = 8
+__all__ = [
+    "BLOCK",
+    "DEFAULT_NODES",
+    "DEFAULT_SAMPLES",
+    "MAX_SAMPLES",
+    "MIN_SAMPLES",
+    "Case",
+    "Job",
+    "MonteCarlo",
+    "Plan",
+    "Progress",
+    "Take",
+    "montecarlo",
+    "montecarlo_each",
+    "sample_chunks",
+]
+
+MOST_THREADS = 8
+EXECUTOR_WORKERS = 32
+"""Tasks at a time that an executor is taken for, where nobody says how many workers it has."""
 
 Progress = Callable[[int], object]
-Job = Callable[[np.random.Generator, int], Array]
-
-
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """What is sampled and how.
-
-    Attributes
-    ----------
-    samples, seed : int
-    over : Over
-        |E| at one random point per machine, or its largest or mean over the points of a machine.
-    nodes : int
-        Nodes per axis for `max` and `mean`.
-    spec_um : float or None
-        Specification whose probability is asked for, µm.
-    cylinder : Cylinder or None
-        Largest workpiece; None takes it from the model's workpiece point.
-    workers : int or None
-        Threads; None for one per core, at most 8.
-    """
-
-    samples: int = DEFAULT_SAMPLES
-    seed: int = 0
-    over: Over | str = Over.SAMPLED
-    nodes: int = DEFAULT_NODES
-    spec_um: float | None = None
-    cylinder: Cylinder | None = None
-    workers: int | None = None
-
-    def check(self) -> None:
-        """Refuse what cannot be sampled.
-
-        Raises
-        ------
-        OptionError
-            Naming the value and what was expected.
-        """
-        if not MIN_SAMPLES <= self.samples <= MAX_SAMPLES:
-            raise OptionError(f"samples: {self.samples}; expected 1 to {MAX_SAMPLES:,}")
-        if self.seed < 0:
-            raise OptionError(f"seed: {self.seed}; expected a whole number, 0 or above")
-        if self.over not in [*Over]:
-            raise OptionError(f"over {self.over!r}; expected one of {', '.join(Over)}")
-        if self.spec_um is not None and not 0.0 <= self.spec_um < np.inf:
-            raise OptionError(f"specification: {self.spec_um:g} µm; expected 0 or above")
-        if self.workers is not None and self.workers < 1:
-            raise OptionError(f"workers: {self.workers}; expected 1 or more")
+Take = Callable[[int, Array], object]
+"""Called with the number of a case and |E| of its next machines, [n], µm."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,6 +97,9 @@ def montecarlo(
     view: View | None = None,
     plan: Plan | None = None,
     progress: Progress | None = None,
+    *,
+    executor: Executor | None = None,
+    take: Take | None = None,
 ) -> MonteCarlo:
     """Sample machines and collect the distribution of their volumetric error.
 
@@ -144,8 +112,8 @@ def montecarlo(
     view : View, optional
         Loop and reference; the tool loop by default.
     plan : Plan, optional
-    progress : callable, optional
-        Called with the number of machines done since the last call.
+    progress, executor, take : optional
+        See `montecarlo_each`.
 
     Returns
     -------
@@ -160,47 +128,147 @@ def montecarlo(
     -----
     First order in the errors. Thesis, section 4.3, has `sampled`.
     """
-    view, plan = view or View(), plan or Plan()
-    plan.check()
-    job = build_job(
-        model,
-        workspace,
-        view,
-        plan,
-        draws.draw,
-        lambda places: node_gains(model, draws.keys, view, places),
+    case = Case(model, draws, workspace, view or View(), plan or Plan())
+    (found,) = montecarlo_each(
+        [case], workers=case.plan.workers, executor=executor, progress=progress, take=take
     )
-    return collect(job, draws, view, plan, progress)
+    return found
 
 
-def collect(
-    job: Job, draws: Draws, view: View, plan: Plan, progress: Progress | None = None
-) -> MonteCarlo:
-    """Sample machines with a job and collect the distribution of their |E|.
+def montecarlo_each(
+    cases: Iterable[Case],
+    *,
+    workers: int | None = None,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+    take: Take | None = None,
+) -> Iterator[MonteCarlo]:
+    """Sample the machines of many cases: a fleet, or the points of a sweep.
+
+    Parameters
+    ----------
+    cases : iterable of Case
+        Taken as they are needed.
+    workers : int, optional
+        Threads, one per core and at most 8 by default; of an executor, its workers.
+    executor : concurrent.futures.Executor, optional
+        Does the work instead of threads: a pool of processes, or of a cluster. A case is cut into
+        tasks of 131,072 machines at least.
+    progress : callable, optional
+        Called with the number of machines done since the last call.
+    take : callable, optional
+        Called with the number of a case and |E| of its next machines, in order.
+
+    Yields
+    ------
+    MonteCarlo
+        Of each case, in order.
+
+    Raises
+    ------
+    OptionError
+        If a number of a plan is out of range.
+    WorkersLostError
+        If the executor gives up.
+    """
+    if executor is not None:
+        in_flight = 2 * (workers or EXECUTOR_WORKERS)
+        yield from _collect(_sent_tasks(cases, take), executor, in_flight, progress, take)
+        return
+    count = min(workers or min(os.cpu_count() or 1, MOST_THREADS), LOCAL_WORKERS[1])
+    with threads(count) as pool:
+        yield from _collect(_own_tasks(cases, take), pool, 2 * count, progress, take)
+
+
+def sample_chunks(job: Job, plan: Plan) -> Iterator[Array]:
+    """Run a job for every block on several threads and give the results in order.
 
     Parameters
     ----------
     job : callable
-        See `build_job`.
-    draws : Draws
-        What the result says was drawn.
-    view : View
+        Takes a random generator and a number of machines, gives their |E|, [n], µm.
     plan : Plan
-    progress : callable, optional
 
-    Returns
-    -------
-    MonteCarlo
+    Yields
+    ------
+    ndarray, [n], µm
+        At most a few blocks are held at a time.
     """
-    stream = Stream(plan.samples, plan.spec_um)
-    for values in sample_chunks(job, plan):
-        stream.add(values)
+
+    def block(index: int) -> Array:
+        return job(*plan.block(index))
+
+    workers = min(plan.workers or min(os.cpu_count() or 1, MOST_THREADS), plan.blocks)
+    with threads(workers) as pool:
+        tasks = ((index,) for index in range(plan.blocks))
+        for _, values in run_in_order(block, tasks, pool, 2 * workers):
+            yield values
+
+
+_Task = tuple[Case, int, int, bool, Job | None]
+"""A case, its first block and the one after the last, whether samples are kept, and the job."""
+
+
+def _own_tasks(cases: Iterable[Case], take: Take | None) -> Iterator[_Task]:
+    """Cut cases into single blocks; what they go through is built once a case."""
+    for case in cases:
+        case.check()
+        job = case.build_job()
+        for index in range(case.plan.blocks):
+            yield case, index, index + 1, take is not None, job
+
+
+def _sent_tasks(cases: Iterable[Case], take: Take | None) -> Iterator[_Task]:
+    """Cut cases into pieces that are worth sending."""
+    for case in cases:
+        case.check()
+        size, blocks = case.task_blocks, case.plan.blocks
+        for first in range(0, blocks, size):
+            yield case, first, min(first + size, blocks), take is not None, None
+
+
+def _run(case: Case, first: int, end: int, keep: bool, job: Job | None) -> Part | MonteCarlo:
+    """Do a task; a case that is one task is evaluated to its end, which is much less to send."""
+    part = sample_blocks(case, first, end, keep=keep, job=job)
+    if keep or job is not None or case.plan.blocks > LEAST_BLOCKS:
+        return part
+    stream = Stream(case.plan.samples, case.plan.spec_um)
+    stream.merge(part)
+    return _finish(case, stream)
+
+
+def _collect(
+    tasks: Iterable[_Task],
+    executor: Executor | None,
+    in_flight: int,
+    progress: Progress | None,
+    take: Take | None,
+) -> Iterator[MonteCarlo]:
+    """Put the results of tasks together, one case after the other."""
+    number, stream = 0, None
+    for (case, _, end, _, _), found in run_in_order(_run, tasks, executor, in_flight):
+        if isinstance(found, MonteCarlo):
+            done, result = case.plan.samples, found
+        else:
+            stream = Stream(case.plan.samples, case.plan.spec_um) if stream is None else stream
+            stream.merge(found)
+            done = found.count
+            result = _finish(case, stream) if end == case.plan.blocks else None
+            if take is not None and found.values is not None:
+                take(number, found.values)
         if progress is not None:
-            progress(len(values))
+            progress(done)
+        if result is not None:
+            yield result
+            number, stream = number + 1, None
+
+
+def _finish(case: Case, stream: Stream) -> MonteCarlo:
+    """Read the numbers of a case."""
     return MonteCarlo(
-        plan,
-        draws,
-        view,
+        case.plan,
+        case.draws,
+        case.view,
         stream.mean_um,
         stream.rms_um,
         stream.mode_um(),
@@ -212,89 +280,3 @@ def collect(
         stream.probability(),
         stream.exact_quantiles,
     )
-
-
-def sample_chunks(job: Job, plan: Plan) -> Iterator[Array]:
-    """Run a job for every chunk on several threads and give the results in order.
-
-    Parameters
-    ----------
-    job : callable
-        Takes a random generator and a number of machines, gives their |E|, [n], µm.
-    plan : Plan
-
-    Yields
-    ------
-    ndarray, [n], µm
-        At most a few chunks are held at a time.
-    """
-
-    def chunk(index: int) -> Array:
-        # The same stream as SeedSequence(seed).spawn(index + 1)[index], without the list.
-        stream = np.random.SeedSequence(plan.seed, spawn_key=(index,))
-        count = min(CHUNK, plan.samples - index * CHUNK)
-        return job(np.random.default_rng(stream), count)
-
-    chunks = range((plan.samples + CHUNK - 1) // CHUNK)
-    workers = min(plan.workers or min(os.cpu_count() or 1, MAX_WORKERS), len(chunks))
-    if workers == 1:
-        yield from map(chunk, chunks)
-        return
-    pending: deque[Future[Array]] = deque()
-    with ThreadPoolExecutor(workers) as executor:
-        try:
-            for index in chunks:
-                if len(pending) >= 2 * workers:
-                    yield pending.popleft().result()
-                pending.append(executor.submit(chunk, index))
-            while pending:
-                yield pending.popleft().result()
-        finally:
-            executor.shutdown(wait=False, cancel_futures=True)
-
-
-def build_job(
-    model: Model,
-    workspace: Workspace,
-    view: View,
-    plan: Plan,
-    draw: Job,
-    gains_at: Callable[[Places], Array],
-) -> Job:
-    """Build what a chunk of machines goes through.
-
-    Parameters
-    ----------
-    model : Model
-    workspace : Workspace
-    view : View
-    plan : Plan
-    draw : callable
-        Takes a random generator and a number n, gives values of machines, [n, K].
-    gains_at : callable
-        Gives what one unit of each value does at places, [3, K, N], µm.
-
-    Returns
-    -------
-    callable
-        Takes a random generator and a number n, gives |E| of machines, [n], µm.
-    """
-    cylinder = choose_cylinder(model, plan.cylinder) if view.loop is Loop.WORKPIECE else None
-    over = Over(plan.over)
-    if over is Over.SAMPLED:
-
-        def one_point_each(rng: np.random.Generator, count: int) -> Array:
-            values = draw(rng, count)
-            places = random_places(model, view.loop, workspace, cylinder, rng, count)
-            gains = gains_at(places)
-            return np.sqrt(sum((np.einsum("nk,kn->n", values, gain) ** 2) for gain in gains))
-
-        return one_point_each
-    find = extreme_places if over is Over.MAX else spread_places
-    places = find(model, view.loop, workspace, cylinder, plan.nodes)
-    gains = gains_at(places)
-
-    def all_points_each(rng: np.random.Generator, count: int) -> Array:
-        return reduce_nodes(draw(rng, count), gains, over, places.weights)
-
-    return all_points_each

@@ -6,12 +6,15 @@ position is so at the next one. At one point without a reference this makes no d
 """
 
 from collections.abc import Mapping
+from concurrent.futures import Executor
 from dataclasses import dataclass
+from dataclasses import field as dataclass_field
 
 import numpy as np
 
+from warpspace.analysis.cases import Case
 from warpspace.analysis.draws import SIGMAS, Distribution, Draws
-from warpspace.analysis.montecarlo import MonteCarlo, Plan, Progress, build_job, collect
+from warpspace.analysis.montecarlo import MonteCarlo, Plan, Progress, Take, montecarlo_each
 from warpspace.analysis.points import Places
 from warpspace.field.evaluate import View, amplitudes_of, build_basis, evaluate_first_order
 from warpspace.field.grid import Workspace
@@ -90,6 +93,44 @@ def field_uncertainty(
     return FieldUncertainty(np.sqrt(position), np.sqrt(norm), np.sqrt(tilt))
 
 
+@dataclass(frozen=True, slots=True)
+class UncertainCase(Case):
+    """A measured machine whose errors are off by their standard uncertainties.
+
+    Attributes
+    ----------
+    errors : ErrorSet
+        As measured.
+    uncertainty : ErrorSet
+        Standard uncertainty along the axis of each error.
+    """
+
+    errors: ErrorSet = dataclass_field(default_factory=ErrorSet)
+    uncertainty: ErrorSet = dataclass_field(default_factory=ErrorSet)
+
+    def machines(self, rng: np.random.Generator, count: int) -> Array:
+        """Draw by how many standard uncertainties each error is off, and one last, [count, K + 1].
+
+        The one is the factor of the errors as measured.
+        """
+        draws = self.draws
+        widths = {Distribution.NORMAL: SIGMAS, Distribution.UNIFORM: np.sqrt(3.0)}
+        size = np.full(len(draws.keys), widths[Distribution(draws.distribution)])
+        unit = Draws(draws.keys, np.zeros(len(draws.keys)), size, draws.distribution)
+        return np.column_stack([unit.draw(rng, count), np.ones(count)])
+
+    def responses(self, places: Places) -> Array:
+        """Responses to one standard uncertainty each, and the measured error last, [3, K + 1, N]."""
+        keys, model, view = self.draws.keys, self.model, self.view
+        at, point = places.coordinates, places.point_mm
+        basis = build_basis(model, self.uncertainty, keys, at, view, point)
+        factors = amplitudes_of(self.uncertainty, keys)[:, None, None]
+        parts = factors * basis.position.reshape(len(keys), -1, 3)
+        measured = evaluate_first_order(model, self.errors, at, view, point)
+        both = np.concatenate([parts, measured.error_um.reshape(1, -1, 3)])
+        return np.ascontiguousarray(np.moveaxis(both, -1, 0))
+
+
 def uncertain_montecarlo(
     model: Model,
     errors: ErrorSet,
@@ -99,6 +140,10 @@ def uncertain_montecarlo(
     plan: Plan | None = None,
     distribution: Distribution = Distribution.NORMAL,
     progress: Progress | None = None,
+    *,
+    workers: int | None = None,
+    executor: Executor | None = None,
+    take: Take | None = None,
 ) -> MonteCarlo:
     """Sample what the machine may be: its measured errors, each off by its uncertainty.
 
@@ -116,6 +161,8 @@ def uncertain_montecarlo(
         Normal, or uniform with the same standard uncertainty.
     progress : callable, optional
         Called with the number of machines done since the last call.
+    workers, executor, take : optional
+        See `warpspace.analysis.montecarlo.montecarlo_each`.
 
     Returns
     -------
@@ -124,25 +171,13 @@ def uncertain_montecarlo(
         or √3 of them where uniform, as half widths.
     """
     view, plan = view or View(), plan or Plan()
-    plan.check()
     own = ErrorSet(uncertainty)
     keys = tuple(own)
     widths = {Distribution.NORMAL: SIGMAS, Distribution.UNIFORM: np.sqrt(3.0)}
-    size = np.full(len(keys), widths[distribution])
-    unit = Draws(keys, np.zeros(len(keys)), size, distribution)
-
-    def responses(places: Places) -> Array:
-        """Responses to one standard uncertainty each, and the nominal error last, [3, K + 1, N]."""
-        basis = build_basis(model, own, keys, places.coordinates, view, places.point_mm)
-        parts = amplitudes_of(own, keys)[:, None, None] * basis.position.reshape(len(keys), -1, 3)
-        nominal = evaluate_first_order(model, errors, places.coordinates, view, places.point_mm)
-        both = np.concatenate([parts, nominal.error_um.reshape(1, -1, 3)])
-        return np.ascontiguousarray(np.moveaxis(both, -1, 0))
-
-    def machines(rng: np.random.Generator, count: int) -> Array:
-        return np.column_stack([unit.draw(rng, count), np.ones(count)])
-
-    job = build_job(model, workspace, view, plan, machines, responses)
-    centre = amplitudes_of(errors, keys)
-    drawn = Draws(keys, centre, size * np.abs(amplitudes_of(own, keys)), distribution)
-    return collect(job, drawn, view, plan, progress)
+    size = np.full(len(keys), widths[distribution]) * np.abs(amplitudes_of(own, keys))
+    drawn = Draws(keys, amplitudes_of(errors, keys), size, distribution)
+    case = UncertainCase(model, drawn, workspace, view, plan, errors, own)
+    (found,) = montecarlo_each(
+        [case], workers=workers or plan.workers, executor=executor, progress=progress, take=take
+    )
+    return found

@@ -90,6 +90,16 @@ def crease_edges(mesh: Any) -> Array:
     return np.asarray(mesh.vertices[mesh.face_adjacency_edges[sharp]], dtype=float)
 
 
+def _check_geometry(scene: Any) -> None:
+    """Refuse what trimesh takes as it comes: points in a plane, vertices that are not there."""
+    for mesh in scene.geometry.values():
+        if np.shape(getattr(mesh, "vertices", ()))[1:] != (3,):
+            raise ValueError("it has points without three coordinates")
+        faces = np.asarray(getattr(mesh, "faces", ()))
+        if faces.size and not (int(faces.min()) >= 0 and int(faces.max()) < len(mesh.vertices)):
+            raise ValueError("a triangle names a vertex that is not there")
+
+
 def open_meshes(path: Path, what: str) -> Any:
     """Open a file of meshes with trimesh; nothing in it is changed or merged.
 
@@ -127,9 +137,11 @@ def open_meshes(path: Path, what: str) -> Any:
 
     try:
         with np.errstate(all="ignore"):
-            return trimesh.load_scene(
+            found = trimesh.load_scene(
                 io.BytesIO(data), file_type=path.suffix[1:].lower(), process=False
             )
+            _check_geometry(found)
+            return found
     except Exception as error:  # noqa: BLE001  # trimesh raises whatever a damaged file leads to
         reason = str(error) or type(error).__name__
         raise OptionError(f"{path}: no {what} that can be read ({reason})") from None

@@ -92,10 +92,16 @@ MIN_FIGURE_PX = (400, 300)
 MAX_FIGURE_SIDE_PX = 12_000
 MAX_FIGURE_AREA_PX = 64_000_000
 ANIMATION_FRAMES = (2, 600)
-SAMPLES = (1, 1_000_000_000)
+SAMPLES = (1, 1_000_000_000_000)
 """Machines of a Monte Carlo run."""
 MOST_CONCEPTS = 8
 """Machines that are set side by side."""
+WORKERS = (1, 100_000)
+"""Tasks of a Monte Carlo run that are worked on at a time."""
+LOCAL_WORKERS = (1, 512)
+"""Processes or threads of this machine."""
+SWEEP_CASES = 1_000_000
+"""Combinations of scenes and half widths in one sweep."""
 REPAIR_COUNT = (1, 12)
 """Adjustments in one set of a repair."""
 REPAIR_NODES = (2, 41)

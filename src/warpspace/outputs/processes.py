@@ -1,4 +1,4 @@
-"""Pools of processes that draw; no such process outlives the one that started it."""
+"""Pools of processes that draw or compute; no such process outlives the one that started it."""
 
 import os
 import signal
@@ -37,7 +37,7 @@ def start_pool(processes: int, *, tasks_per_process: int | None = None) -> Proce
         If this process has been told to end.
     """
     if _ending.is_set():
-        raise RenderError("nothing more is drawn: the program ends")
+        raise RenderError("nothing more is begun: the program ends")
     pool = ProcessPoolExecutor(
         processes,
         get_context("spawn"),
@@ -67,6 +67,12 @@ def end_pool(pool: ProcessPoolExecutor, *, wait: bool = True) -> None:
         _kill(pool)
     # also after a kill, which takes no time: the interpreter must not end in the midst of it
     pool.shutdown(wait=True, cancel_futures=True)
+
+
+def forget_pool(pool: ProcessPoolExecutor) -> None:
+    """Leave a broken pool to its own thread, which ends its processes; to be called from it."""
+    _pools.discard(pool)
+    pool.shutdown(wait=False)
 
 
 def kill_pools() -> None:

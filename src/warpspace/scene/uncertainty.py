@@ -1,6 +1,7 @@
 """What the standard uncertainties of a scene's errors do to its field, and to its |E|."""
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from warpspace.analysis import uncertain
 from warpspace.analysis.draws import Distribution, loop_keys
-from warpspace.analysis.montecarlo import MonteCarlo, Plan, Progress
+from warpspace.analysis.montecarlo import MonteCarlo, Plan, Progress, Take
 from warpspace.analysis.uncertain import FieldUncertainty
 from warpspace.exceptions import SceneError
 from warpspace.field.grid import DEFAULT_NODES, build_grid
@@ -75,6 +76,9 @@ def uncertain_montecarlo(
     loop: Loop | str = Loop.TOOL,
     distribution: Distribution | str = Distribution.NORMAL,
     progress: Progress | None = None,
+    workers: int | None = None,
+    executor: Executor | None = None,
+    take: Take | None = None,
 ) -> MonteCarlo:
     """Sample what a measured machine may be: its errors, each off by its standard uncertainty.
 
@@ -87,6 +91,8 @@ def uncertain_montecarlo(
         "normal", or "uniform" with the same standard uncertainty.
     progress : callable, optional
         Called with the number of machines done since the last call.
+    workers, executor, take : optional
+        See `warpspace.analysis.montecarlo.montecarlo_each`.
 
     Returns
     -------
@@ -109,6 +115,9 @@ def uncertain_montecarlo(
         plan,
         Distribution(distribution),
         progress,
+        workers=workers,
+        executor=executor,
+        take=take,
     )
 
 

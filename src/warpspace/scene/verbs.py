@@ -1,6 +1,7 @@
 """What can be asked of a scene beside its field: the analyses, joined with what a scene holds."""
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 
 from warpspace.analysis import allocation as allocating
 from warpspace.analysis import contributions as shares
@@ -91,6 +92,8 @@ def montecarlo(
     cylinder: Cylinder | None = None,
     workers: int | None = None,
     progress: sampling.Progress | None = None,
+    executor: Executor | None = None,
+    take: sampling.Take | None = None,
 ) -> sampling.MonteCarlo:
     """Sample machines from the tolerances of a scene.
 
@@ -113,9 +116,13 @@ def montecarlo(
         Largest workpiece, for the workpiece loop; by default the one whose top rim the scene's
         workpiece point lies on.
     workers : int, optional
-        Threads; the result does not depend on it.
+        Threads, or workers of the executor; the result does not depend on it.
     progress : callable, optional
         Called with the number of machines done since the last call.
+    executor : concurrent.futures.Executor, optional
+        Does the work instead of threads: a pool of processes, or a cluster's.
+    take : callable, optional
+        Called with 0 and |E| of the next machines, in order.
 
     Returns
     -------
@@ -132,7 +139,9 @@ def montecarlo(
     plan = sampling.Plan(samples, seed, over, grid, spec_um, cylinder, workers)
     plan.check()
     draws = scene_draws(scene, view.loop, distribution, clip=clip)
-    return sampling.montecarlo(scene.model, draws, scene.workspace, view, plan, progress)
+    return sampling.montecarlo(
+        scene.model, draws, scene.workspace, view, plan, progress, executor=executor, take=take
+    )
 
 
 def allocate(

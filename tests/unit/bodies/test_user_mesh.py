@@ -1,6 +1,7 @@
 """Meshes made by trimesh, written in all four formats, and read as bodies."""
 
 import os
+import re
 import struct
 
 import numpy as np
@@ -178,3 +179,20 @@ def test_obj_does_not_open_the_files_it_names(tmp_path):
     path.write_text("mtllib secret.mtl\n" + path.read_text())
     (tmp_path / "secret.mtl").mkdir()
     assert len(load_mesh(path, "R").body.triangles) == 12
+
+
+def test_a_triangle_of_a_vertex_that_is_not_there(tmp_path):
+    content = trimesh.creation.box((20.0, 30.0, 40.0)).export(file_type="ply", encoding="ascii")
+    head, faces = content.split(b"end_header\n")
+    path = tmp_path / "box.ply"
+    path.write_bytes(head + b"end_header\n" + re.sub(rb"(?m)^3 7 ", b"3 70 ", faces))
+    assert b"\n3 70 " in path.read_bytes()
+    with pytest.raises(OptionError, match=r"box\.ply: no PLY file .* vertex that is not there"):
+        load_mesh(path, "X")
+
+
+def test_points_with_one_coordinate(tmp_path):
+    path = tmp_path / "point.obj"
+    path.write_text("v -10.0\n", "utf-8")
+    with pytest.raises(OptionError, match="without three coordinates"):
+        load_mesh(path, "X")

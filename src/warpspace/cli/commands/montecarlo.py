@@ -1,12 +1,27 @@
 """Command `montecarlo`: the volumetric error of machines drawn from a scene's tolerances."""
 
 import math
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import click
 from click.core import ParameterSource
 
-from warpspace.cli.file_options import check_targets, force_option, plot_option
+from warpspace.cli.file_options import (
+    check_targets,
+    force_option,
+    output_option,
+    plot_option,
+)
+from warpspace.cli.fleets import (
+    PRINTED,
+    cells,
+    columns,
+    find_scenes,
+    load_each,
+    row,
+)
+from warpspace.cli.machine_table import check_machine_table, machine_table
 from warpspace.cli.options import (
     grid_option,
     json_option,
@@ -14,6 +29,7 @@ from warpspace.cli.options import (
     print_json,
     scene_argument,
 )
+from warpspace.cli.pools import find_workers, scheduler_option, workers_option
 from warpspace.cli.progress import progress
 from warpspace.cli.sampling_options import (
     clip_option,
@@ -24,19 +40,21 @@ from warpspace.cli.sampling_options import (
     seed_option,
     specification_option,
 )
-from warpspace.cli.tables import print_text
+from warpspace.cli.tables import print_table, print_text
 from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
-    from warpspace.analysis.montecarlo import MonteCarlo
+    from warpspace.analysis.montecarlo import MonteCarlo, Plan, Progress, Take
+    from warpspace.cli.pools import Workers
     from warpspace.scene.model import Scene
+    from warpspace.scene.sweeps import SweepPoint
 
 SOURCES = ("tolerances", "uncertainty")
 OVER = ("sampled", "max", "mean")
 
 
 @click.command()
-@scene_argument()
+@scene_argument("scenes", metavar="SCENE…", nargs=-1, required=True)
 @samples_option
 @seed_option
 @grid_option(11, "for --over max|mean")
@@ -61,14 +79,14 @@ OVER = ("sampled", "max", "mean")
     help="Machines within the tolerances; or what the measured machine may be: the errors of SCENE,"
     " each off by its standard uncertainty.",
 )
-@click.option(
-    "--workers", type=int, help="Threads; the result does not depend on it.  [one per core]"
-)
+@workers_option
+@scheduler_option
 @plot_option("histogram")
+@output_option("|E| of every machine as a table: .parquet or .csv.", required=False)
 @force_option
 @json_option
 def montecarlo(
-    scene: str,
+    scenes: Sequence[str],
     samples: int,
     seed: int,
     grid: int,
@@ -79,7 +97,9 @@ def montecarlo(
     cylinder: str | None,
     source: str,
     workers: int | None,
+    scheduler: str | None,
     plot: str | None,
+    output: str | None,
     *,
     force: bool,
     clip: bool,
@@ -87,7 +107,8 @@ def montecarlo(
 ) -> None:
     """Show how large |E| gets on machines within tolerance.
 
-    Machines are sampled from the tolerances of SCENE; |E| is the length of the error in µm.
+    Machines are sampled from the tolerances of each SCENE (a folder stands for the scenes in it;
+    several are printed as a table); |E| is the length of the error in µm.
     Each parameter is drawn once per machine and holds everywhere; a component error is the value it
     has at the point looked at. Tool and relative loop: points uniform in the working volume, rotary
     axes at their place in the scene. Workpiece loop: points uniform in the volume of the largest
@@ -99,47 +120,117 @@ def montecarlo(
 
     Quantiles are exact up to a million samples; beyond, from a histogram with steps of 0.002 %.
     """
-    from warpspace.analysis.montecarlo import Plan
-    from warpspace.scene import verbs
-    from warpspace.scene.library import load_scene
-    from warpspace.scene.uncertainty import uncertain_montecarlo
+    from warpspace.analysis.plan import Plan
 
-    check_targets(scene, force=force, plot=plot)
+    names = find_scenes(scenes)
+    check_targets(*names, force=force, plot=plot)
     if source == "uncertainty" and clip:
         raise OptionError("--clip is for tolerances: an uncertainty has no limits; leave it out")
-    loaded = load_scene(scene)
-    size = parse_cylinder(cylinder)
-    with progress("sampling", max(samples, 0), "machines", silent=as_json) as bar:
+    if plot is not None and len(names) > 1:
+        raise OptionError("--plot draws one machine; expected one scene")
+    plan = Plan(samples, seed, over, grid, spec_um, parse_cylinder(cylinder), None)
+    plan.check()
+    check_machine_table(output, names, samples, force=force)
+    total = samples * len(names)
+    loaded = load_each(names)
+    with (
+        find_workers(scheduler, workers, total) as found,
+        progress("sampling", total, "machines", silent=as_json) as bar,
+        machine_table(output, names, force=force) as take,
+    ):
         if source == "uncertainty":
-            plan = Plan(samples, seed, over, grid, spec_um, size, workers)
-            result = uncertain_montecarlo(
-                loaded,
-                plan,
-                loop=loop,
-                distribution=_chosen(distribution) or "normal",
-                progress=bar.advance,
-            )
+            chosen = _chosen(distribution) or "normal"
+            points = [
+                _uncertain(scene, index, plan, loop, chosen, found, bar.advance, take)
+                for index, scene in enumerate(loaded)
+            ]
         else:
-            result = verbs.montecarlo(
-                loaded,
-                samples=samples,
-                seed=seed,
-                distribution=distribution,
-                clip=clip,
-                loop=loop,
-                over=over,
-                grid=grid,
-                spec_um=spec_um,
-                cylinder=size,
-                workers=workers,
-                progress=bar.advance,
-            )
+            points = _sampled(loaded, plan, loop, distribution, clip, found, bar.advance, take)
+    first = points[0]
     if plot is not None:
-        _plot(plot, loaded, result, source, force=force)
-    if as_json:
-        print_json({**result_json(result), "from": source})
-        return
-    _print(loaded, result, source)
+        _plot(plot, first.scene, first.sampled, source, force=force)
+    if as_json and len(points) == 1:
+        print_json({**result_json(first.sampled), "from": source})
+    elif as_json:
+        print_json({"scenes": [_named_json(point) for point in points], "from": source})
+    elif len(points) == 1:
+        _print(first.scene, first.sampled, source)
+    else:
+        _print_fleet(points, spec_um, source)
+    if output is not None and not as_json:
+        print_text(f"wrote {output}")
+
+
+def _sampled(
+    scenes: "Iterable[Scene]",
+    plan: "Plan",
+    loop: str,
+    distribution: str,
+    clip: bool,
+    found: "Workers",
+    advance: "Progress",
+    take: "Take | None",
+) -> "list[SweepPoint]":
+    """Sample machines within the tolerances of each scene."""
+    from warpspace.scene.sweeps import sweep
+
+    return list(
+        sweep(
+            scenes,
+            plan=plan,
+            distribution=distribution,
+            clip=clip,
+            loop=loop,
+            executor=found.executor,
+            workers=found.number,
+            progress=advance,
+            take=take,
+        )
+    )
+
+
+def _uncertain(
+    scene: "Scene",
+    index: int,
+    plan: "Plan",
+    loop: str,
+    distribution: str,
+    found: "Workers",
+    advance: "Progress",
+    take: "Take | None",
+) -> "SweepPoint":
+    """Sample what the measured machine of a scene may be."""
+    from warpspace.scene.sweeps import SweepPoint
+    from warpspace.scene.uncertainty import uncertain_montecarlo
+
+    sampled = uncertain_montecarlo(
+        scene,
+        plan,
+        loop=loop,
+        distribution=distribution,
+        progress=advance,
+        workers=found.number,
+        executor=found.executor,
+        take=None if take is None else lambda _, values: take(index, values),
+    )
+    return SweepPoint(scene, {}, sampled)
+
+
+def _named_json(point: "SweepPoint") -> dict[str, object]:
+    """Spell the result of one scene among others."""
+    return {
+        "scene": point.scene.name,
+        "title": point.scene.title,
+        **result_json(point.sampled),
+    }
+
+
+def _print_fleet(points: "Sequence[SweepPoint]", spec_um: float | None, source: str) -> None:
+    """Print a line for each scene."""
+    print_text(describe(points[0].sampled, source))
+    print_table(columns((), spec_um), [cells(row(point), ()) for point in points[:PRINTED]])
+    if len(points) > PRINTED:
+        print_text(f"… and {len(points) - PRINTED:,} scenes more; --json prints all")
 
 
 def result_json(result: "MonteCarlo") -> dict[str, object]:

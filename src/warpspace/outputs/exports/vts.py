@@ -10,6 +10,7 @@ import numpy as np
 from warpspace.exceptions import SceneError, WarpspaceError
 from warpspace.field.basis import ErrorField
 from warpspace.field.grid import MIN_NODES
+from warpspace.outputs.exports.vts_header import check_header
 from warpspace.outputs.files import write_atomically
 from warpspace.picture.scene_picture import ScenePicture, evaluate_picture
 from warpspace.scene.library import parse_scene
@@ -165,10 +166,11 @@ def _read_arrays(path: Path) -> tuple[dict[str, Array], tuple[int, int, int]]:
             raise SceneError(source, [f"is larger than {MAX_VTS_BYTES:,} bytes"])
         with path.open("rb") as file:
             head = file.read(4096)
+        if b"StructuredGrid" not in head:
+            raise SceneError(source, ["is no VTK structured grid (.vts)"])
+        check_header(path, source, MAX_VTS_BYTES)
     except OSError as error:
         raise SceneError(source, [f"cannot be read: {error.strerror or error}"]) from None
-    if b"StructuredGrid" not in head:
-        raise SceneError(source, ["is no VTK structured grid (.vts)"])
     import pyvista as pv
     from vtkmodules.vtkCommonCore import vtkObject
     from vtkmodules.vtkIOXML import vtkXMLStructuredGridReader

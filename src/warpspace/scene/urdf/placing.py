@@ -1,5 +1,6 @@
 """From the joints of a robot to the axes of a machine: names, offsets, rotations, travels."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -20,6 +21,9 @@ from warpspace.machine.limits import MIN_SPAN
 from warpspace.scene.urdf.frames import PARALLEL, axis_frame, relative_places
 from warpspace.scene.urdf.reading import MOVING, path_to, root_of
 from warpspace.units import Array
+
+LARGEST = 1e9
+"""Metres, or the length of a direction: beyond, products overflow."""
 
 MM_PER_M = 1000.0
 TOOL_NAMES = ("tool", "tcp", "tool0", "tool_tip", "t", "ee_link", "flange")
@@ -177,7 +181,7 @@ def _check_joints(joints: Sequence[Any], source: str) -> None:
             )
         elif joint.type in MOVING and not _finite_direction(joint):
             problems.append(f"joint {joint.name!r}: its axis is no direction")
-        if joint.origin is not None and not np.isfinite(joint.origin).all():
+        if joint.origin is not None and not (np.abs(joint.origin) < LARGEST).all():
             problems.append(f"joint {joint.name!r}: its origin is no finite number")
     if problems:
         raise SceneError(source, problems)
@@ -188,7 +192,7 @@ def _finite_direction(joint: Any) -> bool:
     axis = np.asarray(joint.axis, dtype=float)
     if axis.shape != (3,) or not np.isfinite(axis).all():
         return False
-    return bool(np.linalg.norm(axis) > PARALLEL)
+    return PARALLEL < math.hypot(*axis) < LARGEST
 
 
 def _stands(joint: Any) -> bool:

@@ -1,0 +1,201 @@
+"""The files the program reads: for each format some good ones to begin with, and how it is read.
+
+A new import format is one entry in `FORMATS`. `read` gets the bytes of a file and a folder that it
+may use; what it raises on purpose is a `WarpspaceError`.
+"""
+
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from warpspace.app.documents.links import unpack
+from warpspace.app.documents.received_files import upload_text
+from warpspace.resources import scenes_dir
+from warpspace.scene.library import load_scene, parse_scene, scene_names
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format of files.
+
+    Attributes
+    ----------
+    name : str
+    seeds : callable
+        Gives good files, as bytes.
+    read : callable
+        Reads the bytes of a file, in a folder that it may use.
+    share : float
+        How much of the count it gets, by that of others.
+    text : bool
+        Whether words of the format are put into it, beside changed bytes.
+    """
+
+    name: str
+    seeds: Callable[[], list[bytes]]
+    read: Callable[[bytes, Path], object]
+    share: float = 1.0
+    text: bool = True
+
+
+FORMATS: list[Format] = []
+
+
+def add(file_format: Format) -> None:
+    """Add a format."""
+    FORMATS.append(file_format)
+
+
+CSV_SCENE = """
+machine = "dvf5000"
+[errors]
+EXX = { csv = "x.csv", column = "error" }
+"""
+MESH_SCENE = """
+machine = "dvf5000"
+[bodies]
+X = "x%s"
+"""
+WORDS = [
+    *(b"nan", b"inf", b"-inf", b"1e308", b"5e-324", b"-0.0", b"1e5", b"true", b"false", b'""'),
+    *(b"[", b"]", b"{", b"}", b"[[", b"]]", b"=", b".", b",", b"\n", b"\r\n", b"#", b'"', b"'"),
+    *(b'"""', b"'''", b"\\u0000", b"\xff\xfe", b"\xef\xbb\xbf", b"\x00", b"\xf0\x9f\x98\x80"),
+    *(b"machine", b"chain", b"wCBFXYZt", b"errors", b"EXX", b"EC0Y", b"ramp", b"poly", b"table"),
+    *(b"harmonics", b"csv", b"column", b"tolerances", b"default", b"view", b"workspace", b"bodies"),
+    *(
+        b"../" * 8,
+        b"/dev/zero",
+        b"/proc/self/mem",
+        b"[" * 500,
+        b"a." * 500,
+        b"9" * 400,
+        b"0x",
+        b"_",
+    ),
+    *(b"<joint", b"</robot>", b"<!ENTITY x 'y'>", b"&x;", b"xyz=", b"rpy=", b"<mesh filename="),
+]
+"""What mutations put into texts: words of the formats, and what readers stumble over."""
+
+
+def _scenes() -> list[bytes]:
+    return [(scenes_dir() / f"{name}.toml").read_bytes() for name in scene_names()]
+
+
+def _read_scene(content: bytes, folder: Path) -> object:
+    del folder
+    return parse_scene(upload_text(content, "fuzz.toml"), "fuzz")
+
+
+def _read_scene_file(content: bytes, folder: Path) -> object:
+    (folder / "s.toml").write_bytes(content)
+    return load_scene(folder / "s.toml")
+
+
+def _read_link(content: bytes, folder: Path) -> object:
+    del folder
+    return unpack(content.decode("latin-1"))
+
+
+def _csvs() -> list[bytes]:
+    rows = "\n".join(f"{x},{x / 100}" for x in range(-275, 276, 25))
+    return [
+        f"X,error\n{rows}\n".encode(),
+        f"X;error\r\n{rows.replace(',', ';').replace('.', ',')}\r\n".encode(),
+        b"# remark\nX\terror\n-275\t0\n275\t4.1\n",
+    ]
+
+
+def _read_csv(content: bytes, folder: Path) -> object:
+    (folder / "x.csv").write_bytes(content)
+    (folder / "s.toml").write_text(CSV_SCENE, "utf-8")
+    return load_scene(folder / "s.toml")
+
+
+def _mesh_seeds(ending: str) -> Callable[[], list[bytes]]:
+    def seeds() -> list[bytes]:
+        import trimesh
+
+        shape = trimesh.creation.box((20.0, 30.0, 40.0))
+        found = shape.export(file_type=ending)
+        seeds = [found if isinstance(found, bytes) else found.encode()]
+        if ending == "stl":
+            ascii_ = shape.export(file_type="stl_ascii")
+            seeds.append(ascii_ if isinstance(ascii_, bytes) else ascii_.encode())
+            seeds.append(b"\0" * 80 + struct.pack("<I", 2**31) + b"\0" * 50)
+        if ending == "ply":
+            seeds.append(shape.export(file_type="ply", encoding="ascii"))
+        return seeds
+
+    return seeds
+
+
+def _read_mesh(ending: str) -> Callable[[bytes, Path], object]:
+    def read(content: bytes, folder: Path) -> object:
+        from warpspace.bodies.user_mesh import load_mesh
+
+        path = folder / f"x.{ending}"
+        path.write_bytes(content)
+        return load_mesh(path, "X")
+
+    return read
+
+
+def _vts() -> list[bytes]:
+    import tempfile
+
+    from warpspace.outputs.exports.formats import write_export
+    from warpspace.picture.scene_picture import evaluate_picture
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "x.vts"
+        write_export(evaluate_picture(load_scene("dvf5000_first"), grid=3), path)
+        return [path.read_bytes()]
+
+
+def _read_vts(content: bytes, folder: Path) -> object:
+    from warpspace.outputs.exports import load_stored_field
+
+    (folder / "x.vts").write_bytes(content)
+    return load_stored_field(folder / "x.vts")
+
+
+URDF = """<?xml version="1.0"?>
+<robot name="r">
+  <link name="base"/><link name="tool"><visual><geometry><box size="0.1 0.1 0.2"/></geometry>
+  </visual></link><link name="slide"/>
+  <joint name="x" type="prismatic"><parent link="base"/><child link="slide"/>
+    <origin xyz="0 0 0.1" rpy="0 0 0"/><axis xyz="1 0 0"/>
+    <limit lower="-0.2" upper="0.3" effort="1" velocity="1"/></joint>
+  <joint name="b" type="revolute"><parent link="slide"/><child link="tool"/>
+    <axis xyz="0 1 0"/><limit lower="-1" upper="1.5" effort="1" velocity="1"/></joint>
+</robot>
+"""
+
+
+def _read_urdf(content: bytes, folder: Path) -> object:
+    from warpspace.bodies.urdf_meshes import frame_meshes
+    from warpspace.scene.urdf.left_out import left_out
+    from warpspace.scene.urdf.placing import place_robot
+    from warpspace.scene.urdf.reading import read_robot
+    from warpspace.scene.urdf.text import imported_text
+
+    path = folder / "r.urdf"
+    path.write_bytes(content)
+    loaded, others = read_robot(path)
+    found = place_robot(loaded, str(path), "", "")
+    _, unread, _ = frame_meshes(loaded, found.frame_of, folder)
+    notes = [*found.notes, *unread, *left_out(loaded, others, found.frame_of)]
+    return parse_scene(imported_text(found.machine, path.name, notes, {}), "fuzz")
+
+
+add(Format("scene", _scenes, _read_scene, 6.0))
+add(Format("scene file", _scenes, _read_scene_file, 2.0))
+add(Format("csv", _csvs, _read_csv, 2.0))
+add(Format("stl", _mesh_seeds("stl"), _read_mesh("stl"), text=False))
+add(Format("obj", _mesh_seeds("obj"), _read_mesh("obj")))
+add(Format("ply", _mesh_seeds("ply"), _read_mesh("ply"), text=False))
+add(Format("glb", _mesh_seeds("glb"), _read_mesh("glb"), text=False))
+add(Format("vts", _vts, _read_vts))
+add(Format("urdf", lambda: [URDF.encode()], _read_urdf))
+add(Format("link", lambda: [b"ZXJyb3JzPUVBWDo1", b"Y29sb3VyPXg"], _read_link, 0.5))
