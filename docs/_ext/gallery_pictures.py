@@ -16,10 +16,25 @@ EXTRA = HERE / "_build" / "extra"
 WRITTEN = HERE / "_build" / "examples"
 
 ORDER = (
-    "error_map error_map_component slices orientation_map comparison machine traces rotary"
-    " error_curves gains montecarlo repair ballbar concepts animation own_plotter exports"
-    " design_review"
-).split()
+    "error_map",
+    "error_map_component",
+    "slices",
+    "orientation_map",
+    "comparison",
+    "machine",
+    "traces",
+    "rotary",
+    "error_curves",
+    "gains",
+    "montecarlo",
+    "repair",
+    "ballbar",
+    "concepts",
+    "animation",
+    "own_plotter",
+    "exports",
+    "design_review",
+)
 """What comes first in the gallery; other examples follow in the order of their names."""
 FRAME_PX = 560
 
@@ -80,7 +95,7 @@ def target_argument(_: dict[str, Any], script_vars: dict[str, Any]) -> list[str]
 
 
 def add_pictures(
-    block: Any, block_vars: dict[str, Any], gallery_conf: dict[str, Any], **_: Any
+    _: Any, block_vars: dict[str, Any], gallery_conf: dict[str, Any], **__: Any
 ) -> str:
     """Show what an example has written, and its scene.
 
@@ -113,7 +128,7 @@ def add_pictures(
 def _write_scene(script: Path, names: dict[str, Any]) -> str | None:
     """Write the first scene of an example as an offline page, once per scene."""
     from warpspace import load_scene
-    from warpspace.outputs.exports.formats import write_export
+    from warpspace.cli.exports import write_export
     from warpspace.picture.scene_picture import evaluate_picture
 
     loaded = re.findall(r'load_scene\("(\w+)"\)|\("(dvf5000_\w+)"', script.read_text("utf-8"))
