@@ -29,7 +29,6 @@ extensions = [
     "numpydoc",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
-    "sphinx.ext.viewcode",
     "sphinx_click",
     "sphinx_design",
     "sphinx_gallery.gen_gallery",
@@ -40,6 +39,7 @@ exclude_patterns = ["_build", "_ext", "_templates", "gallery/*.py", "gallery/*.i
 templates_path = ["_templates"]
 nitpicky = False  # types in docstrings are words for readers, "ndarray, [..., 3], mm"
 
+smartquotes = False  # "--at" is an option, no dash
 myst_heading_anchors = 4
 myst_enable_extensions = ["colon_fence"]
 

@@ -53,7 +53,8 @@ def entries(page: Path) -> Iterator[str]:
     for block in blocks(page.read_text("utf-8"), "{toctree}"):
         for line in block.splitlines():
             if line and not line.startswith(":"):
-                yield line
+                titled = re.fullmatch(r".+ <(.+)>", line)
+                yield titled.group(1) if titled else line
 
 
 def section(page: Path, heading: str) -> str | None:

@@ -25,10 +25,6 @@ PAGES = {
 ALIASES = (GenericAlias, UnionType)
 OPTIONS = """
 
-## Options
-
-Read from the program itself; `warpspace {name} -h` prints the same.
-
 ```{{eval-rst}}
 .. click:: {module}:{attribute}
    :prog: warpspace {name}
@@ -100,12 +96,21 @@ def plain_bars(lines: list[str]) -> None:
             lines[i] = re.sub(r"(?<!\\)\|", r"\|", line)
 
 
+def _short_titles() -> str:
+    """Name every command in a table of contents by its name alone."""
+    from warpspace.cli.registry import COMMANDS
+
+    return "\n".join(f"{name} <{name}>" for name in sorted(COMMANDS))
+
+
 def _source_read(app: "Sphinx", name: str, source: list[str]) -> None:
     """Add to a page what only the site has."""
     source[0] = inward(source[0], name.count("/"))
     source[0] = without_coming_pages(source[0], Path(app.srcdir, name).parent)
     folder, _, page = name.rpartition("/")
-    if folder == "commands" and page != "index":
+    if folder == "commands" and page == "index":
+        source[0] = re.sub(r"^\*$", _short_titles(), source[0], flags=re.MULTILINE)
+    elif folder == "commands":
         source[0] += options_of(page)
 
 
