@@ -82,7 +82,17 @@ def main() -> None:
     check_commands(sys.argv[1])
     check_python()
     check_app()
-    names = ("numpy", "scipy", "pydantic", "pyvista", "vtk", "matplotlib", "viser", "trimesh", "click")
+    names = (
+        "numpy",
+        "scipy",
+        "pydantic",
+        "pyvista",
+        "vtk",
+        "matplotlib",
+        "viser",
+        "trimesh",
+        "click",
+    )
     versions = ", ".join(f"{name} {metadata.version(name)}" for name in names)
     print(f"Python {sys.version.split()[0]}: works with {versions}")
 

@@ -1,10 +1,10 @@
-"""Check the links of the built site: those inside it on disk, those to the outside over the network.
+"""Check the links of the built site: those inside it on disk, those outside over the network.
 
     python docs/_ext/check_links.py docs/_build/html [docs/_build/linkcheck/output.json]
 
 Inside, every page, picture and anchor that is linked must exist; one that is missing ends with
-status 1. Outside, what Sphinx's linkcheck has found is summed up: a page that answers "not found" ends
-with status 1 too, one that could not be asked (no network, no answer) is listed and does not.
+status 1. Outside, what Sphinx's linkcheck has found is summed up: a page that answers "not found"
+ends with status 1 too, one that could not be asked (no network, no answer) is listed and does not.
 """
 
 import json
@@ -66,8 +66,10 @@ def broken_inside(site: Path) -> list[str]:
             )
             if lost:
                 broken.append(f"{path.relative_to(site.resolve())}: {link}")
-    print(f"inside: {len(pages)} pages, {sum(len(p.links) for p in pages.values())} links,"
-          f" {len(broken)} broken")
+    print(
+        f"inside: {len(pages)} pages, {sum(len(p.links) for p in pages.values())} links,"
+        f" {len(broken)} broken"
+    )
     return sorted(broken)
 
 
@@ -79,8 +81,10 @@ def broken_outside(results: Path) -> list[str]:
     bad = [row for row in rows if row["status"] not in {"working", "redirected", "ignored"}]
     gone = [row for row in bad if any(code in row["info"].split()[:1] for code in NO_PAGE)]
     unasked = [row for row in bad if row not in gone]
-    print(f"outside: {len(rows)} links, {len(fine)} answered, {len(gone)} gone,"
-          f" {len(unasked)} could not be asked")
+    print(
+        f"outside: {len(rows)} links, {len(fine)} answered, {len(gone)} gone,"
+        f" {len(unasked)} could not be asked"
+    )
     for row in unasked:
         print(f"  not asked: {row['uri']} ({row['filename']}:{row['lineno']}): {row['info'][:100]}")
     return [f"{row['filename']}:{row['lineno']}: {row['uri']}: {row['info']}" for row in gone]
@@ -89,7 +93,7 @@ def broken_outside(results: Path) -> list[str]:
 def main() -> int:
     """Check what the arguments name."""
     lost = broken_inside(Path(sys.argv[1]))
-    if len(sys.argv) > 2:  # noqa: PLR2004 - the second argument
+    if len(sys.argv) > 2:
         lost += broken_outside(Path(sys.argv[2]))
     for line in lost:
         print(f"broken: {line}", file=sys.stderr)
