@@ -10,10 +10,13 @@ ARGS ?=
 # when what is to be installed has changed.
 RUN_STAMP := $(VENV)/.installed-run
 DEV_STAMP := $(VENV)/.installed-dev
+DOCS_STAMP := $(VENV)/.installed-docs
+SPHINX := OMP_NUM_THREADS=1 $(BIN)/python -m sphinx -d docs/_build/doctrees docs
 PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help view test proofs coverage lint format bench screenshots clean system-packages
+.PHONY: help view test proofs coverage lint format bench screenshots docs linkcheck drawings dist \
+    packaging clean system-packages
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
@@ -51,8 +54,26 @@ bench: $(DEV_STAMP) ## run every benchmark
 screenshots: system-packages $(DEV_STAMP) ## take the pictures of README and docs anew
 	$(BIN)/python examples/screenshots.py $(ARGS)
 
+docs: system-packages $(DOCS_STAMP) ## build the documentation site into docs/_build/html, run its doctests
+	$(SPHINX) docs/_build/html -b html -W --keep-going $(ARGS)
+	$(BIN)/python docs/_ext/check_links.py docs/_build/html
+	$(BIN)/python -m pytest -q tests/documentation
+
+linkcheck: docs ## check the links of the site; what cannot be asked without a network is listed
+	$(SPHINX) docs/_build/linkcheck -b linkcheck -q || true
+	$(BIN)/python docs/_ext/check_links.py docs/_build/html docs/_build/linkcheck/output.json
+
+drawings: $(DOCS_STAMP) ## draw the pictures of docs/model.md anew
+	$(BIN)/python docs/drawings.py
+
+dist: $(DOCS_STAMP) ## build wheel and sdist into dist/, the same bytes every time
+	bash .ci/dist.sh $(BIN)/python dist
+
+packaging: system-packages $(DOCS_STAMP) ## try the wheel in empty environments: each Python, lowest and newest packages
+	bash .ci/packaging.sh $(ARGS)
+
 clean: ## remove what the other targets made, .venv included
-	rm -rf $(VENV) build dist htmlcov .coverage .coverage.* \
+	rm -rf $(VENV) build dist htmlcov docs/_build docs/gallery docs/reference/generated .coverage .coverage.* \
 	    .pytest_cache .ruff_cache .hypothesis .import_linter_cache
 	find src tests benchmarks examples -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true
 
@@ -73,3 +94,8 @@ $(DEV_STAMP): pyproject.toml constraints.txt | $(BIN)/python
 	$(PIP_INSTALL) hatchling editables
 	$(PIP_INSTALL) --no-build-isolation -e '.[test,dev]'
 	@touch $(RUN_STAMP) $@
+
+$(DOCS_STAMP): pyproject.toml constraints.txt | $(BIN)/python
+	$(PIP_INSTALL) hatchling editables
+	$(PIP_INSTALL) --no-build-isolation -e '.[test,dev,docs]'
+	@touch $(RUN_STAMP) $(DEV_STAMP) $@

@@ -1,4 +1,8 @@
-"""Let the working volume bend from true scale to the display factor and back.
+"""
+Animation
+=========
+
+Let the working volume bend from true scale to the display factor and back.
 
 Run: python examples/animation.py [FOLDER]
 """

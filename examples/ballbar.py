@@ -1,4 +1,8 @@
-"""Circular test of ISO 230-4.
+"""
+Circular test
+=============
+
+Circular test of ISO 230-4 on the model.
 
 Run ``python examples/ballbar.py [FILE]``; FILE ends in .png, .svg or .pdf.
 """

@@ -1,4 +1,8 @@
-"""Two machines and their difference on one scale.
+"""
+Two machines compared
+=====================
+
+Two machines and their difference on one scale.
 
 Run ``python examples/comparison.py [FILE]``; FILE ends in .png, .svg or .pdf.
 """

@@ -1,4 +1,8 @@
-"""Two machine concepts within the same tolerances, side by side.
+"""
+Machine concepts
+================
+
+Machine concepts within the same tolerances, side by side.
 
 The axes are the same and stand in another order: the table of the second machine carries X and Y.
 Run ``python examples/concepts.py [FILE]``; FILE ends in .png, .svg or .pdf.

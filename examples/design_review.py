@@ -1,4 +1,8 @@
-"""Write the design review of two measured machines as a PDF.
+"""
+Design review
+=============
+
+Write the design review of two measured machines as a PDF.
 
 Run: python examples/design_review.py [FOLDER]
 """

@@ -1,4 +1,8 @@
-"""Errors along each axis with their tolerance bands.
+"""
+Error curves
+============
+
+Errors along each axis with their tolerance bands.
 
 Run ``python examples/error_curves.py [FILE]``; FILE ends in .png, .svg or .pdf.
 """

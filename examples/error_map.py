@@ -1,4 +1,8 @@
-"""The error map: the bent working volume of a measured machine.
+"""
+Error map
+=========
+
+The bent working volume of a measured machine.
 
 Run ``python examples/error_map.py [FILE]``; FILE ends in .png, .svg or .pdf.
 """

@@ -1,4 +1,8 @@
-"""One signed component, seen from the front, on a dark ground.
+"""
+One component, dark
+===================
+
+One signed component, seen from the front, on a dark ground.
 
 Run ``python examples/error_map_component.py [FILE]``; FILE ends in .png, .svg or .pdf.
 """

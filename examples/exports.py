@@ -1,4 +1,8 @@
-"""Write a scene for other programs, and read it back: GLB, VTS, CSV.
+"""
+Exports
+=======
+
+Write a scene for other programs, and read it back: GLB, VTS, CSV.
 
 Run: python examples/exports.py [FOLDER]
 """

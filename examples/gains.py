@@ -1,4 +1,8 @@
-"""The largest error gains over the travel.
+"""
+Error gains
+===========
+
+The largest error gains over the travel.
 
 Run ``python examples/gains.py [FILE]``; FILE ends in .png, .svg or .pdf.
 """

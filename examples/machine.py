@@ -1,4 +1,8 @@
-"""The machine with its deformed bodies.
+"""
+Machine
+=======
+
+The machine with its deformed bodies.
 
 Run ``python examples/machine.py [FILE]``; FILE ends in .png, .svg or .pdf.
 """

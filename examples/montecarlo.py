@@ -1,4 +1,8 @@
-"""Volumetric error of machines within tolerance.
+"""
+Monte Carlo
+===========
+
+Volumetric error of machines within tolerance.
 
 Run ``python examples/montecarlo.py [FILE]``; FILE ends in .png, .svg or .pdf.
 """

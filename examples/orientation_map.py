@@ -1,4 +1,8 @@
-"""How far the tool axis leans, over the working volume.
+"""
+Orientation map
+===============
+
+How far the tool axis leans, over the working volume.
 
 Run ``python examples/orientation_map.py [FILE]``; FILE ends in .png, .svg or .pdf.
 """

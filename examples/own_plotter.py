@@ -1,4 +1,8 @@
-"""Draw a scene with a plotter of your own.
+"""
+A plotter of your own
+=====================
+
+Draw a scene with a plotter of your own.
 
 Run: python examples/own_plotter.py [FILE.png]
 """

@@ -1,4 +1,8 @@
-"""What to repair: before and after the best adjustments, and what each error does to the volume.
+"""
+What to repair
+==============
+
+Before and after the best adjustments, and what each error does to the volume.
 
 Run ``python examples/repair.py [FILE]``; FILE ends in .png, .svg or .pdf.
 """

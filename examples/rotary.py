@@ -1,4 +1,8 @@
-"""Error motions of a wobbling rotary table: it tilts once and runs out twice a turn.
+"""
+Rotary error motions
+====================
+
+A wobbling rotary table tilts once and runs out twice a turn.
 
 Run ``python examples/rotary.py [FILE]``; FILE ends in .png, .svg or .pdf.
 """

@@ -1,4 +1,8 @@
-"""Three slices through the middle of the working volume.
+"""
+Slices
+======
+
+Three slices through the middle of the working volume.
 
 Run ``python examples/slices.py [FILE]``; FILE ends in .png, .svg or .pdf.
 """

@@ -1,4 +1,8 @@
-"""What a wobbling rotary table does to points on it.
+"""
+Rotary traces
+=============
+
+What a wobbling rotary table does to points on it.
 
 Run ``python examples/traces.py [FILE]``; FILE ends in .png, .svg or .pdf.
 """

@@ -1,6 +1,8 @@
 """The public names of the package."""
 
 import os
+import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -8,6 +10,8 @@ from pathlib import Path
 import pytest
 
 import warpspace
+
+ROOT = Path(__file__).parents[2]
 
 
 def test_every_public_name_can_be_had() -> None:
@@ -47,3 +51,22 @@ def test_help_of_the_command_line_loads_no_numerics_and_no_renderer() -> None:
     code = f"import sys, warpspace.cli; print([n for n in {heavy.split()} if n in sys.modules])"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"
+
+
+def test_the_typed_program_runs() -> None:
+    program = runpy.run_path(str(ROOT / "tests" / "typed" / "program.py"))
+    largest, key, mean = program["main"]()
+    assert (round(largest, 2), key) == (51.72, "EA0Z")
+    assert 25 < mean < 32
+
+
+def test_version_changelog_and_citation_agree() -> None:
+    version = re.escape(warpspace.__version__)
+    changelog = (ROOT / "CHANGELOG.md").read_text("utf-8")
+    assert re.search(rf"^## {version} \(.+\)$", changelog, re.MULTILINE), "CHANGELOG.md"
+    citation = (ROOT / "CITATION.cff").read_text("utf-8")
+    assert re.search(rf"^version: {version}$", citation, re.MULTILINE), "CITATION.cff"
+    for key in ("cff-version", "message", "title", "authors", "license"):
+        assert re.search(rf"^{key}: *\S*", citation, re.MULTILINE), key
+    assert "license: MIT" in citation
+    assert "MIT License" in (ROOT / "LICENSE").read_text("utf-8")

@@ -120,7 +120,7 @@ class UncertainCase(Case):
         return np.column_stack([unit.draw(rng, count), np.ones(count)])
 
     def responses(self, places: Places) -> Array:
-        """Responses to one standard uncertainty each, and the measured error last, [3, K + 1, N]."""
+        """Give responses to a standard uncertainty each, the measured error last, [3, K + 1, N]."""
         keys, model, view = self.draws.keys, self.model, self.view
         at, point = places.coordinates, places.point_mm
         basis = build_basis(model, self.uncertainty, keys, at, view, point)

@@ -69,6 +69,14 @@ def load_scene(name_or_path: str | Path) -> Scene:
     ------
     SceneError
         With every problem of the file: key, value and what was expected.
+
+    Examples
+    --------
+    >>> scene = load_scene("dvf5000_first")
+    >>> scene.title
+    'DVF5000, first machine measured'
+    >>> str(scene.machine.chain)
+    'wCBFXYZt'
     """
     path = scene_path(name_or_path)
     name = path.stem.encode(errors="replace").decode()  # bytes that are no text become "?"

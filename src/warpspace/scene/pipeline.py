@@ -61,6 +61,16 @@ def evaluate(
     ------
     OptionError, UnknownNameError
         If an argument names something that does not exist.
+
+    Examples
+    --------
+    >>> from warpspace import load_scene
+    >>> scene = load_scene("dvf5000_first")
+    >>> corner = evaluate(scene, at={"X": 275, "Y": -225, "Z": -480})
+    >>> [round(float(part), 2) for part in corner.error_um]
+    [3.94, 49.81, -13.39]
+    >>> evaluate(scene, grid=11).error_um.shape
+    (11, 11, 11, 3)
     """
     if at is not None and grid is not None:
         raise OptionError("give either points (at) or a grid, not both")

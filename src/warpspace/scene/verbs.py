@@ -55,6 +55,13 @@ def gains(
     ------
     OptionError, UnknownNameError
         If an argument is out of range or names something that does not exist.
+
+    Examples
+    --------
+    >>> from warpspace import load_scene
+    >>> largest = gains(load_scene("dvf5000_nominal"), at={"X": 0, "Y": -225, "Z": -480})[0]
+    >>> largest.key, largest.lever_mm, round(largest.norm, 2)
+    ('EA0Z', (0.0, -242.0, -1440.0), 1.46)
     """
     chosen = choose_view(scene, loop).loop
     if over_travel:
@@ -134,6 +141,13 @@ def montecarlo(
         If the scene has no tolerances, or not for every parameter.
     OptionError
         If an argument is out of range.
+
+    Examples
+    --------
+    >>> from warpspace import load_scene
+    >>> result = montecarlo(load_scene("dvf5000_general"), samples=20_000, seed=1)
+    >>> 40 < result.mean_um < 43
+    True
     """
     view = choose_view(scene, loop)
     plan = sampling.Plan(samples, seed, over, grid, spec_um, cylinder, workers)

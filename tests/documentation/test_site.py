@@ -1,0 +1,144 @@
+"""The documentation site holds every page, command, tab and example; its links lead somewhere."""
+
+import ast
+import re
+import runpy
+import shlex
+import sys
+from pathlib import Path
+
+import pytest
+
+from doc_pages import DOCS, ROOT, anchors, blocks, entries, links, pages, section
+from warpspace import __version__
+from warpspace.app.server.tabs import tabs
+from warpspace.cli.registry import COMMANDS
+
+GENERATED = {"gallery/index", "reference/index"}
+WORDS_OF_A_HOW_TO = 25
+EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+LEFT_TAB = "Error curve"
+
+
+@pytest.fixture
+def configuration(monkeypatch: pytest.MonkeyPatch) -> dict[str, object]:
+    """Give the settings of the site."""
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    return runpy.run_path(str(DOCS / "conf.py"))
+
+
+def test_the_configuration_loads_and_finds_what_it_names(configuration) -> None:
+    assert configuration["version"] == __version__
+    for name in configuration["html_css_files"]:
+        assert (DOCS / "_static" / name).is_file()
+    for folder in configuration["templates_path"]:
+        assert (DOCS / folder).is_dir()
+
+
+def test_every_page_is_in_a_table_of_contents() -> None:
+    contained = {(DOCS / "index.md").resolve()}
+    for page in pages():
+        for entry in entries(page):
+            found = [path.resolve() for path in page.parent.glob(f"{entry}.md")]
+            coming = "*" in entry or page.parent.joinpath(entry).name == "index"
+            assert found or coming, f"{page.name}: there is no page {entry}"
+            contained.update(found)
+    missing = {path.resolve() for path in pages() if DOCS in path.parents} - contained
+    assert not missing, (
+        f"{sorted(path.name for path in missing)}: in no table of contents; name them in"
+        " docs/site/howto.md, explanation.md or evidence.md"
+    )
+
+
+def test_every_command_has_a_how_to() -> None:
+    for name in COMMANDS:
+        page = DOCS / "commands" / f"{name}.md"
+        assert page.is_file(), (
+            f"there is no docs/commands/{name}.md: write what a user does with `warpspace {name}`;"
+            " the options are added by the site"
+        )
+        text = page.read_text("utf-8")
+        assert re.search(rf"^# How to .*: `{name}`$", text, re.MULTILINE), page.name
+        assert re.search(rf"^warpspace {name}\b", "".join(blocks(text, "sh")), re.MULTILINE), (
+            page.name
+        )
+    assert {path.stem for path in (DOCS / "commands").glob("*.md")} == {*COMMANDS, "index"}
+
+
+def test_the_list_of_commands_leads_to_each() -> None:
+    listed = {file for file, _ in links(DOCS / "commands" / "index.md")}
+    assert {f"{name}.md" for name in COMMANDS} <= listed
+
+
+def test_every_tab_has_a_how_to() -> None:
+    for tab in ("Errors", LEFT_TAB, *(tab.name for tab in tabs())):
+        text = section(DOCS / "app.md", tab)
+        assert text is not None, f"docs/app.md has no section {tab}: say what a user does there"
+        words = re.sub(r"!\[[^\]]*\]\([^)]*\)", "", text).split()
+        assert len(words) >= WORDS_OF_A_HOW_TO, f"docs/app.md, {tab}: say what a user does there"
+
+
+def command_lines() -> list[str]:
+    found = []
+    for page in pages():
+        text = page.read_text("utf-8")
+        found += [
+            line
+            for block in blocks(text, "sh")
+            for line in block.splitlines()
+            if "warpspace " in line
+        ]
+        found += re.findall(r"`(warpspace [a-z][^`]*)`", " ".join(text.split()))
+    return sorted({line.strip() for line in found if line.strip().startswith("warpspace ")})
+
+
+@pytest.mark.parametrize("line", command_lines())
+def test_commands_of_the_pages_are_understood(line: str) -> None:
+    words = shlex.split(line, comments=True)[1:]
+    if words[0].startswith("-") or words[0].isupper():
+        return
+    assert words[0] in COMMANDS, line
+    if "…" in words or len(words) == 1:  # a command that is only named
+        return
+    if re.search(r"\b[A-Z]{2,}\b", " ".join(words[1:])) and "=" not in line:
+        return  # a form with placeholders
+    COMMANDS[words[0]].make_context(words[0], words[1:])
+
+
+@pytest.mark.parametrize("page", pages(), ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_links_lead_somewhere(page: Path) -> None:
+    for file, anchor in links(page):
+        target = (page.parent / file).resolve() if file else page
+        if file in {"gallery/index", "/gallery/index"}:
+            continue
+        if target == DOCS / "reference" / "index.md":
+            continue
+        assert target.exists(), f"{page.name}: {file}"
+        if anchor:
+            assert anchor in anchors(target), f"{page.name}: {file}#{anchor}"
+
+
+@pytest.mark.parametrize("script", EXAMPLES, ids=lambda script: script.stem)
+def test_every_example_has_a_title_for_the_gallery(script: Path) -> None:
+    if script.stem == "screenshots":
+        return
+    text = ast.get_docstring(ast.parse(script.read_text("utf-8")), clean=False) or ""
+    assert re.match(r"\n(.+)\n(=+)\n\n\S", text), (
+        f'{script.name}: begin with """, a title, a line of = below it, and a sentence'
+    )
+    title, line = text.splitlines()[1:3]
+    assert len(line) == len(title)
+
+
+def test_drawings_are_those_of_the_model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "path", [str(DOCS), *sys.path])
+    module = runpy.run_path(str(DOCS / "drawings.py"), run_name="drawings")
+    shown = set(re.findall(r"\(images/model_(\w+)\.svg\)", (DOCS / "model.md").read_text("utf-8")))
+    assert shown == set(module["DRAWINGS"])
+    assert {p.stem.removeprefix("model_") for p in (DOCS / "images").glob("*.svg")} == shown
+    for name in shown:
+        drawn = module["draw"](name, tmp_path).read_text("utf-8")
+        kept = (DOCS / "images" / f"model_{name}.svg").read_text("utf-8")
+        words = [re.findall(r"<text[^>]*>([^<]*)<", text) for text in (drawn, kept)]
+        assert words[0] == words[1], f"{name}: run docs/drawings.py"
+        assert words[0]
