@@ -6,10 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from warpspace.bench.readings import simulate
+from warpspace.bench.registry import find_test
 from warpspace.calibration import Request, calibrate, read_readings
 from warpspace.calibration.candidates import candidates
 from warpspace.calibration.circles import circles_of
-from warpspace.calibration.kinds.points import VIEW, nominal_tip
+from warpspace.calibration.kinds.kind import VIEW
+from warpspace.calibration.kinds.points import nominal_tip
 from warpspace.calibration.next_best import next_best
 from warpspace.calibration.rank import spell_rank
 from warpspace.calibration.readings import Readings, find_data
@@ -268,3 +271,37 @@ def test_predicted_covariance_of_the_next_measurement_is_the_one_obtained() -> N
     got, said = (np.sqrt(np.diag(matrix)) for matrix in (both.covariance, step.covariance))
     assert said == pytest.approx(got, rel=0.05)
     assert step.map_after_um < step.map_before_um
+
+
+def test_squareness_is_found_in_circles_of_two_planes(tmp_path: Path) -> None:
+    """Circles in XY and YZ, read as the bench reads them: squareness told, slopes like it said."""
+    scene = load_scene("dvf5000_nominal")
+    errors = ErrorSet(
+        {
+            "EC0Y": Constant(scene.axis_span("Y")).with_amplitude(23.1),
+            "EA0Z": Constant(scene.axis_span("Z")).with_amplitude(-17.0),
+        }
+    )
+    machine = replace(scene, errors=errors)
+    files, kinds = [], []
+    for plane in ("XY", "YZ"):
+        test = find_test("circular")(plane=plane, radius_mm=150.0, points=72)
+        plan = test.plan(machine)
+        readings = simulate(machine, plan)
+        sign = np.where(plan.marks["sense"] > 0.0, "+", "-")
+        rows = zip(sign, plan.marks["angle_deg"], readings, strict=True)
+        lines = [f"{way},{angle:.9g},{value:.9g}" for way, angle, value in rows]
+        path = tmp_path / f"{plane}.csv"
+        path.write_text("\n".join(["direction,angle_deg,radial_um", *lines]), encoding="utf-8")
+        files.append(str(path))
+        kinds.append(f"circular:plane={plane}:radius=150")
+    sets = [read_readings(*row) for row in zip(files, [scene] * 2, kinds, strict=True)]
+    found = calibrate(scene, sets, Request(keys=("EC0Y", "EA0Z")))
+    values = {one.key: one.value for one in found.parameters}
+    assert values == pytest.approx({"EC0Y": 23.1, "EA0Z": -17.0}, rel=1e-5)
+    assert found.rms_after_mm < 1e-6 * found.rms_before_mm
+    # with one circle alone
+    alone = calibrate(scene, sets[:1], Request(keys=("EC0Y", "EXY:ramp")))
+    assert ("EXY", "EC0Y") in alone.rank.confounded
+    words = "the slope of EXY and EC0Y cannot be told apart by these readings"
+    assert words in spell_rank(alone.rank, alone.slopes)

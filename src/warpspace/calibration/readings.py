@@ -92,9 +92,12 @@ def read_readings(name: str, scene: Scene, kind: str | None = None) -> Readings:
     """
     from warpspace.calibration.kinds.registry import find_kind, recognise
 
-    table = read_table(find_data(name))
-    found = recognise(table, scene) if kind is None else find_kind(kind)
-    return found.read(table, scene)
+    path = find_data(name)
+    found = None if kind is None else find_kind(kind)
+    if found is not None and found.own_columns:
+        return found.read(ReadingTable(str(path), {}, {}, ()), scene)
+    table = read_table(path)
+    return (found or recognise(table, scene)).read(table, scene)
 
 
 def axis_columns(

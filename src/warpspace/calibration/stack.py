@@ -5,13 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpspace.calibration.kinds.points import VIEW
 from warpspace.calibration.kinds.registry import find_kind
 from warpspace.calibration.readings import Readings
 from warpspace.calibration.terms import Terms
-from warpspace.field.evaluate import build_basis, evaluate_exact
 from warpspace.scene.model import Scene
-from warpspace.units import MM_PER_UM, Array
+from warpspace.units import Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,13 +47,11 @@ class Stack:
     def residuals(self, terms: Terms, amplitudes: Array, unknown: Array) -> list[Array]:
         """Give observed − predicted of each set with the exact model, [n, d] each, mm."""
         errors = terms.errors_with(amplitudes)
-        found: list[Array] = []
-        for one in self.sets:
-            field = evaluate_exact(self.scene.model, errors, one.coordinates, VIEW)
-            error_mm = field.error_um * MM_PER_UM
-            predicted = find_kind(one.kind).predict(one, error_mm, self.unknowns, unknown)
-            found.append(one.observed_mm - predicted)
-        return found
+        return [
+            one.observed_mm
+            - find_kind(one.kind).observe(self.scene, one, errors, self.unknowns, unknown)
+            for one in self.sets
+        ]
 
     def derivatives(
         self, terms: Terms, amplitudes: Array, unknown: Array
@@ -68,13 +64,9 @@ class Stack:
         by_parameter: list[Array] = []
         by_unknown: list[Array] = []
         for one in self.sets:
-            model = self.scene.model
-            basis = build_basis(model, errors, terms.keys, one.coordinates, VIEW)
-            field = evaluate_exact(model, errors, one.coordinates, VIEW)
-            by_error, own = find_kind(one.kind).derivatives(
-                one, field.error_um * MM_PER_UM, self.unknowns, unknown
+            gains, own = find_kind(one.kind).slopes(
+                self.scene, one, errors, terms.keys, self.unknowns, unknown
             )
-            gains = np.einsum("ndx,knx->ndk", by_error, basis.position) * MM_PER_UM
             by_parameter.append(gains.reshape(one.observed_mm.size, len(terms.keys)))
             by_unknown.append(own.reshape(one.observed_mm.size, len(self.unknowns)))
         return by_parameter, by_unknown

@@ -7,17 +7,22 @@ import numpy as np
 
 from warpspace.calibration.readings import Readings
 from warpspace.calibration.table import ReadingTable
+from warpspace.field.evaluate import View, build_basis, evaluate_exact
+from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import sort_axes
+from warpspace.machine.errors import ErrorSet
 from warpspace.scene.model import Scene
-from warpspace.units import Array
+from warpspace.units import MM_PER_UM, Array
+
+VIEW = View(Loop.RELATIVE, "workpiece")
+"""How errors are looked at: the tool point relative to the workpiece, in its nominal frame."""
 
 
 class Kind(ABC):
     """A kind of measurement.
 
-    The model of a reading is a function of the error of the tool point relative to the workpiece,
-    given in the nominal workpiece frame, and of a few numbers that nobody knows: where a sphere or
-    a station stands, by how much a session is shifted.
+    A reading is a function of the errors of the machine and of a few numbers that nobody knows:
+    where a sphere or a station stands, by how much a session is shifted.
 
     Attributes
     ----------
@@ -27,8 +32,11 @@ class Kind(ABC):
         What it is, for lists and help.
     columns : str
         Columns of its file.
+    own_columns : bool
+        Whether it reads the file itself, columns of words among them.
     """
 
+    own_columns: ClassVar[bool] = False
     name: ClassVar[str]
     words: ClassVar[str]
     columns: ClassVar[str]
@@ -54,6 +62,67 @@ class Kind(ABC):
     @abstractmethod
     def start(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:
         """Give values of the unknowns to begin with, [m], mm."""
+
+    @abstractmethod
+    def observe(
+        self,
+        scene: Scene,
+        readings: Readings,
+        errors: ErrorSet,
+        unknowns: tuple[str, ...],
+        values: Array,
+    ) -> Array:
+        """Give the readings that errors would lead to, with the exact model.
+
+        Parameters
+        ----------
+        scene : Scene
+        readings : Readings
+        errors : ErrorSet
+        unknowns : tuple of str, (m,)
+        values : ndarray, [m], mm
+
+        Returns
+        -------
+        ndarray, [n, d], mm
+        """
+
+    @abstractmethod
+    def slopes(
+        self,
+        scene: Scene,
+        readings: Readings,
+        errors: ErrorSet,
+        keys: tuple[str, ...],
+        unknowns: tuple[str, ...],
+        values: Array,
+    ) -> tuple[Array, Array]:
+        """Differentiate the readings, to first order in the errors.
+
+        Parameters
+        ----------
+        scene : Scene
+        readings : Readings
+        errors : ErrorSet
+            Gives the curve of each parameter.
+        keys : tuple of str, (K,)
+        unknowns : tuple of str, (m,)
+        values : ndarray, [m], mm
+
+        Returns
+        -------
+        by_parameter : ndarray, [n, d, K], mm per µm or µrad
+        by_unknown : ndarray, [n, d, m]
+        """
+
+    def automatic_keys(self, readings: Readings, scene: Scene) -> tuple[str, ...]:
+        """List the parameters that ``--fit auto`` looks for, the likelier first."""
+        del readings
+        return scene.parameter_keys
+
+
+class FromVectors(Kind):
+    """A kind whose readings follow from the error vectors at its poses."""
 
     @abstractmethod
     def predict(
@@ -92,13 +161,41 @@ class Kind(ABC):
         by_unknown : ndarray, [n, d, m]
         """
 
-    def automatic_keys(self, readings: Readings, scene: Scene) -> tuple[str, ...]:
-        """List the parameters that ``--fit auto`` looks for, the likelier first."""
-        del readings
-        return scene.parameter_keys
+    def observe(
+        self,
+        scene: Scene,
+        readings: Readings,
+        errors: ErrorSet,
+        unknowns: tuple[str, ...],
+        values: Array,
+    ) -> Array:
+        """Evaluate the errors, and predict."""
+        return self.predict(readings, _error_mm(scene, readings, errors), unknowns, values)
+
+    def slopes(
+        self,
+        scene: Scene,
+        readings: Readings,
+        errors: ErrorSet,
+        keys: tuple[str, ...],
+        unknowns: tuple[str, ...],
+        values: Array,
+    ) -> tuple[Array, Array]:
+        """Put what an error does to a reading behind what a parameter does to the error."""
+        error_mm = _error_mm(scene, readings, errors)
+        by_error, by_unknown = self.derivatives(readings, error_mm, unknowns, values)
+        basis = build_basis(scene.model, errors, keys, readings.coordinates, VIEW)
+        gains = np.einsum("ndx,knx->ndk", by_error, basis.position) * MM_PER_UM
+        return gains, by_unknown
 
 
-class Placed(Kind):
+def _error_mm(scene: Scene, readings: Readings, errors: ErrorSet) -> Array:
+    """Evaluate the error at the poses of readings, exactly, [n, 3], mm."""
+    field = evaluate_exact(scene.model, errors, readings.coordinates, VIEW)
+    return field.error_um * MM_PER_UM
+
+
+class Placed(FromVectors):
     """A kind whose readings are ± the error plus the place of something, one place per session."""
 
     place: ClassVar[str]

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from warpspace.calibration.kinds.kind import Kind
+from warpspace.calibration.kinds.kind import FromVectors
 from warpspace.calibration.kinds.points import nominal_tip
 from warpspace.calibration.readings import (
     Readings,
@@ -24,7 +24,7 @@ LEAST = 5
 """Readings that a station needs: its place, its dead path, and one to check."""
 
 
-class Lengths(Kind):
+class Lengths(FromVectors):
     """Distances between the tool point and stations, each with an unknown place and dead path."""
 
     name: ClassVar[str] = "lengths"

@@ -14,7 +14,6 @@ from warpspace.calibration.readings import (
     uncertainties_mm,
 )
 from warpspace.calibration.table import ReadingTable
-from warpspace.field.evaluate import View
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, nominal_point
 from warpspace.kinematics.model import Loop
@@ -23,8 +22,6 @@ from warpspace.scene.model import Scene
 from warpspace.units import Array
 
 VECTORS = (("ex_um", "ey_um", "ez_um"), ("ex_mm", "ey_mm", "ez_mm"))
-VIEW = View(Loop.RELATIVE, "workpiece")
-"""How the errors are looked at: the tool point relative to the workpiece, in its frame."""
 
 
 class Points(Placed):

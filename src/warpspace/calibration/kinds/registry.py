@@ -1,7 +1,9 @@
 """The kinds of measurement there are. A new one is a module beside this and a line below."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 
+from warpspace.calibration.kinds.bench import TestReadings, test_kinds
 from warpspace.calibration.kinds.kind import Kind
 from warpspace.calibration.kinds.lengths import Lengths
 from warpspace.calibration.kinds.points import Points
@@ -18,16 +20,25 @@ KINDS: Mapping[str, Kind] = {
 
 
 def find_kind(name: str) -> Kind:
-    """Look up a kind.
+    """Look up a kind: one of this table, or a test with its options (``circular:plane=XZ``).
 
     Raises
     ------
     UnknownNameError
         If there is none of that name.
     """
-    if name not in KINDS:
-        raise UnknownNameError("kind of measurement", name, KINDS)
-    return KINDS[name]
+    if name in KINDS:
+        return KINDS[name]
+    tests = test_kinds()
+    if name.partition(":")[0] not in tests:
+        raise UnknownNameError("kind of measurement", name, (*KINDS, *tests))
+    return _test_kind(name)
+
+
+@lru_cache(maxsize=256)
+def _test_kind(text: str) -> Kind:
+    """Build the kind of a test with its options."""
+    return TestReadings(text)
 
 
 def recognise(table: ReadingTable, scene: Scene) -> Kind:

@@ -17,6 +17,7 @@ from warpspace.cli.options import json_option, print_json, scene_argument
 from warpspace.cli.progress import progress
 from warpspace.cli.tables import Column, number_columns, print_table, print_text
 from warpspace.cli.terminal import echo
+from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -41,8 +42,13 @@ ENDINGS = (".toml",)
 )
 @click.option(
     "--kind",
+    "kinds",
+    multiple=True,
     metavar="KIND",
-    help="points, sphere, sphere-tcp or lengths.  [told by the columns of each file]",
+    help="points, sphere, sphere-tcp, lengths, or a test with its options such as"
+    " circular:plane=XZ:radius=150 (`warpspace test --list`; its test sphere is r-test here)."
+    " Once for all files, or once for each, --data before --predict."
+    "  [told by the columns of each file]",
 )
 @click.option(
     "--fit",
@@ -74,7 +80,7 @@ ENDINGS = (".toml",)
 def calibrate(
     scene: str,
     data: tuple[str, ...],
-    kind: str | None,
+    kinds: tuple[str, ...],
     fit: tuple[str, ...],
     predict: tuple[str, ...],
     next_count: int | None,
@@ -108,8 +114,12 @@ def calibrate(
     check_targets(scene, force=force, plot=plot, csv_path=csv_path)
     loaded = load_scene(scene)
     request = Request(read_keys(fit), robust=robust, priors=priors)
-    sets = [read_readings(name, loaded, kind) for name in data]
-    held = [read_readings(name, loaded, kind) for name in predict]
+    each = _each(kinds, len(files))
+    read = [
+        read_readings(name, loaded, kind)
+        for name, kind in zip((*data, *predict), each, strict=True)
+    ]
+    sets, held = read[: len(data)], read[len(data) :]
     with progress("fitting", silent=as_json):
         found = find(loaded, sets, request, held)
     circles = [
@@ -141,6 +151,23 @@ def calibrate(
     _print_apart(found, apart, steps)
     for path in filter(None, (output, csv_path, plot)):
         echo(f"wrote {path}")
+
+
+def _each(kinds: Sequence[str], files: int) -> Sequence[str | None]:
+    """Give each file its kind.
+
+    Raises
+    ------
+    OptionError
+        If there are neither one nor as many kinds as files.
+    """
+    if len(kinds) <= 1:
+        return [kinds[0] if kinds else None] * files
+    if len(kinds) != files:
+        raise OptionError(
+            f"--kind is given {len(kinds)} times for {files} files; expected 1 or {files}"
+        )
+    return kinds
 
 
 def _target(
@@ -313,6 +340,8 @@ def _print(
     )
     rows: list[tuple[str, ...]] = []
     for one in found.parameters:
+        if one.key in found.rank.unseen and not one.before:
+            continue
         row = parameter(one.key)
         if one.standard_uncertainty is None or one.interval is None:
             rows.append((one.key, row.name, f"{one.before:.1f}", "", "", row.unit, "", "no"))
