@@ -317,10 +317,12 @@ def kept_tabs(browser: "Browser") -> Iterator[list[Tab]]:
 
 def take(kept_tabs: list[Tab], viewer: Viewer, browser: "Browser") -> Tab:
     """Give the page that the last test has left, or open one."""
+    from playwright.sync_api import Error
+
     if kept_tabs:
         try:
             kept_tabs[0].begin_anew()
-        except pytest.fail.Exception:
+        except (Error, pytest.fail.Exception):  # what a test has left is no fault of the next
             kept_tabs.pop().page.context.close()
     if not kept_tabs:
         kept_tabs.append(open_page(viewer, browser))
