@@ -11,6 +11,7 @@ import pytest
 from PIL import Image
 
 from app.frames import draw, new_visitor
+from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
@@ -66,6 +67,7 @@ TIDY = """() => {
   return document.querySelectorAll('.mantine-Notification-root').length;
 }"""
 """Takes the link out of the address, closes the messages, and counts those that were there."""
+LIVE = LiveModel()
 FAILED = pytest.StashKey[bool]()
 
 
@@ -134,8 +136,7 @@ class Tab:
         session.context.act(forget)
         session.context.look_from(self._camera)
         self.until(lambda: self.page.evaluate(TIDY) == 0)
-        wanted = drawn_nodes(session._live.evaluate(start))
-        self.until(lambda: session.state == start and self.shows(wanted))
+        self.until(lambda: session.state == start and self.shows_state(start))
 
     def screenshot(self) -> np.ndarray:
         """Draw the page as it is now, and give its pixels, [height, width, 3]."""
@@ -189,6 +190,15 @@ class Tab:
         """Points of a node that is shown, [n, 3]; None where it is hidden or absent."""
         found = self.page.evaluate(DRAWN, name)
         return None if found is None else np.reshape(found, (-1, 3))
+
+    def shows_state(self, state: AppState) -> bool:
+        """Whether the surface drawn is that of a state."""
+        return self.shows(drawn_nodes(LIVE.evaluate(state)))
+
+    def until_shown(self, state: AppState, seconds: float = 15.0) -> None:
+        """Wait until the surface drawn is that of a state."""
+        wanted = drawn_nodes(LIVE.evaluate(state))
+        self.until(lambda: self.shows(wanted), seconds)
 
     def text(self, value: str) -> str:
         """A number on the page, as it is spelt."""
@@ -307,10 +317,12 @@ def kept_tabs(browser: "Browser") -> Iterator[list[Tab]]:
 
 def take(kept_tabs: list[Tab], viewer: Viewer, browser: "Browser") -> Tab:
     """Give the page that the last test has left, or open one."""
+    from playwright.sync_api import Error
+
     if kept_tabs:
         try:
             kept_tabs[0].begin_anew()
-        except pytest.fail.Exception:
+        except (Error, pytest.fail.Exception):  # what a test has left is no fault of the next
             kept_tabs.pop().page.context.close()
     if not kept_tabs:
         kept_tabs.append(open_page(viewer, browser))

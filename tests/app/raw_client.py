@@ -14,15 +14,11 @@ from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import msgspec.msgpack
 import psutil
-import viser
 import websockets
-import zstandard
 
-from app.first_camera import CAMERA
-
-pack = msgspec.msgpack.encode
+from app import wire
+from app.wire import CAMERA, HOW, pack, unpack
 
 
 class App:
@@ -108,12 +104,7 @@ class Tab:
     async def _read(self) -> None:
         with contextlib.suppress(websockets.ConnectionClosed):
             async for raw in self.socket:
-                assert isinstance(raw, bytes)
-                size, packed = (int.from_bytes(raw[at : at + 8], "little") for at in (0, 8))
-                text = zstandard.ZstdDecompressor().decompress(
-                    raw[16 : 16 + packed], max_output_size=size
-                )
-                for message in msgspec.msgpack.decode(text)["messages"]:
+                for message in unpack(raw):
                     await self._take(message)
 
     async def _take(self, message: dict[str, Any]) -> None:
@@ -132,12 +123,7 @@ class Tab:
 
 
 async def dial(app: App) -> websockets.ClientConnection:
-    return await websockets.connect(
-        app.url,
-        subprotocols=[f"viser-v{viser.__version__}"],  # pyright: ignore[reportArgumentType]
-        max_size=None,
-        compression=None,
-    )
+    return await websockets.connect(app.url, **HOW)
 
 
 async def until(fine: Callable[[], bool], seconds: float) -> None:
@@ -148,7 +134,7 @@ async def until(fine: Callable[[], bool], seconds: float) -> None:
 
 
 def update(uuid: object, updates: object) -> bytes:
-    return pack({"type": "GuiUpdateMessage", "uuid": uuid, "updates": updates})
+    return pack(wire.update(uuid, updates))
 
 
 def camera(**fields: object) -> bytes:

@@ -1,6 +1,6 @@
 """A tab of a plug-in appears on the page and follows the picture."""
 
-from app.test_page_steps import OPEN, Wire, dial
+from app.wire import OPEN, Wire, dial
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.context import PanelContext
 from warpspace.app.server.tabs import Tab, register_tab, tabs, unregister_tab

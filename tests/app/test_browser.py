@@ -75,7 +75,7 @@ def test_last_position_of_a_fast_drag_is_what_is_shown(tab: Tab) -> None:
     for value in np.linspace(-10.0, 10.0, 60).round(1):
         tab.send("EYX", f"{value}")
         tab.page.wait_for_timeout(8)
-    tab.until(lambda: tab.shows(drawn_nodes(model(START.with_amplitude("EYX", 10.0)))))
+    tab.until_shown(START.with_amplitude("EYX", 10.0))
     check_numbers(tab, model(START.with_amplitude("EYX", 10.0)))
 
 
@@ -86,7 +86,7 @@ def test_hostile_values_are_clamped_and_shown_as_clamped(tab: Tab, sent: str, ke
     tab.send("EAX", sent)
     tab.until(lambda: tab.page.get_by_text("Clamped").count() > 0)
     expected = START.with_amplitude("EAX", kept)
-    tab.until(lambda: tab.shows(drawn_nodes(model(expected))))
+    tab.until_shown(expected)
     tab.until(lambda: float(tab.box("EAX").input_value()) == kept)
     check_numbers(tab, model(expected))
     assert tab.page.get_by_text(r"EAX =").first.is_visible()
@@ -101,13 +101,13 @@ def test_hostile_density_factor_and_words(tab: Tab) -> None:
     tab.page.wait_for_timeout(500)
     tab.send("EXX", "4")
     wanted = START.with_amplitude("EXX", 4.0).with_exaggeration(0.001)
-    tab.until(lambda: tab.shows(drawn_nodes(model(wanted))))
+    tab.until_shown(wanted)
 
 
 def test_number_box_takes_a_typed_value(tab: Tab) -> None:
     tab.box("EXX").fill("5.5")
     tab.box("EXX").press("Enter")
-    tab.until(lambda: tab.shows(drawn_nodes(model(START.with_amplitude("EXX", 5.5)))))
+    tab.until_shown(START.with_amplitude("EXX", 5.5))
 
 
 def test_exaggeration_component_density_loop_and_positions(tab: Tab) -> None:
@@ -132,7 +132,7 @@ def test_exaggeration_component_density_loop_and_positions(tab: Tab) -> None:
 def test_another_scene_brings_its_title_sliders_and_box(tab: Tab) -> None:
     scene = load_scene("teach_tilted_c")
     tab.choose("Scene", scene.title)
-    tab.until(lambda: tab.shows(drawn_nodes(model(start_state(scene)))))
+    tab.until_shown(start_state(scene))
     tab.until(lambda: scene.title in tab.page.title())
     assert float(tab.box("EA0C").input_value()) == 40.0
     assert tab.page.get_by_text("Rotary positions").is_visible()
@@ -141,9 +141,9 @@ def test_another_scene_brings_its_title_sliders_and_box(tab: Tab) -> None:
 def test_two_tabs_are_independent(tab: Tab, open_tab: Callable[[], Tab]) -> None:
     other = open_tab()
     tab.send("EXX", "6")
-    tab.until(lambda: tab.shows(drawn_nodes(model(START.with_amplitude("EXX", 6.0)))))
+    tab.until_shown(START.with_amplitude("EXX", 6.0))
     other.page.wait_for_timeout(500)
-    assert other.shows(drawn_nodes(model(START)))
+    assert other.shows_state(START)
     ended = other.session
     other.page.close()
     tab.until(lambda: ended not in tab.viewer.sessions)
@@ -160,4 +160,4 @@ def test_exception_in_the_session_is_shown_and_the_session_goes_on(
     tab.until(lambda: tab.page.get_by_text("a wheel came off").count() > 0)
     assert "a wheel came off" in caplog.text
     tab.send("EXX", "4")
-    tab.until(lambda: tab.shows(drawn_nodes(model(START.with_amplitude("EXX", 4.0)))))
+    tab.until_shown(START.with_amplitude("EXX", 4.0))

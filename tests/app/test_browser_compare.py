@@ -81,7 +81,7 @@ def compare_with_pin(tab: Tab) -> AppState:
     state = replace(state, comparison=state.comparison.with_shown("difference"))
     tab.page.wait_for_timeout(100)
     tab.page.get_by_role("button", name="B − A", exact=True).click()
-    tab.until(lambda: tab.shows(drawn_nodes(LIVE.evaluate(state))))
+    tab.until_shown(state)
     assert tab.state() == state
     return state
 
@@ -104,7 +104,7 @@ def test_a_link_brings_the_comparison_with_the_state_before(
 ) -> None:
     state = compare_with_pin(tab)
     other = follow(press_link(tab))
-    other.until(lambda: other.shows(drawn_nodes(LIVE.evaluate(state))))
+    other.until_shown(state)
     assert other.state() == state
     other.panel("Compare")
     other.until(lambda: other.page.locator("[data-compared='mean B − A']").count() == 1)
@@ -113,7 +113,7 @@ def test_a_link_brings_the_comparison_with_the_state_before(
     assert other.page.get_by_label("B", exact=True).input_value() == "present errors"
     # and it goes on from there
     other.page.get_by_role("button", name="A", exact=True).click()
-    other.until(lambda: other.shows(drawn_nodes(LIVE.evaluate(START))))
+    other.until_shown(START)
 
 
 def test_a_saved_scene_brings_the_comparison_of_two_scenes(
@@ -241,10 +241,10 @@ def test_a_linear_axis_is_turned_round_in_the_conventions(tab: Tab) -> None:
     tab.until(lambda: "…" not in row.inner_text())
     assert row.inner_text().split()[-2:] == [f"{effect.mean_um:.2f}", f"{effect.max_um:.2f}"]
     row.click()
-    tab.until(lambda: tab.shows(drawn_nodes(LIVE.evaluate(with_choice(START, "direction X=-1")))))
+    tab.until_shown(with_choice(START, "direction X=-1"))
     tab.until(lambda: row.get_attribute("aria-checked") == "true")
     tab.page.get_by_role("button", name="Conventions of the scene").click()
-    tab.until(lambda: tab.shows(drawn_nodes(LIVE.evaluate(START))))
+    tab.until_shown(START)
 
 
 @pytest.mark.slow

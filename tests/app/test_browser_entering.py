@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from app.conftest import Tab, drawn_nodes
+from app.conftest import Tab
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state import edits
-from warpspace.app.state.app_state import AppState, start_state
+from warpspace.app.state.app_state import start_state
 from warpspace.app.state.listing import used_keys
 from warpspace.machine.errors import Table
 from warpspace.scene.library import load_scene
@@ -16,12 +16,6 @@ from warpspace.scene.library import load_scene
 pytestmark = pytest.mark.browser
 START = start_state(load_scene("dvf5000_first"))
 LIVE = LiveModel()
-
-
-def shows(tab: Tab, state: AppState) -> None:
-    """Wait until a state is drawn."""
-    wanted = drawn_nodes(LIVE.evaluate(state))
-    tab.until(lambda: tab.shows(wanted))
 
 
 def type_number(tab: Tab, key: str, text: str) -> None:
@@ -39,7 +33,7 @@ def messages(tab: Tab) -> int:
 
 def test_a_typed_number_is_believed_and_widens_the_slider(tab: Tab) -> None:
     type_number(tab, "EAX", "87.3")
-    shows(tab, edits.with_typed_amplitude(START, "EAX", 87.3))
+    tab.until_shown(edits.with_typed_amplitude(START, "EAX", 87.3))
     tab.until(lambda: tab.box("EAX").input_value() == "87.3")
     thumb = tab.thumb("EAX")
     tab.until(lambda: thumb.get_attribute("aria-valuemax") == "200")
@@ -50,7 +44,7 @@ def test_a_typed_number_is_believed_and_widens_the_slider(tab: Tab) -> None:
     assert tab.page.evaluate("document.activeElement.dataset.number") == "EAX"
     tab.page.keyboard.press("Escape")
     tab.page.get_by_role("button", name="Undo").click()
-    shows(tab, START)
+    tab.until_shown(START)
     tab.until(lambda: tab.box("EAX").input_value() == "5.5")
 
 
@@ -114,7 +108,7 @@ def test_a_table_is_pasted_for_an_error_that_is_zero(tab: Tab) -> None:
     span = edits.axis_span(START, "EYX")
     table = Table(span, ((-275.0, 0.0), (0.0, 32.0), (275.0, -12.5)))
     wanted = edits.with_curve(START, "EYX", table)
-    shows(tab, wanted)
+    tab.until_shown(wanted)
     tab.until(lambda: tab.text("curve remark") != "")
     assert tab.text("curve remark") == (
         "Heading left out: “X [mm] EYX [µm]”. Rows sorted by position. Values of the same position"
@@ -137,7 +131,7 @@ def test_errors_that_are_zero_are_hidden_and_found(open_tab: Callable[..., Tab])
     search.fill("EXX")
     tab.until(lambda: tab.page.evaluate(keys) == ["EXX"])
     type_number(tab, "EXX", "10")
-    shows(tab, START.with_amplitude("EXX", 10.0))
+    tab.until_shown(START.with_amplitude("EXX", 10.0))
     search.fill("")
     tab.until(lambda: {*tab.page.evaluate(keys)} == {*used, "EXX"})
     tab.page.get_by_role("checkbox", name="Sort by effect").check()

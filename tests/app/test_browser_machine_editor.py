@@ -6,13 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.conftest import SCENES, Tab, drawn_nodes
-from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.state.app_state import AppState
+from app.conftest import SCENES, Tab
 from warpspace.bodies.placed import load_bodies
 
 pytestmark = pytest.mark.browser
-LIVE = LiveModel()
 START = str(SCENES[0].machine.chain)
 
 
@@ -32,11 +29,6 @@ def type_into(field, text: str) -> None:
     field.press("Enter")
 
 
-def is_drawn(tab: Tab, state: AppState) -> bool:
-    """Whether the surface on the page is that of a state."""
-    return tab.shows(drawn_nodes(LIVE.evaluate(state)))
-
-
 def slider_names(tab: Tab) -> list[str]:
     """Labels of the sliders of the tab Machine."""
     texts = tab.page.locator("label").all_text_contents()
@@ -50,7 +42,7 @@ def test_another_chain_is_typed_and_box_sliders_and_bodies_follow_and_undo_goes_
     type_into(chain, "wBFXYZt")
     tab.until(lambda: chain_of(tab) == "wBFXYZt")
     tab.until(lambda: tab.page.locator("section[data-frame=C]").count() == 0)
-    tab.until(lambda: is_drawn(tab, tab.session.state))
+    tab.until(lambda: tab.shows_state(tab.session.state))
     said = tab.page.locator(".mantine-Notification-root", has_text="axis C left out")
     said.first.wait_for()
     assert load_bodies(tab.session.state.scene.machine)
@@ -61,7 +53,7 @@ def test_another_chain_is_typed_and_box_sliders_and_bodies_follow_and_undo_goes_
     assert tab.page.locator("label", has_text=re.compile(r"^C \[°\]")).count() == 0
     tab.page.keyboard.press("Control+z")
     tab.until(lambda: chain_of(tab) == START)
-    tab.until(lambda: is_drawn(tab, tab.session.state))
+    tab.until(lambda: tab.shows_state(tab.session.state))
     assert tab.session.state.scene == SCENES[0]
     tab.panel("Machine editor")
     tab.until(lambda: chain.input_value() == START)
@@ -95,7 +87,7 @@ def test_order_side_direction_and_numbers_are_changed_by_hand(tab: Tab):
     tab.until(lambda: tab.session.state.scene.machine.axes["B"].rotation_deg[0] == 45.0)
     type_into(box(tab, "Upper end of X in the working volume, in mm"), "100")
     tab.until(lambda: tab.session.state.scene.workspace.ranges["X"][1] == 100.0)
-    tab.until(lambda: is_drawn(tab, tab.session.state))
+    tab.until(lambda: tab.shows_state(tab.session.state))
     type_into(box(tab, "Upper end of X in the working volume, in mm"), "lots")
     tab.page.locator(".mantine-Notification-root", has_text="expected a number").first.wait_for()
     assert tab.session.state.scene.workspace.ranges["X"][1] == 100.0
@@ -107,7 +99,7 @@ def test_a_changed_machine_is_saved_and_opened_again(tab: Tab, tmp_path: Path):
     z = SCENES[0].machine.axes["Z"].offset_mm[2]
     type_into(box(tab, "z of the offset of Z, in mm"), f"{z + 30:g}")
     tab.until(lambda: tab.session.state.scene.machine.axes["Z"].offset_mm[2] == z + 30.0)
-    tab.until(lambda: is_drawn(tab, tab.session.state))
+    tab.until(lambda: tab.shows_state(tab.session.state))
     before, drawn = tab.session.state, tab.vertices()
     tab.panel("Files")
     with tab.page.expect_download() as download:
@@ -131,7 +123,7 @@ def test_a_machine_is_chosen_from_its_picture(tab: Tab):
     tab.page.locator("[data-machine=gantry_mill]").click()
     tab.until(lambda: tab.session.state.scene.machine.name == "gantry_mill")
     tab.page.locator("[data-machine]").first.wait_for(state="detached")
-    tab.until(lambda: is_drawn(tab, tab.session.state))
+    tab.until(lambda: tab.shows_state(tab.session.state))
     tab.page.get_by_role("button", name="Machine of the scene").click()
     tab.until(lambda: tab.session.state.scene == SCENES[0])
     assert np.isfinite(tab.vertices()).all()

@@ -110,7 +110,7 @@ def test_two_scenes_are_compared_with_one_scale(tab: Tab) -> None:
     tab.until(lambda: tab.page.evaluate(PLACE, "/compare/other") is not None)
     tab.choose("B", "nothing")
     tab.until(lambda: tab.page.evaluate(PLACE, "/compare/other") is None)
-    tab.until(lambda: tab.shows(drawn_nodes(LIVE.evaluate(START))))
+    tab.until_shown(START)
 
 
 def test_what_is_steered_is_compared_with_the_state_before(tab: Tab) -> None:
@@ -134,9 +134,9 @@ def test_a_convention_changes_the_map_and_says_by_how_much(tab: Tab) -> None:
     )
     row.click()
     state = with_choice(START, "component_errors=before_motion")
-    tab.until(lambda: tab.shows(drawn_nodes(LIVE.evaluate(state))))
+    tab.until_shown(state)
     tab.page.get_by_role("button", name="Conventions of the scene").click()
-    tab.until(lambda: tab.shows(drawn_nodes(LIVE.evaluate(START))))
+    tab.until_shown(START)
 
 
 def test_the_reference_is_picked_on_the_box(tab: Tab) -> None:
@@ -147,7 +147,7 @@ def test_the_reference_is_picked_on_the_box(tab: Tab) -> None:
     tab.until(lambda: tab.state().scene.reference is not None)
     state = tab.state()
     assert state.picked is None
-    tab.until(lambda: tab.shows(drawn_nodes(LIVE.evaluate(state))))
+    tab.until_shown(state)
     at = Picked(dict(state.scene.reference or {}))
     assert np.linalg.norm(answer(state, at, 1.0).explanation.error_um) < 1e-6
 
@@ -171,7 +171,7 @@ def test_a_saved_scene_opens_to_the_identical_state(
     other = open_tab()
     other.panel("Files")
     other.upload("dvf5000_first.toml", path.read_bytes())
-    other.until(lambda: other.shows(drawn_nodes(LIVE.evaluate(state))))
+    other.until_shown(state)
     back = other.state()
     assert back.amplitudes == state.amplitudes
     assert back.component == "y"
@@ -234,7 +234,7 @@ def test_bad_uploads_are_refused_in_the_page_and_the_session_goes_on(tab: Tab) -
     tab.upload("big.toml", b"x" * (5 * 2**20))
     tab.until(lambda: tab.page.get_by_text("at most 4 MB").count() > 0)
     tab.send("EXX", "4")
-    tab.until(lambda: tab.shows(drawn_nodes(LIVE.evaluate(START.with_amplitude("EXX", 4.0)))))
+    tab.until_shown(START.with_amplitude("EXX", 4.0))
 
 
 def test_a_200_mb_upload_announced_by_a_hostile_page_is_not_kept(tab: Tab) -> None:
@@ -255,7 +255,7 @@ def test_a_200_mb_upload_announced_by_a_hostile_page_is_not_kept(tab: Tab) -> No
     tab.until(lambda: tab.page.get_by_text("more has arrived").count() > 0)
     assert tab.session._client.gui._current_file_upload_states == {}
     tab.send("EXX", "4")
-    tab.until(lambda: tab.shows(drawn_nodes(LIVE.evaluate(START.with_amplitude("EXX", 4.0)))))
+    tab.until_shown(START.with_amplitude("EXX", 4.0))
 
 
 @pytest.mark.own_page
@@ -266,7 +266,7 @@ def test_ten_uploads_at_once_and_a_script_in_a_title(tab: Tab) -> None:
     text = state_to_toml(start_state(scene))
     for number in range(10):
         tab.upload(f"scene {number}.toml", text.encode())
-    tab.until(lambda: tab.shows(drawn_nodes(LIVE.evaluate(start_state(SCENES[1])))), 30.0)
+    tab.until_shown(start_state(SCENES[1]), 30.0)
     tab.until(lambda: tab.state().scene.name == "scene 9", 30.0)
     tab.panel("Compare")
     tab.page.get_by_role("button", name="Pin as before").click()

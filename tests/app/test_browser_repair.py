@@ -2,13 +2,11 @@
 
 import pytest
 
-from app.conftest import SCENES, Tab, drawn_nodes
-from warpspace.app.evaluation.evaluate import LiveModel
+from app.conftest import SCENES, Tab
 from warpspace.app.state.app_state import start_state
 from warpspace.scene import repairs as scene_repairs
 
 pytestmark = pytest.mark.browser
-LIVE = LiveModel()
 START = start_state(SCENES[0])
 
 
@@ -26,7 +24,7 @@ def test_find_and_apply_the_best_repair(tab: Tab) -> None:
     wanted = found.repairs[1].adjust
     tab.until(lambda: tab.state().amplitudes["EA0Z"] == pytest.approx(wanted["EA0Z"]))
     state = tab.session.state
-    tab.until(lambda: tab.shows(drawn_nodes(LIVE.evaluate(state))))
+    tab.until_shown(state)
     tab.panel("Compare")
     compared = tab.page.inner_text(".ws-comparison")
     assert "before repair" in compared
@@ -45,7 +43,7 @@ def test_compare_draws_the_repaired_volume_and_changes_no_error(tab: Tab) -> Non
     tab.until(lambda: tab.state().comparison.b is not None)
     state = tab.session.state
     assert state.amplitudes == START.amplitudes
-    tab.until(lambda: tab.shows(drawn_nodes(LIVE.evaluate(state))))
+    tab.until_shown(state)
 
 
 def test_the_smallest_max_is_another_repair(tab: Tab) -> None:

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from markupsafe import Markup
 from PIL import Image
 
-from app.test_page_steps import OPEN, Wire, dial
+from app.wire import OPEN, Wire, dial
 from warpspace.app.documents.services import CancelledError, ConceptRequest, Services
 from warpspace.app.evaluation.concepts import Answer, answer, ask
 from warpspace.app.evaluation.machine_edits.updates import with_word

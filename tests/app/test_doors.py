@@ -7,12 +7,12 @@ from contextlib import closing, contextmanager, nullcontext
 
 import msgspec.msgpack
 import pytest
-import viser
 from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosedError
 from websockets.protocol import State
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import ClientConnection
 
+from app.wire import PROTOCOL, dial
 from warpspace.app.server import guard, network, viewer
 from warpspace.app.server.doors import Access, Asked, Doors, Place, read_place
 from warpspace.app.server.guard import Limits, Rate
@@ -27,7 +27,7 @@ UPGRADE = {
     "Connection": "Upgrade",
     "Sec-WebSocket-Version": "13",
     "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==",
-    "Sec-WebSocket-Protocol": f"viser-v{viser.__version__}",
+    "Sec-WebSocket-Protocol": PROTOCOL,
 }
 KINDS = pytest.mark.parametrize("upgrade", [{}, UPGRADE], ids=["page", "websocket"])
 SCENE = load_scene("dvf5000_nominal")
@@ -273,15 +273,6 @@ def limited(monkeypatch: pytest.MonkeyPatch, limits: Limits) -> Iterator[Viewer]
     monkeypatch.setattr(viewer, "Guard", lambda doors: guard.Guard(doors, limits))
     with Viewer(SCENE) as running:
         yield running
-
-
-def dial(running: Viewer) -> ClientConnection:
-    return connect(
-        running.url.replace("http", "ws", 1),
-        subprotocols=[f"viser-v{viser.__version__}"],  # pyright: ignore[reportArgumentType]
-        max_size=None,
-        compression=None,
-    )
 
 
 def drain(wire: ClientConnection) -> ConnectionClosedError:

@@ -9,18 +9,17 @@ from pathlib import Path
 
 import pytest
 
-from app.first_camera import CAMERA
 from app.raw_client import (
     App,
     Tab,
     come_and_go,
     nonsense,
-    pack,
     running_app,
     send_all,
     steadily,
     upload,
 )
+from app.wire import CAMERA, pack
 from warpspace.app.browser.incoming import may_pass, may_set
 from warpspace.app.server.repeated_lines import RepeatedLines
 

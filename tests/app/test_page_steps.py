@@ -1,23 +1,15 @@
 """A page is built in steps: map and sliders first, the rest as fast as the page draws it."""
 
-import re
-import secrets
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack
 from typing import Any
 
-import msgspec.msgpack
 import pytest
-import viser
-import zstandard
-from websockets.sync.client import connect
-from websockets.sync.connection import Connection
 
-from app.first_camera import CAMERA
-from warpspace.app.browser.arrivals import CARRIER
-from warpspace.app.browser.opening import drawn_script, stage_script
+from app.wire import OPEN, Wire, dial
+from warpspace.app.browser.opening import drawn_script
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.server import page_steps
 from warpspace.app.server.contents import PageContents
@@ -25,94 +17,16 @@ from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.listing import used_keys
-from warpspace.machine.parameters import PARAMETERS
 from warpspace.scene.library import load_scene
 
 KEYS = set(used_keys(start_state(load_scene("dvf5000_first"))))
 """Errors that a page lists at first: those that are not zero."""
-OPEN = stage_script("open")
-
-
-class Wire:
-    """A page that shows nothing and remembers what it was sent."""
-
-    def __init__(self, socket: Connection) -> None:
-        self._socket = socket
-        self.kinds: list[str] = []
-        self.labels: list[str] = []
-        self.scripts: list[str] = []
-        self.widgets: dict[str, str] = {}
-        self.chosen: list[str] = []
-        self.send({"type": "GuiUpdateMessage", "uuid": CARRIER, "updates": {"value": new_token()}})
-        self.send(CAMERA)
-
-    def send(self, message: dict[str, Any]) -> None:
-        self._socket.send(msgspec.msgpack.encode(message))
-
-    def update(self, uuid: str, value: object) -> None:
-        self.send({"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": value}})
-
-    def read_until(self, fine: Callable[[], bool], seconds: float = 20.0) -> bool:
-        """Read until something holds; tell whether it did before nothing came any more."""
-        while not fine():
-            try:
-                raw = self._socket.recv(timeout=seconds)
-            except TimeoutError:
-                return False
-            assert isinstance(raw, bytes)
-            size, packed = (int.from_bytes(raw[at : at + 8], "little") for at in (0, 8))
-            text = zstandard.ZstdDecompressor().decompress(
-                raw[16 : 16 + packed], max_output_size=size
-            )
-            for message in msgspec.msgpack.decode(text)["messages"]:
-                self._take(message)
-        return True
-
-    def _take(self, message: dict[str, Any]) -> None:
-        self.kinds.append(message["type"])
-        label = message.get("props", {}).get("label") if "props" in message else None
-        if isinstance(label, str):
-            self.labels.append(label)
-            self.widgets.setdefault(label.split(" ")[0], message["uuid"])
-        if isinstance(value := message.get("updates", {}).get("value"), str):
-            self.chosen.append(value)
-        if isinstance(value := message.get("value"), str):
-            self.chosen.append(value)
-        if message["type"] == "RunJavascriptMessage":
-            self.scripts.append(message["source"])
-
-    @property
-    def keys(self) -> set[str]:
-        """Keys of the errors that have a slider; those of tolerances do not count."""
-        return {label.split(" ")[0] for label in self.labels if "±" not in label} & set(PARAMETERS)
-
-    @property
-    def question(self) -> tuple[str, str]:
-        """The latest question whether all is drawn: widget and number."""
-        found = re.findall(
-            r'requestAnimationFrame|uuid: "([^"]+)", updates: \{ value: "(\d+)" \}',
-            "".join(self.scripts),
-        )
-        return [pair for pair in found if pair[0]][-1]
-
-
-def new_token() -> str:
-    return secrets.token_hex(16)
 
 
 @pytest.fixture(scope="module")
 def viewer() -> Iterator[Viewer]:
     with Viewer(load_scene("dvf5000_first")) as running:
         yield running
-
-
-def dial(viewer: Viewer) -> Connection:
-    return connect(
-        viewer.url.replace("http", "ws", 1),
-        subprotocols=[f"viser-v{viser.__version__}"],  # pyright: ignore[reportArgumentType]
-        max_size=None,
-        compression=None,
-    )
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from markupsafe import Markup
 
-from app.test_page_steps import OPEN, Wire, dial
+from app.wire import OPEN, Wire, dial
 from warpspace.analysis.repair import Objective
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.repair import BEFORE, ask, with_adjusted, with_preview, with_repair

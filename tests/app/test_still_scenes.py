@@ -1,19 +1,12 @@
 """The app opens machines whose volume is a line or a point."""
 
-import secrets
 from dataclasses import replace
 
-import msgspec.msgpack
 import numpy as np
 import pytest
-import viser
-import zstandard
-from websockets.sync.client import connect
 
-from app.first_camera import CAMERA
+from app.wire import OPEN, Wire, dial
 from still_scenes import TEXTS, still_scene
-from warpspace.app.browser.arrivals import CARRIER
-from warpspace.app.browser.opening import stage_script
 from warpspace.app.evaluation.budget import pick
 from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.evaluate import LiveModel
@@ -26,27 +19,10 @@ from warpspace.picture.mesh import map_mesh, outline_pieces
 
 def messages_until_open(viewer: Viewer) -> list[dict]:
     """Open a page that draws nothing and read what it is sent until all of it is there."""
-    found: list[dict] = []
-    opened = stage_script("open")
-    token = {"type": "GuiUpdateMessage", "uuid": CARRIER, "updates": {"value": ""}}
-    token["updates"] = {"value": secrets.token_hex(16)}
-    with connect(
-        viewer.url.replace("http", "ws", 1),
-        subprotocols=[f"viser-v{viser.__version__}"],  # pyright: ignore[reportArgumentType]
-        max_size=None,
-        compression=None,
-    ) as socket:
-        for message in (token, CAMERA):
-            socket.send(msgspec.msgpack.encode(message))
-        while not any(message.get("source") == opened for message in found):
-            raw = socket.recv(timeout=30.0)
-            assert isinstance(raw, bytes)
-            size, packed = (int.from_bytes(raw[at : at + 8], "little") for at in (0, 8))
-            text = zstandard.ZstdDecompressor().decompress(
-                raw[16 : 16 + packed], max_output_size=size
-            )
-            found += msgspec.msgpack.decode(text)["messages"]
-    return found
+    with dial(viewer) as socket:
+        wire = Wire(socket)
+        assert wire.read_until(lambda: OPEN in wire.scripts, seconds=30.0)
+    return wire.messages
 
 
 @pytest.mark.filterwarnings("ignore:Queued an? .* on a closed connection")  # as `run_viewer` does

@@ -13,9 +13,8 @@ import msgspec.msgpack
 import pytest
 import viser
 from viser import _messages as messages
-from websockets.sync.client import connect
 
-from app.first_camera import CAMERA
+from app.wire import CAMERA, dial
 from warpspace.app import browser
 from warpspace.app.browser.viser_private import (
     dom_id,
@@ -85,12 +84,7 @@ def look_up(owner: Any, path: str) -> Any:
 def client() -> Iterator[tuple[viser.ViserServer, viser.ClientHandle]]:
     with (
         Viewer(load_scene("dvf5000_nominal")) as running,
-        connect(
-            running.url.replace("http", "ws", 1),
-            subprotocols=[f"viser-v{viser.__version__}"],  # pyright: ignore[reportArgumentType]
-            max_size=None,
-            compression=None,
-        ) as socket,
+        dial(running) as socket,
     ):
         socket.send(msgspec.msgpack.encode(CAMERA))
         while not running._server.get_clients():

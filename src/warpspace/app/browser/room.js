@@ -194,7 +194,8 @@
         try { last = localStorage.getItem(KEY); } catch { /* no storage */ }
         if (last === "hidden" && button.getAttribute("aria-pressed") === "true") button.click();
       }
-      seen = pending = ""; plates = 0;
+      seen = pending = "";
+      if ("dark" in changes) plates = 0;
     },
   };
   root.addEventListener("click", ({ target, isTrusted }) => {
