@@ -156,7 +156,8 @@ def test_readings_of_a_test_and_error_vectors_together(warpspace, tmp_path: Path
     text = "\n".join(f"{angle},{value}" for angle, value in rows)
     circle.write_text(f"angle_deg,radial_um\n{text}\n", encoding="utf-8")
     points.write_text(
-        "z_mm,ex_um,ey_um,ez_um\n-480,0,0,0\n-80,0,0,8\n-280,0,0,4\n", encoding="utf-8"
+        "session,z_mm,ex_um,ey_um,ez_um\na,-480,0,0,0\na,-80,0,0,8\na,-280,0,0,4\n",
+        encoding="utf-8",
     )
     both = ("calibrate", "dvf5000_nominal", "--data", circle, "--data", points)
     kinds = ("--kind", "circular:plane=XY:radius=100", "--kind", "points")
