@@ -263,22 +263,23 @@ def launch(playwright: Playwright) -> Browser:
     return playwright.chromium.launch(executable_path=path, args=CHROMIUM)
 
 
+def opened_ms(browser: Browser, url: str, ready: str) -> tuple[float, float]:
+    """Time until a page that meets a condition is opaque, and until it is drawn at all, ms."""
+    with browser.new_context(viewport=PAGE) as context:
+        page = context.new_page()
+        start = time.perf_counter()
+        page.goto(f"{url}/?fixedDpr=1")
+        page.wait_for_function(ready)
+        page.evaluate(DRAWN)
+        drawn = time.perf_counter()
+        if not page.evaluate(OPAQUE):
+            page.wait_for_function(OPAQUE)
+            page.evaluate(DRAWN)
+        return (time.perf_counter() - start) * 1e3, (drawn - start) * 1e3
+
+
 def page_part() -> dict[str, float]:
     """Time until the page can be used, beside viser's page with nothing in it."""
-
-    def opened_ms(browser: Browser, url: str, ready: str) -> tuple[float, float]:
-        with browser.new_context(viewport=PAGE) as context:
-            page = context.new_page()
-            start = time.perf_counter()
-            page.goto(f"{url}/?fixedDpr=1")
-            page.wait_for_function(ready)
-            page.evaluate(DRAWN)
-            drawn = time.perf_counter()
-            if not page.evaluate(OPAQUE):
-                page.wait_for_function(OPAQUE)
-                page.evaluate(DRAWN)
-            return (time.perf_counter() - start) * 1e3, (drawn - start) * 1e3
-
     with contextlib.redirect_stdout(io.StringIO()):
         empty = viser.ViserServer(host="127.0.0.1", port=8590, verbose=False)
     times: dict[str, list[tuple[float, float]]] = {"ours": [], "empty": []}

@@ -1,12 +1,10 @@
 """Machines side by side: what is asked, and its answer, computed beside the session."""
 
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from warpspace.app.documents.services import CancelledError, ConceptRequest
 from warpspace.app.evaluation.resulting_scene import scene_of
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.concept_choice import ConceptChoice
@@ -17,8 +15,8 @@ if TYPE_CHECKING:
     from warpspace.scene.concepts import Concept, ConceptPlan
 
 POLL_S = 0.1
-STRIP_PX = (480, 340)
-"""Size of each picture; it is shown about half as large, sharp on fine screens too."""
+NODES = 21
+"""Nodes per axis that colours are chosen from; the pictures have the same."""
 _TURN = threading.Lock()
 """One comparison at a time for all tabs together, so that sliders stay quick."""
 
@@ -53,12 +51,6 @@ class Question:
         from warpspace.scene.concepts import ConceptPlan
 
         return ConceptPlan(self.limit_um, self.own_tolerances, over=self.over, workers=1)
-
-    def request(self, *, dark: bool, strip: bool) -> ConceptRequest:
-        """Ask for the pictures, alone or on a sheet with words."""
-        return ConceptRequest(
-            self.scenes, self.plan(), self.loop, dark, STRIP_PX if strip else None
-        )
 
 
 def _alike(ones: Sequence[Scene], others: Sequence[Scene]) -> bool:
@@ -102,7 +94,7 @@ def ask(state: AppState, choice: ConceptChoice) -> Question:
 
 def answer(
     question: Question, cancelled: threading.Event, progress: Callable[[float], object]
-) -> Answer:
+) -> Answer | None:
     """Compare machines.
 
     Parameters
@@ -115,12 +107,11 @@ def answer(
 
     Returns
     -------
-    Answer
+    Answer or None
+        None where it was cancelled.
 
     Raises
     ------
-    CancelledError
-        If it was cancelled.
     SceneError, OptionError
         If tolerances are missing, or machines cannot be sampled.
     """
@@ -135,27 +126,22 @@ def answer(
     def report(machines: int) -> None:
         nonlocal done
         if cancelled.is_set():
-            raise CancelledError("the comparison was cancelled")
+            raise _CancelledError
         done += machines
         progress(done / total)
 
-    with _turn(cancelled):
+    while not _TURN.acquire(timeout=POLL_S):
+        if cancelled.is_set():
+            return None
+    try:
         found = compare_concepts(question.scenes, plan, loop=question.loop, progress=report)
         values = [picture_concept(concept, NODES).values for concept in found]
+    except _CancelledError:
+        return None
+    finally:
+        _TURN.release()
     return Answer(question, found, choose_scale(values, "norm"))
 
 
-NODES = 21
-"""Nodes per axis that colours are chosen from; the pictures have the same."""
-
-
-@contextmanager
-def _turn(cancelled: threading.Event) -> Iterator[None]:
-    """Wait until no other tab compares, unless that is cancelled."""
-    while not _TURN.acquire(timeout=POLL_S):
-        if cancelled.is_set():
-            raise CancelledError("the comparison was cancelled")
-    try:
-        yield
-    finally:
-        _TURN.release()
+class _CancelledError(Exception):
+    """Ends a comparison that nobody waits for any more."""

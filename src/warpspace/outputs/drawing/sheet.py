@@ -29,6 +29,9 @@ from warpspace.picture.words import (
 )
 from warpspace.scene.model import Scene
 
+HINTED = 0.92
+"""Share of a room that measured text may take beside other text: small letters are drawn wider."""
+
 
 def new_canvas(settings: FigureSettings, *, exact: bool) -> Canvas:
     """Start a figure."""
@@ -143,7 +146,7 @@ def draw_footer(
     source = f"warpspace {__version__} · scene {' · '.join(scene.name for scene in scenes)}"
     source, size = canvas.fit(source, 0.45 * room, SIZES.small)
     canvas.text(canvas.width - margin, y, source, size=size, colour=theme.muted, ha="right")
-    left = room - canvas.text_size(source, size)[0] - canvas.px(24.0)
+    left = HINTED * (room - canvas.text_size(source, size)[0]) - canvas.px(24.0)
     words = [
         " / ".join(dict.fromkeys(map(convention_words, scenes))),
         "error = actual − nominal",

@@ -20,12 +20,14 @@ from warpspace.app.state.concept_choice import (
     LOOPS,
     OVERS,
     TOLERANCES,
+    Chosen,
     ConceptChoice,
 )
 from warpspace.exceptions import WarpspaceError
 
 if TYPE_CHECKING:
     from warpspace.app.evaluation.concepts import Answer
+    from warpspace.scene.concepts import Concept
 
 logger = logging.getLogger(__name__)
 FEW = (
@@ -212,21 +214,22 @@ class ConceptsPanel:
 
     def _rows(self, state: AppState) -> list[ConceptRow]:
         """List the chosen machines, with numbers and pictures where they were compared."""
-        before = self._compared.machines if self._answer is not None else ()
         rows: list[ConceptRow] = []
         for chosen in self._choice.machines:
-            place = next((at for at, one in enumerate(before) if one.is_same(chosen)), None)
-            known = place is not None and self._answer is not None
             title = f"{state.scene.title} (as it stands)" if chosen.scene is None else chosen.title
-            rows.append(
-                ConceptRow(
-                    title,
-                    chosen.scene is not None,
-                    self._answer.concepts[place] if known else None,
-                    self._pictures[place] if known and self._pictures else "",
-                )
-            )
+            opens = chosen.scene is not None
+            rows.append(ConceptRow(title, opens, *self._known(chosen)))
         return rows
+
+    def _known(self, chosen: Chosen) -> "tuple[Concept | None, str]":
+        """Give numbers and picture of a machine, as far as there are any."""
+        if self._answer is None:
+            return None, ""
+        for place, one in enumerate(self._compared.machines):
+            if one.is_same(chosen):
+                picture = self._pictures[place] if self._pictures else ""
+                return self._answer.concepts[place], picture
+        return None, ""
 
     def _note(self, state: AppState) -> str:
         """Say what is to be done next, or what went wrong."""

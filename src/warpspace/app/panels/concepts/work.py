@@ -8,6 +8,7 @@ from math import exp
 from typing import TYPE_CHECKING, Any
 
 from warpspace.app.documents.jobs import Jobs, Progress
+from warpspace.app.documents.services import ConceptRequest
 from warpspace.app.evaluation.concepts import Answer, Question, answer
 from warpspace.app.panels.context import PanelContext
 from warpspace.app.readouts.concepts import cut_strip
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 COMPARING, SHEET = "Comparing machines", "Sheet of all machines"
 SAMPLED = 45.0
 """Per cent of the bar when all machines are sampled; the rest are pictures."""
+STRIP_PX = (480, 340)
+"""Size of each picture; it is shown about half as large, sharp on fine screens too."""
 DRAWING_S, SHEET_S = 6.0, 8.0
 """How long pictures usually take."""
 
@@ -66,13 +69,13 @@ class ConceptWork:
 
         def work(cancelled: threading.Event) -> None:
             found = answer(question, cancelled, progress)
-            if cancelled.is_set():
+            if found is None or cancelled.is_set():
                 return
             self._context.act(partial(self._found, found, choice))
             if draw is None:
                 return
             self._drawing_since = time.monotonic()
-            strip = draw(question.request(dark=dark, strip=True), cancelled)
+            strip = draw(_request(question, dark, STRIP_PX), cancelled)
             pictures = cut_strip(strip, len(question.scenes))
             if not cancelled.is_set():
                 self._context.act(partial(self._drawn, found, pictures))
@@ -87,7 +90,7 @@ class ConceptWork:
             return True
 
         def work(cancelled: threading.Event) -> None:
-            content = draw(question.request(dark=dark, strip=False), cancelled)
+            content = draw(_request(question, dark), cancelled)
             if not cancelled.is_set():
                 client.send_file_download("concepts.png", content, save_immediately=True)
                 client.flush()
@@ -114,3 +117,10 @@ class ConceptWork:
             return SAMPLED * min(self._share, 1.0)
         drawn = 1.0 - exp(-(time.monotonic() - self._drawing_since) / DRAWING_S)
         return SAMPLED + (100.0 - SAMPLED) * drawn
+
+
+def _request(
+    question: Question, dark: bool, strip_px: tuple[int, int] | None = None
+) -> ConceptRequest:
+    """Ask for the pictures alone, or for a sheet with words."""
+    return ConceptRequest(question.scenes, question.plan(), question.loop, dark, strip_px)

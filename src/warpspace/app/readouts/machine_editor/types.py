@@ -16,7 +16,7 @@ from warpspace.scene.machines import machine_picture
 WIDTH_PX = 240
 """Of a small picture: it is shown smaller, sharp on fine screens too."""
 QUALITY = 80
-DRAWING = (0.0, 0.11, 0.66, 0.93)
+DRAWING = (0.02, 0.16, 0.6, 0.875)
 """Part of a picture in which the machine is: left, upper, right and lower end."""
 
 
