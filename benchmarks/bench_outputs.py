@@ -93,7 +93,7 @@ def measure() -> Section:
             )
     text = (
         "Whole commands with everything they load, beside the start of Python with numpy; fields"
-        " also beside what else writes the same numbers, which holds the whole table. Processor time"
-        " counts the renderer's process and its threads too."
+        " also beside what else writes the same numbers, which holds the whole table. Processor"
+        " time counts the renderer's process and its threads too."
     )
     return Section("Files", text, rows)
