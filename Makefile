@@ -46,10 +46,8 @@ format: $(DEV_STAMP) ## format the code and apply safe fixes
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-bench: $(DEV_STAMP) ## run every benchmark
-	@set -e; for script in benchmarks/bench_*.py; do \
-	    [ -e "$$script" ] || { echo "no benchmarks/bench_*.py"; exit 1; }; \
-	    echo "== $$script"; $(BIN)/python "$$script" $(ARGS); done
+bench: system-packages $(DEV_STAMP) ## run every benchmark and write docs/performance.md
+	$(BIN)/python benchmarks/run.py $(ARGS)
 
 screenshots: system-packages $(DEV_STAMP) ## take the pictures of README and docs anew
 	$(BIN)/python examples/screenshots.py $(ARGS)

@@ -1,117 +1,62 @@
-"""How long the model takes: a slider move, a new basis, and the start of the command line.
-
-Each figure stands beside a floor measured in the same run, so that a busy or slow machine shows as
-such: the ratio is what to compare between machines.
-"""
-
-import subprocess
-import sys
-import time
-from collections.abc import Callable
-from dataclasses import dataclass
+"""How long the model takes: a slider move and a new basis."""
 
 import numpy as np
+from table import Growth, Row, Section
+from timing import best, in_turns
 
 from warpspace import load_scene
+from warpspace.field.basis import ErrorBasis
 from warpspace.field.evaluate import amplitudes_of
 from warpspace.field.grid import build_grid
+from warpspace.kinematics.model import Loop
 from warpspace.scene.pipeline import grid_basis
 
 NODES = 21
+PARAMETERS = (5, 10, 20, 40)
 
 
-@dataclass(frozen=True)
-class Row:
-    """One line of the table."""
-
-    what: str
-    ms: float
-    floor: str
-    floor_ms: float
-    target: str
-
-
-def best_ms(run: Callable[[], object], repeats: int) -> float:
-    """Give the shortest of several runs, ms: the one that was disturbed least."""
-    run()
-    times = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        run()
-        times.append(time.perf_counter() - start)
-    return 1e3 * min(times)
-
-
-def python(*arguments: str) -> Callable[[], object]:
-    """Give a run of a fresh interpreter."""
-    return lambda: subprocess.run([sys.executable, *arguments], check=True, capture_output=True)
-
-
-def measure() -> list[Row]:
-    """Measure everything once."""
+def measure() -> Section:
+    """Measure a slider move, and a basis for another place."""
     scene = load_scene("dvf5000_first")
     grid = build_grid(scene.model, scene.workspace, NODES)
     basis = grid_basis(scene, grid)
     amplitudes = amplitudes_of(scene.errors, basis.keys)
+    every = np.arange(1.0, len(basis.keys) + 1.0)
     flat = np.random.default_rng(0).standard_normal((len(basis.keys), grid.nominal_mm.size))
-    product = best_ms(lambda: amplitudes @ flat, 50)
-    written = best_ms(lambda: np.zeros(basis.position.shape) + 1.0, 10)
+    product = f"numpy's product, {flat.shape[0]} × {flat.shape[1]}"
     tilted = scene.workspace.moved({"B": -30.0, "C": 45.0})
 
-    def new_basis(loop: str, nodes: int = NODES) -> Callable[[], object]:
-        from warpspace.kinematics.model import Loop
+    def new_basis(loop: Loop, nodes: int = NODES) -> object:
+        return grid_basis(scene, build_grid(scene.model, tilted, nodes), scene.view(loop))
 
-        return lambda: grid_basis(
-            scene, build_grid(scene.model, tilted, nodes), scene.view(Loop(loop))
+    rows = []
+    for words, values in (("7 errors", amplitudes), (f"all {len(every)} errors", every)):
+        took, floor = in_turns(lambda: basis.evaluate(values), lambda: values @ flat, 50)  # noqa: B023
+        rows.append(
+            Row(f"slider move, position and tilt, {words}", took, product, floor, most=5e-3)
+        )
+    writing = "filling one array of its size"
+    for loop in Loop:
+        took, floor = in_turns(
+            lambda: new_basis(loop),  # noqa: B023
+            lambda: np.zeros(basis.position.shape) + 1.0,
+        )
+        rows.append(Row(f"basis for new B, C: {loop} loop", took, writing, floor, most=0.1))
+
+    def part(count: int) -> ErrorBasis:
+        few = slice(count)
+        return ErrorBasis(
+            basis.keys[few], basis.nominal_mm, basis.position[few], basis.orientation[few]
         )
 
-    floor = f"one product {flat.shape[0]} × {flat.shape[1]}"
-    write = "filling one array of its size"
-    return [
-        Row(
-            "slider move (position and tilt)",
-            best_ms(lambda: basis.evaluate(amplitudes), 50),
-            floor,
-            product,
-            "≤ 5 ms with geometry",
-        ),
-        *(
-            Row(
-                f"basis for new B, C: {loop} loop",
-                best_ms(new_basis(loop), 5),
-                write,
-                written,
-                "≤ 100 ms",
-            )
-            for loop in ("tool", "workpiece", "relative")
-        ),
-        Row(
-            "basis for another density (11³)",
-            best_ms(new_basis("tool", 11), 5),
-            write + " (21³)",
-            written,
-            "≤ 100 ms",
-        ),
-        Row(
-            "warpspace -h",
-            best_ms(python("-m", "warpspace", "-h"), 5),
-            "python -c pass",
-            best_ms(python("-c", "pass"), 5),
-            "≤ 300 ms",
-        ),
+    parts = {count: part(count) for count in PARAMETERS if count <= len(every)}
+    growth = [
+        Growth(
+            f"slider move, {NODES}³ nodes",
+            "errors",
+            [*map(float, parts)],
+            [best(lambda: small.evaluate(every[:n]), 50) for n, small in parts.items()],  # noqa: B023
+        )
     ]
-
-
-def main() -> None:
-    """Print the table."""
-    print(f"nodes {NODES}³ = {NODES**3}; best of several runs; ratio = time / floor\n")
-    print(f"{'what':<34}{'ms':>9}  {'floor':<40}{'ms':>9}{'ratio':>8}  target")
-    for row in measure():
-        print(
-            f"{row.what:<34}{row.ms:>9.2f}  {row.floor:<40}{row.floor_ms:>9.2f}"
-            f"{row.ms / row.floor_ms:>8.1f}  {row.target}"
-        )
-
-
-if __name__ == "__main__":
-    main()
+    text = f"What the app works out, over {NODES}³ = {NODES**3} nodes."
+    return Section("The model behind a slider", text, rows, growth)

@@ -1,14 +1,9 @@
-"""How long sampling takes: beside the bare matrix products, and beside a plain loop over nodes.
-
-Floors are measured in the same run, so that a busy or slow machine shows as such.
-"""
-
-import subprocess
-import sys
-import time
-from collections.abc import Callable
+"""How long sampling takes, beside the bare matrix products and beside a line of NumPy."""
 
 import numpy as np
+from scipy import stats
+from table import Growth, Row, Section
+from timing import best, in_turns, python
 
 import warpspace
 from warpspace.analysis.draws import build_draws, loop_keys
@@ -17,80 +12,95 @@ from warpspace.analysis.nodes import node_gains, reduce_nodes
 from warpspace.analysis.points import spread_places
 from warpspace.field.evaluate import View
 from warpspace.kinematics.model import Loop
+from warpspace.scene.concepts import ConceptPlan, compare_concepts
 
 MACHINES, NODES = 100_000, 11
-LOOP_MACHINES = 2_000
+SAMPLES = (10_000, 30_000, 100_000, 300_000, 1_000_000)
+LIBRARY = (
+    *("dvf5000_first", "machine_trunnion_ac", "machine_head_head_ca", "machine_bridge_cmm"),
+    *("machine_gantry_mill", "machine_scara", "machine_printer_3d", "machine_lathe_mill"),
+)
+COUNTS = (1, 2, 4, 8)
 MANY = """
-import resource, warpspace
+import re, sys, warpspace
+from pathlib import Path
 warpspace.montecarlo(warpspace.load_scene("dvf5000_general"), samples=10_000_000)
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+found = re.search(r"VmHWM:\\s*(\\d+) kB", Path("/proc/self/status").read_text())
+print(f"peak {found[1]} kB", file=sys.stderr)
 """
 
 
-def best(run: Callable[[], object], repeats: int = 3) -> float:
-    """Give the shortest of several runs, s."""
-    times = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        run()
-        times.append(time.perf_counter() - start)
-    return min(times)
-
-
-def plain_loop(amplitudes: np.ndarray, gains: np.ndarray) -> np.ndarray:
-    """Largest |E| of every machine, node by node."""
-    largest = np.zeros(len(amplitudes))
-    for node in range(gains.shape[2]):
-        error = np.stack([amplitudes @ gain[:, node] for gain in gains], -1)
-        largest = np.maximum(largest, np.linalg.norm(error, axis=-1))
-    return largest
-
-
-def main() -> None:
-    """Print the figures."""
+def measure() -> Section:
+    """Measure sampled machines."""
     scene = warpspace.load_scene("dvf5000_general")
     keys = loop_keys(scene.model, Loop.TOOL, scene.parameter_keys)
     draws = build_draws(scene.tolerances, keys, "uniform")
     places = spread_places(scene.model, Loop.TOOL, scene.workspace, None, NODES)
     gains = node_gains(scene.model, keys, View(), places)
-    plan = Plan(samples=MACHINES)
     amplitudes = draws.draw(np.random.default_rng(0), MACHINES)
     out = np.empty((4096, gains.shape[2]))
+    widths = np.ptp(amplitudes, axis=0) / 2.0
+    one_node = np.ascontiguousarray(gains[:, :, 0].T)
+    nodes = gains.shape[2]
 
-    def bare() -> None:
+    def products() -> None:
         for gain in gains:
             for start in range(0, MACHINES, len(out)):
                 block = amplitudes[start : start + len(out)]
                 np.matmul(block, gain, out=out[: len(block)])
 
     def engine(over: str) -> None:
-        job = lambda rng, count: reduce_nodes(draws.draw(rng, count), gains, over)  # noqa: E731
-        for _ in sample_chunks(job, plan):
+        for _ in sample_chunks(
+            lambda rng, count: reduce_nodes(draws.draw(rng, count), gains, over),
+            Plan(samples=MACHINES),
+        ):
             pass
 
-    floor = best(bare)
-    print(f"{MACHINES:,} machines × {NODES}³ nodes × {len(keys)} parameters")
-    print(f"  bare matrix products                      {floor:8.3f} s")
+    def numpy_line() -> object:
+        rng = np.random.default_rng(0)
+        drawn = rng.uniform(-widths, widths, (MACHINES, len(widths)))
+        return np.percentile(np.linalg.norm(drawn @ one_node, axis=1), 95)
+
+    def scipy_line() -> object:
+        drawn = stats.uniform(-widths, 2.0 * widths).rvs((MACHINES, len(widths)), random_state=0)
+        return np.percentile(np.linalg.norm(drawn @ one_node, axis=1), 95)
+
+    def ours() -> object:
+        return warpspace.montecarlo(scene, samples=MACHINES)
+
+    rows = []
+    for words, line in (("NumPy", numpy_line), ("SciPy", scipy_line)):
+        took, floor = in_turns(ours, line, 3)
+        beside = f"one line of {words} at one node, P95 only"
+        rows.append(Row(f"montecarlo, {MACHINES:,} machines at random points", took, beside, floor))
+    beside = f"the bare matrix products, {len(keys)} errors"
     for over in ("max", "mean"):
-        took = best(lambda: engine(over))  # noqa: B023 - called at once
-        ratio = f"{took / floor:.2f} × (target ≤ 4, aim 2)"
-        print(f"  drawing and {over:<4} over all nodes           {took:8.3f} s  {ratio}")
-    for over in ("sampled", "max", "mean"):
-        took = best(lambda: warpspace.montecarlo(scene, samples=MACHINES, over=over))  # noqa: B023
-        print(f"  warpspace.montecarlo(over={over!r:<9})       {took:8.3f} s  {took / floor:.2f} ×")
-    few = amplitudes[:LOOP_MACHINES]
-    fast = best(lambda: reduce_nodes(few, gains, "max"))
-    slow = best(lambda: plain_loop(few, gains), 1)
-    ratio = f"{slow / fast:.1f} × the engine on one thread"
-    print(f"  plain loop over nodes, {LOOP_MACHINES:,} machines      {slow:8.3f} s  {ratio}")
-    start = time.perf_counter()
-    done = subprocess.run([sys.executable, "-c", MANY], check=True, capture_output=True, text=True)
-    megabytes = int(done.stdout) / 1024.0
-    print(
-        f"  10,000,000 machines sampled: {time.perf_counter() - start:.1f} s,"
-        f" {megabytes:.0f} MiB at most (target < 1024)"
+        took, floor = in_turns(lambda: engine(over), products, 2)  # noqa: B023
+        what = f"drawing {MACHINES:,} machines, {over} over {nodes} nodes"
+        rows.append(Row(what, took, beside, floor, most_ratio=4.0))
+    many = python("-c", MANY)
+    floor = "the amplitudes of all machines at once"
+    held = 10_000_000 * len(keys) * 8 / 2**20
+    rows.append(Row("memory for 10,000,000 machines", many.peak_mb, floor, held, "MB", most=1024.0))
+    scenes = [warpspace.load_scene(name) for name in LIBRARY]
+    plan = ConceptPlan(samples=20_000)
+    growth = [
+        Growth(
+            "montecarlo at random points",
+            "samples",
+            [*map(float, SAMPLES)],
+            [best(lambda: warpspace.montecarlo(scene, samples=n), 2) for n in SAMPLES],  # noqa: B023
+        ),
+        Growth(
+            "concepts side by side, 20,000 samples each",
+            "machines",
+            [*map(float, COUNTS)],
+            [best(lambda: compare_concepts(scenes[:n], plan), 1) for n in COUNTS],  # noqa: B023
+        ),
+    ]
+    text = (
+        "Machines sampled from their tolerances. The lines of NumPy and SciPy draw the same number"
+        " of machines at one node; ours draws a point for each machine too, keeps a histogram and"
+        " streams, so that memory stays flat. Processor time of all threads together."
     )
-
-
-if __name__ == "__main__":
-    main()
+    return Section("Monte Carlo", text, rows, growth)

@@ -1,61 +1,99 @@
-"""Exports and reports: how long they take and how large they get, beside what the issue allows.
+"""Files: a field of a million nodes, exports, reports; their time, their memory, their size."""
 
-Run: python benchmarks/bench_outputs.py
-"""
-
-import subprocess
-import sys
 import tempfile
-import time
+from functools import partial
 from pathlib import Path
 
-LIMITS = (  # name, arguments, seconds allowed, bytes allowed
-    ("export .glb", ("export", "dvf5000_first"), "glb", None, None),
-    ("export .vts", ("export", "dvf5000_first"), "vts", None, None),
-    ("export .csv", ("export", "dvf5000_first"), "csv", None, None),
-    ("export .html", ("export", "dvf5000_first"), "html", None, 3_000_000),
-    ("report .html, one scene", ("report", "dvf5000_first"), "html", 30.0, 8_000_000),
-    ("report .html, two scenes", ("report", "dvf5000_first", "dvf5000_second"), "html", 30.0, 8e6),
-    ("report .pdf, two scenes", ("report", "dvf5000_first", "dvf5000_second"), "pdf", 30.0, 8e6),
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+from table import Row, Section
+from timing import cheapest, in_turns, python, warpspace
+
+from warpspace import evaluate, load_scene
+from warpspace.field.grid import build_grid
+from warpspace.outputs.exports.fields import FIELD_ENDINGS, FieldRecord, write_field
+
+NODES, PEER_NODES = 101, 41
+EXPORTS = (  # name, arguments, ending, seconds and MB allowed
+    ("export .glb", ("export", "dvf5000_first"), ".glb", 30.0, 8.0),
+    ("export .vts", ("export", "dvf5000_first"), ".vts", 30.0, 8.0),
+    ("export .html", ("export", "dvf5000_first"), ".html", 30.0, 3.0),
+    ("report .html, one scene", ("report", "dvf5000_first"), ".html", 30.0, 8.0),
+    ("report .pdf, two scenes", ("report", "dvf5000_first", "dvf5000_second"), ".pdf", 30.0, 8.0),
     (
         "animate .webp, 12 pictures",
         ("animate", "dvf5000_first", "--frames", "12"),
-        "webp",
-        None,
-        None,
+        ".webp",
+        60.0,
+        8.0,
     ),
 )
 
 
-def main() -> int:
-    """Run every command as a user does; exit 1 where a limit is broken."""
-    broken = 0
-    floor = _timed(["-c", "import warpspace, numpy"])
-    print(f"{'':30} {'seconds':>9} {'allowed':>9} {'MB':>8} {'allowed':>9}")
-    print(f"{'floor: python, numpy':30} {floor:9.2f}")
-    with tempfile.TemporaryDirectory() as folder:
-        for number, (name, arguments, ending, seconds, size) in enumerate(LIMITS):
-            target = Path(folder) / f"{number}.{ending}"
-            took = _timed(["-m", "warpspace", *arguments, "-o", str(target)])
-            large = target.stat().st_size
-            late = seconds is not None and took > seconds
-            fat = size is not None and large > size
-            broken += late + fat
-            print(
-                f"{name:30} {took:9.2f} {'' if seconds is None else f'{seconds:.0f}':>9}"
-                f" {large / 1e6:8.2f} {'' if size is None else f'{size / 1e6:.0f}':>9}"
-                + (" TOO SLOW" if late else "")
-                + (" TOO LARGE" if fat else "")
+def peers(record: FieldRecord, folder: Path) -> dict[str, tuple[str, partial]]:
+    """What else writes the same numbers, all at once."""
+    shape = record.shape
+    table = {
+        name: np.broadcast_to(values, shape).reshape(-1) for name, values in record.columns.items()
+    }
+    arrays = {"nominal": record.field.nominal_mm, "error": record.field.error_um}
+    arrays |= {"norm": record.field.norm_um, "orientation": record.field.orientation_urad}
+    frame = pd.DataFrame(table)
+    csv = partial(frame.to_csv, folder / "p.csv", index=False, float_format="%.9g")
+    return {
+        ".parquet": (
+            "pyarrow, the whole table",
+            partial(pq.write_table, pa.table(table), folder / "p.parquet", compression="zstd"),
+        ),
+        ".npz": ("numpy.savez", partial(np.savez, folder / "p.npz", **arrays)),
+        ".csv": ("pandas to_csv, nine digits", csv),
+    }
+
+
+def measure() -> Section:
+    """Run the commands as a user does."""
+    rows = []
+    scene = load_scene("dvf5000_general")
+    grid = build_grid(scene.model, scene.workspace, PEER_NODES)
+    record = FieldRecord(grid.coordinates, evaluate(scene, grid=PEER_NODES))
+    floor = cheapest(lambda: python("-c", "import warpspace, numpy"))
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        target = folder / "f"
+        for ending, (words, peer) in peers(record, folder).items():
+            took, other = in_turns(
+                lambda: write_field(record, target.with_suffix(ending)),  # noqa: B023
+                peer,
+                3,
             )
-    return 1 if broken else 0
-
-
-def _timed(arguments: list[str]) -> float:
-    """Wall time of a Python process, s."""
-    start = time.perf_counter()
-    subprocess.run([sys.executable, *arguments], check=True, stdout=subprocess.DEVNULL)
-    return time.perf_counter() - start
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+            what = f"writing {PEER_NODES}³ nodes as {ending}"
+            rows.append(Row(what, took, words, other))
+        result = 101**3 * 3 * 8 / 1e6
+        for ending in FIELD_ENDINGS:
+            options = ("field", "dvf5000_first", "--grid", NODES, "--force", "-o")
+            cost = cheapest(lambda: warpspace(*options, target.with_suffix(ending)), 2)  # noqa: B023
+            what = f"field --grid {NODES} -o {ending}"
+            rows.append(Row(what, cost.processor_s, "python, numpy", floor.processor_s, most=3.0))
+            rows.append(
+                Row(f"{what}, memory", cost.peak_mb, "the errors", result, "MB", most=500.0)
+            )
+        for what, arguments, ending, seconds, size in EXPORTS:
+            written = folder / f"{what.split(',')[0].replace(' ', '_')}{ending}"
+            cost = python("-m", "warpspace", *arguments, "-o", written)
+            large = written.stat().st_size / 1e6
+            beside = "python, numpy"
+            rows += [
+                Row(what, cost.processor_s, beside, floor.processor_s, most=seconds),
+                Row(f"{what}, wall", cost.wall_s, beside, floor.wall_s),
+            ]
+            rows.append(
+                Row(f"{what}, size", large, "the errors of 21³", 21**3 * 24e-6, "MB", most=size)
+            )
+    text = (
+        "Whole commands with everything they load, beside the start of Python with numpy; fields"
+        " also beside what else writes the same numbers, which holds the whole table. Processor"
+        " time counts the renderer's process and its threads too."
+    )
+    return Section("Files", text, rows)

@@ -1,28 +1,27 @@
 """Five tabs drag a slider each at 20 Hz beside fifteen idle ones: latency, stale values, memory.
 
-    python benchmarks/bench_tabs.py [--tabs 5] [--idle 15] [--seconds 60] [--rate 20]
-
 Latency is from sending a slider's position until the numbers of that position, or of a later one,
-have come back: everything but the browser. The load of the machine stands beside it.
+have come back: everything but the browser.
 """
 
-import argparse
 import asyncio
-import os
-import sys
 import time
+from dataclasses import dataclass
 
 import numpy as np
 from app_client import NUMBERS, Tab, rss_mb, running_app
+from table import Growth, Row, Section
+from timing import best
 
 from warpspace import load_scene
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.readouts import summary as legend
 from warpspace.app.state.app_state import start_state
 
+TABS, IDLE, SECONDS, RATE = 5, 15, 15.0, 20.0
+GROWING = (1, 2, 4, 8)
 KEY = "EAY"
 POSITIONS = 61
-SETTLED_S = 10.0
 FINAL_S = 10.0
 """How long the last value may take to be shown before it counts as stale."""
 
@@ -37,6 +36,18 @@ def expected() -> tuple[np.ndarray, dict[tuple, int]]:
     }
     assert len(shown) == POSITIONS, "positions cannot be told apart by their numbers"
     return values, shown
+
+
+@dataclass(frozen=True)
+class Found:
+    """Latencies in s, processor time of a picture in s, its bytes, stale tabs, memory in MB."""
+
+    median_s: float
+    p95_s: float
+    picture_s: float
+    size: float
+    stale: int
+    memory_mb: float
 
 
 async def drag(tab: Tab, values: np.ndarray, seconds: float, rate: float) -> list[tuple]:
@@ -75,79 +86,85 @@ def latencies(sent: list[tuple], seen: list[tuple], shown: dict[tuple, int]) -> 
     return found
 
 
-async def run(url: str, process, options: argparse.Namespace) -> bool:
-    """Measure and print; give whether all targets are met."""
+async def drag_all(url: str, process, tabs: int, idle: int) -> Found:
+    """Have some tabs drag beside some idle ones."""
     values, shown = expected()
-    every = [Tab(url) for _ in range(options.tabs + options.idle)]
-    tabs = every[: options.tabs]
-    start = time.perf_counter()
+    every = [Tab(url) for _ in range(tabs + idle)]
+    dragging = every[:tabs]
     for tab in every:
         await tab.open()
-    print(
-        f"{len(every)} tabs open after {time.perf_counter() - start:.1f} s,"
-        f" {len(tabs)} of them drag"
-    )
-    for tab in tabs:
+    for tab in dragging:
         tab.seen.clear()
         tab.bytes = 0
-    process.cpu_percent()
-    memory: list[tuple[float, float]] = []
-
-    async def watch() -> None:
-        begin = time.perf_counter()
-        while True:
-            memory.append((time.perf_counter() - begin, rss_mb(process)))
-            await asyncio.sleep(0.5)
-
-    watcher = asyncio.create_task(watch())
-    sent = await asyncio.gather(*(drag(tab, values, options.seconds, options.rate) for tab in tabs))
-    cpu = process.cpu_percent()
-    pictures = sum(len(tab.seen) for tab in tabs)
-    moved = sum(tab.bytes for tab in tabs) / max(sum(len(tab.seen) for tab in tabs), 1)
+    used = sum(process.cpu_times()[:2])
+    sent = await asyncio.gather(*(drag(tab, values, SECONDS, RATE) for tab in dragging))
+    used = sum(process.cpu_times()[:2]) - used
     end = time.perf_counter()
     while True:
         await asyncio.sleep(0.1)
-        pairs = zip(tabs, sent, strict=True)
+        pairs = zip(dragging, sent, strict=True)
         stale = sum(shown.get(tab.shown) != out[-1][1] for tab, out in pairs)
         if not stale or time.perf_counter() - end > FINAL_S:
             break
-    final = time.perf_counter() - end
-    watcher.cancel()
+    memory = rss_mb(process)
+    pictures = sum(len(tab.seen) for tab in dragging)
     times = [
-        t for tab, out in zip(tabs, sent, strict=True) for t in latencies(out, tab.seen, shown)
+        t for tab, out in zip(dragging, sent, strict=True) for t in latencies(out, tab.seen, shown)
     ]
+    size = sum(tab.bytes for tab in dragging) / max(pictures, 1)
     for tab in every:
         await tab.close()
-    p50, p95, worst = 1e3 * np.quantile(times, (0.5, 0.95, 1.0))
-    settled = [mb for at, mb in memory if at >= min(SETTLED_S, options.seconds / 2)]
-    growth = np.mean(settled[-4:]) - np.mean(settled[:4])
-    load = os.getloadavg()[0]
-    print(f"positions sent       {sum(map(len, sent))}, answered {len(times)}")
-    print(
-        f"latency              median {p50:.1f} ms, p95 {p95:.1f} ms (≤ 50), worst {worst:.0f} ms"
-    )
-    each = 10 * cpu * options.seconds / pictures
-    print(f"pictures             {pictures}, {each:.2f} ms of a core each")
-    print(f"bytes per picture    {moved / 1e3:.1f} kB (≤ 200)")
-    print(f"stale final values   {stale} (0), all shown after {final:.1f} s")
-    print(f"memory               {settled[-1]:.0f} MB, {growth:+.1f} MB after settling (flat)")
-    print(f"server               {cpu:.0f} % of a core; load of the machine {load:.1f}")
-    print(f"messages             {sorted({p for tab in tabs for p in tab.problems}) or 'none'}")
-    return p95 <= 50.0 and stale == 0 and growth < 10.0 and moved <= 200e3
+    p50, p95 = np.quantile(times, (0.5, 0.95))
+    return Found(p50, p95, used / max(pictures, 1), size, stale, memory)
 
 
-def main() -> None:
-    """Run from the command line; exit 1 where a target is missed."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--tabs", type=int, default=5, help="tabs that drag")
-    parser.add_argument("--idle", type=int, default=15, help="tabs that are open beside them")
-    parser.add_argument("--seconds", type=float, default=60.0)
-    parser.add_argument("--rate", type=float, default=20.0, help="positions per second and tab")
-    options = parser.parse_args()
+def measure() -> Section:
+    """Measure five dragging tabs beside fifteen idle ones, and one tab to eight."""
     with running_app() as (url, process):
-        fine = asyncio.run(run(url, process, options))
-    sys.exit(0 if fine else 1)
-
-
-if __name__ == "__main__":
-    main()
+        bare = rss_mb(process)
+        grown = [asyncio.run(drag_all(url, process, tabs, 0)) for tabs in GROWING]
+    with running_app() as (url, process):
+        found = asyncio.run(drag_all(url, process, TABS, IDLE))
+    live, state = LiveModel(), start_state(load_scene("dvf5000_first"))
+    live.evaluate(state)
+    moves = iter(np.linspace(-80.0, 80.0, 1000))
+    model = best(lambda: live.evaluate(state.with_amplitude(KEY, float(next(moves)))), 50)
+    words = f"{TABS} tabs at {RATE:g} positions a second beside {IDLE} idle ones"
+    tick = 1.0 / RATE
+    one = grown[0]
+    rows = [
+        Row(f"latency, median, wall: {words}", found.median_s, "between two positions", tick),
+        Row(
+            f"latency, P95, wall: {words}",
+            found.p95_s,
+            "between two positions",
+            tick,
+            most_ratio=1.0,
+        ),
+        Row("processor time of a picture of one tab", found.picture_s, "the model alone", model),
+        Row(
+            "bytes of a picture",
+            found.size / 1e3,
+            "one tab alone",
+            one.size / 1e3,
+            "kB",
+            most=200.0,
+        ),
+        Row("stale final values, + 1", found.stale + 1.0, "none, + 1", 1.0, "", most_ratio=1.0),
+        Row(f"memory with {TABS + IDLE} tabs", found.memory_mb, "with none", bare, "MB"),
+    ]
+    counts = [*map(float, GROWING)]
+    growth = [
+        Growth(
+            "processor time of all pictures of a position",
+            "tabs",
+            counts,
+            [n * f.picture_s for n, f in zip(GROWING, grown, strict=True)],
+        ),
+        Growth("memory of the server", "tabs", counts, [f.memory_mb for f in grown], "MB"),
+    ]
+    text = (
+        "Clients that speak viser's protocol, without a browser. Latency is from sending a"
+        " position until the numbers of that position, or of a later one, have come back."
+    )
+    return Section("Many tabs", text, rows, growth)

@@ -24,12 +24,11 @@ def check_machine_table(
     OptionError, OutputError
         If the file cannot or must not be written, or a CSV file would be too long.
     """
-    from warpspace.outputs.exports.rows import ROW_ENDINGS, check_rows
+    from warpspace.outputs.exports.rows import ROW_ENDINGS
 
     if output is None:
         return
     check_output(output, ROW_ENDINGS, force=force, scenes=names)
-    check_rows(output)
     rows = samples * len(names)
     if output.lower().endswith(".csv") and rows > MOST_CSV_ROWS:
         raise OptionError(

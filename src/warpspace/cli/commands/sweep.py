@@ -98,7 +98,7 @@ def sweep(
     number of workers, processes or machines of a cluster.
     """
     from warpspace.analysis.plan import Plan
-    from warpspace.outputs.exports.rows import ROW_ENDINGS, check_rows, write_rows
+    from warpspace.outputs.exports.rows import ROW_ENDINGS, write_rows
     from warpspace.scene.sweeps import check_half_widths, count_points
     from warpspace.scene.sweeps import sweep as run
 
@@ -110,7 +110,6 @@ def sweep(
         raise OptionError(f"{count:,} rows; expected at most {SWEEP_CASES:,}")
     if output is not None:
         check_output(output, ROW_ENDINGS, force=force, scenes=names)
-        check_rows(output)
     plan = Plan(samples, seed, over, grid, limit_um, parse_cylinder(cylinder), None)
     plan.check()
     total = samples * count

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from warpspace import __version__
-from warpspace.exceptions import OutputError
 from warpspace.outputs.files import write_atomically
 
 ROW_ENDINGS = (".parquet", ".csv")
@@ -50,7 +49,7 @@ def write_rows(
     Raises
     ------
     OutputError
-        If the file cannot be written, or pyarrow is needed and not installed.
+        If the file cannot be written.
     """
     write = _parquet if Path(path).suffix.lower() == ".parquet" else _csv
     with (
@@ -58,23 +57,6 @@ def write_rows(
         write(temporary, kinds, remarks or {}) as append,
     ):
         yield append
-
-
-def check_rows(path: str | Path) -> None:
-    """Refuse a Parquet file where nothing can write it, before the work begins.
-
-    Raises
-    ------
-    OutputError
-        If pyarrow is not installed.
-    """
-    if Path(path).suffix.lower() == ".parquet":
-        try:
-            import pyarrow.parquet  # noqa: F401 - whether it is there
-        except ImportError:
-            raise OutputError(
-                f"{path}: Parquet needs pyarrow: pip install 'warpspace[cluster]', or write a .csv"
-            ) from None
 
 
 @contextmanager

@@ -1,0 +1,80 @@
+"""How long things take: processor time, in turns with what stands beside them.
+
+Processor time does not count what else a machine is busy with, and taking turns lets what is left
+of it (caches, clock) meet both sides. The shortest of several runs is the one disturbed least.
+"""
+
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from os import wait4
+
+Run = Callable[[], object]
+PEAK = """
+import re, sys
+from pathlib import Path
+from warpspace.cli import main
+try:
+    main()
+finally:
+    found = re.search(r"VmHWM:\\s*(\\d+) kB", Path("/proc/self/status").read_text())
+    print(f"peak {found[1]} kB", file=sys.stderr)
+"""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a command took: processor time in s, wall time in s, memory at most in MB."""
+
+    processor_s: float
+    wall_s: float
+    peak_mb: float = 0.0
+
+
+def processor_s(run: Run) -> float:
+    """Processor time of one run, all threads together, s."""
+    start = time.process_time()
+    run()
+    return time.process_time() - start
+
+
+def best(run: Run, repeats: int = 5) -> float:
+    """Shortest processor time of several runs, after one that warms up, s."""
+    run()
+    return min(processor_s(run) for _ in range(repeats))
+
+
+def in_turns(ours: Run, beside: Run, repeats: int = 5) -> tuple[float, float]:
+    """Shortest processor times of two things that are run in turns, s."""
+    ours()
+    beside()
+    pairs = [(processor_s(ours), processor_s(beside)) for _ in range(repeats)]
+    return min(pair[0] for pair in pairs), min(pair[1] for pair in pairs)
+
+
+def python(*arguments: object) -> Cost:
+    """Run a fresh interpreter."""
+    start = time.perf_counter()
+    with subprocess.Popen(
+        [sys.executable, *map(str, arguments)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+    ) as process:
+        said = process.stderr.read().decode() if process.stderr else ""
+        _, status, used = wait4(process.pid, 0)
+        process.returncode = status
+    if status:
+        raise RuntimeError(f"{' '.join(map(str, arguments))}: {said}")
+    peak = [line.split()[1] for line in said.splitlines() if line.startswith("peak ")]
+    wall = time.perf_counter() - start
+    return Cost(used.ru_utime + used.ru_stime, wall, float(peak[0]) / 1024.0 if peak else 0.0)
+
+
+def warpspace(*arguments: object) -> Cost:
+    """Run the command line in a fresh interpreter, its memory measured too."""
+    return python("-c", PEAK, *arguments)
+
+
+def cheapest(run: Callable[[], Cost], repeats: int = 3) -> Cost:
+    """Give the run of several that took the least processor time."""
+    return min((run() for _ in range(repeats)), key=lambda cost: cost.processor_s)
