@@ -1,7 +1,7 @@
 """The errors of one axis as rigid motions along it, and back to curves."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,7 +13,8 @@ from warpspace.machine.axes import DIRECTIONS
 from warpspace.machine.curves.constant import Constant
 from warpspace.machine.curves.curve import ErrorFunction, Span
 from warpspace.machine.curves.directional import Directional
-from warpspace.machine.curves.pieces import SMALL, fit_curves
+from warpspace.machine.curves.pieces import SMALL, Pieces, fit_curves
+from warpspace.machine.curves.table import Table
 from warpspace.machine.errors import ErrorSet
 from warpspace.machine.travel import TravelDirection
 from warpspace.units import Array
@@ -92,6 +93,13 @@ class AxisErrors:
         functions = [self.errors.functions.get(key) for key in self.keys()]
         return np.unique(np.concatenate([np.zeros(0), *(f.kinks for f in functions if f)]))
 
+    def points(self, key: str) -> tuple[float, ...]:
+        """Positions at which an error was measured, as far as its curve knows them."""
+        function = self.errors.functions.get(key)
+        if isinstance(function, Pieces):
+            return function.points
+        return function.kinks if isinstance(function, Table) else ()
+
     def with_components(self, along: Along, *, adds: bool = False) -> ErrorSet:
         """Give the set with other component errors of the axis.
 
@@ -112,7 +120,7 @@ class AxisErrors:
         OptionError
             If an error that depends on a second axis would have to change.
         """
-        self._check(adds=adds)
+        self.refuse_two_arguments(adds=adds)
         ways = [TravelDirection.MEAN]
         functions = [self.errors.functions.get(key) for key in self.keys()]
         if any(function and function.has_directions for function in functions):
@@ -130,11 +138,13 @@ class AxisErrors:
                 )
             curve = _joined([curves[index] for curves in new], self.span)
             chosen.pop(key, None)
+            if isinstance(curve, Pieces):
+                curve = replace(curve, points=self.points(key))
             if curve is not None:
                 chosen[key] = curve
         return ErrorSet(chosen)
 
-    def _check(self, *, adds: bool) -> None:
+    def refuse_two_arguments(self, *, adds: bool) -> None:
         """Refuse errors of two arguments where they cannot stay as they are."""
         for key in self.keys():
             if self.depends_on_others(key) and not (adds and key[1] in DIRECTIONS[:3]):

@@ -46,6 +46,7 @@ def moved_to_constants(own: AxisErrors, taken: SmallMotion) -> ErrorSet:
     ``E0 · M · E = (E0 · G) · M · (M⁻¹ · G⁻¹ · M · E)``, exactly; before the motion ``E0 · E · M =
     (E0 · G) · (G⁻¹ · E) · M``.
     """
+    own.refuse_two_arguments(adds=False)
     if not taken.half.any() and not taken.shift_mm.any():
         return own.errors
     errors = own.with_components(lambda q, present: without(own, taken, q, present))

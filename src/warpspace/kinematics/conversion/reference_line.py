@@ -10,7 +10,7 @@ from warpspace.exceptions import OptionError
 from warpspace.kinematics.conversion.axis_errors import AxisErrors
 from warpspace.kinematics.conversion.gauge import moved_to_constants, without
 from warpspace.kinematics.conversion.small_motion import SmallMotion
-from warpspace.kinematics.model import Model
+from warpspace.kinematics.model import ComponentErrors, Model
 from warpspace.machine.curves.curve import Span
 from warpspace.machine.errors import ErrorSet
 from warpspace.units import MM_PER_UM, Array
@@ -111,17 +111,22 @@ def convert_reference_line(
     Raises
     ------
     OptionError
-        If the axis is rotary, or an error of it depends on a second one.
+        If the axis is rotary, its errors act before the motion, or one depends on a second axis.
 
     Notes
     -----
-    The lines of a curve with points of its own are laid through these points within the range (as
-    measured), any other through 101 evenly spread positions.
+    The line of a table is laid through its points within the range, as measured, and that of a
+    curve that was converted from one likewise; any other through 101 evenly spread positions.
     """
     for axis, line in lines.items():
         own = AxisErrors(model, errors, axis, spans[axis])
         if not model.machine.axes[axis].is_linear:
             raise OptionError(f"{axis} is rotary; only linear axes have straightness")
+        if own.order != ComponentErrors.AFTER_MOTION:
+            raise OptionError(
+                f"errors of {axis} act {own.order}, where a rotation tilts the motion as well and a"
+                " straightness does not; expected component_errors after_motion"
+            )
         errors = moved_to_constants(own, _line_motion(own, ReferenceLine(line)))
     return errors
 
@@ -148,7 +153,6 @@ def _line_motion(own: AxisErrors, line: ReferenceLine) -> SmallMotion:
 def _positions(own: AxisErrors, key: str) -> Array:
     """Choose the positions that the line of a straightness curve is laid through."""
     low, high = own.span
-    function = own.errors.functions.get(key)
-    kinks = np.array(() if function is None else function.kinks)
-    kinks = kinks[(kinks >= low) & (kinks <= high)]
-    return kinks if len(kinks) > 1 else np.linspace(low, high, EVENLY)
+    points = np.array(own.points(key))
+    points = points[(points >= low) & (points <= high)]
+    return points if len(points) > 1 else np.linspace(low, high, EVENLY)

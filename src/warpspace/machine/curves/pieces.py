@@ -36,16 +36,19 @@ class Pieces(ErrorFunction):
         Where the last one ends.
     coefficients : tuple of tuple of float, (n, up to 6)
         Of Σ cₖ·(q − start)ᵏ, per piece.
+    points : tuple of float
+        Positions at which it was measured, where it was converted from a table.
     """
 
     name: ClassVar[str] = "pieces"
     title: ClassVar[str] = "pieces of polynomials"
-    forms: ClassVar[tuple[tuple[str, ...], ...]] = (("pieces", "end"),)
+    forms: ClassVar[tuple[tuple[str, ...], ...]] = (("pieces", "end", "points"),)
     row_words: ClassVar[str] = "pieces of polynomials come from a conversion"
     edited_as_rows: ClassVar[bool] = False
     starts: tuple[float, ...] = (0.0,)
     end: float = 1.0
     coefficients: tuple[tuple[float, ...], ...] = ((0.0,),)
+    points: tuple[float, ...] = ()
 
     @cached_property
     def _padded(self) -> Array:
@@ -88,7 +91,7 @@ class Pieces(ErrorFunction):
 
     @classmethod
     def read(cls, raw: Any, span: Span, reader: ValueReader) -> Self:
-        """Read ``{ pieces = [[start, c0, c1, …], …], end = q }``."""
+        """Read ``{ pieces = [[start, c0, c1, …], …], end = q, points = [] }``."""
         limit = (-MAX_LENGTH_MM, MAX_LENGTH_MM)
         rows: list[tuple[float, ...]] = []
         for index, entry in enumerate(reader.entries(raw["pieces"], ("pieces",), MAX_POINTS)):
@@ -104,12 +107,18 @@ class Pieces(ErrorFunction):
         starts = reader.ascending([row[0] for row in rows] + [end], ("pieces",), MAX_POINTS, limit)
         if reader.findings:
             return cls(span)
-        return cls(span, starts[:-1], end, tuple(row[1:] for row in rows))
+        points = (
+            ()
+            if raw["points"] == []
+            else reader.ascending(raw["points"], ("points",), MAX_POINTS, limit)
+        )
+        return cls(span, starts[:-1], end, tuple(row[1:] for row in rows), points)
 
     def to_toml(self) -> object:
-        """Spell it as ``{ pieces = [[start, c0, c1, …], …], end = q }``."""
+        """Spell it as ``{ pieces = [[start, c0, c1, …], …], end = q, points = [] }``."""
         pairs = zip(self.starts, self.coefficients, strict=True)
-        return {"pieces": [[start, *row] for start, row in pairs], "end": self.end}
+        pieces = [[start, *row] for start, row in pairs]
+        return {"pieces": pieces, "end": self.end, "points": list(self.points)}
 
     def describe(self, unit: str, value: Spell, position: Spell) -> str:
         """Count the pieces."""
