@@ -52,7 +52,7 @@ def scene_texts(draw: st.DrawFn, *, everything: bool = False) -> str:
     traced = draw(st.lists(POINTS, max_size=2))
     points = {"tool": draw(POINTS), "workpiece": draw(POINTS), "traces": traced}
     parts += ["[workspace]", *_rows(ranges), "[points_mm]", *_rows(points)]
-    errors = {key: draw(curves(key)) for key in draw(_some_keys(chain))}
+    errors = {key: draw(curves(key, chain)) for key in draw(_some_keys(chain))}
     guides = "{ guides = [{ ramp = 4 }, { table = [[-300, 0.0], [300, 9.0]] }] }"
     errors |= {f"E{ALONG[axis[0]]}{axis}": guides for axis in guided}
     parts += ["[errors]", *_rows(errors)]
@@ -64,11 +64,31 @@ def scene_texts(draw: st.DrawFn, *, everything: bool = False) -> str:
     return "\n".join(parts)
 
 
-def curves(key: str) -> st.SearchStrategy[str]:
+def curves(key: str, chain: Chain) -> st.SearchStrategy[str]:
     """Spelt errors of all kinds; a constant where nothing else is possible."""
-    constant = SIZES.map(str)
     if parameter(key).is_constant:
-        return constant
+        return SIZES.map(str)
+    plain = _plain_curves(key)
+    pairs = st.tuples(plain, plain)
+    forms = [plain, pairs.map(lambda two: f"{{ forward = {two[0]}, backward = {two[1]} }}")]
+    own = parameter(key).axis
+    if others := [axis for axis in chain.axes if axis != own]:
+        values = st.tuples(st.sampled_from(others), SIZES, SIZES)
+        forms.append(values.map(lambda given: _surface(own, *given)))
+    return st.one_of(*forms)
+
+
+def _surface(own: str, other: str, low: float, high: float) -> str:
+    """Spell a table over two axes."""
+    return (
+        f'{{ table2 = {{ axes = ["{own}", "{other}"], {own} = [-100, 80], {other} = [-50, 0, 90],'
+        f" values = [[0.0, {low}, 1.0], [{high}, 2.0, -3.0]] }} }}"
+    )
+
+
+def _plain_curves(key: str) -> st.SearchStrategy[str]:
+    """Spelt curves along the axis of an error."""
+    constant = SIZES.map(str)
     forms = [
         SIZES.map(lambda value: f"{{ ramp = {value} }}"),
         SIZES.map(lambda value: f"{{ poly = [{value}, 0.001] }}"),

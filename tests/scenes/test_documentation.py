@@ -16,7 +16,7 @@ from warpspace.scene.schema import (
 )
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+PAGES = (ROOT / "README.md", ROOT / "CONVENTIONS.md", *sorted((ROOT / "docs").glob("*.md")))
 
 
 def _blocks(page: str, language: str) -> list[str]:

@@ -8,18 +8,20 @@ from typing import Any
 from warpspace.exceptions import SceneError, near_miss
 from warpspace.field.grid import Workspace
 from warpspace.kinematics.model import Model
-from warpspace.machine.axes import direction_index, is_linear
+from warpspace.machine.axes import is_linear
 from warpspace.machine.description import Machine, Range, build_machine
-from warpspace.machine.errors import ErrorFunction, ErrorSet, Harmonics
+from warpspace.machine.errors import ErrorFunction, ErrorSet
 from warpspace.machine.limits import MAX_ERROR
-from warpspace.machine.parameters import PARAMETERS, ErrorKind
+from warpspace.machine.parameters import PARAMETERS
 from warpspace.machine.tolerances import TOLERANCE_CLASSES, Tolerance, ToleranceSet
 from warpspace.scene.bodies import body_notes, read_bodies
-from warpspace.scene.conventions import component_orders
+from warpspace.scene.conventions import component_orders, measuring_lines
 from warpspace.scene.curves import read_curve
 from warpspace.scene.guides import is_guides, read_guides
 from warpspace.scene.measurements import read_measurements, read_uncertainties
 from warpspace.scene.model import Scene
+from warpspace.scene.notation import Notation, read_errors
+from warpspace.scene.notes import scene_notes
 from warpspace.scene.sections import Problems
 from warpspace.scene.volume import read_workspace
 
@@ -37,8 +39,6 @@ SECTIONS = (
     "measured",
     "view",
 )
-MANY_COSINES = 10_000_000
-"""Cosines that the curves of a scene take before it is said: about a second of computing."""
 Raw = Mapping[str, object]
 STAND_IN = build_machine("wFXYZABCt")
 """Has every axis there is: with it the rest of a document is checked whose machine is unusable."""
@@ -112,9 +112,13 @@ def build_scene(
     )
     reference = _reference(view, workspace, problems)
     order, own_orders = component_orders(convention, machine, problems)
+    lines = measuring_lines(convention, machine, problems)
     if problems.lines:
         raise SceneError(source, problems.lines)
-    model = Model(machine, order, points.tool, points.workpiece, own_orders, convention.direction)
+    points_mm = (points.tool, points.workpiece)
+    model = Model(machine, order, *points_mm, own_orders, convention.direction)
+    notation = Notation(convention.squareness, lines)
+    errors = read_errors(model, errors, workspace, notation, source)
     return Scene(
         name=name,
         title=texts.get("title") or name,
@@ -127,9 +131,7 @@ def build_scene(
         reference=reference,
         description=texts.get("description") or "",
         notes=(
-            *_travel_notes(machine, workspace),
-            *_carried_notes(machine, errors),
-            *_costly_notes(errors),
+            *scene_notes(machine, workspace, errors),
             *body_notes(machine),
         ),
         uncertainty=uncertainty,
@@ -252,49 +254,3 @@ def _reference(view: Any, workspace: Workspace, problems: Problems) -> dict[str,
         name: q for name, q in workspace.positions.items() if is_linear(name) or name in spanning
     }
     return {**middle, **view.reference}
-
-
-def _travel_notes(machine: Machine, workspace: Workspace) -> tuple[str, ...]:
-    """Remark on axes that are drawn outside their travel."""
-    notes: list[str] = []
-    for name in machine.axes:
-        (low, high), (first, last) = workspace.ranges[name], machine.axes[name].travel
-        if low < first or high > last:
-            unit = machine.axes[name].unit
-            notes.append(
-                f"workspace.{name} {low:g} … {high:g} {unit} reaches beyond the travel"
-                f" {first:g} … {last:g} {unit}"
-            )
-    return tuple(notes)
-
-
-def _costly_notes(errors: ErrorSet) -> tuple[str, ...]:
-    """Remark on harmonics that take long to evaluate: many terms with short waves."""
-    curves = [part for curve in errors.functions.values() for part in curve.parts]
-    waves = [curve for curve in curves if isinstance(curve, Harmonics)]
-    if sum(curve.cosines for curve in waves) <= MANY_COSINES:
-        return ()
-    terms = sum(len(curve.terms) for curve in waves)
-    found = f"errors: {len(waves)} curves with {terms} harmonics, many of short wavelength"
-    return (f"{found}: opening the scene takes seconds; fewer terms are faster",)
-
-
-def _carried_notes(machine: Machine, errors: ErrorSet) -> tuple[str, ...]:
-    """Remark on squareness errors of an axis that carries the axis it is measured against."""
-    notes: list[str] = []
-    for key in errors:
-        row = PARAMETERS[key]
-        if row.kind is not ErrorKind.SQUARENESS or errors.amplitude(key) == 0.0:
-            continue
-        own = direction_index(row.axis)
-        if row.direction == own:
-            continue
-        branches = (machine.chain.tool, machine.chain.workpiece)
-        branch = next(branch for branch in branches if row.axis in branch)
-        notes += [
-            f"errors.{key} turns {other} as well, which rides on {row.axis}: the angle"
-            f" between them stays, the pair turns as a whole"
-            for other in branch[branch.index(row.axis) + 1 :]
-            if is_linear(other) and direction_index(other) == 3 - row.direction - own
-        ]
-    return tuple(notes)

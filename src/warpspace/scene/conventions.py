@@ -45,3 +45,15 @@ def component_orders(
     names = list(found.values())
     main = max(dict.fromkeys(names), key=names.count)
     return main, tuple((name, order) for name, order in found.items() if order != main)
+
+
+def measuring_lines(
+    convention: Any, machine: Machine, problems: Problems
+) -> dict[str, tuple[float, float, float]]:
+    """Give the measuring lines of a scene by axis, mm, and note axes that there are not."""
+    found = dict(getattr(convention, "measuring_line_mm", {}))
+    for axis in found:
+        if axis not in machine.axes:
+            where = "convention.measuring_line_mm"
+            problems.unknown(where, axis, machine.axes, "axis of this machine")
+    return found

@@ -4,6 +4,7 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import TypeGuard, cast
 
+from warpspace.exceptions import OptionError
 from warpspace.machine.curves.combination import combine_curves
 from warpspace.machine.curves.curve import ErrorFunction
 from warpspace.machine.description import Machine
@@ -93,10 +94,14 @@ def read_guides(
     if first is None or second is None:
         return {}
     weight = gantry.rotation_weight
-    return {
-        key: combine_curves(first, second, MEAN),
-        gantry.rotation_key: combine_curves(first, second, (-weight, weight)),
-    }
+    try:
+        return {
+            key: combine_curves(first, second, MEAN),
+            gantry.rotation_key: combine_curves(first, second, (-weight, weight)),
+        }
+    except OptionError as error:
+        problems.add(where, str(error))
+        return {}
 
 
 def _spelled(axis: str) -> str:

@@ -15,17 +15,21 @@ from warpspace.machine.tolerances import Tolerance
 from warpspace.machine.travel import TravelDirection
 from warpspace.scene.machines import load_machine, machine_names
 from warpspace.scene.model import Scene
+from warpspace.scene.notation import Notation, write_errors
 
 _WRAP = 8
 """Entries of a list that stand on one line."""
 
 
-def scene_to_toml(scene: Scene) -> str:
+def scene_to_toml(scene: Scene, notation: Notation | None = None) -> str:
     """Spell a scene as the text of a scene file.
 
     Parameters
     ----------
     scene : Scene
+    notation : Notation, optional
+        Convention that the numbers of the errors are written in, and that the text then says; that
+        of the program by default.
 
     Returns
     -------
@@ -40,6 +44,8 @@ def scene_to_toml(scene: Scene) -> str:
     axis in the working volume; it is written as the polynomial it is.
     """
     known = _bundled(scene.machine)
+    notation = notation or Notation()
+    scene = replace(scene, errors=write_errors(scene, notation))
     head: dict[str, object] = {"title": scene.title}
     if known is not None:
         head["machine"] = scene.machine.name
@@ -54,6 +60,7 @@ def scene_to_toml(scene: Scene) -> str:
         convention["reference_axis"] = "free"
     if scene.model.direction != TravelDirection.MEAN:
         convention["direction"] = str(scene.model.direction)
+    convention |= notation.to_toml()
     parts.append(_section("convention", convention))
     ranges = {
         axis: low if low == high else [low, high]

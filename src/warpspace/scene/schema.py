@@ -17,6 +17,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from warpspace.kinematics.conventions.registry import convention_names
+from warpspace.kinematics.conversion.squareness import SquarenessSign
 from warpspace.machine.body_source import MESH_UNITS, TOOL_SHAPES
 from warpspace.machine.curves.table import MAX_FILE_NAME
 from warpspace.machine.limits import (
@@ -170,6 +171,8 @@ class ConventionSection(Section):
     ] = "after_motion"
     reference_axis: Literal["fixed", "free"] = "fixed"
     direction: Annotated[str, _one_of(tuple(TravelDirection))] = TravelDirection.MEAN.value
+    squareness: Annotated[str, _one_of(tuple(SquarenessSign))] = SquarenessSign.RIGHT_HAND.value
+    measuring_line_mm: dict[str, Point] = {}
 
 
 class PointsSection(Section):

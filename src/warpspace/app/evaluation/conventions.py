@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from warpspace.analysis.wrong_conventions import ConventionCost, convention_costs
+from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.state.app_state import AppState, start_loop
 from warpspace.app.state.ranges import Span
 from warpspace.field.grid import Grid, build_grid
@@ -248,6 +250,13 @@ class Effects:
         for choice in self._changes:
             self._changes[choice] = self._changes[choice] + parts[choice] - parts[OWN]
         self._amplitudes = amplitudes
+
+
+def costs_of(state: AppState) -> tuple[ConventionCost, ...]:
+    """Find what it would cost if the errors drawn had been measured in another convention."""
+    scene = active_scene(state)
+    view = scene.view(state.loop)
+    return convention_costs(scene.model, scene.errors, scene.workspace, view, state.nodes)
 
 
 def own_state(state: AppState) -> AppState:

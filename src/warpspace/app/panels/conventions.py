@@ -4,12 +4,14 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+from warpspace.analysis.wrong_conventions import ConventionCost
 from warpspace.app.browser.clicks import Clicks
 from warpspace.app.browser.handles import Input
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.conventions import (
     Effect,
     Effects,
+    costs_of,
     reference_spans,
     with_choice,
     with_own_conventions,
@@ -37,6 +39,7 @@ class ConventionsPanel:
         gui = context.gui
         self._context, self._effects = context, Effects()
         self._known: dict[str, Effect] = {}
+        self._costs: tuple[ConventionCost, ...] = ()
         self._asked: AppState | None = None
         self._clicks = Clicks(gui, lambda word: context.post(lambda s: with_choice(s, word)))
         self._text: Any = gui.add_html("")
@@ -108,7 +111,7 @@ class ConventionsPanel:
         """Show what is in force; the effects follow when changes pause."""
         state = picture.state
         if _axes_of(state) != self._built_for:
-            self._known = {}
+            self._known, self._costs = {}, ()
             self._build(state)
         reference = state.scene.reference
         if reference is not None:
@@ -127,14 +130,14 @@ class ConventionsPanel:
         state, self._asked = self._asked, None
         if state is None:
             return
-        known = self._effects.of(state)
-        if known != self._known:
-            self._known = known
+        known, costs = self._effects.of(state), costs_of(state)
+        if (known, costs) != (self._known, self._costs):
+            self._known, self._costs = known, costs
             self._write(state)
 
     def _write(self, state: AppState) -> None:
         """Write the table."""
-        content = conventions_html(state, self._known, self._clicks.attributes)
+        content = conventions_html(state, self._known, self._clicks.attributes, self._costs)
         if content != self._text.content:
             self._text.content = content
 

@@ -1,10 +1,11 @@
 """The table of conventions as HTML: every choice with what it changes."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from itertools import groupby
 
 from markupsafe import Markup
 
+from warpspace.analysis.wrong_conventions import ConventionCost
 from warpspace.app.evaluation.conventions import Effect, choices, chosen, own_state
 from warpspace.app.evaluation.machine import standing
 from warpspace.app.readouts.html import render
@@ -41,13 +42,40 @@ def spell_choice(choice: str) -> str:
     return f"{axis} {'+1' if sign == '1' else '−1'}"
 
 
+COST_GROUPS = {
+    "squareness": ("Sign of squareness", "the scene's: by the right-hand rule"),
+    "measuring_line": ("Measuring line", "the scene's: at the origin of each axis"),
+    "straightness": ("Reference line of straightness", "the scene's: with its tilt"),
+    "zero_at": ("Zero of the curves", "the scene's: as given"),
+}
+COST_WORDS = {
+    "squareness=over_90": "positive where the angle is over 90°",
+    "squareness=under_90": "positive where it is under 90°",
+    "measuring_line": "through the middle of the volume",
+    "straightness=end_point": "end points taken out",
+    "straightness=least_squares": "least squares taken out",
+    "straightness=minimum_zone": "minimum zone taken out",
+    "zero_at": "zero in the middle of each axis",
+}
+
+
+def _cost_group(cost: ConventionCost) -> str:
+    """Give the key of `COST_GROUPS` that a cost belongs to."""
+    return cost.name.partition("=")[0]
+
+
 def _group(choice: str) -> str:
     """Give the key of `GROUPS` that a choice belongs to."""
     what, _, axis = choice.split("=", maxsplit=1)[0].partition(" ")
     return what if not axis else "linear" if is_linear(axis) else "rotary"
 
 
-def conventions_html(state: AppState, effects: Mapping[str, Effect], attributes: Attributes) -> str:
+def conventions_html(
+    state: AppState,
+    effects: Mapping[str, Effect],
+    attributes: Attributes,
+    costs: Sequence[ConventionCost] = (),
+) -> str:
     """Spell the table of all choices.
 
     Parameters
@@ -57,6 +85,8 @@ def conventions_html(state: AppState, effects: Mapping[str, Effect], attributes:
         By choice; what is missing is not known yet.
     attributes : callable
         Gives the attributes that make a row clickable, by choice and ARIA role.
+    costs : sequence of ConventionCost, optional
+        What data in a wrong convention would cost; none where it is not known yet.
 
     Returns
     -------
@@ -75,4 +105,6 @@ def conventions_html(state: AppState, effects: Mapping[str, Effect], attributes:
         effects=effects,
         spell_choice=spell_choice,
         attributes=attributes,
+        cost_groups=[(*COST_GROUPS[name], list(own)) for name, own in groupby(costs, _cost_group)],
+        cost_words=COST_WORDS,
     )

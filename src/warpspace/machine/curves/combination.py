@@ -4,12 +4,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from warpspace.exceptions import OptionError
 from warpspace.machine.curves.constant import Constant
 from warpspace.machine.curves.curve import ErrorFunction
+from warpspace.machine.curves.directional import Directional
 from warpspace.machine.curves.harmonics import Harmonics
 from warpspace.machine.curves.poly import Poly
 from warpspace.machine.curves.ramp import Ramp
 from warpspace.machine.curves.table import Table
+from warpspace.machine.curves.two_arguments import TwoArguments
 from warpspace.machine.limits import MAX_POINTS, MAX_TERMS
 from warpspace.units import Array
 
@@ -40,6 +43,12 @@ def combine_curves(first: ErrorFunction, second: ErrorFunction, weights: Weights
         weight = weights[0] if one is first else weights[1]
         if isinstance(other, Constant) and other.value == 0.0:
             return one.scaled(weight)
+    if isinstance(first, Directional) or isinstance(second, Directional):
+        there = combine_curves(*(_way(one, "forward") for one in (first, second)), weights)
+        back = combine_curves(*(_way(one, "backward") for one in (first, second)), weights)
+        return Directional(span, there, back)
+    if isinstance(first, TwoArguments) or isinstance(second, TwoArguments):
+        return _surface(first, second, weights)
     match first, second:
         case Constant(), Constant():
             return Constant(span, weights[0] * first.value + weights[1] * second.value)
@@ -58,6 +67,38 @@ def combine_curves(first: ErrorFunction, second: ErrorFunction, weights: Weights
         case _:
             pass
     return _sampled(first, second, weights)
+
+
+def _way(curve: ErrorFunction, way: str) -> ErrorFunction:
+    """Give the curve of one direction of travel."""
+    return getattr(curve, way) if isinstance(curve, Directional) else curve
+
+
+def _surface(first: ErrorFunction, second: ErrorFunction, weights: Weights) -> TwoArguments:
+    """Add curves of which one or both depend on a second axis, at the points of both."""
+    surfaces = [curve for curve in (first, second) if isinstance(curve, TwoArguments)]
+    axes = surfaces[0].axes
+    if any(surface.axes != axes for surface in surfaces):
+        one, other = (surface.axes[1] for surface in surfaces)
+        raise OptionError(f"guides depend on {one} and on {other}; expected one second axis")
+    zero = Constant(first.span)
+    plain = [
+        curve
+        if isinstance(curve, TwoArguments | Constant | Table)
+        else _sampled(curve, zero, (1.0, 0.0))
+        for curve in (first, second)
+    ]
+    own = np.unique(np.concatenate([np.array(curve.kinks) for curve in plain]))
+    other = np.unique(np.concatenate([np.array(one.positions[1]) for one in surfaces]))
+    if len(own) * len(other) > MAX_POINTS:
+        raise OptionError(f"guides need {len(own) * len(other):,} points; at most {MAX_POINTS:,}")
+    at = {axes[0]: own[:, None], axes[1]: other}
+    total = sum(
+        weight * np.broadcast_to(curve.evaluate_at(axes[0], at), (len(own), len(other)))
+        for weight, curve in zip(weights, plain, strict=True)
+    )
+    positions = (tuple(own.tolist()), tuple(other.tolist()))
+    return TwoArguments(first.span, axes, positions, tuple(map(tuple, np.asarray(total).tolist())))
 
 
 def _coefficients(curve: Constant | Ramp | Poly) -> tuple[float, ...]:

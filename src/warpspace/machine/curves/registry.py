@@ -7,6 +7,7 @@ from warpspace.machine.curves.constant import Constant
 from warpspace.machine.curves.curve import ErrorFunction
 from warpspace.machine.curves.directional import Directional
 from warpspace.machine.curves.harmonics import Harmonics
+from warpspace.machine.curves.pieces import Pieces
 from warpspace.machine.curves.poly import Poly
 from warpspace.machine.curves.ramp import Ramp
 from warpspace.machine.curves.table import Table
@@ -18,7 +19,8 @@ Form = tuple[str, ...]
 """Keys of the table that spells a curve in a scene file."""
 
 _KINDS: dict[str, CurveKind] = {
-    kind.name: kind for kind in (Constant, Ramp, Poly, Harmonics, Table, TwoArguments, Directional)
+    kind.name: kind
+    for kind in (Constant, Ramp, Poly, Harmonics, Table, TwoArguments, Directional, Pieces)
 }
 """By name, in the order of lists: simplest first."""
 

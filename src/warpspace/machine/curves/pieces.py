@@ -1,0 +1,239 @@
+"""Pieces of polynomials: what an exact translation between conventions gives."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.polynomial import chebyshev, polynomial
+
+from warpspace.exceptions import OptionError
+from warpspace.machine.curves.constant import Constant
+from warpspace.machine.curves.curve import SPAN_SAMPLES, ErrorFunction, Rows, Span, Spell
+from warpspace.machine.curves.poly import Poly
+from warpspace.machine.curves.reading import ValueReader
+from warpspace.machine.limits import MAX_LENGTH_MM, MAX_POINTS
+from warpspace.units import Array
+
+DEGREE = 5
+MOST_PIECES = 4096
+SMALL = 1e-12
+"""µm or µrad: what is smaller everywhere counts as nothing, and fits are no worse."""
+PER_PIECE = 8
+"""Positions of each piece at which the peak is looked for."""
+
+
+@dataclass(frozen=True)
+class Pieces(ErrorFunction):
+    """Polynomials one behind the other, their ends held.
+
+    Attributes
+    ----------
+    starts : tuple of float, (n,)
+        Ascending positions at which the pieces begin, mm or degrees.
+    end : float
+        Where the last one ends.
+    coefficients : tuple of tuple of float, (n, up to 6)
+        Of Σ cₖ·(q − start)ᵏ, per piece.
+    points : tuple of float
+        Positions at which it was measured, where it was converted from a table.
+    """
+
+    name: ClassVar[str] = "pieces"
+    title: ClassVar[str] = "pieces of polynomials"
+    forms: ClassVar[tuple[tuple[str, ...], ...]] = (("pieces", "end", "points"),)
+    row_words: ClassVar[str] = "pieces of polynomials come from a conversion"
+    edited_as_rows: ClassVar[bool] = False
+    starts: tuple[float, ...] = (0.0,)
+    end: float = 1.0
+    coefficients: tuple[tuple[float, ...], ...] = ((0.0,),)
+    points: tuple[float, ...] = ()
+
+    @cached_property
+    def _padded(self) -> Array:
+        """Coefficients with zeros behind, [n, 6]."""
+        padded = np.zeros((len(self.starts), DEGREE + 1))
+        for row, own in zip(padded, self.coefficients, strict=True):
+            row[: len(own)] = own
+        return padded
+
+    def evaluate(self, position: Array) -> Array:
+        """Give the value of the piece that each position lies in."""
+        starts = np.array(self.starts)
+        held = np.clip(np.asarray(position, dtype=float), starts[0], self.end)
+        piece = np.clip(np.searchsorted(starts, held, side="right") - 1, 0, len(starts) - 1)
+        along, own = held - starts[piece], self._padded[piece]
+        value = np.zeros(along.shape)
+        for k in range(DEGREE, -1, -1):
+            value = value * along + own[..., k]
+        return value
+
+    def scaled(self, factor: float) -> Self:
+        """Multiply all coefficients."""
+        rows = tuple(tuple(factor * c for c in row) for row in self.coefficients)
+        return replace(self, coefficients=rows)
+
+    def grown(self) -> Self:
+        """Give the line from 0 at the first position to 1 at the last."""
+        reach = self.end - self.starts[0]
+        return replace(self, starts=self.starts[:1], coefficients=((0.0, 1.0 / reach),))
+
+    @property
+    def samples(self) -> int:
+        """A few in each piece."""
+        return max(SPAN_SAMPLES, PER_PIECE * len(self.starts) + 1)
+
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """Where pieces meet, and the ends."""
+        return (*self.starts, self.end)
+
+    @classmethod
+    def read(cls, raw: Any, span: Span, reader: ValueReader) -> Self:
+        """Read ``{ pieces = [[start, c0, c1, …], …], end = q, points = [] }``."""
+        limit = (-MAX_LENGTH_MM, MAX_LENGTH_MM)
+        rows: list[tuple[float, ...]] = []
+        for index, entry in enumerate(reader.entries(raw["pieces"], ("pieces",), MAX_POINTS)):
+            place = ("pieces", index)
+            numbers = reader.entries(entry, place, DEGREE + 2)
+            if len(numbers) == 1:
+                reader.note(place, "expected [start, c0, c1, …]", entry)
+            row = tuple(reader.number(value, (*place, k)) for k, value in enumerate(numbers))
+            rows.append(row or (0.0, 0.0))
+        end = reader.number(raw["end"], ("end",), *limit)
+        if reader.findings:
+            return cls(span)
+        starts = reader.ascending([row[0] for row in rows] + [end], ("pieces",), MAX_POINTS, limit)
+        if reader.findings:
+            return cls(span)
+        points = (
+            ()
+            if raw["points"] == []
+            else reader.ascending(raw["points"], ("points",), MAX_POINTS, limit)
+        )
+        return cls(span, starts[:-1], end, tuple(row[1:] for row in rows), points)
+
+    def to_toml(self) -> object:
+        """Spell it as ``{ pieces = [[start, c0, c1, …], …], end = q, points = [] }``."""
+        pairs = zip(self.starts, self.coefficients, strict=True)
+        pieces = [[start, *row] for start, row in pairs]
+        return {"pieces": pieces, "end": self.end, "points": list(self.points)}
+
+    def describe(self, unit: str, value: Spell, position: Spell) -> str:
+        """Count the pieces."""
+        del unit, value, position
+        return f"{len(self.starts)} pieces of polynomials"
+
+    @classmethod
+    def from_rows(cls, span: Span, rows: Rows) -> Self:
+        """Refuse: nobody writes them."""
+        del span, rows
+        raise OptionError(cls.row_words)
+
+    def rows(self) -> Rows:
+        """Give one piece a row."""
+        return [(s, *row) for s, row in zip(self.starts, self.coefficients, strict=True)]
+
+    @classmethod
+    def from_curve(cls, present: ErrorFunction, span: Span) -> Self:
+        """Refuse a curve that is none."""
+        if not isinstance(present, cls):
+            raise OptionError(cls.row_words)
+        return replace(present, span=span)
+
+
+def fit_curves(
+    evaluate: Callable[[Array], Array], span: Span, kinks: Array
+) -> list[ErrorFunction | None]:
+    """Fit curves to functions of one position that are smooth between kinks.
+
+    Parameters
+    ----------
+    evaluate : callable
+        Gives values, [n, K], µm or µrad, at positions, [n].
+    span : tuple of float, (2,), mm or degrees
+        Where the fit holds.
+    kinks : ndarray, [m], mm or degrees
+        Positions at which a slope may jump; those within the range count.
+
+    Returns
+    -------
+    list of (ErrorFunction or None), (K,)
+        A constant or a polynomial where one piece is enough, else pieces; None where the function
+        is nothing anywhere. Off by no more than 10⁻¹² µm or µrad, as far as numbers of this size
+        can be told apart.
+
+    Raises
+    ------
+    OptionError
+        If more than 4096 pieces would be needed besides those between kinks.
+    """
+    low, high = span
+    inner = kinks[(kinks > low) & (kinks < high)]
+    at = np.concatenate([[low], np.unique(inner), [high]])
+    limit = len(at) + MOST_PIECES
+    while True:
+        coefficients, off = _fit(evaluate, at)
+        bad = off > SMALL
+        if not bad.any():
+            break
+        if len(at) + int(bad.sum()) > limit:
+            raise OptionError("the curves wave too much to be converted exactly")
+        at = np.sort(np.concatenate([at, ((at[:-1] + at[1:]) / 2.0)[bad]]))
+    return [_simplest(span, at, coefficients[..., k]) for k in range(coefficients.shape[-1])]
+
+
+def _fit(evaluate: Callable[[Array], Array], at: Array) -> tuple[Array, Array]:
+    """Interpolate in Chebyshev points of each piece: coefficients [n, 6, K], worst miss [n]."""
+    width = np.diff(at)
+    nodes = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
+    checks = np.linspace(-0.97, 0.97, 9)
+    everything = np.concatenate([nodes, checks])
+    places = at[:-1, None] + 0.5 * width[:, None] * (1.0 + everything)
+    values = np.asarray(evaluate(places.ravel()))
+    values = values.reshape(len(width), len(everything), -1)
+    inside, beyond = values[:, : DEGREE + 1], values[:, DEGREE + 1 :]
+    series = np.linalg.solve(
+        chebyshev.chebvander(nodes, DEGREE), inside.transpose(1, 0, 2).reshape(DEGREE + 1, -1)
+    )
+    found = np.tensordot(chebyshev.chebvander(checks, DEGREE), series, axes=1)
+    missed = np.abs(found - beyond.transpose(1, 0, 2).reshape(len(checks), -1)).max(axis=0)
+    size = np.abs(values).max(axis=1).ravel()
+    missed = np.where(missed > 2e-14 * size, missed, 0.0)  # no number of this size is finer
+    powers = _power_matrix() @ series  # of (q − start) / width
+    shape = (DEGREE + 1, len(width), values.shape[-1])
+    scale = width[:, None] ** -np.arange(DEGREE + 1.0)
+    local = powers.reshape(shape).transpose(1, 0, 2) * scale[..., None]
+    return local, missed.reshape(len(width), -1).max(axis=1)
+
+
+def _power_matrix() -> Array:
+    """Turn a Chebyshev series over −1 … 1 into powers of a share 0 … 1 of the piece."""
+    rows = np.zeros((DEGREE + 1, DEGREE + 1))
+    for k in range(DEGREE + 1):
+        plain = chebyshev.cheb2poly(np.eye(DEGREE + 1)[k])
+        shifted = np.zeros(1)
+        for power, c in enumerate(plain):
+            shifted = polynomial.polyadd(shifted, c * polynomial.polypow([-1.0, 2.0], power))
+        rows[: len(shifted), k] = shifted
+    return rows
+
+
+def _simplest(span: Span, at: Array, coefficients: Array) -> ErrorFunction | None:
+    """Give the simplest kind of curve with pieces of these coefficients, [n, 6]."""
+    width = np.diff(at)[:, None]
+    reach = np.abs(coefficients) * width ** np.arange(DEGREE + 1.0)
+    kept = np.where(reach > SMALL / 4.0, coefficients, 0.0)
+    if not kept.any():
+        return None
+    degree = int(np.flatnonzero(kept.any(axis=0)).max())
+    if degree == 0 and np.ptp(kept[:, 0]) <= SMALL:
+        return Constant(span, float(kept[:, 0].mean()))
+    if len(kept) == 1:
+        shifted = np.zeros(1)
+        for power, c in enumerate(kept[0, : degree + 1]):
+            shifted = polynomial.polyadd(shifted, c * polynomial.polypow([-at[0], 1.0], power))
+        return Poly(span, tuple(float(c) for c in shifted))
+    rows = tuple(tuple(float(c) for c in row[: degree + 1]) for row in kept)
+    return Pieces(span, tuple(at[:-1].tolist()), float(at[-1]), rows)

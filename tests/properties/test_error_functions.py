@@ -1,0 +1,150 @@
+"""Errors of two arguments and by direction of travel, in any chain: linear, exact, batched."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from chains import models, positions, vectors
+from warpspace.field.evaluate import (
+    View,
+    amplitudes_of,
+    build_basis,
+    evaluate_exact,
+    evaluate_first_order,
+)
+from warpspace.kinematics.model import Loop, Model
+from warpspace.machine.curves.curve import ErrorFunction
+from warpspace.machine.errors import Constant, Directional, ErrorSet, Ramp, Table, TwoArguments
+from warpspace.machine.parameters import axis_parameters
+from warpspace.machine.travel import TravelDirection
+
+SPAN = (-500.0, 500.0)
+STEP = 10.0
+"""µm or µrad of a central difference."""
+VALUES = st.integers(1, 40).map(float)
+
+
+@st.composite
+def functions(draw: st.DrawFn, model: Model, axis: str) -> ErrorFunction:
+    """Errors that depend on two axes, on the direction of travel, or on both."""
+    others = [name for name in model.machine.axes if name != axis]
+
+    def one() -> ErrorFunction:
+        if not others or draw(st.booleans()):
+            return Table(SPAN, ((-400.0, draw(VALUES)), (10.0, draw(VALUES)), (300.0, 3.0)))
+        rows = tuple(tuple(draw(VALUES) for _ in range(3)) for _ in range(2))
+        axes = (axis, draw(st.sampled_from(others)))
+        return TwoArguments(SPAN, axes, ((-300.0, 200.0), (-150.0, 0.0, 100.0)), rows)
+
+    if draw(st.booleans()):
+        return Directional(SPAN, one(), draw(st.sampled_from((one(), Constant(SPAN, 5.0)))))
+    return one()
+
+
+@st.composite
+def cases(draw: st.DrawFn) -> tuple[Model, ErrorSet]:
+    """A model looked at in some direction, and a set of such errors on one of its axes."""
+    model = draw(models())
+    axis = draw(st.sampled_from([*model.machine.axes]))
+    keys = [row.key for row in axis_parameters(axis) if not row.is_constant]
+    chosen = draw(st.lists(st.sampled_from(keys), min_size=1, max_size=3, unique=True))
+    errors = {key: draw(functions(model, axis)) for key in chosen}
+    return replace(model, direction=draw(st.sampled_from(TravelDirection))), ErrorSet(errors)
+
+
+@settings(max_examples=40)
+@given(data=st.data())
+def test_a_batch_gives_what_a_loop_over_its_points_gives(data: st.DataObject) -> None:
+    model, errors = data.draw(cases())
+    view = View(data.draw(st.sampled_from(Loop)))
+    batch = data.draw(positions(model, (2, 3)))
+    for evaluate in (evaluate_first_order, evaluate_exact):
+        whole = evaluate(model, errors, batch, view)
+        for index in np.ndindex(2, 3):
+            one = {axis: values[index] for axis, values in batch.items()}
+            single = evaluate(model, errors, one, view)
+            np.testing.assert_allclose(whole.error_um[index], single.error_um, atol=1e-9)
+            np.testing.assert_allclose(
+                whole.orientation_urad[index], single.orientation_urad, atol=1e-9
+            )
+
+
+@settings(max_examples=40)
+@given(data=st.data())
+def test_a_grid_gives_what_its_points_give(data: st.DataObject) -> None:
+    model, errors = data.draw(cases())
+    one = data.draw(positions(model, (3,)))
+    names = [*one]
+    shapes = {name: [3 if k == i % 3 else 1 for k in range(3)] for i, name in enumerate(names)}
+    open_grid = {name: one[name].reshape(shapes[name]) for name in names}
+    full = {name: np.broadcast_to(values, (3, 3, 3)) for name, values in open_grid.items()}
+    found = evaluate_first_order(model, errors, open_grid).error_um
+    expected = evaluate_first_order(model, errors, full).error_um
+    np.testing.assert_allclose(np.broadcast_to(found, expected.shape), expected, atol=1e-9)
+
+
+@settings(max_examples=40)
+@given(data=st.data())
+def test_the_response_is_the_derivative_of_the_exact_field_by_the_amplitude(
+    data: st.DataObject,
+) -> None:
+    model, errors = data.draw(cases())
+    view = View(data.draw(st.sampled_from(Loop)))
+    at = data.draw(positions(model, (4,)))
+    point = np.array([data.draw(vectors()) for _ in range(4)])
+    for key in errors:
+        basis = build_basis(model, errors, (key,), at, view, point)
+        moved = [
+            evaluate_exact(
+                model, ErrorSet({key: errors.functions[key].with_amplitude(a)}), at, view, point
+            )
+            for a in (STEP, -STEP)
+        ]
+        slope = (moved[0].error_um - moved[1].error_um) / (2.0 * STEP)
+        np.testing.assert_allclose(basis.position[0], slope, rtol=0, atol=1e-6)
+
+
+@settings(max_examples=40)
+@given(data=st.data())
+def test_amplitudes_scale_the_field_and_zero_is_none(data: st.DataObject) -> None:
+    model, errors = data.draw(cases())
+    at = data.draw(positions(model, (4,)))
+    keys = tuple(errors)
+    basis = build_basis(model, errors, keys, at)
+    amplitudes = amplitudes_of(errors, keys)
+    field = evaluate_first_order(model, errors, at).error_um
+    np.testing.assert_allclose(basis.evaluate(amplitudes).error_um, field, atol=1e-9)
+    assert not basis.evaluate(0.0 * amplitudes).error_um.any()
+    nothing = ErrorSet({key: one.scaled(0.0) for key, one in errors.functions.items()})
+    np.testing.assert_allclose(evaluate_exact(model, nothing, at).error_um, 0.0, atol=1e-9)
+
+
+@settings(max_examples=40)
+@given(data=st.data())
+def test_every_parameter_with_such_a_curve_moves_some_point(data: st.DataObject) -> None:
+    model = data.draw(models())
+    axis = data.draw(st.sampled_from([*model.machine.axes]))
+    function = data.draw(functions(model, axis))
+    at = data.draw(positions(model))
+    corners = 2000.0 * np.array([[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0], [1.0, 1.0, 1.0]])
+    for row in axis_parameters(axis):
+        if not row.is_constant:
+            errors = ErrorSet({row.key: function})
+            moved = evaluate_first_order(model, errors, at, View(Loop.RELATIVE), corners)
+            assert np.abs(moved.error_um).max() > 0.01, row.key
+
+
+@pytest.mark.parametrize("curve", [Constant(SPAN, 3.0), Ramp(SPAN, 3.0)])
+@settings(max_examples=10)
+@given(data=st.data())
+def test_errors_without_a_direction_have_no_reversal(
+    curve: ErrorFunction, data: st.DataObject
+) -> None:
+    model = replace(data.draw(models()), direction=TravelDirection.DIFFERENCE)
+    errors = ErrorSet(dict.fromkeys(model.machine.allowed_keys, curve))
+    at = data.draw(positions(model))
+    assert not evaluate_first_order(model, errors, at).error_um.any()
+    np.testing.assert_allclose(evaluate_exact(model, errors, at).error_um, 0.0, atol=1e-9)

@@ -1,0 +1,445 @@
+"""Error sets in other conventions: closed forms, the same exact field, and the way back."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from warpspace.exceptions import OptionError
+from warpspace.kinematics import transforms
+from warpspace.kinematics.chain import error_transform
+from warpspace.kinematics.conversion.measuring_line import move_measuring_line
+from warpspace.kinematics.conversion.order import convert_order
+from warpspace.kinematics.conversion.reference_line import convert_reference_line, fit_line
+from warpspace.kinematics.conversion.small_motion import SmallMotion
+from warpspace.kinematics.conversion.squareness import (
+    angle_sign,
+    convert_squareness,
+    squareness_keys,
+)
+from warpspace.kinematics.conversion.zero import zero_at
+from warpspace.kinematics.model import Model
+from warpspace.machine.curves.pieces import Pieces, fit_curves
+from warpspace.machine.description import build_machine
+from warpspace.machine.errors import (
+    Constant,
+    Directional,
+    ErrorSet,
+    Harmonics,
+    Poly,
+    Ramp,
+    Table,
+    TwoArguments,
+)
+from warpspace.scene.library import parse_scene
+from warpspace.scene.model import Scene
+from warpspace.scene.notation import covered_spans
+from warpspace.scene.pipeline import evaluate
+
+SAME = 3e-9
+"""µm and µrad: rounding of the exact chain over a metre, times a dozen products."""
+TEXT = """machine = "dvf5000"
+[convention]
+component_errors = "ORDER"
+[workspace]
+X = [-275, 275]
+Y = [-225, 225]
+Z = [-480, -80]
+[errors]
+EXX = { table = [[-275, 0], [-100, 5], [60, -3], [275, 9]] }
+EYX = { poly = [2, 0.03, 1e-4] }
+EZX = { table = [[-275, 1], [0, 4], [275, -2]] }
+EAX = { ramp = 12 }
+EBX = { table = [[-275, -8], [30, 14], [275, 3]] }
+ECX = { harmonics = [[1, 9, 30]] }
+EXY = { forward = { ramp = 4 }, backward = { poly = [1, 0.01] } }
+EBY = 8
+ECY = { ramp = -15 }
+EZZ = { ramp = 7 }
+EXZ = { poly = [0, 0.02] }
+EC0Y = 20
+EA0Z = -14
+EB0Z = 9
+EXC = { harmonics = [[1, 3, 0], [2, 1, 40]] }
+EYC = { harmonics = [[1, 2, 90]] }
+EZC = { harmonics = [[3, 1, 0]] }
+EAC = { harmonics = [[1, 6, 10]] }
+ECC = { harmonics = [[2, 9, 0]] }
+EA0C = 11
+EX0C = 4
+EBB = { ramp = 12 }
+EXB = 3
+"""
+
+
+def scene_of(order: str, direction: int) -> Scene:
+    scene = parse_scene(TEXT.replace("ORDER", order), "s")
+    axes = {
+        name: replace(axis, direction=direction if name in "XC" else 1)
+        for name, axis in scene.machine.axes.items()
+    }
+    machine = replace(scene.machine, axes=axes)
+    return replace(scene, model=replace(scene.model, machine=machine))
+
+
+@pytest.fixture(params=[("after_motion", 1), ("before_motion", 1), ("after_motion", -1)], ids=str)
+def scene(request: pytest.FixtureRequest) -> Scene:
+    return scene_of(*request.param)
+
+
+def assert_same_field(one: Scene, model: Model, errors: ErrorSet, tolerance: float = SAME) -> None:
+    """The exact fields agree in every loop and direction, position and orientation."""
+    random = np.random.default_rng(7)
+    spans = covered_spans(one.model, one.workspace)
+    at = {axis: random.uniform(*span, 150) for axis, span in spans.items()}
+    for way in ("forward", "backward"):
+        pair = [replace(one, model=replace(one.model, direction=way))]
+        pair.append(replace(one, model=replace(model, direction=way), errors=errors))
+        for loop in ("tool", "workpiece", "relative"):
+            a, b = (evaluate(each, at=at, loop=loop, exact=True) for each in pair)
+            assert np.abs(a.error_um).max() > 10.0
+            np.testing.assert_allclose(b.error_um, a.error_um, rtol=0, atol=tolerance)
+            np.testing.assert_allclose(
+                b.orientation_urad, a.orientation_urad, rtol=0, atol=tolerance
+            )
+
+
+def assert_same_curves(one: ErrorSet, other: ErrorSet, spans: Mapping[str, tuple]) -> None:
+    for key in {*one, *other}:
+        axis = key[-1]
+        at = {axis: np.linspace(*spans[axis], 333)}
+        for way in ("forward", "backward"):
+            expected = one.evaluate_at(key, at, way)
+            found = other.evaluate_at(key, at, way)
+            np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10, err_msg=key)
+
+
+def spans_of(scene: Scene) -> dict[str, tuple[float, float]]:
+    return covered_spans(scene.model, scene.workspace)
+
+
+# --- small motions --------------------------------------------------------------------------------
+
+
+def test_small_motions_are_the_transformations_of_the_exact_chain() -> None:
+    random = np.random.default_rng(3)
+    shift, turn = random.normal(0, 50, (2, 20, 3)), random.normal(0, 5e4, (2, 20, 3))
+    found = [SmallMotion.from_errors(s, t) for s, t in zip(shift, turn, strict=True)]
+
+    def matrix(motion: SmallMotion) -> np.ndarray:
+        um, urad = motion.to_errors()
+        values = {f"E{a}X": um[..., k] for k, a in enumerate("XYZ")}
+        values |= {f"E{a}X": urad[..., k] for k, a in enumerate("ABC")}
+        built = error_transform("X", values, constant=False)
+        assert built is not None
+        return built
+
+    for motion, s, t in zip(found, shift, turn, strict=True):
+        np.testing.assert_allclose(motion.to_errors()[0], s, rtol=1e-14)
+        np.testing.assert_allclose(motion.to_errors()[1], t, rtol=1e-13)
+    a, b = found
+    np.testing.assert_allclose(matrix(a @ b), matrix(a) @ matrix(b), atol=1e-14)
+    np.testing.assert_allclose(matrix(a.inverse), np.linalg.inv(matrix(a)), atol=1e-14)
+    pose = transforms.rigid(transforms.axis_rotation(2, 0.7), [100.0, -30.0, 500.0])
+    expected = pose @ matrix(a) @ np.linalg.inv(pose)
+    np.testing.assert_allclose(matrix(a.seen_from(pose)), expected, atol=2e-12)
+
+
+def test_small_numbers_keep_their_digits() -> None:
+    tiny = SmallMotion.from_errors(np.zeros(3), np.array([0.0, 1e-9, 0.0]))
+    assert tiny.to_errors()[1][1] == pytest.approx(1e-9, rel=1e-14)
+    assert (tiny @ tiny).to_errors()[1][1] == pytest.approx(2e-9, rel=1e-14)
+    np.testing.assert_allclose(tiny.arm(np.array([0, 0, 100.0])), [1e-13, 0, 0], atol=1e-22)
+
+
+# --- fits -----------------------------------------------------------------------------------------
+
+
+def test_fits_give_the_simplest_curve_that_is_exact() -> None:
+    span, at = (-100.0, 300.0), np.linspace(-100.0, 300.0, 1001)
+    table = Table(span, ((-100.0, 1.0), (50.0, 7.0), (300.0, -2.0)))
+
+    def values(q: np.ndarray) -> np.ndarray:
+        parts = (0.0 * q, 4.0 + 0.0 * q, 1e-3 * q**2, q * table.evaluate(q), np.sin(q / 20.0))
+        return np.stack(parts, -1)
+
+    nothing, flat, square, product, wave = fit_curves(values, span, np.array(table.kinks))
+    assert nothing is None
+    assert flat == Constant(span, 4.0)
+    for curve, column in ((square, 2), (product, 3), (wave, 4)):
+        assert curve is not None
+        np.testing.assert_allclose(curve.evaluate(at), values(at)[:, column], rtol=0, atol=2e-12)
+    (alone,) = fit_curves(lambda q: 1e-3 * q[:, None] ** 2, span, np.zeros(0))
+    assert isinstance(alone, Poly)
+    assert isinstance(wave, Pieces)
+
+
+def test_pieces_are_held_beyond_their_ends_and_reload() -> None:
+    text = "EXX = { pieces = [[0, 1, 2], [10, 21, -1]], end = 20, points = [5] }"
+    curve = parse_scene(f'machine = "dvf5000"\n[errors]\n{text}\n', "s").errors.functions["EXX"]
+    found = curve.evaluate(np.array([-5.0, 0.0, 5.0, 10.0, 15.0, 20.0, 99.0]))
+    assert found.tolist() == [1.0, 1.0, 11.0, 21.0, 16.0, 11.0, 11.0]
+    rows = [[0.0, 1.0, 2.0], [10.0, 21.0, -1.0]]
+    assert curve.to_toml() == {"pieces": rows, "end": 20.0, "points": [5.0]}
+
+
+# --- before and after the motion ------------------------------------------------------------------
+
+
+def test_a_linear_axis_changes_its_shifts_by_the_arm_of_its_position() -> None:
+    model = Model(build_machine("wFXt"))
+    pitch = ErrorSet({"EBX": Constant((-100.0, 100.0), 10.0)})
+    _, found = convert_order(model, pitch, {"X": (-100.0, 100.0)}, {"X": "before_motion"})
+    # about y: the point at q along x sinks by q × pitch after the motion, which does not turn the
+    # motion itself; before the motion it would, and the shift takes that back
+    rises = found.evaluate("EZX", np.array([-100.0, 100.0]))
+    np.testing.assert_allclose(rises, [-1.0, 1.0], atol=1e-4)
+    assert found.functions["EBX"] == pitch.functions["EBX"]
+
+
+def test_a_rotary_axis_turns_the_directions_of_its_errors() -> None:
+    model = Model(build_machine("wFCt"))
+    after = ErrorSet({"EXC": Constant((0.0, 360.0), 5.0)})
+    _, found = convert_order(model, after, {"C": (0.0, 360.0)}, {"C": "before_motion"})
+    at = np.array([0.0, 90.0, 200.0])
+    np.testing.assert_allclose(found.evaluate("EXC", at), 5 * np.cos(np.deg2rad(at)), atol=1e-11)
+    np.testing.assert_allclose(found.evaluate("EYC", at), 5 * np.sin(np.deg2rad(at)), atol=1e-11)
+
+
+def test_the_other_order_has_the_same_field_and_the_way_back_the_same_curves(scene: Scene) -> None:
+    spans, axes = spans_of(scene), scene.machine.axes
+    present = scene.model.component_errors
+    other = "before_motion" if present == "after_motion" else "after_motion"
+    model, errors = convert_order(scene.model, scene.errors, spans, dict.fromkeys(axes, other))
+    assert model.component_errors == other
+    assert_same_field(scene, model, errors)
+    again, back = convert_order(model, errors, spans, dict.fromkeys(axes, present))
+    assert again == scene.model
+    assert_same_curves(scene.errors, back, spans)
+
+
+def test_one_kind_of_axis_alone_can_be_converted(scene: Scene) -> None:
+    wanted = {"C": "before_motion", "B": "before_motion", "X": "after_motion"}
+    model, errors = convert_order(scene.model, scene.errors, spans_of(scene), wanted)
+    assert [model.convention(axis).name for axis in wanted] == [*wanted.values()]
+    assert model.convention("Y") == scene.model.convention("Y")
+    assert_same_field(scene, model, errors)
+
+
+# --- measuring lines ------------------------------------------------------------------------------
+
+
+def test_the_abbe_arm_of_one_pitch() -> None:
+    model = Model(build_machine("wFXt"))
+    span = (-100.0, 100.0)
+    pitch = ErrorSet({"EBX": Ramp(span, 10.0), "EXX": Constant(span, 2.0)})
+    line = {"X": (0.0, 0.0, 100.0)}
+    found = move_measuring_line(model, pitch, {"X": span}, line, to_origin=False)
+    # 10 µrad × 100 mm = 1 µm; the cosine of the pitch is too small to be seen
+    np.testing.assert_allclose(found.evaluate("EXX", np.array(span)), [2.0, 3.0], atol=1e-9)
+    measured = ErrorSet({"EBX": Ramp(span, 10.0), "EXX": Constant(span, 3.0)})
+    moved = move_measuring_line(model, measured, {"X": span}, line, to_origin=True)
+    np.testing.assert_allclose(moved.evaluate("EXX", np.array(span)), [3.0, 2.0], atol=1e-9)
+
+
+def test_the_line_shows_what_a_reflector_there_would_move_by(scene: Scene) -> None:
+    place = np.array([20.0, 150.0, -80.0])
+    errors = move_measuring_line(
+        scene.model, scene.errors, spans_of(scene), {"X": tuple(place)}, to_origin=False
+    )
+    x = scene.machine.axes["X"]
+    for q in (-200.0, 33.0, 275.0):
+        values = {key: scene.errors.evaluate(key, np.array(q)) for key in scene.errors}
+        body = error_transform("X", values, constant=False)
+        assert body is not None
+        moving = place + x.direction * q * np.eye(3)[0]
+        point = moving if scene.model.component_errors == "before_motion" else place
+        seen = (transforms.apply(body, point) - point) * 1e3
+        found = [float(errors.evaluate(f"E{a}X", np.array(q))) for a in "XYZ"]
+        np.testing.assert_allclose(found, seen, atol=1e-9)
+
+
+def test_to_the_line_and_back_are_the_same_curves(scene: Scene) -> None:
+    lines = {"X": (0.0, 150.0, -80.0), "Y": (20.0, 0.0, 300.0), "C": (5.0, 0.0, 200.0)}
+    spans = spans_of(scene)
+    there = move_measuring_line(scene.model, scene.errors, spans, lines, to_origin=False)
+    back = move_measuring_line(scene.model, there, spans, lines, to_origin=True)
+    assert_same_curves(scene.errors, back, spans)
+
+
+# --- zero at a position ---------------------------------------------------------------------------
+
+
+def test_what_is_zero_at_a_position_was_moved_to_the_constants(scene: Scene) -> None:
+    spans = spans_of(scene)
+    wanted = {"X": 10.0, "Z": -100.0, "C": 30.0}
+    errors = zero_at(scene.model, scene.errors, spans, wanted)
+    for axis, position in wanted.items():
+        for letter in "XYZABC":
+            value = float(errors.evaluate(f"E{letter}{axis}", np.array(position)))
+            assert value == pytest.approx(0.0, abs=1e-9)
+    assert_same_field(scene, scene.model, errors)
+
+
+def test_zero_elsewhere_and_back_are_the_same_curves(scene: Scene) -> None:
+    spans = spans_of(scene)
+    first = {"X": 10.0, "Y": 0.0, "C": 30.0}
+    here = zero_at(scene.model, scene.errors, spans, first)
+    there = zero_at(scene.model, here, spans, {"X": -200.0, "Y": 5.0, "C": 130.0})
+    assert_same_curves(here, zero_at(scene.model, there, spans, first), spans)
+
+
+# --- reference lines ------------------------------------------------------------------------------
+
+POSITION = np.array([0.0, 100.0, 200.0, 300.0, 400.0])
+STRAIGHTNESS = np.array([0.0, 4.0, 1.0, 5.0, 2.0])
+
+
+def test_the_end_point_line_goes_through_both_ends() -> None:
+    assert fit_line(POSITION, STRAIGHTNESS, "end_point") == pytest.approx((0.0, 0.005))
+
+
+def test_least_squares_is_that_of_polyfit() -> None:
+    random = np.random.default_rng(2)
+    position, value = np.sort(random.uniform(-500, 300, 40)), random.normal(0, 3, 40)
+    slope, offset = np.polyfit(position, value, 1)
+    assert fit_line(position, value, "least_squares") == pytest.approx((offset, slope))
+
+
+def test_the_minimum_zone_of_a_curve_by_hand() -> None:
+    # the upper side through (100, 4) and (300, 5): 0.005 µm/mm, 3.5 µm at zero; the lower side is
+    # 3.5 µm below it at (0, 0), (200, 1) and (400, 2) alike
+    offset, slope = fit_line(POSITION, STRAIGHTNESS, "minimum_zone")
+    assert (offset, slope) == pytest.approx((1.75, 0.005))
+    rest = STRAIGHTNESS - offset - slope * POSITION
+    assert rest.max() == pytest.approx(1.75)
+    assert rest.min() == pytest.approx(-1.75)
+
+
+def test_no_other_line_has_a_narrower_zone() -> None:
+    random = np.random.default_rng(5)
+    for count in (2, 3, 4, 9, 60):
+        position, value = np.sort(random.uniform(0, 500, count)), random.normal(0, 3, count)
+        _, slope = fit_line(position, value, "minimum_zone")
+        width = np.ptp(value - slope * position)
+        for other in slope + np.linspace(-0.1, 0.1, 2001):
+            assert np.ptp(value - other * position) >= width - 1e-9
+
+
+@pytest.mark.parametrize("line", ["end_point", "least_squares", "minimum_zone"])
+def test_the_tilt_of_straightness_goes_to_the_squareness(line: str) -> None:
+    span = (0.0, 400.0)
+    points = tuple(zip(POSITION.tolist(), STRAIGHTNESS.tolist(), strict=True))
+    model = Model(build_machine("wFXYt", travel={"X": (0.0, 400.0), "Y": span}))
+    errors = ErrorSet({"EXY": Table(span, points), "EC0Y": Constant(span, 20.0)})
+    found = convert_reference_line(model, errors, {"X": span, "Y": span}, {"Y": line})
+    offset, slope = fit_line(POSITION, STRAIGHTNESS, line)
+    # x grows with y: Y leans towards +X, that is by −slope about z; 1 µm/mm is 1000 µrad
+    assert found.amplitude("EC0Y") == pytest.approx(20.0 - 1e3 * slope, abs=1e-4)
+    assert found.amplitude("EX0Y") == pytest.approx(offset, abs=1e-3)
+    assert found.evaluate("ECY", POSITION) == pytest.approx(np.full(5, 1e3 * slope), abs=1e-4)
+    left = found.evaluate("EXY", POSITION)
+    assert fit_line(POSITION, left, line) == pytest.approx((0.0, 0.0), abs=1e-10)
+    np.testing.assert_allclose(left, STRAIGHTNESS - offset - slope * POSITION, atol=1e-3)
+
+
+@pytest.mark.parametrize("line", ["end_point", "least_squares", "minimum_zone"])
+@pytest.mark.parametrize("direction", [1, -1])
+def test_reference_lines_leave_the_field_and_come_back(direction: int, line: str) -> None:
+    scene = scene_of("after_motion", direction)
+    spans = spans_of(scene)
+    errors = convert_reference_line(scene.model, scene.errors, spans, dict.fromkeys("XYZ", line))
+    assert_same_field(scene, scene.model, errors)
+    for key in ("EYX", "EZX"):
+        at = np.array(scene.errors.functions[key].kinks or np.linspace(-275.0, 275.0, 101))
+        assert fit_line(at, errors.evaluate(key, at), line) == pytest.approx((0.0, 0.0), abs=1e-9)
+    other = "end_point" if line != "end_point" else "least_squares"
+    there = convert_reference_line(scene.model, errors, spans, {"X": other})
+    assert_same_field(scene, scene.model, there)
+    again = convert_reference_line(scene.model, errors, spans, {"X": line})
+    assert_same_curves(errors, again, spans)
+
+
+def test_before_the_motion_a_tilt_is_no_matter_of_straightness() -> None:
+    scene = scene_of("before_motion", 1)
+    with pytest.raises(OptionError, match="expected component_errors after_motion"):
+        convert_reference_line(scene.model, scene.errors, spans_of(scene), {"X": "end_point"})
+
+
+# --- signs of squareness --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("key", squareness_keys(build_machine("wFXYZt")))
+def test_the_sign_is_that_of_the_angle_between_the_axes(key: str) -> None:
+    own, about = "XYZ".index(key[3]), "ABC".index(key[1])
+    turn = np.zeros(3)
+    turn[about] = 1e-3
+    axis = transforms.vector_rotation(turn) @ np.eye(3)[own]
+    larger = np.arccos(axis @ np.eye(3)[3 - own - about]) - np.pi / 2.0
+    assert larger == pytest.approx(angle_sign(key) * 1e-3, abs=1e-9)
+
+
+def test_signs_of_the_reference_machine_and_back() -> None:
+    machine = build_machine("wCBFXYZt")
+    errors = ErrorSet(
+        {key: Constant((0.0, 1.0), 7.0) for key in ("EC0Y", "EA0Z", "EB0Z", "EA0C", "EAX")}
+    )
+    over = convert_squareness(machine, errors, "over_90")
+    assert [over.amplitude(key) for key in errors] == [7.0, 7.0, -7.0, 7.0, 7.0]
+    under = convert_squareness(machine, errors, "under_90")
+    assert [under.amplitude(key) for key in errors] == [-7.0, -7.0, 7.0, 7.0, 7.0]
+    for sign in ("over_90", "under_90", "right_hand"):
+        there = convert_squareness(machine, errors, sign)
+        assert convert_squareness(machine, there, sign) == errors
+
+
+# --- errors of two arguments, and what cannot be converted ----------------------------------------
+
+SURFACE = TwoArguments(
+    (-275.0, 275.0), ("X", "Z"), ((-275.0, 275.0), (-480.0, -80.0)), ((0.0, 4.0), (3.0, 9.0))
+)
+
+
+def test_shifts_over_two_axes_stay_where_nothing_is_added_to_them() -> None:
+    scene = parse_scene('machine = "dvf5000"\n[errors]\nEAX = 5\nEBZ = 3\n', "s")
+    errors = ErrorSet({**scene.errors.functions, "EXX": SURFACE})
+    model, found = convert_order(scene.model, errors, spans_of(scene), {"X": "before_motion"})
+    assert found.functions["EXX"] == SURFACE
+    both = replace(scene, errors=errors)
+    random = np.random.default_rng(1)
+    at = {axis: random.uniform(*span, 50) for axis, span in spans_of(scene).items()}
+    a = evaluate(both, at=at, exact=True).error_um
+    b = evaluate(replace(both, model=model, errors=found), at=at, exact=True).error_um
+    np.testing.assert_allclose(b, a, rtol=0, atol=SAME)
+
+
+@pytest.mark.parametrize("key", ["EXX", "EBX"])
+def test_what_depends_on_a_second_axis_and_would_change_is_refused(key: str) -> None:
+    scene = parse_scene('machine = "dvf5000"\n[errors]\nEBX = 5\n', "s")
+    errors = ErrorSet({**scene.errors.functions, key: SURFACE})
+    spans = spans_of(scene)
+    with pytest.raises(OptionError, match=f"{key} depends on X and Z"):
+        zero_at(scene.model, errors, spans, {"X": 0.0})
+    line = {"X": (0.0, 0.0, 100.0)}
+    with pytest.raises(OptionError, match=f"{key} depends on X and Z"):
+        move_measuring_line(scene.model, errors, spans, line, to_origin=False)
+
+
+def test_a_rotary_axis_has_no_straightness() -> None:
+    scene = parse_scene('machine = "dvf5000"\n[errors]\nEXC = 5\n', "s")
+    with pytest.raises(OptionError, match="C is rotary; only linear axes have straightness"):
+        convert_reference_line(scene.model, scene.errors, spans_of(scene), {"C": "end_point"})
+
+
+def test_both_directions_are_converted_and_stay_two() -> None:
+    span = (-100.0, 100.0)
+    model = Model(build_machine("wFXt"))
+    pitch = Directional(span, Constant(span, 10.0), Harmonics(span, ((1.0, 4.0, 0.0),)))
+    errors = move_measuring_line(
+        model, ErrorSet({"EBX": pitch}), {"X": span}, {"X": (0.0, 0.0, 100.0)}, to_origin=False
+    )
+    at = {"X": np.array([0.0, 60.0])}
+    assert errors.functions["EBX"] == pitch
+    np.testing.assert_allclose(errors.evaluate_at("EXX", at, "forward"), [1.0, 1.0], atol=1e-8)
+    np.testing.assert_allclose(errors.evaluate_at("EXX", at, "backward"), [0.4, 0.2], atol=1e-8)
