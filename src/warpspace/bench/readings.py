@@ -109,15 +109,32 @@ def respond(scene: Scene, plan: Plan, keys: Sequence[str] | None = None) -> Resp
     Response
     """
     chosen = tuple(scene.parameter_keys if keys is None else keys)
-    position = np.zeros((len(chosen), len(plan.point_mm), 3))
-    for rows, errors in _by_travel(scene.errors, plan):
-        coordinates = {name: values[rows] for name, values in plan.coordinates.items()}
-        basis = build_basis(scene.model, errors, chosen, coordinates, RELATIVE, plan.point_mm[rows])
-        share = np.array([_share(scene.errors, errors, key) for key in chosen])
-        position[:, rows] = basis.position * share[:, None, None]
+    position = respond_sites(scene, plan, chosen)
     along = np.sum(_differences(plan, position) * plan.direction, axis=-1)
     amplitudes = np.array([scene.errors.amplitude(key) for key in chosen], dtype=float)
     return Response(chosen, amplitudes, (along * plan.gain).T)
+
+
+def respond_sites(scene: Scene, plan: Plan, keys: Sequence[str]) -> Array:
+    """Give the errors of all sites of a plan as a linear function of errors.
+
+    Parameters
+    ----------
+    scene : Scene
+    plan : Plan
+    keys : sequence of str, (K,)
+
+    Returns
+    -------
+    ndarray, [K, n, 3], µm per µm or µrad of amplitude
+    """
+    position = np.zeros((len(keys), len(plan.point_mm), 3))
+    for rows, errors in _by_travel(scene.errors, plan):
+        coordinates = {name: values[rows] for name, values in plan.coordinates.items()}
+        basis = build_basis(scene.model, errors, keys, coordinates, RELATIVE, plan.point_mm[rows])
+        share = np.array([_share(scene.errors, errors, key) for key in keys])
+        position[:, rows] = basis.position * share[:, None, None]
+    return position
 
 
 def _differences(plan: Plan, values: Array) -> Array:
