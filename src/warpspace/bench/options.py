@@ -81,9 +81,7 @@ SHARED = 2
 """Options that every test has, the first fields of the base class."""
 
 
-def read_options(
-    test: type, texts: Mapping[str, str], axes: Collection[str]
-) -> dict[str, Any]:
+def read_options(test: type, texts: Mapping[str, str], axes: Collection[str]) -> dict[str, Any]:
     """Read options of a test from texts.
 
     Parameters
@@ -156,7 +154,9 @@ def _point(flag: str, text: str, axes: Collection[str]) -> dict[str, float]:
         name, equals, number = part.partition("=")
         name = name.strip().upper()
         if not equals or name not in axes or name in found:
-            raise OptionError(f"{flag} {text!r}; expected positions of {', '.join(axes)}: X=10,B=30")
+            raise OptionError(
+                f"{flag} {text!r}; expected positions of {', '.join(axes)}: X=10,B=30"
+            )
         found[name] = _numbers(flag, number, 1)[0]
     return found
 

@@ -140,9 +140,7 @@ def prepare(state: AppState) -> Prepared:
     kind = find_test(state.bench.name)
     test = kind(**read_options(kind, state.bench.options, scene.machine.axes))
     plan = test.plan(scene)
-    nominal = seen_from_workpiece(
-        scene.model, plan.coordinates, scene.workspace, plan.point_mm
-    )
+    nominal = seen_from_workpiece(scene.model, plan.coordinates, scene.workspace, plan.point_mm)
     response = respond_sites(scene, plan, tuple(state.amplitudes))
     return Prepared(test, plan, nominal, response)
 

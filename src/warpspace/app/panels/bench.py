@@ -60,6 +60,7 @@ class TestsPanel:
         name = self._name.poll()
         if name is not None:
             look = look.with_test("" if name == NONE else name)
+            state = _with_sight(state, inside=bool(look.name))
         path = self._path.poll()
         if path is not None:
             look = replace(look, path=path)
@@ -111,7 +112,9 @@ class TestsPanel:
             return gui.add_dropdown(label, (OWN, *known), hint=option.about)
         example = {"point": "X=0,B=30", "vector": "100,0,50"}.get(option.kind, "a number")
         own = "" if option.default is None else f" {option.default:g} where empty."
-        return gui.add_text(label, initial_value="", hint=f"{option.about} Typed as {example}.{own}")
+        return gui.add_text(
+            label, initial_value="", hint=f"{option.about} Typed as {example}.{own}"
+        )
 
     def settle(self, picture: LivePicture) -> None:
         """Draw the figure."""
@@ -119,3 +122,11 @@ class TestsPanel:
         if written != self._written:
             self._written = written
             self._figure.content = written
+
+
+def _with_sight(state: AppState, *, inside: bool) -> AppState:
+    """Draw grid lines in place of a closed surface, which would hide a path; and back again."""
+    before, after = ("surface", "grid") if inside else ("grid", "surface")
+    if state.look.surface != before:
+        return state
+    return replace(state, look=state.look.with_choice(surface=after))
