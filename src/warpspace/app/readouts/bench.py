@@ -6,7 +6,7 @@ import numpy as np
 
 from warpspace.app.evaluation.bench import BenchPicture
 from warpspace.app.readouts.html import message, render
-from warpspace.bench.evaluation.layout import lay_polar
+from warpspace.bench.evaluation.layout import LEAST, lay_polar
 from warpspace.bench.outcome import Chart, Curve
 from warpspace.picture.ticks import tick_values
 from warpspace.units import Array
@@ -18,8 +18,6 @@ NONE_CHOSEN = (
 WIDE, HIGH = 320.0, 190.0
 """Size of a chart in units of its drawing."""
 LEFT, RIGHT, TOP, BOTTOM = 40.0, 8.0, 8.0, 30.0
-LEAST = 1e-6
-"""Range of values below which nothing but rounding varies."""
 
 
 @dataclass(frozen=True, slots=True)
