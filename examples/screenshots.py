@@ -102,6 +102,11 @@ def dark(page: Page) -> None:
     page.keyboard.press("m")
 
 
+def tested(page: Page) -> None:
+    """Run the R-test on the model."""
+    choose(page, "Test", "sphere")
+
+
 def signed(page: Page) -> None:
     """Colour by one signed component."""
     choose(page, "Component", "E_z")
@@ -191,6 +196,7 @@ VISITS = {
     "tab_error_budget": Visit(asked, "Error budget"),
     "tab_repair": Visit(repaired, "Repair"),
     "tab_sensitivities": Visit(by_effect, "Sensitivities"),
+    "tab_tests": Visit(tested, "Tests", share=0.62),
     "tab_compare": Visit(compared, "Compare"),
     "tab_concepts": Visit(side_by_side, "Concepts", share=0.9),
     "tab_files": Visit(as_opened, "Files", share=0.4),

@@ -22,6 +22,7 @@ WRITERS = {
     "montecarlo": (("montecarlo", "{scene}", "--samples", "200", "--plot"), "x.svg"),
     "contributions": (("contributions", "{scene}", "--plot"), "x.svg"),
     "ballbar": (("ballbar", "{scene}", "--plane", "XY", "--radius", "100", "--plot"), "x.svg"),
+    "test": (("test", "straightness", "{scene}", "--plot"), "x.svg"),
     "snapshot": (("snapshot", "{scene}", "-o"), "x.svg"),
     "compare": (("compare", "{scene}", "{scene}", "-o"), "x.svg"),
     "report": (("report", "{scene}", "-o"), "x.html"),

@@ -1,7 +1,5 @@
 """Each single error alone gives the known figure of each test, to 1e-6 relative, first order."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 
@@ -18,7 +16,7 @@ from warpspace.bench.kinds.squareness import Squareness
 from warpspace.bench.kinds.straightness import Straightness
 from warpspace.bench.readings import simulate
 from warpspace.bench.run import Run
-from warpspace.machine.curves.curve import ErrorFunction
+from warpspace.machine.curves.directional import Directional
 from warpspace.machine.errors import Constant, Harmonics, Poly, Table
 from warpspace.scene.model import Scene
 
@@ -31,56 +29,9 @@ def run(scene: Scene, test: BenchTest, *, exact: bool = False) -> Run:
     return Run("model", plan, readings, test.evaluate(plan, readings))
 
 
-@dataclass(frozen=True)
-class Backlash(ErrorFunction):
-    """A constant that depends on the direction of travel, as curves by direction do."""
-
-    value: float = 0.0
-
-    @property
-    def forward(self) -> Constant:
-        return Constant(self.span, self.value / 2.0)
-
-    @property
-    def backward(self) -> Constant:
-        return Constant(self.span, -self.value / 2.0)
-
-    @property
-    def amplitude(self) -> float:
-        return self.value / 2.0
-
-    def evaluate(self, position):
-        return np.zeros(np.shape(position))
-
-    def scaled(self, factor):
-        return Backlash(self.span, self.value * factor)
-
-    forms = ()
-    row_words = title = name = "backlash"
-
-    @classmethod
-    def read(cls, *arguments):
-        raise NotImplementedError
-
-    def to_toml(self):
-        raise NotImplementedError
-
-    def describe(self, *arguments):
-        return ""
-
-    def slider_words(self, *arguments):
-        return ""
-
-    @classmethod
-    def from_rows(cls, *arguments):
-        raise NotImplementedError
-
-    def rows(self):
-        return ()
-
-    @classmethod
-    def from_curve(cls, *arguments):
-        raise NotImplementedError
+def backlash(value: float) -> Directional:
+    span = (0.0, 1.0)
+    return Directional(span, Constant(span, value / 2.0), Constant(span, -value / 2.0))
 
 
 # --- positioning ----------------------------------------------------------------------------------
@@ -113,7 +64,7 @@ def test_abbe_error_of_positioning() -> None:
 
 @pytest.mark.parametrize("exact", [True, False])
 def test_backlash_is_the_reversal(exact: bool) -> None:
-    scene = scene_with(EXX=Backlash((0.0, 1.0), 6.0))
+    scene = scene_with(EXX=backlash(6.0))
     found = run(scene, Positioning(axis="X"), exact=exact).outcome
     assert found["B_um"] == found["R_um"] == found["A_um"] == pytest.approx(6.0, **EXACT)
     assert found["M_um"] == pytest.approx(0.0, abs=1e-9)
@@ -158,7 +109,7 @@ def test_squareness_of_every_layout_is_the_same_in_every_test(scene: str, number
 
 def test_backlash_steps_on_the_circle() -> None:
     # +3 µm while X moves upwards, −3 µm while downwards: ±3·cos φ on the two halves
-    found = run(scene_with(EXX=Backlash((0.0, 1.0), 6.0)), Circular(radius_mm=100.0, points=360))
+    found = run(scene_with(EXX=backlash(6.0)), Circular(radius_mm=100.0, points=360))
     marks = found.plan.marks
     forward = -np.sin(np.deg2rad(marks["angle_deg"]) + 1e-9 * marks["sense"]) * marks["sense"] > 0.0
     expected = np.where(forward, 3.0, -3.0) * np.cos(np.deg2rad(marks["angle_deg"]))
@@ -227,7 +178,7 @@ def test_step_diagonals_tell_the_axes_apart() -> None:
 
 def test_backlash_along_diagonals() -> None:
     length = np.linalg.norm([550.0, 450.0, 400.0])
-    found = run(scene_with(EXX=Backlash((0.0, 1.0), 6.0)), Diagonals()).outcome
+    found = run(scene_with(EXX=backlash(6.0)), Diagonals()).outcome
     assert found["B_um"] == pytest.approx(6.0 * 550.0 / length, **EXACT)
 
 

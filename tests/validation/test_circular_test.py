@@ -69,3 +69,17 @@ def test_axes_that_move_against_their_name_give_the_same_squareness() -> None:
     assert warpspace.ballbar(scene, plane="XY", radius_mm=100).squareness_urad == pytest.approx(
         20.0
     )
+
+
+@pytest.mark.parametrize("scene_name", ["dvf5000_first", "dvf5000_second"])
+@pytest.mark.parametrize("plane", KEYS)
+def test_the_bench_finds_what_the_ball_bar_does(scene_name: str, plane: str) -> None:
+    # figures 5-3, 5-9 and 5-14 of the thesis are circles of the measured machines
+    from warpspace.bench.kinds.circular import Circular
+
+    scene = warpspace.load_scene(scene_name)
+    known = warpspace.ballbar(scene, plane=plane, radius_mm=150)
+    found = warpspace.run_test(scene, Circular(plane=plane, radius_mm=150.0)).model.outcome
+    assert found["circular_deviation_um"] == pytest.approx(known.circular_deviation_um, abs=0.005)
+    assert found["squareness_urad"] == pytest.approx(known.squareness_urad, abs=0.02)
+    assert found["scale_difference_um"] == pytest.approx(known.scale_difference_um, abs=0.005)

@@ -99,6 +99,14 @@ def ballbar(
     ------
     OptionError, UnknownNameError
         If the circle cannot be run in the working volume of the scene.
+
+    Examples
+    --------
+    >>> import warpspace
+    >>> scene = warpspace.load_scene("dvf5000_first")
+    >>> result = warpspace.ballbar(scene, plane="XY", radius_mm=150)
+    >>> round(result.circular_deviation_um, 2), round(result.squareness_urad, 2)
+    (6.86, 2.94)
     """
     test = Circular(plane=plane, radius_mm=radius_mm, at=centre or {}, points=points)
     key = plane_axes(scene.machine, plane)[2]

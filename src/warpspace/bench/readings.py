@@ -1,15 +1,17 @@
 """Readings that a test would take on the model: exactly, and as a linear function of the errors."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from warpspace.bench.plan import NONE, Plan
 from warpspace.field.evaluate import View, build_basis, evaluate_exact
-from warpspace.kinematics.model import Loop
+from warpspace.kinematics.model import Loop, Model
+from warpspace.machine.curves.directional import Directional
 from warpspace.machine.errors import ErrorFunction, ErrorSet
 from warpspace.machine.parameters import parameter
+from warpspace.machine.travel import TravelDirection
 from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM, Array
 
@@ -62,9 +64,10 @@ def simulate(scene: Scene, plan: Plan, *, exact: bool = True) -> Array:
 def site_errors(scene: Scene, plan: Plan) -> Array:
     """Evaluate the error of the tool against the workpiece at every site, exactly, [n, 3], µm."""
     found = np.zeros((len(plan.point_mm), 3))
+    model = _both_ways(scene)
     for rows, errors in _by_travel(scene.errors, plan):
         coordinates = {name: values[rows] for name, values in plan.coordinates.items()}
-        field = evaluate_exact(scene.model, errors, coordinates, RELATIVE, plan.point_mm[rows])
+        field = evaluate_exact(model, errors, coordinates, RELATIVE, plan.point_mm[rows])
         found[rows] = field.error_um
     return found
 
@@ -109,15 +112,33 @@ def respond(scene: Scene, plan: Plan, keys: Sequence[str] | None = None) -> Resp
     Response
     """
     chosen = tuple(scene.parameter_keys if keys is None else keys)
-    position = np.zeros((len(chosen), len(plan.point_mm), 3))
-    for rows, errors in _by_travel(scene.errors, plan):
-        coordinates = {name: values[rows] for name, values in plan.coordinates.items()}
-        basis = build_basis(scene.model, errors, chosen, coordinates, RELATIVE, plan.point_mm[rows])
-        share = np.array([_share(scene.errors, errors, key) for key in chosen])
-        position[:, rows] = basis.position * share[:, None, None]
+    position = respond_sites(scene, plan, chosen)
     along = np.sum(_differences(plan, position) * plan.direction, axis=-1)
     amplitudes = np.array([scene.errors.amplitude(key) for key in chosen], dtype=float)
     return Response(chosen, amplitudes, (along * plan.gain).T)
+
+
+def respond_sites(scene: Scene, plan: Plan, keys: Sequence[str]) -> Array:
+    """Give the errors of all sites of a plan as a linear function of errors.
+
+    Parameters
+    ----------
+    scene : Scene
+    plan : Plan
+    keys : sequence of str, (K,)
+
+    Returns
+    -------
+    ndarray, [K, n, 3], µm per µm or µrad of amplitude
+    """
+    position = np.zeros((len(keys), len(plan.point_mm), 3))
+    model = _both_ways(scene)
+    for rows, errors in _by_travel(scene.errors, plan):
+        coordinates = {name: values[rows] for name, values in plan.coordinates.items()}
+        basis = build_basis(model, errors, keys, coordinates, RELATIVE, plan.point_mm[rows])
+        share = np.array([_share(scene.errors, errors, key) for key in keys])
+        position[:, rows] = basis.position * share[:, None, None]
+    return position
 
 
 def _differences(plan: Plan, values: Array) -> Array:
@@ -144,10 +165,15 @@ def _by_travel(errors: ErrorSet, plan: Plan) -> Iterator[tuple[Array, ErrorSet]]
         )
 
 
+def _both_ways(scene: Scene) -> Model:
+    """Give the model without a direction of travel of its own: each site has its own."""
+    return replace(scene.model, direction=TravelDirection.MEAN)
+
+
 def _depends_on_travel(errors: ErrorSet, axis: str) -> bool:
     """Tell whether any error of an axis depends on the direction it has come in."""
     return any(
-        parameter(key).axis == axis and hasattr(function, "forward")
+        parameter(key).axis == axis and isinstance(function, Directional)
         for key, function in errors.functions.items()
     )
 
@@ -157,9 +183,9 @@ def _travelling(errors: ErrorSet, way: Mapping[str, float]) -> ErrorSet:
 
     def chosen(key: str, function: ErrorFunction) -> ErrorFunction:
         sign = way.get(parameter(key).axis, 0.0)
-        if not sign:
+        if not sign or not isinstance(function, Directional):
             return function
-        return getattr(function, "forward" if sign > 0.0 else "backward", function)
+        return function.forward if sign > 0.0 else function.backward
 
     return ErrorSet({key: chosen(key, function) for key, function in errors.functions.items()})
 

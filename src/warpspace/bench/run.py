@@ -69,6 +69,15 @@ def run_test(
         If the test cannot be run on the machine.
     SceneError
         If the file cannot be used.
+
+    Examples
+    --------
+    >>> import warpspace
+    >>> from warpspace.bench.kinds.sphere import Sphere
+    >>> scene = warpspace.load_scene("dvf5000_first")
+    >>> result = warpspace.run_test(scene, Sphere(axis="C", ball=(100.0, 0.0, 60.0)))
+    >>> round(result.model.outcome["z_um"], 1)
+    21.5
     """
     if data is None:
         plan = test.plan(scene)

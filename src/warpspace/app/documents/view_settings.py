@@ -12,6 +12,7 @@ from urllib.parse import parse_qsl, urlencode
 
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, Shown, start_state
+from warpspace.app.state.bench import option_names
 from warpspace.app.state.exclusions import Exclusions
 from warpspace.app.state.look import linear_spans, slice_spans
 from warpspace.app.state.picked import Picked, read_trace, spell_trace
@@ -101,6 +102,11 @@ def _differences(state: AppState) -> Iterator[tuple[str, str]]:
     for axis, at in state.rotary.held:
         if axis in state.positions:
             yield f"rotary.held.{axis}", spell_numbers(at)
+    if state.bench.name:
+        yield "test", state.bench.name
+        yield from ((f"test.{name}", text) for name, text in sorted(state.bench.options.items()))
+    if not state.bench.path:
+        yield "test.path", spell(state.bench.path)
     for name in ("excluded", "only"):
         if keys := getattr(state.exclusions, name):
             yield name, ",".join(sorted(keys))
@@ -200,9 +206,15 @@ def _handlers(state: AppState) -> dict[str, Handler]:
         "rotary.chosen": lambda s, v: replace(s, rotary=s.rotary.with_chosen(v)),
         **dict.fromkeys(("excluded", "muted"), lambda s, v: _with_exclusions(s, excluded=v)),
         **dict.fromkeys(("only", "soloed"), lambda s, v: _with_exclusions(s, only=v)),
+        "test": lambda s, v: replace(s, bench=s.bench.with_test(v)),
+        "test.path": lambda s, v: replace(s, bench=replace(s.bench, path=read_switch(v))),
         TRACE: lambda s, v: replace(s, picked=read_trace(v)),
         "lever": lambda s, v: replace(s, lever=v) if v in s.amplitudes else refuse(),
     }
+    for name in option_names():
+        found[f"test.{name}"] = lambda s, v, name=name: replace(
+            s, bench=s.bench.with_option(name, v)
+        )
     for key in state.amplitudes:
         found[key] = lambda s, v, key=key: edits.with_typed_amplitude(s, key, read_number(v))
     for axis in state.positions:

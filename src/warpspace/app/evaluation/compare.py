@@ -49,6 +49,7 @@ def side_state(now: AppState, side: Side[AppState]) -> AppState:
         machine=now.machine,
         shown=now.shown,
         rotary=now.rotary if _turns_alike(base, now) else RotaryLook(),
+        bench=now.bench,
         comparison=Comparison(),
         picked=now.picked,
         lever=now.lever,
@@ -150,6 +151,7 @@ def _difference(a: LivePicture, b: LivePicture) -> LivePicture:
     return replace(
         subtract_pictures(b, a),
         colours=None,
+        bench=None,
         traces=subtract_traces(b.traces, a.traces),
         slices=subtract_slices(b.slices, a.slices),
     )

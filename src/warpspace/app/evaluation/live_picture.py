@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from warpspace.analysis.statistics import Statistics
+from warpspace.app.evaluation.bench import BenchPicture
 from warpspace.app.state.app_state import AppState
 from warpspace.picture.model import Picture
 from warpspace.picture.size import picture_size_mm
@@ -62,12 +63,15 @@ class LivePicture(Picture):
         What is drawn, where that is another state than the one steered; else None.
     compared : Compared or None
         The comparison it belongs to.
+    bench : BenchPicture, str or None
+        The standard test that is run, or why it cannot be; None where none is.
     """
 
     state: AppState
     traces: tuple[TraceLines, ...]
     subject: AppState | None = None
     compared: Compared | None = None
+    bench: BenchPicture | str | None = None
 
     @cached_property
     def size_mm(self) -> float:

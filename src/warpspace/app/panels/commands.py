@@ -24,6 +24,7 @@ WORDS = {
     "nodes": "grid density",
     "exclusions": "which errors are included",
     "rotary": "rotary traces",
+    "bench": "test",
     "tolerances": "tolerance",
     "specification": "specification",
     "scene": "scene",

@@ -70,6 +70,7 @@ for _tab in (
     Tab("Error budget", "results", [f"{_HERE}.budget:BudgetPanel"]),
     Tab("Repair", "results", [f"{_HERE}.repair:RepairPanel"]),
     Tab("Sensitivities", "results", [f"{_HERE}.sensitivities:SensitivitiesPanel"]),
+    Tab("Tests", "results", [f"{_HERE}.bench:TestsPanel"]),
     Tab("Compare", "results", [f"{_HERE}.compare:ComparePanel"]),
     Tab("Concepts", "results", [f"{_HERE}.concepts:ConceptsPanel"]),
     Tab("Files", "results", [f"{_HERE}.files:FilesPanel"]),

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from warpspace.app.state.bench import BenchLook
 from warpspace.app.state.comparison import Comparison
 from warpspace.app.state.exclusions import Exclusions
 from warpspace.app.state.look import Look, MachineLook, RotaryLook
@@ -80,6 +81,8 @@ class AppState:
         The schematic machine.
     rotary : RotaryLook
         What is traced.
+    bench : BenchLook
+        Which standard test is run.
     picked : Picked or None
         The point whose error is explained.
     lever : str
@@ -111,6 +114,7 @@ class AppState:
     look: Look = field(default_factory=Look)
     machine: MachineLook = field(default_factory=MachineLook)
     rotary: RotaryLook = field(default_factory=RotaryLook)
+    bench: BenchLook = field(default_factory=BenchLook)
     picked: Picked | None = None
     lever: str = ""
     comparison: "Comparison[AppState]" = field(default_factory=Comparison[Any])
@@ -206,6 +210,7 @@ class AppState:
             look=self.look,
             machine=self.machine,
             rotary=replace(self.rotary, off=frozenset()),
+            bench=self.bench,
             chosen_error=self.chosen_error,
         )
 

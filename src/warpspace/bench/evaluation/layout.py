@@ -15,8 +15,8 @@ RINGS = 2
 """Rings of round deviations on either side of it."""
 REACH = 0.36
 """Room that these take on either side."""
-LEAST = 1e-6
-"""Deviations below it, µm or µrad, are none."""
+LEAST = 1e-3
+"""A nanometre: charts draw smaller deviations, µm or µrad, as none."""
 
 
 @dataclass(frozen=True, slots=True)

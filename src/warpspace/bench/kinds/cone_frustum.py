@@ -29,7 +29,7 @@ class ConeFrustum(BenchTest):
 
     name: ClassVar[str] = "cone-frustum"
     title: ClassVar[str] = "Cone frustum"
-    standard: ClassVar[str] = "ISO 10791-7, M3; ISO 10791-6 (with a ball bar)"
+    standard: ClassVar[str] = "ISO 10791-7, M3"
     words: ClassVar[str] = (
         "The tool runs round a cone that stands tilted on the table, its axis along the flank,"
         " so that"
@@ -103,8 +103,8 @@ class ConeFrustum(BenchTest):
             coordinates,
             np.broadcast_to(nominal_point(model, Loop.TOOL, coordinates), (len(theta), 3)),
             direction,
-            place=f"cone {2 * self.half_apex_deg:g}° · base tilted {self.tilt_deg:g}° · radius"
-            f" {self.radius_mm:g} mm · middle ({spelled}) mm of the workpiece",
+            place=f"cone {2 * self.half_apex_deg:g}° tilted by {self.tilt_deg:g}° · radius"
+            f" {self.radius_mm:g} mm about ({spelled}) mm",
             marks={
                 "angle_deg": angle_deg, "sense": np.ones(len(theta)),
                 "along": np.cos(theta), "up": np.sin(theta),

@@ -9,7 +9,6 @@ from warpspace.cli.file_options import check_output, force_option, plot_option
 from warpspace.cli.options import json_option, parse_point, print_json, scene_argument
 from warpspace.cli.tables import Column, print_table, print_text
 from warpspace.cli.terminal import echo
-from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -182,7 +181,7 @@ def _check_plot(plot: str, scene: str, data: str | None, *, force: bool) -> "Pat
 
 def _parse(name: str, values: dict[str, Any], scene: "Scene") -> dict[str, Any]:
     """Read the options that click leaves as texts."""
-    from warpspace.bench.options import options_of
+    from warpspace.bench.options import options_of, read_option
     from warpspace.bench.registry import find_test
 
     found = dict(values)
@@ -192,26 +191,10 @@ def _parse(name: str, values: dict[str, Any], scene: "Scene") -> dict[str, Any]:
             axes = scene.machine.axes
             found[option.name] = {} if text is None else parse_point(text, axes, option.flag)
         elif option.kind == "vector" and text is not None:
-            found[option.name] = _vector(text, option.flag)
+            found[option.name] = read_option(option, text, scene.machine.axes)
         elif option.kind == "axis" and text:
             found[option.name] = text.strip().upper()
     return found
-
-
-def _vector(text: str, flag: str) -> tuple[float, ...]:
-    """Read three numbers with commas between."""
-    import math
-
-    parts = text.split(",")
-    try:
-        numbers = tuple(float(part) for part in parts)
-    except ValueError:
-        numbers = ()
-    if len(numbers) != 3 or not all(
-        math.isfinite(number) and abs(number) <= 1e5 for number in numbers
-    ):
-        raise OptionError(f"{flag} {text!r}; expected three numbers in mm, for instance 100,0,50")
-    return numbers
 
 
 def result_json(result: "BenchResult") -> dict[str, object]:

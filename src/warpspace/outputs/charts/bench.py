@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from warpspace.bench.evaluation.layout import PolarLayout, lay_polar
+from warpspace.bench.evaluation.layout import LEAST, PolarLayout, lay_polar
 from warpspace.bench.outcome import Chart, Curve, Outcome
 from warpspace.bench.run import BenchResult
 from warpspace.outputs.charts.paper import SMALL, TEXT, ground, quiet, sheet, style
@@ -117,7 +117,7 @@ def _lines(axes: Axes, chart: Chart) -> None:
         axes.set_aspect("equal", adjustable="datalim")
     else:
         values = np.concatenate([curve.y for curve in chart.curves])
-        if np.ptp(values) < 1e-6:  # nothing but rounding: no chart of noise
+        if np.ptp(values) < LEAST:  # nothing but rounding: no chart of noise
             middle = float(np.round(values.mean(), 6))
             axes.set_ylim(middle - 1.0, middle + 1.0)
     axes.set_xlabel(chart.x_label, size=SMALL)

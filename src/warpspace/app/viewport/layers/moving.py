@@ -10,6 +10,7 @@ from warpspace.app.viewport.layers import Layer
 from warpspace.app.viewport.layers.annotations import AnnotationsLayer
 from warpspace.app.viewport.layers.asked_point import AskedPointLayer
 from warpspace.app.viewport.layers.axes import AxesLayer
+from warpspace.app.viewport.layers.bench import BenchLayer
 from warpspace.app.viewport.layers.ghost_machine import GhostMachineLayer
 from warpspace.app.viewport.layers.machine import MachineLayer
 from warpspace.app.viewport.layers.other_side import OtherSideLayer
@@ -23,7 +24,7 @@ Tell = Callable[[Mapping[str, float]], None]
 
 def draw_around(scene: SceneApi, picture: LivePicture) -> list[Layer]:
     """Draw what lies on and around the map."""
-    kinds = (TracesLayer, AxesLayer, OtherSideLayer, AskedPointLayer, GhostMachineLayer)
+    kinds = (TracesLayer, BenchLayer, AxesLayer, OtherSideLayer, AskedPointLayer, GhostMachineLayer)
     return [kind(scene, picture) for kind in kinds]
 
 

@@ -1,0 +1,49 @@
+"""Which standard test is run, with which options, and whether its path is drawn."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from warpspace.bench.options import options_of
+from warpspace.bench.registry import bench_names, find_test
+
+LONGEST = 80
+"""Characters of one option."""
+
+
+@dataclass(frozen=True, slots=True)
+class BenchLook:
+    """The test that is looked at.
+
+    Attributes
+    ----------
+    name : str
+        Of the test; empty for none.
+    options : mapping of str to str
+        Its options as somebody typed or chose them; those left out are the test's own choice.
+    path : bool
+        Whether its path is drawn.
+    """
+
+    name: str = ""
+    options: Mapping[str, str] = field(default_factory=dict[str, str])
+    path: bool = True
+
+    def with_test(self, name: str) -> "BenchLook":
+        """Choose a test, with its own options; what is no test changes nothing."""
+        if name == self.name or (name and name not in bench_names()):
+            return self
+        return replace(self, name=name, options={})
+
+    def with_option(self, option: str, text: str) -> "BenchLook":
+        """Set one option as typed; empty for the test's own choice."""
+        options = {key: value for key, value in self.options.items() if key != option}
+        if text.strip():
+            options[option] = text.strip()[:LONGEST]
+        return replace(self, options=options)
+
+
+def option_names() -> frozenset[str]:
+    """List the names of the options of all tests."""
+    return frozenset(
+        option.name for name in bench_names() for option in options_of(find_test(name))
+    )
