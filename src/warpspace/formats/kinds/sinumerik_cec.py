@@ -146,6 +146,9 @@ def write(wanted: Wanted) -> Files:
     for target in wanted.corrector.moved:
         found = {group: table[target] for group, table in needed.items()}
         tables += _tables_for(wanted, target, found)
+    if not tables:  # nothing to correct: a table of zeros
+        axis = axes[0]
+        tables.append((axis, wanted.corrector.moved[0], np.zeros(len(wanted.places(axis))), 0))
     if len(tables) > MOST_TABLES:
         raise OptionError(
             f"sinumerik-cec: {len(tables)} tables; expected at most {MOST_TABLES}, as the control"
