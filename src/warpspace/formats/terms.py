@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpspace.kinematics.model import Coordinates
 from warpspace.units import Array
@@ -210,7 +211,7 @@ def trilinear(
     ndarray, [..., k]
         Beyond the grid the values of its border.
     """
-    cells: list[Array] = []
+    cells: list[NDArray[np.intp]] = []
     shares: list[Array] = []
     for point, along in zip(points, positions, strict=True):
         places = np.asarray(along, dtype=float)

@@ -1,13 +1,15 @@
 """From imported errors to a scene: each error a curve, its runs and uncertainties beside it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.formats.importing import Reading
 from warpspace.formats.measured import BACKWARD, FORWARD, Imported, Plane, Series
+from warpspace.kinematics.model import Model
 from warpspace.machine.axes import is_linear
 from warpspace.machine.curves.constant import Constant
 from warpspace.machine.curves.curve import ErrorFunction
@@ -29,6 +31,7 @@ MEASURED = ("csv", "rtl")
 """Formats whose runs are readings, which are kept with the scene."""
 LEEWAY = 1e-6
 """mm or degrees by which a position may lie beyond the travel."""
+T = TypeVar("T")
 SIGNS = {FORWARD: "+", BACKWARD: "-"}
 
 
@@ -148,9 +151,9 @@ def into_scene(reading: Reading, base: Scene | None, title: str, name: str) -> I
     return ImportedScene(parsed, text, (*notes, *said))
 
 
-def _without(table: object, curves: dict[str, ErrorFunction]) -> dict[str, object]:
+def _without(table: Mapping[str, T], curves: Mapping[str, ErrorFunction]) -> dict[str, T]:
     """Give the entries of parameters that are not imported."""
-    return {key: value for key, value in dict(table).items() if key not in curves}  # type: ignore[call-overload]
+    return {key: value for key, value in table.items() if key not in curves}
 
 
 def _check_keys(found: Imported, base: Scene, name: str) -> None:
@@ -280,7 +283,7 @@ def _measured(
     return uncertainty, measured
 
 
-def _convention(found: Imported, base: Scene) -> tuple[object, list[str]]:
+def _convention(found: Imported, base: Scene) -> tuple[Model, list[str]]:
     """Give the axes of imported component errors the convention of their file."""
     model = base.model
     own = dict(model.own_component_errors)

@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any
 
 from warpspace.app.browser.address import listen_script, show_script
+from warpspace.app.browser.dropping import drop_script
 from warpspace.app.browser.page import error_words
 from warpspace.app.browser.uploads import Uploads, size_message, size_script
 from warpspace.app.browser.viser_private import dom_id
@@ -20,6 +21,7 @@ from warpspace.app.documents.scene_list import dropped_words
 from warpspace.app.documents.services import CancelledError
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
+from warpspace.app.panels.importing import ImportWindow, accepted_endings
 from warpspace.app.readouts.html import message
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.comparison import Comparison
@@ -48,6 +50,7 @@ class FilesPanel:
         self._context = context
         self._picture: LivePicture | None = None
         self._jobs = Jobs(self._report, self._failed)
+        self._import = ImportWindow(context)
         self._add_scene_files()
         self._add_outputs()
         gui = context.gui
@@ -63,9 +66,10 @@ class FilesPanel:
         """Add opening, saving and the link."""
         context, gui = self._context, self._context.gui
         upload = gui.add_upload_button(
-            "Open a scene …",
-            mime_type=".toml",
-            hint="A scene file (TOML, at most 4 MB). All its problems are listed; undo goes back.",
+            "Open a scene or data …",
+            mime_type=accepted_endings(),
+            hint="A scene file (TOML), or measured errors and tables of controllers, at most 4 MB;"
+            " dropping files on the page does the same. Undo goes back.",
         )
         Uploads(
             context.client,
@@ -77,6 +81,7 @@ class FilesPanel:
         refused = gui.add_text("", "", visible=False)
         refused.on_update(lambda _: self._context.act(lambda: self._refuse(str(refused.value))))
         context.page.run_script(size_script(upload, refused, MAX_SCENE_BYTES))
+        context.page.run_script(drop_script(upload))
         self._group(
             "Keep scene, settings and camera",
             {"Save scene": self._save, "Link": self._link},
@@ -130,9 +135,12 @@ class FilesPanel:
             self._failed(label, error)
 
     def _open(self, name: str, content: bytes) -> None:
-        """Open an uploaded scene."""
+        """Open an uploaded scene, or show what a file of measured data would bring."""
 
         def read() -> None:
+            if not name.lower().endswith(".toml"):
+                self._import.offer(name, content)
+                return
             title = incoming.safe_name(name)
             text = incoming.upload_text(content, f"{title}.toml")
             opened, camera = document.open_text(text, title, f"{title}.toml")

@@ -16,6 +16,7 @@ from warpspace.formats.kind import SIGNS, Format, ReadOptions
 from warpspace.formats.measured import Imported
 from warpspace.formats.registry import find_format
 from warpspace.formats.source import Source, source_of_text
+from warpspace.formats.terms import Tables
 from warpspace.formats.to_scene import into_scene
 from warpspace.kinematics.model import Coordinates
 from warpspace.machine.errors import ErrorSet
@@ -210,7 +211,7 @@ class _Controller:
     """What a controller does with the files it has read."""
 
     corrector: Corrector
-    tables: object
+    tables: Tables | None
     size: int
     assumed: tuple[str, ...]
     notes: tuple[str, ...]
@@ -220,7 +221,7 @@ class _Controller:
         """Give what it adds to the commanded positions."""
         if self.tables is None:
             return self.corrector.moves(coordinates)
-        return dict(self.tables.corrections(coordinates, self.direction))  # type: ignore[attr-defined]
+        return dict(self.tables.corrections(coordinates, self.direction))
 
 
 def _read_back(kind: Format, sources: list[Source], wanted: Wanted) -> _Controller:

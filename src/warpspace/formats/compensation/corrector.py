@@ -101,10 +101,9 @@ class Corrector:
         shape = batch_shape(coordinates)
         total = {axis: np.zeros(shape) for axis in self.moved}
         shift, _ = self._response(coordinates, self.axes)
-        back = np.linalg.pinv(shift, rcond=CUT)
-        if self.tilting:
-            carried, turn = self._response(coordinates, self.tilting)
-            upright = np.linalg.pinv(turn, rcond=CUT)
+        back = _inverse(shift)
+        carried, turn = self._response(coordinates, self.tilting)
+        upright = _inverse(turn)
         for _ in range(STEPS):
             position, orientation = self.residual(coordinates, total)
             if self.tilting:
@@ -130,7 +129,18 @@ class Corrector:
             )
             for found, one, other in ((shifts, up[0], down[0]), (turns, up[1], down[1])):
                 found.append(np.broadcast_to((one - other) / (2.0 * small), shape))
-        return np.stack(shifts, -1), np.stack(turns, -1)
+        none = np.zeros((*shape, 0))
+        return (
+            np.stack(shifts, -1) if shifts else none,
+            np.stack(turns, -1) if turns else none,
+        )
+
+
+def _inverse(matrix: Array) -> Array:
+    """Invert, as far as it can be, without directions that hardly act, [..., n, m]."""
+    if not matrix.shape[-1]:
+        return np.swapaxes(matrix, -1, -2)
+    return np.asarray(np.linalg.pinv(matrix, rcond=CUT), dtype=np.float64)
 
 
 def _times(matrix: Array, vector: Array) -> Array:

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from warpspace.formats.compensation.corrector import Corrector
 from warpspace.scene.model import Scene
@@ -52,10 +53,11 @@ class Wanted:
         """Give the factor from a correction to a number of the table."""
         return -1.0 if (self.sign or usual) == "error" else 1.0
 
-    def round(self, values: Array) -> Array:
+    def round(self, values: ArrayLike) -> Array:
         """Round values to the resolution."""
         step = self.resolution
-        return np.round(values / step) * step if step else np.asarray(values)
+        given = np.asarray(values, dtype=float)
+        return np.round(given / step) * step if step else given
 
     def toward(self, direction: str) -> "Wanted":
         """Give what is wanted for one direction of travel, "forward" or "backward"."""
@@ -106,7 +108,6 @@ class Wanted:
         for index in reversed(range(len(self.axes))):
             if self.axes[index] not in kept:
                 found = {
-                    axis: np.tensordot(value, weights, axes=([index], [0]))
-                    for axis, value in found.items()
+                    axis: np.moveaxis(value, index, -1) @ weights for axis, value in found.items()
                 }
         return found

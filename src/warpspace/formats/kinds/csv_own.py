@@ -40,7 +40,7 @@ def _read_one(source: Source) -> Imported:
     """Read one table."""
     numbered = [(i, text) for i, text in enumerate(source.lines, 1) if is_content(text)]
     if not numbered:
-        source.refuse("has no header")
+        source.refuse("has no header; expected one such as X [mm],EXX [um]")
     line, header = numbered[0]
     mark = separator_of(header)
     columns = read_header(source, line, header.split(mark))
@@ -48,7 +48,7 @@ def _read_one(source: Source) -> Imported:
     if not errors:
         source.refuse("has no column of an error; expected for instance EXX [um]", line)
     if len(numbered) < 2:
-        source.refuse("has no rows below its header", line)
+        source.refuse("has no rows below its header; expected at least one", line)
     if len(numbered) - 1 > MAX_POINTS:
         found = f"has {len(numbered) - 1:,} rows"
         source.refuse(f"{found}; expected at most {MAX_POINTS:,}", numbered[MAX_POINTS + 1][0])
@@ -169,7 +169,7 @@ def _all_series(
             table[way][place] = row["error", column.name]
         given = {way: values for way, values in table.items() if not np.isnan(values).all()}
         if not given:
-            source.refuse(f"column {column.name} is empty")
+            source.refuse(f"column {column.name} is empty; expected numbers, or no such column")
         holes = np.isnan(np.array(list(given.values()))).all(axis=0)
         if holes.any():
             found = f"{column.name} has no value at {axis} {places[holes][0]:g}"

@@ -27,8 +27,8 @@ SIGN = (
     " table follows the error curve); --sign correction says otherwise"
 )
 TRAVEL = (
-    "BACKLASH is the value for travel in the negative direction, positions beyond the table take its"
-    " end values"
+    "BACKLASH is the value for travel in the negative direction; positions beyond the table take"
+    " its end values"
 )
 POSITION, BACKLASH, NUMBER, ACTIVE = "AXISPOS", "BACKLASH", "NR", "ACTIVE"
 WIDTH = 12
@@ -54,7 +54,7 @@ def _rows(source: Source) -> list[tuple[int, Cells]]:
     _, head = lines[0]
     names = head.upper().lstrip("#").split()
     if not lines[-1][1].strip().upper().startswith("[END]"):
-        source.refuse("does not end with [END] (is the file cut off?)", lines[-1][0])
+        source.refuse("is not the end; expected [END] (is the file cut off?)", lines[-1][0])
     starts = [_start(head.upper(), names, index) for index in range(len(names))]
     rows: list[tuple[int, Cells]] = []
     for number, text in lines[1:-1]:
@@ -124,7 +124,7 @@ def _lines(source: Source, along: str, options: ReadOptions) -> list[Line]:
     """Build the tables of one .COM file."""
     rows = _rows(source)
     if not rows:
-        source.refuse("has no compensation points")
+        source.refuse("has no compensation points; expected at least one")
     if len(rows) > MOST_POINTS:
         found = f"has {len(rows)} compensation points"
         source.refuse(f"{found}; expected at most {MOST_POINTS}, as the control takes", rows[-1][0])

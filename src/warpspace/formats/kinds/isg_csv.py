@@ -20,7 +20,6 @@ from warpspace.machine.limits import MAX_POINTS
 from warpspace.machine.parameters import parameter
 
 NAME = "isg-csv"
-ARGUMENTS = ("X", "Y", "Z", "A", "B", "C")
 DIGITS = 12
 _SPLIT = re.compile(r"[\s;,]+")
 Block = list[tuple[int, list[str]]]
@@ -35,7 +34,9 @@ def recognise(head: str, name: str) -> bool:
             continue
         names = [part for part in _SPLIT.split(bare) if part]
         known = [part for part in names if volumetric.error_name(part)]
-        return bool(known) and len(known) + sum(part in ARGUMENTS for part in names) == len(names)
+        return bool(known) and len(known) + sum(
+            part in volumetric.ARGUMENTS for part in names
+        ) == len(names)
     return False
 
 
@@ -56,7 +57,9 @@ def _blocks(source: Source) -> list[Block]:
         if bare:
             blocks[-1].append((number, [part for part in _SPLIT.split(bare) if part]))
             if len(blocks[-1]) > MAX_POINTS:
-                source.refuse(f"a block has more than {MAX_POINTS:,} rows", number)
+                source.refuse(
+                    f"a block has more than {MAX_POINTS:,} rows; expected at most so many", number
+                )
     return [block for block in blocks if block]
 
 
@@ -68,30 +71,37 @@ def _read_one(source: Source) -> list[Imported]:
         part = _read_block(source, block)
         for key in part.keys:
             if key in known:
-                source.refuse(f"{volumetric.file_name(key)} stands in two blocks", block[0][0])
+                source.refuse(
+                    f"{volumetric.file_name(key)} stands in two blocks; expected it in one",
+                    block[0][0],
+                )
             known.add(key)
         found.append(part)
     if not known:
-        source.refuse("has no errors")
+        source.refuse("has no errors; expected a header such as X EXX EYX")
     return found
 
 
 def _read_block(source: Source, block: Block) -> Imported:
     """Read a header and its records."""
     line, names = block[0]
-    arguments = [name for name in names if name in ARGUMENTS]
+    arguments = [name for name in names if name in volumetric.ARGUMENTS]
     left = [name for name in names if volumetric.OTHER.fullmatch(name)]
     for name in names:
-        if name not in ARGUMENTS and name not in left and not volumetric.error_name(name):
+        if (
+            name not in volumetric.ARGUMENTS
+            and name not in left
+            and not volumetric.error_name(name)
+        ):
             expected = "expected arguments X Y Z A B C and parameters such as EXX or C0B"
             source.refuse(f"column {name!r}; {expected}", line)
     if twice := next((name for name in names if names.count(name) > 1), ""):
-        source.refuse(f"column {twice} stands there twice", line)
+        source.refuse(f"column {twice} stands there twice; expected it once", line)
     if len(arguments) > 2:
         expected = "expected one or two: no error here depends on more"
         source.refuse(f"{len(arguments)} arguments {' '.join(arguments)}; {expected}", line)
     if len(block) < 2:
-        source.refuse("a header without records", line)
+        source.refuse("a header without records; expected at least one", line)
     rows: list[tuple[int, dict[str, float]]] = []
     for number, parts in block[1:]:
         if len(parts) != len(names):
@@ -177,6 +187,7 @@ def _plane(
 def write(wanted: Wanted) -> Files:
     """Write the errors of a scene, a block an axis."""
     held = sampled(wanted)
+    volumetric.check_axes(held, NAME)
     blocks: list[str] = []
     if held.constants:
         names = [volumetric.file_name(key) for key in held.constants]

@@ -53,7 +53,7 @@ def _read_one(source: Source) -> Imported:
                 _row(source, number, body, rows, name, key)
             if closed:
                 if not rows:
-                    source.refuse(f"[{name}] has no points", number)
+                    source.refuse(f"[{name}] has no points; expected position and value", number)
                 if key:
                     at, values = zip(*rows, strict=True)
                     series.append(Series(key, at, (Run(1, BOTH, values),)))
@@ -66,7 +66,7 @@ def _read_one(source: Source) -> Imported:
             if not key:
                 left.append(name)
             elif key in constants or any(one.key == key for one in series):
-                source.refuse(f"[{name}] is given twice", number)
+                source.refuse(f"[{name}] is given twice; expected it once", number)
         elif not name:
             source.refuse(f"{source.shown(number)}; expected a block such as [EXY]", number)
         elif matched := _VALUE.fullmatch(bare):
@@ -85,7 +85,9 @@ def _read_one(source: Source) -> Imported:
             expected = "expected VALUE = number or Gridpoints = {"
             source.refuse(f"{source.shown(number)}; {expected}", number)
     if opened:
-        source.refuse(f"Gridpoints of [{name}] do not end with }} (is the file cut off?)", opened)
+        source.refuse(
+            f"Gridpoints of [{name}] do not end; expected }} (is the file cut off?)", opened
+        )
     notes = (f"{', '.join(left)}: no errors, left out",) if left else ()
     return Imported(NAME, tuple(series), constants=constants, notes=(*source.notes, *notes))
 
@@ -115,12 +117,15 @@ def _row(
     scale = volumetric.factor_of(key) if key else 1.0
     rows.append((position, check_error(value * scale, source, number, name)))
     if len(rows) > MAX_POINTS:
-        source.refuse(f"{name} has more than {MAX_POINTS:,} points", number)
+        source.refuse(
+            f"{name} has more points than {MAX_POINTS:,}; expected at most so many", number
+        )
 
 
 def write(wanted: Wanted) -> Files:
     """Write the errors of a scene; those of two axes have no place and are left out."""
     held = sampled(wanted)
+    volumetric.check_axes(held, NAME)
     lines = [f"// {wanted.scene.title}".replace("\n", " "), "// mm, rad, degrees; variant Vendor"]
     lines += [
         f"// {plane.key} over {' and '.join(plane.axes)}: has no place here, left out"

@@ -101,7 +101,7 @@ def _twist(source: Source, options: ReadOptions) -> Imported | None:
             None,
         )
         if named is None:
-            source.refuse(f"[axis_twist_compensation] has no calibrate_{key}", line)
+            source.refuse(f"[axis_twist_compensation] has no calibrate_{key}; expected it", line)
         ends.append(read_number(twist[named][1], source, twist[named][0], named))
     if len(heights) < 2 or ends[1] <= ends[0]:
         found = f"{len(heights)} z_compensations from {ends[0]:g} to {ends[1]:g}"
@@ -123,7 +123,7 @@ def _twist(source: Source, options: ReadOptions) -> Imported | None:
         found = f"y_offset {offset:g} mm"
         source.refuse(f"{found}; expected {LEAST_OFFSET_MM:g} mm or more to tell a twist", place)
     resolve_axis("X", source, line, options)
-    places = np.linspace(*ends, len(heights))
+    places = np.linspace(ends[0], ends[1], len(heights))
     values = np.array(heights) / offset * RAD_TO_URAD
     run = Run(1, BOTH, tuple(values.tolist()))
     said = (

@@ -66,12 +66,14 @@ def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
                 expected = f"expected a matrix within ±{MOST:g} of the identity"
                 source.refuse(f"{source.shown(number)}; {expected}", number)
             if (row, column) in found:
-                source.refuse(f"C_{row.lower()}{column.lower()} is set twice", number)
+                source.refuse(
+                    f"C_{row.lower()}{column.lower()} is set twice; expected it once", number
+                )
             for axis in (row, column):
                 resolve_axis(axis, source, number, options)
             found[row, column] = value
         if not found:
-            source.refuse("sets no matrixkins.C_xx … C_zz")
+            source.refuse("sets no coefficient; expected setp matrixkins.C_xx … C_zz")
     matrix = tuple(tuple(found.get((row, axis), 0.0) for axis in AXES) for row in AXES)
     return Tables((Affine(AXES, matrix),), (), (), ("mm/mm",))
 

@@ -24,6 +24,7 @@ INFERRED = (
     " nominal; runs with odd numbers forward, even ones backward"
 )
 ONE_WAY = "the flags say one direction: runs with even numbers hold nothing, left out"
+KNOWN = "expected Filetype, Target-count, Targets and Flags"
 _SECTION = re.compile(r"([A-Z][A-Z -]*)::")
 _KEY = re.compile(r"([A-Za-z][A-Za-z0-9 _-]*?)\s*:\s*(.*)")
 Lines = list[tuple[int, str]]
@@ -47,15 +48,17 @@ def _sections(source: Source) -> dict[str, Lines]:
                 expected = f"expected one of {', '.join(SECTIONS)}"
                 source.refuse(f"section {name!r} is not understood; {expected}", number)
             if name in found:
-                source.refuse(f"section {name} stands there twice", number)
+                source.refuse(f"section {name} stands there twice; expected it once", number)
             lines = found.setdefault(name, [])
         elif bare:
             if lines is None:
-                source.refuse(f"{source.shown(number)} before any section", number)
+                source.refuse(
+                    f"{source.shown(number)} before any section; expected HEADER::", number
+                )
             lines.append((number, bare))
     for name in ("TARGET DATA", "RUNS", "DEVIATIONS"):
         if name not in found:
-            source.refuse(f"has no section {name} (is the file cut off?)")
+            source.refuse(f"has no section {name}; expected it (is the file cut off?)")
     return found
 
 
@@ -68,7 +71,7 @@ def _targets(source: Source, lines: Lines) -> tuple[list[float], list[int]]:
         matched = _KEY.fullmatch(text)
         if matched is None:
             if not within:
-                source.refuse(f"{source.shown(number)} is not understood", number)
+                source.refuse(f"{source.shown(number)} is not understood; {KNOWN}", number)
             for part in text.split():
                 value = read_number(part, source, number, "target")
                 values.append(check_position(value, source, number, "target"))
@@ -82,7 +85,7 @@ def _targets(source: Source, lines: Lines) -> tuple[list[float], list[int]]:
         elif key == "targets":
             values += [read_number(part, source, number, "target") for part in value.split()]
         elif key != "filetype":
-            source.refuse(f"{source.shown(number)} is not understood", number)
+            source.refuse(f"{source.shown(number)} is not understood; {KNOWN}", number)
     if len(values) != count:
         line = lines[-1][0] if lines else None
         source.refuse(f"{len(values)} targets; expected {count} as Target-count says", line)
@@ -128,7 +131,7 @@ def _read_one(source: Source, options: ReadOptions) -> Imported:
         if matched and matched[1].strip().lower() == "run-count":
             stated = read_whole(matched[2], source, number, "Run-count", 1, MAX_RUNS)
     if not stated:
-        source.refuse("section RUNS has no Run-count")
+        source.refuse("section RUNS has no Run-count; expected Run-count: number")
     one_way = len(flags) > 1 and flags[1] == 1
     axis = _axis(source, sections, options)
     table: dict[int, np.ndarray] = {}
@@ -139,7 +142,9 @@ def _read_one(source: Source, options: ReadOptions) -> Imported:
             source.refuse(f"run {run}; expected at most {stated} as Run-count says", number)
         row = table.setdefault(run, np.full(len(targets), math.nan))
         if not math.isnan(row[target - 1]):
-            source.refuse(f"run {run}, target {target} stands there twice", number)
+            source.refuse(
+                f"run {run}, target {target} stands there twice; expected it once", number
+            )
         row[target - 1] = value
     kept = {run: row for run, row in table.items() if not (one_way and run % 2 == 0)}
     expected = [run for run in range(1, stated + 1) if not (one_way and run % 2 == 0)]

@@ -5,11 +5,13 @@ K3, pages 243 to 264: linear between equidistant points, end values held, or rep
 modulo function; tables for one direction of travel; the product of two tables is added.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
 
 import numpy as np
 
+from warpspace.exceptions import OptionError
 from warpspace.formats.compensation.wanted import Wanted
 from warpspace.formats.kind import ERROR, Files, Format, ReadOptions, resolve_axis
 from warpspace.formats.measured import Imported, merge
@@ -52,7 +54,7 @@ class _Table:
 def recognise(head: str, name: str) -> bool:
     """Tell it by its variables."""
     del name
-    return f"${PREFIX}" in head
+    return text.assigns(PREFIX, head)
 
 
 def _tables(source: Source) -> dict[int, _Table]:
@@ -91,7 +93,7 @@ def _line(table: _Table, index: int, source: Source, options: ReadOptions) -> Li
     what = f"table {index}"
     for setting in (*AXES, *NUMBERS):
         if setting not in table.axes and setting not in table.numbers:
-            found = f"{what}: ${PREFIX}_{setting}[{index}] is missing"
+            found = f"{what}: ${PREFIX}_{setting}[{index}] is missing; expected it"
             source.refuse(f"{found} (is the file cut off?)", table.line)
     along, target = (
         resolve_axis(table.axes[setting], source, table.line, options) for setting in AXES
@@ -138,36 +140,46 @@ def read(sources: Sequence[Source], options: ReadOptions) -> Imported:
 def write(wanted: Wanted) -> Files:
     """Write tables of every axis over every axis, and products of two where they help."""
     tables: list[tuple[str, str, Array, int]] = []
+    axes = wanted.axes
+    groups = [(), *((axis,) for axis in axes), *combinations(axes, 2)]
+    needed = {group: wanted.averaged(group) for group in groups}
     for target in wanted.corrector.moved:
-        tables += _tables_for(wanted, target)
-        if len(tables) > MOST_TABLES:
-            break
+        found = {group: table[target] for group, table in needed.items()}
+        tables += _tables_for(wanted, target, found)
+    if not tables:  # nothing to correct: a table of zeros
+        axis = axes[0]
+        tables.append((axis, wanted.corrector.moved[0], np.zeros(len(wanted.places(axis))), 0))
+    if len(tables) > MOST_TABLES:
+        raise OptionError(
+            f"sinumerik-cec: {len(tables)} tables; expected at most {MOST_TABLES}, as the control"
+            " takes: correct fewer axes"
+        )
     body = [
         f"; written by warpspace for {wanted.scene.title}".replace("\n", " "),
         f"; {SIGN if not wanted.sign else 'sign: ' + wanted.sign}",
     ]
-    for index, (along, target, values, number) in enumerate(tables[:MOST_TABLES]):
-        # a product points to a table by its place among those of one target
+    for index, (along, target, values, number) in enumerate(tables):
         body += _spelled(wanted, index, along, target, values, number)
     return text.archive("NC_CEC", body)
 
 
-def _tables_for(wanted: Wanted, target: str) -> list[tuple[str, str, Array, int]]:
+def _tables_for(
+    wanted: Wanted, target: str, needed: Mapping[tuple[str, ...], Array]
+) -> list[tuple[str, str, Array, int]]:
     """Give the tables that correct one axis: axis looked up, corrected axis, values, factor table.
 
     The last entry is how many tables further the other factor of a product stands, 0 for none.
     """
     factor = wanted.factor(ERROR)
     axes = wanted.axes
-    mean = float(wanted.averaged([])[target])
-    along = {axis: wanted.averaged([axis])[target] - mean for axis in axes}
+    mean = float(needed[()])
+    along = {axis: needed[axis,] - mean for axis in axes}
     home = target if target in axes else axes[0]
     along[home] = along[home] + mean
     products: list[tuple[str, str, Array, int]] = []
     for i, first in enumerate(axes):
         for second in axes[i + 1 :]:
-            both = wanted.averaged([first, second])[target]
-            rest = factor * _interaction(both)
+            rest = factor * _interaction(needed[first, second])
             left, sizes, right = np.linalg.svd(rest)
             for rank, size in enumerate(sizes[:MOST_PRODUCTS].tolist()):
                 one, other = left[:, rank] * np.sqrt(size), right[rank] * np.sqrt(size)

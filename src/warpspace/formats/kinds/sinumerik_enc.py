@@ -35,7 +35,7 @@ class _Table:
 def recognise(head: str, name: str) -> bool:
     """Tell it by its variables."""
     del name
-    return f"${PREFIX}" in head
+    return text.assigns(PREFIX, head)
 
 
 def _tables(source: Source) -> dict[tuple[int, str], _Table]:
@@ -70,7 +70,7 @@ def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
             what = f"table of {name}"
             for setting in ("STEP", "MIN", "MAX"):
                 if setting not in table.settings:
-                    found = f"{what}: ${PREFIX}_{setting} is missing"
+                    found = f"{what}: ${PREFIX}_{setting} is missing; expected it"
                     source.refuse(f"{found} (is the file cut off?)", table.line)
             if any(term.source == axis for term in terms):
                 source.refuse(

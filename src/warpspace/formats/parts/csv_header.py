@@ -91,10 +91,11 @@ def read_header(source: Source, line: int, parts: Sequence[str]) -> list[Column]
             hint = near_miss(
                 name, [*"XYZABCUVW", *(f"E{a}{b}" for a in "XYZABC" for b in "XYZABC")]
             )
-            source.refuse(f"column {shown(part)} is no axis and no error{hint}", line)
+            expected = "expected an axis, an error, u(error), run or direction"
+            source.refuse(f"column {shown(part)}; {expected}{hint}", line)
     seen = [(one.role, one.name) for one in found]
     if twice := next((one for one in seen if seen.count(one) > 1), None):
-        source.refuse(f"column {twice[1]} stands there twice", line)
+        source.refuse(f"column {twice[1]} stands there twice; expected it once", line)
     return found
 
 

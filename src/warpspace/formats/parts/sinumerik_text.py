@@ -39,6 +39,11 @@ class Assignment:
     value: str
 
 
+def assigns(name: str, head: str) -> bool:
+    """Tell whether a line of a file's head assigns a variable, or one whose name begins so."""
+    return re.search(rf"^\s*(?:N\d+\s+)?\${name}[A-Z_]*\s*\[", head, re.MULTILINE) is not None
+
+
 def assignments(source: Source, names: Sequence[str]) -> Iterator[Assignment]:
     """Give the assignments of a file.
 
@@ -91,7 +96,7 @@ def places_of(start: float, end: float, step: float, source: Source, what: str, 
         source.refuse(f"{found} ({count:.4g}); expected equal steps from start to end", line)
     if round(count) > MOST_INDEX:
         source.refuse(f"{what}: {round(count):,} steps; expected at most {MOST_INDEX:,}", line)
-    return start + step * np.arange(round(count) + 1)
+    return start + step * np.arange(round(count) + 1, dtype=np.float64)
 
 
 def filled(
@@ -125,7 +130,7 @@ def set_once(
         If it has one already.
     """
     if index in table:
-        source.refuse(f"{what}: interpolation point {index} is given twice", line)
+        source.refuse(f"{what}: interpolation point {index} is given twice; expected it once", line)
     table[index] = value
 
 

@@ -51,11 +51,11 @@ def factor_of(lengths: tuple[float, float, float], source: Source, line: int, wh
         If no part has them.
     """
     ac, bd, ad = lengths
-    try:
-        return skew_factor(*(math.sqrt(length) ** 2 for length in lengths))
-    except (ValueError, ZeroDivisionError):
-        found = f"{what}: AC {ac:g}, BD {bd:g}, AD {ad:g} mm are no parallelogram"
-        raise source.problem(f"{found}; expected two diagonals and a side", line) from None
+    # the diagonals of a parallelogram are together longer than twice a side, and differ by less
+    if min(lengths) > 0.0 and ac + bd > 2.0 * ad > abs(ac - bd):
+        return skew_factor(ac, bd, ad)
+    found = f"{what}: AC {ac:g}, BD {bd:g}, AD {ad:g} mm are no parallelogram"
+    raise source.problem(f"{found}; expected two diagonals and a side", line)
 
 
 def skew_term(factors: Mapping[str, float]) -> Affine:

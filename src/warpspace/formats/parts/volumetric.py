@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from warpspace.exceptions import OptionError
 from warpspace.formats.kind import ReadOptions
 from warpspace.formats.measured import BOTH, Imported, Run, Series
 from warpspace.formats.numbers import MM_TO_UM, RAD_TO_URAD
@@ -20,6 +21,7 @@ from warpspace.machine.axes import is_linear
 from warpspace.machine.parameters import PARAMETERS, parameter
 
 STANDARD, ALTERNATIVE = "standard", "alternative"
+ARGUMENTS = ("X", "Y", "Z", "A", "B", "C")
 VARIANTS = (STANDARD, ALTERNATIVE)
 CONVENTION = {"linear": "after_motion", "rotary": "before_motion"}
 ASSUMED = (
@@ -50,6 +52,17 @@ def file_name(key: str) -> str:
 def factor_of(key: str) -> float:
     """Give the factor from mm or rad to µm or µrad."""
     return RAD_TO_URAD if parameter(key).is_rotation else MM_TO_UM
+
+
+def check_axes(held: Imported, name: str) -> None:
+    """Refuse errors of axes that the file has no name for.
+
+    Raises
+    ------
+    OptionError
+    """
+    if other := next((axis for axis in held.axes if axis not in ARGUMENTS), ""):
+        raise OptionError(f"{name} knows the axes {', '.join(ARGUMENTS)}; the scene has {other}")
 
 
 def finished(found: Imported, options: ReadOptions) -> Imported:

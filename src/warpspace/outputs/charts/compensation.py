@@ -82,9 +82,20 @@ def _slice(
     grid = found.grid
     names = grid.axes
     at = [_along(found, index) for index in (across, up)]
-    mesh = axes.pcolormesh(
-        at[0], at[1], values.T, cmap="viridis", vmin=0.0, vmax=largest, shading="gouraud"
+    ends = [(line[0], line[-1], (line[-1] - line[0]) / (len(line) - 1) / 2.0) for line in at]
+    (left, right, half), (low, high, tall) = ends
+    mesh = axes.imshow(
+        values.T,
+        origin="lower",
+        extent=(left - half, right + half, low - tall, high + tall),
+        aspect="auto",
+        interpolation="bilinear",
+        cmap="viridis",
+        vmin=0.0,
+        vmax=largest,
     )
+    axes.set_xlim(left, right)
+    axes.set_ylim(low, high)
     axes.set_xlabel(f"{names[across]} [{_unit(names[across])}]", fontsize=SMALL)
     axes.set_ylabel(f"{names[up]} [{_unit(names[up])}]", fontsize=SMALL)
     still = f"{names[rest]} {_along(found, rest)[worst[rest]]:.4g}" if names[rest] else ""

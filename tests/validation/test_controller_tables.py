@@ -1,0 +1,355 @@
+"""Tables of controllers: what their manuals print, and what they do with it, by hand.
+
+Sources: Siemens SINUMERIK Function Manual Extended Functions (03/2013), K3; FANUC A-79351E, page 3;
+LinuxCNC documentation of COMP_FILE and matrixkins(9); Klipper documentation, Skew Correction; ISG
+kernel documentation, FCT-C26; HEIDENHAIN Technical Manual TNC 306, page 4-21; ISO 230-2.
+"""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from warpspace.formats.importing import read_errors
+from warpspace.formats.kind import ReadOptions
+from warpspace.formats.kinds import (
+    fanuc_3d,
+    heidenhain,
+    linuxcnc_comp,
+    linuxcnc_matrix,
+    marlin,
+    sinumerik_cec,
+    sinumerik_enc,
+)
+from warpspace.formats.measured import BACKWARD, FORWARD
+from warpspace.formats.parts.skew import skew_factor, skew_lengths
+from warpspace.formats.source import source_of_text
+from warpspace.formats.terms import Product, trilinear
+
+PLAIN = ReadOptions()
+
+
+def sources(*texts: str, names: tuple[str, ...] = ()):
+    """Give texts as files."""
+    given = names or tuple(f"file{i}.txt" for i in range(len(texts)))
+    return [source_of_text(text, name) for text, name in zip(texts, given, strict=True)]
+
+
+# --- SINUMERIK, K3, page 242: X1 from -200 to 600 mm in steps of 1 mm, 801 points ---------------
+
+PRINTED = {0: "0.003", 1: "0.01", 2: "0.012", 800: "-0.0"}
+
+
+def sinumerik_242() -> str:
+    """Give the printed example; the points that it leaves out with dots are zero."""
+    lines = ["%_N_AX_EEC_INI", "CHANDATA(1)"]
+    for index in range(801):
+        value = PRINTED.get(index, "0.0")
+        lines.append(f"$AA_ENC_COMP[0,{index},X1]={value} ; compensation value")
+    return "\n".join(
+        [
+            *lines,
+            "$AA_ENC_COMP_STEP[0,X1]=1.0 ; Distance between interpolation points 1.0 mm",
+            "$AA_ENC_COMP_MIN[0,X1]=-200.0 ; Compensation starts at -200.0 mm",
+            "$AA_ENC_COMP_MAX[0,X1]=600.0 ; Compensation ends at +600.0 mm",
+            "$AA_ENC_COMP_IS_MODULO[0,X1]=0 ; Compensation without modulo function",
+            "M17",
+        ]
+    )
+
+
+def test_sinumerik_page_242_interpolates_linearly_and_holds_its_ends() -> None:
+    (table,) = sinumerik_enc.read_tables(sources(sinumerik_242()), PLAIN).terms
+    at = np.array([-300.0, -200.0, -199.5, -199.0, -198.25, 600.0, 900.0])
+    # a positive value makes the axis move in the negative direction (page 238)
+    expected = -np.array([0.003, 0.003, 0.0065, 0.01, 0.0115, 0.0, 0.0])
+    assert table.corrections({"X": at})["X"] == pytest.approx(expected, abs=1e-12)
+
+
+def test_sinumerik_page_242_is_a_positioning_error_in_um() -> None:
+    found = read_errors(sources(sinumerik_242()), PLAIN).found
+    (one,) = found.series
+    assert one.key == "EXX"
+    assert one.values[:3] == pytest.approx([3.0, 10.0, 12.0])
+    assert (one.positions[0], one.positions[-1], len(one.positions)) == (-200.0, 600.0, 801)
+
+
+def test_sinumerik_modulo_repeats_the_table() -> None:
+    text = (
+        "$AA_ENC_COMP[0,0,C]=0.0\n$AA_ENC_COMP[0,1,C]=0.01\n$AA_ENC_COMP[0,2,C]=0.0\n"
+        "$AA_ENC_COMP_STEP[0,C]=180\n$AA_ENC_COMP_MIN[0,C]=0\n$AA_ENC_COMP_MAX[0,C]=360\n"
+        "$AA_ENC_COMP_IS_MODULO[0,C]=1\nM17\n"
+    )
+    (table,) = sinumerik_enc.read_tables(sources(text), PLAIN).terms
+    at = np.array([-90.0, 90.0, 450.0, 360.0])
+    assert table.corrections({"C": at})["C"] == pytest.approx([-0.005, -0.005, -0.005, 0.0])
+
+
+CEC = """%_N_NC_CEC_INI
+CHANDATA(1)
+$AN_CEC[0,0]=0 ; 1. Compensation value for X1: 0 um
+$AN_CEC[0,1]=0.01
+$AN_CEC[0,2]=0.012
+$AN_CEC_INPUT_AXIS[0]=(Y1)
+$AN_CEC_OUTPUT_AXIS[0]=(X1)
+$AN_CEC_STEP[0]=400.0
+$AN_CEC_MIN[0]=-400.0
+$AN_CEC_MAX[0]=400.0
+$AN_CEC_DIRECTION[0]={direction}
+$AN_CEC_MULT_BY_TABLE[0]={other}
+$AN_CEC_IS_MODULO[0]=0
+$AN_CEC[1,0]=0
+$AN_CEC[1,1]=1
+$AN_CEC_INPUT_AXIS[1]=(Z1)
+$AN_CEC_OUTPUT_AXIS[1]=(X1)
+$AN_CEC_STEP[1]=100.0
+$AN_CEC_MIN[1]=0.0
+$AN_CEC_MAX[1]=100.0
+M17
+"""
+
+
+def test_sinumerik_cec_adds_tables_and_the_product_of_two() -> None:
+    tables = sinumerik_cec.read_tables(sources(CEC.format(direction=0, other=2)), PLAIN)
+    at = {"Y": np.array(-200.0), "Z": np.array(50.0)}
+    # 0.005 of table 0, 0.5 of table 1, and their product is added (page 249)
+    assert tables.corrections(at)["X"] == pytest.approx(-(0.005 + 0.5 + 0.005 * 0.5))
+    product = next(term for term in tables.terms if isinstance(term, Product))
+    assert product.corrections(at)["X"] == pytest.approx(-0.0025)
+
+
+def test_sinumerik_cec_direction_acts_in_one_direction_of_travel() -> None:
+    tables = sinumerik_cec.read_tables(sources(CEC.format(direction=1, other=0)), PLAIN)
+    at = {"Y": np.array(400.0), "Z": np.array(0.0)}
+    assert tables.corrections(at, 1)["X"] == pytest.approx(-0.012)
+    assert tables.corrections(at, -1)["X"] == pytest.approx(0.0)
+    # the sag of X over Y, and what Z adds
+    found = read_errors(sources(CEC.format(direction=1, other=0)), PLAIN).found
+    keys = {one.key: one for one in found.series}
+    assert set(keys) == {"EXY", "EXZ"}
+    assert keys["EXY"].mean(FORWARD)[-1] == pytest.approx(12.0)
+    assert keys["EXY"].mean(BACKWARD)[-1] == pytest.approx(0.0)
+
+
+# --- FANUC: one cell by hand ---------------------------------------------------------------------
+
+
+def test_fanuc_trilinear_formula_for_one_cell() -> None:
+    corners = np.array([3.0, 7.0, -2.0, 5.0, 11.0, -6.0, 4.0, 9.0])
+    values = corners.reshape(2, 2, 2, 1)
+    places = ((0.0, 10.0), (0.0, 20.0), (0.0, 40.0))
+    x, y, z = 0.3, 0.6, 0.25
+    expected = (
+        3.0 * (1 - x) * (1 - y) * (1 - z)
+        + 7.0 * (1 - x) * (1 - y) * z
+        + -2.0 * (1 - x) * y * (1 - z)
+        + 5.0 * (1 - x) * y * z
+        + 11.0 * x * (1 - y) * (1 - z)
+        + -6.0 * x * (1 - y) * z
+        + 4.0 * x * y * (1 - z)
+        + 9.0 * x * y * z
+    )
+    point = [np.array(3.0), np.array(12.0), np.array(10.0)]
+    assert trilinear(point, places, values)[0] == pytest.approx(expected, abs=1e-12)
+    assert expected == pytest.approx(2.77, abs=1e-9)
+
+
+def test_fanuc_counts_are_detection_units_times_the_magnification() -> None:
+    rows = [
+        "# three-dimensional error compensation",
+        "# detection unit = 0.0001 mm",
+        "# magnification = 3",
+        "point,X [mm],Y [mm],Z [mm],CX,CY,CZ",
+    ]
+    number = 0
+    for z in (0, 1):
+        for y in (0, 1):
+            for x in (0, 1):
+                number += 1
+                rows.append(f"{number},{x * 10},{y * 10},{z * 10},{number},0,{-number}")
+    tables = fanuc_3d.read_tables(sources("\n".join(rows)), PLAIN)
+    at = {"X": np.array(10.0), "Y": np.array(0.0), "Z": np.array(0.0)}
+    found = tables.corrections(at)
+    assert (found["X"], found["Z"]) == (pytest.approx(6e-4), pytest.approx(-6e-4))
+
+
+# --- LinuxCNC ------------------------------------------------------------------------------------
+
+TYPE_0 = "-1.000 -1.005 -0.995\n0.000 0.002 -0.003\n1.000 1.003 0.998\n"
+TYPE_1 = "-1.000 0.005 -0.005\n0.000 0.002 -0.003\n1.000 0.003 -0.004\n"
+
+
+def test_linuxcnc_type_0_example_adds_nominal_minus_actual() -> None:
+    options = ReadOptions(axis="X", variant="type-0")
+    (table,) = linuxcnc_comp.read_tables(sources(TYPE_0), options).terms
+    at = np.array([-2.0, -1.0, -0.5, 0.0, 1.0, 5.0])
+    forward = table.corrections({"X": at}, 1)["X"]
+    reverse = table.corrections({"X": at}, -1)["X"]
+    assert forward == pytest.approx([0.005, 0.005, 0.0015, -0.002, -0.003, -0.003])
+    assert reverse == pytest.approx([-0.005, -0.005, -0.001, 0.003, 0.002, 0.002])
+
+
+def test_linuxcnc_type_1_example_is_added_as_it_stands() -> None:
+    options = ReadOptions(axis="X", variant="type-1")
+    (table,) = linuxcnc_comp.read_tables(sources(TYPE_1), options).terms
+    at = np.array([-1.0, 0.0, 1.0])
+    assert table.corrections({"X": at}, 1)["X"] == pytest.approx([0.005, 0.002, 0.003])
+    assert table.corrections({"X": at}, -1)["X"] == pytest.approx([-0.005, -0.003, -0.004])
+    # both directions: the first rows of the two examples mean the same
+    zero = linuxcnc_comp.read_tables(
+        sources(TYPE_0), ReadOptions(axis="X", variant="type-0")
+    ).terms[0]
+    assert table.corrections({"X": at[:1]}, 1)["X"] == pytest.approx(
+        zero.corrections({"X": at[:1]}, 1)["X"]
+    )
+
+
+def test_matrixkins_squareness_of_printed_diagonals() -> None:
+    assert linuxcnc_matrix.squareness(140.4, 142.8) == pytest.approx(0.016950, abs=5e-7)
+
+
+def test_matrixkins_shear_is_the_squareness_of_y() -> None:
+    text = "setp matrixkins.C_xx 1\nsetp matrixkins.C_xy 0.01695\nsetp matrixkins.C_yy 1.0001\n"
+    found = read_errors(sources(text), PLAIN).found
+    assert found.constants == {"EC0Y": pytest.approx(16950.0)}
+    # the joint moves 0.1 mm/m further than commanded: the axis would be that much short
+    assert found.curves == {"EYY": {"poly": [0.0, pytest.approx(-0.1)]}}
+
+
+# --- Klipper and Marlin --------------------------------------------------------------------------
+
+
+def test_klipper_printed_lengths() -> None:
+    # by hand: side² = (2·140.4² + 2·142.8² − 4·99.8²) / 4, then cot of the angle at A
+    ac, bd, ad = 140.4, 142.8, 99.8
+    side = math.sqrt((2 * ac**2 + 2 * bd**2 - 4 * ad**2) / 4)
+    cosine = (ac**2 - side**2 - ad**2) / (2 * side * ad)
+    assert skew_factor(ac, bd, ad) == pytest.approx(cosine / math.sqrt(1 - cosine**2), rel=1e-12)
+    assert skew_factor(ac, bd, ad) == pytest.approx(-0.0169507, abs=5e-8)
+    text = "SET_SKEW XY=140.4,142.8,99.8 XZ=141.6,141.4,99.8 YZ=142.4,140.5,99.5\n"
+    found = read_errors(sources(text), PLAIN).found
+    assert set(found.constants) == {"EC0Y", "EA0Z", "EB0Z"}
+    # the diagonal in X+/Y+ is the shorter one: Y leans towards −x, which is +γ about z
+    assert found.constants["EC0Y"] == pytest.approx(16950.7, abs=0.1)
+
+
+@pytest.mark.parametrize("factor", [-0.3, -1e-5, 0.0, 2e-4, 0.1])
+def test_skew_lengths_are_the_inverse_of_the_factor(factor: float) -> None:
+    assert skew_factor(*skew_lengths(factor)) == pytest.approx(factor, abs=1e-12)
+
+
+def test_marlin_corrects_x_over_z_by_both_factors() -> None:
+    tables = marlin.read_tables(sources("M852 I0.01 J0.02 K0.03\n"), PLAIN)
+    at = {"X": np.array(0.0), "Y": np.array(10.0), "Z": np.array(100.0)}
+    found = tables.corrections(at)
+    # planner.h: x −= y·xy + z·(xz − xy·yz), y −= z·yz
+    assert found["X"] == pytest.approx(-(10 * 0.01 + 100 * (0.02 - 0.01 * 0.03)))
+    assert (found["Y"], found["Z"]) == (pytest.approx(-3.0), pytest.approx(0.0))
+
+
+# --- HEIDENHAIN ----------------------------------------------------------------------------------
+
+COM = """BEGIN TAB_Z.COM MM
+NR    AXISPOS     BACKLASH    Y
+0     -990                    0
+1     -973.616                -0.06
+2     -957.232                -0.09
+3     -940.848
+4     -924.464
+5     -908.08                 -0.12
+[END]
+"""
+CMA = """BEGIN CONFIG.CMA MM
+NR    ACTIVE      Y           Z
+0     *                       TAB_Z
+[END]
+"""
+
+
+def test_heidenhain_y_over_z_of_the_manual_interpolates_lines_without_entry() -> None:
+    # TNC 306, page 4-21: Y = F(Z), lines 3 and 4 without entry
+    files = sources(COM, CMA, names=("TAB_Z.COM", "CONFIG.CMA"))
+    (table,) = heidenhain.read_tables(files, PLAIN).terms
+    assert (table.source, table.target) == ("Z", "Y")
+    at = np.array([-1000.0, -981.808, -940.848, -924.464, -908.08, 0.0])
+    assert table.corrections({"Z": at})["Y"] == pytest.approx(
+        [0.0, 0.03, 0.10, 0.11, 0.12, 0.12], abs=1e-12
+    )
+    found = read_errors(files, PLAIN).found
+    assert [one.key for one in found.series] == ["EYZ"]
+
+
+# --- volumetric compensation ---------------------------------------------------------------------
+
+ETALON = """// Every parameter is specified in a block.
+[C0B]
+VALUE = 0.000022355737
+[A0B]
+VALUE = 0.000047622950
+[EXY]
+Gridpoints = {
+          -280.0 -0.001358635132
+          -270.0 -0.000240680764
+          -260.0 0.000877273605
+          260.0 -0.001297146744
+          270.0 -0.000316265101
+}  // end of EXY
+"""
+ISG_TWO = """// The argument "Z" now crops up in the header.
+Z      X      EXX    EYX    EZX    EAX    EBX    ECX
+// In the first block Z is always = 0.
+0.0    0.0    0.02   0.01   0.07   0.00   0.0042 0.003
+0.0    10.0   0.00   -0.1   0.01   0.00   0.0011 0.002
+// In the second block Z is always = 100.
+100.0  0.0    0.01   0.02   0.03   0.07   0.0040 0.003
+100.0  10.0   0.03   -0.09  0.03   0.06   0.0015 0.000
+"""
+
+
+def test_etalon_example_in_um_and_urad() -> None:
+    found = read_errors(sources(ETALON), PLAIN).found
+    assert found.constants == {
+        "EC0B": pytest.approx(22.355737),
+        "EA0B": pytest.approx(47.622950),
+    }
+    (one,) = found.series
+    assert one.key == "EXY"
+    assert one.values[0] == pytest.approx(-1.358635132)
+    assert one.positions == (-280.0, -270.0, -260.0, 260.0, 270.0)
+
+
+def test_isg_example_of_two_arguments() -> None:
+    found = read_errors(sources(ISG_TWO), PLAIN).found
+    assert [plane.key for plane in found.planes] == ["EXX", "EYX", "EZX", "EAX", "EBX", "ECX"]
+    first = found.planes[0]
+    assert (first.axes, first.first, first.second) == (("X", "Z"), (0.0, 10.0), (0.0, 100.0))
+    assert first.values == ((20.0, 10.0), (0.0, 30.0))
+    pitch = found.planes[4]
+    assert np.array(pitch.values) == pytest.approx(np.array([[4200.0, 4000.0], [1100.0, 1500.0]]))
+
+
+# --- ISO 230-2: five targets, five runs, both directions -----------------------------------------
+
+
+def test_mean_reversal_and_repeatability_of_five_targets_and_five_runs(tmp_path: Path) -> None:
+    targets = (0.0, 100.0, 200.0, 300.0, 400.0)
+    rng = np.random.default_rng(230)
+    there = np.round(rng.normal(2.0, 0.5, (5, 5)), 1)
+    back = np.round(rng.normal(0.5, 0.5, (5, 5)), 1)
+    lines = ["X [mm],run,direction,EXX [um]"]
+    for run in range(5):
+        lines += [f"{q},{run + 1},+,{there[run, i]}" for i, q in enumerate(targets)]
+        lines += [f"{q},{run + 1},-,{back[run, 4 - i]}" for i, q in enumerate(reversed(targets))]
+    (one,) = read_errors(sources("\n".join(lines)), PLAIN).found.series
+    mean_up, mean_down = there.sum(axis=0) / 5, back.sum(axis=0) / 5
+    assert one.forward == pytest.approx(mean_up)
+    assert one.backward == pytest.approx(mean_down)
+    assert one.values == pytest.approx((mean_up + mean_down) / 2)
+    assert one.reversal == pytest.approx(mean_up - mean_down)
+    s_up = np.sqrt(((there - mean_up) ** 2).sum(axis=0) / 4)
+    s_down = np.sqrt(((back - mean_down) ** 2).sum(axis=0) / 4)
+    expected = np.maximum.reduce(
+        [2 * s_up + 2 * s_down + np.abs(mean_up - mean_down), 4 * s_up, 4 * s_down]
+    )
+    assert one.repeatability == pytest.approx(expected)
