@@ -15,7 +15,7 @@ TRIES = """async ({port, number}) => {
   const host = number % 2 ? own : `localhost:${port}`;
   const socket = protocol => new Promise(resolve => {
     let tab;
-    try { tab = protocol ? new WebSocket(`ws://${host}/`, protocol) : new WebSocket(`ws://${host}/`); }
+    try { tab = new WebSocket(`ws://${host}/`, protocol ? [protocol] : []); }
     catch { return resolve(false); }
     tab.onopen = () => resolve(true); tab.onmessage = () => resolve(true);
     tab.onerror = () => resolve(false); setTimeout(() => resolve(false), 4000);
@@ -40,7 +40,10 @@ TRIES = """async ({port, number}) => {
     try { const s = new WebSocket('ws://${host}/', PROTOCOL);
       s.onopen = () => postMessage(true); s.onerror = () => postMessage(false); }
     catch { postMessage(false); }`])));
-  if (await new Promise(r => { worker.onmessage = e => r(e.data); setTimeout(() => r(false), 4000); }))
+  const told = new Promise(resolve => {
+    worker.onmessage = event => resolve(event.data); setTimeout(() => resolve(false), 4000);
+  });
+  if (await told)
     found.push('socket of a worker');
   worker.terminate();
   return found;
