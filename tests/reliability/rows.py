@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from reliability import doors, kills, messages, pages, soak, surroundings
+from reliability import doors, kills, messages, pages, proxy, soak, surroundings
 from reliability.reading import read_many
 from reliability.row import Outcome, Row
 
@@ -54,5 +54,10 @@ ROWS: tuple[Row, ...] = (
     Row(
         "pages", "A foreign page in a real browser tries to get in: none does",
         800, "attempts", pages.run,
+    ),
+    Row(
+        "proxy", "Visitors through a real nginx with TLS and two servers, each thrice; the doors"
+        " through it; a server lost: each visitor stays at one server, nobody else gets in",
+        200, "visitors", proxy.run,
     ),
 )  # fmt: skip
