@@ -79,7 +79,7 @@ def test_the_example_of_a_proxy() -> None:
     holds(proxy.run(20), 20)
 
 
-# --- a row that must fail does ---------------------------------------------------------------------
+# --- a row that must fail does ------------------------------------------------------------------
 
 
 def read_in_process(read: Callable[[bytes, Path], object], folder: Path) -> list[str]:
@@ -122,7 +122,7 @@ def test_every_format_can_read_its_own_files(tmp_path: Path) -> None:
                 assert each.read(content, folder) is not None
 
 
-# --- the table -------------------------------------------------------------------------------------
+# --- the table ----------------------------------------------------------------------------------
 
 ROW = Row("kills", "what | must hold", 1000, "kills", kills.run)
 
