@@ -11,6 +11,7 @@ import websockets
 
 from app.first_camera import CAMERA
 from app.raw_client import App, Tab, dial, nonsense, pack, running_app, send_all, steadily, update
+from reliability.lag import Lag
 from reliability.row import Outcome
 
 LONGEST_S = 1.0
@@ -26,23 +27,22 @@ FLOOD = 5000
 def run(count: int) -> Outcome:
     """Send so many messages."""
     with tempfile.TemporaryDirectory() as folder, running_app(Path(folder)) as app:
-        sent, taken, growth = asyncio.run(_attack(app, count))
-        faults: list[str] = []
-        if max(taken) > LONGEST_S:
-            faults.append(f"the honest tab waited {max(taken):.2f} s")
+        lag = Lag()
+        sent, taken, growth = asyncio.run(_attack(app, count, lag))
+        faults = lag.judge(max(taken), LONGEST_S)
         if growth > MOST_MB:
             faults.append(f"memory has grown by {growth:.0f} MB")
         if len(app.log) > LOG_LINES or any("Traceback" in line for line in app.log):
             faults.append(f"{len(app.log)} lines of log: {app.log[:5]}")
     return Outcome(
         sent,
-        f"the honest tab was answered {len(taken)} times, in {max(taken):.2f} s at most;"
-        f" memory {growth:+.0f} MB",
+        f"the honest tab was answered {len(taken)} times, in {max(taken):.2f} s at most"
+        f" {lag.words}; memory {growth:+.0f} MB",
         faults,
     )
 
 
-async def _attack(app: App, count: int) -> tuple[int, list[float], float]:
+async def _attack(app: App, count: int, lag: Lag) -> tuple[int, list[float], float]:
     """Send in every way at once, and drag a slider meanwhile."""
     chance = random.Random(14)
     async with Tab(app) as honest, Tab(app) as hostile:
@@ -63,6 +63,7 @@ async def _attack(app: App, count: int) -> tuple[int, list[float], float]:
         taken: list[float] = []
         for value in itertools.count(1):
             taken.append(await honest.answer_s(value % 10 + 0.5))
+            lag.measure()
             if all(task.done() for task in work):
                 break
             await asyncio.sleep(0.1)
