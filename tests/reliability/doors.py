@@ -188,22 +188,6 @@ def run(count: int) -> Outcome:
     """Make so many attempts, a hundredth of them uploads."""
     chance, tally = random.Random(11), Tally()
     uploads = max(1, min(count // 100, 200))
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        running_app(Path(folder), "--token", TOKEN) as app,
-    ):
-        port = int(app.url.rpartition(":")[2])
-        before = app.memory_mb
-        for attempt in itertools.islice(attempts(port, chance), count - uploads):
-            try_one(port, attempt, tally)
-            if number % 20 == 0:
-                tally.lag.measure()
-        growth = app.memory_mb - before
-        if growth > MOST_MB:
-            tally.faults.append(f"requests cost {growth:.0f} MB")
-        lines = len(app.log)
-        if lines > 60:
-            tally.faults.append(f"{lines} lines of log")
     options = ("--token", TOKEN)
     with tempfile.TemporaryDirectory() as folder, running_app(Path(folder), *options) as app:
         port = int(app.url.rpartition(":")[2])
