@@ -28,7 +28,10 @@ def run(count: int) -> Outcome:
     """Send so many messages."""
     with tempfile.TemporaryDirectory() as folder, running_app(Path(folder)) as app:
         lag = Lag()
-        sent, taken, growth = asyncio.run(_attack(app, count, lag))
+        warm = count // 4  # libraries are loaded then, and the heap has its size for so many
+        first, taken, _ = asyncio.run(_attack(app, warm, lag))
+        sent, later, growth = asyncio.run(_attack(app, count - warm, lag))
+        sent, taken = first + sent, [*taken, *later]
         faults = lag.judge(max(taken), LONGEST_S)
         if growth > MOST_MB:
             faults.append(f"memory has grown by {growth:.0f} MB")
