@@ -33,9 +33,7 @@ def case(scene: warpspace.Scene, over: str, samples: int) -> Case:
 def main() -> None:
     """Measure and extrapolate."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument(
-        "--blocks", type=int, default=16, help="of 8,192 machines"
-    )
+    parser.add_argument("--blocks", type=int, default=16, help="of 8,192 machines")
     blocks = parser.parse_args().blocks
     scene = warpspace.load_scene("dvf5000_general")
     print(f"{'over':8} {'machines/s of a core':>22} {'MB of a task':>14} {'core h of 10^12':>17}")
