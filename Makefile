@@ -15,8 +15,8 @@ SPHINX := OMP_NUM_THREADS=1 $(BIN)/python -m sphinx -d docs/_build/doctrees docs
 PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help view test proofs coverage lint format bench screenshots docs linkcheck drawings dist \
-    packaging clean system-packages
+.PHONY: help view test proofs reliability coverage lint format bench screenshots docs linkcheck \
+    drawings dist packaging clean system-packages
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
@@ -30,6 +30,10 @@ test: system-packages $(DEV_STAMP) ## install what is missing, then lint, type-c
 
 proofs: system-packages $(DEV_STAMP) ## run the slow proofs: kills, hostile messages, the largest page
 	$(BIN)/python -m pytest -m proof --durations=10 $(ARGS)
+
+reliability: system-packages $(DEV_STAMP) ## try to break it, and write docs/reliability.md (ARGS="--fraction 0.01")
+	$(PIP_INSTALL) --no-build-isolation -e '.[fuzz]' || echo "no atheris here: leave out the row coverage"
+	PYTHONPATH=tests $(BIN)/python -m reliability $(ARGS)
 
 coverage: system-packages $(DEV_STAMP) ## run the tests and say which lines none of them reaches
 	rm -f .coverage

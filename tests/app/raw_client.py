@@ -7,10 +7,11 @@ import os
 import re
 import secrets
 import socket as sockets
+import ssl
 import subprocess
 import sys
 import time
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,22 +23,32 @@ from app.wire import CAMERA, HOW, pack, unpack
 
 
 class App:
-    """The app in a process of its own."""
+    """The app in a process of its own, reached directly or through a proxy."""
 
-    def __init__(self, url: str, process: psutil.Process, log: Path) -> None:
-        self.url, self._process, self._log = url, process, log
+    def __init__(
+        self,
+        url: str,
+        process: psutil.Process,
+        log: Path,
+        *,
+        headers: Mapping[str, str] | None = None,
+        trust: ssl.SSLContext | None = None,
+        address: tuple[str, int] | None = None,
+    ) -> None:
+        self.url, self.process, self.path = url, process, log
+        self.headers, self.trust, self.address = dict(headers or {}), trust, address
 
     @property
     def threads(self) -> int:
-        return self._process.num_threads()
+        return self.process.num_threads()
 
     @property
     def memory_mb(self) -> float:
-        return self._process.memory_info().rss / 1e6
+        return self.process.memory_info().rss / 1e6
 
     @property
     def log(self) -> list[str]:
-        return self._log.read_text("utf-8").splitlines()
+        return self.path.read_text("utf-8").splitlines()
 
     def settles(self, threads: int, seconds: float = 15.0) -> int:
         """Give how many threads there are once they are no more than so many, or time is over."""
@@ -123,7 +134,12 @@ class Tab:
 
 
 async def dial(app: App) -> websockets.ClientConnection:
-    return await websockets.connect(app.url, **HOW)
+    through: dict[str, Any] = {}
+    if app.address is not None:
+        through = {"host": app.address[0], "port": app.address[1], "ssl": app.trust}
+    return await websockets.connect(
+        app.url, additional_headers=app.headers, **through, **HOW
+    )
 
 
 async def until(fine: Callable[[], bool], seconds: float) -> None:

@@ -20,6 +20,8 @@ WRITERS = {
     "gains csv": (("gains", "{scene}", "--csv"), "x.csv"),
     "gains plot": (("gains", "{scene}", "--plot"), "x.svg"),
     "montecarlo": (("montecarlo", "{scene}", "--samples", "200", "--plot"), "x.svg"),
+    "machines sampled": (("montecarlo", "{scene}", "--samples", "200", "-o"), "x.csv"),
+    "sweep": (("sweep", "{scene}", "--samples", "200", "-o"), "x.parquet"),
     "contributions": (("contributions", "{scene}", "--plot"), "x.svg"),
     "ballbar": (("ballbar", "{scene}", "--plane", "XY", "--radius", "100", "--plot"), "x.svg"),
     "test": (("test", "straightness", "{scene}", "--plot"), "x.svg"),

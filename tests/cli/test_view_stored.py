@@ -32,6 +32,8 @@ def test_stored_field_is_shown_with_its_settings_and_its_errors(tmp_path):
         ('NumberOfTuples="1"', 'NumberOfTuples="99999999999"'),
         ('WholeExtent="0 2 0 2 0 2"', 'WholeExtent="0 2000000 0 2 0 2"'),
         ('WholeExtent="0 2 0 2 0 2"', 'WholeExtent="0 -2 0 2 0 2"'),
+        ("AQAAAACAAAAIAAAA", "AQAtableAAACAAAA"),
+        ("AQAAAACAAAAIAAAA", "/////wCAAAAIAAAA"),
         ("<StructuredGrid", "<StructuredGrid <"),
         ("<VTKFile", '<!DOCTYPE x [<!ENTITY a "b">]><VTKFile'),
     ],

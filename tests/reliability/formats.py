@@ -101,8 +101,7 @@ def _csvs() -> list[bytes]:
     rows = "\n".join(f"{x},{x / 100}" for x in range(-275, 276, 25))
     return [
         f"X,error\n{rows}\n".encode(),
-        f"X;error\r\n{rows.replace(',', ';').replace('.', ',')}\r\n".encode(),
-        b"# remark\nX\terror\n-275\t0\n275\t4.1\n",
+        b"\xef\xbb\xbfX,error\r\n-275,0\r\n275,4.1\r\n",
     ]
 
 
@@ -163,7 +162,9 @@ def _read_vts(content: bytes, folder: Path) -> object:
 URDF = """<?xml version="1.0"?>
 <robot name="r">
   <link name="base"/><link name="tool"><visual><geometry><box size="0.1 0.1 0.2"/></geometry>
-  </visual></link><link name="slide"/>
+  </visual></link><link name="slide"><visual><origin xyz="0 0 0.1" rpy="0 0.1 0"/>
+  <geometry><cylinder radius="0.1" length="0.4"/></geometry></visual><visual><geometry>
+  <mesh filename="package://r/x.stl" scale="1 1 1"/></geometry></visual></link>
   <joint name="x" type="prismatic"><parent link="base"/><child link="slide"/>
     <origin xyz="0 0 0.1" rpy="0 0 0"/><axis xyz="1 0 0"/>
     <limit lower="-0.2" upper="0.3" effort="1" velocity="1"/></joint>

@@ -1,7 +1,7 @@
 """Writers that are killed at any moment: the old file or the new one, never a piece, no litter.
 
-A process that has loaded the writers forks one for each kill, so that most of a kill's time is spent
-in writing. Every writer writes the files of two scenes in turn, whose bytes are known beforehand.
+A process that has loaded the writers forks one for each kill, so that it is hit while it
+writes. Every writer writes the files of two scenes in turn, whose bytes are known beforehand.
 """
 
 import os

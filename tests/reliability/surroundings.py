@@ -118,7 +118,7 @@ def _try(place: Place, command: Sequence[str], target: str) -> list[str]:
         line = [sys.executable, "-m", "warpspace", *command, target, "--force"]
         processes = [
             subprocess.Popen(
-                line, cwd=folder, env=environment, preexec_fn=place.start,
+                line, cwd=folder, env=environment, preexec_fn=place.start,  # noqa: PLW1509 - no thread here
                 stdout=subprocess.PIPE, stderr=subprocess.PIPE,
             )
             for _ in range(1 if place.start is _no_folder else 2)

@@ -1,6 +1,7 @@
 """A body of a machine as a mesh, and the way trimesh opens files of meshes."""
 
 import io
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -135,6 +136,8 @@ def open_meshes(path: Path, what: str) -> Any:
         raise OptionError(f"{path}: the file is empty; expected a {what}")
     import trimesh
 
+    # it logs what it makes of a damaged file, traceback included; the message says it
+    logging.getLogger("trimesh").addHandler(logging.NullHandler())
     try:
         with np.errstate(all="ignore"):
             found = trimesh.load_scene(

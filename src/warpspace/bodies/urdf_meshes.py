@@ -12,6 +12,8 @@ ENDINGS = (".stl", ".obj", ".ply", ".glb", ".dae")
 PARENTS = 3
 """Folders above that of the robot's file in which ``package://`` is looked for."""
 MM_PER_M = 1000.0
+LARGEST_M = 1e6
+"""Of a shape, its place and its scale; also keeps NaN out."""
 
 
 def frame_meshes(
@@ -47,10 +49,13 @@ def frame_meshes(
         frame, pose = frame_of[link.name]
         for visual in link.visuals:
             where = f"link {link.name!r}"
+            placed = np.eye(4) if visual.origin is None else np.array(visual.origin, dtype=float)
+            if not (np.abs(placed) < LARGEST_M).all():
+                notes.append(f"{where}: the place of its shape is no finite number; left out")
+                continue
             mesh = _shape(visual.geometry, where, folder, notes, files)
             if mesh is None:
                 continue
-            placed = np.eye(4) if visual.origin is None else np.array(visual.origin, dtype=float)
             mesh.apply_transform(placed)
             mesh.apply_scale(MM_PER_M)
             mesh.apply_transform(pose)
@@ -68,16 +73,32 @@ def _shape(geometry: Any, where: str, folder: Path, notes: list[str], files: lis
     if geometry is None:
         return None
     if geometry.box is not None:
-        return creation.box(extents=np.abs(np.asarray(geometry.box.size, dtype=float)))
+        sizes = _sizes(geometry.box.size, 3, f"{where}: its box", notes)
+        return None if sizes is None else creation.box(extents=sizes)
     if geometry.cylinder is not None:
-        return creation.cylinder(
-            radius=abs(geometry.cylinder.radius), height=abs(geometry.cylinder.length), sections=48
-        )
+        given = (geometry.cylinder.radius, geometry.cylinder.length)
+        sizes = _sizes(given, 2, f"{where}: its cylinder", notes)
+        if sizes is None:
+            return None
+        return creation.cylinder(radius=sizes[0], height=sizes[1], sections=48)
     if geometry.sphere is not None:
-        return creation.icosphere(subdivisions=2, radius=abs(geometry.sphere.radius))
+        sizes = _sizes([geometry.sphere.radius], 1, f"{where}: its sphere", notes)
+        return None if sizes is None else creation.icosphere(subdivisions=2, radius=sizes[0])
     if geometry.mesh is None:
         return None
     return _mesh(geometry.mesh, where, folder, notes, files)
+
+
+def _sizes(given: Any, count: int, what: str, notes: list[str]) -> Array | None:
+    """Read the sizes of a shape, [count], metres; None where they are none, which is noted."""
+    try:
+        sizes = np.abs(np.asarray(given, dtype=float))
+    except (TypeError, ValueError):
+        sizes = np.empty(0)
+    if sizes.shape == (count,) and (sizes < LARGEST_M).all():
+        return sizes
+    notes.append(f"{what} has no size that can be read; left out")
+    return None
 
 
 def _mesh(given: Any, where: str, folder: Path, notes: list[str], files: list[Path]) -> Any:
@@ -107,7 +128,11 @@ def _mesh(given: Any, where: str, folder: Path, notes: list[str], files: list[Pa
     files.append(path)
     bare = trimesh.Trimesh(np.array(mesh.vertices), np.array(mesh.faces), process=False)
     if given.scale is not None:
-        bare.apply_transform(np.diag([*np.broadcast_to(given.scale, 3), 1.0]))
+        scale = np.asarray(given.scale, dtype=float)
+        if scale.shape not in ((), (1,), (3,)) or not (np.abs(scale) < LARGEST_M).all():
+            notes.append(f"{where}: mesh {name!r} has no scale that can be read; left out")
+            return None
+        bare.apply_transform(np.diag([*np.broadcast_to(scale, 3), 1.0]))
     return bare
 
 

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from chains import models
+from warpspace.bodies.urdf_meshes import frame_meshes
 from warpspace.exceptions import SceneError
 from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import Model, complete_coordinates
@@ -241,3 +242,28 @@ def test_joints_without_limits_and_with_one_position_are_noted(tmp_path: Path) -
     assert str(found.machine.chain) == "wFXt"
     assert any("'one' has no limits" in note for note in notes)
     assert any("'two' has one position" in note for note in notes)
+
+
+@pytest.mark.parametrize(
+    ("shape", "said"),
+    [
+        ('<box size="0.1 0.1"/>', "its box has no size"),
+        ('<box size="-inf 0.1 0.2"/>', "its box has no size"),
+        ('<box size="nan 0.1 0.2"/>', "its box has no size"),
+        ('<cylinder radius="1e300" length="1"/>', "its cylinder has no size"),
+        ('<sphere radius="inf"/>', "its sphere has no size"),
+    ],
+)
+def test_a_shape_without_a_size_is_left_out(tmp_path: Path, shape: str, said: str) -> None:
+    text = f"""<robot name="r"><link name="base"/><link name="tool">
+      <visual><geometry>{shape}</geometry></visual>
+      <visual><origin xyz="1e200 0 0"/><geometry><box size="1 1 1"/></geometry></visual></link>
+      <joint name="x" type="prismatic"><parent link="base"/><child link="tool"/>
+      <axis xyz="1 0 0"/><limit lower="0" upper="1" effort="1" velocity="1"/></joint></robot>"""
+    path = tmp_path / "r.urdf"
+    path.write_text(text, encoding="utf-8")
+    robot, _ = read_robot(path)
+    meshes, notes, _ = frame_meshes(robot, {"tool": ("X", np.eye(4))}, tmp_path)
+    assert meshes == {}
+    assert any(said in note for note in notes)
+    assert any("the place of its shape is no finite number" in note for note in notes)

@@ -168,7 +168,7 @@ def _read_arrays(path: Path) -> tuple[dict[str, Array], tuple[int, int, int]]:
             head = file.read(4096)
         if b"StructuredGrid" not in head:
             raise SceneError(source, ["is no VTK structured grid (.vts)"])
-        check_header(path, source, MAX_VTS_BYTES)
+        check_header(path, source)
     except OSError as error:
         raise SceneError(source, [f"cannot be read: {error.strerror or error}"]) from None
     import pyvista as pv

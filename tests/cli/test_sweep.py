@@ -1,0 +1,136 @@
+"""Sweeps and fleets on the command line: rows, tables, and what is refused."""
+
+import csv
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+import warpspace as package
+from warpspace.exceptions import OptionError, UnknownNameError
+from warpspace.resources import scenes_dir
+
+FEW = ("--samples", "3000")
+
+
+def test_a_row_is_what_montecarlo_gives_for_the_same_scene(warpspace, tmp_path: Path) -> None:
+    steps = ("--tolerance", "EAX=5:20:2", "--tolerance", "translation=4,8")
+    found = json.loads(
+        warpspace("sweep", "dvf5000_general", *steps, "--limit-um", "40", *FEW, "--json").out
+    )
+    assert found["tolerances"] == {"EAX": [5.0, 20.0], "translation": [4.0, 8.0]}
+    rows = found["rows"]
+    assert [(row["EAX"], row["translation"]) for row in rows] == [
+        *[(5.0, 4.0), (5.0, 8.0), (20.0, 4.0), (20.0, 8.0)]
+    ]
+    scene = tmp_path / "s.toml"
+    text = (scenes_dir() / "dvf5000_general.toml").read_text("utf-8")
+    changed = text.replace("{ translation = 10,", "{ translation = 8,") + "EAX = 20\n"
+    assert changed.count("translation = 8") == 1
+    scene.write_text(changed, encoding="utf-8")
+    run = ("montecarlo", scene, "--spec-um", "40", *FEW, "--json")
+    alone = json.loads(warpspace(*run).out)
+    for key in ("mean_um", "median_um", "p95_um", "p99_um", "max_um"):
+        assert rows[3][key] == pytest.approx(alone[key], rel=1e-12), key
+    assert rows[3]["probability"] == alone["specification"]["probability"]
+
+
+def test_a_wider_tolerance_gives_a_larger_error(warpspace) -> None:
+    steps = ("--tolerance", "squareness=0:50:6")
+    rows = json.loads(warpspace("sweep", "dvf5000_general", *steps, *FEW, "--json").out)["rows"]
+    rms = [row["rms_um"] for row in rows]
+    assert rms == sorted(rms)
+    assert rms[-1] > 1.2 * rms[0]
+
+
+def test_a_fleet_of_a_folder(warpspace, tmp_path: Path) -> None:
+    for name, width in (("b", 20), ("a", 10)):
+        (tmp_path / f"{name}.toml").write_text(
+            f'title = "=machine {name}"\nmachine = "dvf5000"\n[tolerances]\n'
+            f"default = {{ translation = {width}, rotation = {width}, squareness = {width} }}\n"
+        )
+    target = tmp_path / "fleet.csv"
+    printed = warpspace("sweep", tmp_path, *FEW, "-o", target)
+    assert printed.status == 0, printed.err
+    rows = list(csv.DictReader(target.read_text("utf-8").splitlines()))
+    assert [row["scene"] for row in rows] == ["a", "b"]
+    assert rows[0]["title"] == "'=machine a"
+    assert float(rows[1]["mean_um"]) == pytest.approx(2.0 * float(rows[0]["mean_um"]))
+    both = json.loads(warpspace("montecarlo", tmp_path, *FEW, "--json").out)["scenes"]
+    assert [float(row["mean_um"]) for row in rows] == [one["mean_um"] for one in both]
+    table = warpspace("montecarlo", tmp_path, *FEW)
+    assert table.out.count("\n  a ") == 1
+    warpspace("sweep", tmp_path, *FEW, "-o", target).refused("--force")
+
+
+def test_every_machine_is_written(warpspace, tmp_path: Path) -> None:
+    pq = pytest.importorskip("pyarrow.parquet")
+    target = tmp_path / "m.parquet"
+    run = ("montecarlo", "dvf5000_general", "dvf5000_proposed", "--samples", "9000", "--json")
+    found = json.loads(warpspace(*run, "-o", target).out)["scenes"]
+    table = pq.read_table(target)
+    assert table.num_rows == 18_000
+    names = table["scene"].to_pylist()
+    assert names == ["dvf5000_general"] * 9000 + ["dvf5000_proposed"] * 9000
+    assert table["machine"].to_pylist() == [*range(9000)] * 2
+    values = table["error_um"].to_numpy()
+    assert values[:9000].max() == found[0]["max_um"]
+    assert values[9000:].mean() == pytest.approx(found[1]["mean_um"], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("steps", "said"),
+    [
+        ("EAX", "KEY=FROM:TO:N"),
+        ("EAX=", "KEY=FROM:TO:N"),
+        ("=1", "KEY=FROM:TO:N"),
+        ("EAX=1:2", "KEY=FROM:TO:N"),
+        ("EAX=1:2:0", "KEY=FROM:TO:N"),
+        ("EAX=1:2:x", "KEY=FROM:TO:N"),
+        ("EAX=1:inf:3", "KEY=FROM:TO:N"),
+        ("EAX=nan", "half width nan"),
+        ("EAX=-1", "half width -1"),
+        ("EAX=1e9", "half width 1e+09"),
+        ("EAX=1:2:2000000", "KEY=FROM:TO:N"),
+        ("EAQ=1", "did you mean 'EA"),
+        ("rotatoin=1", "did you mean 'rotation'"),
+    ],
+)
+def test_steps_that_are_none(warpspace, steps: str, said: str) -> None:
+    warpspace("sweep", "dvf5000_general", "--tolerance", steps, *FEW).refused(said)
+
+
+def test_what_is_refused_before_anything_is_sampled(warpspace, tmp_path: Path) -> None:
+    run = ("sweep", "dvf5000_general", "--tolerance", "EAX=1:2:2")
+    warpspace(*run, "--tolerance", "EAX=3").refused("EAX is given twice")
+    many = ("--tolerance", "EAX=1:2:2000", "--tolerance", "EAY=1:2:2000")
+    warpspace("sweep", "dvf5000_general", *many).refused("4,000,000 combinations")
+    warpspace("sweep", tmp_path).refused("a folder without .toml files")
+    (tmp_path / "bad.toml").write_text("machine = 3")
+    warpspace("sweep", "dvf5000_general", tmp_path).refused("bad.toml")
+    target = tmp_path / "x.txt"
+    warpspace(*run, "-o", target).refused("unknown ending '.txt'")
+    run = ("montecarlo", "dvf5000_general", "dvf5000_proposed")
+    warpspace(*run, "--plot", tmp_path / "x.svg").refused("--plot draws one machine")
+    long = ("--samples", "20000000", "-o", tmp_path / "x.csv")
+    warpspace("montecarlo", "dvf5000_general", *long).refused("20,000,000 rows")
+    assert not target.exists()
+
+
+def test_without_pyarrow_it_is_said_what_to_install(warpspace, tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
+    target = tmp_path / "x.parquet"
+    warpspace("sweep", "dvf5000_general", *FEW, "-o", target).refused("warpspace[cluster]")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_same_from_python() -> None:
+    scene = package.load_scene("dvf5000_general")
+    points = list(package.sweep(iter([scene]), {"EAX": [5.0, 20.0]}))
+    assert [point.half_widths for point in points] == [{"EAX": 5.0}, {"EAX": 20.0}]
+    assert points[0].scene.tolerances.get("EAX").half_width == 5.0
+    with pytest.raises(UnknownNameError, match="parameter or tolerance class 'EAQ'"):
+        list(package.sweep([scene], {"EAQ": [1.0]}))
+    with pytest.raises(OptionError, match="no half width"):
+        list(package.sweep([scene], {"EAX": []}))
