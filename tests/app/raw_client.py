@@ -137,9 +137,7 @@ async def dial(app: App) -> websockets.ClientConnection:
     through: dict[str, Any] = {}
     if app.address is not None:
         through = {"host": app.address[0], "port": app.address[1], "ssl": app.trust}
-    return await websockets.connect(
-        app.url, additional_headers=app.headers, **through, **HOW
-    )
+    return await websockets.connect(app.url, additional_headers=app.headers, **through, **HOW)
 
 
 async def until(fine: Callable[[], bool], seconds: float) -> None:

@@ -8,8 +8,8 @@ import tempfile
 from pathlib import Path
 
 import websockets
-
 from app.first_camera import CAMERA
+
 from app.raw_client import App, Tab, dial, nonsense, pack, running_app, send_all, steadily, update
 from reliability.lag import Lag
 from reliability.row import Outcome
