@@ -1,4 +1,8 @@
-"""Draw the conventions of error sets into ``docs/images``, one drawing each.
+"""
+Drawings of the conventions
+===========================
+
+Draw the conventions of error sets into ``docs/images``, one drawing each.
 
     python examples/convention_drawings.py [--to docs/images]
 
