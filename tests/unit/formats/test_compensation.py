@@ -321,3 +321,10 @@ def test_constants_of_the_alternative_model_turn_with_the_axis() -> None:
     shift = transforms.apply(expected, np.array(base.model.workpiece_point_mm)) - point
     assert found == pytest.approx(shift * 1e3, abs=1e-3)
     assert np.abs(evaluate(plain, at=at, loop="workpiece").error_um[0]).max() > 1.0
+
+
+@pytest.mark.parametrize("name", ["machine_gantry_mill", "machine_scara"])
+@pytest.mark.parametrize("form", ["csv", "iso-text", "isg-csv", "sinumerik-cec", "sinumerik-enc"])
+def test_a_machine_without_errors_has_nothing_to_correct(form: str, name: str) -> None:
+    scene = replace(load_scene(name), errors=ErrorSet())
+    assert compensate(scene, Plan(form, 3), 5).after_statistics.max_um == pytest.approx(0.0)

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from warpspace.exceptions import OptionError
 from warpspace.formats.compensation.wanted import OTHER_NODES, Wanted
 from warpspace.units import Array
 
@@ -25,11 +26,23 @@ def fit_linear(wanted: Wanted, allowed: Sequence[tuple[str, str]]) -> dict[tuple
         mm per mm. Where the scene holds a point still, the correction of that point counts for
         nothing.
 
+    Raises
+    ------
+    OptionError
+        If the machine lacks one of X, Y and Z.
+
     Notes
     -----
     Least squares over the working volume, its nodes weighed by their share of it. There is no
     constant part: such a controller has no place for one.
     """
+    machine = wanted.scene.machine
+    if missing := [axis for axis in AXES if axis not in machine.axes]:
+        found_axes = ", ".join(machine.axes)
+        raise OptionError(
+            f"the matrix is of X, Y and Z; the machine {machine.chain} has {found_axes}, no"
+            f" {missing[0]}"
+        )
     places = {
         axis: np.linspace(*wanted.scene.workspace.ranges[axis], OTHER_NODES) for axis in wanted.axes
     }

@@ -13,7 +13,7 @@ from warpspace.formats.kind import Files, Format, ReadOptions
 from warpspace.formats.measured import BOTH, Imported, Plane, Run, Series, merge
 from warpspace.formats.numbers import check_error, check_position, read_number, spell
 from warpspace.formats.parts import volumetric
-from warpspace.formats.parts.parametric import sampled, table_of
+from warpspace.formats.parts.parametric import sampled, table_of, zero_key
 from warpspace.formats.parts.planes import plane_of
 from warpspace.formats.source import Source
 from warpspace.machine.limits import MAX_POINTS
@@ -215,7 +215,13 @@ def write(wanted: Wanted) -> Files:
                 lines.append("\t".join([repr(second), repr(first), value]))
         blocks.append("\n".join(lines))
     head = f"// {wanted.scene.title}".replace("\n", " ") + "\n// mm, rad, degrees\n"
-    return {"": head + "\n#\n".join(blocks or ["X\tEXX\n0.0\t0.0"]) + "\n"}
+    return {"": head + "\n#\n".join(blocks or [_nothing(wanted)]) + "\n"}
+
+
+def _nothing(wanted: Wanted) -> str:
+    """Spell a block whose error is zero, for a scene without any."""
+    key = zero_key(wanted.scene)
+    return f"{parameter(key).axis}\t{key}\n0.0\t0.0"
 
 
 FORMAT = Format(

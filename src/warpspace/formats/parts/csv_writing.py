@@ -7,7 +7,7 @@ from warpspace.formats.kind import Files
 from warpspace.formats.measured import BACKWARD, FORWARD
 from warpspace.formats.numbers import spell
 from warpspace.formats.parts.csv_header import DIRECTION, RUN
-from warpspace.formats.parts.parametric import sampled, table_of
+from warpspace.formats.parts.parametric import sampled, table_of, zero_key
 from warpspace.machine.axes import is_linear
 from warpspace.machine.parameters import parameter
 
@@ -73,6 +73,7 @@ def write(wanted: Wanted) -> Files:
         files[f"_{plane.key}.csv"] = "\n".join(lines) + "\n"
     names = list(files)
     if not names:
-        return {"": "EXX [um]\n0.0\n"}
+        key = zero_key(wanted.scene)
+        return {"": f"{key} [{'urad' if parameter(key).is_rotation else 'um'}]\n0.0\n"}
     files[""] = files.pop(names[0])
     return files

@@ -7,6 +7,7 @@ import numpy as np
 
 from warpspace.formats.compensation.wanted import Wanted
 from warpspace.formats.measured import BACKWARD, BOTH, FORWARD, Imported, Plane, Run, Series
+from warpspace.machine.axes import direction_index, is_linear
 from warpspace.machine.curves.directional import Directional
 from warpspace.machine.curves.table import Table
 from warpspace.machine.curves.two_arguments import TwoArguments
@@ -35,6 +36,12 @@ class Rows:
 def places_along(scene: Scene, axis: str, count: int) -> np.ndarray:
     """Give positions of a table along an axis: its working range, else its travel."""
     return np.linspace(*scene.axis_span(axis), count)
+
+
+def zero_key(scene: Scene) -> str:
+    """Give an error of the machine for a file of a scene without any: its value is zero."""
+    axis = next(iter(scene.machine.axes))
+    return f"E{'XYZABC'[direction_index(axis) + (0 if is_linear(axis) else 3)]}{axis}"
 
 
 def sampled(wanted: Wanted) -> Imported:
