@@ -21,6 +21,13 @@ DROP = """files => {
     {bubbles: true, cancelable: true, dataTransfer: carried}));
 }"""
 
+TAKES = """() => {
+  const carried = new DataTransfer();
+  carried.items.add(new File(["0"], "a.csv"));
+  return !document.body.dispatchEvent(new DragEvent("dragover",
+    {bubbles: true, cancelable: true, dataTransfer: carried}));
+}"""
+
 
 def preview(tab: Tab) -> str:
     """Text of the preview, once it is there."""
@@ -29,7 +36,7 @@ def preview(tab: Tab) -> str:
 
 
 def test_a_measured_table_is_shown_and_only_applied_when_asked(tab: Tab) -> None:
-    before = tab.state
+    before = tab.state()
     tab.panel("Files")
     tab.upload("x.csv", RUNS)
     text = preview(tab)
@@ -38,28 +45,32 @@ def test_a_measured_table_is_shown_and_only_applied_when_asked(tab: Tab) -> None
     assert tab.page.locator(f"{PREVIEW} svg polyline").count() == 2
     tab.page.get_by_role("button", name="Cancel", exact=True).last.click()
     tab.page.wait_for_selector(PREVIEW, state="detached")
-    assert tab.state.scene == before.scene
+    assert tab.state().scene == before.scene
     tab.upload("x.csv", RUNS)
     preview(tab)
     tab.page.get_by_role("button", name="Apply", exact=True).last.click()
-    tab.until(lambda: "EXX" in tab.state.scene.errors)
-    assert tab.state.amplitudes["EXX"] == pytest.approx(5.0)
-    assert tab.state.scene.measured["EXX"].count == 6
+    tab.until(lambda: "EXX" in tab.state().scene.errors)
+    assert tab.state().amplitudes["EXX"] == pytest.approx(5.0)
+    assert tab.state().scene.measured["EXX"].count == 6
     # the errors that the scene had are still there
-    assert set(before.scene.errors) <= set(tab.state.scene.errors)
+    assert set(before.scene.errors) <= set(tab.state().scene.errors)
 
 
 def test_dropped_files_that_belong_together_are_read_together(tab: Tab) -> None:
     com = "BEGIN T_Y.COM MM\nNR AXISPOS X\n0 -200 0.001\n1 0 0.002\n2 200 0.004\n[END]\n"
     cma = "BEGIN T.CMA MM\nNR ACTIVE Y\n0 * T_Y\n[END]\n"
-    tab.page.evaluate(DROP, [["T_Y.COM", com], ["T.CMA", cma]])
-    tab.until(lambda: tab.page.locator(PREVIEW).count() == 1 and "T.CMA" in preview(tab))
-    assert "EXY" in preview(tab)
-    assert "T_Y.COM" in preview(tab)
+    tab.until(lambda: tab.page.evaluate(TAKES))
+    for files in ([["T_Y.COM", com], ["T.CMA", cma]], [["T.CMA", cma], ["T_Y.COM", com]]):
+        tab.page.evaluate(DROP, files)
+        tab.until(lambda: tab.page.locator(PREVIEW).count() == 1 and "T.CMA" in preview(tab))
+        tab.until(lambda: "T_Y.COM" in preview(tab))
+        assert "EXY" in preview(tab)
+        tab.page.get_by_role("button", name="Cancel", exact=True).last.click()
+        tab.page.wait_for_selector(PREVIEW, state="detached")
 
 
 def test_a_bad_or_hostile_file_changes_nothing_and_is_named(tab: Tab) -> None:
-    before = tab.state
+    before = tab.state()
     tab.panel("Files")
     for name, content, fragment in (
         ("bad.csv", b"X [mm],EXX [um]\n0,1\n0,2\n", "line 3"),
@@ -70,5 +81,5 @@ def test_a_bad_or_hostile_file_changes_nothing_and_is_named(tab: Tab) -> None:
         tab.upload(name, content)
         tab.page.get_by_text(fragment).first.wait_for()
     assert tab.page.locator(PREVIEW).count() == 0
-    assert tab.state.scene == before.scene
+    assert tab.state().scene == before.scene
     assert json.dumps("<img") not in tab.page.content()

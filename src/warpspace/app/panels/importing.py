@@ -1,5 +1,6 @@
 """The window that shows what files of measured data would bring, to apply or to cancel."""
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -36,11 +37,12 @@ class ImportWindow:
     def __init__(self, context: PanelContext) -> None:
         self._context = context
         self._sources: list[Source] = []
+        self._refused: list[Source] = []
         self._made: ImportedScene | None = None
         self._window: Any = None
 
     def offer(self, name: str, content: bytes) -> None:
-        """Take a file; with those that the window shows already where they belong together.
+        """Take a file; with those shown, or the one refused before it, where they belong together.
 
         Raises
         ------
@@ -50,14 +52,17 @@ class ImportWindow:
         last = name.replace("\\", "/").rsplit("/", 1)[-1]
         ending = last.rsplit(".", 1)[-1] if "." in last else "txt"
         source = open_upload(f"{safe_name(last, 'file')}.{safe_name(ending, 'txt')}", content)
-        together = [one for one in self._sources if one.name != source.name]
-        if together and self._window is not None and len(together) < MOST_FILES:
-            try:
-                self._show([*together, source])
-            except WarpspaceError:
-                self._show([source])
-            return
-        self._show([source])
+        for others in (self._sources, self._refused):
+            together = [one for one in others if one.name != source.name]
+            if together and len(together) < MOST_FILES:
+                with suppress(WarpspaceError):
+                    self._show([*together, source])
+                    return
+        try:
+            self._show([source])
+        except WarpspaceError:
+            self._refused = [source]  # such as a list of tables that come after it
+            raise
 
     def _show(self, sources: list[Source]) -> None:
         """Read files into the present scene, and show what that brings."""
@@ -66,7 +71,7 @@ class ImportWindow:
         names = [source.name for source in sources]
         made = into_scene(reading, base, base.title, ", ".join(names))
         self._close()
-        self._sources, self._made = sources, made
+        self._sources, self._refused, self._made = sources, [], made
         self._window = gui.add_modal("Import errors")
         with self._window:
             apply = gui.add_button("Apply", hint="Take these errors over; undo goes back.")
@@ -89,7 +94,7 @@ class ImportWindow:
     def _cancel(self) -> None:
         """Forget the files."""
         self._close()
-        self._sources, self._made = [], None
+        self._sources, self._refused, self._made = [], [], None
         self._context.client.flush()
 
     def _close(self) -> None:
