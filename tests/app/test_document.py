@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 
 import pytest
 
-from warpspace.app.documents.received_files import safe_name, upload_text
+from warpspace.app.documents.received_files import safe_file_name, safe_name, upload_text
 from warpspace.app.documents.scene_file import (
     MAX_PACKED_TEXT,
     open_link,
@@ -204,6 +204,20 @@ def test_cameras_that_see_nothing_are_not_taken(numbers: str) -> None:
 )
 def test_names_from_a_browser_are_made_safe(given: str, kept: str) -> None:
     assert safe_name(given) == kept
+
+
+@pytest.mark.parametrize(
+    ("given", "kept"),
+    [
+        ("a b.CSV", "a b.CSV"),
+        ("../../<img src=x>.csv", "img src_x.csv"),
+        ("noending", "noending.txt"),
+        ("x.c/../sv", "sv.txt"),
+        (".", "file.txt"),
+    ],
+)
+def test_file_names_of_received_data_keep_their_ending(given: str, kept: str) -> None:
+    assert safe_file_name(given) == kept
 
 
 def test_uploads_that_are_no_scene_are_refused_with_every_problem() -> None:

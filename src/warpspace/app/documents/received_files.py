@@ -31,6 +31,23 @@ def safe_name(name: str, fallback: str = "scene") -> str:
     return clean or fallback
 
 
+def safe_file_name(name: str) -> str:
+    """Make a file name that keeps its ending, or gets ``.txt`` where it has none.
+
+    Parameters
+    ----------
+    name : str
+        Anything, as for `safe_name`.
+
+    Returns
+    -------
+    str
+    """
+    last = name.replace("\\", "/").rsplit("/", 1)[-1]
+    ending = last.rsplit(".", 1)[-1] if "." in last else "txt"
+    return f"{safe_name(last, 'file')}.{safe_name(ending, 'txt')}"
+
+
 def upload_text(content: bytes, source: str) -> str:
     """Read the bytes of an uploaded file.
 

@@ -153,7 +153,7 @@ class FilesPanel:
         """Say that a file was too large to be sent, from what the page tells."""
         _, size, name = (*message.split(":", 2), "", "")[:3]
         size_bytes = float(size) if size.isdigit() and len(size) < 16 else 0.0
-        text = size_message(f"{incoming.safe_name(name)}.toml", size_bytes, MAX_SCENE_BYTES)
+        text = size_message(incoming.safe_file_name(name), size_bytes, MAX_SCENE_BYTES)
         self._context.notify("Not opened", text, "red")
 
     def _follow(self, message: str) -> None:

@@ -4,7 +4,7 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
-from warpspace.app.documents.received_files import safe_name
+from warpspace.app.documents.received_files import safe_file_name
 from warpspace.app.evaluation.resulting_scene import scene_of
 from warpspace.app.panels.context import PanelContext
 from warpspace.app.readouts.import_preview import preview_html
@@ -49,9 +49,7 @@ class ImportWindow:
         WarpspaceError
             If it cannot be read; what was shown before stays.
         """
-        last = name.replace("\\", "/").rsplit("/", 1)[-1]
-        ending = last.rsplit(".", 1)[-1] if "." in last else "txt"
-        source = open_upload(f"{safe_name(last, 'file')}.{safe_name(ending, 'txt')}", content)
+        source = open_upload(safe_file_name(name), content)
         for others in (self._sources, self._refused):
             together = [one for one in others if one.name != source.name]
             if together and len(together) < MOST_FILES:
