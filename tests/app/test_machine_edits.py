@@ -26,7 +26,7 @@ from warpspace.app.state.edits import (
 )
 from warpspace.app.state.history import History, describe_change
 from warpspace.bodies.placed import load_bodies
-from warpspace.machine.errors import Constant, Ramp
+from warpspace.machine.errors import Constant, Directional, Ramp
 from warpspace.scene.library import load_scene, parse_scene
 from warpspace.scene.machines import machine_picture
 
@@ -275,6 +275,9 @@ def test_guides_share_the_curve_of_the_axis_and_other_curves_are_said(state: App
     assert edits.curve_of(pair, "ECY").evaluate(np.array([-225.0])) == pytest.approx(0.0)
     other = with_curve(pair, "ECY", Constant(ramp.span, 5.0))
     assert guide_errors(other, "Y") is None
+    there, back = (Ramp(ramp.span, value) for value in (8.0, 6.0))
+    by_direction = with_curve(pair, "ECY", Directional(ramp.span, there, back))
+    assert guide_errors(by_direction, "Y") is None
     refused = with_word(other, "guide Y 0 1")
     assert "different curves" in refused.notes[-1]
     assert refused.amplitudes == other.amplitudes

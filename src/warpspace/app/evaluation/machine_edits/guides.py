@@ -6,7 +6,7 @@ import numpy as np
 
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
-from warpspace.machine.curves.curve import ErrorFunction
+from warpspace.machine.curves.curve import OWN, ErrorFunction
 from warpspace.machine.gantry import Gantry
 
 SAMPLES = 65
@@ -100,6 +100,9 @@ def _one_curve(state: AppState, gantry: Gantry) -> bool:
     curves = [edits.curve_of(state, key) for key in (gantry.positioning_key, gantry.rotation_key)]
     if any(curve.amplitude == 0.0 for curve in curves):
         return True
+    if any(curve.has_directions or {*curve.arguments} - {OWN} for curve in curves):
+        first, second = (curve.with_amplitude(1.0) for curve in curves)
+        return first == second
     at = np.linspace(*edits.axis_span(state, gantry.positioning_key), SAMPLES)
-    first, second = (curve.evaluate(at) / curve.amplitude for curve in curves)
-    return bool(np.abs(first - second).max() <= ALIKE)
+    one, other = (curve.evaluate(at) / curve.amplitude for curve in curves)
+    return bool(np.abs(one - other).max() <= ALIKE)

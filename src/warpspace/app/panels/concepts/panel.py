@@ -193,6 +193,8 @@ class ConceptsPanel:
 
     def _failed(self, name: str, error: Exception) -> None:
         """Show what went wrong, log what nobody foresaw; the outcome of before stays."""
+        if not self._context.page.is_open:
+            return
         if isinstance(error, CancelledError):
             self._context.notify("Cancelled", "What was shown stays.", "gray")
             return
@@ -216,9 +218,12 @@ class ConceptsPanel:
         """List the chosen machines, with numbers and pictures where they were compared."""
         rows: list[ConceptRow] = []
         for chosen in self._choice.machines:
-            title = f"{state.scene.title} (as it stands)" if chosen.scene is None else chosen.title
-            opens = chosen.scene is not None
-            rows.append(ConceptRow(title, opens, *self._known(chosen)))
+            concept, picture = self._known(chosen)
+            title = chosen.title
+            if chosen.scene is None:  # another one may have been opened since
+                present = state.scene if concept is None else concept.scene
+                title = f"{present.title} (as it stands)"
+            rows.append(ConceptRow(title, chosen.scene is not None, concept, picture))
         return rows
 
     def _known(self, chosen: Chosen) -> "tuple[Concept | None, str]":

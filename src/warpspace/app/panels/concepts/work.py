@@ -99,6 +99,9 @@ class ConceptWork:
 
     def _report(self, progress: Progress | None) -> None:
         """Show how far the work is; from another thread."""
+        if not self._context.page.is_open:  # nobody waits for it any more, the widgets are gone
+            self._jobs.cancel()
+            return
         busy = progress is not None
         if progress is not None:
             sampling = progress.name == COMPARING and not self._drawing_since
