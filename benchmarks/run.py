@@ -10,6 +10,7 @@ import argparse
 import os
 import platform
 import sys
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from importlib import import_module, metadata
 from pathlib import Path
@@ -48,6 +49,7 @@ shortest of several runs. An exponent is fitted to the three largest sizes: 1 is
 | load while it ran | {load} |
 | versions | {versions} |
 | targets | {missed} |
+| not run | {left_out} |
 """
 
 
@@ -73,8 +75,8 @@ def load_words(before: float, after: float) -> str:
     return words
 
 
-def page_text(sections: list[Section], load: str) -> str:
-    """Spell the page."""
+def page_text(sections: list[Section], load: str, left_out: Sequence[str] = ()) -> str:
+    """Spell the page, with the benchmarks that were left out."""
     missed = [row.what for section in sections for row in section.rows if not row.is_met]
     head = HEAD.format(
         command="make bench",
@@ -82,6 +84,7 @@ def page_text(sections: list[Section], load: str) -> str:
         machine=machine_words(),
         load=load,
         versions=version_words(),
+        left_out=", ".join(left_out) or "none",
         missed="all met" if not missed else f"missed: {'; '.join(missed)}",
     )
     return "\n".join([head, *(section_text(section) for section in sections)]).rstrip() + "\n"
@@ -106,7 +109,8 @@ def main() -> None:
     output = options.output or (None if options.names else PAGE)
     if output is not None:
         load = load_words(before, os.getloadavg()[0])
-        output.write_text(page_text(sections, load), encoding="utf-8")
+        left_out = [name for name in BENCHMARKS if name not in chosen]
+        output.write_text(page_text(sections, load, left_out), encoding="utf-8")
     missed = [row.what for section in sections for row in section.rows if not row.is_met]
     if missed:
         sys.exit(f"targets missed: {'; '.join(missed)}")

@@ -70,3 +70,18 @@ def test_version_changelog_and_citation_agree() -> None:
         assert re.search(rf"^{key}: *\S*", citation, re.MULTILINE), key
     assert "license: MIT" in citation
     assert "MIT License" in (ROOT / "LICENSE").read_text("utf-8")
+
+
+@pytest.mark.parametrize("options", [("--at", "X=0"), ("--grid", "3", "-o", "x.npz")])
+def test_a_field_loads_no_statistics_of_scipy_and_no_renderer(
+    options: tuple[str, ...], tmp_path: Path
+) -> None:
+    """Half of what the command took was scipy.stats, which only uncertainties need."""
+    heavy = "scipy.stats viser pyvista vtkmodules matplotlib trimesh pandas pyarrow"
+    code = (
+        "import sys; from warpspace.cli import main; main();"
+        f" print([n for n in {heavy.split()} if n in sys.modules])"
+    )
+    command = [sys.executable, "-c", code, "field", "dvf5000_first", *options]
+    found = subprocess.run(command, capture_output=True, text=True, check=True, cwd=tmp_path)
+    assert found.stdout.splitlines()[-1] == "[]"

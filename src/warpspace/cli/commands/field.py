@@ -95,7 +95,6 @@ def field(
     from warpspace.picture.words import direction_words
     from warpspace.scene.library import load_scene
     from warpspace.scene.pipeline import choose_view, in_direction
-    from warpspace.scene.uncertainty import evaluate_uncertainty, flat_uncertainty
 
     if points and grid is not None:
         raise OptionError("--at and --grid exclude each other; give one of them")
@@ -108,6 +107,8 @@ def field(
     with progress("evaluating", silent=as_json):
         axes, result, nodes = _evaluate(loaded, points, grid, view, exact=exact)
         if uncertain:
+            from warpspace.scene.uncertainty import evaluate_uncertainty
+
             at = axes if points else None
             spread = evaluate_uncertainty(loaded, at=at, grid=grid, loop=loop, frame=frame)
         plain = statistics(result, axes)
@@ -121,7 +122,10 @@ def field(
         with progress("writing", silent=as_json):
             for path in files:
                 write_field(FieldRecord(axes, result, about, spread), path, overwrite=force)
-    spread = None if spread is None else flat_uncertainty(spread)
+    if spread is not None:
+        from warpspace.scene.uncertainty import flat_uncertainty
+
+        spread = flat_uncertainty(spread)
     if as_json:
         found = {"statistics": asdict(summary)}
         if nodes is not None:

@@ -5,11 +5,10 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from dataclasses import field as attribute
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpspace.analysis.uncertain import FieldUncertainty
 from warpspace.exceptions import OptionError
 from warpspace.field.basis import ErrorField
 from warpspace.field.grid import DIMENSIONS
@@ -17,6 +16,9 @@ from warpspace.field.pieces import cut, pieces
 from warpspace.machine.axes import is_linear
 from warpspace.outputs.files import check_target, write_atomically
 from warpspace.units import MICROMETRE, MICRORADIAN, Array
+
+if TYPE_CHECKING:
+    from warpspace.analysis.uncertain import FieldUncertainty
 
 ABOUT = "about_json"
 """Name under which NPZ and VTS files say what they hold."""
@@ -44,7 +46,7 @@ class FieldRecord:
     axes: Mapping[str, Array]
     field: ErrorField
     about: Mapping[str, str] = attribute(default_factory=dict[str, str])
-    uncertainty: FieldUncertainty | None = None
+    uncertainty: "FieldUncertainty | None" = None
 
     @property
     def shape(self) -> tuple[int, ...]:
