@@ -171,7 +171,8 @@ def _print(scene: "Scene", found: "Converted") -> None:
     """Print what has changed, and that the field has not."""
     from warpspace.machine.parameters import parameter
 
-    print_text(f"{scene.title}: {len(found.changed)} errors written otherwise")
+    count = len(found.changed)
+    print_text(f"{scene.title}: {count} error{'' if count == 1 else 's'} written otherwise")
     columns = (
         Column("error", leads=True),
         Column("unit"),
