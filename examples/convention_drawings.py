@@ -10,6 +10,7 @@ Draw the conventions of error sets into ``docs/images``, one drawing each.
 """
 
 import argparse
+import io
 from collections.abc import Callable
 from pathlib import Path
 
@@ -21,11 +22,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
+from PIL import Image
 
 from warpspace.kinematics.conversion.reference_line import ReferenceLine, fit_line
 
 TO = Path(__file__).resolve().parents[1] / "docs" / "images"
 INK, MUTED, ACTUAL, SECOND = "#1b2430", "#7b8494", "#c8283c", "#1f6fb2"
+COLOURS = 24
+"""Few are enough for lines and letters, and make small files."""
 SIZE, DPI = (9.0, 3.6), 110
 FONT = 13
 
@@ -238,7 +242,10 @@ def main() -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name, draw in DRAWINGS.items():
         target = folder / f"{name}.png"
-        draw().savefig(target, metadata={"Software": None}, facecolor="white")
+        content = io.BytesIO()
+        draw().savefig(content, format="png", facecolor="white")
+        drawing = Image.open(content).convert("RGB").quantize(COLOURS)
+        drawing.save(target, optimize=True)
         print(target)
 
 

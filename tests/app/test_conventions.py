@@ -139,7 +139,7 @@ def test_the_panel_does_nothing_while_a_slider_moves(monkeypatch: pytest.MonkeyP
     )
     panel = object.__new__(ConventionsPanel)
     panel._built_for = panel_module._axes_of(START)
-    panel._known, panel._at, panel._asked = {}, {}, None
+    panel._known, panel._at, panel._asked, panel._costs = {}, {}, None, ()
     panel._context = SimpleNamespace(act=lambda step: step())
     panel._effects, panel._text = Effects(), SimpleNamespace(content="")
     panel._clicks = SimpleNamespace(attributes=None)

@@ -14,7 +14,7 @@ from warpspace.app.readouts.numbers import thousands
 from warpspace.field.basis import ErrorField
 from warpspace.geometry.colour import ColourScale, colour_table
 from warpspace.geometry.deform import round_down
-from warpspace.picture.words import spell_factor, spell_short
+from warpspace.picture.words import direction_words, spell_factor, spell_short
 from warpspace.units import MICROMETRE, MM_PER_UM
 
 BAR_PX = 190
@@ -173,4 +173,5 @@ def heading(picture: LivePicture) -> str:
         nodes="×".join(str(count) for count in picture.grid.shape),
         factor=f"exaggeration {spell_factor(picture.exaggeration)}",
         auto=picture.state.exaggeration is None,
+        direction=" ".join(direction_words(state.scene)),
     )

@@ -46,10 +46,11 @@ MAX_SHOWN = 40
 def convert(
     scene: str, wishes: tuple[str, ...], output: str, *, force: bool, as_json: bool
 ) -> None:
-    """Write the errors of SCENE in another convention; the field stays the same.
+    """Write the errors of SCENE in another convention.
 
-    The file is read again, and the exact fields of both are compared at 500 places of the travel:
-    that difference is printed. What is converted exactly only with errors left out is refused.
+    The field stays the same: the file is read again, and the exact fields of both are compared at
+    500 places of the travel, whose largest difference is printed. What cannot be converted exactly
+    is refused.
     """
     from warpspace.outputs.files import write_atomically
     from warpspace.scene.conversion import convert_scene
@@ -170,7 +171,8 @@ def _print(scene: "Scene", found: "Converted") -> None:
     """Print what has changed, and that the field has not."""
     from warpspace.machine.parameters import parameter
 
-    print_text(f"{scene.title}: {len(found.changed)} errors written otherwise")
+    count = len(found.changed)
+    print_text(f"{scene.title}: {count} error{'' if count == 1 else 's'} written otherwise")
     columns = (
         Column("error", leads=True),
         Column("unit"),

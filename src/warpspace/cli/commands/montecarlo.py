@@ -150,7 +150,8 @@ def montecarlo(
     if plot is not None:
         _plot(plot, first.scene, first.sampled, source, force=force)
     if as_json and len(points) == 1:
-        print_json({**result_json(first.sampled), "from": source})
+        kind = {} if source == "tolerances" else {"from": source}
+        print_json({**result_json(first.sampled), **kind})
     elif as_json:
         print_json({"scenes": [_named_json(point) for point in points], "from": source})
     elif len(points) == 1:
