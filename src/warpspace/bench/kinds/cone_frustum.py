@@ -56,7 +56,7 @@ class ConeFrustum(BenchTest):
     def plan(self, scene: Scene) -> Plan:
         """Run the circle once."""
         check_count("--points", self.points, 8, 5_000)
-        return self._lay(scene, np.arange(self.points) * (360.0 / self.points))
+        return self._lay(scene, np.linspace(0.0, 360.0, self.points, endpoint=False))
 
     def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
         """Run the angles of a file, in their order."""

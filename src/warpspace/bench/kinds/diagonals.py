@@ -20,7 +20,7 @@ from warpspace.bench.options import check_count, option
 from warpspace.bench.outcome import Chart, Curve, Outcome, Quantity
 from warpspace.bench.paths.placing import following_axes, relative_point
 from warpspace.bench.paths.planes import PLANES, find_plane
-from warpspace.bench.plan import Plan, build_plan
+from warpspace.bench.plan import Plan, Whole, build_plan
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.chain import nominal_point
 from warpspace.kinematics.model import Loop
@@ -127,7 +127,7 @@ class Diagonals(BenchTest):
         """Lay the plan through shares of diagonals."""
         names = diagonal_names(self.kind)
         start, end = self._positions(scene, names)
-        index = number.astype(int)
+        index = number.astype(np.intp)
         positions = start[index] + share[:, None] * (end - start)[index]
         signs = np.array([diagonal_signs(name) for name in names])[index]
         marks = {"diagonal": number, "way": way}
@@ -171,7 +171,7 @@ class Diagonals(BenchTest):
         return plan, np.concatenate(values)
 
     def _plan(
-        self, scene: Scene, positions: Array, ways: Array, index: Array, marks: dict[str, Array]
+        self, scene: Scene, positions: Array, ways: Array, index: Whole, marks: dict[str, Array]
     ) -> Plan:
         """Put the plan together from axis positions, [m, 3]; sites of the starts come last."""
         names = diagonal_names(self.kind)

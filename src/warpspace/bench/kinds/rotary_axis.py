@@ -231,7 +231,7 @@ def motions(plan: Plan, readings: Array) -> Motions:
         about_centre(leaning),
         z - z.mean(),
         c - c.mean(),
-        tuple(float(once_mean(values, theta)) for values in (x, y, a, b)),
+        (once_mean(x, theta), once_mean(y, theta), once_mean(a, theta), once_mean(b, theta)),
     )
 
 

@@ -85,7 +85,7 @@ class Squareness(BenchTest):
             chosen = which == index
             across = (plane.up, plane.along)[index]
             parts.append(line_plan(self, scene, axis, across, position[chosen], way[chosen]))
-        return _join(*parts, plane)
+        return _join(parts[0], parts[1], plane)
 
     def evaluate(self, plan: Plan, readings: Array) -> Outcome:
         """Take the angle between the reference lines of both axes."""
