@@ -64,8 +64,8 @@ def fit_circle_readings(plan: Plan, readings: Array) -> CircleFit:
     ----------
     plan : Plan
         With marks angle_deg, sense, along, up (the direction of the bar along the two axes of the
-        plane), radius_mm and gain_sign. With the mark as_read the centre is an error of the machine,
-        not of the set-up, and stays in: the ball of a circle about a rotary axis turns with it.
+        plane), radius_mm and gain_sign. With the mark as_read the centre is an error of the
+        machine, not of the set-up, and stays in: the ball beside a rotary axis turns with it.
     readings : ndarray, [m], µm
 
     Returns

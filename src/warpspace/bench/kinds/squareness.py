@@ -44,7 +44,7 @@ class Squareness(BenchTest):
 
     def plan(self, scene: Scene) -> Plan:
         """Run the first axis there and back, then the second."""
-        check_count("--points", self.points, 3, 10_000)
+        check_count("--points", self.points, 3, 2_000)
         axes = plane_axes(scene.machine, self.plane)[:2]
         positions = [np.linspace(*scene.axis_span(axis), self.points) for axis in axes]
         return self._lay(
