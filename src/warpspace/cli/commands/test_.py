@@ -64,7 +64,8 @@ def test_(context: click.Context, *, listing: bool) -> None:
 
     Each test prints its standard's numbers and draws its customary figure; with --data measured
     readings are evaluated by the same formulas and drawn over the model's. Readings come from the
-    exact chain, along the path that the test has on the machine. `warpspace test NAME --help` has the options of a test.
+    exact chain, along the path that the test has on the machine. `warpspace test NAME --help` has
+    the options of a test.
     """
     if context.invoked_subcommand is None:
         if not listing:
