@@ -211,8 +211,7 @@ def result_json(result: "BenchResult") -> dict[str, object]:
     }
     if result.measured is not None:
         found["model"] = {q.key: q.value for q in result.model.outcome.quantities}
-        difference = result.measured.readings - result.model.readings
-        found["rms_difference"] = float((difference**2).mean() ** 0.5)
+        found["rms_difference"] = result.rms_difference
     found["notes"] = list(result.notes)
     return found
 
