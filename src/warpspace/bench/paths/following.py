@@ -195,7 +195,8 @@ def circle_directions(model: Model, path: Followed) -> dict[str, Array]:
     if length.min() < 1e-3:
         raise OptionError(f"the ball lies on {path.axis}; expected a distance from it")
     radial = arm / length
-    return {"radial": radial, "tangential": np.cross(axial, radial), "axial": axial}
+    tangential: Array = np.asarray(np.cross(axial, radial), dtype=np.float64)
+    return {"radial": radial, "tangential": tangential, "axial": axial}
 
 
 def lay_followed(
