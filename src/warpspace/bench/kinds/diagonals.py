@@ -255,10 +255,9 @@ class Diagonals(BenchTest):
         if any("B_um" in row for row in rows):
             quantities.append(Quantity("B_um", "largest reversal B", _largest(rows, "B_um"), "µm"))
         squareness = squareness_of_diagonals(plan, names, lengths)
+        words = "squareness {} that it looks like"
         quantities += [
-            Quantity(
-                f"squareness_{key}_urad", f"squareness {key} that it looks like", value, "µrad"
-            )
+            Quantity(f"squareness_{key}_urad", words.format(key), value, "µrad")
             for key, value in squareness.items()
         ]
         return Outcome(tuple(quantities), {"diagonals": rows})
