@@ -65,6 +65,7 @@ def test_numbers_are_those_of_the_scene() -> None:
     [
         ("circular", {"radius_mm": "much"}, "--radius 'much'; expected a number"),
         ("circular", {"radius_mm": "900"}, "leaves the working volume"),
+        ("circular", {"points": "20000"}, "expected at most 20,000 in the app"),
         ("circular", {"points": "7.5"}, "expected a whole number"),
         ("circular", {"plane": "AB"}, "expected one of XY, XZ, YZ"),
         ("sphere", {"ball": "1,2"}, "expected three numbers"),

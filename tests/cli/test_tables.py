@@ -29,6 +29,8 @@ COMMANDS = {
     "montecarlo": ("montecarlo", "dvf5000_proposed", "--samples", "500", "--spec-um", "40"),
     "allocate": ("allocate", "dvf5000_first", "--limit-um", "40", "--samples", "2000"),
     "ballbar": ("ballbar", "dvf5000_first", "--plane", "XY", "--radius", "50"),
+    "test": ("test", "positioning", "dvf5000_first"),
+    "list of tests": ("test", "--list"),
     "thesis": ("thesis",),
 }
 WITH_JSON = ("scenes", "check", "field", "compare", "measured", "montecarlo", "ballbar")

@@ -139,6 +139,7 @@ def test_circle_that_follows_a_rotary_axis() -> None:
     found = run(scene_with(EA0C=20.0), Circular(rotary="C", bar="axial", radius_mm=100.0))
     theta = np.deg2rad(found.plan.marks["angle_deg"])
     np.testing.assert_allclose(found.readings, -20.0 * 0.1 * np.sin(theta), atol=1e-9)
+    assert found.outcome["circular_deviation_um"] == pytest.approx(4.0, **EXACT)
 
 
 # --- diagonals ------------------------------------------------------------------------------------

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpspace.bench.plan import NONE, Plan
+from warpspace.bench.plan import NONE, Plan, Whole
 from warpspace.field.evaluate import View, build_basis, evaluate_exact
 from warpspace.kinematics.model import Loop, Model
 from warpspace.machine.curves.directional import Directional
@@ -149,7 +149,7 @@ def _differences(plan: Plan, values: Array) -> Array:
     return shift
 
 
-def _by_travel(errors: ErrorSet, plan: Plan) -> Iterator[tuple[Array, ErrorSet]]:
+def _by_travel(errors: ErrorSet, plan: Plan) -> Iterator[tuple[Whole, ErrorSet]]:
     """Split the sites by the directions in which axes have come; the errors that act there."""
     every = np.arange(len(plan.point_mm))
     axes = [axis for axis in plan.travel if _depends_on_travel(errors, axis)]

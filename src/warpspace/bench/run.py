@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import read_table, unit_notes
 from warpspace.bench.outcome import Chart
@@ -38,6 +40,20 @@ class BenchResult:
     def measured(self) -> Run | None:
         """What was measured."""
         return self.runs[1] if len(self.runs) > 1 else None
+
+    @property
+    def rms_difference(self) -> float | None:
+        """RMS of measured − model, once the unknowns of the set-up are fitted, µm or µrad.
+
+        None where nothing was measured.
+        """
+        if self.measured is None:
+            return None
+        difference = self.measured.readings - self.model.readings
+        if self.model.plan.setup:
+            design = np.stack(list(self.model.plan.setup.values()), -1)
+            difference = difference - design @ np.linalg.lstsq(design, difference, rcond=None)[0]
+        return float(np.sqrt(np.mean(difference**2)))
 
     @property
     def charts(self) -> tuple[Chart, ...]:

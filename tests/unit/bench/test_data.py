@@ -214,3 +214,34 @@ def test_tests_that_cannot_be_run(name: str, options: dict, message: str) -> Non
 def test_machines_without_rotary_axes_are_refused(name: str) -> None:
     with pytest.raises(OptionError, match="rotary ax"):
         run_test(scene_with("machine_c_frame_mill"), find_test(name)())
+
+
+def test_a_hundred_thousand_readings_are_evaluated_at_once() -> None:
+    import numpy as np
+
+    from warpspace.bench.evaluation.lines import reference_lines
+    from warpspace.bench.kinds.positioning import target_statistics
+
+    position = np.repeat(np.linspace(-250.0, 250.0, 10_000), 10)
+    way = np.tile([1.0, -1.0], 50_000)
+    found = target_statistics(position, way, 1e-4 * position**2)
+    np.testing.assert_allclose(found.mean, 1e-4 * found.target**2 + np.zeros((2, 1)), atol=1e-7)
+    np.testing.assert_allclose(found.deviation, 0.0, atol=1e-9)
+    places = np.linspace(-250.0, 250.0, 100_001)
+    lines = reference_lines(places, 1e-4 * places**2)
+    assert lines["minimum_zone"].deviation_um == pytest.approx(6.25, abs=1e-6)
+
+
+def test_the_narrowest_band_is_found_among_all_slopes() -> None:
+    import numpy as np
+
+    from warpspace.bench.evaluation.lines import reference_lines
+
+    random = np.random.default_rng(7)
+    for _ in range(20):
+        x, y = np.sort(random.uniform(-9.0, 9.0, 30)), random.normal(size=30)
+        slopes = np.linspace(-5.0, 5.0, 20_001)
+        heights = np.ptp(y - slopes[:, None] * x, axis=-1)
+        found = reference_lines(x, y)["minimum_zone"].deviation_um
+        assert found <= heights.min() + 1e-12
+        assert found == pytest.approx(heights.min(), abs=0.01)

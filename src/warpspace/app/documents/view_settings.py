@@ -102,11 +102,7 @@ def _differences(state: AppState) -> Iterator[tuple[str, str]]:
     for axis, at in state.rotary.held:
         if axis in state.positions:
             yield f"rotary.held.{axis}", spell_numbers(at)
-    if state.bench.name:
-        yield "test", state.bench.name
-        yield from ((f"test.{name}", text) for name, text in sorted(state.bench.options.items()))
-    if not state.bench.path:
-        yield "test.path", spell(state.bench.path)
+    yield from state.bench.pairs()
     for name in ("excluded", "only"):
         if keys := getattr(state.exclusions, name):
             yield name, ",".join(sorted(keys))

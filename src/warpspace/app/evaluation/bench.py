@@ -12,11 +12,13 @@ from warpspace.bench.outcome import Chart
 from warpspace.bench.plan import Plan
 from warpspace.bench.readings import respond_sites, sense
 from warpspace.bench.registry import find_test
-from warpspace.exceptions import WarpspaceError
+from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.field.grid import Workspace, seen_from_workpiece
 from warpspace.units import MM_PER_UM, Array
 
 CACHE_BYTES = 60_000_000
+MOST_SITES = 20_000
+"""Responses of so many places are held."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,6 +142,10 @@ def prepare(state: AppState) -> Prepared:
     kind = find_test(state.bench.name)
     test = kind(**read_options(kind, state.bench.options, scene.machine.axes))
     plan = test.plan(scene)
+    if len(plan.point_mm) > MOST_SITES:
+        raise OptionError(
+            f"{len(plan.point_mm):,} places; expected at most {MOST_SITES:,} in the app"
+        )
     nominal = seen_from_workpiece(scene.model, plan.coordinates, scene.workspace, plan.point_mm)
     response = respond_sites(scene, plan, tuple(state.amplitudes))
     return Prepared(test, plan, nominal, response)

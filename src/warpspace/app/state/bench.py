@@ -1,6 +1,6 @@
 """Which standard test is run, with which options, and whether its path is drawn."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from warpspace.bench.options import options_of
@@ -27,6 +27,14 @@ class BenchLook:
     name: str = ""
     options: Mapping[str, str] = field(default_factory=dict[str, str])
     path: bool = True
+
+    def pairs(self) -> Iterator[tuple[str, str]]:
+        """Spell what differs from no test, for a line of settings."""
+        if self.name:
+            yield "test", self.name
+            yield from ((f"test.{name}", text) for name, text in sorted(self.options.items()))
+        if not self.path:
+            yield "test.path", "0"
 
     def with_test(self, name: str) -> "BenchLook":
         """Choose a test, with its own options; what is no test changes nothing."""

@@ -64,7 +64,8 @@ def fit_circle_readings(plan: Plan, readings: Array) -> CircleFit:
     ----------
     plan : Plan
         With marks angle_deg, sense, along, up (the direction of the bar along the two axes of the
-        plane), radius_mm and gain_sign.
+        plane), radius_mm and gain_sign. With the mark as_read the centre is an error of the
+        machine, not of the set-up, and stays in: the ball beside a rotary axis turns with it.
     readings : ndarray, [m], µm
 
     Returns
@@ -84,7 +85,8 @@ def fit_circle_readings(plan: Plan, readings: Array) -> CircleFit:
         parts += [along**2 - up**2, 2.0 * along * up]
     design = np.stack(parts, -1)
     fit = np.linalg.lstsq(design, readings, rcond=None)[0]
-    radial = readings - design[:, 1:3] @ fit[1:3]
+    as_read = "as_read" in marks
+    radial = readings if as_read else readings - design[:, 1:3] @ fit[1:3]
     squareness = None
     if elliptic:
         gain = marks["gain_sign"][0] * marks["radius_mm"][0] * UM_PER_MM_URAD

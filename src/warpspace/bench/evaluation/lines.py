@@ -84,8 +84,19 @@ def reference_lines(position_mm: Array, deviation_um: Array) -> dict[str, Refere
 
 def _narrowest(x: Array, y: Array) -> float:
     """Slope of the narrowest band around points in order of x."""
-    edges = {*_hull_slopes(x, y), *_hull_slopes(x, -y, -1.0)}
-    return min(edges, key=lambda slope: (float(np.ptp(y - slope * x)), abs(slope)))
+    edges = sorted({*_hull_slopes(x, y), *_hull_slopes(x, -y, -1.0)})
+
+    def height(number: int) -> float:
+        return float(np.ptp(y - edges[number] * x))
+
+    low, high = 0, len(edges) - 1  # the height is a convex function of the slope
+    while low < high:
+        middle = (low + high) // 2
+        if height(middle) <= height(middle + 1):
+            high = middle
+        else:
+            low = middle + 1
+    return edges[low]
 
 
 def _hull_slopes(x: Array, y: Array, sign: float = 1.0) -> list[float]:

@@ -62,8 +62,8 @@ class BallPlate(BenchTest):
 
     def _grid(self) -> tuple[Array, Array, Array]:
         """Give position, row and column of every ball, row by row."""
-        check_count("--balls", self.balls, 2, 50)
-        check_count("--positions", self.positions, 1, 50)
+        check_count("--balls", self.balls, 2, 20)
+        check_count("--positions", self.positions, 1, 10)
         grid = np.meshgrid(
             np.arange(self.positions), np.arange(self.balls), np.arange(self.balls), indexing="ij"
         )

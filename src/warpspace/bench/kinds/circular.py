@@ -43,7 +43,8 @@ class Circular(BenchTest):
         " deviation G is the largest minus the smallest radial deviation; an ellipse at 45° is"
         " squareness, one along the axes a difference of their scales, a step where an axis turns"
         " back its reversal. With --rotary the linear axes follow a ball on a rotary axis, and the"
-        " bar stands in the radial, tangential or axial direction of its circle."
+        " bar stands in the radial, tangential or axial direction of its circle; these readings"
+        " count as they are."
     )
     columns: ClassVar[tuple[DataColumn, ...]] = (
         DataColumn("direction", "sign", default="+"),
@@ -192,8 +193,8 @@ class Circular(BenchTest):
             curves.append(self._squareness(fit, runs[0].plan))
         return (
             Chart(
-                "polar", self._title(), "angle [°]", "radial deviation [µm]", tuple(curves), (),
-                "About the least-squares centre.",
+                "polar", self._title(), "angle [°]", "deviation [µm]", tuple(curves), (),
+                "As read." if self.rotary else "About the least-squares centre.",
             ),
         )  # fmt: skip
 

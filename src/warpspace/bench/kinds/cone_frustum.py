@@ -22,6 +22,9 @@ from warpspace.kinematics.model import Loop
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
+MOST = 3_600
+"""Readings of one file: the rotary axes are found for one after the other."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class ConeFrustum(BenchTest):
@@ -32,8 +35,7 @@ class ConeFrustum(BenchTest):
     standard: ClassVar[str] = "ISO 10791-7, M3"
     words: ClassVar[str] = (
         "The tool runs round a cone that stands tilted on the table, its axis along the flank,"
-        " so that"
-        " three linear and two rotary axes move at once. A ball bar from the middle of the"
+        " so that three linear and two rotary axes move at once. A ball bar from the middle of the"
         " circle, or"
         " the roundness of the machined cone, gives the radial deviation: circularity about the"
         " least-squares centre."
@@ -55,13 +57,15 @@ class ConeFrustum(BenchTest):
 
     def plan(self, scene: Scene) -> Plan:
         """Run the circle once."""
-        check_count("--points", self.points, 8, 5_000)
-        return self._lay(scene, np.arange(self.points) * (360.0 / self.points))
+        check_count("--points", self.points, 8, 720)
+        return self._lay(scene, np.linspace(0.0, 360.0, self.points, endpoint=False))
 
     def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
         """Run the angles of a file, in their order."""
         if len(table) < 8:
             raise table.refuse(f"has {len(table)} readings; expected at least 8")
+        if len(table) > MOST:
+            raise table.refuse(f"has {len(table):,} readings; expected at most {MOST:,}")
         order = np.argsort(table["angle_deg"], kind="stable")
         angle = table["angle_deg"][order]
         if np.ptp(angle) < 1.0:

@@ -20,7 +20,7 @@ from warpspace.bench.options import check_count, option
 from warpspace.bench.outcome import Chart, Curve, Outcome, Quantity
 from warpspace.bench.paths.placing import following_axes, relative_point
 from warpspace.bench.paths.planes import PLANES, find_plane
-from warpspace.bench.plan import Plan, build_plan
+from warpspace.bench.plan import Plan, Whole, build_plan
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.chain import nominal_point
 from warpspace.kinematics.model import Loop
@@ -53,7 +53,7 @@ class Diagonals(BenchTest):
 
     def plan(self, scene: Scene) -> Plan:
         """Run every diagonal there and back; step diagonals there only."""
-        check_count("--targets", self.targets, 2, 10_000)
+        check_count("--targets", self.targets, 2, 500)
         share = np.linspace(0.0, 1.0, self.targets)
         if self.kind == "step":
             return self._steps(scene)
@@ -127,7 +127,7 @@ class Diagonals(BenchTest):
         """Lay the plan through shares of diagonals."""
         names = diagonal_names(self.kind)
         start, end = self._positions(scene, names)
-        index = number.astype(int)
+        index = number.astype(np.intp)
         positions = start[index] + share[:, None] * (end - start)[index]
         signs = np.array([diagonal_signs(name) for name in names])[index]
         marks = {"diagonal": number, "way": way}
@@ -171,7 +171,7 @@ class Diagonals(BenchTest):
         return plan, np.concatenate(values)
 
     def _plan(
-        self, scene: Scene, positions: Array, ways: Array, index: Array, marks: dict[str, Array]
+        self, scene: Scene, positions: Array, ways: Array, index: Whole, marks: dict[str, Array]
     ) -> Plan:
         """Put the plan together from axis positions, [m, 3]; sites of the starts come last."""
         names = diagonal_names(self.kind)
@@ -255,10 +255,9 @@ class Diagonals(BenchTest):
         if any("B_um" in row for row in rows):
             quantities.append(Quantity("B_um", "largest reversal B", _largest(rows, "B_um"), "µm"))
         squareness = squareness_of_diagonals(plan, names, lengths)
+        words = "squareness {} that it looks like"
         quantities += [
-            Quantity(
-                f"squareness_{key}_urad", f"squareness {key} that it looks like", value, "µrad"
-            )
+            Quantity(f"squareness_{key}_urad", words.format(key), value, "µrad")
             for key, value in squareness.items()
         ]
         return Outcome(tuple(quantities), {"diagonals": rows})

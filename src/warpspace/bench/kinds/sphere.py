@@ -59,7 +59,7 @@ class Sphere(BenchTest):
 
     def plan(self, scene: Scene) -> Plan:
         """Turn the axis as far as the linear axes can follow."""
-        check_count("--points", self.points, 4, 100_000)
+        check_count("--points", self.points, 4, 3_600)
         axis, ball = self._set_up(scene)
         angle = reachable(
             scene, self.model(scene), axis, ball, self.at, self.start, self.end, self.points

@@ -104,7 +104,7 @@ class Straightness(BenchTest):
 
     def plan(self, scene: Scene) -> Plan:
         """Run the axis there and back."""
-        check_count("--points", self.points, 3, 10_000)
+        check_count("--points", self.points, 3, 2_000)
         axis, _ = self.directions(scene)
         position = np.linspace(*scene.axis_span(axis), self.points)
         return self._lay(

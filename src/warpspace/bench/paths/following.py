@@ -174,8 +174,8 @@ def reachable(
         )
     outside = np.flatnonzero(~inside)
     before, after = outside[outside < at_here], outside[outside > at_here]
-    first = fine[before[-1] + 1] if len(before) else fine[0]
-    last = fine[after[0] - 1] if len(after) else fine[-1]
+    first = float(fine[before[-1] + 1] if len(before) else fine[0])
+    last = float(fine[after[0] - 1] if len(after) else fine[-1])
     if last - first < 1.0:
         raise OptionError(
             f"{axis} could turn by {last - first:.2g}° only before a linear axis reaches its end;"
@@ -195,7 +195,8 @@ def circle_directions(model: Model, path: Followed) -> dict[str, Array]:
     if length.min() < 1e-3:
         raise OptionError(f"the ball lies on {path.axis}; expected a distance from it")
     radial = arm / length
-    return {"radial": radial, "tangential": np.cross(axial, radial), "axial": axial}
+    tangential: Array = np.asarray(np.cross(axial, radial), dtype=np.float64)
+    return {"radial": radial, "tangential": tangential, "axial": axial}
 
 
 def lay_followed(
@@ -221,6 +222,7 @@ def lay_followed(
             "up": np.sin(theta),
             "radius_mm": np.full(count, wanted.radius_mm),
             "gain_sign": np.ones(count),
+            "as_read": np.ones(count),
         },
         length_mm=BAR_MM,
         travel=travels(path.coordinates, sense),

@@ -65,7 +65,10 @@ def orient(
         return transforms.rotate(np.swapaxes(pose, -1, -2), tool_axis(model, at))
 
     seeds = np.stack(
-        np.meshgrid(*(np.linspace(*pair, SEEDS) for pair in limits), indexing="ij"), -1
+        np.meshgrid(
+            *(np.linspace(float(low), float(high), SEEDS) for low, high in limits), indexing="ij"
+        ),
+        -1,
     ).reshape(-1, 2)
     reached = direction(seeds)
     here = np.array([float(stand[name]) for name in names])

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.kinematics import transforms
@@ -131,8 +132,8 @@ def following_axes(model: Model) -> tuple[str, str, str]:
             found.setdefault(direction_index(axis.name), axis.name)
     if len(found) != 3:
         raise OptionError(
-            f"the machine {model.machine.chain} cannot follow a point of the workpiece; expected"
-            " linear axes along x, y and z"
+            f"the machine {model.machine.chain} has not three linear axes; expected one along each"
+            " of x, y and z"
         )
     return found[0], found[1], found[2]
 
@@ -182,7 +183,7 @@ def ball_point(model: Model, coordinates: Coordinates) -> Array:
     return transforms.apply(transforms.inverse(pose), nominal_point(model, Loop.TOOL, coordinates))
 
 
-def within_travel(machine: Machine, coordinates: Mapping[str, Array]) -> Array:
+def within_travel(machine: Machine, coordinates: Mapping[str, Array]) -> NDArray[np.bool_]:
     """Tell at which sites all linear axes are within their travel, [n]."""
     inside = np.ones((), dtype=bool)
     for name, values in coordinates.items():

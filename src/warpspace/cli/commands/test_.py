@@ -60,11 +60,12 @@ class TestTable(MutableMapping[str, click.Command]):
 @click.option("--list", "listing", is_flag=True, help="List the tests: name, standard, what it is.")
 @click.pass_context
 def test_(context: click.Context, *, listing: bool) -> None:
-    """Run a standard test on SCENE, as it would be run on the machine.
+    """Run a standard test of machine tools on SCENE.
 
     Each test prints its standard's numbers and draws its customary figure; with --data measured
     readings are evaluated by the same formulas and drawn over the model's. Readings come from the
-    exact chain. `warpspace test NAME --help` has the options of a test.
+    exact chain, along the path that the test has on the machine. `warpspace test NAME --help` has
+    the options of a test.
     """
     if context.invoked_subcommand is None:
         if not listing:
@@ -210,8 +211,7 @@ def result_json(result: "BenchResult") -> dict[str, object]:
     }
     if result.measured is not None:
         found["model"] = {q.key: q.value for q in result.model.outcome.quantities}
-        difference = result.measured.readings - result.model.readings
-        found["rms_difference"] = float((difference**2).mean() ** 0.5)
+        found["rms_difference"] = result.rms_difference
     found["notes"] = list(result.notes)
     return found
 

@@ -1,5 +1,7 @@
 """Figures of the test bench: the charts of a test side by side, its numbers beside them."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -13,7 +15,7 @@ from warpspace.outputs.charts.paper import SMALL, TEXT, ground, quiet, sheet, st
 
 CHART_IN, ROW_IN, NUMBERS_IN = 4.9, 4.6, 3.6
 LEGEND_IN = 0.19
-DASHES = {"line": "-", "dashed": (0, (4, 3)), "thin": "-", "dots": "none"}
+DASHES: dict[str, Any] = {"line": "-", "dashed": (0, (4, 3)), "thin": "-", "dots": "none"}
 MOST_NUMBERS = 16
 
 
