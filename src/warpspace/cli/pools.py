@@ -8,7 +8,7 @@ from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, cast
 
 import click
 
@@ -124,10 +124,9 @@ class LastingPool(Executor):
 
     def _try(self, outer: "Future[Any]", call: Callable[[], Any], left: int) -> None:
         """Hand a task to the pool that is there."""
+        pool = self._pool
         try:
-            with self._lock:
-                pool = self._pool
-                inner = pool.submit(call)
+            inner = pool.submit(call)
         except BrokenProcessPool:
             self._again(outer, call, left, pool)
         else:
@@ -193,7 +192,8 @@ def _cluster(address: str) -> Generator[Workers]:
             " instance tcp://127.0.0.1:8786"
         ) from None
     try:
-        threads = sum(client.ncores().values())
+        cores = cast("dict[str, int]", client.ncores())
+        threads = sum(cores.values())
         if not threads:
             raise OptionError(f"--scheduler {address!r}: the cluster has no worker")
         # a task that has lost its worker runs again elsewhere; `pure` would hash its arguments
