@@ -3,9 +3,9 @@
 import os
 import threading
 from collections.abc import Callable, Generator
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor, Future, InvalidStateError
 from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, cast
@@ -144,10 +144,12 @@ class LastingPool(Executor):
         if inner.cancelled():
             outer.cancel()
             outer.set_running_or_notify_cancel()
-        elif isinstance(inner.exception(), BrokenProcessPool):
+            return
+        if isinstance(inner.exception(), BrokenProcessPool):
             self._again(outer, call, left - 1, pool)
-        elif not outer.cancelled():
-            error = inner.exception()
+            return
+        error = inner.exception()
+        with suppress(InvalidStateError):  # dropped in this very moment
             if error is None:
                 outer.set_result(inner.result())
             else:
