@@ -143,7 +143,7 @@ def running_app(*options: str):
         yield url, psutil.Process(process.pid)
     finally:
         process.terminate()
-        process.wait(10)
+        process.wait(60)
 
 
 def rss_mb(process: psutil.Process) -> float:

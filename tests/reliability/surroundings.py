@@ -99,11 +99,14 @@ def run(count: int) -> Outcome:
         place, command = pairs[(number * 7) % len(pairs)]
         faults += _try(place, *command)
         done += 1
-    places = min(len(PLACES), count)
+    tried = {(number * 7) % len(pairs) for number in range(count)}
+    places = {at % len(PLACES) for at in tried}
+    commands = {at // len(PLACES) for at in tried}
     return Outcome(
         done,
-        f"{places} surroundings × {len(COMMANDS)} writing commands, two instances each time: done,"
-        " or one message, exit 2 and nothing half-written",
+        f"{len(places)} surroundings and {len(commands)} writing commands, {len(tried)} of"
+        f" {len(pairs)} combinations, two instances each time: done, or one message, exit 2 and"
+        " nothing half-written",
         faults,
     )
 

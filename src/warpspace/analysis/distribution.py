@@ -155,7 +155,7 @@ class Stream:
         """Take in blocks of samples that were summarised, in their order."""
         if self._values is not None and part.values is not None:
             self._values[self.count : self.count + part.count] = part.values
-        if self._fine is not None and part.bins is not None:
+        if self._fine is not None and part.bins is not None and part.counts is not None:
             self._fine[part.bins] += part.counts
         self.count += part.count
         for block, squares in zip(part.sums, part.square_sums, strict=True):

@@ -107,8 +107,9 @@ def _read(
     mesh.update_faces(mesh.nondegenerate_faces())
     if not len(mesh.faces):
         raise OptionError(f"{path}: all of its triangles are points or lines")
-    open_edges = _clean(mesh)
-    body = build_body(mesh, path.stem, frame, colour)
+    with np.errstate(all="ignore"):  # a flat surface has no volume, and no centre of it
+        open_edges = _clean(mesh)
+        body = build_body(mesh, path.stem, frame, colour)
     if not open_edges:
         return LoadedMesh(body)
     warning = f"{path}: the surface is not closed ({open_edges} open edges); it is drawn as it is"

@@ -3,12 +3,12 @@
 import os
 import threading
 from collections.abc import Callable, Generator
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor, Future, InvalidStateError
 from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, cast
 
 import click
 
@@ -124,10 +124,9 @@ class LastingPool(Executor):
 
     def _try(self, outer: "Future[Any]", call: Callable[[], Any], left: int) -> None:
         """Hand a task to the pool that is there."""
+        pool = self._pool
         try:
-            with self._lock:
-                pool = self._pool
-                inner = pool.submit(call)
+            inner = pool.submit(call)
         except BrokenProcessPool:
             self._again(outer, call, left, pool)
         else:
@@ -145,10 +144,12 @@ class LastingPool(Executor):
         if inner.cancelled():
             outer.cancel()
             outer.set_running_or_notify_cancel()
-        elif isinstance(inner.exception(), BrokenProcessPool):
+            return
+        if isinstance(inner.exception(), BrokenProcessPool):
             self._again(outer, call, left - 1, pool)
-        elif not outer.cancelled():
-            error = inner.exception()
+            return
+        error = inner.exception()
+        with suppress(InvalidStateError):  # dropped in this very moment
             if error is None:
                 outer.set_result(inner.result())
             else:
@@ -193,7 +194,8 @@ def _cluster(address: str) -> Generator[Workers]:
             " instance tcp://127.0.0.1:8786"
         ) from None
     try:
-        threads = sum(client.ncores().values())
+        cores = cast("dict[str, int]", client.ncores())
+        threads = sum(cores.values())
         if not threads:
             raise OptionError(f"--scheduler {address!r}: the cluster has no worker")
         # a task that has lost its worker runs again elsewhere; `pure` would hash its arguments

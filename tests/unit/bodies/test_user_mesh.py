@@ -196,3 +196,14 @@ def test_points_with_one_coordinate(tmp_path):
     path.write_text("v -10.0\n", "utf-8")
     with pytest.raises(OptionError, match="without three coordinates"):
         load_mesh(path, "X")
+
+
+def test_a_closed_surface_without_volume_warns_of_nothing(tmp_path):
+    path = tmp_path / "x.obj"
+    corners = "-10 -15 -20|-10 -15 20|-10 15 -20|-10 15 20|-10 15 20"
+    corners += "|10 -15 -20|10 -15 20|10 15 -20|-10 15 20|10 15 20"
+    faces = "2 4 1|5 2 1|1 4 3|3 5 1|2 8 4|6 2 5|6 8 2|4 8 3|7 5 3|3 8 7|7 6 5|8 6 7"
+    lines = [f"v {corner}" for corner in corners.split("|")]
+    lines += [f"f {face}" for face in faces.split("|")]
+    path.write_text("\n".join(lines), "utf-8")
+    assert len(load_mesh(path, "X").body.triangles) > 0

@@ -205,6 +205,8 @@ def test_what_has_no_place_is_named(tmp_path: Path) -> None:
         (LINKS + ONE + TWO.format("").replace("0 0 1", "0 0 0"), "no direction"),
         (LINKS + ONE + TWO.format("").replace("0 0 1", "9e210 0 0"), "no direction"),
         (LINKS + ONE + TWO.format('<origin xyz="1e300 0 0"/>'), "origin is no finite number"),
+        (LINKS + ONE + TWO.format('<origin xyz="0 9e999 0"/>'), "origin is no finite number"),
+        (LINKS + ONE + TWO.format('<origin rpy="9e999 0 0"/>'), "origin is no finite number"),
         (LINKS + ONE + TWO.format("").replace("0 0 1", "a b c"), "no complete URDF"),
         (LINKS + '<joint name="one" type="fixed"/>', "no complete URDF"),
         (LINKS + ONE + ONE, "joint 'one' is there twice"),

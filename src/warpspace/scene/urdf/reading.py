@@ -5,6 +5,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.machine.limits import MAX_SCENE_BYTES
 from warpspace.scene.files import read_text
@@ -83,9 +85,11 @@ def _parse(text: str, source: str) -> Any:
     except ImportError:
         raise _not_installed() from None
     try:
-        loaded = URDF.load(
-            io.BytesIO(text.encode()), build_scene_graph=False, load_meshes=False, mesh_dir=""
-        )
+        # numbers that are not finite are refused by name later
+        with np.errstate(all="ignore"):
+            loaded = URDF.load(
+                io.BytesIO(text.encode()), build_scene_graph=False, load_meshes=False, mesh_dir=""
+            )
     except (ValueError, TypeError, KeyError, IndexError, AttributeError, AssertionError) as error:
         # yourdfpy reads without checking: what is missing or no number ends in one of these
         reason = f"{type(error).__name__}: {error}".replace("\n", " ")[:200]
