@@ -41,7 +41,8 @@ nitpicky = False  # types in docstrings are words for readers, "ndarray, [..., 3
 
 smartquotes = False  # "--at" is an option, no dash
 myst_heading_anchors = 4
-myst_enable_extensions = ["colon_fence"]
+myst_enable_extensions = ["colon_fence", "linkify"]
+myst_linkify_fuzzy_links = False
 
 # --- gallery -------------------------------------------------------------------------------------
 
