@@ -50,7 +50,7 @@ sphinx_gallery_conf = {
     "examples_dirs": [str(HERE.parent / "examples")],
     "gallery_dirs": ["gallery"],
     "filename_pattern": r"\.py$",
-    "ignore_pattern": r"(screenshots|__init__)\.py$",
+    "ignore_pattern": rf"({'|'.join(gallery_pictures.TOOLS)})\.py$",
     "reset_argv": "gallery_pictures.target_argument",
     "image_scrapers": ("gallery_pictures.add_pictures",),
     "reset_modules": (),
