@@ -6,7 +6,8 @@ import numpy as np
 
 from warpspace.exceptions import OptionError
 from warpspace.kinematics import transforms
-from warpspace.kinematics.chain import exact_error, nominal_point
+from warpspace.kinematics.chain import nominal_point
+from warpspace.kinematics.deviation import exact_error
 from warpspace.kinematics.model import Coordinates, Loop, Model
 from warpspace.machine.curves.constant import Constant
 from warpspace.machine.curves.pieces import SMALL
