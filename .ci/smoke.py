@@ -15,7 +15,7 @@ from importlib import metadata
 from pathlib import Path
 
 COMMAND = Path(sys.executable).parent / "warpspace"
-PATIENCE_S = 300
+PATIENCE_S = 1200
 
 
 def warpspace(*arguments: str) -> str:

@@ -41,7 +41,8 @@ nitpicky = False  # types in docstrings are words for readers, "ndarray, [..., 3
 
 smartquotes = False  # "--at" is an option, no dash
 myst_heading_anchors = 4
-myst_enable_extensions = ["colon_fence"]
+myst_enable_extensions = ["colon_fence", "linkify"]
+myst_linkify_fuzzy_links = False
 
 # --- gallery -------------------------------------------------------------------------------------
 
@@ -49,7 +50,7 @@ sphinx_gallery_conf = {
     "examples_dirs": [str(HERE.parent / "examples")],
     "gallery_dirs": ["gallery"],
     "filename_pattern": r"\.py$",
-    "ignore_pattern": r"(screenshots|__init__)\.py$",
+    "ignore_pattern": rf"({'|'.join(gallery_pictures.TOOLS)})\.py$",
     "reset_argv": "gallery_pictures.target_argument",
     "image_scrapers": ("gallery_pictures.add_pictures",),
     "reset_modules": (),

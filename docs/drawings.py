@@ -65,6 +65,7 @@ def _arrow(axes: Axes, start: Points, end: Points, colour: str, width: float = 1
         "",
         xy=tuple(end),
         xytext=tuple(start),
+        annotation_clip=False,
         arrowprops={
             "arrowstyle": "-|>",
             "color": colour,
@@ -117,7 +118,7 @@ def frames() -> Figure:
         axes.plot([], [], color=TOOL, lw=3, alpha=0.55, label="tool branch: X, Y, Z, t")[0],
         axes.plot([], [], color=WORK, lw=3, alpha=0.55, label="workpiece branch: B, C, w")[0],
     ]
-    axes.legend(handles=handles, loc="upper right", frameon=False)
+    figure.legend(handles=handles, loc="outside lower center", ncols=2, frameon=False)
     axes.set_title("wCBFXYZt: from the frame of the machine R outwards", loc="left")
     _bare(axes)
     axes.margins(0.08)
@@ -152,7 +153,7 @@ def lever() -> Figure:
         va="bottom",
     )
     label = f"1 µrad of EAY about x moves the point by\ny {gain[1]:+.3f} µm, z {gain[2]:+.3f} µm"
-    axes.text(*_beside(turned[1:], 30, -6), label, color=ERROR, va="center")
+    axes.text(*_beside(turned[1:], 60, -12), label, color=ERROR, va="center")
     sweep = np.linspace(0.0, angle, 20)
     radius = 0.35 * np.hypot(*reach[1:])
     start = np.arctan2(reach[2], reach[1])
@@ -249,6 +250,8 @@ def squareness() -> Figure:
     tip = centre + 1.12 * (drawn[drawn.shape[0] // 2, -1] - centre)
     _arrow(axes, centre, np.array([centre[0], tip[1]]), FAINT)
     _arrow(axes, centre, tip, AXES[1], 2.2)
+    axes.set_ylim(top=tip[1] + 10.0)
+    axes.set_xlim(right=centre[0] + 360.0)
     axes.text(*_beside(centre, 345, 0), "X", color=AXES[0], va="center", weight="bold")
     axes.text(*_beside(tip, -14, 0), "Y", color=AXES[1], ha="right", weight="bold")
     axes.set_title(f"EC0Y = +{gamma:g} µrad, the middle held still, drawn ×5000", loc="left")

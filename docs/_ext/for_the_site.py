@@ -6,6 +6,8 @@
 """
 
 import re
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from types import GenericAlias, UnionType
 from typing import TYPE_CHECKING
@@ -23,11 +25,13 @@ PAGES = {
 """Pages outside this folder, and where the site shows them."""
 
 ALIASES = (GenericAlias, UnionType)
+COMING = ("performance.md",)
+"""Pages that a command writes (`make bench`): until it has, links to them are words."""
 OPTIONS = """
 
 ```{{eval-rst}}
 .. click:: {module}:{attribute}
-   :prog: warpspace {name}
+   :prog: warpspace {name}{nested}
 ```
 """
 
@@ -49,13 +53,17 @@ def options_of(name: str) -> str:
     -------
     str
     """
+    from click import Group
+
     from warpspace.cli.registry import COMMANDS
 
     command = COMMANDS[name]
-    module = command.callback.__module__
-    home = __import__(module, fromlist=["_"])
+    stem = name.replace("-", "_")
+    homes = (f"warpspace.cli.commands.{module}" for module in (stem, f"{stem}_"))
+    home = import_module(next(module for module in homes if find_spec(module)))
     attribute = next(key for key, value in vars(home).items() if value is command)
-    return OPTIONS.format(name=name, module=module, attribute=attribute)
+    nested = "\n   :nested: full" if isinstance(command, Group) else ""
+    return OPTIONS.format(name=name, module=home.__name__, attribute=attribute, nested=nested)
 
 
 def inward(text: str, depth: int) -> str:
@@ -106,6 +114,9 @@ def _short_titles() -> str:
 def _source_read(app: "Sphinx", name: str, source: list[str]) -> None:
     """Add to a page what only the site has."""
     source[0] = inward(source[0], name.count("/"))
+    for page in COMING:
+        if not Path(app.srcdir, page).exists():
+            source[0] = re.sub(rf"\[([^\]]+)\]\([./]*{re.escape(page)}[^)]*\)", r"\1", source[0])
     source[0] = without_coming_pages(source[0], Path(app.srcdir, name).parent)
     folder, _, page = name.rpartition("/")
     if folder == "commands" and page == "index":

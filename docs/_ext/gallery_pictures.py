@@ -36,6 +36,8 @@ ORDER = (
     "design_review",
 )
 """What comes first in the gallery; other examples follow in the order of their names."""
+TOOLS = ("convention_drawings", "screenshots")
+"""Scripts beside the examples that take the pictures of the pages."""
 FRAME_PX = 560
 
 TABS = """
