@@ -183,7 +183,7 @@ def side_by_side(page: Page) -> None:
         page.wait_for_timeout(PAUSE_MS)
     press(page, "Done")
     press(page, "Compare")
-    page.wait_for_selector(".ws-concepts img", timeout=60_000)
+    page.wait_for_selector(".ws-concepts img", timeout=180_000)
 
 
 VISITS = {
