@@ -244,12 +244,11 @@ class Diagonals(BenchTest):
             if self.kind == "step":
                 row["by_axis_um"] = steps_by_axis(plan.marks["axis"][chosen], readings[chosen])
             rows.append(row)
-        found = lengths[np.isfinite(lengths)]
         quantities = [
             Quantity("E_um", "largest systematic deviation E", _largest(rows, "E_um"), "µm"),
             Quantity(
                 "length_difference_um", "longest less shortest deviation of length",
-                float(np.ptp(found)), "µm",
+                float(np.ptp(lengths[np.isfinite(lengths)])), "µm",
             ),
         ]  # fmt: skip
         if any("B_um" in row for row in rows):
@@ -297,5 +296,5 @@ def _alike(run: Run, index: int) -> bool:
 
 
 def _largest(rows: Sequence[dict[str, object]], key: str) -> float:
-    """Largest of a number over the diagonals."""
+    """Give the largest of a number over the diagonals."""
     return max(float(str(row[key])) for row in rows if key in row)
