@@ -8,9 +8,9 @@ import tempfile
 from pathlib import Path
 
 import websockets
-from app.first_camera import CAMERA
 
 from app.raw_client import App, Tab, dial, nonsense, pack, running_app, send_all, steadily, update
+from app.wire import CAMERA
 from reliability.lag import Lag
 from reliability.row import Outcome
 
