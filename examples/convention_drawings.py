@@ -13,6 +13,7 @@ import argparse
 import io
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 
@@ -32,6 +33,8 @@ COLOURS = 24
 """Few are enough for lines and letters, and make small files."""
 SIZE, DPI = (9.0, 3.6), 110
 FONT = 13
+Place = Any
+"""Two coordinates."""
 
 
 def sheet(columns: int = 2) -> tuple[Figure, list[Axes]]:
@@ -44,7 +47,7 @@ def sheet(columns: int = 2) -> tuple[Figure, list[Axes]]:
     return figure, panels
 
 
-def arrow(axes: Axes, start: object, end: object, colour: str = INK, width: float = 2.0) -> None:
+def arrow(axes: Axes, start: Place, end: Place, colour: str = INK, width: float = 2.0) -> None:
     """Draw an arrow."""
     axes.annotate(
         "",
@@ -54,12 +57,12 @@ def arrow(axes: Axes, start: object, end: object, colour: str = INK, width: floa
     )
 
 
-def text(axes: Axes, x: float, y: float, words: str, colour: str = INK, **style: object) -> None:
+def text(axes: Axes, x: float, y: float, words: str, colour: str = INK) -> None:
     """Write words."""
-    axes.text(x, y, words, color=colour, fontsize=FONT, ha="center", va="center", **style)
+    axes.text(x, y, words, color=colour, fontsize=FONT, ha="center", va="center")
 
 
-def body(axes: Axes, centre: object, turn: float, colour: str, size: object = (1.1, 0.6)) -> None:
+def body(axes: Axes, centre: Place, turn: float, colour: str, size: Place = (1.1, 0.6)) -> None:
     """Draw a body, turned by an angle in rad."""
     half = np.array(size) / 2.0
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half

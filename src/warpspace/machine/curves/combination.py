@@ -44,8 +44,10 @@ def combine_curves(first: ErrorFunction, second: ErrorFunction, weights: Weights
         if isinstance(other, Constant) and other.value == 0.0:
             return one.scaled(weight)
     if isinstance(first, Directional) or isinstance(second, Directional):
-        there = combine_curves(*(_way(one, "forward") for one in (first, second)), weights)
-        back = combine_curves(*(_way(one, "backward") for one in (first, second)), weights)
+        there, back = (
+            combine_curves(_way(first, way), _way(second, way), weights)
+            for way in ("forward", "backward")
+        )
         return Directional(span, there, back)
     if isinstance(first, TwoArguments) or isinstance(second, TwoArguments):
         return _surface(first, second, weights)

@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Any, ClassVar, Self, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpspace.exceptions import OptionError
 from warpspace.machine.curves.curve import ErrorFunction, Rows, Span, Spell
@@ -19,6 +20,7 @@ POSITIONS = (-MAX_LENGTH_MM, MAX_LENGTH_MM)
 VALUES = (-MAX_ERROR, MAX_ERROR)
 FORM = "table2"
 Numbers = tuple[float, ...]
+Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -209,7 +211,7 @@ class TwoArguments(ErrorFunction):
         return replace(present, span=span)
 
 
-def _cell(at: Numbers, position: Array) -> tuple[Array, Array, Array]:
+def _cell(at: Numbers, position: Array) -> tuple[Indices, Indices, Array]:
     """Find the neighbours of positions, and the share of the way from the lower to the upper."""
     points = np.array(at)
     held = np.clip(position, points[0], points[-1])
