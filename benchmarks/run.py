@@ -33,6 +33,8 @@ BENCHMARKS = (
     "bench_tabs",
 )
 """One module each, with a function `measure` that gives a `Section`."""
+APART = ("bench_cluster", "bench_machines")
+"""Programs of their own, with pages or output of their own."""
 PAGE = Path(__file__).parents[1] / "docs" / "performance.md"
 SHOWN = ("warpspace", "numpy", "scipy", "viser", "pyvista", "vtk", "pyarrow")
 PEERS = ("pytransform3d", "pin")
