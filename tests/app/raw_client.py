@@ -81,7 +81,12 @@ def running_app(folder: Path, *options: str) -> Iterator[App]:
         yield App(f"ws://127.0.0.1:{port}", psutil.Process(process.pid), log)
     finally:
         process.terminate()
-        process.wait(10)
+        try:
+            process.wait(30)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+            raise
 
 
 class Tab:
