@@ -226,10 +226,11 @@ def _print_json(
             {name: values[part] for name, values in positions.items()},
             ErrorField(nominal[part], error[part], orientation[part]),
         )
-        for index, row in enumerate(rows if spread is not None else (), start=start):
-            row["uncertainty_um"] = spread.error_um[index].tolist()
-            row["uncertainty_norm_um"] = float(spread.norm_um[index])
-            row["uncertainty_urad"] = spread.orientation_urad[index].tolist()
+        if spread is not None:
+            for index, row in enumerate(rows, start=start):
+                row["uncertainty_um"] = spread.error_um[index].tolist()
+                row["uncertainty_norm_um"] = float(spread.norm_um[index])
+                row["uncertainty_urad"] = spread.orientation_urad[index].tolist()
         click.echo((", " if start else "") + spell_json(rows)[1:-1], nl=False)
     click.echo(
         "]" + "".join(f', "{name}": {spell_json(part)}' for name, part in found.items()) + "}"
