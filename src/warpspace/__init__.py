@@ -11,6 +11,7 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from warpspace.bench.ballbar import ballbar
     from warpspace.bench.run import run_test
+    from warpspace.calibration.calibrate import calibrate
     from warpspace.exceptions import SceneError, WarpspaceError
     from warpspace.field.basis import ErrorField
     from warpspace.outputs.exports.multiblock import to_pyvista
@@ -35,6 +36,7 @@ _HOME = {
     "evaluate": "warpspace.scene.pipeline",
     "allocate": "warpspace.scene.verbs",
     "ballbar": "warpspace.bench.ballbar",
+    "calibrate": "warpspace.calibration.calibrate",
     "contributions": "warpspace.scene.verbs",
     "gains": "warpspace.scene.verbs",
     "measured": "warpspace.scene.verbs",
@@ -55,6 +57,7 @@ __all__ = [
     "__version__",
     "allocate",
     "ballbar",
+    "calibrate",
     "contributions",
     "evaluate",
     "gains",

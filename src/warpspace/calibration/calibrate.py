@@ -55,6 +55,15 @@ def calibrate(
     it keeps the value of the scene. Standard uncertainties: out of the covariance
     ``s²·(JᵀWJ)⁻¹``, s from the residuals where the readings have no uncertainties of their own,
     intervals with Student's t (ISO/IEC Guide 98-3, H.3).
+
+    Examples
+    --------
+    >>> from warpspace import load_scene
+    >>> from warpspace.calibration import read_readings
+    >>> scene = load_scene("fork_head_bc")
+    >>> found = calibrate(scene, [read_readings("tcp_on.csv", scene)])
+    >>> round(found.rms_before_mm, 3), round(found.rms_after_mm, 3)
+    (0.278, 0.061)
     """
     request = request or Request()
     if not sets:
