@@ -170,12 +170,12 @@ class ErrorCurvePanel:
     def _draw(self, drawn: Drawn, row: Parameter, state: AppState) -> None:
         """Draw the curve along the travel, with what is known of its measurement."""
         unit = state.scene.machine.axes[row.axis].unit
-        function, *own = drawn
+        function, uncertainty, measured = drawn
         span = edits.axis_span(state, row.key)
-        self._chart.data = at, value, *_ = curve_data(function, span, *own)
+        self._chart.data = at, value, *_ = curve_data(function, span, uncertainty, measured)
         self._words.content = chart_text(
             describe_curve(f"{row.key}, {row.name}", row.unit, unit, at, value)
-            + measured_words(*own)
+            + measured_words(uncertainty, measured)
         )
         self._chart.axes = (
             chart_axis(f"{row.axis} [{unit}]", 34),

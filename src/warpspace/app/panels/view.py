@@ -71,7 +71,7 @@ class ViewPanel:
             ),
             changed,
         )
-        self._ways = Names(DIRECTION_WORDS)
+        self._ways = Names({str(way): words for way, words in DIRECTION_WORDS.items()})
         self._way: Input[str] = Input(
             gui.add_dropdown(
                 "Direction of travel",
