@@ -17,6 +17,8 @@ from warpspace.machine.limits import MAX_ERROR, MAX_TEXT
 from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM, Array
 
+CALIBRATED = ", calibrated"
+"""Behind the title of a calibrated scene."""
 OUTLIER = 4.0
 """Robust standard deviations beyond which a reading is named."""
 
@@ -82,7 +84,8 @@ def calibrate(
     covariance = covariance_of(solved, len(free)) * (1.0 if stack.has_uncertainties else sigma**2)
     errors = part.errors_with(solved.amplitudes)
     _check_size(part, solved.amplitudes)
-    fitted_scene = replace(scene, title=f"{scene.title}, calibrated"[:MAX_TEXT], errors=errors)
+    title = f"{scene.title.removesuffix(CALIBRATED)}{CALIBRATED}"[:MAX_TEXT]
+    fitted_scene = replace(scene, title=title, errors=errors)
     outliers = _outliers(stack, after)
     held, held_notes = _predict(scene, terms, part, predict, stack, begin, solved, request)
     return Calibration(
