@@ -1,6 +1,5 @@
 """The readings that are fitted: uploaded files and bundled ones, their kind, and their list."""
 
-import logging
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -19,7 +18,6 @@ from warpspace.calibration.kinds.registry import KINDS
 from warpspace.calibration.readings import bundled_data
 from warpspace.exceptions import WarpspaceError
 
-logger = logging.getLogger(__name__)
 MOST_BYTES = 2 * 2**20
 WHAT = "CSV file of readings"
 NOT_CHOSEN, BY_COLUMNS = "choose …", "told by its columns"
@@ -46,6 +44,7 @@ class ReadingsPart:
         self._context, self._changed = context, changed
         self._files: tuple[Measured, ...] = ()
         self._problem = ""
+        self._fitted = False
         self._clicks = Clicks(gui, lambda word: context.act(partial(self._do, word)))
         upload = gui.add_upload_button(
             "Add readings …",
@@ -99,6 +98,11 @@ class ReadingsPart:
         self._problem = problem
         self._write()
 
+    def note_fit(self) -> None:
+        """Take note that a fit has ended well."""
+        self._fitted, self._problem = True, ""
+        self._write()
+
     def _show_options(self) -> None:
         """Show the box for options where a test is chosen."""
         visible = str(self._kind.handle.value) in test_kinds()
@@ -133,9 +137,7 @@ class ReadingsPart:
         scene = scene_of(self._context.store.state)
         try:
             measured = take(scene, read(), name, self._chosen_kind(), self._files)
-        except Exception as error:  # noqa: BLE001 - shown and logged
-            if not isinstance(error, WarpspaceError):
-                logger.error("%s", name, exc_info=error)
+        except WarpspaceError as error:
             self._refuse(error_words(error))
             return
         self._files = (*self._files, measured)
@@ -171,5 +173,5 @@ class ReadingsPart:
 
     def _write(self) -> None:
         """Write the list; what is the same already is not sent."""
-        note = READY if self._files else EMPTY
+        note = ("" if self._fitted else READY) if self._files else EMPTY
         self._text.put(content=files_html(self._files, note, self._problem, self._clicks.button))

@@ -2,6 +2,7 @@
 
 import logging
 import threading
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -85,9 +86,10 @@ class CalibratePanel:
                 "Residual arrows in the box",
                 (NO_ARROWS, ARROWS_BEFORE, ARROWS_AFTER),
                 visible=False,
-                hint="Observed − predicted at each reading, exaggerated; the factor is shown.",
+                hint="Observed − predicted at each reading, exaggerated; the factor is shown. The"
+                " box is drawn as lines meanwhile.",
             ),
-            lambda: context.act(self._write),
+            lambda: context.act(self._choose_arrows),
         )
         self._text = Handle(gui.add_html("", visible=False))
 
@@ -133,6 +135,7 @@ class CalibratePanel:
     def _take(self, found: Answer) -> None:
         """Show an answer."""
         self._answer = found
+        self._readings.note_fit()
         self._write()
 
     def _do(self, word: str) -> None:
@@ -169,6 +172,12 @@ class CalibratePanel:
             content=calibration_html(given, standing, self._clicks.button, words), visible=True
         )
         self._context.client.flush()
+
+    def _choose_arrows(self) -> None:
+        """Draw arrows, or none; a closed surface would hide them."""
+        inside = str(self._arrows.handle.value) != NO_ARROWS
+        self._context.post(partial(_with_sight, inside=inside))
+        self._write()
 
     def _draw_arrows(self, given: Answer, standing: str) -> str:
         """Draw what the fit leaves where that is chosen; say with which factor."""
@@ -210,3 +219,11 @@ class CalibratePanel:
             self._context.client.flush()
 
         self._context.act(say)
+
+
+def _with_sight(state: AppState, *, inside: bool) -> AppState:
+    """Draw grid lines in place of a closed surface; and back again."""
+    before, after = ("surface", "grid") if inside else ("grid", "surface")
+    if state.look.surface != before:
+        return state
+    return replace(state, look=state.look.with_choice(surface=after))
