@@ -84,6 +84,10 @@ def test_words_and_table(given):
     assert '"calibration rms after">61.5<' in html
     assert html.count("<circle") == 2 * 23
     assert 'data-key="EB0B"' in html
+    assert "339.3 ± 82.2" in html
+    assert "175 … 504" in html
+    assert "−14.4 … 87.7" in html
+    assert "0.0 held" in html
     assert "EX0C" in html
     assert 'data-word="apply"' in html
     assert "error vector at" in html

@@ -16,6 +16,8 @@ Button = Callable[[str], Markup]
 WIDTH, HEIGHT, EDGE = 400.0, 110.0, 6.0
 MOST_BARS = 200
 """Readings that have a bar each; more share one, which shows the longest."""
+WIDE = 100.0
+"""Ends of intervals that need no decimals, µm or µrad."""
 MOST_WORDS = 12
 """Notes and readings far off that are listed."""
 
@@ -79,7 +81,7 @@ def calibration_html(given: Answer, standing: str, button: Button, arrows: str =
         freedom=found.freedom,
         count=sum(len(one.readings) for one in found.fitted),
         circles=given.circles,
-        rows=[(one, _told(one)) for one in shown],
+        rows=[(one, _told(one), _value(one), _interval(one)) for one in shown],
         in_part=any(_told(one) == "in part" for one in shown),
         confounded=spell_rank(found.rank, found.slopes),
         apart=[(group[0], words) for group, words in given.apart.items()],
@@ -98,6 +100,21 @@ def _told(one: Found) -> str:
     if one.standard_uncertainty is None or one.interval is None:
         return "no"
     return "yes" if one.identifiable else "in part"
+
+
+def _value(one: Found) -> str:
+    """Spell a value with its standard uncertainty, or that it is held."""
+    if one.standard_uncertainty is None:
+        return f"{one.before:.1f} held".replace("-", "−")
+    return f"{one.value:.1f} ± {one.standard_uncertainty:.1f}".replace("-", "−")
+
+
+def _interval(one: Found) -> str:
+    """Spell a 95 % interval; wide ones without decimals."""
+    if one.interval is None:
+        return ""
+    digits = 0 if max(map(abs, one.interval)) >= WIDE else 1
+    return " … ".join(f"{end:.{digits}f}" for end in one.interval).replace("-", "−")
 
 
 def _far(groups: Sequence[Residuals]) -> list[str]:
