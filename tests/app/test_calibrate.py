@@ -266,3 +266,19 @@ def test_a_page_fits_compares_applies_and_takes_only_known_words():
         act(lambda: part._do("remove 0"))
         assert wire.read_until(lambda: not part.files)
         assert session.state.comparison.a.title == BEFORE
+
+
+def test_readings_of_a_standard_test_come_with_its_options():
+    rows = [
+        f"{run},{way},{target},{0.02 * (target - 350)}"
+        for run in (1, 2)
+        for way in "+-"
+        for target in range(150, 551, 50)
+    ]
+    text = "run,direction,target_mm,deviation_um\n" + "\n".join(rows) + "\n"
+    file = take(SCENE, text, "x.csv", "positioning:axis=X", ())
+    assert file.count == len(rows)
+    found = answer(ask(START, [file], "EXX", robust=False), threading.Event(), lambda _: None)
+    assert found.found.rms_after_mm < 1e-9 < found.found.rms_before_mm
+    assert "none of these" not in calibration_html(found, "current", plain)
+    assert arrows_of(found, before=True)[0].shape == (0, 3)
