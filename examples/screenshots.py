@@ -26,7 +26,7 @@ from warpspace.app.server.viewer import Viewer
 from warpspace.cli.services import build_services
 from warpspace.scene.library import load_scene
 
-SCENES = ("dvf5000_first", "dvf5000_second", "teach_wobbling_table")
+SCENES = ("dvf5000_first", "dvf5000_second", "teach_wobbling_table", "fork_head_bc")
 WHOLE, ONE_TAB = (1600, 900), (1280, 900)
 """Width and height of the page, CSS pixels."""
 LEFT_WIDTH, RIGHT_WIDTH = column_widths(ONE_TAB[0])
@@ -186,6 +186,18 @@ def side_by_side(page: Page) -> None:
     page.wait_for_selector(".ws-concepts img", timeout=180_000)
 
 
+def calibrated(page: Page) -> None:
+    """Fit the bundled readings of a fork head, and draw the machine that they give."""
+    choose(page, "Bundled readings", "tcp_on.csv")
+    press(page, "Fit")
+    outcome = page.locator("[data-value='calibration']")
+    outcome.wait_for(timeout=60_000)
+    outcome.locator("[data-word='compare']").click()
+    page.wait_for_timeout(PAUSE_MS)
+    choose(page, "Residual arrows in the box", "before")
+    outcome.evaluate("part => part.scrollIntoView({ block: 'start' })")
+
+
 VISITS = {
     "app": Visit(as_opened),
     "app_dark": Visit(dark),
@@ -199,6 +211,7 @@ VISITS = {
     "tab_tests": Visit(tested, "Tests", share=0.62),
     "tab_compare": Visit(compared, "Compare"),
     "tab_concepts": Visit(side_by_side, "Concepts", share=0.9),
+    "tab_calibrate": Visit(calibrated, "Calibrate", "fork_head_bc", share=0.93),
     "tab_files": Visit(as_opened, "Files", share=0.4),
     "tab_view": Visit(sliced, "View"),
     "tab_machine": Visit(bent, "Machine", share=0.6),

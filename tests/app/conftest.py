@@ -256,8 +256,8 @@ class Tab:
         self.page.get_by_role("tab", name=name, exact=True).click()
 
     def upload(self, name: str, content: bytes) -> None:
-        """Give a file to the page."""
-        self.page.locator("input[type=file]").set_input_files(
+        """Give a scene or the like to the page, in the tab Files."""
+        self.page.locator("input[type=file][accept^='.toml']").set_input_files(
             {"name": name, "mimeType": "text/plain", "buffer": content}
         )
 

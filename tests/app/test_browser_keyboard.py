@@ -63,8 +63,8 @@ def test_an_error_is_found_set_looked_at_and_undone_without_a_mouse(tab: Tab) ->
     tab.until(lambda: page.evaluate(FOCUSED) == "Compare")
     # ... and its neighbour with an arrow
     keys(tab, "ArrowRight")
-    files = page.get_by_role("tab", name="Files", exact=True)
-    tab.until(lambda: files.get_attribute("aria-selected") == "true")
+    beside = page.get_by_role("tab", name="Concepts", exact=True)
+    tab.until(lambda: beside.get_attribute("aria-selected") == "true")
     # 5. undo both
     keys(tab, "Control+z", "Control+z")
     tab.until(lambda: tab.session.state.component == "norm")

@@ -239,7 +239,11 @@ def test_bad_uploads_are_refused_in_the_page_and_the_session_goes_on(tab: Tab) -
 
 def test_a_200_mb_upload_announced_by_a_hostile_page_is_not_kept(tab: Tab) -> None:
     tab.panel("Files")
-    uuid = tab.page.locator("input[type=file]").get_attribute("id").removeprefix("file_upload_")
+    uuid = (
+        tab.page.locator("input[type=file][accept^='.toml']")
+        .get_attribute("id")
+        .removeprefix("file_upload_")
+    )
     script = """([uuid, transfer, size, parts]) => {
       const viewer = window.__viserMutable;
       viewer.sendMessage({type: 'FileTransferStartUpload', source_component_uuid: uuid,

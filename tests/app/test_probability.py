@@ -8,7 +8,9 @@ import pytest
 
 from warpspace import load_scene
 from warpspace.analysis.draws import Distribution, build_draws
-from warpspace.analysis.montecarlo import Over, Plan, montecarlo
+from warpspace.analysis.montecarlo import montecarlo
+from warpspace.analysis.nodes import Over
+from warpspace.analysis.plan import Plan
 from warpspace.app.evaluation.probability import (
     SAMPLES,
     build_ensemble,

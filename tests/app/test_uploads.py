@@ -11,6 +11,7 @@ from warpspace.app.browser.uploads import MOST_AT_ONCE, MOST_PARTS, Uploads
 
 LIMIT = 1000
 BUTTON = "the-button"
+OTHER, OTHER_LIMIT = "another-button", 100
 
 
 class Connection:
@@ -38,15 +39,17 @@ class Client:
         self.gui: Any = object.__new__(viser.GuiApi)
         self.gui._current_file_upload_states = {}
         self.gui._websock_interface = self._websock_connection
-        self.gui._gui_input_handle_from_uuid = {BUTTON: None, "a-slider": None}
+        self.gui._gui_input_handle_from_uuid = {BUTTON: None, OTHER: None, "a-slider": None}
         handlers = self._websock_connection.handlers
         handlers[messages.FileTransferStartUpload] = self.gui._handle_file_transfer_start
         handlers[messages.FileTransferPart] = self.gui._handle_file_transfer_part
         self.finished: list[bytes] = []
         self.gui._finish_file_upload = self._finish
         self.refused: list[str] = []
-        button = SimpleNamespace(_impl=SimpleNamespace(uuid=BUTTON), on_upload=lambda _: None)
-        Uploads(self, button, LIMIT, lambda *_: None, self.refused.append)  # pyright: ignore[reportArgumentType]
+        uploads = Uploads(self)  # pyright: ignore[reportArgumentType]
+        for uuid, limit in ((BUTTON, LIMIT), (OTHER, OTHER_LIMIT)):
+            button = SimpleNamespace(_impl=SimpleNamespace(uuid=uuid), on_upload=lambda _: None)
+            uploads.watch(button, limit, lambda *_: None, self.refused.append, "measurement")
 
     def _finish(self, client: int, transfer: str, widget: str) -> None:
         state = self.gui._current_file_upload_states.pop(transfer)
@@ -56,8 +59,10 @@ class Client:
         message = messages.FileTransferStartUpload(widget, name, "a.toml", "", parts, size)
         self._websock_connection.handlers[type(message)](0, message)
 
-    def part(self, content: bytes, number: int = 0, name: str = "a") -> None:
-        message = messages.FileTransferPart(BUTTON, name, number, content)
+    def part(
+        self, content: bytes, number: int = 0, name: str = "a", widget: str | None = BUTTON
+    ) -> None:
+        message = messages.FileTransferPart(widget, name, number, content)
         self._websock_connection.handlers[type(message)](0, message)
 
     @property
@@ -113,3 +118,33 @@ def test_other_widgets_take_no_files(client: Client) -> None:
     client.start(4, widget="a-slider")
     client.part(b"abcd")
     assert client.finished == []
+
+
+def test_each_button_has_a_limit_of_its_own(client: Client) -> None:
+    client.start(OTHER_LIMIT + 1, widget=OTHER)
+    client.part(b"x" * (OTHER_LIMIT + 1), widget=OTHER)
+    assert client.held == 0
+    assert client.finished == []
+    assert "expected a measurement of at most" in client.refused[0]
+    client.start(OTHER_LIMIT + 1, name="b")
+    client.part(b"x" * (OTHER_LIMIT + 1), name="b")
+    client.start(OTHER_LIMIT, widget=OTHER, name="c")
+    client.part(b"y" * OTHER_LIMIT, name="c", widget=OTHER)
+    assert client.finished == [b"x" * (OTHER_LIMIT + 1), b"y" * OTHER_LIMIT]
+
+
+@pytest.mark.parametrize("widget", [OTHER, "a-slider", None])
+def test_a_file_cannot_change_its_button_on_the_way(client: Client, widget: str | None) -> None:
+    client.start(LIMIT, 2)
+    client.part(b"x" * (LIMIT - 1))
+    client.part(b"x", 1, widget=widget)
+    assert client.finished == []
+    assert client.held == 0
+    assert "not sent to where it was announced" in client.refused[0]
+
+
+def test_all_buttons_together_take_only_so_many_at_once(client: Client) -> None:
+    for number in range(MOST_AT_ONCE + 1):
+        client.start(4, 2, name=f"{number}", widget=(BUTTON, OTHER)[number % 2])
+    assert len(client.gui._current_file_upload_states) == MOST_AT_ONCE
+    assert "at once" in client.refused[0]

@@ -8,7 +8,7 @@ import pytest
 
 from warpspace import load_scene
 from warpspace.analysis.distribution import Histogram, Probability
-from warpspace.analysis.montecarlo import Over
+from warpspace.analysis.nodes import Over
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.probability import Estimate
 from warpspace.app.evaluation.sensitivities import rank_picture

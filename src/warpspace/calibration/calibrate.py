@@ -10,13 +10,15 @@ from warpspace.calibration.rank import Rank, find_rank
 from warpspace.calibration.readings import Readings
 from warpspace.calibration.results import Calibration, Found, Request, Residuals
 from warpspace.calibration.solve import MAD, Solved, covariance_of, solve
-from warpspace.calibration.stack import Stack, named, rms_mm
+from warpspace.calibration.stack import Stack, Watch, named, rms_mm, unwatched
 from warpspace.calibration.terms import Terms, automatic, build_terms
 from warpspace.exceptions import OptionError
 from warpspace.machine.limits import MAX_ERROR, MAX_TEXT
 from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM, Array
 
+CALIBRATED = ", calibrated"
+"""Behind the title of a calibrated scene."""
 OUTLIER = 4.0
 """Robust standard deviations beyond which a reading is named."""
 
@@ -26,6 +28,7 @@ def calibrate(
     sets: Sequence[Readings],
     request: Request | None = None,
     predict: Sequence[Readings] = (),
+    watch: Watch = unwatched,
 ) -> Calibration:
     """Find the errors of a machine in readings.
 
@@ -37,6 +40,8 @@ def calibrate(
     request : Request, optional
     predict : sequence of Readings, optional
         Readings that are not fitted but predicted.
+    watch : callable, optional
+        Called before each evaluation of the model; what it raises ends the work.
 
     Returns
     -------
@@ -68,8 +73,8 @@ def calibrate(
     request = request or Request()
     if not sets:
         raise OptionError("no readings; expected at least one file (--data FILE)")
-    sets, assumed = _weighed(scene, sets, request)
-    stack = Stack.of(scene, sets)
+    sets, assumed = _weighed(scene, sets, request, watch)
+    stack = Stack.of(scene, sets, watch)
     terms = build_terms(scene, automatic(scene, sets) if request.keys is None else request.keys)
     if not terms.keys:
         raise OptionError("no axis moves whose errors could be found; expected --fit KEYS")
@@ -88,7 +93,8 @@ def calibrate(
     covariance = covariance_of(solved, len(free)) * (1.0 if stack.has_uncertainties else sigma**2)
     errors = part.errors_with(solved.amplitudes)
     _check_size(part, solved.amplitudes)
-    fitted_scene = replace(scene, title=f"{scene.title}, calibrated"[:MAX_TEXT], errors=errors)
+    title = f"{scene.title.removesuffix(CALIBRATED)}{CALIBRATED}"[:MAX_TEXT]
+    fitted_scene = replace(scene, title=title, errors=errors)
     outliers = _outliers(stack, after)
     held, held_notes = _predict(scene, terms, part, predict, stack, begin, solved, request)
     return Calibration(
@@ -113,12 +119,12 @@ def calibrate(
 
 
 def _weighed(
-    scene: Scene, sets: Sequence[Readings], request: Request
+    scene: Scene, sets: Sequence[Readings], request: Request, watch: Watch
 ) -> tuple[Sequence[Readings], tuple[str, ...]]:
     """Give readings an uncertainty where tolerances are to be weighed against them."""
     if not request.priors or all(one.sigma_mm is not None for one in sets):
         return sets, ()
-    width = calibrate(scene, sets, replace(request, priors=False)).sigma_mm
+    width = calibrate(scene, sets, replace(request, priors=False), (), watch).sigma_mm
     weighed = [
         one if one.sigma_mm is not None else replace(one, sigma_mm=np.full(len(one), width))
         for one in sets
@@ -236,7 +242,7 @@ def _predict(
     """Predict readings that were not fitted; set-ups that were not fitted are placed by them."""
     if not predict:
         return (), ()
-    held = Stack.of(scene, predict)
+    held = Stack.of(scene, predict, stack.watch)
     known_before = named(stack.unknowns, begin.unknown)
     known_after = named(stack.unknowns, solved.unknown)
     new = [name for name in held.unknowns if name not in known_after]

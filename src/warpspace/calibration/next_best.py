@@ -9,7 +9,7 @@ from warpspace.calibration.candidates import Candidate, candidates
 from warpspace.calibration.rank import find_rank
 from warpspace.calibration.readings import Readings
 from warpspace.calibration.results import Calibration
-from warpspace.calibration.stack import Stack
+from warpspace.calibration.stack import Stack, Watch, unwatched
 from warpspace.calibration.terms import Terms, build_terms
 from warpspace.exceptions import OptionError
 from warpspace.field.grid import build_grid
@@ -60,6 +60,7 @@ def next_best(
     count: int = 1,
     choice: Sequence[Candidate] | None = None,
     noise_mm: float | None = None,
+    watch: Watch = unwatched,
 ) -> tuple[Step, ...]:
     """Choose measurements one after the other, each for the greatest gain.
 
@@ -77,6 +78,8 @@ def next_best(
         `warpspace.calibration.candidates.candidates`.
     noise_mm : float, optional
         Standard uncertainty of one component; by default that of the residuals.
+    watch : callable, optional
+        Called before each evaluation of the model; what it raises ends the work.
 
     Returns
     -------
@@ -100,16 +103,17 @@ def next_best(
     noise = max(noise_mm or found.sigma_mm, LEAST_NOISE_MM)
     if Stack.of(scene, sets).has_uncertainties and noise_mm is None:
         noise = float(np.median(np.concatenate([_sigma(one, noise) for one in sets])))
-    known = _information(scene, terms, sets, noise)
+    known = _information(Stack.of(scene, sets, watch), terms, noise)
     known = _plus(known, _prior(scene, keys))
     weigh = _map(found.scene, terms)
     rows = [
-        (one, _information(scene, terms, [one.readings], noise))
+        (one, _information(Stack.of(scene, [one.readings], watch), terms, noise))
         for one in choice or candidates(scene)
     ]
     steps: list[Step] = []
     before = _map_um(weigh, _covariance(known, keys))
     for _ in range(count):
+        watch()
         gains = [(one, _covariance(_plus(known, row), keys), row) for one, row in rows]
         best, covariance, row = min(gains, key=lambda gain: _map_um(weigh, gain[1]))
         after = _map_um(weigh, covariance)
@@ -123,6 +127,7 @@ def separating(
     sets: Sequence[Readings],
     found: Calibration,
     choice: Sequence[Candidate] | None = None,
+    watch: Watch = unwatched,
 ) -> dict[tuple[str, ...], str]:
     """Name for each group of parameters that look alike a measurement that tells them apart.
 
@@ -132,6 +137,8 @@ def separating(
     sets : sequence of Readings
     found : Calibration
     choice : sequence of Candidate, optional
+    watch : callable, optional
+        Called before each evaluation of the model; what it raises ends the work.
 
     Returns
     -------
@@ -145,7 +152,7 @@ def separating(
     for one in choice or candidates(scene):
         if not missing:
             break
-        stack = Stack.of(scene, [*sets, one.readings])
+        stack = Stack.of(scene, [*sets, one.readings], watch)
         by_parameter, by_unknown = stack.derivatives(terms, terms.start, stack.start())
         rank = find_rank(keys, np.vstack(by_parameter), np.vstack(by_unknown))
         still = {group[0] for group in rank.confounded}
@@ -162,15 +169,12 @@ def _sigma(readings: Readings, noise_mm: float) -> Array:
     return readings.sigma_mm
 
 
-def _information(
-    scene: Scene, terms: Terms, sets: Sequence[Readings], noise_mm: float
-) -> _Knowledge:
+def _information(stack: Stack, terms: Terms, noise_mm: float) -> _Knowledge:
     """Give the information of readings on the parameters and their own unknowns."""
-    stack = Stack.of(scene, sets)
     by_parameter, by_unknown = stack.derivatives(terms, terms.start, stack.start())
     rows = np.hstack([np.vstack(by_parameter), np.vstack(by_unknown)])
     weights = np.concatenate(
-        [np.repeat(1.0 / _sigma(one, noise_mm), one.observed_mm.shape[1]) for one in sets]
+        [np.repeat(1.0 / _sigma(one, noise_mm), one.observed_mm.shape[1]) for one in stack.sets]
     )
     weighted = rows * weights[:, None]
     return _Knowledge((*terms.keys, *stack.unknowns), weighted.T @ weighted)

@@ -6,9 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from warpspace.calibration.table import ReadingTable, read_table
+from warpspace.calibration.table import ReadingTable, parse_table
 from warpspace.exceptions import OptionError, SceneError
+from warpspace.machine.limits import MAX_CSV_BYTES
 from warpspace.resources import assets_dir
+from warpspace.scene.files import read_text
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
@@ -90,13 +92,31 @@ def read_readings(name: str, scene: Scene, kind: str | None = None) -> Readings:
     OptionError
         If no kind fits.
     """
+    path = find_data(name)
+    return parse_readings(read_text(path, MAX_CSV_BYTES), str(path), scene, kind)
+
+
+def parse_readings(text: str, source: str, scene: Scene, kind: str | None = None) -> Readings:
+    """Read the text of a file of readings; see `read_readings`.
+
+    Parameters
+    ----------
+    text : str
+    source : str
+        Name of the file, for messages; nothing is opened.
+    scene : Scene
+    kind : str, optional
+
+    Returns
+    -------
+    Readings
+    """
     from warpspace.calibration.kinds.registry import find_kind, recognise
 
-    path = find_data(name)
     found = None if kind is None else find_kind(kind)
     if found is not None and found.own_columns:
-        return found.read(ReadingTable(str(path), {}, {}, ()), scene)
-    table = read_table(path)
+        return found.read(ReadingTable(source, {}, {}, (), text), scene)
+    table = parse_table(text, source)
     return (found or recognise(table, scene)).read(table, scene)
 
 

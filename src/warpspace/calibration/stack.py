@@ -1,6 +1,6 @@
 """Several sets of readings as one problem: predictions and derivatives, weighted."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,12 @@ from warpspace.calibration.readings import Readings
 from warpspace.calibration.terms import Terms
 from warpspace.scene.model import Scene
 from warpspace.units import Array
+
+Watch = Callable[[], object]
+
+
+def unwatched() -> None:
+    """Let the work go on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,17 +28,20 @@ class Stack:
     sets : tuple of Readings
     unknowns : tuple of str, (m,)
         What the set-ups leave unknown; files that name the same session share it.
+    watch : callable
+        Called before each evaluation of the model; what it raises ends the work.
     """
 
     scene: Scene
     sets: tuple[Readings, ...]
     unknowns: tuple[str, ...]
+    watch: Watch = unwatched
 
     @classmethod
-    def of(cls, scene: Scene, sets: Sequence[Readings]) -> "Stack":
+    def of(cls, scene: Scene, sets: Sequence[Readings], watch: Watch = unwatched) -> "Stack":
         """Put sets together."""
         names = (name for one in sets for name in find_kind(one.kind).unknowns(one))
-        return cls(scene, tuple(sets), tuple(dict.fromkeys(names)))
+        return cls(scene, tuple(sets), tuple(dict.fromkeys(names)), watch)
 
     def start(self) -> Array:
         """Give values of the unknowns to begin with, [m], mm."""
@@ -46,6 +55,7 @@ class Stack:
 
     def residuals(self, terms: Terms, amplitudes: Array, unknown: Array) -> list[Array]:
         """Give observed − predicted of each set with the exact model, [n, d] each, mm."""
+        self.watch()
         errors = terms.errors_with(amplitudes)
         return [
             one.observed_mm
@@ -60,6 +70,7 @@ class Stack:
 
         Errors act to first order here; the residuals are those of the exact model.
         """
+        self.watch()
         errors = terms.errors_with(amplitudes)
         by_parameter: list[Array] = []
         by_unknown: list[Array] = []

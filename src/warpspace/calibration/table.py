@@ -4,7 +4,7 @@ import csv
 import io
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +19,8 @@ MAX_READINGS = 20_000
 LABELS = ("session", "run")
 """Columns that hold a name; the first that is there tells sessions apart."""
 MAX_LABEL = 60
+MAX_SESSIONS = 100
+"""Set-ups in one file: each has unknowns of its own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,12 +37,15 @@ class ReadingTable:
         Names by column: `session` and `run`.
     lines : tuple of int, (n,)
         Line of the file that each row stands on.
+    text : str
+        All of the file, for kinds that have columns of their own.
     """
 
     source: str
     columns: Mapping[str, Array]
     labels: Mapping[str, tuple[str, ...]]
     lines: tuple[int, ...]
+    text: str = ""
 
     def __len__(self) -> int:
         """Count the rows."""
@@ -69,11 +74,18 @@ class ReadingTable:
 
 
 def read_table(path: Path) -> ReadingTable:
-    """Read a CSV file with a header; lines that begin with # are remarks.
+    """Read a CSV file; see `parse_table`."""
+    return parse_table(read_text(path, MAX_CSV_BYTES), str(path))
+
+
+def parse_table(text: str, source: str) -> ReadingTable:
+    """Read the text of a CSV file with a header; lines that begin with # are remarks.
 
     Parameters
     ----------
-    path : Path
+    text : str
+    source : str
+        Name of the file, for messages; nothing is opened.
 
     Returns
     -------
@@ -82,10 +94,9 @@ def read_table(path: Path) -> ReadingTable:
     Raises
     ------
     SceneError
-        If it cannot be read, is no table, or holds something that is no finite number.
+        If it is no table, or holds something that is no finite number.
     """
-    source = str(path)
-    lines = read_text(path, MAX_CSV_BYTES).splitlines()
+    lines = text.splitlines()
     kept = [
         (number, line)
         for number, line in enumerate(lines, 1)
@@ -112,7 +123,12 @@ def read_table(path: Path) -> ReadingTable:
     body = [(number, row) for (number, _), row in zip(kept[1:], rows[1:], strict=True)]
     if not body:
         raise SceneError(source, ["has a header but no rows; expected readings below it"])
-    return _parse(source, header, body)
+    table = replace(_parse(source, header, body), text=text)
+    named = len(set(table.session or ()))
+    if named > MAX_SESSIONS:
+        found = f"names {named:,} sessions; expected at most {MAX_SESSIONS}"
+        raise SceneError(source, [found])
+    return table
 
 
 def _parse(

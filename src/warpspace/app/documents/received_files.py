@@ -48,19 +48,30 @@ def safe_file_name(name: str) -> str:
     return f"{safe_name(last, 'file')}.{safe_name(ending, 'txt')}"
 
 
-def upload_text(content: bytes, source: str) -> str:
+def upload_text(
+    content: bytes, source: str, most_bytes: int = MAX_SCENE_BYTES, what: str = "scene file"
+) -> str:
     """Read the bytes of an uploaded file.
+
+    Parameters
+    ----------
+    content : bytes
+    source : str
+        Name of the file, for messages.
+    most_bytes : int, optional
+    what : str, optional
+        What is expected.
 
     Raises
     ------
     OptionError
         If it is too large or no UTF-8 text.
     """
-    if len(content) > MAX_SCENE_BYTES:
-        raise OptionError(size_message(source, len(content), MAX_SCENE_BYTES))
+    if len(content) > most_bytes:
+        raise OptionError(size_message(source, len(content), most_bytes, what))
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise OptionError(
-            f"{source} is not UTF-8 text (byte {error.start}); expected a scene file"
+            f"{source} is not UTF-8 text (byte {error.start}); expected a {what}"
         ) from None

@@ -13,6 +13,7 @@ from dataclasses import replace
 from viser import ClientHandle, GuiApi, ViserServer
 
 from warpspace.app.browser.page import Page
+from warpspace.app.browser.uploads import Uploads
 from warpspace.app.documents.scene_list import SceneList
 from warpspace.app.documents.services import Services
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -39,6 +40,8 @@ class PanelContext:
     ----------
     client : viser.ClientHandle
     page : Page
+    uploads : Uploads
+        Of all upload buttons of the tab.
     camera : TabCamera
     store : StateStore
         State and history: the tab's own, or those of a shared review.
@@ -67,6 +70,7 @@ class PanelContext:
         services: Services,
     ) -> None:
         self.client, self.page, self.camera = client, Page(server, client), TabCamera(client)
+        self.uploads = Uploads(client)
         self.store, self.scenes, self.services = store, scenes, services
         self.shown: LivePicture | None = None
         self.stage: MovingLayer | None = None

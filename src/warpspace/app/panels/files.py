@@ -10,7 +10,7 @@ from typing import Any
 from warpspace.app.browser.address import listen_script, show_script
 from warpspace.app.browser.dropping import drop_script
 from warpspace.app.browser.page import error_words
-from warpspace.app.browser.uploads import Uploads, size_message, size_script
+from warpspace.app.browser.uploads import size_message, size_script
 from warpspace.app.browser.viser_private import dom_id
 from warpspace.app.documents import links
 from warpspace.app.documents import received_files as incoming
@@ -71,8 +71,7 @@ class FilesPanel:
             hint="A scene file (TOML), or measured errors and tables of controllers, at most 4 MB;"
             " dropping files on the page does the same. Undo goes back.",
         )
-        Uploads(
-            context.client,
+        context.uploads.watch(
             upload,
             MAX_SCENE_BYTES,
             lambda name, content: self._context.act(partial(self._open, name, content)),

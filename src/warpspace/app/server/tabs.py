@@ -73,6 +73,7 @@ for _tab in (
     Tab("Tests", "results", [f"{_HERE}.bench:TestsPanel"]),
     Tab("Compare", "results", [f"{_HERE}.compare:ComparePanel"]),
     Tab("Concepts", "results", [f"{_HERE}.concepts:ConceptsPanel"]),
+    Tab("Calibrate", "results", [f"{_HERE}.calibrate:CalibratePanel"]),
     Tab("Files", "results", [f"{_HERE}.files:FilesPanel"]),
     Tab(
         "View",

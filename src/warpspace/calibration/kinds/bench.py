@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from warpspace.bench.base import BenchTest
-from warpspace.bench.data import read_table
+from warpspace.bench.data import parse_table
 from warpspace.bench.options import TestOption, options_of
 from warpspace.bench.plan import Plan
 from warpspace.bench.readings import respond, simulate
@@ -84,7 +84,7 @@ class TestReadings(Kind):
 
     def read(self, table: ReadingTable, scene: Scene) -> Readings:
         """Lay the path of the test through the poses of the file."""
-        own = read_table(table.source, self.test.data_columns(scene))
+        own = parse_table(table.text, self.test.data_columns(scene), table.source)
         plan, measured = self.test.plan_data(scene, own)
         hint = "Are the readings in the unit that their column names?"
         check_spread(float(np.abs(measured).max()) * MM_PER_UM, MAX_ERROR * 1e-3, own.source, hint)

@@ -33,7 +33,7 @@ class Kind(ABC):
     columns : str
         Columns of its file.
     own_columns : bool
-        Whether it reads the file itself, columns of words among them.
+        Whether it takes the text of the file, columns of words among them, rather than its table.
     """
 
     own_columns: ClassVar[bool] = False
