@@ -2,7 +2,6 @@
 
 import csv
 import json
-import sys
 from pathlib import Path
 
 import pytest
@@ -116,13 +115,6 @@ def test_what_is_refused_before_anything_is_sampled(warpspace, tmp_path: Path) -
     long = ("--samples", "20000000", "-o", tmp_path / "x.csv")
     warpspace("montecarlo", "dvf5000_general", *long).refused("20,000,000 rows")
     assert not target.exists()
-
-
-def test_without_pyarrow_it_is_said_what_to_install(warpspace, tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
-    target = tmp_path / "x.parquet"
-    warpspace("sweep", "dvf5000_general", *FEW, "-o", target).refused("warpspace[cluster]")
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_same_from_python() -> None:

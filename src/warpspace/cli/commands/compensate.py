@@ -85,7 +85,7 @@ def compensate(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Write the table that compensates SCENE, and say what it leaves.
+    """Write a table of compensation, and say what it leaves.
 
     The program reads its own file back and does with it what the controller does: it interpolates,
     rounds and clips, and adds the result to the commanded positions. What is left is evaluated with

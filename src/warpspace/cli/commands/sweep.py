@@ -90,7 +90,7 @@ def sweep(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Show what tolerances do to |E|, in steps, for one or many scenes.
+    """Show what tolerances in steps do to |E|.
 
     Machines of every SCENE (a folder stands for the scenes in it) are drawn with every combination
     of half widths, with the same seed throughout, so that rows differ by their tolerances only.

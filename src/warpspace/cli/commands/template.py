@@ -19,7 +19,7 @@ from warpspace.exceptions import OptionError
 )
 @force_option
 def template(axis: str, output: str | None, positions: str | None, *, force: bool) -> None:
-    """Write a table for the measured errors of AXIS, for `warpspace import`.
+    """Write a table to fill in with measured errors of AXIS.
 
     Its header names the six errors of the axis and their uncertainties with their units; columns
     that are not needed may be left out.
