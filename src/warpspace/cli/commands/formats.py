@@ -9,7 +9,7 @@ from warpspace.cli.tables import Column, print_table
 @click.command()
 @json_option
 def formats(*, as_json: bool) -> None:
-    """List the formats of data and controllers, and what each holds.
+    """List the formats of data, and what each holds.
 
     `warpspace import` reads all of them; `warpspace compensate` writes those marked so.
     """
