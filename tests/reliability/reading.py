@@ -130,7 +130,14 @@ class Reader:
 
     @property
     def most_mb(self) -> float:
-        """Memory the process has ever had, MB."""
+        """Memory the process has ever had, MB.
+
+        Linux lets a process inherit `ru_maxrss` from the one that started it; VmHWM begins anew.
+        """
+        status = Path("/proc/self/status")
+        if status.exists():
+            line = next(x for x in status.read_text().splitlines() if x.startswith("VmHWM"))
+            return float(line.split()[1]) / 1024.0
         scale = 1024.0 if sys.platform == "linux" else 1024.0**2
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / scale
 
