@@ -190,6 +190,73 @@ def _read_urdf(content: bytes, folder: Path) -> object:
     return parse_scene(imported_text(found.machine, path.name, notes, {}), "fuzz")
 
 
+def _measured() -> list[bytes]:
+    """Write what each format holds of a small machine, and an empty form of our own."""
+    import tempfile
+
+    from click.testing import CliRunner
+
+    from warpspace.cli.registry import COMMANDS
+    from warpspace.formats.registry import formats
+
+    seeds: list[bytes] = []
+    with tempfile.TemporaryDirectory() as folder:
+        form = str(Path(folder) / "form.csv")
+        CliRunner().invoke(COMMANDS["template"], ["X", "-o", form])
+        for kind in formats():
+            target = Path(folder) / f"{kind.name}.txt"
+            line = ["dvf5000_first", "--format", kind.name, "-o", str(target), "--grid", "3"]
+            CliRunner().invoke(COMMANDS["compensate"], line)  # some are read only
+        for path in sorted(Path(folder).iterdir()):
+            seeds.append(path.read_bytes())
+    return seeds
+
+
+def _read_measured(content: bytes, folder: Path) -> object:
+    del folder
+    from warpspace.formats.importing import open_upload, read_errors
+    from warpspace.formats.kind import ReadOptions
+    from warpspace.formats.to_scene import base_scene, into_scene
+
+    base = base_scene("dvf5000")
+    reading = read_errors([open_upload("x", content)], ReadOptions(base.machine))
+    return into_scene(reading, base, "fuzz", "x")
+
+
+def _readings() -> list[bytes]:
+    from warpspace.calibration.readings import bundled_data, find_data
+
+    points = b"session,x_mm,z_mm,ex_um,ey_um,ez_um,u_um\na,0,0,1,2,3,1\nb,100,-200,4,5,6,1\n"
+    return [*(find_data(name).read_bytes() for name in bundled_data()), points]
+
+
+def _read_readings(content: bytes, folder: Path) -> object:
+    from warpspace.calibration import read_readings
+
+    path = folder / "r.csv"
+    path.write_bytes(content)
+    return read_readings(str(path), load_scene("fork_head_bc"))
+
+
+def _tests() -> list[bytes]:
+    rows = "\n".join(
+        f"{run},{way},{target},{target / 50 + run / 10}"
+        for run in (1, 2, 3)
+        for way in "+-"
+        for target in range(-200, 201, 100)
+    )
+    return [f"run,direction,target_mm,deviation_um\n{rows}\n".encode()]
+
+
+def _read_test(content: bytes, folder: Path) -> object:
+    from warpspace.bench.registry import find_test
+    from warpspace.bench.run import run_test
+
+    path = folder / "t.csv"
+    path.write_bytes(content)
+    return run_test(load_scene("dvf5000_first"), find_test("positioning")(), path)
+
+
 add(Format("scene", _scenes, _read_scene, 6.0))
 add(Format("scene file", _scenes, _read_scene_file, 2.0))
 add(Format("csv", _csvs, _read_csv, 2.0))
@@ -200,3 +267,6 @@ add(Format("glb", _mesh_seeds("glb"), _read_mesh("glb"), text=False))
 add(Format("vts", _vts, _read_vts))
 add(Format("urdf", lambda: [URDF.encode()], _read_urdf))
 add(Format("link", lambda: [b"ZXJyb3JzPUVBWDo1", b"Y29sb3VyPXg"], _read_link, 0.5))
+add(Format("measured", _measured, _read_measured, 2.0))
+add(Format("readings", _readings, _read_readings))
+add(Format("test", _tests, _read_test))
