@@ -191,25 +191,22 @@ def _read_urdf(content: bytes, folder: Path) -> object:
 
 
 def _measured() -> list[bytes]:
-    """Write what each format holds of a small machine, and an empty form of our own."""
-    import tempfile
-
-    from click.testing import CliRunner
-
-    from warpspace.cli.registry import COMMANDS
-    from warpspace.formats.registry import formats
-
-    seeds: list[bytes] = []
-    with tempfile.TemporaryDirectory() as folder:
-        form = str(Path(folder) / "form.csv")
-        CliRunner().invoke(COMMANDS["template"], ["X", "-o", form])
-        for kind in formats():
-            target = Path(folder) / f"{kind.name}.txt"
-            line = ["dvf5000_first", "--format", kind.name, "-o", str(target), "--grid", "3"]
-            CliRunner().invoke(COMMANDS["compensate"], line)  # some are read only
-        for path in sorted(Path(folder).iterdir()):
-            seeds.append(path.read_bytes())
-    return seeds
+    """Give a filled form of our own, and tables of controllers."""
+    form = "X [mm],run,direction,EXX [um],EBX [urad]\n" + "\n".join(
+        f"{position},{run},{way},{position / 100 + run},{run}"
+        for run in (1, 2)
+        for way in "+-"
+        for position in (-250, 0, 250)
+    )
+    linuxcnc = "\n".join(
+        f"{position} {position + 0.01} {position - 0.01}" for position in (0, 100, 200)
+    )
+    points = "".join(f"$AA_ENC_COMP[0,{at},X]={at / 1000}\n" for at in range(5))
+    sinumerik = (
+        points + "$AA_ENC_COMP_STEP[0,X]=100\n$AA_ENC_COMP_MIN[0,X]=-200\n"
+        "$AA_ENC_COMP_MAX[0,X]=200\n$AA_ENC_COMP_IS_MODULO[0,X]=0\n"
+    )
+    return [text.encode() for text in (form, linuxcnc, sinumerik)]
 
 
 def _read_measured(content: bytes, folder: Path) -> object:
