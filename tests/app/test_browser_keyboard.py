@@ -63,7 +63,7 @@ def test_an_error_is_found_set_looked_at_and_undone_without_a_mouse(tab: Tab) ->
     tab.until(lambda: page.evaluate(FOCUSED) == "Compare")
     # ... and its neighbour with an arrow
     keys(tab, "ArrowRight")
-    beside = page.get_by_role("tab", name="Concepts", exact=True)
+    beside = page.get_by_role("tab", name="Calibrate", exact=True)
     tab.until(lambda: beside.get_attribute("aria-selected") == "true")
     # 5. undo both
     keys(tab, "Control+z", "Control+z")

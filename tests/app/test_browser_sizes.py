@@ -200,12 +200,15 @@ def test_the_box_fills_a_room_that_grows_unless_it_was_turned(tab: Tab) -> None:
     assert wider[3] - wider[1] > before[3] - before[1] + 5 or wider[2] > before[2] + 5
     room = tab.page.evaluate(BOXES)["room"]
     x, y = (room[0] + room[2]) / 2, (room[1] + room[3]) / 2
+    start = tab.session.context.camera.remember()
     tab.page.mouse.move(x, y)
     tab.page.mouse.down()
     tab.page.mouse.move(x + 80, y + 20, steps=4)
     tab.page.mouse.up()
+    camera = tab.session.context.camera
+    tab.until(lambda: not np.allclose(camera.remember().position, start.position, atol=0.1))
     settled(tab)
-    turned = tab.session.context.camera.remember()
+    turned = camera.remember()
     tab.page.set_viewport_size({"width": 1280, "height": 720})
     settled(tab)
     kept = tab.session.context.camera.remember()

@@ -72,7 +72,6 @@ for _tab in (
     Tab("Sensitivities", "results", [f"{_HERE}.sensitivities:SensitivitiesPanel"]),
     Tab("Tests", "results", [f"{_HERE}.bench:TestsPanel"]),
     Tab("Compare", "results", [f"{_HERE}.compare:ComparePanel"]),
-    Tab("Concepts", "results", [f"{_HERE}.concepts:ConceptsPanel"]),
     Tab("Calibrate", "results", [f"{_HERE}.calibrate:CalibratePanel"]),
     Tab("Files", "results", [f"{_HERE}.files:FilesPanel"]),
     Tab(
@@ -89,6 +88,7 @@ for _tab in (
     Tab("Machine editor", "settings", [f"{_HERE}.machine_editor:MachineEditorPanel"]),
     Tab("Rotary axes", "settings", [f"{_HERE}.rotary_axes:RotaryAxesPanel"]),
     Tab("Tolerances", "settings", [f"{_HERE}.tolerances:TolerancesPanel"]),
+    Tab("Concepts", "settings", [f"{_HERE}.concepts:ConceptsPanel"]),
     Tab("Conventions", "settings", [f"{_HERE}.conventions:ConventionsPanel"]),
 ):
     register_tab(_tab)
