@@ -8,6 +8,7 @@ from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
 from warpspace.app.readouts.bench import bench_html
+from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.bench.options import TestOption, options_of
 from warpspace.bench.registry import bench_names, find_test
@@ -60,7 +61,7 @@ class TestsPanel:
         name = self._name.poll()
         if name is not None:
             look = look.with_test("" if name == NONE else name)
-            state = _with_sight(state, inside=bool(look.name))
+            state = edits.with_sight(state, inside=bool(look.name))
         path = self._path.poll()
         if path is not None:
             look = replace(look, path=path)
@@ -122,11 +123,3 @@ class TestsPanel:
         if written != self._written:
             self._written = written
             self._figure.content = written
-
-
-def _with_sight(state: AppState, *, inside: bool) -> AppState:
-    """Draw grid lines in place of a closed surface, which would hide a path; and back again."""
-    before, after = ("surface", "grid") if inside else ("grid", "surface")
-    if state.look.surface != before:
-        return state
-    return replace(state, look=state.look.with_choice(surface=after))

@@ -1,4 +1,4 @@
-"""Changes of a state that reach into its scene: curves and tolerances. Pure, and clamped."""
+"""Changes of a state: curves and tolerances of its scene, what of it is seen. Pure, clamped."""
 
 import math
 from collections.abc import Collection, Mapping
@@ -191,3 +191,11 @@ def include_all(state: AppState) -> AppState:
 def with_specification(state: AppState, specification: Specification) -> AppState:
     """Hold the tolerances against another specification."""
     return replace(state, specification=specification)
+
+
+def with_sight(state: AppState, *, inside: bool) -> AppState:
+    """Draw grid lines in place of a closed surface, which would hide what is inside; and back."""
+    before, after = ("surface", "grid") if inside else ("grid", "surface")
+    if state.look.surface != before:
+        return state
+    return replace(state, look=state.look.with_choice(surface=after))

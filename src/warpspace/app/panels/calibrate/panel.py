@@ -2,7 +2,6 @@
 
 import logging
 import threading
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -26,6 +25,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.calibrate.files import ReadingsPart
 from warpspace.app.panels.context import PanelContext
 from warpspace.app.readouts.calibration import arrows_of, calibration_html
+from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.viewport.layers.residuals import ResidualsLayer
 from warpspace.calibration.terms import AUTO
@@ -176,7 +176,7 @@ class CalibratePanel:
     def _choose_arrows(self) -> None:
         """Draw arrows, or none; a closed surface would hide them."""
         inside = str(self._arrows.handle.value) != NO_ARROWS
-        self._context.post(partial(_with_sight, inside=inside))
+        self._context.post(partial(edits.with_sight, inside=inside))
         self._write()
 
     def _draw_arrows(self, given: Answer, standing: str) -> str:
@@ -219,11 +219,3 @@ class CalibratePanel:
             self._context.client.flush()
 
         self._context.act(say)
-
-
-def _with_sight(state: AppState, *, inside: bool) -> AppState:
-    """Draw grid lines in place of a closed surface; and back again."""
-    before, after = ("surface", "grid") if inside else ("grid", "surface")
-    if state.look.surface != before:
-        return state
-    return replace(state, look=state.look.with_choice(surface=after))
