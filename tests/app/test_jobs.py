@@ -2,8 +2,11 @@
 
 import threading
 
+from app.wire import OPEN, Wire, dial
 from warpspace.app.documents.jobs import Jobs, Progress
-from warpspace.app.documents.services import CancelledError
+from warpspace.app.documents.services import CancelledError, Request, Services
+from warpspace.app.server.viewer import Viewer
+from warpspace.scene.library import load_scene
 
 
 class Watcher:
@@ -58,3 +61,24 @@ def test_what_a_job_raises_is_handed_over() -> None:
     watcher.jobs.start("bad", work, 1.0)
     assert watcher.failed.wait(5)
     assert str(watcher.failures[0]) == "broken"
+
+
+def test_what_is_made_for_a_page_that_has_gone_is_given_up() -> None:
+    begun, given_up = threading.Event(), threading.Event()
+
+    def draw(_: Request, cancelled: threading.Event) -> bytes:
+        begun.set()
+        if cancelled.wait(10):
+            given_up.set()
+        return b""
+
+    scene = load_scene("dvf5000_first")
+    with Viewer(scene, services=Services(draw_figure=draw)) as viewer:
+        with dial(viewer) as socket:
+            wire = Wire(socket)
+            assert wire.read_until(lambda: OPEN in wire.scripts, seconds=30.0)
+            (session,) = viewer.sessions
+            (panel,) = [p for p in session.display.panels if type(p).__name__ == "FilesPanel"]
+            session.context.act(panel._figure)
+            assert begun.wait(10)
+        assert given_up.wait(5)

@@ -1,6 +1,5 @@
 """The panel "Files": open, save, link; pictures and exports, made beside the session."""
 
-import logging
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -9,27 +8,24 @@ from typing import Any
 
 from warpspace.app.browser.address import listen_script, show_script
 from warpspace.app.browser.dropping import drop_script
-from warpspace.app.browser.page import error_words
 from warpspace.app.browser.uploads import size_message, size_script
 from warpspace.app.browser.viser_private import dom_id
 from warpspace.app.documents import links
 from warpspace.app.documents import received_files as incoming
 from warpspace.app.documents import scene_file as document
 from warpspace.app.documents.export_request import build_request, exported_words, file_stem
-from warpspace.app.documents.jobs import Jobs, Progress
 from warpspace.app.documents.scene_list import dropped_words
-from warpspace.app.documents.services import CancelledError
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
 from warpspace.app.panels.importing import ImportWindow, accepted_endings
+from warpspace.app.panels.job_part import JobPart
 from warpspace.app.readouts.html import message
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.comparison import Comparison
 from warpspace.app.viewport.camera import CameraMemory
-from warpspace.exceptions import OptionError, WarpspaceError
+from warpspace.exceptions import OptionError
 from warpspace.machine.limits import MAX_SCENE_BYTES
 
-logger = logging.getLogger(__name__)
 FIGURE_S, VIEW_S, PAGE_S, EXPORT_S = 5.0, 1.5, 1.0, 1.0
 RENDER_TIMEOUT_S = 30.0
 LARGEST_VIEW_PX = 4096
@@ -49,18 +45,17 @@ class FilesPanel:
     def __init__(self, context: PanelContext, _state: AppState) -> None:
         self._context = context
         self._picture: LivePicture | None = None
-        self._jobs = Jobs(self._report, self._failed)
         self._import = ImportWindow(context)
         self._add_scene_files()
         self._add_outputs()
         gui = context.gui
         self._shows: Any = gui.add_html("", visible=False)
-        self._status: Any = gui.add_markdown("", visible=False)
-        self._bar: Any = gui.add_progress_bar(0.0, visible=False, animated=True)
-        self._cancel: Any = gui.add_button(
-            "Cancel", color="gray", visible=False, hint="Give up what is being made."
+        self._job = JobPart(
+            context,
+            self._failed,
+            "Give up what is being made.",
+            lambda progress: f"{progress.name} is being made …",
         )
-        self._cancel.on_click(lambda _: self._jobs.cancel())
 
     def _add_scene_files(self) -> None:
         """Add opening, saving and the link."""
@@ -131,7 +126,7 @@ class FilesPanel:
         try:
             action()
         except Exception as error:  # noqa: BLE001 - shown and logged
-            self._failed(label, error)
+            self._job.fail(label, error)
 
     def _open(self, name: str, content: bytes) -> None:
         """Open an uploaded scene, or show what a file of measured data would bring."""
@@ -250,7 +245,7 @@ class FilesPanel:
             if not cancelled.is_set():
                 self._send(stem, ending, content)
 
-        if not self._jobs.start(name, work, usual_s):
+        if not self._job.start(name, work, usual_s):
             self._context.notify(
                 "Busy", "One file at a time; wait for the other or cancel it", "gray"
             )
@@ -261,26 +256,10 @@ class FilesPanel:
         client.send_file_download(f"{stem}{ending}", content, save_immediately=True)
         client.flush()
 
-    def _report(self, progress: Progress | None) -> None:
-        """Show how far the job is; from another thread."""
-        busy = progress is not None
-        if progress is not None:
-            self._status.content = f"{progress.name} is being made …"
-            self._bar.value = progress.percent
-        for handle in (self._status, self._bar, self._cancel):
-            if handle.visible != busy:
-                handle.visible = busy
-        self._context.client.flush()
-
-    def _failed(self, name: str, error: Exception) -> None:
-        """Show what went wrong, log what nobody foresaw."""
-        if isinstance(error, CancelledError):
-            self._context.notify("Cancelled", name, "gray")
-            return
-        if not isinstance(error, WarpspaceError):
-            logger.error("%s", name, exc_info=error)
+    def _failed(self, name: str, words: str) -> None:
+        """Show what went wrong."""
         title = name if name == "Not opened" else f"{name}: failed"
-        self._context.notify(title, error_words(error), "red")
+        self._context.notify(title, words, "red")
 
     def read(self, state: AppState) -> AppState:
         """Nothing to take over."""

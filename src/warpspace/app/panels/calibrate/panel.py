@@ -1,16 +1,12 @@
 """The calibrate panel: readings, what is looked for, the fit beside the session, its outcome."""
 
-import logging
 import threading
 from functools import partial
 from typing import Any
 
 from warpspace.app.browser.clicks import Clicks
 from warpspace.app.browser.handles import Handle, Input
-from warpspace.app.browser.page import error_words
-from warpspace.app.documents.jobs import Jobs, Progress
 from warpspace.app.documents.scene_list import dropped_words
-from warpspace.app.documents.services import CancelledError
 from warpspace.app.evaluation.calibration import (
     LONGEST_KEYS,
     Answer,
@@ -24,14 +20,13 @@ from warpspace.app.evaluation.calibration import (
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.calibrate.files import ReadingsPart
 from warpspace.app.panels.context import PanelContext
+from warpspace.app.panels.job_part import JobPart
 from warpspace.app.readouts.calibration import arrows_of, calibration_html
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.viewport.layers.residuals import ResidualsLayer
 from warpspace.calibration.terms import AUTO
-from warpspace.exceptions import WarpspaceError
 
-logger = logging.getLogger(__name__)
 NAME, USUAL_S = "Calibrating", 4.0
 NO_ARROWS, ARROWS_BEFORE, ARROWS_AFTER = "none", "before", "after"
 NONE_LEFT = "No arrows: none of these readings is a vector."
@@ -51,7 +46,6 @@ class CalibratePanel:
     def __init__(self, context: PanelContext, _state: AppState) -> None:
         gui = context.gui
         self._context = context
-        self._jobs = Jobs(self._report, self._failed)
         self._answer: Answer | None = None
         self._doing = ""
         self._layer = ResidualsLayer(context.client.scene)
@@ -74,12 +68,13 @@ class CalibratePanel:
             "Fit", hint="Find the errors in the readings. It runs beside the page."
         )
         self._start.on_click(lambda _: context.act(self._fit))
-        self._status: Any = gui.add_markdown("", visible=False)
-        self._bar: Any = gui.add_progress_bar(0.0, visible=False, animated=True)
-        self._cancel: Any = gui.add_button(
-            "Cancel", color="gray", visible=False, hint="Give it up; what was shown stays."
+        self._job = JobPart(
+            context,
+            lambda _, words: context.act(partial(self._say, words)),
+            "Give it up; what was shown stays.",
+            lambda _: self._doing,
+            kept="What was shown stays.",
         )
-        self._cancel.on_click(lambda _: self._jobs.cancel())
         self._clicks = Clicks(gui, lambda word: context.act(partial(self._do, word)))
         self._arrows: Input[str] = Input(
             gui.add_dropdown(
@@ -115,8 +110,7 @@ class CalibratePanel:
         """Start the work."""
         question = self._ask(self._context.store.state)
         if not question.files:
-            self._readings.say("There are no readings yet: add a file, or choose bundled ones.")
-            self._context.client.flush()
+            self._say("There are no readings yet: add a file, or choose bundled ones.")
             return
         self._readings.say("")
 
@@ -129,7 +123,7 @@ class CalibratePanel:
                 self._context.act(partial(self._take, found))
 
         self._doing = ""
-        if not self._jobs.start(NAME, work, USUAL_S):
+        if not self._job.start(NAME, work, USUAL_S):
             self._context.notify("Busy", "Readings are being fitted already.", "gray")
 
     def _take(self, found: Answer) -> None:
@@ -194,28 +188,7 @@ class CalibratePanel:
         )
         return f"Arrows in the box: residuals {chosen}, × {factor:g}" if factor else NONE_LEFT
 
-    def _report(self, progress: Progress | None) -> None:
-        """Show how far the work is; from another thread."""
-        busy = progress is not None
-        if progress is not None:
-            self._status.content = self._doing
-            self._bar.value = progress.percent
-        for handle in (self._status, self._bar, self._cancel):
-            if handle.visible != busy:
-                handle.visible = busy
+    def _say(self, problem: str) -> None:
+        """Say what went wrong; the outcome of before stays."""
+        self._readings.say(problem)
         self._context.client.flush()
-
-    def _failed(self, name: str, error: Exception) -> None:
-        """Show what went wrong, log what nobody foresaw; the outcome of before stays."""
-        if isinstance(error, CancelledError):
-            self._context.notify("Cancelled", "What was shown stays.", "gray")
-            return
-        if not isinstance(error, WarpspaceError):
-            logger.error("%s", name, exc_info=error)
-        words = error_words(error)
-
-        def say() -> None:
-            self._readings.say(words)
-            self._context.client.flush()
-
-        self._context.act(say)

@@ -1,13 +1,10 @@
 """The concepts panel: machines to choose, how they are compared, and the outcome."""
 
-import logging
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from warpspace.app.browser.clicks import Clicks
 from warpspace.app.browser.handles import Handle, Input
-from warpspace.app.browser.page import error_words
-from warpspace.app.documents.services import CancelledError
 from warpspace.app.evaluation.concepts import ask
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.concepts.choosing import ConceptWindow
@@ -23,13 +20,11 @@ from warpspace.app.state.concept_choice import (
     Chosen,
     ConceptChoice,
 )
-from warpspace.exceptions import WarpspaceError
 
 if TYPE_CHECKING:
     from warpspace.app.evaluation.concepts import Answer
     from warpspace.scene.concepts import Concept
 
-logger = logging.getLogger(__name__)
 FEW = (
     "The same tolerances on several machines: which one holds a limit, and which errors matter in"
     " each? Choose two machines or more, then press Compare. Tolerances are those of A."
@@ -59,7 +54,6 @@ class ConceptsPanel:
         self._compared = self._choice
         self._pictures: list[str] = []
         self._problem = ""
-        self._work = ConceptWork(context, self._take, self._take_pictures, self._failed)
         self._clicks = Clicks(gui, lambda word: context.act(partial(self._do, word)))
         self._window = ConceptWindow(context, self._clicks, self._choose)
         choose = gui.add_button(
@@ -83,7 +77,7 @@ class ConceptsPanel:
             "Compare", hint="Sample machines of each within tolerance. It runs beside the page."
         )
         self._start.on_click(lambda _: context.act(self._compare))
-        self._work.add_progress()
+        self._work = ConceptWork(context, self._take, self._take_pictures, self._failed)
         with gui.add_folder(HOW, expand_by_default=False):
             self._tolerances = self._list(
                 "Tolerances",
@@ -191,17 +185,10 @@ class ConceptsPanel:
             if not self._work.draw_sheet(self._answer.question, dark=dark):
                 self._context.notify("Busy", "Wait for the comparison, or cancel it.", "gray")
 
-    def _failed(self, name: str, error: Exception) -> None:
-        """Show what went wrong, log what nobody foresaw; the outcome of before stays."""
-        if not self._context.page.is_open:
-            return
-        if isinstance(error, CancelledError):
-            self._context.notify("Cancelled", "What was shown stays.", "gray")
-            return
-        if not isinstance(error, WarpspaceError):
-            logger.error("%s", name, exc_info=error)
-        self._problem = error_words(error)
-        self._context.notify("Not compared", self._problem, "red")
+    def _failed(self, _name: str, words: str) -> None:
+        """Show what went wrong; the outcome of before stays."""
+        self._problem = words
+        self._context.notify("Not compared", words, "red")
         self._context.act(lambda: self._write(self._context.store.state))
 
     def _write(self, state: AppState) -> None:

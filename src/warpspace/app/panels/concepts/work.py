@@ -5,12 +5,13 @@ import time
 from collections.abc import Callable
 from functools import partial
 from math import exp
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from warpspace.app.documents.jobs import Jobs, Progress
+from warpspace.app.documents.jobs import Progress
 from warpspace.app.documents.services import ConceptRequest
 from warpspace.app.evaluation.concepts import Answer, Question, answer
 from warpspace.app.panels.context import PanelContext
+from warpspace.app.panels.job_part import JobPart
 from warpspace.app.readouts.concepts import cut_strip
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ class ConceptWork:
     drawn : callable
         Gets the answer and a picture of each of its machines; on the session.
     failed : callable
-        Gets what was being done and what it raised.
+        Gets what was being done and in words what went wrong; from other threads.
     """
 
     def __init__(
@@ -44,21 +45,18 @@ class ConceptWork:
         context: PanelContext,
         found: "Callable[[Answer, ConceptChoice], None]",
         drawn: Callable[[Answer, list[str]], None],
-        failed: Callable[[str, Exception], None],
+        failed: Callable[[str, str], None],
     ) -> None:
         self._context, self._found, self._drawn = context, found, drawn
-        self._jobs = Jobs(self._report, failed)
         self._share, self._drawing_since = 0.0, 0.0
-
-    def add_progress(self) -> None:
-        """Add what says how far the work is, and ends it."""
-        gui = self._context.gui
-        self._status: Any = gui.add_markdown("", visible=False)
-        self._bar: Any = gui.add_progress_bar(0.0, visible=False, animated=True)
-        self._cancel: Any = gui.add_button(
-            "Cancel", color="gray", visible=False, hint="Give it up; what was shown stays."
+        self._job = JobPart(
+            context,
+            failed,
+            "Give it up; what was shown stays.",
+            lambda progress: "Sampling machines …" if self._samples(progress) else "Drawing …",
+            self._percent,
+            "What was shown stays.",
         )
-        self._cancel.on_click(lambda _: self._jobs.cancel())
 
     def compare(self, question: Question, choice: "ConceptChoice", *, dark: bool) -> bool:
         """Compare machines, then draw them; False where something runs already."""
@@ -81,7 +79,7 @@ class ConceptWork:
                 self._context.act(partial(self._drawn, found, pictures))
 
         self._share, self._drawing_since = 0.0, 0.0
-        return self._jobs.start(COMPARING, work, DRAWING_S)
+        return self._job.start(COMPARING, work, DRAWING_S)
 
     def draw_sheet(self, question: Question, *, dark: bool) -> bool:
         """Draw one sheet and have the browser save it; False where something runs already."""
@@ -95,28 +93,17 @@ class ConceptWork:
                 client.send_file_download("concepts.png", content, save_immediately=True)
                 client.flush()
 
-        return self._jobs.start(SHEET, work, SHEET_S)
+        return self._job.start(SHEET, work, SHEET_S)
 
-    def _report(self, progress: Progress | None) -> None:
-        """Show how far the work is; from another thread."""
-        if not self._context.page.is_open:  # nobody waits for it any more, the widgets are gone
-            self._jobs.cancel()
-            return
-        busy = progress is not None
-        if progress is not None:
-            sampling = progress.name == COMPARING and not self._drawing_since
-            self._status.content = "Drawing …" if not sampling else "Sampling machines …"
-            self._bar.value = self._percent(progress)
-        for handle in (self._status, self._bar, self._cancel):
-            if handle.visible != busy:
-                handle.visible = busy
-        self._context.client.flush()
+    def _samples(self, progress: Progress) -> bool:
+        """Tell whether machines are being sampled."""
+        return progress.name == COMPARING and not self._drawing_since
 
     def _percent(self, progress: Progress) -> float:
         """Put sampling, which counts its machines, and drawing, which does not, on one bar."""
         if progress.name != COMPARING:
             return progress.percent
-        if not self._drawing_since:
+        if self._samples(progress):
             return SAMPLED * min(self._share, 1.0)
         drawn = 1.0 - exp(-(time.monotonic() - self._drawing_since) / DRAWING_S)
         return SAMPLED + (100.0 - SAMPLED) * drawn

@@ -1,25 +1,20 @@
 """The button "Allocate" with what belongs to it: wanted share, costs, progress, outcome."""
 
-import logging
 import threading
 from typing import TYPE_CHECKING, Any
 
 from warpspace.app.browser.handles import Input
-from warpspace.app.browser.page import error_words
-from warpspace.app.documents.jobs import Jobs, Progress
-from warpspace.app.documents.services import CancelledError
 from warpspace.app.panels import PanelContext
+from warpspace.app.panels.job_part import JobPart
 from warpspace.app.readouts.probability import spell_allocation
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.specification import PERCENT
-from warpspace.exceptions import WarpspaceError
 from warpspace.machine.tolerances import ToleranceSet
 
 if TYPE_CHECKING:
     from warpspace.analysis.allocation import Ensemble
 
-logger = logging.getLogger(__name__)
 NAME = "Allocating tolerances"
 USUAL_S = 3.0
 
@@ -35,7 +30,6 @@ class AllocationPart:
 
     def __init__(self, context: PanelContext, state: AppState) -> None:
         self._context, gui = context, context.gui
-        self._jobs = Jobs(self._report, self._failed)
         self._done = 0.0
         self._ensemble: Ensemble | None = None
         self._found: tuple[ToleranceSet, str] | None = None
@@ -58,11 +52,14 @@ class AllocationPart:
             " Undo takes it back in one step.",
         )
         self._start.on_click(lambda _: context.act(self._allocate))
-        self._bar: Any = gui.add_progress_bar(0.0, visible=False, animated=True)
-        self._cancel: Any = gui.add_button(
-            "Cancel", color="gray", visible=False, hint="Leave the tolerances as they are."
+        self._job = JobPart(
+            context,
+            lambda _, words: context.notify("Not allocated", words, "red"),
+            "Leave the tolerances as they are.",
+            words=None,
+            percent=lambda _: min(100.0 * self._done, 100.0),
+            kept="The tolerances stay as they were.",
         )
-        self._cancel.on_click(lambda _: self._jobs.cancel())
         self._outcome: Any = gui.add_html("", visible=False)
 
     def add_costs(self, state: AppState) -> None:
@@ -124,24 +121,5 @@ class AllocationPart:
             self._context.post(lambda state: with_allocated(state, asked, found))
 
         self._done = 0.0
-        if not self._jobs.start(NAME, work, USUAL_S):
+        if not self._job.start(NAME, work, USUAL_S):
             self._context.notify("Busy", "Tolerances are being allocated already.", "gray")
-
-    def _report(self, progress: Progress | None) -> None:
-        """Show how far the work is; from another thread."""
-        busy = progress is not None
-        if busy:
-            self._bar.value = min(100.0 * self._done, 100.0)
-        for handle in (self._bar, self._cancel):
-            if handle.visible != busy:
-                handle.visible = busy
-        self._context.client.flush()
-
-    def _failed(self, name: str, error: Exception) -> None:
-        """Show what went wrong, log what nobody foresaw."""
-        if isinstance(error, CancelledError):
-            self._context.notify("Cancelled", "The tolerances stay as they were.", "gray")
-            return
-        if not isinstance(error, WarpspaceError):
-            logger.error("%s", name, exc_info=error)
-        self._context.notify("Not allocated", error_words(error), "red")
