@@ -63,8 +63,9 @@ DRAWN = """name => {
 }"""
 TIDY = """() => {
   history.replaceState(null, '', location.pathname + '?fixedDpr=1');
-  document.querySelectorAll('.mantine-Notification-closeButton').forEach(b => b.click());
-  return document.querySelectorAll('.mantine-Notification-root').length;
+  const close = '.mantine-Notification-closeButton, #warpspace-server button';
+  document.querySelectorAll(close).forEach(b => b.click());
+  return document.querySelectorAll('.mantine-Notification-root, #warpspace-server').length;
 }"""
 """Takes the link out of the address, closes the messages, and counts those that were there."""
 LIVE = LiveModel()

@@ -192,7 +192,6 @@ def test_scale_bars_are_right_in_every_view(tab: Tab) -> None:
     tab.page.get_by_role("checkbox", name="Orthographic", exact=False).uncheck()
 
 
-@pytest.mark.own_page
 def test_the_box_fills_a_room_that_grows_unless_it_was_turned(tab: Tab) -> None:
     tab.page.keyboard.press("f")
     before = settled(tab)
