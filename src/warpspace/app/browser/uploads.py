@@ -148,3 +148,20 @@ def size_script(button: Any, carrier: Any, most_bytes: int) -> str:
       updates: {{ value: performance.now() + ":" + file.size + ":" + file.name }} }});
   }}, true);
 }})();"""
+
+
+def read_refusal(told: str) -> tuple[str, float]:
+    """Read name and size of a refused file from what the script of `size_script` tells.
+
+    Parameters
+    ----------
+    told : str
+        From a browser: anything.
+
+    Returns
+    -------
+    tuple of (str, float)
+        The name as it came, and bytes; 0 for what is no size.
+    """
+    _, size, name = (*told.split(":", 2), "", "")[:3]
+    return name, float(size) if size.isdecimal() and len(size) < 16 else 0.0

@@ -8,7 +8,6 @@ from typing import Any
 
 from warpspace.app.browser.address import listen_script, show_script
 from warpspace.app.browser.dropping import drop_script
-from warpspace.app.browser.uploads import size_message, size_script
 from warpspace.app.browser.viser_private import dom_id
 from warpspace.app.documents import links
 from warpspace.app.documents import received_files as incoming
@@ -19,6 +18,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
 from warpspace.app.panels.importing import ImportWindow, accepted_endings
 from warpspace.app.panels.job_part import JobPart
+from warpspace.app.panels.uploading import add_upload
 from warpspace.app.readouts.html import message
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.comparison import Comparison
@@ -60,21 +60,17 @@ class FilesPanel:
     def _add_scene_files(self) -> None:
         """Add opening, saving and the link."""
         context, gui = self._context, self._context.gui
-        upload = gui.add_upload_button(
+        upload = add_upload(
+            context,
             "Open a scene or data …",
-            mime_type=accepted_endings(),
+            self._open,
+            lambda text: context.notify("Not opened", text, "red"),
+            incoming.safe_file_name,
+            endings=accepted_endings(),
             hint="A scene file (TOML), or measured errors and tables of controllers, at most 4 MB;"
             " dropping files on the page does the same. Undo goes back.",
+            most_bytes=MAX_SCENE_BYTES,
         )
-        context.uploads.watch(
-            upload,
-            MAX_SCENE_BYTES,
-            lambda name, content: self._context.act(partial(self._open, name, content)),
-            lambda text: self._context.notify("Not opened", text, "red"),
-        )
-        refused = gui.add_text("", "", visible=False)
-        refused.on_update(lambda _: self._context.act(lambda: self._refuse(str(refused.value))))
-        context.page.run_script(size_script(upload, refused, MAX_SCENE_BYTES))
         context.page.run_script(drop_script(upload))
         self._group(
             "Keep scene, settings and camera",
@@ -142,13 +138,6 @@ class FilesPanel:
             self._context.notify("Opened", f"{title}.toml", "green")
 
         self._try("Not opened", read)
-
-    def _refuse(self, message: str) -> None:
-        """Say that a file was too large to be sent, from what the page tells."""
-        _, size, name = (*message.split(":", 2), "", "")[:3]
-        size_bytes = float(size) if size.isdigit() and len(size) < 16 else 0.0
-        text = size_message(incoming.safe_file_name(name), size_bytes, MAX_SCENE_BYTES)
-        self._context.notify("Not opened", text, "red")
 
     def _follow(self, message: str) -> None:
         """Show what a link describes."""

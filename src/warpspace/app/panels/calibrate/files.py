@@ -7,11 +7,11 @@ from typing import Any
 from warpspace.app.browser.clicks import Clicks
 from warpspace.app.browser.handles import Handle, Input
 from warpspace.app.browser.page import error_words
-from warpspace.app.browser.uploads import size_message, size_script
 from warpspace.app.documents.received_files import safe_name, upload_text
 from warpspace.app.evaluation.calibration import MOST_FILES, Measured, bundled, take
 from warpspace.app.evaluation.resulting_scene import scene_of
 from warpspace.app.panels.context import PanelContext
+from warpspace.app.panels.uploading import add_upload
 from warpspace.app.readouts.calibration import files_html
 from warpspace.calibration.kinds.bench import test_kinds
 from warpspace.calibration.kinds.registry import KINDS
@@ -46,21 +46,17 @@ class ReadingsPart:
         self._problem = ""
         self._fitted = False
         self._clicks = Clicks(gui, lambda word: context.act(partial(self._do, word)))
-        upload = gui.add_upload_button(
+        add_upload(
+            context,
             "Add readings …",
-            mime_type=".csv",
+            self._add_upload,
+            self._refuse,
+            _spell,
+            endings=".csv",
             hint=f"A CSV file with a header, UTF-8, at most 2 MB; up to {MOST_FILES} files.",
+            most_bytes=MOST_BYTES,
+            what=WHAT,
         )
-        context.uploads.watch(
-            upload,
-            MOST_BYTES,
-            lambda name, content: context.act(partial(self._add_upload, name, content)),
-            lambda text: context.act(partial(self._refuse, text)),
-            WHAT,
-        )
-        refused = gui.add_text("", "", visible=False)
-        refused.on_update(lambda _: context.act(lambda: self._refuse_large(str(refused.value))))
-        context.page.run_script(size_script(upload, refused, MOST_BYTES))
         self._bundled: Input[str] = Input(
             gui.add_dropdown(
                 "Bundled readings",
@@ -122,7 +118,7 @@ class ReadingsPart:
 
     def _add_upload(self, name: str, content: bytes) -> None:
         """Take in a file that a browser has sent."""
-        spelled = f"{safe_name(name, 'readings')}.csv"
+        spelled = _spell(name)
         self._add(spelled, lambda: upload_text(content, spelled, MOST_BYTES, WHAT))
 
     def _add_bundled(self) -> None:
@@ -149,13 +145,6 @@ class ReadingsPart:
         self.say(text)
         self._context.client.flush()
 
-    def _refuse_large(self, told: str) -> None:
-        """Say that a file was too large to be sent, from what the page tells."""
-        _, size, name = (*told.split(":", 2), "", "")[:3]
-        size_bytes = float(size) if size.isdigit() and len(size) < 16 else 0.0
-        spelled = f"{safe_name(name, 'readings')}.csv"
-        self._refuse(size_message(spelled, size_bytes, MOST_BYTES, WHAT))
-
     def _do(self, word: str) -> None:
         """Remove a file; the word comes from a browser and may be anything."""
         verb, _, number = word.partition(" ")
@@ -175,3 +164,8 @@ class ReadingsPart:
         """Write the list; what is the same already is not sent."""
         note = ("" if self._fitted else READY) if self._files else EMPTY
         self._text.put(content=files_html(self._files, note, self._problem, self._clicks.button))
+
+
+def _spell(name: str) -> str:
+    """Make a name of what a browser calls a file."""
+    return f"{safe_name(name, 'readings')}.csv"
