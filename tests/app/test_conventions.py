@@ -1,5 +1,6 @@
 """Conventions: every choice is applied, measured against the scene's own, and undone."""
 
+from collections.abc import Callable
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,11 +17,13 @@ from warpspace.app.evaluation.conventions import (
     with_reference,
 )
 from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import conventions as panel_module
 from warpspace.app.panels.conventions import ConventionsPanel
 from warpspace.app.readouts.conventions import conventions_html
+from warpspace.app.server import display as display_module
 from warpspace.app.server.display import Display
-from warpspace.app.state.app_state import start_state
+from warpspace.app.state.app_state import AppState, start_state
 from warpspace.picture.mesh import edge_pieces
 from warpspace.scene.library import load_scene
 
@@ -151,9 +154,53 @@ def test_the_panel_does_nothing_while_a_slider_moves(monkeypatch: pytest.MonkeyP
         moved = moved.with_amplitude("EXX", value)
         parts.show(LIVE.evaluate(moved))
     assert calls == ["written"]
-    panel.settle(LIVE.evaluate(moved))
+    panel.rest(LIVE.evaluate(moved))
     assert len(calls) == 2
-    panel.settle(LIVE.evaluate(moved))
+    panel.rest(LIVE.evaluate(moved))
     assert len(calls) == 2
     parts.show(LIVE.evaluate(with_choice(moved, "loop=relative")))
     assert len(calls) == 3
+
+
+def test_what_is_slowest_waits_until_a_drag_has_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Worked out with every chart it took a third of what a drag costs the server."""
+    clock, done = [100.0], []
+    monkeypatch.setattr(display_module, "time", SimpleNamespace(monotonic=lambda: clock[0]))
+
+    class Charts:
+        """Follows in a drag now and then; its slow part does not."""
+
+        def read(self, state: AppState) -> AppState:
+            return state
+
+        def show(self, picture: LivePicture) -> None:
+            """Nothing at once."""
+
+        def settle(self, picture: LivePicture) -> None:
+            done.append("chart")
+
+        def rest(self, picture: LivePicture) -> None:
+            done.append("slow")
+
+    def run(step: Callable[[], object]) -> None:
+        step()
+
+    picture, parts = LIVE.evaluate(START), Display()
+    parts.add(picture, panels=[Charts()])
+    for _ in range(40):  # two seconds of a drag
+        parts.show(picture)
+        clock[0] += 0.05
+        while parts.is_due(paused=False):
+            parts.settle(picture, run)
+    assert set(done) == {"chart"}
+    assert 5 <= len(done) <= 10
+    clock[0] += 0.1
+    while parts.is_due(paused=True):
+        parts.settle(picture, run)
+    assert "slow" not in done
+    assert parts.pause_s == pytest.approx(0.35)
+    clock[0] += 0.4
+    while parts.is_due(paused=True):
+        parts.settle(picture, run)
+    assert done.count("slow") == 1
+    assert parts.pause_s is None

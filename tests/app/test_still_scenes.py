@@ -25,7 +25,6 @@ def messages_until_open(viewer: Viewer) -> list[dict]:
     return wire.messages
 
 
-@pytest.mark.filterwarnings("ignore:Queued an? .* on a closed connection")  # as `run_viewer` does
 @pytest.mark.parametrize("name", TEXTS)
 def test_a_page_opens_with_its_map_and_without_a_problem(
     name: str, monkeypatch: pytest.MonkeyPatch

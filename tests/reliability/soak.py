@@ -8,7 +8,7 @@ from pathlib import Path
 from reliability.row import Outcome
 
 SCRIPT = Path(__file__).resolve().parents[2] / "benchmarks" / "soak_app.py"
-TABS, RATE = 20, 2.0
+TABS, RATE = 20, 0.5
 
 
 def run(count: int) -> Outcome:

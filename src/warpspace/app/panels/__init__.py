@@ -11,7 +11,7 @@ from warpspace.app.panels.context import PanelContext
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.store import Update
 
-__all__ = ["Deferred", "Panel", "PanelContext", "Selective", "Update"]
+__all__ = ["Deferred", "Panel", "PanelContext", "Resting", "Selective", "Update"]
 
 
 class Panel(Protocol):
@@ -41,4 +41,13 @@ class Deferred(Protocol):
 
     def settle(self, picture: LivePicture) -> None:
         """Bring charts up to date; some tens of milliseconds at most."""
+        ...
+
+
+@runtime_checkable
+class Resting(Protocol):
+    """A panel with something so slow that it waits until nothing has changed for a while."""
+
+    def rest(self, picture: LivePicture) -> None:
+        """Have what is slow worked out; it is not asked to while a slider is dragged."""
         ...

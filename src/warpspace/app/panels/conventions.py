@@ -119,7 +119,7 @@ class ConventionsPanel:
                 bound.show(float(reference.get(axis, bound.handle.value)))
         self._write(state)
 
-    def settle(self, picture: LivePicture) -> None:
+    def rest(self, picture: LivePicture) -> None:
         """Have it worked out what every choice changes: slow, so that other tabs need not wait."""
         waiting, self._asked = self._asked is not None, picture.state
         if not waiting:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.panels import Deferred, Panel, Selective
+from warpspace.app.panels import Deferred, Panel, Resting, Selective
 from warpspace.app.state.app_state import AppState
 from warpspace.app.viewport.layers import Layer
 
@@ -14,6 +14,8 @@ SETTLE_S = 0.1
 """Pause in the changes after which charts follow: longer than between two moves of a drag."""
 LONGEST_SETTLE_S = 0.25
 """Charts lag no longer than this behind while a slider is being dragged."""
+REST_S = 0.5
+"""Pause after which the slowest panels follow; a drag does not pay for them."""
 
 
 class Display:
@@ -27,7 +29,9 @@ class Display:
         # isinstance of a protocol is slow: asked once, not on every slider move
         self._selective: dict[Layer | Panel, Selective] = {}
         self._deferred: list[Deferred] = []
-        self._waiting: deque[Deferred] = deque()
+        self._resting: list[Resting] = []
+        self._restless_since: float | None = None
+        self._waiting: deque[Callable[[LivePicture], None]] = deque()
         self._concerned: dict[Layer | Panel, tuple[object, ...]] = {}
 
     @property
@@ -56,6 +60,7 @@ class Display:
                 self._selective[part] = part
                 self._concerned[part] = part.concerns(picture)
         self._deferred += [panel for panel in panels if isinstance(panel, Deferred)]
+        self._resting += [panel for panel in panels if isinstance(panel, Resting)]
         self._state = picture.state
         self._unsettle()
 
@@ -82,23 +87,31 @@ class Display:
         self._unsettle()
 
     def _unsettle(self) -> None:
-        """Have charts follow soon."""
+        """Have charts follow soon, and the slowest panels when changes have rested."""
+        now = time.monotonic()
         if self._unsettled_since is None:
-            self._unsettled_since = time.monotonic()
+            self._unsettled_since = now
+        if self._resting:
+            self._restless_since = now
 
     @property
     def pause_s(self) -> float | None:
         """How long to wait for further changes before charts follow; None where none has to."""
         if self._waiting:
             return 0.0
-        return None if self._unsettled_since is None else SETTLE_S
+        if self._unsettled_since is not None:
+            return SETTLE_S
+        since = self._restless_since
+        return None if since is None else max(0.0, since + REST_S - time.monotonic())
 
     def is_due(self, *, paused: bool) -> bool:
         """Tell whether a chart is to follow now."""
         if self._waiting:
             return True
-        since = self._unsettled_since
-        return since is not None and (paused or time.monotonic() - since > LONGEST_SETTLE_S)
+        since, now = self._unsettled_since, time.monotonic()
+        if since is not None:
+            return paused or now - since > LONGEST_SETTLE_S
+        return self._restless_since is not None and now - self._restless_since >= REST_S
 
     def settle(self, picture: LivePicture, guarded: Callable[[Callable[[], object]], None]) -> None:
         """Bring the next chart up to date; one at a time, so that a slider never waits for all.
@@ -109,8 +122,11 @@ class Display:
         guarded : callable
             Runs a step and reports what it raises.
         """
-        if not self._waiting:
+        if not self._waiting and self._unsettled_since is not None:
             self._unsettled_since = None
-            self._waiting.extend(self._deferred)
+            self._waiting.extend(panel.settle for panel in self._deferred)
+        elif not self._waiting:
+            self._restless_since = None
+            self._waiting.extend(panel.rest for panel in self._resting)
         if self._waiting:
-            guarded(partial(self._waiting.popleft().settle, picture))
+            guarded(partial(self._waiting.popleft(), picture))
