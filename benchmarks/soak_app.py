@@ -1,6 +1,6 @@
 """The app for an hour: tabs come, drag, drop out, come back, leave; memory must not grow.
 
-    python benchmarks/soak_app.py [--minutes 60] [--tabs 6] [--rate 10]
+    python benchmarks/soak_app.py [--minutes 60] [--tabs 6] [--rate 10] [--pause 1]
 
 A fifth of the run is warming up (caches, allocator). Then the line through the memory over time is
 what counts, together with what stays behind of threads and open files. CPU is that of the server
@@ -16,14 +16,15 @@ import time
 import numpy as np
 from app_client import Tab, rss_mb, running_app
 
+MOVES_A_DRAG = 10
 KEYS = ("EAX", "EAY", "ECY", "EAZ", "EC0Y", "EA0Z", "EB0Z")
 MAX_MB_PER_HOUR = 20.0
 
 
 async def visit(
-    url: str, until: float, rate: float, rng: random.Random, counts: dict[str, int]
+    url: str, until: float, options: argparse.Namespace, rng: random.Random, counts: dict[str, int]
 ) -> None:
-    """Be one visitor after the other, who moves sliders so many times a second."""
+    """Be one visitor after the other, who drags one slider, looks, and drags another."""
     while time.monotonic() < until:
         tab = Tab(url)
         for _ in range(rng.randint(1, 4)):  # connections of one visitor
@@ -31,14 +32,15 @@ async def visit(
             counts["connections"] += 1
             counts["open"] += 1
             expected = tab.values
-            start, moves = time.monotonic(), rng.randint(10, 60)
-            for move in range(1, moves + 1):
-                key = rng.choice(KEYS)
-                value = round(rng.uniform(-10.0, 10.0), 1)
-                await tab.drag(key, value)
-                expected[key] = value
-                counts["moves"] += 1
-                await asyncio.sleep(max(0.0, start + move / rate - time.monotonic()))
+            for _ in range(rng.randint(1, 6)):
+                key, start = rng.choice(KEYS), time.monotonic()
+                for move in range(1, MOVES_A_DRAG + 1):
+                    value = round(rng.uniform(-10.0, 10.0), 1)
+                    await tab.drag(key, value)
+                    expected[key] = value
+                    counts["moves"] += 1
+                    await asyncio.sleep(max(0.0, start + move / options.rate - time.monotonic()))
+                await asyncio.sleep(options.pause * rng.uniform(0.5, 1.5))
             await asyncio.sleep(0.4)
             await tab.close()
             counts["open"] -= 1
@@ -74,7 +76,7 @@ async def run(url: str, process, options: argparse.Namespace) -> bool:
     counts = {"connections": 0, "moves": 0, "open": 0}
     memory: list[tuple[float, float]] = []
     visitors = [
-        asyncio.create_task(visit(url, until, options.rate, random.Random(seed), counts))
+        asyncio.create_task(visit(url, until, options, random.Random(seed), counts))
         for seed in range(options.tabs)
     ]
     start, next_line = time.monotonic(), 0.0
@@ -117,7 +119,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--minutes", type=float, default=60.0)
     parser.add_argument("--tabs", type=int, default=6, help="visitors at a time")
-    parser.add_argument("--rate", type=float, default=10.0, help="moves per second and visitor")
+    parser.add_argument("--rate", type=float, default=10.0, help="moves per second of a drag")
+    parser.add_argument("--pause", type=float, default=1.0, help="seconds between two drags, about")
     options = parser.parse_args()
     with running_app() as (url, process):
         fine = asyncio.run(run(url, process, options))

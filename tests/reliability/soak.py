@@ -8,15 +8,14 @@ from pathlib import Path
 from reliability.row import Outcome
 
 SCRIPT = Path(__file__).resolve().parents[2] / "benchmarks" / "soak_app.py"
-TABS, RATE = 20, 0.5
+TABS, RATE, PAUSE_S = 20, 10.0, 15.0
 
 
 def run(count: int) -> Outcome:
     """Run so many minutes."""
     command = [sys.executable, str(SCRIPT), "--minutes", str(count), "--tabs", str(TABS)]
-    process = subprocess.run(
-        [*command, "--rate", str(RATE)], capture_output=True, text=True, check=False
-    )
+    pace = ["--rate", str(RATE), "--pause", str(PAUSE_S)]
+    process = subprocess.run([*command, *pace], capture_output=True, text=True, check=False)
     said = process.stdout
     memory = re.search(r"memory .*", said)
     moves = re.search(r"(\d+) connections, (\d+) moves", said)
