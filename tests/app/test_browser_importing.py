@@ -29,6 +29,11 @@ TAKES = """() => {
 }"""
 
 
+COMP = b"-200 0.001 0.003\n0 0.002 0.004\n200 0.005 0.006\n"
+PROBLEM = "[data-value='import-problem']"
+FOLDER = "What the files do not say"
+
+
 def preview(tab: Tab) -> str:
     """Text of the preview, once it is there."""
     tab.page.wait_for_selector(PREVIEW)
@@ -83,3 +88,50 @@ def test_a_bad_or_hostile_file_changes_nothing_and_is_named(tab: Tab) -> None:
     assert tab.page.locator(PREVIEW).count() == 0
     assert tab.state().scene == before.scene
     assert json.dumps("<img") not in tab.page.content()
+
+
+def test_what_a_file_does_not_say_is_asked_for_in_the_window(tab: Tab) -> None:
+    before = tab.state()
+    tab.panel("Files")
+    tab.upload("joint.comp", COMP)
+    tab.page.wait_for_selector(PROBLEM)
+    assert "which axis" in tab.text("import-problem")
+    apply = tab.page.get_by_role("button", name="Apply", exact=True).last
+    assert apply.is_disabled()
+    assert tab.page.locator(PREVIEW).count() == 0
+    tab.written("Axis").fill("<img src=x onerror=alert(1)>")
+    tab.until(lambda: "<img" in tab.text("import-problem"))
+    assert tab.page.locator(f"{PROBLEM} img").count() == 0
+    tab.written("Axis").fill("Y")
+    tab.until(lambda: tab.page.locator(PREVIEW).count() == 1 and "EYY" in preview(tab))
+    tab.until(lambda: not tab.page.locator(PROBLEM).is_visible())
+    assert not apply.is_disabled()
+    tab.choose("Variant", "type-1")
+    tab.until(lambda: "taken for offsets" not in preview(tab))
+    apply.click()
+    tab.until(lambda: "EYY" in tab.state().scene.errors)
+    assert set(before.scene.errors) <= set(tab.state().scene.errors)
+
+
+def test_a_choice_that_does_not_fit_keeps_the_preview_and_cannot_be_applied(tab: Tab) -> None:
+    before = tab.state()
+    tab.panel("Files")
+    tab.upload("x.csv", RUNS)
+    preview(tab)
+    assert not tab.page.get_by_label("Format", exact=True).first.is_visible()
+    tab.page.get_by_text(FOLDER).click()
+    tab.choose("Format", "marlin: Marlin skew correction, M852 and Configuration.h")
+    tab.page.wait_for_selector(PROBLEM)
+    assert "x.csv: has no skew factors" in tab.text("import-problem")
+    assert "EXX" in preview(tab)
+    assert "As it was last read" in preview(tab)
+    apply = tab.page.get_by_role("button", name="Apply", exact=True).last
+    tab.until(apply.is_disabled)
+    # neither sign nor variant is asked of a table of measured errors
+    tab.choose("Format", "recognised: measurement table of warpspace")
+    tab.until(lambda: not tab.page.locator(PROBLEM).is_visible())
+    assert not tab.page.get_by_label("Sign", exact=True).first.is_visible()
+    tab.until(lambda: not apply.is_disabled())
+    tab.page.get_by_role("button", name="Cancel", exact=True).last.click()
+    tab.page.wait_for_selector(PREVIEW, state="detached")
+    assert tab.state().scene == before.scene

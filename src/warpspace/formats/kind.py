@@ -119,7 +119,7 @@ def resolve_axis(name: str, source: Source, line: int | None, options: ReadOptio
 
     Raises
     ------
-    SceneError
+    UnsaidError
         If it means no axis, or none of the machine.
     """
     machine = options.machine
@@ -133,12 +133,12 @@ def resolve_axis(name: str, source: Source, line: int | None, options: ReadOptio
         known = ", ".join(machine.axes)
         hint = "" if given else f" (--axis {bare or 'NAME'}=AXIS says which one it is)"
         found = f"axis {bare!r} is none of the machine {machine.chain}, which has {known}{hint}"
-        source.refuse(found, line)
+        raise source.unsaid(found, line)
     for axis in candidates:
         if len(axis) == 1 or given:
             return axis
     expected = f"expected X Y Z U V W A B C; --axis {bare or 'NAME'}=AXIS says which one it is"
-    raise source.problem(f"axis {bare!r} is not known; {expected}", line)
+    raise source.unsaid(f"axis {bare!r} is not known; {expected}", line)
 
 
 def _candidates(bare: str) -> list[str]:

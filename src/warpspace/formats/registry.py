@@ -90,8 +90,10 @@ def recognise(sources: Sequence[Source]) -> Format:
 
     Raises
     ------
+    UnsaidError
+        If a file is of no format that is known.
     SceneError
-        If a file is of no format that is known, or they are of several.
+        If they are of several.
     """
     found: dict[str, Format] = {}
     for source in sources:
@@ -100,7 +102,7 @@ def recognise(sources: Sequence[Source]) -> Format:
             names = ", ".join(one.name for one in formats())
             first = next((line for line in source.lines if line.strip()), "")
             number = source.lines.index(first) + 1 if first else None
-            source.refuse(
+            raise source.unsaid(
                 f"{source.shown(number) if number else 'nothing'} is of no format that is known;"
                 f" expected one of {names} (--format NAME says which; `warpspace formats` lists"
                 " what each holds)",

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
-from warpspace.exceptions import SceneError
+from warpspace.exceptions import SceneError, UnsaidError
 from warpspace.scene.files import check_file
 
 MAX_BYTES = 64 * 1024 * 1024
@@ -62,12 +62,20 @@ class Source:
 
     def problem(self, problem: str, line: int | None = None) -> SceneError:
         """Give the exception that refuses the file, see `refuse`."""
-        where = "" if line is None else f"line {line}: "
-        return SceneError(self.name, [where + problem])
+        return SceneError(self.name, [_placed(problem, line)])
+
+    def unsaid(self, problem: str, line: int | None = None) -> UnsaidError:
+        """Give the exception that asks for what the file does not say, see `refuse`."""
+        return UnsaidError(self.name, [_placed(problem, line)])
 
     def shown(self, line: int) -> str:
         """Give a line as a message shows it; its number counts from 1."""
         return shown(self.lines[line - 1])
+
+
+def _placed(problem: str, line: int | None) -> str:
+    """Put the number of a line before a problem."""
+    return problem if line is None else f"line {line}: {problem}"
 
 
 def shown(text: str) -> str:

@@ -38,7 +38,14 @@ class Curve:
     dots: tuple[tuple[float, float, str], ...]
 
 
-def preview_html(reading: Reading, names: Sequence[str], machine: str, notes: Sequence[str]) -> str:
+def preview_html(
+    reading: Reading,
+    names: Sequence[str],
+    machine: str,
+    notes: Sequence[str],
+    *,
+    stale: bool = False,
+) -> str:
     """Show what an import would bring.
 
     Parameters
@@ -50,6 +57,8 @@ def preview_html(reading: Reading, names: Sequence[str], machine: str, notes: Se
         Title of the machine.
     notes : sequence of str
         What would be replaced or kept.
+    stale : bool, optional
+        Whether it is of choices that have been changed since, to some that do not fit.
 
     Returns
     -------
@@ -63,6 +72,7 @@ def preview_html(reading: Reading, names: Sequence[str], machine: str, notes: Se
         recognised=reading.recognised,
         names=names,
         machine=machine,
+        stale=stale,
         units=found.units,
         rows=summaries(found),
         curves=[_curve(one) for one in found.series[:MOST_CURVES]],

@@ -117,7 +117,7 @@ def _looked_up(source: Source, axes: dict[str, list[str]], options: ReadOptions)
     if len(last) == 1 and last in "XYZUVWABC":
         return resolve_axis(last, source, None, options)
     expected = "expected its .CMA file beside it, or --axis X"
-    raise source.problem(f"does not say over which axis; {expected}")
+    raise source.unsaid(f"does not say over which axis; {expected}")
 
 
 def _lines(source: Source, along: str, options: ReadOptions) -> list[Line]:

@@ -112,7 +112,8 @@ def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
             letter = stem.upper().rsplit("_", 1)[-1]
             axis = options.axis or (letter if len(letter) == 1 and letter in JOINTS else "")
         if not axis:
-            source.refuse("does not say which axis it is for; expected --axis X, or its INI file")
+            expected = "expected --axis X, or its INI file"
+            raise source.unsaid(f"does not say which axis it is for; {expected}")
         axis = resolve_axis(axis, source, None, options)
         rows = _rows(source)
         kind, said = _kind(rows, options.variant or kind)

@@ -118,7 +118,7 @@ def _axis(source: Source, sections: dict[str, Lines], options: ReadOptions) -> s
         matched = _KEY.fullmatch(text)
         if matched and matched[1].strip().lower() == "axis" and matched[2].strip():
             return resolve_axis(matched[2].split()[0], source, number, options)
-    raise source.problem("does not name its axis; expected --axis X")
+    raise source.unsaid("does not name its axis; expected --axis X")
 
 
 def _read_one(source: Source, options: ReadOptions) -> Imported:
