@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from warpspace.machine.parameters import parameter
 from warpspace.units import Array
@@ -13,6 +14,7 @@ FORWARD, BACKWARD, BOTH = 1, -1, 0
 """Direction of travel in which a value was taken; both where a file does not tell."""
 REPEATABILITY = 4.0
 """ISO 230-2, 3.17: unidirectional repeatability in standard deviations."""
+Matrix = tuple[tuple[float, ...], ...]
 
 
 @dataclass(frozen=True)
@@ -117,13 +119,53 @@ class Plane:
     first, second : tuple of float, mm or degrees
         Ascending positions of the two axes.
     values : tuple of tuple of float, (first, second), µm or µrad
+        Forward values where `backward` is given.
+    backward : tuple of tuple of float, (first, second), µm or µrad
+        Values for travel of the first axis in the negative direction; empty where they are the
+        same.
     """
 
     key: str
     axes: tuple[str, str]
     first: tuple[float, ...]
     second: tuple[float, ...]
-    values: tuple[tuple[float, ...], ...]
+    values: Matrix
+    backward: Matrix = ()
+
+    def table(self, direction: int) -> Array:
+        """Give the values of a direction of travel, the mean of both for 0, (first, second)."""
+        forward = np.array(self.values)
+        backward = np.array(self.backward) if self.backward else forward
+        return {FORWARD: forward, BACKWARD: backward, BOTH: (forward + backward) / 2.0}[direction]
+
+
+def plane_by_direction(
+    key: str,
+    axes: tuple[str, str],
+    positions: tuple[ArrayLike, ArrayLike],
+    tables: Mapping[int, Array],
+) -> Plane:
+    """Build an error over two axes of its values in both directions of travel.
+
+    Parameters
+    ----------
+    key : str
+    axes : tuple of str, (2,)
+    positions : tuple of array_like, (n,) and (m,), mm or degrees
+        Ascending, of each axis.
+    tables : mapping of int to ndarray, (first, second), µm or µrad
+        By direction, 1 and −1.
+
+    Returns
+    -------
+    Plane
+        With one table where both are the same.
+    """
+    forward, backward = (
+        tuple(tuple(row) for row in tables[way].tolist()) for way in (FORWARD, BACKWARD)
+    )
+    first, second = (tuple(np.asarray(at, dtype=float).tolist()) for at in positions)
+    return Plane(key, axes, first, second, forward, () if backward == forward else backward)
 
 
 @dataclass(frozen=True)
@@ -173,6 +215,15 @@ class Imported:
         """Axes that its errors belong to, each once."""
         own = [parameter(key).axis for key in self.keys]
         return tuple(dict.fromkeys((*own, *(axis for one in self.planes for axis in one.axes))))
+
+    @property
+    def size(self) -> int:
+        """How many numbers it holds."""
+        series = sum(len(run.values) for one in self.series for run in one.runs)
+        planes = sum(
+            len(one.first) * len(one.second) * (2 if one.backward else 1) for one in self.planes
+        )
+        return series + planes + len(self.constants)
 
 
 def merge(parts: Sequence[Imported]) -> Imported:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpspace.formats.measured import BACKWARD, FORWARD, Imported, Series
+from warpspace.formats.measured import BACKWARD, BOTH, FORWARD, Imported, Series
 from warpspace.machine.parameters import parameter
 
 
@@ -17,7 +17,8 @@ class Summary:
     key, unit : str
         Values below are in the unit, µm or µrad.
     kind : str
-        "table", "by direction", "over Z", "constant", or the name of a curve.
+        "table", "by direction", "over Z", "over Z, by direction", "constant", or the name of a
+        curve.
     points, runs : int
     directions : str
         "+", "-", "+ -", or empty where not told.
@@ -51,15 +52,16 @@ def summaries(found: Imported) -> list[Summary]:
     """Summarise all errors of an import."""
     rows = [_of_series(one) for one in found.series]
     for plane in found.planes:
-        values = np.array(plane.values)
+        values = plane.table(BOTH)
+        ways = ", by direction" if plane.backward else ""
         rows.append(
             Summary(
                 plane.key,
                 parameter(plane.key).unit,
-                f"over {plane.axes[1]}",
+                f"over {plane.axes[1]}{ways}",
                 values.size,
                 0,
-                "",
+                "+ -" if plane.backward else "",
                 (plane.first[0], plane.first[-1]),
                 float(values.min()),
                 float(values.max()),

@@ -6,7 +6,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from warpspace.formats.kind import ReadOptions
-from warpspace.formats.measured import BACKWARD, BOTH, FORWARD, Imported, Plane, Run, Series
+from warpspace.formats.measured import (
+    BACKWARD,
+    BOTH,
+    FORWARD,
+    Imported,
+    Plane,
+    Run,
+    Series,
+    plane_by_direction,
+)
 from warpspace.formats.numbers import DEG_TO_URAD, MM_TO_UM, RAD_TO_URAD
 from warpspace.formats.source import Source
 from warpspace.formats.terms import Affine, Grid3, Line, Product, Tables
@@ -16,6 +25,7 @@ from warpspace.units import Array
 
 SQUARENESS = {("X", "Y"): ("EC0Y", -1.0), ("X", "Z"): ("EB0Z", 1.0), ("Y", "Z"): ("EA0Z", -1.0)}
 """Squareness that an error of the first axis in proportion to the second one is, and its sign."""
+WAYS = (FORWARD, BACKWARD)
 NEGLIGIBLE = 1e-9
 """µm or µrad."""
 
@@ -116,10 +126,7 @@ def _series(key: str, parts: Sequence[Line], machine: Machine | None) -> Series:
     """Add up the tables of one error over all their positions."""
     at = np.unique(np.concatenate([part.positions for part in parts]))
     factor = _factor(machine, parts[0].source, parts[0].target)
-    ways = {
-        way: factor * np.sum([part.at(at, way) for part in parts], axis=0)
-        for way in (FORWARD, BACKWARD)
-    }
+    ways = {way: factor * np.sum([part.at(at, way) for part in parts], axis=0) for way in WAYS}
     if np.array_equal(ways[FORWARD], ways[BACKWARD]):
         runs = (Run(1, BOTH, tuple(ways[FORWARD].tolist())),)
     else:
@@ -128,21 +135,19 @@ def _series(key: str, parts: Sequence[Line], machine: Machine | None) -> Series:
 
 
 def _plane(term: Product, machine: Machine | None, source: Source) -> Plane:
-    """Spell a product of tables as an error of two axes."""
+    """Spell a product of tables as an error of two axes, by direction where they are."""
     one, other = term.first, term.second
     if one.source == other.source or not is_linear(one.target):
         source.refuse(
             f"multiplies tables over {one.source} and {other.source} for {one.target}; expected"
             " tables over two axes that correct a linear axis"
         )
-    factor = _factor(machine, one.source, one.target) * term.sign
-    values = factor * np.outer(one.values, other.values)
-    return Plane(
-        error_key(one.source, one.target),
-        (one.source, other.source),
-        one.positions,
-        other.positions,
-        _rows(values),
+    factor = _factor(machine, one.source, one.target)
+    first, second = np.meshgrid(one.positions, other.positions, indexing="ij")
+    tables = {way: factor * term.at(first, second, way) for way in WAYS}
+    key = error_key(one.source, one.target)
+    return plane_by_direction(
+        key, (one.source, other.source), (one.positions, other.positions), tables
     )
 
 
@@ -196,9 +201,13 @@ def _joined(
         if place is None:
             left.append(one)
             continue
-        column = np.repeat(one.values[:, None], 2, axis=1)
         ends = (joined[place].second[0], joined[place].second[-1])
-        own = Plane(one.key, place[1], one.positions, ends, _rows(column))
+        columns = {
+            way: np.repeat((one.values if mean is None else mean)[:, None], 2, axis=1)
+            for way in WAYS
+            for mean in (one.mean(way),)
+        }
+        own = plane_by_direction(one.key, place[1], (one.positions, ends), columns)
         joined[place] = _added(joined[place], own)
     return left, list(joined.values())
 
@@ -207,16 +216,16 @@ def _added(one: Plane, other: Plane) -> Plane:
     """Add two planes over all their positions."""
     first = np.union1d(one.first, other.first)
     second = np.union1d(one.second, other.second)
-    total = sum(_resampled(plane, first, second) for plane in (one, other))
-    return Plane(
-        one.key, one.axes, tuple(first.tolist()), tuple(second.tolist()), _rows(np.asarray(total))
-    )
+    totals = {
+        way: _resampled(one, way, first, second) + _resampled(other, way, first, second)
+        for way in WAYS
+    }
+    return plane_by_direction(one.key, one.axes, (first.tolist(), second.tolist()), totals)
 
 
-def _resampled(plane: Plane, first: Array, second: Array) -> Array:
+def _resampled(plane: Plane, direction: int, first: Array, second: Array) -> Array:
     """Interpolate a plane linearly at other positions, ends held."""
-    values = np.asarray(plane.values)
-    rows = np.array([np.interp(second, plane.second, row) for row in values])
+    rows = np.array([np.interp(second, plane.second, row) for row in plane.table(direction)])
     return np.array([np.interp(first, plane.first, column) for column in rows.T]).T
 
 

@@ -65,6 +65,11 @@ class Line:
         """How many numbers it takes."""
         return len(self.values) + len(self.backward)
 
+    @property
+    def is_directed(self) -> bool:
+        """Whether it depends on the direction of travel."""
+        return bool(self.direction or self.backward)
+
     def at(self, position: Array, direction: int = 0) -> Array:
         """Interpolate linearly, [...]; without a direction of travel the mean of both."""
         if self.backward and direction == 0:
@@ -103,9 +108,14 @@ class Product:
 
     def corrections(self, coordinates: Coordinates, direction: int = 0) -> dict[str, Array]:
         """Give the correction of the target of the first table."""
-        first = self.first.at(coordinates[self.first.source], direction)
-        second = self.second.at(coordinates[self.second.source], direction)
-        return {self.first.target: self.sign * first * second}
+        first, second = (np.asarray(coordinates[line.source]) for line in (self.first, self.second))
+        return {self.first.target: self.at(first, second, direction)}
+
+    def at(self, first: Array, second: Array, direction: int = 0) -> Array:
+        """Multiply both tables at positions of their axes; without a direction the mean of both."""
+        if direction == 0 and (self.first.is_directed or self.second.is_directed):
+            return (self.at(first, second, 1) + self.at(first, second, -1)) / 2.0
+        return self.sign * self.first.at(first, direction) * self.second.at(second, direction)
 
 
 @dataclass(frozen=True)

@@ -245,12 +245,16 @@ def _table(span: tuple[float, float], at: Sequence[float], values: Sequence[floa
 
 
 def _surface(plane: Plane, base: Scene, name: str) -> ErrorFunction:
-    """Build a table over two axes."""
+    """Build a table over two axes, by direction where it depends on it."""
     if len(plane.first) * len(plane.second) > MAX_POINTS:
         found = f"{plane.key} has {len(plane.first)} × {len(plane.second)} values"
         raise SceneError(name, [f"{found}; expected at most {MAX_POINTS:,}"])
     span = base.axis_span(parameter(plane.key).axis)
-    return TwoArguments(span, plane.axes, (plane.first, plane.second), plane.values)
+    at = (plane.first, plane.second)
+    forward = TwoArguments(span, plane.axes, at, plane.values)
+    if not plane.backward:
+        return forward
+    return Directional(span, forward, replace(forward, values=plane.backward))
 
 
 def _measured(

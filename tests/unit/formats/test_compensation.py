@@ -15,7 +15,6 @@ from warpspace.formats.kinds import fanuc_3d
 from warpspace.formats.registry import formats, recognise
 from warpspace.formats.source import source_of_text
 from warpspace.formats.to_scene import into_scene
-from warpspace.machine.curves.directional import Directional
 from warpspace.machine.errors import Constant, ErrorSet, Harmonics, Poly, Table
 from warpspace.scene.library import load_scene, parse_scene
 from warpspace.scene.pipeline import evaluate
@@ -79,22 +78,6 @@ def test_parameters_written_and_read_give_the_same_field(name: str) -> None:
     # six printed decimals of a micrometre or microradian, levers below 1.5 m
     assert np.abs(there.error_um - here.error_um).max() < 5e-6
     assert written.after_statistics.max_um < 0.02
-
-
-def test_directions_of_travel_are_kept_in_the_own_table_and_by_linuxcnc() -> None:
-    scene = scene_with("EXX = { forward = { poly = [2, 0.01] }, backward = { poly = [-1, 0.01] } }")
-    back = read_back(compensate(scene, Plan("csv", 3), NODES), scene)
-    assert isinstance(back.errors.functions["EXX"], Directional)
-    found = compensate(scene, Plan("linuxcnc-comp", 3), NODES)
-    back = read_back(found, scene)
-    curve = back.errors.functions["EXX"]
-    assert isinstance(curve, Directional)
-    assert curve.forward.evaluate(np.array(0.0)) == pytest.approx(2.0, abs=1e-3)
-    assert curve.backward.evaluate(np.array(0.0)) == pytest.approx(-1.0, abs=1e-3)
-    for way in ("forward", "backward", "mean"):
-        looked_at = replace(scene, model=replace(scene.model, direction=way))
-        left = compensate(looked_at, Plan("linuxcnc-comp", 3), NODES).after_statistics.max_um
-        assert left < 0.002, way
 
 
 @pytest.mark.parametrize("name", ["sinumerik-enc", "linuxcnc-comp", "sinumerik-cec", "heidenhain"])

@@ -15,6 +15,7 @@ from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
     from warpspace.analysis.statistics import Statistics
+    from warpspace.field.basis import ErrorField
     from warpspace.formats.compensation.compensate import Compensation, Plan
     from warpspace.formats.compensation.sweep import Step
     from warpspace.scene.model import Scene
@@ -166,11 +167,13 @@ def _run(
         *number_columns(("mean", "RMS", "P95", "max"), "µm"),
         *number_columns(("mean tilt", "max tilt"), "µrad"),
     )
+    shown = {"": found, **found.directions}
     rows = [
-        (word, *_four(numbers), *(f"{value:.2f}" for value in _tilt(found, word)))
-        for word, numbers in (
-            ("before", found.before_statistics),
-            ("after", found.after_statistics),
+        (f"{word} {way}".rstrip(), *_four(numbers), *(f"{v:.2f}" for v in _tilt(found, field)))
+        for way, one in shown.items()
+        for word, numbers, field in (
+            ("before", one.before_statistics, one.before),
+            ("after", one.after_statistics, one.after),
         )
     ]
     print_table(columns, rows)
@@ -297,19 +300,25 @@ def _json(found: "Compensation", files: list[str]) -> dict[str, object]:
         "after": _statistics(after),
         "worst_after_um": after.max_um,
         "orientation": {
-            word: dict(zip(("mean_urad", "max_urad"), _tilt(found, word), strict=True))
-            for word in ("before", "after")
+            word: dict(zip(("mean_urad", "max_urad"), _tilt(found, field), strict=True))
+            for word, field in (("before", found.before), ("after", found.after))
+        },
+        "directions": {
+            way: {
+                "before": _statistics(one.before_statistics),
+                "after": _statistics(one.after_statistics),
+            }
+            for way, one in found.directions.items()
         },
         "assumed": list(found.assumed),
         "notes": list(found.notes),
     }
 
 
-def _tilt(found: "Compensation", word: str) -> tuple[float, float]:
+def _tilt(found: "Compensation", field: "ErrorField") -> tuple[float, float]:
     """Give mean, by volume, and largest tilt of the tool axis, µrad."""
     import numpy as np
 
-    field = found.before if word == "before" else found.after
     tilt = np.linalg.norm(field.orientation_urad, axis=-1)
     return float(np.sum(found.grid.weights * tilt)), float(tilt.max())
 

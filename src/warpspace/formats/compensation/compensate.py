@@ -1,7 +1,7 @@
 """A compensation from a scene to the controller and back: written, read, evaluated, applied."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -9,11 +9,17 @@ from warpspace.analysis.statistics import Statistics, volume_statistics
 from warpspace.exceptions import OptionError
 from warpspace.field.basis import ErrorField
 from warpspace.field.grid import Grid, build_grid
-from warpspace.formats.compensation.corrector import Corrector, build_corrector, field_after
+from warpspace.formats.compensation.corrector import Corrector, build_corrector
+from warpspace.formats.compensation.directions import (
+    WAYS,
+    InDirection,
+    evaluated,
+    reversal_notes,
+    toward,
+)
 from warpspace.formats.compensation.wanted import Wanted
 from warpspace.formats.importing import Reading
 from warpspace.formats.kind import SIGNS, Format, ReadOptions
-from warpspace.formats.measured import Imported
 from warpspace.formats.registry import find_format
 from warpspace.formats.source import Source, source_of_text
 from warpspace.formats.terms import Tables
@@ -28,7 +34,6 @@ NODES = 28
 """Nodes per axis that what is left is evaluated at: between the points of usual tables."""
 RESOLUTION = (0.0, 0.1)
 """mm or degrees."""
-WAYS = {TravelDirection.FORWARD: 1, TravelDirection.BACKWARD: -1}
 
 
 @dataclass(frozen=True)
@@ -80,6 +85,8 @@ class Compensation:
     axes : tuple of str
         Axes that are corrected.
     assumed, notes : tuple of str
+    directions : mapping of str to InDirection
+        "forward" and "backward", where errors depend on the direction of travel.
     """
 
     format: Format
@@ -93,6 +100,7 @@ class Compensation:
     axes: tuple[str, ...]
     assumed: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    directions: Mapping[str, InDirection] = field(default_factory=dict[str, InDirection])
 
     @property
     def bytes(self) -> int:
@@ -181,28 +189,30 @@ def compensate(scene: Scene, plan: Plan, nodes: int = NODES) -> Compensation:
         for add, text in files.items()
     ]
     controller = _read_back(kind, sources, wanted)
-    reference = _reference(scene)
-    before = field_after(corrector, grid.coordinates, {}, grid.nominal_mm, reference, {})
-    after = field_after(
-        corrector,
-        grid.coordinates,
-        controller.moves(grid.coordinates),
-        grid.nominal_mm,
-        reference,
-        {} if reference is None else controller.moves(reference),
-    )
+    still = _reference(scene)
+    own = evaluated(corrector, controller.moves, grid, still)
+    directions: dict[str, InDirection] = {}
+    notes = controller.notes
+    if scene.errors.has_directions:
+        there, back = (
+            evaluated(toward(corrector, way), controller.toward(way).moves, grid, still)
+            for way in WAYS
+        )
+        directions = {"forward": there, "backward": back}
+        notes += reversal_notes(there, back, scene.errors, scene.model.direction)
     return Compensation(
         kind,
         files,
         points,
         controller.size,
         grid,
-        before,
-        after,
+        own.before,
+        own.after,
         str(corrector.loop),
         corrector.moved,
         controller.assumed,
-        controller.notes,
+        notes,
+        directions,
     )
 
 
@@ -216,6 +226,10 @@ class _Controller:
     assumed: tuple[str, ...]
     notes: tuple[str, ...]
     direction: int
+
+    def toward(self, direction: TravelDirection) -> "_Controller":
+        """Give the controller whose axes travel in a direction."""
+        return replace(self, corrector=toward(self.corrector, direction), direction=WAYS[direction])
 
     def moves(self, coordinates: Coordinates) -> dict[str, Array]:
         """Give what it adds to the commanded positions."""
@@ -246,6 +260,13 @@ def _read_back(kind: Format, sources: list[Source], wanted: Wanted) -> _Controll
     lost = [key for key in scene.errors if key not in errors and scene.errors.amplitude(key)]
     if lost:
         notes.append(f"has no place for {', '.join(lost)}")
+    partly = [
+        key
+        for key in scene.errors
+        if key in errors and set(scene.errors.arguments(key)) - set(errors.arguments(key))
+    ]
+    if partly:
+        notes.append(f"holds {', '.join(partly)} over fewer axes than the scene")
     differing = [
         axis
         for axis in scene.machine.axes
@@ -255,7 +276,7 @@ def _read_back(kind: Format, sources: list[Source], wanted: Wanted) -> _Controll
         notes.append(
             f"errors of {', '.join(differing)} stand in another convention here than in the scene"
         )
-    return _Controller(corrector, None, _count(found), found.assumed, tuple(notes), direction)
+    return _Controller(corrector, None, found.size, found.assumed, tuple(notes), direction)
 
 
 def _rounded(errors: ErrorSet, resolution: float) -> ErrorSet:
@@ -265,13 +286,6 @@ def _rounded(errors: ErrorSet, resolution: float) -> ErrorSet:
         f"--resolution {resolution:g}: formats of error parameters have as many digits as they"
         " print; expected a table of corrections"
     )
-
-
-def _count(found: Imported) -> int:
-    """Count the numbers of an error set."""
-    series = sum(len(run.values) for one in found.series for run in one.runs)
-    planes = sum(len(one.first) * len(one.second) for one in found.planes)
-    return series + planes + len(found.constants)
 
 
 def _reference(scene: Scene) -> dict[str, Array] | None:

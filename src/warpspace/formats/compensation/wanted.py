@@ -7,6 +7,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warpspace.formats.compensation.corrector import Corrector
+from warpspace.machine.curves.directional import Directional
+from warpspace.machine.errors import ErrorSet
+from warpspace.machine.parameters import parameter
+from warpspace.machine.travel import TravelDirection
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
@@ -59,10 +63,34 @@ class Wanted:
         given = np.asarray(values, dtype=float)
         return np.round(given / step) * step if step else given
 
-    def toward(self, direction: str) -> "Wanted":
-        """Give what is wanted for one direction of travel, "forward" or "backward"."""
-        model = replace(self.corrector.model, direction=direction)
-        return replace(self, corrector=replace(self.corrector, model=model))
+    @property
+    def directed(self) -> tuple[str, ...]:
+        """Those of `axes` that have errors by direction of travel."""
+        functions = self.corrector.errors.functions
+        found = {parameter(key).axis for key, curve in functions.items() if curve.has_directions}
+        return tuple(axis for axis in self.axes if axis in found)
+
+    def toward(self, direction: str, axis: str = "") -> "Wanted":
+        """Give what is wanted for one direction of travel, of all axes or of one alone.
+
+        Parameters
+        ----------
+        direction : str
+            "mean", "forward" or "backward".
+        axis : str, optional
+            All other axes travel as in the scene; "forward" or "backward" then.
+        """
+        model, errors = self.corrector.model, self.corrector.errors
+        if not axis:
+            corrector = replace(self.corrector, model=replace(model, direction=direction))
+            return replace(self, corrector=corrector)
+        own = {
+            key: curve.forward if direction == TravelDirection.FORWARD else curve.backward
+            for key, curve in errors.functions.items()
+            if isinstance(curve, Directional) and parameter(key).axis == axis
+        }
+        changed = ErrorSet({**errors.functions, **own})
+        return replace(self, corrector=replace(self.corrector, errors=changed))
 
     def corrections(self, places: Mapping[str, Array]) -> dict[str, Array]:
         """Give the corrections of all axes on a grid of places along the axes of the volume.

@@ -9,7 +9,16 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from warpspace.formats.kind import Format, ReadOptions
-from warpspace.formats.measured import BACKWARD, BOTH, FORWARD, Imported, Run, Series, merge
+from warpspace.formats.measured import (
+    BACKWARD,
+    BOTH,
+    FORWARD,
+    Imported,
+    Plane,
+    Run,
+    Series,
+    merge,
+)
 from warpspace.formats.numbers import check_error, check_position, read_number, read_whole
 from warpspace.formats.parts.csv_header import (
     DIRECTION,
@@ -22,7 +31,7 @@ from warpspace.formats.parts.csv_header import (
     separator_of,
 )
 from warpspace.formats.parts.csv_writing import write
-from warpspace.formats.parts.planes import SAME, distinct, plane_of
+from warpspace.formats.parts.planes import SAME, Point, distinct, plane_by_ways
 from warpspace.formats.source import Source, shown
 from warpspace.machine.limits import MAX_POINTS, MAX_RUNS
 from warpspace.machine.parameters import parameter
@@ -62,7 +71,7 @@ def _read_one(source: Source) -> Imported:
         expected = "expected it in a file without positions"
         source.refuse(f"column {wrong} is a constant error; {expected}", line)
     if len(positions) == 2:
-        return _planes(source, rows, columns, units)
+        return _planes(source, rows, columns, units, line)
     if len(positions) > 2:
         source.refuse(f"{len(positions)} columns of positions; expected one or two", line)
     axis = positions[0].name
@@ -214,24 +223,33 @@ def _uncertainty(rows: Sequence[Row], key: str, index: np.ndarray, count: int) -
 
 
 def _planes(
-    source: Source, rows: Sequence[Row], columns: Sequence[Column], units: tuple[str, ...]
+    source: Source,
+    rows: Sequence[Row],
+    columns: Sequence[Column],
+    units: tuple[str, ...],
+    line: int,
 ) -> Imported:
-    """Read errors over two axes."""
+    """Read errors over two axes: a value a point of a grid, of each direction of travel if told."""
     first, second = (one.name for one in columns if one.role == "position")
-    planes = []
+    if unknown := next((one for one in columns if one.role in (RUN, "uncertainty")), None):
+        what = RUN if unknown.role == RUN else f"u({unknown.name})"
+        expected = "expected positions, direction and errors over two axes"
+        source.refuse(f"column {what}; {expected}: one value a point", line)
+    planes: list[Plane] = []
     for column in columns:
         if column.role != "error":
             continue
         own = parameter(column.name).axis
         if own not in (first, second):
             expected = f"expected errors of {first} or {second}"
-            source.refuse(f"column {column.name} is an error of {own}; {expected}")
+            source.refuse(f"column {column.name} is an error of {own}; {expected}", line)
         names = (own, second if own == first else first)
-        points = [
-            (line, row["position", names[0]], row["position", names[1]], row["error", column.name])
-            for line, row in rows
-        ]
-        planes.append(plane_of(column.name, names, points, source))
+        points: dict[int, list[Point]] = {}
+        for number, row in rows:
+            at = (row["position", names[0]], row["position", names[1]])
+            way = int(row.get((DIRECTION, DIRECTION), BOTH))
+            points.setdefault(way, []).append((number, *at, row["error", column.name]))
+        planes.append(plane_by_ways(column.name, names, points, source))
     return Imported(NAME, planes=tuple(planes), units=units, notes=source.notes)
 
 
@@ -240,9 +258,10 @@ FORMAT = Format(
     title="measurement table of warpspace",
     source="docs/import.md",
     endings=(".csv", ".txt"),
-    holds="any error along its axis or over two axes, runs, directions, uncertainties; constants",
+    holds="any error along its axis, with runs, directions and uncertainties; over two axes, with"
+    " directions; constants",
     units="as the header says: um mm nm in, urad mrad rad arcsec deg",
-    grid="any positions",
+    grid="any positions; over two axes every point of a grid",
     limits=f"{MAX_POINTS:,} rows",
     recognise=recognise,
     read=read,

@@ -5,7 +5,7 @@ HEIDENHAIN Technical Manual MANUALplus 620, pages 713 to 718, and TNC 407/415/42
 linear between them; `axis of the column in the .COM = F(axis of the column in the .CMA)`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from warpspace.formats.numbers import check_position, read_number
 from warpspace.formats.source import Source
 from warpspace.formats.table_errors import errors_of
 from warpspace.formats.terms import HELD, Line, Tables
+from warpspace.machine.travel import TravelDirection
+from warpspace.units import Array
 
 MOST_POINTS = 256
 """Entries of one table (TNC 407 Technical Manual, module 9095, error 3)."""
@@ -33,6 +35,7 @@ TRAVEL = (
 POSITION, BACKLASH, NUMBER, ACTIVE = "AXISPOS", "BACKLASH", "NR", "ACTIVE"
 WIDTH = 12
 Cells = dict[str, str]
+Columns = dict[str, list[str]]
 
 
 def recognise(head: str, name: str) -> bool:
@@ -210,23 +213,49 @@ def write(wanted: Wanted) -> Files:
         places = wanted.places(axis)
         values = wanted.averaged([axis])
         home = {target: target if target in wanted.axes else wanted.axes[0] for target in targets}
-        columns = {
-            target: wanted.factor(ERROR)
-            * (values[target] - (0.0 if home[target] == axis else mean[target]))
-            for target in targets
-        }
-        name = f"{stem}_{axis}"
-        rows = [(POSITION, *targets)]
-        rows += [
-            (f"{q:+.4f}", *(f"{value:+.4f}" for value in found))
-            for q, *found in zip(places, *(wanted.round(columns[t]) for t in targets), strict=True)
-        ]
-        files[f"_{axis}.COM"] = _spelled(f"{name}.COM", rows)
+        taken = {target: 0.0 if home[target] == axis else mean[target] for target in targets}
+
+        def spelled(found: Mapping[str, Array], taken: Mapping[str, float] = taken) -> Columns:
+            """Spell what is needed of each axis, without what stands in another table."""
+            factor = wanted.factor(ERROR)
+            return {
+                target: [
+                    f"{v:+.4f}" for v in wanted.round(factor * (found[target] - taken[target]))
+                ]
+                for target in targets
+            }
+
+        columns = _with_backlash(wanted, axis, spelled) or spelled(values)
+        rows = [(POSITION, *columns)]
+        rows += [(f"{q:+.4f}", *found) for q, *found in zip(places, *columns.values(), strict=True)]
+        files[f"_{axis}.COM"] = _spelled(f"{stem}_{axis}.COM", rows)
     header = (ACTIVE, *wanted.axes)
     files[""] = _spelled(
         f"{stem}.CMA", [header, ("*", *(f"{stem}_{axis}" for axis in wanted.axes))], width=24
     )
     return files
+
+
+def _with_backlash(
+    wanted: Wanted, axis: str, spelled: Callable[[Mapping[str, Array]], Columns]
+) -> Columns:
+    """Spell the one column of a table and its values for travel in the negative direction.
+
+    Empty where they do not depend on the direction, and where several axes are corrected over the
+    one: which of them BACKLASH belongs to is not published then.
+    """
+    if axis not in wanted.directed:
+        return {}
+    there, back = (
+        spelled(wanted.toward(way, axis).averaged([axis]))
+        for way in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
+    )
+    used = [
+        target for target in there if any(float(value) for value in (*there[target], *back[target]))
+    ]
+    if len(used) != 1 or there == back:
+        return {}
+    return {BACKLASH: back[used[0]], used[0]: there[used[0]]}
 
 
 def _spelled(name: str, rows: Sequence[Sequence[str]], width: int = WIDTH) -> str:
@@ -243,7 +272,7 @@ FORMAT = Format(
     title="HEIDENHAIN .COM and .CMA, nonlinear axis error compensation",
     source="HEIDENHAIN, Technical Manual MANUALplus 620 (01/2012), 6.10.3, pages 713 to 718",
     endings=(".cma", ".com"),
-    holds="displacements of any axis over any axis; backlash of one axis a table",
+    holds="displacements of any axis over any axis; by direction where a table corrects one axis",
     units="mm, degrees",
     grid="equal steps along the axis looked up",
     limits="256 points a table, 0.0001 mm",

@@ -13,7 +13,7 @@ from warpspace.formats.kind import Files, Format, ReadOptions
 from warpspace.formats.measured import BOTH, Imported, Plane, Run, Series, merge
 from warpspace.formats.numbers import check_error, check_position, read_number, spell
 from warpspace.formats.parts import volumetric
-from warpspace.formats.parts.parametric import sampled, table_of, zero_key
+from warpspace.formats.parts.parametric import in_one_direction, sampled, table_of, zero_key
 from warpspace.formats.parts.planes import plane_of
 from warpspace.formats.source import Source
 from warpspace.machine.limits import MAX_POINTS
@@ -186,7 +186,7 @@ def _plane(
 
 def write(wanted: Wanted) -> Files:
     """Write the errors of a scene, a block an axis."""
-    held = sampled(wanted)
+    held = in_one_direction(sampled(wanted), wanted)
     volumetric.check_axes(held, NAME)
     blocks: list[str] = []
     if held.constants:
@@ -194,10 +194,7 @@ def write(wanted: Wanted) -> Files:
         values = [spell(v / volumetric.factor_of(k), DIGITS) for k, v in held.constants.items()]
         blocks.append("\n".join(["\t".join(names), "\t".join(values)]))
     for axis in dict.fromkeys(parameter(one.key).axis for one in held.series):
-        own = [one for one in held.series if parameter(one.key).axis == axis]
-        table = table_of(
-            [Series(o.key, o.positions, (Run(1, BOTH, tuple(o.values.tolist())),)) for o in own]
-        )
+        table = table_of([one for one in held.series if parameter(one.key).axis == axis])
         lines = ["\t".join([axis, *table.keys])]
         for position, _, values in table.rows:
             scaled = [

@@ -12,7 +12,7 @@ from warpspace.formats.kind import Files, Format, ReadOptions
 from warpspace.formats.measured import BOTH, Imported, Run, Series, merge
 from warpspace.formats.numbers import check_error, check_position, read_number
 from warpspace.formats.parts import volumetric
-from warpspace.formats.parts.parametric import sampled
+from warpspace.formats.parts.parametric import in_one_direction, sampled
 from warpspace.formats.source import Source
 from warpspace.machine.limits import MAX_POINTS
 from warpspace.machine.parameters import parameter
@@ -124,7 +124,7 @@ def _row(
 
 def write(wanted: Wanted) -> Files:
     """Write the errors of a scene; those of two axes have no place and are left out."""
-    held = sampled(wanted)
+    held = in_one_direction(sampled(wanted), wanted)
     volumetric.check_axes(held, NAME)
     lines = [f"// {wanted.scene.title}".replace("\n", " "), "// mm, rad, degrees; variant Vendor"]
     lines += [

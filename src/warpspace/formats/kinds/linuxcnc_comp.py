@@ -151,7 +151,7 @@ def write(wanted: Wanted) -> Files:
         places = wanted.places(axis)
         ways = (TravelDirection.FORWARD, TravelDirection.BACKWARD)
         forward, backward = (
-            wanted.round(wanted.toward(way).averaged([axis])[axis]).tolist() for way in ways
+            wanted.round(wanted.toward(way, axis).averaged([axis])[axis]).tolist() for way in ways
         )
         files[f"_{axis}.comp"] = "".join(
             f"{spell(q, DIGITS)} {spell(there, DIGITS)} {spell(back, DIGITS)}\n"

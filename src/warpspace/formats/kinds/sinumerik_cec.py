@@ -5,11 +5,8 @@ K3, pages 243 to 264: linear between equidistant points, end values held, or rep
 modulo function; tables for one direction of travel; the product of two tables is added.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import combinations
-
-import numpy as np
 
 from warpspace.exceptions import OptionError
 from warpspace.formats.compensation.wanted import Wanted
@@ -17,10 +14,10 @@ from warpspace.formats.kind import ERROR, Files, Format, ReadOptions, resolve_ax
 from warpspace.formats.measured import Imported, merge
 from warpspace.formats.numbers import read_whole
 from warpspace.formats.parts import sinumerik_text as text
+from warpspace.formats.parts.cross_tables import CrossTable, cross_tables
 from warpspace.formats.source import Source
 from warpspace.formats.table_errors import errors_of
 from warpspace.formats.terms import HELD, MODULO, Line, Product, Tables, Term
-from warpspace.units import Array
 
 PREFIX = "AN_CEC"
 AXES = ("INPUT_AXIS", "OUTPUT_AXIS")
@@ -34,10 +31,6 @@ SIGN = (
     " manual says of $AA_ENC_COMP; it does not say so of $AN_CEC: try it on the machine, or give"
     " --sign correction"
 )
-MOST_PRODUCTS = 3
-"""Pairs of tables for one axis over two others."""
-LEAST_MM = 1e-5
-"""A product of tables below it is not worth two tables."""
 
 
 @dataclass
@@ -139,16 +132,7 @@ def read(sources: Sequence[Source], options: ReadOptions) -> Imported:
 
 def write(wanted: Wanted) -> Files:
     """Write tables of every axis over every axis, and products of two where they help."""
-    tables: list[tuple[str, str, Array, int]] = []
-    axes = wanted.axes
-    groups = [(), *((axis,) for axis in axes), *combinations(axes, 2)]
-    needed = {group: wanted.averaged(group) for group in groups}
-    for target in wanted.corrector.moved:
-        found = {group: table[target] for group, table in needed.items()}
-        tables += _tables_for(wanted, target, found)
-    if not tables:  # nothing to correct: a table of zeros
-        axis = axes[0]
-        tables.append((axis, wanted.corrector.moved[0], np.zeros(len(wanted.places(axis))), 0))
+    tables = cross_tables(wanted, wanted.factor(ERROR), MOST_TABLES)
     if len(tables) > MOST_TABLES:
         raise OptionError(
             f"sinumerik-cec: {len(tables)} tables; expected at most {MOST_TABLES}, as the control"
@@ -158,76 +142,29 @@ def write(wanted: Wanted) -> Files:
         f"; written by warpspace for {wanted.scene.title}".replace("\n", " "),
         f"; {SIGN if not wanted.sign else 'sign: ' + wanted.sign}",
     ]
-    for index, (along, target, values, number) in enumerate(tables):
-        body += _spelled(wanted, index, along, target, values, number)
+    for index, table in enumerate(tables):
+        body += _spelled(wanted, index, table)
     return text.archive("NC_CEC", body)
 
 
-def _tables_for(
-    wanted: Wanted, target: str, needed: Mapping[tuple[str, ...], Array]
-) -> list[tuple[str, str, Array, int]]:
-    """Give the tables that correct one axis: axis looked up, corrected axis, values, factor table.
-
-    The last entry is how many tables further the other factor of a product stands, 0 for none.
-    """
-    factor = wanted.factor(ERROR)
-    axes = wanted.axes
-    mean = float(needed[()])
-    along = {axis: needed[axis,] - mean for axis in axes}
-    home = target if target in axes else axes[0]
-    along[home] = along[home] + mean
-    products: list[tuple[str, str, Array, int]] = []
-    for i, first in enumerate(axes):
-        for second in axes[i + 1 :]:
-            rest = factor * _interaction(needed[first, second])
-            left, sizes, right = np.linalg.svd(rest)
-            for rank, size in enumerate(sizes[:MOST_PRODUCTS].tolist()):
-                one, other = left[:, rank] * np.sqrt(size), right[rank] * np.sqrt(size)
-                if np.abs(one).max() * np.abs(other).max() < LEAST_MM:
-                    break
-                # both tables also act by themselves: their axis' own table takes that back
-                along[first] = along[first] - factor * one
-                along[second] = along[second] - factor * other
-                products += [(first, target, one, 1), (second, target, other, 0)]
-    own = [(axis, target, factor * values, 0) for axis, values in along.items()]
-    kept = [table for table in own if np.abs(table[2]).max() > LEAST_MM / 100.0]
-    return [*kept, *products]
-
-
-def _interaction(both: Array) -> Array:
-    """Take out of a table of two axes what depends on one of them alone, [n1, n2]."""
-    one, other = (_shares(count) for count in both.shape)
-    first, second = both @ other, one @ both
-    return both - first[:, None] - second + one @ first
-
-
-def _shares(count: int) -> Array:
-    """Give the share of an axis that belongs to each of its points, trapezoidal, [n]."""
-    shares = np.ones(count)
-    shares[[0, -1]] = 0.5
-    return shares / shares.sum()
-
-
-def _spelled(
-    wanted: Wanted, index: int, along: str, target: str, values: Array, number: int
-) -> list[str]:
+def _spelled(wanted: Wanted, index: int, table: CrossTable) -> list[str]:
     """Spell one table."""
-    places = wanted.places(along)
+    places = wanted.places(table.along)
     step = (places[-1] - places[0]) / (len(places) - 1)
     lines = [f"; MD18342 $MN_MM_CEC_MAX_POINTS[{index}] = {len(places)}"]
     lines += [
         f"${PREFIX}[{index},{point}]={text.value_text(value)}"
-        for point, value in enumerate(wanted.round(values).tolist())
+        for point, value in enumerate(wanted.round(table.values).tolist())
     ]
     return [
         *lines,
-        f"${PREFIX}_INPUT_AXIS[{index}]=({along})",
-        f"${PREFIX}_OUTPUT_AXIS[{index}]=({target})",
+        f"${PREFIX}_INPUT_AXIS[{index}]=({table.along})",
+        f"${PREFIX}_OUTPUT_AXIS[{index}]=({table.target})",
         f"${PREFIX}_STEP[{index}]={float(step)!r}",
         f"${PREFIX}_MIN[{index}]={float(places[0])!r}",
         f"${PREFIX}_MAX[{index}]={float(places[-1])!r}",
-        f"${PREFIX}_DIRECTION[{index}]=0",
-        f"${PREFIX}_MULT_BY_TABLE[{index}]={index + number + 1 if number else 0}",
+        f"${PREFIX}_DIRECTION[{index}]={table.direction}",
+        f"${PREFIX}_MULT_BY_TABLE[{index}]={index + table.number + 1 if table.number else 0}",
         f"${PREFIX}_IS_MODULO[{index}]=0",
     ]
 

@@ -1,0 +1,110 @@
+"""What a compensation does in each direction of travel, for errors that depend on it."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from warpspace.analysis.statistics import Statistics, volume_statistics
+from warpspace.field.basis import ErrorField
+from warpspace.field.grid import Grid
+from warpspace.formats.compensation.corrector import Corrector, field_after
+from warpspace.kinematics.model import Coordinates
+from warpspace.machine.errors import ErrorSet
+from warpspace.machine.travel import DIRECTION_WORDS, TravelDirection
+from warpspace.units import Array
+
+Moves = Callable[[Coordinates], Mapping[str, Array]]
+WAYS = {TravelDirection.FORWARD: 1, TravelDirection.BACKWARD: -1}
+HELD = 0.05
+"""Share of the reversal that may be left where a format holds it: the steps of its table."""
+LEAST_UM = 0.01
+"""A reversal below it is none."""
+
+
+@dataclass(frozen=True)
+class InDirection:
+    """What a compensation does while all axes travel in one direction.
+
+    Attributes
+    ----------
+    before, after : ErrorField
+    grid : Grid
+    """
+
+    before: ErrorField
+    after: ErrorField
+    grid: Grid
+
+    @property
+    def before_statistics(self) -> Statistics:
+        """Of the scene as it is."""
+        return volume_statistics(self.before, self.grid)
+
+    @property
+    def after_statistics(self) -> Statistics:
+        """Of what is left."""
+        return volume_statistics(self.after, self.grid)
+
+
+def toward(corrector: Corrector, direction: str) -> Corrector:
+    """Give a corrector whose axes travel in a direction."""
+    return replace(corrector, model=replace(corrector.model, direction=direction))
+
+
+def evaluated(
+    corrector: Corrector, moves: Moves, grid: Grid, reference: Coordinates | None
+) -> InDirection:
+    """Evaluate a scene before and after a compensation.
+
+    Parameters
+    ----------
+    corrector : Corrector
+    moves : callable
+        Gives what the controller adds to commanded positions, mm or degrees.
+    grid : Grid
+    reference : mapping of str to ndarray or None
+        The point held still.
+    """
+    at, nominal = grid.coordinates, grid.nominal_mm
+    still = {} if reference is None else moves(reference)
+    return InDirection(
+        field_after(corrector, at, {}, nominal, reference, {}),
+        field_after(corrector, at, moves(at), nominal, reference, still),
+        grid,
+    )
+
+
+def reversal_notes(
+    there: InDirection, back: InDirection, errors: ErrorSet, direction: str
+) -> tuple[str, ...]:
+    """Say what of the reversal a format has no place for.
+
+    Parameters
+    ----------
+    there, back : InDirection
+        Forward and backward.
+    errors : ErrorSet
+        Of the scene.
+    direction : str
+        What the scene looks at.
+
+    Returns
+    -------
+    tuple of str
+        Nothing where hardly any of it is left.
+    """
+    before, after = (
+        float(np.linalg.norm(one.error_um - other.error_um, axis=-1).max())
+        for one, other in ((there.before, back.before), (there.after, back.after))
+    )
+    if after <= max(LEAST_UM, HELD * before):
+        return ()
+    keys = ", ".join(key for key, curve in errors.functions.items() if curve.has_directions)
+    words = DIRECTION_WORDS[TravelDirection(direction)]
+    said = (
+        f"direction of travel is not held here, or not all of it: by {keys} forward and backward"
+        f" differ by up to {before:.3g} µm before and {after:.3g} µm after (where one value stands"
+        f" for both: {words})"
+    )
+    return (said,)
