@@ -4,7 +4,6 @@ import math
 import re
 from collections.abc import Mapping
 
-from warpspace.exceptions import near_miss
 from warpspace.formats.source import Source, shown
 from warpspace.machine.limits import MAX_ERROR, MAX_LENGTH_MM
 
@@ -96,8 +95,19 @@ def read_whole(text: str, source: Source, line: int, what: str, low: int, high: 
     return int(value)
 
 
-def unit_factor(unit: str, known: Mapping[str, float], source: Source, line: int) -> float:
+def unit_factor(
+    unit: str, known: Mapping[str, float], source: Source, line: int, what: str
+) -> float:
     """Give the factor of a unit.
+
+    Parameters
+    ----------
+    unit : str
+    known : mapping of str to float
+    source : Source
+    line : int
+    what : str
+        What has it, for messages.
 
     Raises
     ------
@@ -105,8 +115,8 @@ def unit_factor(unit: str, known: Mapping[str, float], source: Source, line: int
         Naming the units that there are.
     """
     if unit not in known:
-        units = [name for name in known if name.isascii()]
-        source.refuse(f"unknown unit {shown(unit)}{near_miss(unit, units)}", line)
+        units = ", ".join(name for name in known if name.isascii())
+        source.refuse(f"{what} in {shown(unit)}; expected one of the units {units}", line)
     return known[unit]
 
 

@@ -159,13 +159,14 @@ def _without(table: Mapping[str, T], curves: Mapping[str, ErrorFunction]) -> dic
 def _check_keys(found: Imported, base: Scene, name: str) -> None:
     """Refuse parameters that the machine does not have."""
     machine = base.machine
+    expected = f"expected errors of {', '.join(machine.axes)}"
     problems = [
-        f"{key}: the machine {machine.chain} has no axis {parameter(key).axis}"
+        f"{key}: the machine {machine.chain} has no axis {parameter(key).axis}; {expected}"
         for key in found.keys
         if parameter(key).axis not in machine.axes
     ]
     problems += [
-        f"{plane.key}: the machine {machine.chain} has no axis {axis}"
+        f"{plane.key}: the machine {machine.chain} has no axis {axis}; {expected}"
         for plane in found.planes
         for axis in plane.axes
         if axis not in machine.axes

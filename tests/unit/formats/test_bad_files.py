@@ -9,6 +9,7 @@ from warpspace.formats.importing import open_upload, read_errors
 from warpspace.formats.kind import ReadOptions
 from warpspace.formats.registry import recognise
 from warpspace.formats.source import MAX_BYTES, source_of_bytes, source_of_text
+from warpspace.formats.to_scene import into_scene
 from warpspace.scene.library import load_scene
 
 GOOD = "X [mm],EXX [um],EAX [urad]\n-100,1,2\n0,0,0\n100,-1.5,3\n"
@@ -41,6 +42,10 @@ def refused(text: str, *fragments: str, name: str = "file.csv", **options) -> No
         GOOD.replace(",", ";").replace(".", ",").encode(),
         GOOD.replace(",", "\t").replace(".", ",").encode(),
         GOOD.rstrip("\n").encode(),
+        "\n".join('"' + row.replace(",", '","') + '"' for row in GOOD.splitlines()).encode(),
+        "\n".join(
+            '"' + row.replace(",", '";"').replace(".", ",") + '"' for row in GOOD.splitlines()
+        ).encode(),
         ("# gemessen in München\n" + GOOD).encode("cp1252"),
         ("\n\n" + GOOD + "\n  \n,,\n").encode(),
         GOOD.replace("[um]", "[mm]").replace(",1,", ",0.001,").replace("-1.5", "-0.0015").encode(),
@@ -74,6 +79,10 @@ def test_rows_in_another_order_are_sorted_and_it_is_said() -> None:
         ("X [mm],EXX [um]\n0,1\n0,2\n", ("line 3", "line 2", "run and direction")),
         ("X [mm],EXX [um]\n0,1\n1\n", ("line 3", "1 fields", "2")),
         ("X [mm],EXX [um]\n0,1,5\n", ("line 2", "3 fields", "decimal commas")),
+        ("X [mm],EXX [um],EAX [um]\n0,1,1\n", ("line 1", "EAX in 'um'", "urad, mrad")),
+        ("X [cm],EXX [um]\n0,1\n", ("line 1", "X in 'cm'", "units um, mm")),
+        ('X [mm],EXX [um]\n"1,000",1\n', ("line 2", "decimal comma")),
+        ('X [mm],EXX [um]\n"1,1\n', ("line 2", "1 fields")),
         ("X [mm],EXX [um]\n0,abc\n", ("line 2", "'abc'", "finite number")),
         ("X [mm],EXX [um]\n0,nan\n", ("line 2", "finite number")),
         ("X [mm],EXX [um]\n0,1_0\n", ("line 2", "finite number")),
@@ -186,9 +195,33 @@ def test_too_many_or_unsorted_rows_for_linuxcnc() -> None:
         read("0 0 0\n1 0 0\n", "joint.comp")
 
 
+def test_a_second_table_of_an_axis_is_refused_not_added() -> None:
+    comp = [source_of_text("0 0.001 0.002\n10 0.001 0.002\n", f"{n}_X.comp") for n in "ab"]
+    with pytest.raises(SceneError, match=r"b_X\.comp: is a second table of X; expected one"):
+        read_errors(comp, ReadOptions())
+    tables = [source_of_text(com([(0.0, 0.1), (1.0, 0.2)]), f"{n}_X.COM") for n in "ab"]
+    with pytest.raises(SceneError, match=r"b_X\.COM: is a second table over X; expected one"):
+        read_errors(tables, ReadOptions())
+
+
+def test_a_skew_factor_that_the_firmware_refuses_is_named_with_its_line() -> None:
+    refused("G28\nM852 I5\n", "line 2", "factor 5 of XY", "±1", name="a.gcode")
+
+
+def test_an_error_of_an_axis_that_the_machine_lacks_names_those_it_has() -> None:
+    base = load_scene("dvf5000_nominal")
+    found = read_errors([source_of_text("U [mm],EXU [um]\n0,1\n9,2\n", "u.csv")], ReadOptions())
+    with pytest.raises(SceneError) as caught:
+        into_scene(found, base, "", "u.csv")
+    for fragment in ("u.csv", "EXU", "no axis U", "expected errors of X, Y, Z, B, C"):
+        assert fragment in str(caught.value)
+
+
 def test_a_million_rows_are_refused_at_the_line_that_is_too_many() -> None:
     text = "X [mm],EXX [um]\n" + "0,1\n" * 1_000_000
     refused(text, "1,000,000 rows", "at most 100,000", "line 100002")
+    many = "BEGIN T_X.COM MM\nNR AXISPOS X\n" + "0 0 0\n" * 1_000_000 + "[END]\n"
+    refused(many, "1000000 rows", "at most 256", "line 259", name="T_X.COM")
 
 
 def test_sizes_of_hostile_files() -> None:

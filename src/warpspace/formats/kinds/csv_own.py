@@ -25,6 +25,7 @@ from warpspace.formats.parts.csv_header import (
     DIRECTIONS,
     RUN,
     Column,
+    fields,
     is_content,
     read_header,
     recognise,
@@ -52,7 +53,7 @@ def _read_one(source: Source) -> Imported:
         source.refuse("has no header; expected one such as X [mm],EXX [um]")
     line, header = numbered[0]
     mark = separator_of(header)
-    columns = read_header(source, line, header.split(mark))
+    columns = read_header(source, line, fields(header, mark))
     errors = [one for one in columns if one.role == "error"]
     if not errors:
         source.refuse("has no column of an error; expected for instance EXX [um]", line)
@@ -92,7 +93,7 @@ def _rows(
     comma = mark != ","
     rows: list[Row] = []
     for number, text in numbered:
-        parts = text.split(mark)
+        parts = fields(text, mark)
         if len(parts) != len(columns):
             found = f"{len(parts)} fields"
             if mark == "," and len(parts) > len(columns):

@@ -55,7 +55,7 @@ def _settings(source: Source) -> tuple[float, int, list[tuple[int, str]]]:
         if key == "detection unit":
             size, _, name = value.partition(" ")
             unit = read_number(size, source, number, key)
-            unit *= unit_factor(name.strip(), MM_PER, source, number)
+            unit *= unit_factor(name.strip(), MM_PER, source, number, key)
             if not 1e-7 <= unit <= 1.0:
                 source.refuse(f"{key} {value}; expected 0.0000001 … 1 mm", number)
         elif key == "magnification":

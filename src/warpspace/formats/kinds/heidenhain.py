@@ -59,6 +59,10 @@ def _rows(source: Source) -> list[tuple[int, Cells]]:
     if not lines[-1][1].strip().upper().startswith("[END]"):
         source.refuse("is not the end; expected [END] (is the file cut off?)", lines[-1][0])
     starts = [_start(head.upper(), names, index) for index in range(len(names))]
+    if len(lines) - 2 > MOST_POINTS:
+        found = f"has {len(lines) - 2} rows"
+        expected = f"expected at most {MOST_POINTS}, as the control takes"
+        source.refuse(f"{found}; {expected}", lines[MOST_POINTS + 1][0])
     rows: list[tuple[int, Cells]] = []
     for number, text in lines[1:-1]:
         parts = text.split()
@@ -128,9 +132,6 @@ def _lines(source: Source, along: str, options: ReadOptions) -> list[Line]:
     rows = _rows(source)
     if not rows:
         source.refuse("has no compensation points; expected at least one")
-    if len(rows) > MOST_POINTS:
-        found = f"has {len(rows)} compensation points"
-        source.refuse(f"{found}; expected at most {MOST_POINTS}, as the control takes", rows[-1][0])
     columns = [name for name in rows[0][1] if name not in (NUMBER, POSITION, BACKLASH)]
     if POSITION not in rows[0][1] or not columns:
         source.refuse(f"expected the columns {POSITION} and one for each corrected axis")
@@ -189,11 +190,12 @@ def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
     axes, tables = _assignment(sources)
     if not tables:
         sources[0].refuse("names tables; expected the .COM files it names beside it")
-    terms = [
-        line
-        for source in tables
-        for line in _lines(source, _looked_up(source, axes, options), options)
-    ]
+    terms: list[Line] = []
+    for source in tables:
+        along = _looked_up(source, axes, options)
+        if any(term.source == along for term in terms):
+            source.refuse(f"is a second table over {along}; expected one active table an axis")
+        terms += _lines(source, along, options)
     said = f"sign: {options.sign}" if options.sign else SIGN
     return Tables(tuple(terms), (said, TRAVEL))
 

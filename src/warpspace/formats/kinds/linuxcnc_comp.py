@@ -115,6 +115,8 @@ def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
             expected = "expected --axis X, or its INI file"
             raise source.unsaid(f"does not say which axis it is for; {expected}")
         axis = resolve_axis(axis, source, None, options)
+        if any(term.source == axis for term in terms):
+            source.refuse(f"is a second table of {axis}; expected one a joint, as LinuxCNC takes")
         rows = _rows(source)
         kind, said = _kind(rows, options.variant or kind)
         assumed += said

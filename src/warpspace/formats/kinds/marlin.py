@@ -31,7 +31,7 @@ def recognise(head: str, name: str) -> bool:
 
 def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
     """Read the skew factors as the firmware holds them."""
-    found: dict[str, float] = {}
+    found: dict[str, tuple[int, float]] = {}
     defined: dict[str, dict[str, tuple[int, float]]] = {}
     for source in sources:
         for number, text in enumerate(source.lines, start=1):
@@ -40,31 +40,33 @@ def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
                 for letter, value in _WORD.findall(bare[4:]):
                     if letter not in LETTERS:
                         source.refuse(f"M852 {letter}; expected I, J, K or S", number)
-                    found[LETTERS[letter]] = read_number(value, source, number, f"M852 {letter}")
+                    factor = read_number(value, source, number, f"M852 {letter}")
+                    found[LETTERS[letter]] = (number, factor)
             elif matched := _DEFINE.match(bare):
                 value = read_number(matched[3].rstrip("f"), source, number, matched[2])
                 defined.setdefault(matched[1], {})[matched[2]] = (number, value)
         for plane, settings in defined.items():
             side = defined.get("XY", {}).get("SIDE_AD")
             if "SKEW_FACTOR" in settings:
-                found[plane] = settings["SKEW_FACTOR"][1]
+                found[plane] = settings["SKEW_FACTOR"]
             elif {"DIAG_AC", "DIAG_BD"} <= settings.keys() and ("SIDE_AD" in settings or side):
                 line, ac = settings["DIAG_AC"]
                 _, ad = settings.get("SIDE_AD") or side or (line, 0.0)
                 lengths = (ac, settings["DIAG_BD"][1], ad)
-                found[plane] = factor_of(lengths, source, line, plane)
+                found[plane] = (line, factor_of(lengths, source, line, plane))
             else:
                 line = next(iter(settings.values()))[0]
                 expected = f"expected {plane}_DIAG_AC, {plane}_DIAG_BD and a side"
                 source.refuse(f"{plane}: {', '.join(settings)}; {expected}", line)
-        for plane, factor in found.items():
+        for plane, (line, factor) in found.items():
             if abs(factor) > MOST:
-                source.refuse(f"factor {factor:g} of {plane}; expected at most ±{MOST:g}")
+                source.refuse(f"factor {factor:g} of {plane}; expected at most ±{MOST:g}", line)
             for axis in plane:
-                resolve_axis(axis, source, None, options)
+                resolve_axis(axis, source, line, options)
     if not found:
         sources[0].refuse("has no skew factors; expected M852 I… J… K… or XY_SKEW_FACTOR")
-    return Tables((skew_term(found),), (), (), ("mm", "rad"))
+    factors = {plane: factor for plane, (_, factor) in found.items()}
+    return Tables((skew_term(factors),), (), (), ("mm", "rad"))
 
 
 def read(sources: Sequence[Source], options: ReadOptions) -> Imported:

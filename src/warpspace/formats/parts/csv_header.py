@@ -1,5 +1,6 @@
 """The header of a measurement table: axes and errors with their units."""
 
+import csv
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -45,7 +46,7 @@ def recognise(head: str, name: str) -> bool:
     """Tell it by a header that names an axis or an error with its unit."""
     del name
     line = next((text for text in head.splitlines() if is_content(text)), "")
-    parts = [part.strip() for part in line.split(separator_of(line))]
+    parts = [part.strip() for part in fields(line, separator_of(line))]
     found = [_HEADING.fullmatch(part) for part in parts]
     if not any(one and (one[2] in PARAMETERS) for one in found):
         return False
@@ -60,6 +61,11 @@ def is_content(text: str) -> bool:
 def separator_of(header: str) -> str:
     """Find what parts the columns."""
     return next((mark for mark in SEPARATORS if mark in header), ",")
+
+
+def fields(text: str, mark: str) -> list[str]:
+    """Split a line; a field may stand in quotes, as spreadsheets write it."""
+    return next(csv.reader([text], delimiter=mark)) if '"' in text else text.split(mark)
 
 
 def read_header(source: Source, line: int, parts: Sequence[str]) -> list[Column]:
@@ -82,11 +88,12 @@ def read_header(source: Source, line: int, parts: Sequence[str]) -> list[Column]
             known = URAD_PER if parameter(name).is_rotation else UM_PER
             _need_unit(unit, name, known, source, line)
             role = "uncertainty" if uncertain else "error"
-            found.append(Column(role, name, unit_factor(unit, known, source, line), unit))
+            found.append(Column(role, name, unit_factor(unit, known, source, line, name), unit))
         elif is_axis_name(name) and not uncertain:
             known = MM_PER if is_linear(name) else DEG_PER
             _need_unit(unit, name, known, source, line)
-            found.append(Column("position", name, unit_factor(unit, known, source, line), unit))
+            factor = unit_factor(unit, known, source, line, name)
+            found.append(Column("position", name, factor, unit))
         else:
             hint = near_miss(
                 name, [*"XYZABCUVW", *(f"E{a}{b}" for a in "XYZABC" for b in "XYZABC")]
