@@ -5,14 +5,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from warpspace.analysis.statistics import Statistics, volume_statistics
 from warpspace.exceptions import OptionError
-from warpspace.field.basis import ErrorField
-from warpspace.field.grid import Grid, build_grid
+from warpspace.field.grid import build_grid
 from warpspace.formats.compensation.corrector import Corrector, build_corrector
 from warpspace.formats.compensation.directions import (
     WAYS,
-    InDirection,
+    BeforeAfter,
     evaluated,
     reversal_notes,
     toward,
@@ -67,7 +65,7 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Compensation:
+class Compensation(BeforeAfter):
     """A compensation and what it leaves.
 
     Attributes
@@ -79,13 +77,11 @@ class Compensation:
         Points of the table per axis.
     size : int
         Numbers that the controller holds.
-    grid : Grid
-    before, after : ErrorField
     loop : str
     axes : tuple of str
         Axes that are corrected.
     assumed, notes : tuple of str
-    directions : mapping of str to InDirection
+    directions : mapping of str to BeforeAfter
         "forward" and "backward", where errors depend on the direction of travel.
     """
 
@@ -93,29 +89,16 @@ class Compensation:
     files: Mapping[str, str]
     points: Mapping[str, int]
     size: int
-    grid: Grid
-    before: ErrorField
-    after: ErrorField
     loop: str
     axes: tuple[str, ...]
     assumed: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
-    directions: Mapping[str, InDirection] = field(default_factory=dict[str, InDirection])
+    directions: Mapping[str, BeforeAfter] = field(default_factory=dict[str, BeforeAfter])
 
     @property
     def bytes(self) -> int:
         """Size of the files."""
         return sum(len(text.encode()) for text in self.files.values())
-
-    @property
-    def before_statistics(self) -> Statistics:
-        """Of the scene as it is."""
-        return volume_statistics(self.before, self.grid)
-
-    @property
-    def after_statistics(self) -> Statistics:
-        """Of what is left."""
-        return volume_statistics(self.after, self.grid)
 
 
 def table_points(
@@ -191,7 +174,7 @@ def compensate(scene: Scene, plan: Plan, nodes: int = NODES) -> Compensation:
     controller = _read_back(kind, sources, wanted)
     still = _reference(scene)
     own = evaluated(corrector, controller.moves, grid, still)
-    directions: dict[str, InDirection] = {}
+    directions: dict[str, BeforeAfter] = {}
     notes = controller.notes
     if scene.errors.has_directions:
         there, back = (
@@ -201,13 +184,13 @@ def compensate(scene: Scene, plan: Plan, nodes: int = NODES) -> Compensation:
         directions = {"forward": there, "backward": back}
         notes += reversal_notes(there, back, scene.errors, scene.model.direction)
     return Compensation(
+        own.before,
+        own.after,
+        own.grid,
         kind,
         files,
         points,
         controller.size,
-        grid,
-        own.before,
-        own.after,
         str(corrector.loop),
         corrector.moved,
         controller.assumed,

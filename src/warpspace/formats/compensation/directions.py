@@ -23,8 +23,8 @@ LEAST_UM = 0.01
 
 
 @dataclass(frozen=True)
-class InDirection:
-    """What a compensation does while all axes travel in one direction.
+class BeforeAfter:
+    """The errors over the working volume before and after a compensation.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ def toward(corrector: Corrector, direction: str) -> Corrector:
 
 def evaluated(
     corrector: Corrector, moves: Moves, grid: Grid, reference: Coordinates | None
-) -> InDirection:
+) -> BeforeAfter:
     """Evaluate a scene before and after a compensation.
 
     Parameters
@@ -68,7 +68,7 @@ def evaluated(
     """
     at, nominal = grid.coordinates, grid.nominal_mm
     still = {} if reference is None else moves(reference)
-    return InDirection(
+    return BeforeAfter(
         field_after(corrector, at, {}, nominal, reference, {}),
         field_after(corrector, at, moves(at), nominal, reference, still),
         grid,
@@ -76,13 +76,13 @@ def evaluated(
 
 
 def reversal_notes(
-    there: InDirection, back: InDirection, errors: ErrorSet, direction: str
+    there: BeforeAfter, back: BeforeAfter, errors: ErrorSet, direction: str
 ) -> tuple[str, ...]:
     """Say what of the reversal a format has no place for.
 
     Parameters
     ----------
-    there, back : InDirection
+    there, back : BeforeAfter
         Forward and backward.
     errors : ErrorSet
         Of the scene.

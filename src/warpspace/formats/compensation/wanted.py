@@ -44,6 +44,11 @@ class Wanted:
     stem: str = "compensation"
 
     @property
+    def title(self) -> str:
+        """Title of the scene in one line, for comments."""
+        return self.scene.title.replace("\n", " ")
+
+    @property
     def axes(self) -> tuple[str, ...]:
         """Axes that span the volume, in the order of the machine."""
         spanning = self.scene.workspace.volume_axes

@@ -14,7 +14,7 @@ import numpy as np
 from warpspace.exceptions import OptionError
 from warpspace.formats.compensation.wanted import Wanted
 from warpspace.formats.kind import CORRECTION, Files, Format, ReadOptions, resolve_axis
-from warpspace.formats.measured import Imported, merge
+from warpspace.formats.measured import Imported
 from warpspace.formats.numbers import MM_PER, check_position, read_number, read_whole, unit_factor
 from warpspace.formats.source import Source
 from warpspace.formats.table_errors import errors_of
@@ -126,7 +126,7 @@ def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
 
 def read(sources: Sequence[Source], options: ReadOptions) -> Imported:
     """Read the errors, of two axes each, that the grid corrects."""
-    return merge([errors_of(read_tables(sources, options), FORMAT.name, sources[0], options)])
+    return errors_of(read_tables(sources, options), FORMAT.name, sources[0], options)
 
 
 def write(wanted: Wanted) -> Files:
@@ -150,9 +150,8 @@ def write(wanted: Wanted) -> Files:
         )
     counts = np.rint(values / (unit * magnification)).astype(int)
     counts = np.clip(counts, -MOST_COUNT - 1, MOST_COUNT)
-    title = wanted.scene.title.replace("\n", " ")
     lines = [
-        f"{MARK}, {title}",
+        f"{MARK}, {wanted.title}",
         f"# detection unit = {unit:.9f}".rstrip("0") + " mm",
         f"# magnification = {magnification}",
         f"# {'values are ' + wanted.sign + 's' if wanted.sign else 'values are added'}",

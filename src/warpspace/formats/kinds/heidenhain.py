@@ -11,7 +11,7 @@ import numpy as np
 
 from warpspace.formats.compensation.wanted import Wanted
 from warpspace.formats.kind import ERROR, Files, Format, ReadOptions, resolve_axis
-from warpspace.formats.measured import Imported, merge
+from warpspace.formats.measured import Imported
 from warpspace.formats.numbers import check_position, read_number
 from warpspace.formats.source import Source
 from warpspace.formats.table_errors import errors_of
@@ -202,7 +202,7 @@ def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
 
 def read(sources: Sequence[Source], options: ReadOptions) -> Imported:
     """Read the errors that the tables correct."""
-    return merge([errors_of(read_tables(sources, options), FORMAT.name, sources[0], options)])
+    return errors_of(read_tables(sources, options), FORMAT.name, sources[0], options)
 
 
 def write(wanted: Wanted) -> Files:

@@ -114,7 +114,7 @@ def _read_block(source: Source, block: Block) -> Imported:
             elif key := volumetric.error_name(name):
                 row[key] = check_error(value * volumetric.factor_of(key), source, number, name)
         rows.append((number, row))
-    notes = (f"{', '.join(left)}: no errors, left out",) if left else ()
+    notes = volumetric.left_out(left)
     notes = (*source.notes, *notes)
     keys = [key for name in names if (key := volumetric.error_name(name))]
     if not arguments:
@@ -211,7 +211,7 @@ def write(wanted: Wanted) -> Files:
                 value = spell(plane.values[i][j] / volumetric.factor_of(plane.key), DIGITS)
                 lines.append("\t".join([repr(second), repr(first), value]))
         blocks.append("\n".join(lines))
-    head = f"// {wanted.scene.title}".replace("\n", " ") + "\n// mm, rad, degrees\n"
+    head = f"// {wanted.title}\n// mm, rad, degrees\n"
     return {"": head + "\n#\n".join(blocks or [_nothing(wanted)]) + "\n"}
 
 

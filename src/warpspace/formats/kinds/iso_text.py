@@ -88,7 +88,7 @@ def _read_one(source: Source) -> Imported:
         source.refuse(
             f"Gridpoints of [{name}] do not end; expected }} (is the file cut off?)", opened
         )
-    notes = (f"{', '.join(left)}: no errors, left out",) if left else ()
+    notes = volumetric.left_out(left)
     return Imported(NAME, tuple(series), constants=constants, notes=(*source.notes, *notes))
 
 
@@ -126,7 +126,7 @@ def write(wanted: Wanted) -> Files:
     """Write the errors of a scene; those of two axes have no place and are left out."""
     held = in_one_direction(sampled(wanted), wanted)
     volumetric.check_axes(held, NAME)
-    lines = [f"// {wanted.scene.title}".replace("\n", " "), "// mm, rad, degrees; variant Vendor"]
+    lines = [f"// {wanted.title}", "// mm, rad, degrees; variant Vendor"]
     lines += [
         f"// {plane.key} over {' and '.join(plane.axes)}: has no place here, left out"
         for plane in held.planes

@@ -152,8 +152,7 @@ def write(wanted: Wanted) -> Files:
         f"{plane}=" + ",".join(f"{length:.6f}" for length in skew_lengths(factor))
         for plane, factor in fitted_factors(wanted).items()
     ]
-    title = wanted.scene.title.replace("\n", " ")
-    head = f"# {title}\n# [skew_correction] must stand in printer.cfg\n"
+    head = f"# {wanted.title}\n# [skew_correction] must stand in printer.cfg\n"
     return {"": f"{head}SET_SKEW {' '.join(parts)}\n"}
 
 

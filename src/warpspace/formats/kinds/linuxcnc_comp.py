@@ -12,7 +12,7 @@ import numpy as np
 
 from warpspace.formats.compensation.wanted import Wanted
 from warpspace.formats.kind import Files, Format, ReadOptions, resolve_axis
-from warpspace.formats.measured import Imported, merge
+from warpspace.formats.measured import Imported
 from warpspace.formats.numbers import check_position, read_number, read_whole, spell
 from warpspace.formats.source import Source
 from warpspace.formats.table_errors import errors_of
@@ -140,13 +140,13 @@ def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
 
 def read(sources: Sequence[Source], options: ReadOptions) -> Imported:
     """Read the positioning errors that the tables correct."""
-    return merge([errors_of(read_tables(sources, options), FORMAT.name, sources[0], options)])
+    return errors_of(read_tables(sources, options), FORMAT.name, sources[0], options)
 
 
 def write(wanted: Wanted) -> Files:
     """Write a table of type 1 for each axis, and the INI lines that name them."""
     files: dict[str, str] = {}
-    lines = [f"# {wanted.scene.title}".replace("\n", " ")]
+    lines = [f"# {wanted.title}"]
     for axis in wanted.axes:
         if axis not in wanted.corrector.moved or axis not in JOINTS:
             continue

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from warpspace.formats.compensation.linear_fit import AXES, fit_linear
 from warpspace.formats.compensation.wanted import Wanted
 from warpspace.formats.kind import Files, Format, ReadOptions, resolve_axis
-from warpspace.formats.measured import Imported, merge
+from warpspace.formats.measured import Imported
 from warpspace.formats.numbers import read_number, spell
 from warpspace.formats.source import Source
 from warpspace.formats.table_errors import errors_of
@@ -80,14 +80,14 @@ def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
 
 def read(sources: Sequence[Source], options: ReadOptions) -> Imported:
     """Read squareness and scale errors that the matrix corrects."""
-    return merge([errors_of(read_tables(sources, options), FORMAT.name, sources[0], options)])
+    return errors_of(read_tables(sources, options), FORMAT.name, sources[0], options)
 
 
 def write(wanted: Wanted) -> Files:
     """Write the matrix that leaves the smallest RMS."""
     allowed = [(row, column) for row in AXES for column in AXES]
     found = fit_linear(wanted, allowed)
-    lines = [f"# {wanted.scene.title}".replace("\n", " ")]
+    lines = [f"# {wanted.title}"]
     for row, column in allowed:
         value = float(row == column) + found.get((row, column), 0.0)
         text = spell(float(wanted.round(value)), DIGITS)

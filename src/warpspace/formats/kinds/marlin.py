@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from warpspace.formats.compensation.wanted import Wanted
 from warpspace.formats.kind import Files, Format, ReadOptions, resolve_axis
-from warpspace.formats.measured import Imported, merge
+from warpspace.formats.measured import Imported
 from warpspace.formats.numbers import read_number, spell
 from warpspace.formats.parts.skew import MOST, PLANES, factor_of, fitted_factors, skew_term
 from warpspace.formats.source import Source
@@ -71,7 +71,7 @@ def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
 
 def read(sources: Sequence[Source], options: ReadOptions) -> Imported:
     """Read squareness errors from skew factors."""
-    return merge([errors_of(read_tables(sources, options), FORMAT.name, sources[0], options)])
+    return errors_of(read_tables(sources, options), FORMAT.name, sources[0], options)
 
 
 def write(wanted: Wanted) -> Files:
@@ -81,9 +81,8 @@ def write(wanted: Wanted) -> Files:
         f"{letter}{spell(float(wanted.round(factors[plane])), DIGITS)}"
         for letter, plane in zip("IJK", PLANES, strict=True)
     ]
-    title = wanted.scene.title.replace("\n", " ")
     return {
-        "": f"; {title}\n; SKEW_CORRECTION_FOR_Z and SKEW_CORRECTION_GCODE must be enabled\n"
+        "": f"; {wanted.title}\n; SKEW_CORRECTION_FOR_Z and SKEW_CORRECTION_GCODE must be enabled\n"
         f"M852 {' '.join(words)}\n"
     }
 

@@ -17,13 +17,12 @@ from warpspace.formats.parts import sinumerik_text as text
 from warpspace.formats.parts.cross_tables import CrossTable, cross_tables
 from warpspace.formats.source import Source
 from warpspace.formats.table_errors import errors_of
-from warpspace.formats.terms import HELD, MODULO, Line, Product, Tables, Term
+from warpspace.formats.terms import Line, Product, Tables, Term
 
 PREFIX = "AN_CEC"
 AXES = ("INPUT_AXIS", "OUTPUT_AXIS")
-NUMBERS = ("STEP", "MIN", "MAX")
 SWITCHES = ("DIRECTION", "MULT_BY_TABLE", "IS_MODULO")
-NAMES = (PREFIX, *(f"{PREFIX}_{name}" for name in (*AXES, *NUMBERS, *SWITCHES)))
+NAMES = (PREFIX, *(f"{PREFIX}_{name}" for name in (*AXES, *text.NUMBERS, *SWITCHES)))
 MOST_TABLES = 62
 """Twice the axes of an NC (manual, "Compensation table index")."""
 SIGN = (
@@ -34,14 +33,10 @@ SIGN = (
 
 
 @dataclass
-class _Table:
-    """What a file says of one table."""
+class _Table(text.Table):
+    """What a file says of one table, with its axes."""
 
-    line: int
-    values: dict[int, float] = field(default_factory=dict[int, float])
     axes: dict[str, str] = field(default_factory=dict[str, str])
-    numbers: dict[str, float] = field(default_factory=dict[str, float])
-    switches: dict[str, int] = field(default_factory=dict[str, int])
 
 
 def recognise(head: str, name: str) -> bool:
@@ -69,7 +64,7 @@ def _tables(source: Source) -> dict[int, _Table]:
             text.set_once(table.values, point, value, source, one.line, f"table {index}")
         elif setting in AXES:
             table.axes[setting] = text.name_of(one.value, source, one.line)
-        elif setting in NUMBERS:
+        elif setting in text.NUMBERS:
             table.numbers[setting] = text.number_of(one, source)
         else:
             low, high = (-1, 1) if setting == "DIRECTION" else (0, MOST_TABLES)
@@ -84,25 +79,14 @@ def _tables(source: Source) -> dict[int, _Table]:
 def _line(table: _Table, index: int, source: Source, options: ReadOptions) -> Line:
     """Build one table as the controller evaluates it."""
     what = f"table {index}"
-    for setting in (*AXES, *NUMBERS):
-        if setting not in table.axes and setting not in table.numbers:
-            found = f"{what}: ${PREFIX}_{setting}[{index}] is missing; expected it"
-            source.refuse(f"{found} (is the file cut off?)", table.line)
+    for setting in AXES:
+        if setting not in table.axes:
+            found = f"{what}: ${PREFIX}_{setting} is missing; expected it (is the file cut off?)"
+            source.refuse(found, table.line)
     along, target = (
         resolve_axis(table.axes[setting], source, table.line, options) for setting in AXES
     )
-    step, start, end = (table.numbers[setting] for setting in NUMBERS)
-    places = text.places_of(start, end, step, source, what, table.line)
-    values = text.filled(table.values, len(places), source, what, table.line)
-    factor = options.factor(ERROR)
-    return Line(
-        along,
-        target,
-        tuple(places.tolist()),
-        tuple(factor * value for value in values),
-        MODULO if table.switches.get("IS_MODULO") else HELD,
-        direction=table.switches.get("DIRECTION", 0),
-    )
+    return text.line_of(table, (along, target), PREFIX, what, source, options.factor(ERROR))
 
 
 def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
@@ -139,7 +123,7 @@ def write(wanted: Wanted) -> Files:
             " takes: correct fewer axes"
         )
     body = [
-        f"; written by warpspace for {wanted.scene.title}".replace("\n", " "),
+        f"; written by warpspace for {wanted.title}",
         f"; {SIGN if not wanted.sign else 'sign: ' + wanted.sign}",
     ]
     for index, table in enumerate(tables):
@@ -150,19 +134,12 @@ def write(wanted: Wanted) -> Files:
 def _spelled(wanted: Wanted, index: int, table: CrossTable) -> list[str]:
     """Spell one table."""
     places = wanted.places(table.along)
-    step = (places[-1] - places[0]) / (len(places) - 1)
-    lines = [f"; MD18342 $MN_MM_CEC_MAX_POINTS[{index}] = {len(places)}"]
-    lines += [
-        f"${PREFIX}[{index},{point}]={text.value_text(value)}"
-        for point, value in enumerate(wanted.round(table.values).tolist())
-    ]
     return [
-        *lines,
+        f"; MD18342 $MN_MM_CEC_MAX_POINTS[{index}] = {len(places)}",
+        *text.point_lines(PREFIX, f"{index},{{}}".format, wanted.round(table.values)),
         f"${PREFIX}_INPUT_AXIS[{index}]=({table.along})",
         f"${PREFIX}_OUTPUT_AXIS[{index}]=({table.target})",
-        f"${PREFIX}_STEP[{index}]={float(step)!r}",
-        f"${PREFIX}_MIN[{index}]={float(places[0])!r}",
-        f"${PREFIX}_MAX[{index}]={float(places[-1])!r}",
+        *text.range_lines(PREFIX, str(index), places),
         f"${PREFIX}_DIRECTION[{index}]={table.direction}",
         f"${PREFIX}_MULT_BY_TABLE[{index}]={index + table.number + 1 if table.number else 0}",
         f"${PREFIX}_IS_MODULO[{index}]=0",

@@ -7,7 +7,6 @@ modulo function; a positive value makes the axis move in the negative direction.
 
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 from warpspace.formats.compensation.wanted import Wanted
 from warpspace.formats.kind import ERROR, Files, Format, ReadOptions, resolve_axis
@@ -15,21 +14,12 @@ from warpspace.formats.measured import Imported, merge
 from warpspace.formats.parts import sinumerik_text as text
 from warpspace.formats.source import Source
 from warpspace.formats.table_errors import errors_of
-from warpspace.formats.terms import HELD, MODULO, Line, Tables
+from warpspace.formats.terms import Line, Tables
 
 PREFIX = "AA_ENC_COMP"
-SETTINGS = ("STEP", "MIN", "MAX", "IS_MODULO")
-NAMES = (PREFIX, *(f"{PREFIX}_{name}" for name in SETTINGS))
+MODULO = "IS_MODULO"
+NAMES = (PREFIX, *(f"{PREFIX}_{name}" for name in (*text.NUMBERS, MODULO)))
 SIGN = "a positive value makes the axis move in the negative direction (manual, page 238)"
-
-
-@dataclass
-class _Table:
-    """What a file says of one table."""
-
-    line: int
-    values: dict[int, float] = field(default_factory=dict[int, float])
-    settings: dict[str, float] = field(default_factory=dict[str, float])
 
 
 def recognise(head: str, name: str) -> bool:
@@ -38,9 +28,9 @@ def recognise(head: str, name: str) -> bool:
     return text.assigns(PREFIX, head)
 
 
-def _tables(source: Source) -> dict[tuple[int, str], _Table]:
+def _tables(source: Source) -> dict[tuple[int, str], text.Table]:
     """Collect the tables of a file, by encoder and axis."""
-    found: defaultdict[tuple[int, str], _Table] = defaultdict(lambda: _Table(0))
+    found: defaultdict[tuple[int, str], text.Table] = defaultdict(lambda: text.Table(0))
     for one in text.assignments(source, NAMES):
         plain = one.name == PREFIX
         if len(one.indices) != (3 if plain else 2):
@@ -53,8 +43,11 @@ def _tables(source: Source) -> dict[tuple[int, str], _Table]:
             index = text.index_of(one.indices[1], source, one.line)
             value = text.number_of(one, source)
             text.set_once(table.values, index, value, source, one.line, f"${PREFIX}")
+        elif (setting := one.name.removeprefix(f"{PREFIX}_")) == MODULO:
+            flag = text.flag_of(one.value, source, one.line, f"${one.name}")
+            table.switches[MODULO] = int(flag)
         else:
-            table.settings[one.name.removeprefix(f"{PREFIX}_")] = text.number_of(one, source)
+            table.numbers[setting] = text.number_of(one, source)
     if not found:
         source.refuse(f"has no ${PREFIX}; expected tables of this variable")
     return dict(found)
@@ -68,28 +61,12 @@ def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
         for (encoder, name), table in _tables(source).items():
             axis = resolve_axis(name, source, table.line, options)
             what = f"table of {name}"
-            for setting in ("STEP", "MIN", "MAX"):
-                if setting not in table.settings:
-                    found = f"{what}: ${PREFIX}_{setting} is missing; expected it"
-                    source.refuse(f"{found} (is the file cut off?)", table.line)
             if any(term.source == axis for term in terms):
                 source.refuse(
                     f"{what}: {axis} has a table already; expected one an axis", table.line
                 )
-            step, start, end = (table.settings[part] for part in ("STEP", "MIN", "MAX"))
-            places = text.places_of(start, end, step, source, what, table.line)
-            values = text.filled(table.values, len(places), source, what, table.line)
-            modulo = bool(table.settings.get("IS_MODULO", 0.0))
             factor = options.factor(ERROR)
-            terms.append(
-                Line(
-                    axis,
-                    axis,
-                    tuple(places.tolist()),
-                    tuple(factor * value for value in values),
-                    MODULO if modulo else HELD,
-                )
-            )
+            terms.append(text.line_of(table, (axis, axis), PREFIX, what, source, factor))
             if encoder:
                 notes.append(f"{name}: the table of measuring system {encoder + 1} was taken")
     said = f"sign: {options.sign}" if options.sign else SIGN
@@ -105,7 +82,7 @@ def read(sources: Sequence[Source], options: ReadOptions) -> Imported:
 def write(wanted: Wanted) -> Files:
     """Write a table for each axis that spans the volume and can be corrected."""
     body: list[str] = [
-        f"; written by warpspace for {wanted.scene.title}".replace("\n", " "),
+        f"; written by warpspace for {wanted.title}",
         f"; {SIGN if not wanted.sign else 'sign: ' + wanted.sign}",
     ]
     for axis in wanted.axes:
@@ -113,18 +90,11 @@ def write(wanted: Wanted) -> Files:
             continue
         places = wanted.places(axis)
         values = wanted.factor(ERROR) * wanted.averaged([axis])[axis]
-        rounded = wanted.round(values)
-        body.append(f"; MD38000 $MA_MM_ENC_COMP_MAX_POINTS[0,{axis}] >= {len(places)}")
         body += [
-            f"${PREFIX}[0,{index},{axis}]={text.value_text(value)}"
-            for index, value in enumerate(rounded.tolist())
-        ]
-        step = (places[-1] - places[0]) / (len(places) - 1)
-        body += [
-            f"${PREFIX}_STEP[0,{axis}]={float(step)!r}",
-            f"${PREFIX}_MIN[0,{axis}]={float(places[0])!r}",
-            f"${PREFIX}_MAX[0,{axis}]={float(places[-1])!r}",
-            f"${PREFIX}_IS_MODULO[0,{axis}]=0",
+            f"; MD38000 $MA_MM_ENC_COMP_MAX_POINTS[0,{axis}] >= {len(places)}",
+            *text.point_lines(PREFIX, f"0,{{}},{axis}".format, wanted.round(values)),
+            *text.range_lines(PREFIX, f"0,{axis}", places),
+            f"${PREFIX}_{MODULO}[0,{axis}]=0",
         ]
     return text.archive("AX_EEC", body)
 

@@ -1,14 +1,15 @@
 """Assignments of system variables in SINUMERIK archives: `$NAME[index, …] = value ; comment`."""
 
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from warpspace.formats.kind import Files
 from warpspace.formats.numbers import read_number, read_whole, spell
 from warpspace.formats.source import Source, shown
+from warpspace.formats.terms import HELD, MODULO, Line
 from warpspace.units import Array
 
 DIGITS = 7
@@ -16,6 +17,8 @@ DIGITS = 7
 STEP_SHARE = 1e-4
 """Share of a step by which start, end and step may disagree."""
 MOST_INDEX = 100_000
+NUMBERS = ("STEP", "MIN", "MAX")
+"""Range of a table."""
 _ASSIGNMENT = re.compile(r"\$([A-Z_]+)\s*\[([^\]]*)\]\s*=\s*(.+)")
 _QUIET = re.compile(r"(%.*|;.*|CHANDATA\(\d+\)|M17|M30|M02|N\d+)?", re.IGNORECASE)
 
@@ -37,6 +40,28 @@ class Assignment:
     name: str
     indices: tuple[str, ...]
     value: str
+
+
+@dataclass
+class Table:
+    """What a file says of one table, as it is read line by line.
+
+    Attributes
+    ----------
+    line : int
+        Where it begins.
+    values : dict of int to float
+        By interpolation point.
+    numbers : dict of str to float
+        STEP, MIN and MAX.
+    switches : dict of str to int
+        IS_MODULO and the like; 0 where they are not set.
+    """
+
+    line: int
+    values: dict[int, float] = field(default_factory=dict[int, float])
+    numbers: dict[str, float] = field(default_factory=dict[str, float])
+    switches: dict[str, int] = field(default_factory=dict[str, int])
 
 
 def assigns(name: str, head: str) -> bool:
@@ -142,6 +167,57 @@ def index_of(text: str, source: Source, line: int) -> int:
 def flag_of(text: str, source: Source, line: int, what: str) -> bool:
     """Read 0 or 1."""
     return bool(read_whole(text, source, line, what, 0, 1))
+
+
+def line_of(
+    table: Table, axes: tuple[str, str], prefix: str, what: str, source: Source, factor: float
+) -> Line:
+    """Build a table as the controller evaluates it.
+
+    Parameters
+    ----------
+    table : Table
+    axes : tuple of str
+        That looked up, and that corrected.
+    prefix : str
+        What its variables begin with.
+    what : str
+        What the table is called in messages.
+    source : Source
+    factor : float
+        From a value to a correction.
+
+    Raises
+    ------
+    SceneError
+        If something is missing, or does not fit together.
+    """
+    for setting in NUMBERS:
+        if setting not in table.numbers:
+            found = f"{what}: ${prefix}_{setting} is missing; expected it (is the file cut off?)"
+            source.refuse(found, table.line)
+    step, start, end = (table.numbers[setting] for setting in NUMBERS)
+    places = places_of(start, end, step, source, what, table.line)
+    values = filled(table.values, len(places), source, what, table.line)
+    return Line(
+        *axes,
+        tuple(places.tolist()),
+        tuple(factor * value for value in values),
+        MODULO if table.switches.get("IS_MODULO") else HELD,
+        direction=table.switches.get("DIRECTION", 0),
+    )
+
+
+def point_lines(prefix: str, point: Callable[[int], str], values: Array) -> list[str]:
+    """Spell the values of a table; the indices of each point are given by a function."""
+    return [f"${prefix}[{point(i)}]={value_text(v)}" for i, v in enumerate(values.tolist())]
+
+
+def range_lines(prefix: str, index: str, places: Array) -> list[str]:
+    """Spell the range of a table in equal steps, whose own indices are given."""
+    step = (places[-1] - places[0]) / (len(places) - 1)
+    bounds = zip(NUMBERS, (step, places[0], places[-1]), strict=True)
+    return [f"${prefix}_{setting}[{index}]={float(number)!r}" for setting, number in bounds]
 
 
 def archive(name: str, body: Sequence[str]) -> Files:

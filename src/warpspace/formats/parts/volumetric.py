@@ -8,7 +8,7 @@ nominal axis and is then subject to location and component errors in fixed direc
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -52,6 +52,11 @@ def file_name(key: str) -> str:
 def factor_of(key: str) -> float:
     """Give the factor from mm or rad to µm or µrad."""
     return RAD_TO_URAD if parameter(key).is_rotation else MM_TO_UM
+
+
+def left_out(names: Sequence[str]) -> tuple[str, ...]:
+    """Say which parameters of a file are no errors."""
+    return (f"{', '.join(names)}: no errors, left out",) if names else ()
 
 
 def check_axes(held: Imported, name: str) -> None:
