@@ -127,3 +127,31 @@ def test_existing_files_and_the_scene_itself_stay(tmp_path: Path, warpspace) -> 
     warpspace(*arguments).refused("t_X.COM", "exists already")
     assert table.read_text(encoding="utf-8") == "mine"
     assert not target.exists()
+
+
+def test_errors_by_direction_of_travel_are_told_in_both(tmp_path: Path, warpspace) -> None:
+    scene = tmp_path / "s.toml"
+    scene.write_text(
+        'machine = "dvf5000"\n[workspace]\nX = [-275, 275]\nY = [-225, 225]\nZ = [-480, -80]\n'
+        "[errors]\nEXX = { forward = { ramp = 8 }, backward = { ramp = 2 } }\n",
+        encoding="utf-8",
+    )
+    for name, held in (("sinumerik-cec", True), ("sinumerik-enc", False)):
+        command = ("compensate", scene, "--format", name, "-o", tmp_path / "t.ini", "--force")
+        found = json.loads(warpspace(*command, "--json").out)
+        assert found["before"]["max_um"] == pytest.approx(5.0)
+        assert found["after"]["max_um"] < 0.01
+        assert found["directions"]["forward"]["before"]["max_um"] == pytest.approx(8.0)
+        assert found["directions"]["backward"]["before"]["max_um"] == pytest.approx(2.0)
+        for way in ("forward", "backward"):
+            left = found["directions"][way]["after"]["max_um"]
+            assert left == pytest.approx(0.0 if held else 3.0, abs=0.01)
+        said = [note for note in found["notes"] if "direction of travel is not held" in note]
+        assert len(said) == (0 if held else 1)
+        text = warpspace(*command).out
+        for word in ("before forward", "after backward"):
+            assert word in text
+    plain = warpspace(
+        "compensate", "dvf5000_first", "--format", "marlin", "-o", tmp_path / "m.gcode", "--json"
+    )
+    assert json.loads(plain.out)["directions"] == {}

@@ -186,3 +186,24 @@ def test_a_template_needs_an_axis_and_ascending_positions(warpspace) -> None:
     warpspace("template", "Q").refused("axis 'Q'")
     warpspace("template", "X", "--positions", "2,1").refused("ascending")
     warpspace("template", "X", "--positions", "a").refused("numbers")
+
+
+def test_a_template_over_two_axes_that_is_filled_in_is_imported(tmp_path: Path, warpspace) -> None:
+    text = warpspace("template", "Y", "--positions=-200,0,200", "--over", "z=-400,-100").out
+    header = next(line for line in text.splitlines() if line and not line.startswith("#"))
+    assert header.startswith("Y [mm],Z [mm],EXY [um],EYY [um]")
+    filled = text.replace(",,,,,,", ",1,2,3,4,5,6.5")
+    assert filled.count(",6.5") == 6
+    target = tmp_path / "s.toml"
+    result = warpspace(
+        "import", write(tmp_path, "t.csv", filled), "--machine", "dvf5000", "-o", target, "--json"
+    )
+    found = {one["key"]: one for one in json.loads(result.out)["errors"]}
+    assert found["ECY"]["kind"] == "over Z"
+    assert found["ECY"]["points"] == 6
+    curve = load_scene(str(target)).errors.functions["ECY"]
+    assert isinstance(curve, TwoArguments)
+    assert curve.values == ((6.5, 6.5),) * 3
+    warpspace("template", "Y", "--over", "Y").refused("another axis than Y")
+    warpspace("template", "Y", "--over", "Q=1,2").refused("--over 'Q=1,2'")
+    warpspace("template", "Y", "--over", "Z=2,1").refused("--over '2,1'; expected ascending")
