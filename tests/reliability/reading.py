@@ -48,11 +48,12 @@ def read_many(way: str, count: int, seed: int) -> Outcome:
         if read < portion:  # its process has ended in the midst
             break
     spelt = ", ".join(
-        f"{name} {number:,}, {good[name] / number:.0%}" for name, number in sorted(total.items())
+        f"{name} {100.0 * good[name] / number:.0f} % of {number:,}"
+        for name, number in sorted(total.items())
     )
     result = (
-        f"slowest {slowest:.2f} s of CPU, at most {most_mb:.0f} MB (files by format, and the share"
-        f" that could be read: {spelt})"
+        f"slowest {slowest:.2f} s of CPU, at most {most_mb:.0f} MB (could be read all the same:"
+        f" {spelt})"
     )
     return Outcome(sum(total.values()), result, faults)
 
