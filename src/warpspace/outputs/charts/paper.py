@@ -89,15 +89,16 @@ def sheet(
     """
     figure = Figure(figsize=(width, height), dpi=DPI, facecolor=ground().paper)
     left = 0.3 / width
-    for text in (
-        figure.text(left, 1.0 - 0.2 / height, title, size=TITLE, weight="bold", va="top"),
-        figure.text(
-            left, 1.0 - 0.5 / height, subtitle, size=SUBTITLE, color=ground().muted, va="top"
-        ),
+    for words, size, down, weight, colour in (
+        (title, TITLE, 0.2, "bold", ground().ink),
+        (subtitle, SUBTITLE, 0.5, "normal", ground().muted),
     ):
+        text = figure.text(
+            left, 1.0 - down / height, words, size=size, weight=weight, color=colour, va="top"
+        )
         wide = text.get_window_extent().width / figure.dpi
         if wide > width - 0.5:  # smaller, so that it does not run off the sheet
-            text.set_fontsize(text.get_fontsize() * max((width - 0.5) / wide, LEAST_SHARE))
+            text.set_fontsize(size * max((width - 0.5) / wide, LEAST_SHARE))
     return figure, 1.0 - top_in / height
 
 
