@@ -22,7 +22,7 @@ from app.raw_client import (
     until,
     upload,
 )
-from app.wire import CAMERA, pack
+from page_protocol import CAMERA, pack
 from warpspace.app.browser.incoming import may_pass, may_set
 from warpspace.app.server.repeated_lines import RepeatedLines
 from warpspace.app.server.viewer import Viewer
