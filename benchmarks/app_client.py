@@ -9,26 +9,15 @@ import sys
 import time
 import urllib.request
 from dataclasses import dataclass, field
+from pathlib import Path
 
-import msgspec.msgpack
 import psutil
-import viser
 import websockets
-import zstandard
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
+from page_protocol import CAMERA, HOW, pack, unpack, update
 
 NUMBERS = re.compile(r'data-value="(mean|RMS|P95|max)"[^>]*>([^<]*)<')
-CAMERA = {
-    "type": "ViewerCameraMessage",
-    "wxyz": (1.0, 0.0, 0.0, 0.0),
-    "position": (30.0, -30.0, 30.0),
-    "fov": 0.4,
-    "near": 0.01,
-    "far": 1000.0,
-    "image_height": 900,
-    "image_width": 1600,
-    "look_at": (0.0, 0.0, 0.0),
-    "up_direction": (0.0, 0.0, 1.0),
-}
 Shown = tuple[tuple[str, str], ...]
 
 
@@ -59,12 +48,7 @@ class Tab:
 
     async def open(self) -> None:
         """Connect and wait until all of the page is there."""
-        self._socket = await websockets.connect(
-            self.url.replace("http", "ws", 1),
-            subprotocols=[f"viser-v{viser.__version__}"],
-            max_size=None,
-            compression=None,
-        )
+        self._socket = await websockets.connect(self.url.replace("http", "ws", 1), **HOW)
         self._reader = asyncio.create_task(self._read())
         await self._send(CAMERA)
         for _ in range(600):
@@ -86,20 +70,16 @@ class Tab:
         await self._update(self.widgets[label], value)
 
     async def _update(self, widget: str, value: object) -> None:
-        await self._send({"type": "GuiUpdateMessage", "uuid": widget, "updates": {"value": value}})
+        await self._send(update(widget, {"value": value}))
 
     async def _send(self, message: dict[str, object]) -> None:
-        await self._socket.send(msgspec.msgpack.encode(message))
+        await self._socket.send(pack(message))
 
     async def _read(self) -> None:
-        zstd = zstandard.ZstdDecompressor()
         with contextlib.suppress(websockets.ConnectionClosed):
             async for raw in self._socket:
                 self.bytes += len(raw)
-                packed = int.from_bytes(raw[8:16], "little")
-                size = int.from_bytes(raw[:8], "little")
-                text = zstd.decompress(raw[16 : 16 + packed], max_output_size=size)
-                for message in msgspec.msgpack.decode(text)["messages"]:
+                for message in unpack(raw):
                     await self._take(message)
 
     async def _run(self, source: str) -> None:

@@ -18,8 +18,8 @@ from typing import Any
 import psutil
 import websockets
 
-from app import wire
-from app.wire import CAMERA, HOW, pack, unpack
+import page_protocol
+from page_protocol import CAMERA, HOW, pack, unpack
 
 
 class App:
@@ -153,7 +153,7 @@ async def until(fine: Callable[[], bool], seconds: float) -> None:
 
 
 def update(uuid: object, updates: object) -> bytes:
-    return pack(wire.update(uuid, updates))
+    return pack(page_protocol.update(uuid, updates))
 
 
 def camera(**fields: object) -> bytes:

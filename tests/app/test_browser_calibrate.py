@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.conftest import Tab
+from app.page_tab import Tab
 from warpspace.app.evaluation.calibration import bundled
 from warpspace.scene.library import load_scene
 

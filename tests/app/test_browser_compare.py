@@ -12,8 +12,8 @@ from urllib.parse import urlencode
 import numpy as np
 import pytest
 
-from app.conftest import SCENES, Tab, drawn_nodes
 from app.frames import new_visitor
+from app.page_tab import SCENES, Tab, drawn_nodes
 from warpspace.app.browser.address import PARAMETER
 from warpspace.app.documents import links
 from warpspace.app.documents.scene_file import open_text, state_to_toml

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 import viser
 
-from app.conftest import open_page, wait_until_open
+from app.page_tab import open_page, wait_until_open
 from warpspace.app.server.doors import Access
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import start_state

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from app.conftest import Tab
+from app.page_tab import Tab
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import start_state

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from app.conftest import SCENES, Tab, wait_until_open
 from app.frames import new_visitor
+from app.page_tab import SCENES, Tab, wait_until_open
 from warpspace.app.server.viewer import Viewer
 
 pytestmark = pytest.mark.browser

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from app.conftest import Tab
+from app.page_tab import Tab
 
 pytestmark = pytest.mark.browser
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from app.conftest import Tab
+from app.page_tab import Tab
 from warpspace.app.state.app_state import start_state
 from warpspace.scene.library import load_scene
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from app.conftest import Tab
+from app.page_tab import Tab
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import start_state
 from warpspace.app.viewport.tone_map import vertex_colours

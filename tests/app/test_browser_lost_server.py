@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from app.conftest import Tab, open_page, wait_until_open
 from app.frames import new_visitor
+from app.page_tab import Tab, open_page, wait_until_open
 from warpspace.app.server.viewer import Viewer
 from warpspace.scene.library import load_scene
 

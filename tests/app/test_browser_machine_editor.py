@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.conftest import SCENES, Tab
+from app.page_tab import SCENES, Tab
 from warpspace.bodies.placed import load_bodies
 
 pytestmark = pytest.mark.browser

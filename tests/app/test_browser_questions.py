@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 
-from app.conftest import SCENES, Tab, drawn_nodes
+from app.page_tab import SCENES, Tab, drawn_nodes
 from warpspace.app.documents.scene_file import state_to_toml
 from warpspace.app.evaluation.budget import Picked, answer
 from warpspace.app.evaluation.compare import scene_side, with_sides

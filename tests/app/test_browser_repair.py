@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.conftest import SCENES, Tab
+from app.page_tab import SCENES, Tab
 from warpspace.app.state.app_state import start_state
 from warpspace.scene import repairs as scene_repairs
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from app.conftest import Tab, open_page, wait_until_open
+from app.page_tab import Tab, open_page, wait_until_open
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.server.viewer import Viewer

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app.conftest import Tab
+from app.page_tab import Tab
 from warpspace.app.state.app_state import start_state
 from warpspace.field.evaluate import evaluate_exact
 from warpspace.picture.axis_motion import evaluate_axis_motion, name_trace

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from app.conftest import TIDY, Tab, wait_until_open
 from app.frames import new_visitor
+from app.page_tab import TIDY, Tab, wait_until_open
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import start_state

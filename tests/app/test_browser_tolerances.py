@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from app.conftest import SCENES, Tab
+from app.page_tab import SCENES, Tab
 from warpspace.app.state.app_state import AppState
 from warpspace.scene import verbs
 

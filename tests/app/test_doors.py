@@ -12,7 +12,8 @@ from websockets.exceptions import ConnectionClosedError
 from websockets.protocol import State
 from websockets.sync.client import ClientConnection
 
-from app.wire import PROTOCOL, dial
+from app.wire import dial
+from page_protocol import PROTOCOL
 from warpspace.app.server import guard, network, viewer
 from warpspace.app.server.doors import Access, Asked, Doors, Place, read_place
 from warpspace.app.server.guard import Limits, Rate

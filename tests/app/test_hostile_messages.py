@@ -7,21 +7,26 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import psutil
 import pytest
 
 from app.raw_client import (
     App,
     Tab,
     come_and_go,
+    dial,
     nonsense,
     running_app,
     send_all,
     steadily,
+    until,
     upload,
 )
-from app.wire import CAMERA, pack
+from page_protocol import CAMERA, pack
 from warpspace.app.browser.incoming import may_pass, may_set
 from warpspace.app.server.repeated_lines import RepeatedLines
+from warpspace.app.server.viewer import Viewer
+from warpspace.scene.library import load_scene
 
 MESSAGES = 10_000
 CONNECTIONS = 200
@@ -102,6 +107,28 @@ def test_two_hundred_connections_that_vanish_leave_nothing_behind(app: App) -> N
     assert app.settles(threads + 3) <= threads + 3
     assert app.memory_mb - memory < 30.0
     assert len(app.log) < 12, "\n".join(app.log[:40])
+
+
+def test_clients_that_read_nothing_do_not_hold_up_the_end() -> None:
+    viewer = Viewer(load_scene("dvf5000_first"))
+    app = App(viewer.url.replace("http", "ws", 1), psutil.Process(), Path())
+
+    async def run() -> float:
+        sockets = [await dial(app) for _ in range(3)]
+        for socket in sockets:
+            await socket.send(pack(CAMERA))
+            socket.transport.pause_reading()
+        await until(lambda: len(viewer.sessions) == 3, 20.0)
+        await asyncio.sleep(1.0)  # the pages are on their way to them
+        began = time.monotonic()
+        viewer.stop()
+        taken = time.monotonic() - began
+        for socket in sockets:
+            socket.transport.abort()
+            await socket.wait_closed()
+        return taken
+
+    assert asyncio.run(run()) < 4.0  # viser would wait for 6 s
 
 
 def test_what_a_page_really_says_passes() -> None:

@@ -14,7 +14,8 @@ import pytest
 import viser
 from viser import _messages as messages
 
-from app.wire import CAMERA, dial
+from app.wire import dial
+from page_protocol import CAMERA
 from warpspace.app import browser
 from warpspace.app.browser.viser_private import (
     dom_id,

@@ -17,9 +17,9 @@ from dask_cluster import dask_cluster
 from lost_process import square
 from warpspace.analysis.plan import BLOCK
 from warpspace.cli import pools
-from warpspace.cli.pools import LastingPool, find_workers
+from warpspace.cli.pools import find_workers
 from warpspace.exceptions import OptionError, WorkersLostError
-from warpspace.outputs.processes import start_pool
+from warpspace.outputs.processes import ProcessPool
 
 distributed = pytest.importorskip("distributed")
 RUN = (
@@ -118,19 +118,16 @@ def test_a_worker_killed_half_way_changes_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
-def test_tasks_of_a_process_that_was_killed_are_done_again(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(pools, "REPLACEMENTS", 2)
-    pool = LastingPool(lambda: start_pool(2))
-    try:
-        futures = [pool.submit(square, number, str(tmp_path), "once") for number in range(8)]
-        assert [future.result(60) for future in futures] == [number**2 for number in range(8)]
-        assert (tmp_path / "killed").exists()
-        lost = pool.submit(square, 3, str(tmp_path), "always")
-        with pytest.raises(WorkersLostError, match="ended 2 times"):
-            lost.result(60)
-        assert pool.submit(square, 2, str(tmp_path), "once").result(60) == 4
-    finally:
-        pool.shutdown(wait=False)
+def test_workers_that_die_again_and_again_end_the_run_with_a_message(tmp_path: Path) -> None:
+    said = f"died {pools.LOSSES + 1} times: out of memory.; run again with fewer --workers"
+
+    def run() -> None:
+        with find_workers(None, 2, pools.WORTH_A_POOL) as found:
+            assert found.executor is not None
+            found.executor.submit(square, 3, str(tmp_path), "always").result(120)
+
+    with pytest.raises(WorkersLostError, match=said):
+        run()
 
 
 def test_a_large_run_gets_processes_and_a_small_one_threads() -> None:
@@ -139,7 +136,7 @@ def test_a_large_run_gets_processes_and_a_small_one_threads() -> None:
     with find_workers(None, 1, 10**9) as alone:
         assert alone.executor is None
     with find_workers(None, 2, pools.WORTH_A_POOL) as many:
-        assert isinstance(many.executor, LastingPool)
+        assert isinstance(many.executor, ProcessPool)
         assert many.number == 2
     with pytest.raises(OptionError, match="workers: 513"), find_workers(None, 513, 1):
         pass

@@ -20,6 +20,10 @@ FIELD = ("field", "dvf5000_first", "--grid", "41", "--force", "--csv", "x.csv")
 PICTURE = ("snapshot", "dvf5000_first", "--force", "-o", "x.png")
 MOVIE = ("animate", "dvf5000_first", "--frames", "30", "--force", "-o", "x.gif")
 REPORT = ("report", "dvf5000_first", "--force", "-o", "x.html")
+SAMPLES = (
+    *("montecarlo", "dvf5000_general", "--samples", "10000000", "--over", "max"),
+    *("--workers", "2", "--force", "-o", "x.csv"),
+)
 # writes slowly, so that it is hit while its temporary file is there
 WRITER = """
 import sys, time
@@ -122,9 +126,11 @@ def test_a_hundred_kills_leave_nothing(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir() if path.name[0] != "x") == ["log"]
 
 
-@pytest.mark.parametrize("command", [PICTURE, MOVIE, REPORT], ids=lambda command: command[0])
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
-def test_renderers_end_with_their_command(
+@pytest.mark.parametrize(
+    "command", [PICTURE, MOVIE, REPORT, SAMPLES], ids=lambda command: command[0]
+)
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+def test_processes_end_with_their_command(
     command: tuple[str, ...], how: signal.Signals, tmp_path: Path
 ) -> None:
     process = start(tmp_path, *command)
@@ -169,6 +175,27 @@ def test_the_next_run_clears_what_a_killed_one_left(tmp_path: Path) -> None:
     alive.wait()
     assert len(left) == 2
     assert all(f"-{alive.pid}-" in name or name == ".warpspace-notes.csv" for name in left)
+
+
+# as dataclasses do while packages are imported
+IN_EXEC = """
+from warpspace.cli import main
+from warpspace.cli.main import cli
+def work(**options):
+    exec("import time; print('here', flush=True); time.sleep(60)")
+cli.main = work
+main()
+"""
+
+
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGINT])
+def test_the_status_says_which_signal_it_was(how: signal.Signals, tmp_path: Path) -> None:
+    process = start(tmp_path, code=IN_EXEC)
+    while "here" not in (tmp_path / "log").read_text():
+        assert process.poll() is None
+        time.sleep(0.05)
+    process.send_signal(how)
+    assert process.wait(20) == 128 + how
 
 
 DRAWING_VIEW = """

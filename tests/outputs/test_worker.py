@@ -25,7 +25,7 @@ def test_a_crash_loses_one_figure_only(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = load_scene("dvf5000_first")
     with FigureWorker() as worker:
         first = worker.render("error-map", [scene], SMALL)
-        (process,) = worker._pool._processes.values()
+        (process,) = (found.process for found in worker._pool._workers)
         threading.Timer(0.3, os.kill, (process.pid, signal.SIGSEGV)).start()
         with pytest.raises(RenderError, match="renderer crashed; other figures are not affected"):
             worker.render("error-map", [scene], LARGE)

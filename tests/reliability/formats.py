@@ -1,9 +1,11 @@
 """The files the program reads: for each format some good ones to begin with, and how it is read.
 
-A new import format is one entry in `FORMATS`. `read` gets the bytes of a file and a folder that it
-may use; what it raises on purpose is a `WarpspaceError`.
+A new format is one entry in `FORMATS`; those of measurements and controllers are there once they
+are registered. `read` gets the bytes of a file and a folder that it may use; what it raises on
+purpose is a `WarpspaceError`.
 """
 
+import re
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,6 +13,7 @@ from pathlib import Path
 
 from warpspace.app.documents.links import unpack
 from warpspace.app.documents.received_files import upload_text
+from warpspace.formats.registry import formats
 from warpspace.resources import scenes_dir
 from warpspace.scene.library import load_scene, parse_scene, scene_names
 
@@ -190,33 +193,88 @@ def _read_urdf(content: bytes, folder: Path) -> object:
     return parse_scene(imported_text(found.machine, path.name, notes, {}), "fuzz")
 
 
+SPLIT = re.compile(rb"^%% (\S{1,20})\n", re.MULTILINE)
+"""Before each file of those that belong together: its name."""
+RTL = """HEADER::
+MACHINE:DVF
+TARGET DATA::
+Filetype: linear
+Target-count: 3
+Targets : -200 0 200
+Flags: 1 1 1
+RUNS::
+Run-count: 2
+DEVIATIONS::
+Run Target Data:
+1 1 0.5
+1 2 1.5
+1 3 -2.5
+2 3 -2.0
+2 2 1.0
+2 1 0.0
+"""
+
+
+def _import_seeds(name: str) -> Callable[[], list[bytes]]:
+    """Give files of a format of measurements or of a controller, as the program writes them."""
+
+    def seeds() -> list[bytes]:
+        from warpspace.formats.compensation.compensate import Plan, compensate
+        from warpspace.formats.registry import find_format
+
+        if not find_format(name).can_write:
+            return [b"%% x.rtl\n" + RTL.encode()]
+        points = None if name in {"marlin", "klipper"} else 3
+        found = compensate(load_scene("dvf5000_first"), Plan(name, points), 3)
+        usual = found.format.endings[0]
+        parts = (f"%% x{add or usual}\n{text}" for add, text in found.files.items())
+        return ["".join(parts).encode()]
+
+    return seeds
+
+
+def _read_import(name: str) -> Callable[[bytes, Path], object]:
+    """Read files as their format whatever their first lines say, and as its controller does."""
+
+    def read(content: bytes, folder: Path) -> object:
+        del folder
+        from warpspace.formats.importing import open_upload, read_errors
+        from warpspace.formats.kind import ReadOptions
+        from warpspace.formats.registry import find_format
+        from warpspace.formats.to_scene import base_scene, into_scene
+
+        base = base_scene("dvf5000")
+        options = ReadOptions(base.machine, axis="X" if name == "rtl" else "")
+        parts = SPLIT.split(content)[1:]
+        sources = [
+            open_upload(file.decode("latin-1"), text)
+            for file, text in zip(parts[::2], parts[1::2], strict=True)
+        ]
+        if not sources:
+            sources = [open_upload("x", content)]
+        kind = find_format(name)
+        if kind.tables is not None:
+            kind.tables(sources, options)
+        return into_scene(read_errors(sources, options, name), base, "fuzz", "x")
+
+    return read
+
+
 def _measured() -> list[bytes]:
-    """Give a filled form of our own, and tables of controllers."""
-    form = "X [mm],run,direction,EXX [um],EBX [urad]\n" + "\n".join(
-        f"{position},{run},{way},{position / 100 + run},{run}"
-        for run in (1, 2)
-        for way in "+-"
-        for position in (-250, 0, 250)
-    )
-    linuxcnc = "\n".join(
-        f"{position} {position + 0.01} {position - 0.01}" for position in (0, 100, 200)
-    )
-    points = "".join(f"$AA_ENC_COMP[0,{at},X]={at / 1000}\n" for at in range(5))
-    sinumerik = (
-        points + "$AA_ENC_COMP_STEP[0,X]=100\n$AA_ENC_COMP_MIN[0,X]=-200\n"
-        "$AA_ENC_COMP_MAX[0,X]=200\n$AA_ENC_COMP_IS_MODULO[0,X]=0\n"
-    )
-    return [text.encode() for text in (form, linuxcnc, sinumerik)]
+    """Give files of all formats of measurements and controllers that are one file."""
+    files = (SPLIT.split(_import_seeds(one.name)()[0])[1:] for one in formats())
+    return [parts[1] for parts in files if len(parts) == 2]
 
 
 def _read_measured(content: bytes, folder: Path) -> object:
+    """Read a file as what it looks like, as the app does."""
     del folder
     from warpspace.formats.importing import open_upload, read_errors
     from warpspace.formats.kind import ReadOptions
     from warpspace.formats.to_scene import base_scene, into_scene
 
     base = base_scene("dvf5000")
-    reading = read_errors([open_upload("x", content)], ReadOptions(base.machine))
+    reading = read_errors([open_upload("x", content)], ReadOptions(base.machine, axis="X"))
     return into_scene(reading, base, "fuzz", "x")
 
 
@@ -264,6 +322,8 @@ add(Format("glb", _mesh_seeds("glb"), _read_mesh("glb"), text=False))
 add(Format("vts", _vts, _read_vts))
 add(Format("urdf", lambda: [URDF.encode()], _read_urdf))
 add(Format("link", lambda: [b"ZXJyb3JzPUVBWDo1", b"Y29sb3VyPXg"], _read_link, 0.5))
-add(Format("measured", _measured, _read_measured, 2.0))
+add(Format("measured", _measured, _read_measured))
+for _one in formats():
+    add(Format(f"import {_one.name}", _import_seeds(_one.name), _read_import(_one.name), 0.5))
 add(Format("readings", _readings, _read_readings))
 add(Format("test", _tests, _read_test))

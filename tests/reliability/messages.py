@@ -10,7 +10,7 @@ from pathlib import Path
 import websockets
 
 from app.raw_client import App, Tab, dial, nonsense, pack, running_app, send_all, steadily, update
-from app.wire import CAMERA
+from page_protocol import CAMERA
 from reliability.lag import Lag
 from reliability.row import Outcome
 

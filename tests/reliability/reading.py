@@ -31,7 +31,7 @@ WAYS = ("bytes", "hypothesis", "atheris")
 
 def read_many(way: str, count: int, seed: int) -> Outcome:
     """Read so many changed files, in processes of their own; give what came of it."""
-    total, done = Counter[str](), 0
+    total, good, done = Counter[str](), Counter[str](), 0
     slowest, most_mb = 0.0, 0.0
     faults: list[str] = []
     while done < count:
@@ -39,6 +39,7 @@ def read_many(way: str, count: int, seed: int) -> Outcome:
         command = [sys.executable, "-m", "reliability.reading", way, str(portion), str(seed + done)]
         found = _watch(command)
         total.update(found["by_format"])
+        good.update(found["read"])
         slowest = max(slowest, float(found["slowest_s"]))
         most_mb = max(most_mb, float(found["most_mb"]))
         faults += found["faults"]
@@ -46,8 +47,14 @@ def read_many(way: str, count: int, seed: int) -> Outcome:
         done += read
         if read < portion:  # its process has ended in the midst
             break
-    spelt = ", ".join(f"{name} {number:,}" for name, number in sorted(total.items()))
-    result = f"slowest {slowest:.2f} s of CPU, at most {most_mb:.0f} MB ({spelt})"
+    spelt = ", ".join(
+        f"{name} {100.0 * good[name] / number:.0f} % of {number:,}"
+        for name, number in sorted(total.items())
+    )
+    result = (
+        f"slowest {slowest:.2f} s of CPU, at most {most_mb:.0f} MB (could be read all the same:"
+        f" {spelt})"
+    )
     return Outcome(sum(total.values()), result, faults)
 
 
@@ -73,7 +80,7 @@ def _watch(command: list[str]) -> dict[str, object]:  # pyright: ignore[reportRe
         found = (
             json.loads(state.read_text())
             if state.exists()
-            else {"by_format": {}, "slowest_s": 0.0, "most_mb": 0.0, "faults": []}
+            else {"by_format": {}, "read": {}, "slowest_s": 0.0, "most_mb": 0.0, "faults": []}
         )
         if not found.get("ended"):
             said = log.read_text(errors="replace")[-2000:]
@@ -104,6 +111,7 @@ class Reader:
 
         self._folder, self._formats = folder, {each.name: each for each in FORMATS}
         self.by_format: Counter[str] = Counter()
+        self.good: Counter[str] = Counter()
         self.slowest_s, self.faults, self._said = 0.0, [], time.monotonic()
         self._largest_mb = max(LARGEST_MB, self.most_mb + LARGEST_MB / 2.0)
         warnings.simplefilter("error")
@@ -116,6 +124,7 @@ class Reader:
         began = time.process_time()
         try:
             self._formats[name].read(content, self._folder)
+            self.good[name] += 1
         except WarpspaceError as error:
             if len(str(error)) > 20_000:
                 self._fault(name, content, f"a message of {len(str(error)):,} characters")
@@ -152,6 +161,7 @@ class Reader:
         text = json.dumps(
             {
                 "by_format": self.by_format,
+                "read": self.good,
                 "slowest_s": self.slowest_s,
                 "most_mb": self.most_mb,
                 "faults": self.faults[:20],

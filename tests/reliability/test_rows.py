@@ -1,6 +1,7 @@
 """A small count of every row of docs/reliability.md, and the table itself."""
 
 import importlib.util
+import random
 import re
 import sys
 from collections.abc import Callable
@@ -20,7 +21,8 @@ from reliability import (
     surroundings,
     table,
 )
-from reliability.formats import FORMATS, Format
+from reliability.formats import FORMATS, WORDS, Format
+from reliability.mutate import mutate
 from reliability.row import Outcome, Row
 from warpspace.exceptions import OptionError
 
@@ -120,6 +122,17 @@ def test_every_format_can_read_its_own_files(tmp_path: Path) -> None:
                 folder = tmp_path / f"{each.name}{number}"
                 folder.mkdir()
                 assert each.read(content, folder) is not None
+
+
+@pytest.mark.parametrize("each", FORMATS, ids=lambda each: each.name)
+def test_changed_files_get_past_the_first_check(each: Format, tmp_path: Path) -> None:
+    reader, chance, seeds = reading.Reader(tmp_path), random.Random(3), each.seeds()
+    for count in range(1, 401):
+        reader.read(each.name, mutate(seeds, WORDS if each.text else [], chance))
+        if 0 < reader.good[each.name] < count:  # some are refused, and some are read
+            break
+    assert reader.faults == []
+    assert 0 < reader.good[each.name] < 400
 
 
 # --- the table ----------------------------------------------------------------------------------

@@ -88,11 +88,31 @@ def fit_circle(points_mm: Array) -> tuple[Array, float, Array]:
     """
     middle = points_mm.mean(axis=0)
     _, _, axes = np.linalg.svd(points_mm - middle, full_matrices=False)
-    flat = (points_mm - middle) @ axes[:2].T
-    system = np.column_stack([2.0 * flat, np.ones(len(flat))])
-    solution, *_ = np.linalg.lstsq(system, np.sum(flat**2, axis=-1), rcond=None)
-    radius = float(np.sqrt(solution[2] + solution[:2] @ solution[:2]))
-    centre = middle + solution[:2] @ axes[:2]
+    flat, radius = fit_flat_circle((points_mm - middle) @ axes[:2].T)
+    centre = middle + flat @ axes[:2]
     normal = np.cross(axes[0], axes[1])
     turning = np.cross(points_mm[:-1] - centre, points_mm[1:] - centre).sum(axis=0)
     return centre, radius, normal if turning @ normal >= 0.0 else -normal
+
+
+def fit_flat_circle(points_mm: Array) -> tuple[Array, float]:
+    """Fit a circle to points of a plane.
+
+    Parameters
+    ----------
+    points_mm : ndarray, [n, 2], mm
+
+    Returns
+    -------
+    centre_mm : ndarray, [2], mm
+    radius_mm : float, mm
+
+    Notes
+    -----
+    Algebraic least squares: x² + y² = 2·a·x + 2·b·y + c, about the mean of the points.
+    """
+    middle = points_mm.mean(axis=0)
+    flat = points_mm - middle
+    system = np.column_stack([2.0 * flat, np.ones(len(flat))])
+    solution, *_ = np.linalg.lstsq(system, np.sum(flat**2, axis=-1), rcond=None)
+    return middle + solution[:2], float(np.sqrt(solution[2] + solution[:2] @ solution[:2]))

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from warpspace.analysis.circles import fit_flat_circle
 from warpspace.calibration.table import ReadingTable
 from warpspace.machine.axes import direction_index
 from warpspace.scene.model import Scene
@@ -63,8 +64,8 @@ def circles_of(table: ReadingTable, scene: Scene) -> tuple[Circle, ...]:
 
     Notes
     -----
-    Algebraic least squares: x² + y² = 2·a·x + 2·b·y + c, as `warpspace.analysis.circles` has it,
-    in the plane of the two linear axes across the rotary one.
+    As `warpspace.analysis.circles.fit_flat_circle` has it, in the plane of the two linear axes
+    across the rotary one.
     """
     read = table.need(("x_mm", "y_mm", "z_mm"))
     labels = np.array(table.session or ("",) * len(table))
@@ -102,11 +103,7 @@ def _fit(
     """Fit one circle."""
     first, second = PLANES[direction_index(axis)]
     flat = read_mm[:, (first, second)]
-    middle = flat.mean(axis=0)
-    system = np.column_stack([2.0 * (flat - middle), np.ones(len(flat))])
-    solution, *_ = np.linalg.lstsq(system, np.sum((flat - middle) ** 2, axis=-1), rcond=None)
-    radius = float(np.sqrt(solution[2] + solution[:2] @ solution[:2]))
-    centre = middle + solution[:2]
+    centre, radius = fit_flat_circle(flat)
     away = np.linalg.norm(flat - centre, axis=-1) - radius
     angle = np.deg2rad(position_deg) * scene.machine.axes[axis].direction
     across = -1.0 if direction_index(axis) == 1 else 1.0  # from z to x about y, not from x to z

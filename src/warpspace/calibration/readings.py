@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from warpspace.resources import assets_dir
 from warpspace.scene.files import read_text
 from warpspace.scene.model import Scene
 from warpspace.units import Array
+
+if TYPE_CHECKING:
+    from warpspace.calibration.circles import Circle
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +43,8 @@ class Readings:
         Name of the file.
     notes : tuple of str
         What was assumed on reading it.
+    circles : tuple of Circle
+        About rotary axes, where the readings are such.
     """
 
     kind: str
@@ -50,6 +56,7 @@ class Readings:
     lines: tuple[int, ...]
     source: str
     notes: tuple[str, ...] = ()
+    circles: "tuple[Circle, ...]" = ()
 
     def __len__(self) -> int:
         """Count the readings."""

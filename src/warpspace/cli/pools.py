@@ -1,14 +1,11 @@
 """Who does the work of a command: threads, processes of this machine, or a Dask cluster."""
 
 import os
-import threading
-from collections.abc import Callable, Generator
-from concurrent.futures import Executor, Future, InvalidStateError
-from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
-from contextlib import contextmanager, suppress
+from collections.abc import Generator
+from concurrent.futures import Executor
+from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
-from typing import Any, cast
+from typing import cast
 
 import click
 
@@ -17,8 +14,10 @@ from warpspace.machine.limits import LOCAL_WORKERS
 
 WORTH_A_POOL = 2_000_000
 """Machines: what takes about 10 s. Below, starting processes costs more than it saves."""
-REPLACEMENTS = 3
-"""How often one task may lose its process before it is given up."""
+LOSSES = 5
+"""How many worker processes a command may lose: each is replaced and its task done again."""
+RETRIES = 3
+"""How often a cluster does a task again that has lost its worker."""
 CONNECT_S = 10
 
 workers_option = click.option(
@@ -68,6 +67,8 @@ def find_workers(scheduler: str | None, workers: int | None, machines: int) -> G
     ------
     OptionError
         If there is no such cluster, or dask is not installed.
+    WorkersLostError
+        If too many workers died.
     """
     if scheduler is not None:
         if workers is not None:
@@ -84,97 +85,15 @@ def find_workers(scheduler: str | None, workers: int | None, machines: int) -> G
     if number == 1 or machines < WORTH_A_POOL:
         yield Workers(None, workers)
         return
-    from warpspace.outputs.processes import start_pool
+    from warpspace.outputs.processes import ProcessPool
 
-    pool = LastingPool(lambda: start_pool(number))
+    pool = ProcessPool(number, losses=LOSSES)
     try:
         yield Workers(pool, number)
+    except WorkersLostError as error:
+        raise WorkersLostError(f"{error}; run again with fewer --workers") from None
     finally:
-        pool.shutdown(wait=False)
-
-
-class LastingPool(Executor):
-    """A pool of processes that is replaced when it loses one; what was not done is done again.
-
-    Parameters
-    ----------
-    start : callable
-        Gives a new pool.
-    """
-
-    def __init__(self, start: Callable[[], ProcessPoolExecutor]) -> None:
-        self._start = start
-        self._lock = threading.Lock()
-        self._pool = start()
-        self._ended = False
-
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> "Future[Any]":
-        """Give a task to the pool."""
-        outer: Future[Any] = Future()
-        self._try(outer, partial(fn, *args, **kwargs), REPLACEMENTS)
-        return outer
-
-    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: ARG002 - signature of Executor
-        """End the processes; tasks not begun are dropped."""
-        from warpspace.outputs.processes import end_pool
-
-        with self._lock:
-            self._ended = True
-            end_pool(self._pool, wait=wait)
-
-    def _try(self, outer: "Future[Any]", call: Callable[[], Any], left: int) -> None:
-        """Hand a task to the pool that is there."""
-        pool = self._pool
-        try:
-            inner = pool.submit(call)
-        except BrokenProcessPool:
-            self._again(outer, call, left, pool)
-        else:
-            inner.add_done_callback(partial(self._done, outer, call, left, pool))
-
-    def _done(
-        self,
-        outer: "Future[Any]",
-        call: Callable[[], Any],
-        left: int,
-        pool: ProcessPoolExecutor,
-        inner: "Future[Any]",
-    ) -> None:
-        """Pass on what came of a task."""
-        if inner.cancelled():
-            outer.cancel()
-            outer.set_running_or_notify_cancel()
-            return
-        if isinstance(inner.exception(), BrokenProcessPool):
-            self._again(outer, call, left - 1, pool)
-            return
-        error = inner.exception()
-        with suppress(InvalidStateError):  # dropped in this very moment
-            if error is None:
-                outer.set_result(inner.result())
-            else:
-                outer.set_exception(error)
-
-    def _again(
-        self, outer: "Future[Any]", call: Callable[[], Any], left: int, broken: ProcessPoolExecutor
-    ) -> None:
-        """Do a task again in another pool, unless it has lost too many."""
-        from warpspace.outputs.processes import forget_pool
-
-        if outer.cancelled():
-            return
-        with self._lock:
-            if left <= 0 or self._ended:
-                error = WorkersLostError(
-                    f"processes were ended {REPLACEMENTS} times in the midst of one task, perhaps"
-                    " for want of memory; run again with fewer --workers"
-                )
-                outer.set_exception(error)
-                return
-            if self._pool is broken:
-                forget_pool(broken)
-                self._pool = self._start()
-        self._try(outer, call, left)
+        pool.kill()
 
 
 @contextmanager
@@ -199,7 +118,7 @@ def _cluster(address: str) -> Generator[Workers]:
         if not threads:
             raise OptionError(f"--scheduler {address!r}: the cluster has no worker")
         # a task that has lost its worker runs again elsewhere; `pure` would hash its arguments
-        yield Workers(client.get_executor(pure=False, retries=REPLACEMENTS), threads)
+        yield Workers(client.get_executor(pure=False, retries=RETRIES), threads)
     except distributed.KilledWorker as error:
         raise WorkersLostError(f"--scheduler {address!r}: {error}") from None
     finally:

@@ -90,25 +90,7 @@ def draw_figure(request: Request, cancelled: threading.Event) -> bytes:
 
 
 def draw_concepts(request: ConceptRequest, cancelled: threading.Event) -> bytes:
-    """Draw machines side by side as a PNG.
-
-    Parameters
-    ----------
-    request : ConceptRequest
-    cancelled : threading.Event
-        Ends the renderer when set.
-
-    Returns
-    -------
-    bytes
-
-    Raises
-    ------
-    CancelledError
-        If it was cancelled.
-    RenderError
-        If it cannot be drawn here.
-    """
+    """Draw machines side by side as a PNG; otherwise as `draw_figure`."""
     from warpspace.outputs.drawing.settings import FigureSettings
 
     settings = FigureSettings(dark=request.dark, loop=request.loop, concepts=request.plan)

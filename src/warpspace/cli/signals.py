@@ -14,6 +14,14 @@ _PATIENCE_S = 1.0
 """A signal that comes again sooner is taken for the same one: some programs send it twice."""
 
 
+class Ended(KeyboardInterrupt):
+    """A signal that ends the program.
+
+    A class of its own: where a plain KeyboardInterrupt has passed through `exec`, as it does while
+    packages are imported, Python ends itself with SIGINT at last, whatever the exit status said.
+    """
+
+
 class Ending:
     """What a signal asked for.
 
@@ -48,12 +56,12 @@ class Ending:
         processes = sys.modules.get("warpspace.outputs.processes")
         if processes is not None:  # a command that draws nothing need not load it
             processes.kill_pools()
-        raise KeyboardInterrupt
+        raise Ended
 
 
 @contextmanager
 def handle_signals() -> Generator[Ending]:
-    """Let signals that end the program raise KeyboardInterrupt, so that files are cleaned up.
+    """Let signals that end the program raise `Ended`, so that files are cleaned up.
 
     Yields
     ------

@@ -1,89 +1,187 @@
-"""Pools of processes that draw or compute; no such process outlives the one that started it."""
+"""Processes that draw or compute; none outlives the program that started it.
+
+Each has a pipe of its own. The processes of `concurrent.futures` share one: if one of them is
+killed while it writes a large result, the rest of that result is waited for without end.
+"""
 
 import os
 import signal
 import threading
-from collections.abc import Generator
-from concurrent.futures import ProcessPoolExecutor
+import traceback
+from collections.abc import Callable, Generator, Mapping
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import get_context, parent_process, resource_tracker
+from multiprocessing.connection import Connection
+from typing import Any
 
-from warpspace.exceptions import RenderError
+from warpspace.exceptions import RenderError, WorkersLostError
 
-_pools: set[ProcessPoolExecutor] = set()
+END_S = 5.0
+"""How long a process that has nothing more to do may take to end by itself."""
+
+_spawn = get_context("spawn")
+_pools: "set[ProcessPool]" = set()
 """The pools that are in use."""
 _ending = threading.Event()
-"""Set once this process has been told to end."""
+"""Set once this program has been told to end."""
+_Task = tuple[Callable[..., Any], tuple[Any, ...], Mapping[str, Any]]
 
 
-def start_pool(processes: int, *, tasks_per_process: int | None = None) -> ProcessPoolExecutor:
-    """Start a pool of processes.
+class ProcessPool(Executor):
+    """Does tasks in processes, each of which does one task after the other.
 
     Parameters
     ----------
     processes : int
-        How many there are at the most.
+        How many there are at the most; each is started when there is a task for it.
     tasks_per_process : int, optional
         A process is replaced after so many tasks.
-
-    Returns
-    -------
-    ProcessPoolExecutor
-        To be ended with `end_pool`.
+    losses : int, optional
+        How many processes may die altogether. Each is replaced, and its task done again; one more,
+        and all tasks fail with `WorkersLostError`.
 
     Raises
     ------
     RenderError
-        If this process has been told to end.
+        If this program has been told to end.
     """
-    if _ending.is_set():
-        raise RenderError("nothing more is begun: the program ends")
-    pool = ProcessPoolExecutor(
-        processes,
-        get_context("spawn"),
-        initializer=_follow_parent,
-        max_tasks_per_child=tasks_per_process,
-    )
-    _pools.add(pool)
-    return pool
+
+    def __init__(
+        self, processes: int, *, tasks_per_process: int | None = None, losses: int = 0
+    ) -> None:
+        if _ending.is_set():
+            raise RenderError("nothing more is begun: the program ends")
+        self.ended = False
+        self._tasks_per_process = tasks_per_process
+        self._may_lose = losses
+        self._lost = 0
+        self._lock = threading.Lock()
+        self._workers: set[_Worker] = set()
+        self._idle: list[_Worker] = []
+        # a thread waits for each process
+        self._threads = ThreadPoolExecutor(processes, "process")
+        _pools.add(self)
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> "Future[Any]":
+        """Give a task to the pool: a function of a module's own level, and what it is called with.
+
+        Returns
+        -------
+        Future
+            Raises what the function raises, or `WorkersLostError`.
+        """
+        return self._threads.submit(self._do, (fn, args, kwargs))
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the processes when they have done their tasks; whether or not that is waited for."""
+        self._threads.shutdown(wait=wait, cancel_futures=cancel_futures)
+        if not wait:
+            return
+        self.ended = True
+        _pools.discard(self)
+        while self._idle:
+            self._retire(self._idle.pop())
+
+    def kill(self) -> None:
+        """Kill the processes in the midst of their tasks; what has not begun is dropped."""
+        self.kill_processes()
+        self.shutdown(cancel_futures=True)
+
+    def kill_processes(self) -> None:
+        """Kill the processes, and start none from now on; safe in a signal handler."""
+        self.ended = True
+        for worker in list(self._workers):
+            worker.process.kill()
+
+    def _do(self, task: _Task) -> Any:
+        """Have a process do a task, as often as it takes."""
+        while True:
+            worker = self._find()
+            try:
+                result, error = worker.do(task)
+            except (EOFError, OSError):  # the end of the pipe, which is that of the process
+                self._retire(worker)
+                with self._lock:
+                    self._lost += not self.ended
+                continue
+            if worker.done == self._tasks_per_process:
+                self._retire(worker)
+            else:
+                self._idle.append(worker)
+            if error is not None:
+                raise error
+            return result
+
+    def _find(self) -> "_Worker":
+        """Give a process that has nothing to do; start one where there is none."""
+        with self._lock:
+            if not self.ended and self._lost <= self._may_lose:
+                if self._idle:
+                    return self._idle.pop()
+                worker = _Worker()
+                self._workers.add(worker)
+                if self.ended:  # in this very moment
+                    worker.process.kill()
+                return worker
+        if self.ended:
+            raise WorkersLostError("the worker processes were ended")
+        times = "once" if self._lost == 1 else f"{self._lost} times"
+        raise WorkersLostError(f"worker processes died {times}: out of memory?")
+
+    def _retire(self, worker: "_Worker") -> None:
+        """End a process that has no task."""
+        with self._lock:
+            worker.end()
+            self._workers.discard(worker)
 
 
-def is_in_use(pool: ProcessPoolExecutor) -> bool:
-    """Tell whether nobody has ended a pool on purpose."""
-    return pool in _pools
+class _Worker:
+    """A process, and this end of its pipe.
 
-
-def end_pool(pool: ProcessPoolExecutor, *, wait: bool = True) -> None:
-    """End a pool; tasks that have not begun are dropped.
-
-    Parameters
+    Attributes
     ----------
-    pool : ProcessPoolExecutor
-    wait : bool, optional
-        Whether tasks that have begun are finished. Else their processes are killed.
+    process : multiprocessing.Process
+    done : int
+        How many tasks it has done.
     """
-    _pools.discard(pool)
-    if not wait:
-        _kill(pool)
-    # also after a kill, which takes no time: the interpreter must not end in the midst of it
-    pool.shutdown(wait=True, cancel_futures=True)
 
+    def __init__(self) -> None:
+        self._pipe, theirs = _spawn.Pipe()
+        self.process = _spawn.Process(target=_work, args=(theirs,), daemon=True)
+        self.done = 0
+        with _interrupts_held_back():
+            self.process.start()
+        theirs.close()  # so that the pipe ends when the process does
 
-def forget_pool(pool: ProcessPoolExecutor) -> None:
-    """Leave a broken pool to its own thread, which ends its processes; to be called from it."""
-    _pools.discard(pool)
-    pool.shutdown(wait=False)
+    def do(self, task: _Task) -> tuple[Any, BaseException | None]:
+        """Send a task and wait for what comes of it; an OSError or EOFError is its end."""
+        try:
+            self._pipe.send(task)
+            self.done += 1
+            return self._pipe.recv()
+        except (EOFError, OSError):
+            raise
+        except Exception as error:  # noqa: BLE001 - something that cannot be sent
+            return None, error
+
+    def end(self) -> None:
+        """Let the process end, and wait for it."""
+        self._pipe.close()
+        self.process.join(END_S)
+        self.process.kill()
+        self.process.join()
 
 
 def kill_pools() -> None:
     """Kill the processes of all pools, and start none from now on; safe in a signal handler."""
     _ending.set()
     while _pools:
-        _kill(_pools.pop())
+        _pools.pop().kill_processes()
 
 
 @contextmanager
-def interrupts_held_back() -> Generator[None]:
+def _interrupts_held_back() -> Generator[None]:
     """Keep Ctrl-C away from processes that this thread starts, until they ignore it themselves.
 
     A terminal sends it to all processes of a command. Only the first one is to answer it.
@@ -100,10 +198,36 @@ def interrupts_held_back() -> Generator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _kill(pool: ProcessPoolExecutor) -> None:
-    """Kill the processes of a pool."""
-    for process in list((pool._processes or {}).values()):  # noqa: SLF001 - no public way
-        process.kill()
+def _work(pipe: "Connection[Any, Any]") -> None:
+    """Do the tasks that come through the pipe; runs in a process of its own."""
+    _follow_parent()
+    while True:
+        try:
+            task = pipe.recv()
+        except (EOFError, OSError):  # nobody is there any more
+            return
+        except Exception as error:  # noqa: BLE001 - something that cannot be read
+            found = None, error
+        else:
+            found = _outcome(*task)
+        try:
+            pipe.send(found)
+        except OSError:
+            return
+        except Exception as error:  # noqa: BLE001 - something that cannot be sent
+            pipe.send((None, error))
+        del found
+
+
+def _outcome(
+    fn: Callable[..., Any], args: tuple[Any, ...], kwargs: Mapping[str, Any]
+) -> tuple[Any, BaseException | None]:
+    """Call a function; give what it returns, or what it raises."""
+    try:
+        return fn(*args, **kwargs), None
+    except Exception as error:  # noqa: BLE001 - raised again by whoever waits for it
+        error.add_note("in a worker process:\n" + traceback.format_exc())
+        return None, error
 
 
 def _follow_parent() -> None:

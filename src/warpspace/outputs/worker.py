@@ -5,12 +5,17 @@ import subprocess
 import sys
 import threading
 from collections.abc import Sequence
-from concurrent.futures import CancelledError, Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import CancelledError, Future
 
-from warpspace.exceptions import OptionError, RenderError, SceneError, UnknownNameError
+from warpspace.exceptions import (
+    OptionError,
+    RenderError,
+    SceneError,
+    UnknownNameError,
+    WorkersLostError,
+)
 from warpspace.outputs.drawing.settings import FigureSettings
-from warpspace.outputs.processes import end_pool, interrupts_held_back, is_in_use, start_pool
+from warpspace.outputs.processes import ProcessPool
 from warpspace.scene.model import Scene
 
 PICTURES_PER_PROCESS = 100
@@ -95,7 +100,7 @@ class FigureWorker:
     def __init__(self, timeout_s: float = TIMEOUT_S) -> None:
         self._timeout_s = timeout_s
         self._lock = threading.Lock()
-        self._pool: ProcessPoolExecutor | None = None
+        self._pool: ProcessPool | None = None
 
     def render(
         self,
@@ -130,8 +135,8 @@ class FigureWorker:
         pool, future = self._submit(name, tuple(scenes), settings or FigureSettings(), form)
         try:
             return future.result(self._timeout_s)
-        except (BrokenProcessPool, CancelledError):
-            if not is_in_use(pool):
+        except (WorkersLostError, CancelledError):
+            if pool.ended:
                 raise RenderError(f"figure {name!r} was given up: its renderer was ended") from None
             self.close(wait=False)
             problem = probe_renderer()
@@ -147,20 +152,23 @@ class FigureWorker:
 
     def _submit(
         self, name: str, scenes: Sequence[Scene], settings: FigureSettings, form: str
-    ) -> "tuple[ProcessPoolExecutor, Future[bytes]]":
+    ) -> "tuple[ProcessPool, Future[bytes]]":
         """Hand a request to the process; start one where there is none."""
         with self._lock:
             if self._pool is None:
-                self._pool = start_pool(1, tasks_per_process=PICTURES_PER_PROCESS)
-            with interrupts_held_back():
-                return self._pool, self._pool.submit(_draw, name, scenes, settings, form)
+                self._pool = ProcessPool(1, tasks_per_process=PICTURES_PER_PROCESS)
+            return self._pool, self._pool.submit(_draw, name, scenes, settings, form)
 
     def close(self, *, wait: bool = True) -> None:
         """End the process; the next request starts a new one."""
         with self._lock:
             pool, self._pool = self._pool, None
-        if pool is not None:
-            end_pool(pool, wait=wait)
+        if pool is None:
+            return
+        if wait:
+            pool.shutdown(cancel_futures=True)
+        else:
+            pool.kill()
 
     def __enter__(self) -> "FigureWorker":
         """Use the worker in a with statement."""

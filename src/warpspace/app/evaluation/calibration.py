@@ -10,7 +10,7 @@ from warpspace.app.evaluation.resulting_scene import scene_of
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.comparison import Side
 from warpspace.calibration.calibrate import calibrate
-from warpspace.calibration.circles import Circle, circles_of
+from warpspace.calibration.circles import Circle
 from warpspace.calibration.kinds.registry import KINDS
 from warpspace.calibration.next_best import Step, next_best, separating
 from warpspace.calibration.readings import bundled_data, find_data, parse_readings
@@ -196,12 +196,7 @@ def answer(question: Question, cancelled: threading.Event, tell: Tell) -> Answer
         tell("Fitting …")
         sets = [parse_readings(one.text, one.name, scene, one.kind) for one in question.files]
         found = calibrate(scene, sets, request, (), watch)
-        circles = tuple(
-            circle
-            for one in question.files
-            if one.told == "sphere"
-            for circle in circles_of(parse_table(one.text, one.name), scene)
-        )
+        circles = tuple(circle for one in sets for circle in one.circles)
         tell("Looking for further measurements …")
         apart = separating(scene, sets, found, watch=watch) if found.rank.confounded else {}
         steps = next_best(scene, sets, found, MOST_NEXT, watch=watch)

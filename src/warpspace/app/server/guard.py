@@ -1,8 +1,10 @@
 """Puts the app's checks and limits around viser's server: each request, connection and message."""
 
 import asyncio
+import contextlib
 import logging
 import time
+import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
 from http import HTTPStatus
@@ -105,6 +107,11 @@ class LimitedConnection(ServerConnection):
         self._log = log
         self._words = f"more than {limits.messages_per_second:g} messages a second"
 
+    def abort(self) -> None:
+        """Cut the connection: nothing more is sent, and nothing is waited for."""
+        if hasattr(self, "transport"):  # it is there from the first byte on
+            self.transport.abort()
+
     async def recv(self, decode: bool | None = None) -> Any:
         """Receive a message; one too many ends the connection."""
         try:
@@ -136,6 +143,13 @@ class Guard:
     def __init__(self, doors: Doors, limits: Limits = LIMITS) -> None:
         self._doors, self._limits = doors, limits
         self._log = OnceLog()
+        self._connections = weakref.WeakSet[LimitedConnection]()
+
+    def cut(self) -> None:
+        """Cut the connections that there are; to be called from another thread than theirs."""
+        for connection in tuple(self._connections):
+            with contextlib.suppress(RuntimeError):  # the event loop has ended with all of them
+                connection.loop.call_soon_threadsafe(connection.abort)
 
     def options(self, theirs: dict[str, Any]) -> dict[str, Any]:
         """Give the options that a server of `websockets` starts with, from those viser has.
@@ -167,6 +181,7 @@ class Guard:
         def create_connection(*args: Any, **kwargs: Any) -> LimitedConnection:
             connection = LimitedConnection(*args, **kwargs)
             connection.limit(self._limits, self._log)
+            self._connections.add(connection)
             return connection
 
         return {

@@ -43,6 +43,8 @@ from warpspace.scene.model import Scene
 logger = logging.getLogger(__name__)
 WATCH_S = 2.0
 """How often sessions are looked for whose connection is gone."""
+FAREWELL_S = 0.5
+"""How long the end waits for pages to close their connection; some read nothing any more."""
 
 
 class Viewer:
@@ -102,7 +104,8 @@ class Viewer:
         self._lock = threading.Lock()
         self._memory = TabMemory()
         self._shared = StateStore(self._start) if shared else None
-        self._server = _serve(self.address, self.port, Guard(doors))
+        self._guard = Guard(doors)
+        self._server = _serve(self.address, self.port, self._guard)
         light_scene(self._server.scene)
         self._arrivals = Arrivals(self._server)
         send_script_to_all(self._server, style_script("page", page_style()))
@@ -222,8 +225,12 @@ class Viewer:
         self._ended.set()
         for session in self.sessions:
             session.stop()
+        cut = threading.Timer(FAREWELL_S, self._guard.cut)
+        cut.daemon = True
+        cut.start()
         with contextlib.redirect_stdout(io.StringIO()):
             self._server.stop()
+        cut.cancel()
 
     def __enter__(self) -> Self:
         return self

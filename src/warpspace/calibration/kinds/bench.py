@@ -100,7 +100,7 @@ class TestReadings(Kind):
             tuple(int(line) for line in lines),
             own.source,
             (f"{self.test.title}: {plan.place}",),
-            plan,
+            plan=plan,
         )
 
     def unknowns(self, readings: Readings) -> tuple[str, ...]:

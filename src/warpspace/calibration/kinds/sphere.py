@@ -1,6 +1,5 @@
 """Sphere centres with TCP correction off: the linear axes read circles about the rotary ones."""
 
-from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -57,7 +56,8 @@ class Sphere(Placed):
             raise SceneError(table.source, [f"{found}; expected a machine with these three axes"])
         coordinates, notes = axis_columns(table, scene, (*rotary, *linear), rotary)
         check_poses({name: coordinates[name] for name in rotary}, table.source)
-        for circle in circles_of(table, scene):
+        circles = circles_of(table, scene)
+        for circle in circles:
             if circle.against:
                 coordinates[circle.axis] = np.where(
                     np.isin(table.session or ("",) * len(table), circle.sessions),
@@ -81,12 +81,13 @@ class Sphere(Placed):
             table.lines,
             table.source,
             notes,
+            circles,
         )
         unknown = self.unknowns(readings)
         about = tip - self._members(readings, unknown) @ self.start(readings, unknown)
         hint = "Are they in mm, and are the offsets of the scene those of the machine?"
         check_spread(float(np.abs(about).max()), SPREAD_MM, table.source, hint)
-        return replace(readings, notes=notes)
+        return readings
 
     def automatic_keys(self, readings: Readings, scene: Scene) -> tuple[str, ...]:
         """Look for rigid errors of the rotary axes that move."""

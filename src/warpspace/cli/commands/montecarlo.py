@@ -1,6 +1,5 @@
 """Command `montecarlo`: the volumetric error of machines drawn from a scene's tolerances."""
 
-import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
@@ -31,6 +30,12 @@ from warpspace.cli.options import (
 )
 from warpspace.cli.pools import find_workers, scheduler_option, workers_option
 from warpspace.cli.progress import progress
+from warpspace.cli.results.montecarlo import (
+    describe,
+    plot_samples,
+    print_samples,
+    result_json,
+)
 from warpspace.cli.sampling_options import (
     clip_option,
     cylinder_option,
@@ -44,7 +49,7 @@ from warpspace.cli.tables import print_table, print_text
 from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
-    from warpspace.analysis.montecarlo import MonteCarlo, Plan, Progress, Take
+    from warpspace.analysis.montecarlo import Plan, Progress, Take
     from warpspace.cli.pools import Workers
     from warpspace.scene.model import Scene
     from warpspace.scene.sweeps import SweepPoint
@@ -148,14 +153,14 @@ def montecarlo(
             points = _sampled(loaded, plan, loop, distribution, clip, found, bar.advance, take)
     first = points[0]
     if plot is not None:
-        _plot(plot, first.scene, first.sampled, source, force=force)
+        plot_samples(plot, first.scene, first.sampled, source, force=force)
     if as_json and len(points) == 1:
         kind = {} if source == "tolerances" else {"from": source}
         print_json({**result_json(first.sampled), **kind})
     elif as_json:
         print_json({"scenes": [_named_json(point) for point in points], "from": source})
     elif len(points) == 1:
-        _print(first.scene, first.sampled, source)
+        print_samples(first.scene, first.sampled, source)
     else:
         _print_fleet(points, spec_um, source)
     if output is not None and not as_json:
@@ -234,111 +239,7 @@ def _print_fleet(points: "Sequence[SweepPoint]", spec_um: float | None, source: 
         print_text(f"… and {len(points) - PRINTED:,} scenes more; --json prints all")
 
 
-def result_json(result: "MonteCarlo") -> dict[str, object]:
-    """Spell a result as the JSON output has it."""
-    found: dict[str, object] = {
-        "samples": result.plan.samples,
-        "seed": result.plan.seed,
-        "distribution": str(result.draws.distribution),
-        "loop": str(result.view.loop),
-        "over": str(result.plan.over),
-        "mean_um": result.mean_um,
-        "mode_um": result.mode_um,
-        "median_um": result.median_um,
-        "p95_um": result.p95_um,
-        "p99_um": result.p99_um,
-        "max_um": result.max_um,
-        "histogram": {
-            "edges_um": result.histogram.edges_um.tolist(),
-            "counts": result.histogram.counts.tolist(),
-        },
-    }
-    if result.probability is not None:
-        found["specification"] = {
-            "spec_um": result.probability.spec_um,
-            "probability": result.probability.probability,
-            "low": result.probability.low,
-            "high": result.probability.high,
-        }
-    return found
-
-
 def _chosen(distribution: str) -> str:
     """Give the distribution that a user has named; empty where it is the one unless said."""
     said = click.get_current_context().get_parameter_source("distribution")
     return "" if said is ParameterSource.DEFAULT else distribution
-
-
-def describe(result: "MonteCarlo", source: str = "tolerances") -> str:
-    """Say in one line what was sampled."""
-    what = {
-        "sampled": "|E| at one random point each",
-        "max": "largest |E| of each",
-        "mean": "mean |E| of each",
-    }[str(result.plan.over)]
-    drawn = str(result.draws.distribution)
-    if drawn == "normal":
-        drawn = "normal, 3σ = half width" + (", clipped" if result.draws.clip else "")
-    if source == "uncertainty":
-        drawn = f"standard uncertainties, {result.draws.distribution}"
-    return (
-        f"{result.view.loop} loop · {result.plan.samples:,} machines, {what} · {drawn} ·"
-        f" seed {result.plan.seed}"
-    )
-
-
-def printed_value(scene: "Scene", result: "MonteCarlo") -> float | None:
-    """Give the value that the thesis prints for this distribution; None where it has none."""
-    from warpspace.analysis.thesis.rows import printed_tables
-
-    name = f"{result.view.loop}_{scene.name.removeprefix('dvf5000_')}"
-    found = printed_tables()["table_4_8"]["predicted"].get(name)
-    here = scene.machine.name == "dvf5000" and scene.name.startswith("dvf5000_")
-    return float(found) if found and here and str(result.plan.over) == "sampled" else None
-
-
-def _plot(path: str, scene: "Scene", result: "MonteCarlo", source: str, *, force: bool) -> None:
-    """Draw the histogram."""
-    from warpspace.outputs.charts import montecarlo_chart, write_chart
-
-    printed = printed_value(scene, result) if source == "tolerances" else None
-    chart = montecarlo_chart(result, scene.title, describe(result, source), printed)
-    write_chart(chart, path, overwrite=force)
-
-
-def _print(scene: "Scene", result: "MonteCarlo", source: str) -> None:
-    """Print the numbers."""
-    from warpspace.analysis.contributions import expected_square
-
-    print_text(f"{scene.title} · {describe(result, source)}")
-    print_text(
-        f"  mean {result.mean_um:.2f}, mode {result.mode_um:.1f}, median {result.median_um:.2f},"
-        f" P95 {result.p95_um:.2f}, P99 {result.p99_um:.2f}, max {result.max_um:.2f} µm"
-    )
-    if source == "tolerances" and str(result.plan.over) == "sampled":
-        variance, offset = expected_square(
-            scene.model, result.draws, scene.workspace, result.view, result.plan
-        )
-        print_text(
-            f"  RMS  {result.rms_um:.2f} µm sampled, {math.sqrt(variance.sum() + offset):.2f} µm"
-            " from trace(J Σ Jᵀ) without sampling"
-        )
-    if source == "tolerances" and (value := printed_value(scene, result)) is not None:
-        print_text(f"  the thesis prints {value:g} µm (table 4-8; see `warpspace thesis`)")
-    if (kept := result.probability) is not None:
-        print_text(
-            f"  |E| ≤ {kept.spec_um:g} µm: {100.0 * kept.probability:.2f} % of the machines,"
-            f" 95 % interval {100.0 * kept.low:.2f} … {100.0 * kept.high:.2f} %"
-        )
-    held = [
-        key
-        for key, width in zip(result.draws.keys, result.draws.half_width, strict=True)
-        if width == 0.0
-    ]
-    if source == "uncertainty":
-        print_text(f"  {len(result.draws.keys) - len(held)} errors with an uncertainty")
-        return
-    note = f"; held at their centre: {', '.join(held)}" if held else ""
-    print_text(f"  {len(result.draws.keys) - len(held)} parameters drawn{note}")
-    if not result.exact_quantiles:
-        print_text("  quantiles to 0.002 % of their value")

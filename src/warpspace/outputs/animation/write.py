@@ -4,22 +4,16 @@ import io
 import os
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Any
 
 from PIL import Image
 
 from warpspace import __version__
-from warpspace.exceptions import OutputError, RenderError
+from warpspace.exceptions import OutputError, RenderError, WorkersLostError
 from warpspace.outputs.animation.pictures import AnimationSettings, draw_frame
 from warpspace.outputs.files import check_target, write_atomically
-from warpspace.outputs.processes import (
-    end_pool,
-    interrupts_held_back,
-    is_in_use,
-    start_pool,
-)
+from warpspace.outputs.processes import ProcessPool
 from warpspace.outputs.worker import probe_renderer
 from warpspace.scene.model import Scene
 
@@ -79,27 +73,22 @@ def _pictures(
 ) -> Iterator[bytes]:
     """Draw all pictures, in order; a crash of a renderer becomes a message."""
     workers = max(1, min(os.cpu_count() or 1, MAX_WORKERS, settings.frames))
-    pool = start_pool(workers)
-    finished = False
+    pool = ProcessPool(workers)
     try:
-        with interrupts_held_back():
-            tasks = [
-                pool.submit(_draw, scene, settings, number) for number in range(settings.frames)
-            ]
+        tasks = [pool.submit(_draw, scene, settings, number) for number in range(settings.frames)]
         for task in tasks:
             yield task.result()
             if progress is not None:
                 progress(1)
-        finished = True
-    except BrokenProcessPool:
-        if not is_in_use(pool):
+    except WorkersLostError:
+        if pool.ended:
             raise RenderError("the animation was given up: its renderers were ended") from None
         problem = probe_renderer()
         raise RenderError(
             f"the animation could not be drawn: {problem or 'the renderer crashed'}"
         ) from None
     finally:
-        end_pool(pool, wait=finished)
+        pool.kill()
 
 
 def _draw(scene: Scene, settings: AnimationSettings, number: int) -> bytes:

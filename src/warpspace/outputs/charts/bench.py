@@ -1,4 +1,4 @@
-"""Figures of the test bench: the charts of a test side by side, its numbers beside them."""
+"""Figures of the test bench: the charts of a test side by side, its numbers where there is room."""
 
 from typing import Any
 
@@ -13,7 +13,9 @@ from warpspace.bench.outcome import Chart, Curve, Outcome
 from warpspace.bench.run import BenchResult
 from warpspace.outputs.charts.paper import SMALL, TEXT, ground, quiet, sheet, style
 
-CHART_IN, ROW_IN, NUMBERS_IN = 4.9, 4.6, 3.6
+CHART_IN, ROW_IN, GAP_IN = 4.9, 4.6, 0.25
+NUMBERS_IN, VALUE_IN, LINE_IN, NOTE_IN = 3.7, 0.95, 0.25, 0.6
+"""Widths of the numbers and of one more column of values; heights of a number and of a note."""
 LEGEND_IN = 0.19
 DASHES: dict[str, Any] = {"line": "-", "dashed": (0, (4, 3)), "thin": "-", "dots": "none"}
 MOST_NUMBERS = 16
@@ -34,9 +36,11 @@ def bench_chart(result: BenchResult, title: str | None = None) -> Figure:
     charts = result.charts
     columns = 1 if len(charts) == 1 else 2
     rows = -(-len(charts) // columns)
-    width = columns * CHART_IN + NUMBERS_IN
-    foot = 0.35
-    height = 0.85 + rows * ROW_IN + foot
+    numbers = NUMBERS_IN + VALUE_IN * (len(result.runs) - 1)
+    width = columns * CHART_IN + (numbers if columns == 1 else 0.0)
+    # beside one chart, in the place of the fourth one, or below all
+    below = 0.0 if len(charts) % 2 else _numbers_in(result)
+    height = 0.85 + rows * (ROW_IN + GAP_IN) + below + 0.1
     with style():
         heading = title or f"{result.test.title} · {result.scene.title}"
         figure, top = sheet(
@@ -45,9 +49,14 @@ def bench_chart(result: BenchResult, title: str | None = None) -> Figure:
         for number, chart in enumerate(charts):
             row, column = divmod(number, columns)
             left = column * CHART_IN / width
-            bottom = top - (row + 1) * ROW_IN / height
+            bottom = top - (row * (ROW_IN + GAP_IN) + ROW_IN) / height
             _draw(figure, chart, (left, bottom, CHART_IN / width, ROW_IN / height))
-        _numbers(figure, result, 1.0 - (NUMBERS_IN - 0.15) / width, top)
+        left = 0.3 if below else CHART_IN + 0.3
+        down = rows if below else rows - 1
+        _numbers(
+            figure, result, left / width, (left + numbers - 0.45) / width,
+            top - down * (ROW_IN + GAP_IN) / height,
+        )  # fmt: skip
         return figure
 
 
@@ -172,35 +181,41 @@ def _handles(chart: Chart) -> list[Line2D | Patch]:
     return found
 
 
-def _numbers(figure: Figure, result: BenchResult, left: float, top: float) -> None:
-    """Write the numbers of the model, and of the data beside them."""
+def _numbers_in(result: BenchResult) -> float:
+    """Height of the numbers and notes of a test."""
+    lines = len(_rows(*(run.outcome for run in result.runs))) + 1
+    return 0.2 + LINE_IN * lines + NOTE_IN * len(result.notes)
+
+
+def _numbers(figure: Figure, result: BenchResult, left: float, right: float, top: float) -> None:
+    """Write the numbers of the model, and of the data beside them, a line each."""
     width, height = figure.get_size_inches()
-    y = top - 0.1 / height
-    right = 1.0 - 0.15 / width
+    y = top - 0.15 / height
     runs = result.runs
-    places = [right - 0.78 / width * (len(runs) - 1 - index) for index in range(len(runs))]
+    places = [right - VALUE_IN / width * (len(runs) - 1 - index) for index in range(len(runs))]
     for run, place in zip(runs, places, strict=True):
         figure.text(place, y, run.who, size=SMALL, color=ground().muted, ha="right")
-    y -= 0.24 / height
-    for key, name, unit in _rows(runs[0].outcome, *(run.outcome for run in runs[1:])):
-        figure.text(left, y, f"{name} [{unit}]", size=SMALL - 0.5, color=ground().muted,
+    for key, name, unit in _rows(*(run.outcome for run in runs)):
+        rule = y - 0.07 / height
+        figure.add_artist(Line2D([left, right], [rule, rule], color=ground().faint, linewidth=0.6))
+        y -= LINE_IN / height
+        figure.text(left, y, f"{name} [{unit}]", size=SMALL, color=ground().muted,
                     parse_math=False)  # fmt: skip
-        y -= (0.16 if len(runs) > 1 else 0.0) / height
         for run, place in zip(runs, places, strict=True):
             values = {quantity.key: quantity.value for quantity in run.outcome.quantities}
             text = f"{_clean(values[key]):.2f}".replace("-", "−") if key in values else "–"
             figure.text(place, y, text, size=TEXT, weight="bold", ha="right")
-        y -= 0.24 / height
+    y -= LINE_IN / height
     for text in result.notes:
         figure.text(left, y, _wrapped(text), size=SMALL - 1.0, color=ground().accent, va="top")
-        y -= 0.6 / height
+        y -= NOTE_IN / height
 
 
-def _rows(first: Outcome, *others: Outcome) -> list[tuple[str, str, str]]:
+def _rows(*outcomes: Outcome) -> list[tuple[str, str, str]]:
     """List the quantities of all runs, each once, as many as fit."""
     found = {
         quantity.key: (quantity.key, quantity.name, quantity.unit)
-        for outcome in (first, *others)
+        for outcome in outcomes
         for quantity in outcome.quantities
     }
     return list(found.values())[:MOST_NUMBERS]

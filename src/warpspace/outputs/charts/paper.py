@@ -17,6 +17,8 @@ from warpspace.outputs.files import check_target, write_atomically
 CHART_ENDINGS = FIGURE_ENDINGS
 DPI = 160.0
 TITLE, SUBTITLE, TEXT, SMALL = 13.0, 9.5, 9.5, 8.5
+LEAST_SHARE = 0.6
+"""Of its size, what a title is drawn with at the least."""
 _THEME: ContextVar[Theme] = ContextVar("theme of the charts", default=LIGHT)
 
 
@@ -87,8 +89,16 @@ def sheet(
     """
     figure = Figure(figsize=(width, height), dpi=DPI, facecolor=ground().paper)
     left = 0.3 / width
-    figure.text(left, 1.0 - 0.2 / height, title, size=TITLE, weight="bold", va="top")
-    figure.text(left, 1.0 - 0.5 / height, subtitle, size=SUBTITLE, color=ground().muted, va="top")
+    for words, size, down, weight, colour in (
+        (title, TITLE, 0.2, "bold", ground().ink),
+        (subtitle, SUBTITLE, 0.5, "normal", ground().muted),
+    ):
+        text = figure.text(
+            left, 1.0 - down / height, words, size=size, weight=weight, color=colour, va="top"
+        )
+        wide = text.get_window_extent().width / figure.dpi
+        if wide > width - 0.5:  # smaller, so that it does not run off the sheet
+            text.set_fontsize(size * max((width - 0.5) / wide, LEAST_SHARE))
     return figure, 1.0 - top_in / height
 
 

@@ -1,0 +1,1 @@
+"""What commands say of a result: printed, as JSON and as CSV."""

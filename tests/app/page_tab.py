@@ -1,0 +1,288 @@
+"""A tab of a real Chromium with the app in it: what tests ask of it, and do to it."""
+
+import base64
+import json
+from collections.abc import Callable
+from io import BytesIO
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from app.frames import draw, new_visitor
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.server.session import Session
+from warpspace.app.server.viewer import Viewer
+from warpspace.app.state.app_state import AppState, start_state
+from warpspace.app.state.store import StateStore
+from warpspace.app.viewport.named_views import CameraSetup
+from warpspace.scene.library import load_scene
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+# What the client or Chromium says of itself in a software renderer.
+HARMLESS = (
+    "THREE.Clock", "GL Driver Message", "SwiftShader", "Software WebGL", "favicon",
+    # of a widget that comes and goes between two messages, viser still sends what changed of it
+    "Tried to update non-existent component",
+)  # fmt: skip
+VERTICES = """() => {
+  const pack = array => {
+    const bytes = new Uint8Array(Float32Array.from(array).buffer), parts = [];
+    for (let at = 0; at < bytes.length; at += 8192)
+      parts.push(String.fromCharCode(...bytes.subarray(at, at + 8192)));
+    return btoa(parts.join(''));
+  };
+  const node = window.__viserMutable.nodeRefFromName['/box/surface'];
+  let found = null;
+  if (node) node.traverse(o => {
+    if (o.isMesh && o.geometry.attributes.color) {
+      const p = o.geometry.attributes.position, c = o.geometry.attributes.color;
+      found = [pack(p.array), pack(c.array)];
+    }
+  });
+  return found;
+}"""
+DRAWN = """name => {
+  const node = window.__viserMutable.nodeRefFromName[name];
+  let found = null;
+  if (node) node.traverse(o => {
+    if (!found && o.geometry && o.visible) {
+      const at = o.geometry.attributes;
+      const seen = at.instanceStart ? at.instanceStart.data.array : at.position.array;
+      let shown = true;
+      for (let up = o; up; up = up.parent) shown = shown && up.visible;
+      if (shown) found = Array.from(seen);
+    }
+  });
+  return found;
+}"""
+TIDY = """() => {
+  history.replaceState(null, '', location.pathname + '?fixedDpr=1');
+  const close = '.mantine-Notification-closeButton, #warpspace-server button';
+  document.querySelectorAll(close).forEach(b => b.click());
+  return document.querySelectorAll('.mantine-Notification-root, #warpspace-server').length;
+}"""
+"""Takes the link out of the address, closes the messages, and counts those that were there."""
+LIVE = LiveModel()
+
+
+def wait_until_open(page: "Page") -> None:
+    """Wait until all of a page is there."""
+    shown = ":is([data-value='max'], [data-strip='max']):visible"  # the latter on a phone
+    page.wait_for_selector(f"html[data-warpspace=open] {shown}", timeout=60_000)
+
+
+class Tab:
+    """A browser tab with the app in it; `query` goes into its address.
+
+    Most errors of most machines are zero and hidden at first; with `everything` they are listed.
+    """
+
+    def __init__(
+        self, page: "Page", viewer: Viewer, query: str = "", *, everything: bool = True
+    ) -> None:
+        self.page, self.viewer = page, viewer
+        self.errors: list[str] = []
+        page.on("pageerror", lambda error: self.errors.append(str(error)))
+        page.on("console", self._listen)
+        page.goto(f"{viewer.url}/?fixedDpr=1{query}")
+        wait_until_open(page)
+        self.until(lambda: self.vertices() is not None)
+        if everything:
+            self.list_all()
+        self._camera = self.session.context.camera.remember()
+
+    @property
+    def session(self) -> Session:
+        """The session of this tab."""
+        token = self.page.evaluate("window.__warpspaceTab")
+        return next(session for session in self.viewer.sessions if session.token == token)
+
+    def state(self) -> AppState:
+        """State of the tab, once what is on its way has arrived."""
+        self.page.wait_for_timeout(200)
+        return self.session.state
+
+    def list_all(self) -> None:
+        """List the errors that are zero as well."""
+        box = self.page.get_by_role("checkbox", name="Hide errors that are zero")
+        if box.is_checked():
+            box.uncheck()
+            self.until(lambda: self.listed() == len(self.session.state.amplitudes))
+
+    def listed(self) -> int:
+        """Number of errors listed."""
+        return self.page.locator("input[data-number]").count()
+
+    def begin_anew(self) -> None:
+        """Make the page again what it was when it was opened, in a tenth of the time."""
+        start, session = start_state(SCENES[0]), self.session
+
+        def forget() -> None:
+            session.use(StateStore(start))
+            session.context.camera._stand = CameraSetup()
+
+        self.page.wait_for_selector("html[data-warpspace=open]")
+        self.page.keyboard.press("Escape")
+        self.written("Find an error").fill("")
+        self.list_all()
+        self.panel("Volumetric error")
+        self.panel("View")
+        session.context.act(forget)
+        session.context.look_from(self._camera)
+        self.until(lambda: self.page.evaluate(TIDY) == 0)
+        self.until(lambda: session.state == start and self.shows_state(start))
+
+    def screenshot(self) -> np.ndarray:
+        """Draw the page as it is now, and give its pixels, [height, width, 3]."""
+        draw(self.page)
+        return np.asarray(Image.open(BytesIO(self.page.screenshot())).convert("RGB")).astype(int)
+
+    def _listen(self, message: Any) -> None:
+        if message.type == "error" and not any(word in message.text for word in HARMLESS):
+            self.errors.append(message.text)
+
+    def until(self, fine: Callable[[], bool], seconds: float = 15.0) -> None:
+        """Wait until something holds."""
+        for _ in range(int(seconds / 0.05)):
+            if fine():
+                return
+            self.page.wait_for_timeout(50)
+        pytest.fail(f"did not come true within {seconds:g} s")
+
+    def surface(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Vertices (mm) and colours of the drawn surface, read back from the browser's scene."""
+        found = self.page.evaluate(VERTICES)
+        if found is None:
+            return None
+        points, colours = (np.frombuffer(base64.b64decode(part), "<f4") for part in found)
+        return points.reshape(-1, 3).astype(float), colours.reshape(-1, 3).astype(float)
+
+    def shows_colours(self, wanted: np.ndarray) -> bool:
+        """Whether the surface drawn has these colours; not while the page loads another one."""
+        found = self.surface()
+        return (
+            found is not None
+            and found[1].shape == wanted.shape
+            and np.allclose(found[1], wanted, atol=1e-5)
+        )
+
+    def vertices(self) -> np.ndarray | None:
+        """Vertices of the drawn surface, [M, 3], mm."""
+        found = self.surface()
+        return None if found is None else found[0]
+
+    def shows(self, vertices: np.ndarray) -> bool:
+        """Whether the surface drawn has these vertices."""
+        drawn = self.vertices()
+        return (
+            drawn is not None
+            and drawn.shape == vertices.shape
+            and np.allclose(drawn, vertices, atol=1e-3)
+        )
+
+    def drawn(self, name: str) -> np.ndarray | None:
+        """Points of a node that is shown, [n, 3]; None where it is hidden or absent."""
+        found = self.page.evaluate(DRAWN, name)
+        return None if found is None else np.reshape(found, (-1, 3))
+
+    def shows_state(self, state: AppState) -> bool:
+        """Whether the surface drawn is that of a state."""
+        return self.shows(drawn_nodes(LIVE.evaluate(state)))
+
+    def until_shown(self, state: AppState, seconds: float = 15.0) -> None:
+        """Wait until the surface drawn is that of a state."""
+        wanted = drawn_nodes(LIVE.evaluate(state))
+        self.until(lambda: self.shows(wanted), seconds)
+
+    def text(self, value: str) -> str:
+        """A number on the page, as it is spelt."""
+        return self.page.inner_text(f"[data-value='{value}']")
+
+    def number(self, value: str) -> float:
+        """A number on the page, without its unit."""
+        return float(self.text(value).split()[0])
+
+    def widget(self, label: str) -> str:
+        """Id of the widget whose label begins with a word."""
+        script = """label => [...document.querySelectorAll('label')]
+            .find(l => l.textContent.startsWith(label)).getAttribute('for')"""
+        return self.page.evaluate(script, label)
+
+    def box(self, label: str) -> Any:
+        """Number box of the slider whose label begins with a word: that of an error, or viser's."""
+        own = self.page.locator(f"input[data-number='{label}']")
+        if own.count():
+            return own
+        return self.page.locator(f"[id='{self.widget(label)}'] ~ div input")
+
+    def written(self, label: str) -> Any:
+        """Text box beside a label; viser does not tie them together."""
+        row = self.page.locator(f"//label[text()='{label}']/ancestor::div[2]")
+        return row.locator("input, textarea").first
+
+    def thumb(self, label: str) -> Any:
+        """Thumb of the slider whose label begins with a word."""
+        return self.page.locator(f"[id='{self.widget(label)}'] [role=slider]")
+
+    def send(self, label: str, value: str) -> None:
+        """Send a value as a hostile page would, spelt in JavaScript."""
+        self.page.evaluate(
+            f"window.__viserMutable.sendMessage({{type: 'GuiUpdateMessage',"
+            f" uuid: {json.dumps(self.widget(label))}, updates: {{value: {value}}}}})"
+        )
+
+    def drag(self, label: str, values: list[float]) -> None:
+        """Send the positions of a drag 10 ms apart, however busy the page is with drawing."""
+        self.page.evaluate(
+            """([uuid, values]) => {
+              for (const value of values) {
+                window.__viserMutable.sendMessage(
+                  {type: 'GuiUpdateMessage', uuid, updates: {value}});
+                const until = performance.now() + 10;
+                while (performance.now() < until);
+              }
+            }""",
+            [self.widget(label), values],
+        )
+
+    def panel(self, name: str) -> None:
+        """Bring a tab of a panel to the front."""
+        self.page.get_by_role("tab", name=name, exact=True).click()
+
+    def upload(self, name: str, content: bytes) -> None:
+        """Give a scene or the like to the page, in the tab Files."""
+        self.page.locator("input[type=file][accept^='.toml']").set_input_files(
+            {"name": name, "mimeType": "text/plain", "buffer": content}
+        )
+
+    def choose(self, label: str, option: str) -> None:
+        """Choose an option of a dropdown."""
+        self.page.get_by_label(label, exact=True).first.click()
+        self.page.get_by_role("option", name=option, exact=True).first.click()
+
+
+SCENES = [load_scene(name) for name in ("dvf5000_first", "dvf5000_second", "teach_tilted_c")]
+"""What the app with services is started with, the first of them shown."""
+
+
+def drawn_nodes(picture: LivePicture) -> np.ndarray:
+    """Where a picture draws the nodes of its surface, [M, 3], mm."""
+    return picture.drawn_mm.reshape(-1, 3)[picture.topology.surface.nodes]
+
+
+def open_page(
+    viewer: Viewer,
+    browser: "Browser",
+    query: str = "",
+    size: tuple[int, int] = (1280, 720),
+    *,
+    everything: bool = True,
+) -> Tab:
+    """Open the app as a visitor of its own; `query` goes into the address."""
+    page = new_visitor(browser, size).new_page()
+    return Tab(page, viewer, query, everything=everything)
