@@ -119,7 +119,7 @@ def test_a_worker_killed_half_way_changes_nothing(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
 def test_workers_that_die_again_and_again_end_the_run_with_a_message(tmp_path: Path) -> None:
-    said = f"died {pools.LOSSES + 1} times: out of memory.; run again with fewer --workers"
+    said = f"died {pools.LOSSES + 1} times .out of memory... run again with fewer --workers"
 
     def run() -> None:
         with find_workers(None, 2, pools.WORTH_A_POOL) as found:

@@ -126,7 +126,8 @@ def _series(key: str, parts: Sequence[Line], machine: Machine | None) -> Series:
     """Add up the tables of one error over all their positions."""
     at = np.unique(np.concatenate([part.positions for part in parts]))
     factor = _factor(machine, parts[0].source, parts[0].target)
-    ways = {way: factor * np.sum([part.at(at, way) for part in parts], axis=0) for way in WAYS}
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite the scene refuses
+        ways = {way: factor * np.sum([part.at(at, way) for part in parts], axis=0) for way in WAYS}
     if np.array_equal(ways[FORWARD], ways[BACKWARD]):
         runs = (Run(1, BOTH, tuple(ways[FORWARD].tolist())),)
     else:

@@ -127,7 +127,7 @@ class ProcessPool(Executor):
         if self.ended:
             raise WorkersLostError("the worker processes were ended")
         times = "once" if self._lost == 1 else f"{self._lost} times"
-        raise WorkersLostError(f"worker processes died {times}: out of memory?")
+        raise WorkersLostError(f"worker processes died {times} (out of memory?)")
 
     def _retire(self, worker: "_Worker") -> None:
         """End a process that has no task."""
