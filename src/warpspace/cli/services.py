@@ -3,11 +3,18 @@
 import threading
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from warpspace.app.documents.services import CancelledError, ConceptRequest, Request, Services
-from warpspace.exceptions import OptionError
+from warpspace.app.documents.services import (
+    CancelledError,
+    CompensationRequest,
+    ConceptRequest,
+    Request,
+    Services,
+)
+from warpspace.exceptions import OptionError, RenderError
 from warpspace.outputs.exports.formats import export_formats
 from warpspace.outputs.exports.formats import write_export as write
 from warpspace.outputs.figures.catalogue import figure_kinds
@@ -29,6 +36,7 @@ def build_services() -> Services:
         draw_figure,
         write_export,
         draw_concepts,
+        draw_compensation,
         figures=tuple((kind.name, kind.caption) for kind in figure_kinds() if kind.scenes == 1),
         exports=tuple((form.ending, form.about) for form in export_formats() if form.in_app),
     )
@@ -119,6 +127,50 @@ def draw_concepts(request: ConceptRequest, cancelled: threading.Event) -> bytes:
     return _render("concepts", request.scenes, settings, cancelled)
 
 
+def draw_compensation(request: CompensationRequest, cancelled: threading.Event) -> bytes:
+    """Draw the maps of a compensation as a PNG.
+
+    Parameters
+    ----------
+    request : CompensationRequest
+    cancelled : threading.Event
+        Ends the process that draws when set.
+
+    Returns
+    -------
+    bytes
+
+    Raises
+    ------
+    CancelledError
+        If it was cancelled.
+    """
+    from warpspace.outputs.charts.compensation_column import draw_maps
+    from warpspace.outputs.processes import end_pool, interrupts_held_back, start_pool
+
+    _take_turn(cancelled)
+    pool = start_pool(1)
+    try:
+        with interrupts_held_back():
+            drawn = pool.submit(draw_maps, request.found, dark=request.dark, narrow=request.narrow)
+        while not wait([drawn], POLL_S).done:
+            if cancelled.is_set():
+                raise CancelledError("the maps were cancelled")
+        return drawn.result()
+    except BrokenProcessPool:
+        raise RenderError("the maps could not be drawn: their process has ended") from None
+    finally:
+        end_pool(pool, wait=False)
+        _renderers.release()
+
+
+def _take_turn(cancelled: threading.Event) -> None:
+    """Wait until one more figure may be drawn."""
+    while not _renderers.acquire(timeout=POLL_S):
+        if cancelled.is_set():
+            raise CancelledError("cancelled while waiting for a renderer")
+
+
 def _render(
     name: str,
     scenes: Sequence[Scene],
@@ -128,9 +180,7 @@ def _render(
     """Draw a figure in a process of its own, which ends when that is cancelled."""
     from warpspace.outputs.worker import FigureWorker
 
-    while not _renderers.acquire(timeout=POLL_S):
-        if cancelled.is_set():
-            raise CancelledError("cancelled while waiting for a renderer")
+    _take_turn(cancelled)
     try:
         with FigureWorker() as worker, ThreadPoolExecutor(1) as caller:
             drawn = caller.submit(worker.render, name, scenes, settings, "png")

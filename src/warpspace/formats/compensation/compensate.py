@@ -1,6 +1,6 @@
 """A compensation from a scene to the controller and back: written, read, evaluated, applied."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,26 +9,20 @@ from warpspace.analysis.statistics import Statistics, volume_statistics
 from warpspace.exceptions import OptionError
 from warpspace.field.basis import ErrorField
 from warpspace.field.grid import Grid, build_grid
-from warpspace.formats.compensation.corrector import Corrector, build_corrector, field_after
+from warpspace.formats.compensation.controller import Controller, read_back
+from warpspace.formats.compensation.corrector import build_corrector
 from warpspace.formats.compensation.wanted import Wanted
-from warpspace.formats.importing import Reading
-from warpspace.formats.kind import SIGNS, Format, ReadOptions
-from warpspace.formats.measured import Imported
+from warpspace.formats.kind import SIGNS, Format
 from warpspace.formats.registry import find_format
-from warpspace.formats.source import Source, source_of_text
-from warpspace.formats.terms import Tables
-from warpspace.formats.to_scene import into_scene
-from warpspace.kinematics.model import Coordinates
-from warpspace.machine.errors import ErrorSet
+from warpspace.formats.source import source_of_text
 from warpspace.machine.travel import TravelDirection
 from warpspace.scene.model import Scene
-from warpspace.units import Array
 
 NODES = 28
 """Nodes per axis that what is left is evaluated at: between the points of usual tables."""
 RESOLUTION = (0.0, 0.1)
 """mm or degrees."""
-WAYS = {TravelDirection.FORWARD: 1, TravelDirection.BACKWARD: -1}
+EXPECTED_GRID = "expected a number of points, or AXIS=NUMBER with commas between"
 
 
 @dataclass(frozen=True)
@@ -72,27 +66,49 @@ class Compensation:
         Texts by what is added to the name of the file.
     points : mapping of str to int
         Points of the table per axis.
-    size : int
-        Numbers that the controller holds.
     grid : Grid
     before, after : ErrorField
-    loop : str
-    axes : tuple of str
-        Axes that are corrected.
-    assumed, notes : tuple of str
+    controller : Controller
+        It has read the files.
     """
 
     format: Format
     files: Mapping[str, str]
     points: Mapping[str, int]
-    size: int
     grid: Grid
     before: ErrorField
     after: ErrorField
-    loop: str
-    axes: tuple[str, ...]
-    assumed: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    controller: Controller
+
+    @property
+    def size(self) -> int:
+        """Numbers that the controller holds."""
+        return self.controller.size
+
+    @property
+    def loop(self) -> str:
+        """Structural loop that is corrected."""
+        return str(self.controller.loop)
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Axes that are corrected."""
+        return self.controller.corrector.moved
+
+    @property
+    def assumed(self) -> tuple[str, ...]:
+        """What the documentation of the format leaves open."""
+        return self.controller.assumed
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the controller cannot hold, in words."""
+        return self.controller.notes
+
+    @property
+    def points_words(self) -> str:
+        """Spell the points of the table."""
+        return spell_points(self.format, self.points)
 
     @property
     def bytes(self) -> int:
@@ -108,6 +124,35 @@ class Compensation:
     def after_statistics(self) -> Statistics:
         """Of what is left."""
         return volume_statistics(self.after, self.grid)
+
+    def tilt_urad(self, field: ErrorField) -> tuple[float, float]:
+        """Give mean, by volume, and largest tilt of the tool axis in one of the fields, µrad."""
+        tilt = np.linalg.norm(field.orientation_urad, axis=-1)
+        return float(np.sum(self.grid.weights * tilt)), float(tilt.max())
+
+
+def read_points(text: str) -> int | dict[str, int]:
+    """Read points per axis as a user types them: 9, or X=9,Y=5.
+
+    Raises
+    ------
+    OptionError
+        If it is neither; whether a format takes so many is asked by `table_points`.
+    """
+    try:
+        if "=" not in text:
+            return int(text)
+        pairs = [part.partition("=") for part in text.split(",")]
+        return {name.strip().upper(): int(count) for name, _, count in pairs}
+    except ValueError:
+        raise OptionError(f"--grid {text!r}; {EXPECTED_GRID}") from None
+
+
+def spell_points(kind: Format, points: Mapping[str, int]) -> str:
+    """Spell the points of a table."""
+    if kind.grid.startswith("none"):
+        return "no grid"
+    return ", ".join(f"{axis} {count}" for axis, count in points.items()) + " points"
 
 
 def table_points(
@@ -138,7 +183,9 @@ def table_points(
     return given
 
 
-def compensate(scene: Scene, plan: Plan, nodes: int = NODES) -> Compensation:
+def compensate(
+    scene: Scene, plan: Plan, nodes: int = NODES, *, watch: Callable[[], None] | None = None
+) -> Compensation:
     """Write the compensation of a scene, have it read and evaluated, and give what is left.
 
     Parameters
@@ -147,6 +194,8 @@ def compensate(scene: Scene, plan: Plan, nodes: int = NODES) -> Compensation:
     plan : Plan
     nodes : int, optional
         Nodes per axis that what is left is evaluated at.
+    watch : callable, optional
+        Called between the steps; what it raises ends the work.
 
     Returns
     -------
@@ -171,112 +220,26 @@ def compensate(scene: Scene, plan: Plan, nodes: int = NODES) -> Compensation:
         raise OptionError(f"--sign {plan.sign!r}: expected error or correction, of a table")
     if scene.model.direction == TravelDirection.DIFFERENCE:
         scene = replace(scene, model=replace(scene.model, direction=TravelDirection.MEAN))
+    watch = watch or _go_on
     corrector = build_corrector(scene, plan.loop, orientation=plan.orientation)
     points = table_points(kind, scene, plan.points)
     wanted = Wanted(scene, corrector, points, plan.resolution, plan.sign, plan.stem)
+    watch()
     files = kind.write(wanted)
+    watch()
     grid = build_grid(scene.model, scene.workspace, nodes)
     sources = [
         source_of_text(text, f"{plan.stem}{add}{'' if add else kind.endings[0]}")
         for add, text in files.items()
     ]
-    controller = _read_back(kind, sources, wanted)
-    reference = _reference(scene)
-    before = field_after(corrector, grid.coordinates, {}, grid.nominal_mm, reference, {})
-    after = field_after(
-        corrector,
-        grid.coordinates,
-        controller.moves(grid.coordinates),
-        grid.nominal_mm,
-        reference,
-        {} if reference is None else controller.moves(reference),
-    )
-    return Compensation(
-        kind,
-        files,
-        points,
-        controller.size,
-        grid,
-        before,
-        after,
-        str(corrector.loop),
-        corrector.moved,
-        controller.assumed,
-        controller.notes,
-    )
+    label = f"{kind.name} ({spell_points(kind, points)})"
+    controller = read_back(kind, sources, wanted, label)
+    watch()
+    before = controller.without().field(grid.coordinates, grid.nominal_mm)
+    after = controller.field(grid.coordinates, grid.nominal_mm)
+    watch()
+    return Compensation(kind, files, points, grid, before, after, controller)
 
 
-@dataclass(frozen=True)
-class _Controller:
-    """What a controller does with the files it has read."""
-
-    corrector: Corrector
-    tables: Tables | None
-    size: int
-    assumed: tuple[str, ...]
-    notes: tuple[str, ...]
-    direction: int
-
-    def moves(self, coordinates: Coordinates) -> dict[str, Array]:
-        """Give what it adds to the commanded positions."""
-        if self.tables is None:
-            return self.corrector.moves(coordinates)
-        return dict(self.tables.corrections(coordinates, self.direction))
-
-
-def _read_back(kind: Format, sources: list[Source], wanted: Wanted) -> _Controller:
-    """Read the files as the controller does."""
-    scene = wanted.scene
-    options = ReadOptions(scene.machine, sign=wanted.sign)
-    direction = WAYS.get(TravelDirection(scene.model.direction), 0)
-    if kind.tables is not None:
-        tables = kind.tables(sources, options)
-        return _Controller(
-            wanted.corrector, tables, tables.size, tables.assumed, tables.notes, direction
-        )
-    found = kind.read(sources, options)
-    bare = replace(scene, errors=ErrorSet(), uncertainty={}, measured={})
-    held = into_scene(Reading(found, kind, recognised=True), bare, scene.title, scene.name).scene
-    errors = held.errors
-    if wanted.resolution:
-        errors = _rounded(errors, wanted.resolution)
-    model = replace(held.model, direction=scene.model.direction)
-    corrector = replace(wanted.corrector, model=model, errors=errors)
-    notes = list(found.notes)
-    lost = [key for key in scene.errors if key not in errors and scene.errors.amplitude(key)]
-    if lost:
-        notes.append(f"has no place for {', '.join(lost)}")
-    differing = [
-        axis
-        for axis in scene.machine.axes
-        if model.convention(axis).name != scene.model.convention(axis).name
-    ]
-    if differing:
-        notes.append(
-            f"errors of {', '.join(differing)} stand in another convention here than in the scene"
-        )
-    return _Controller(corrector, None, _count(found), found.assumed, tuple(notes), direction)
-
-
-def _rounded(errors: ErrorSet, resolution: float) -> ErrorSet:
-    """Refuse: the resolution of error parameters is that of their digits."""
-    del errors
-    raise OptionError(
-        f"--resolution {resolution:g}: formats of error parameters have as many digits as they"
-        " print; expected a table of corrections"
-    )
-
-
-def _count(found: Imported) -> int:
-    """Count the numbers of an error set."""
-    series = sum(len(run.values) for one in found.series for run in one.runs)
-    planes = sum(len(one.first) * len(one.second) for one in found.planes)
-    return series + planes + len(found.constants)
-
-
-def _reference(scene: Scene) -> dict[str, Array] | None:
-    """Give the coordinates of the point that is held still."""
-    if scene.reference is None:
-        return None
-    still = {**scene.workspace.positions, **scene.reference}
-    return {axis: np.asarray(still[axis]) for axis in scene.machine.axes}
+def _go_on() -> None:
+    """Let the work go on."""

@@ -87,8 +87,10 @@ def sheet(
     """
     figure = Figure(figsize=(width, height), dpi=DPI, facecolor=ground().paper)
     left = 0.3 / width
-    figure.text(left, 1.0 - 0.2 / height, title, size=TITLE, weight="bold", va="top")
-    figure.text(left, 1.0 - 0.5 / height, subtitle, size=SUBTITLE, color=ground().muted, va="top")
+    # a title is what a user calls a scene: a $ in it is a dollar
+    plain: dict[str, Any] = {"va": "top", "parse_math": False}
+    figure.text(left, 1.0 - 0.2 / height, title, size=TITLE, weight="bold", **plain)
+    figure.text(left, 1.0 - 0.5 / height, subtitle, size=SUBTITLE, color=ground().muted, **plain)
     return figure, 1.0 - top_in / height
 
 
