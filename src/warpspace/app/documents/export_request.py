@@ -9,7 +9,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.comparison import AFTER, BEFORE, Side
-from warpspace.app.state.table import without_words
+from warpspace.app.state.table import drawn_tables, without_words
 from warpspace.picture.comparison import conditions_of_both
 from warpspace.scene.model import Scene
 
@@ -71,10 +71,12 @@ def _request(picture: LivePicture, state: AppState, scene: Scene) -> Request:
 
 
 def file_stem(picture: LivePicture) -> str:
-    """Name the files of a picture, without an ending."""
-    found = picture.compared
+    """Name the files of a picture, without an ending; of one with a table say so."""
+    found, plain = picture.compared, safe_name(picture.state.scene.name)
+    if drawn_tables(picture.state):
+        return f"{plain}_with_table"
     if found is None:
-        return safe_name(picture.state.scene.name)
+        return plain
     a, b = (
         _side_stem(side, picture.state.comparison.pinned)
         for side in (picture.state.comparison.a, picture.state.comparison.b)

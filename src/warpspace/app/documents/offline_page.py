@@ -217,11 +217,10 @@ def point_words(picture: LivePicture) -> str:
     if picked is None or picture.is_difference:
         return ""
     found = answer(picture.drawn_state, picked, picture.exaggeration)
-    length = float(np.linalg.norm(found.explanation.error_um))
+    length = float(np.linalg.norm(found.drawn_um))
     axes = own_axes(picture.drawn_state.scene, found.at)
     place = spell_point(axes, found.explanation.nominal_mm)
-    without = " without the table" if picture.drawn_state.controller is not None else ""
-    return f"marked point: {place} mm, |E| {length:.1f} µm{without}"
+    return f"marked point: {place} mm, |E| {length:.1f} µm"
 
 
 def _row(key: str, value: str) -> dict[str, str]:

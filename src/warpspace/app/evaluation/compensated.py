@@ -4,15 +4,19 @@ What does not depend on the errors (what the controller adds, where the axes sta
 the first-order responses are; a slider move is then one evaluation of the exact chain.
 """
 
+from typing import TYPE_CHECKING
+
 from warpspace.app.evaluation.cache import Cache, Identity
 from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.state.app_state import AppState
 from warpspace.field.basis import ErrorField
 from warpspace.field.grid import Grid
-from warpspace.formats.compensation.controller import Corrected
 from warpspace.geometry.traces import TraceGroup
 from warpspace.kinematics.model import Coordinates, Loop
 from warpspace.units import Array
+
+if TYPE_CHECKING:
+    from warpspace.formats.compensation.controller import Corrected
 
 CACHE_BYTES = 60_000_000
 

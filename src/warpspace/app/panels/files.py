@@ -187,7 +187,8 @@ class FilesPanel:
         if draw is not None and picture is not None:
             kind = self._figures.get(self._kind.value, "")
             request = replace(build_request(picture), figure=kind)
-            self._make("Figure", ".png", FIGURE_S, lambda cancelled: draw(request, cancelled), kind)
+            stem = f"{file_stem(picture)}_{kind or 'figure'}"
+            self._make("Figure", stem, ".png", FIGURE_S, lambda stop: draw(request, stop))
 
     def _bare(self) -> LivePicture | None:
         """Give what figures and exports show: what is drawn, without a table of compensation."""
@@ -213,7 +214,7 @@ class FilesPanel:
             )
             return view_png(pixels, picture, bars)
 
-        self._make("View", ".png", VIEW_S, make)
+        self._make("View", f"{file_stem(picture)}_view", ".png", VIEW_S, make)
 
     def _page(self) -> None:
         """Write the offline page of what is drawn."""
@@ -224,19 +225,18 @@ class FilesPanel:
             toml = {"scene_toml": self._alone_if_large(document.state_to_toml)}
             camera = self._context.camera.remember()
             make: Make = lambda _: build_offline_html(picture, toml, camera).encode()  # noqa: E731
-            self._make("Page", ".html", PAGE_S, make)
+            self._make("Page", file_stem(picture), ".html", PAGE_S, make)
 
     def _export(self, name: str, ending: str) -> None:
         """Write an export."""
         write, picture = self._context.services.write_export, self._bare()
         if write is not None and picture is not None:
             request = build_request(picture)
-            self._make(name, ending, EXPORT_S, lambda _: write(request, ending))
+            stem = file_stem(picture)
+            self._make(name, stem, ending, EXPORT_S, lambda _: write(request, ending))
 
-    def _make(self, name: str, ending: str, usual_s: float, make: Make, kind: str = "") -> None:
+    def _make(self, name: str, stem: str, ending: str, usual_s: float, make: Make) -> None:
         """Make a file beside the session and send it."""
-        stem = "view" if self._picture is None else file_stem(self._picture)
-        stem += {"Figure": f"_{kind or 'figure'}", "View": "_view"}.get(name, "")
 
         def work(cancelled: threading.Event) -> None:
             content = make(cancelled)

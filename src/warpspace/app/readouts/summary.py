@@ -164,11 +164,13 @@ def heading(picture: LivePicture) -> str:
     """
     state = picture.drawn_state
     active, machine = state.active, state.scene.machine
+    compared = picture.compared.title if picture.compared is not None else ""
+    table = "" if picture.is_difference else table_words(state)
     return render(
         "heading",
         title=state.scene.title,
-        compared=picture.compared.title if picture.compared is not None else "",
-        table=table_words(state),
+        compared=compared,
+        table="" if table in compared else table,
         edited=len(state.changed_keys),
         excluded=sum(1 for key, value in state.amplitudes.items() if value != active[key]),
         machine=f"{machine.title}, chain {machine.chain}",

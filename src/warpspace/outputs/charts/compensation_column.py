@@ -15,7 +15,7 @@ from warpspace.outputs.charts.paper import DPI, ground, on_ground, style
 from warpspace.outputs.drawing.style import DARK, LIGHT
 from warpspace.outputs.encoding import encode_figure
 
-WIDTH_IN, HEIGHT_IN = 5.2, 5.4
+WIDTH_IN, HEIGHT_IN = 4.3, 5.0
 WORDS = 9.0
 
 
@@ -36,7 +36,7 @@ def compensation_column(found: Compensation) -> Figure:
         figure = Figure(figsize=(WIDTH_IN, HEIGHT_IN), dpi=DPI, facecolor=ground().paper)
         axes = np.atleast_2d(figure.subplots(3, max(len(planes), 1), squeeze=False))
         figure.subplots_adjust(
-            left=0.085, right=0.86, top=0.93, bottom=0.085, wspace=0.36, hspace=0.62
+            left=0.095, right=0.85, top=0.93, bottom=0.085, wspace=0.42, hspace=0.66
         )
         for row, (words, field, largest) in zip(axes, chart_fields(found), strict=True):
             place = row[0].get_position()
@@ -50,7 +50,7 @@ def compensation_column(found: Compensation) -> Figure:
             ]
             for column in row:
                 _narrow(column)
-            beside = figure.add_axes((0.885, place.y0, 0.022, place.height))
+            beside = figure.add_axes((0.875, place.y0, 0.024, place.height))
             bar = figure.colorbar(meshes[0], cax=beside)
             bar.ax.tick_params(labelsize=WORDS - 2.0)
             bar.ax.set_title("|E| [µm]", fontsize=WORDS - 1.5, pad=6.0)
@@ -64,7 +64,7 @@ def _narrow(axes: Axes) -> None:
     axes.xaxis.label.set_fontsize(WORDS - 1.0)
     axes.set_ylabel("")
     axes.tick_params(labelsize=WORDS - 2.0)
-    axes.locator_params(nbins=4)
+    axes.locator_params(nbins=3)
 
 
 def draw_maps(found: Compensation, *, dark: bool, narrow: bool) -> bytes:

@@ -75,12 +75,10 @@ class AskedPointLayer:
         )
         nominal = found.explanation.nominal_mm + found.shift_mm
         self._line("vector", np.stack([nominal, found.drawn_mm])[None])
-        length = float(np.linalg.norm(found.explanation.error_um))
-        # the contributions of the errors, which a table does not take part in
-        without = " without the table" if picture.drawn_state.controller is not None else ""
+        length = float(np.linalg.norm(found.drawn_um))
         self._label(
             "point",
-            f"{length:.1f} µm{without}\n{spell_axes(found.at)}\n{spell_in_r(nominal)}",
+            f"{length:.1f} µm\n{spell_axes(found.at)}\n{spell_in_r(nominal)}",
             found.drawn_mm + 1.8 * RADIUS * size * np.eye(3)[2],
         )
         chosen = [p for p in found.explanation.contributions if p.key == picture.state.lever]
