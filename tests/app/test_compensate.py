@@ -26,6 +26,7 @@ from warpspace.app.evaluation.compensation import (
     box_of,
     with_box,
 )
+from warpspace.app.evaluation.conventions import with_reference
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.machine import tool_point
 from warpspace.app.evaluation.machine_edits.updates import with_changed_scene
@@ -150,6 +151,22 @@ def test_other_loops_and_directions_of_travel_are_evaluated_as_they_are(found: A
     model = replace(SCENE.model, direction=TravelDirection.DIFFERENCE)
     turned = replace(left, scene=replace(SCENE, model=model))
     assert LIVE.evaluate(turned).field.norm_um.max() < 1e-9  # nothing depends on the direction
+
+
+def test_an_empty_table_leaves_what_is_drawn_without_one(found: Answer) -> None:
+    held = with_reference(START, {"X": 100.0, "Y": -50.0, "Z": -280.0}).with_position("B", 20.0)
+    empty = found.found.controller.without()
+    for loop in Loop:
+        plain = replace(
+            held, loop=loop, look=replace(held.look, surface="slices", quantity="orientation")
+        )
+        bare, picture = LIVE.evaluate(plain), LIVE.evaluate(replace(plain, controller=empty))
+        assert np.abs(picture.field.error_um - bare.field.error_um).max() < 0.01
+        assert np.abs(picture.field.orientation_urad - bare.field.orientation_urad).max() < 0.01
+        for one, other in zip(picture.slices, bare.slices, strict=True):
+            assert np.abs(one.field.error_um - other.field.error_um).max() < 0.01
+        for one, other in zip(picture.traces, bare.traces, strict=True):
+            assert np.abs(one.error_um - other.error_um).max() < 0.01
 
 
 def test_what_changes_the_machine_ends_the_table(found: Answer) -> None:

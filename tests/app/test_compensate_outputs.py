@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from markupsafe import Markup
 from PIL import Image
 
 from app.test_compensate import LIVE, SCENE, START, computed
@@ -15,6 +16,7 @@ from warpspace.app.documents.services import CancelledError, CompensationRequest
 from warpspace.app.evaluation.budget import answer, pick_worst, with_picked
 from warpspace.app.evaluation.compensation import BOTH, LEFT, Answer, ask, holds_for, with_box
 from warpspace.app.evaluation.repair import with_preview
+from warpspace.app.readouts.budget import answer_html
 from warpspace.app.readouts.error_controls import slider_hint
 from warpspace.app.readouts.summary import heading
 from warpspace.app.state.app_state import start_state
@@ -50,6 +52,9 @@ def test_a_point_that_is_asked_about_lies_on_the_drawn_box(found: Answer) -> Non
     plain = answer(without_table(asked), asked.picked, picture.exaggeration)
     assert np.array_equal(explained.explanation.error_um, plain.explanation.error_um)
     assert np.linalg.norm(plain.drawn_um) > 2.0 * np.linalg.norm(explained.drawn_um)
+    left_um = f"|E| {picture.statistics.max_um:.2f} µm"
+    assert left_um in answer_html(explained, "", lambda _: Markup(""))
+    assert "the table leaves" not in answer_html(plain, "", lambda _: Markup(""))
     length = f"{picture.statistics.max_um:.1f} µm"
     assert length in point_words(LIVE.evaluate(asked))
 

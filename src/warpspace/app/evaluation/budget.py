@@ -58,6 +58,11 @@ class Answer:
     drawn_mm: Array
     drawn_um: Array
 
+    @property
+    def is_corrected(self) -> bool:
+        """Whether a table corrects the point that is drawn."""
+        return self.drawn_um is not self.explanation.error_um
+
 
 def pick(picture: LivePicture, origin_mm: Array, direction: Array) -> Picked | None:
     """Find the point of a drawn trace or surface that a click means.

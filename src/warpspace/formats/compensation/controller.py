@@ -138,7 +138,7 @@ class Controller:
             )
             return replace(there, less=back)
         machine = Corrector(scene.model, scene.errors, loop, ())
-        held = _reference(scene)
+        held = _reference(scene, coordinates)
         return Corrected(
             nominal_mm,
             machine.move(coordinates, self.moves(coordinates, way), point_mm),
@@ -186,12 +186,12 @@ def _toward(scene: Scene, direction: TravelDirection) -> Scene:
     return replace(scene, model=replace(scene.model, direction=direction))
 
 
-def _reference(scene: Scene) -> dict[str, Array] | None:
-    """Give the coordinates of the point that is held still."""
+def _reference(scene: Scene, coordinates: Coordinates) -> dict[str, Array] | None:
+    """Give the coordinates of the point that is held still; other axes stand as they do."""
     if scene.reference is None:
         return None
-    still = {**scene.workspace.positions, **scene.reference}
-    return {axis: np.asarray(still[axis]) for axis in scene.machine.axes}
+    still = scene.reference
+    return {axis: np.asarray(still.get(axis, at)) for axis, at in coordinates.items()}
 
 
 def read_back(kind: Format, sources: list[Source], wanted: Wanted, label: str) -> Controller:
