@@ -10,6 +10,7 @@ from markupsafe import Markup
 from PIL import Image
 
 from app.test_compensate import LIVE, SCENE, START, computed
+from still_scenes import still_scene
 from warpspace.app.documents.export_request import build_request, file_stem
 from warpspace.app.documents.offline_page import build_offline_html, point_words
 from warpspace.app.documents.services import CancelledError, CompensationRequest
@@ -28,7 +29,9 @@ from warpspace.app.state.compensation_choice import (
 )
 from warpspace.app.state.table import without_table
 from warpspace.cli.services import draw_compensation
+from warpspace.exceptions import OptionError
 from warpspace.machine.parameters import parameter
+from warpspace.outputs.charts.compensation_column import draw_maps
 from warpspace.scene.library import load_scene
 
 WORDS = "with the table heidenhain (X 9, Y 9, Z 9 points)"
@@ -134,3 +137,21 @@ def test_maps_are_drawn_beside_the_page_and_can_be_cancelled(found: Answer) -> N
     cancelled.set()
     with pytest.raises(CancelledError):
         draw_compensation(CompensationRequest(found.found, dark=False), cancelled)
+
+
+@pytest.mark.parametrize("name", ["wFXt", "wXFt", "only Y moves", "only X stands still"])
+def test_machines_with_few_moving_axes_have_box_and_maps_too(name: str) -> None:
+    state = start_state(still_scene(name))
+    given = computed(state, CompensationChoice("heidenhain", "5")).found
+    picture = LIVE.evaluate(with_box(state, BOTH, given.controller))
+    assert picture.compared is not None
+    assert picture.compared.b.max_um <= picture.compared.a.max_um
+    for narrow in (True, False):
+        assert draw_maps(given, dark=False, narrow=narrow).startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("name", ["wCFt", "nothing moves"])
+def test_machines_with_nothing_to_correct_are_refused_in_one_line(name: str) -> None:
+    with pytest.raises(OptionError, match="to correct") as refused:
+        computed(start_state(still_scene(name)), CompensationChoice("heidenhain", "5"))
+    assert "\n" not in str(refused.value)
