@@ -198,6 +198,21 @@ def calibrated(page: Page) -> None:
     outcome.evaluate("part => part.scrollIntoView({ block: 'start' })")
 
 
+def compensated(page: Page) -> None:
+    """Compute a table for a control, and draw what it leaves."""
+    choose(page, "Table", "HEIDENHAIN .COM and .CMA, nonlinear axis error compensation")
+    points = page.get_by_label("Points per axis", exact=True).first
+    points.fill("11")
+    points.press("Enter")
+    page.wait_for_timeout(PAUSE_MS)
+    press(page, "Compute")
+    maps = page.locator("[data-value='compensation maps']")
+    maps.wait_for(timeout=60_000)
+    choose(page, "The box shows", "what is left")
+    page.wait_for_timeout(SETTLED_MS)
+    maps.evaluate("part => part.scrollIntoView({ block: 'end' })")
+
+
 VISITS = {
     "app": Visit(as_opened),
     "app_dark": Visit(dark),
@@ -218,6 +233,7 @@ VISITS = {
     "tab_machine_editor": Visit(as_opened, "Machine editor"),
     "tab_rotary_axes": Visit(as_opened, "Rotary axes", "teach_wobbling_table"),
     "tab_tolerances": Visit(allocated, "Tolerances"),
+    "tab_compensate": Visit(compensated, "Compensate", share=0.9),
     "tab_conventions": Visit(as_opened, "Conventions"),
 }
 """File name to visit."""
@@ -230,6 +246,7 @@ LEFT_TABS, LOWER_TABS = (
         "Machine editor",
         "Rotary axes",
         "Tolerances",
+        "Compensate",
         "Conventions",
     ),
 )

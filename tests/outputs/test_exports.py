@@ -1,5 +1,6 @@
 """Exports read back by other libraries: trimesh, PyVista, pandas."""
 
+import base64
 import json
 import os
 import resource
@@ -219,6 +220,19 @@ def test_damaged_vts_gives_one_message(tmp_path, capfd) -> None:
     with pytest.raises(SceneError, match="no such file"):
         load_stored_field(tmp_path / "missing.vts")
     assert capfd.readouterr().err == ""
+
+
+def test_array_of_no_blocks_that_has_a_last_one_is_refused(tmp_path) -> None:
+    """VTK ends the whole program on it."""
+    path = tmp_path / "a.vts"
+    write_vts(evaluate_picture(load_scene("dvf5000_first"), grid=3), path)
+    good = path.read_bytes()
+    begin = base64.b64encode(struct.pack("<4I", 1, 32768, 8, 14))[:20]
+    bad = base64.b64encode(struct.pack("<4I", 0, 32768, 8, 14))[:20]
+    assert begin in good
+    path.write_bytes(good.replace(begin, bad, 1))
+    with pytest.raises(SceneError, match=r"a\.vts: is no VTK structured grid"):
+        load_stored_field(path)
 
 
 @pytest.mark.parametrize("name", SCENES)

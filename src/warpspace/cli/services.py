@@ -6,8 +6,14 @@ from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from warpspace.app.documents.services import CancelledError, ConceptRequest, Request, Services
-from warpspace.exceptions import OptionError
+from warpspace.app.documents.services import (
+    CancelledError,
+    CompensationRequest,
+    ConceptRequest,
+    Request,
+    Services,
+)
+from warpspace.exceptions import OptionError, RenderError, WorkersLostError
 from warpspace.outputs.exports.formats import export_formats
 from warpspace.outputs.exports.formats import write_export as write
 from warpspace.outputs.figures.catalogue import figure_kinds
@@ -29,6 +35,7 @@ def build_services() -> Services:
         draw_figure,
         write_export,
         draw_concepts,
+        draw_compensation,
         figures=tuple((kind.name, kind.caption) for kind in figure_kinds() if kind.scenes == 1),
         exports=tuple((form.ending, form.about) for form in export_formats() if form.in_app),
     )
@@ -101,6 +108,49 @@ def draw_concepts(request: ConceptRequest, cancelled: threading.Event) -> bytes:
     return _render("concepts", request.scenes, settings, cancelled)
 
 
+def draw_compensation(request: CompensationRequest, cancelled: threading.Event) -> bytes:
+    """Draw the maps of a compensation as a PNG.
+
+    Parameters
+    ----------
+    request : CompensationRequest
+    cancelled : threading.Event
+        Ends the process that draws when set.
+
+    Returns
+    -------
+    bytes
+
+    Raises
+    ------
+    CancelledError
+        If it was cancelled.
+    """
+    from warpspace.outputs.charts.compensation_column import draw_maps
+    from warpspace.outputs.processes import ProcessPool
+
+    _take_turn(cancelled)
+    pool = ProcessPool(1)
+    try:
+        drawn = pool.submit(draw_maps, request.found, dark=request.dark, narrow=request.narrow)
+        while not wait([drawn], POLL_S).done:
+            if cancelled.is_set():
+                raise CancelledError("the maps were cancelled")
+        return drawn.result()
+    except WorkersLostError:
+        raise RenderError("the maps could not be drawn: their process has ended") from None
+    finally:
+        pool.kill()
+        _renderers.release()
+
+
+def _take_turn(cancelled: threading.Event) -> None:
+    """Wait until one more figure may be drawn."""
+    while not _renderers.acquire(timeout=POLL_S):
+        if cancelled.is_set():
+            raise CancelledError("cancelled while waiting for a renderer")
+
+
 def _render(
     name: str,
     scenes: Sequence[Scene],
@@ -110,9 +160,7 @@ def _render(
     """Draw a figure in a process of its own, which ends when that is cancelled."""
     from warpspace.outputs.worker import FigureWorker
 
-    while not _renderers.acquire(timeout=POLL_S):
-        if cancelled.is_set():
-            raise CancelledError("cancelled while waiting for a renderer")
+    _take_turn(cancelled)
     try:
         with FigureWorker() as worker, ThreadPoolExecutor(1) as caller:
             drawn = caller.submit(worker.render, name, scenes, settings, "png")

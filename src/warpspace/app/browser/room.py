@@ -31,7 +31,7 @@ def column_widths(page_width: float) -> tuple[int, int]:
         return 0, 0
     if page_width < NARROW_PX:
         return 300, 292
-    return (350, 320) if page_width < WIDE_PX else (480, 450)
+    return (350, 340) if page_width < WIDE_PX else (480, 450)
 
 
 @dataclass(frozen=True, slots=True)

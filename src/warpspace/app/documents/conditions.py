@@ -2,6 +2,7 @@
 
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
+from warpspace.app.state.table import table_words
 from warpspace.picture.comparison import conditions_of_both
 from warpspace.picture.words import direction_words, exclusion_words, range_words
 
@@ -30,8 +31,9 @@ def state_conditions(state: AppState) -> tuple[str, ...]:
 
 
 def all_conditions(state: AppState) -> tuple[str, ...]:
-    """Say the direction of travel, and which errors do not take part."""
-    return (*direction_words(state.scene), *state_conditions(state))
+    """Say the direction of travel, which errors do not take part, and the table that corrects."""
+    table = table_words(state)
+    return (*direction_words(state.scene), *state_conditions(state), *((table,) if table else ()))
 
 
 def picture_conditions(picture: LivePicture) -> tuple[str, ...]:

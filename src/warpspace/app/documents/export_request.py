@@ -9,8 +9,11 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.comparison import AFTER, BEFORE, Side
+from warpspace.app.state.table import drawn_tables, without_words
 from warpspace.picture.comparison import conditions_of_both
 from warpspace.scene.model import Scene
+
+AS_DRAWN = "View and HTML show what is drawn."
 
 
 def build_request(picture: LivePicture) -> Request:
@@ -68,10 +71,12 @@ def _request(picture: LivePicture, state: AppState, scene: Scene) -> Request:
 
 
 def file_stem(picture: LivePicture) -> str:
-    """Name the files of a picture, without an ending."""
-    found = picture.compared
+    """Name the files of a picture, without an ending; of one with a table say so."""
+    found, plain = picture.compared, safe_name(picture.state.scene.name)
+    if drawn_tables(picture.state):
+        return f"{plain}_with_table"
     if found is None:
-        return safe_name(picture.state.scene.name)
+        return plain
     a, b = (
         _side_stem(side, picture.state.comparison.pinned)
         for side in (picture.state.comparison.a, picture.state.comparison.b)
@@ -91,6 +96,8 @@ def _side_stem(side: Side[AppState], pinned: Side[AppState] | None) -> str:
 def exported_words(picture: LivePicture) -> str:
     """Say what pictures and exports show, where that is not simply what is steered."""
     found = picture.compared
+    if without := without_words(picture.state):
+        return f"Figure, exports, Save and Link: {without[0].lower()}{without[1:]} {AS_DRAWN}"
     if found is None:
         tilts = picture.state.look.tilts
         return "The figure shows the tilts of the tool axis as needles on the box." if tilts else ""

@@ -15,12 +15,13 @@ from warpspace.app.documents.scene_file import (
 )
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.comparison import Comparison
+from warpspace.app.state.table import without_table
 from warpspace.app.viewport.camera import CameraMemory
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.machine.limits import MAX_KEPT_TEXT
 from warpspace.scene.model import Scene
 
-LINK, FILE, NAME, ALONE = "link", "file", "name", "alone"
+LINK, FILE, NAME, ALONE, TABLE = "link", "file", "name", "alone", "table"
 NEVER_KEPT = (
     "what Undo and Redo could go back to",
     "other scenes that were opened in this tab",
@@ -28,6 +29,7 @@ NEVER_KEPT = (
     "a file that was being made",
 )
 COMPARISON = "the comparison, which was too large to keep"
+NO_TABLE = "the table of compensation that the box was drawn with, and its comparison"
 START_VALUES = "the values that Reset goes back to: it goes back to those restored"
 UNREADABLE = "what this tab has kept cannot be read"
 
@@ -64,6 +66,8 @@ def kept_text(state: AppState, camera: CameraMemory | None, known: Sequence[Scen
     str
         Empty where it is too large.
     """
+    bare = without_table(state)
+    table, state = bare is not state, bare
     alone = replace(state, comparison=Comparison())
     for whole in (state,) if alone == state else (state, alone):
         with suppress(OptionError):
@@ -73,6 +77,8 @@ def kept_text(state: AppState, camera: CameraMemory | None, known: Sequence[Scen
                 kept[LINK] = link
             if whole is not state:
                 kept[ALONE] = "yes"
+            if table:
+                kept[TABLE] = "yes"
             text = json.dumps(kept)
             if len(text) <= MAX_KEPT_TEXT:
                 return text
@@ -101,7 +107,8 @@ def read_kept(text: str, known: Sequence[Scene]) -> Restored:
     """
     kept = _parse(text)
     file, link = kept.get(FILE, ""), kept.get(LINK, "")
-    missing = (*NEVER_KEPT, *((COMPARISON,) if ALONE in kept else ()))
+    lost = {ALONE: COMPARISON, TABLE: NO_TABLE}
+    missing = (*NEVER_KEPT, *(words for key, words in lost.items() if key in kept))
     with suppress(WarpspaceError):
         state, camera = open_link(link, known)
         if state_to_toml(state, camera) == file:

@@ -217,7 +217,7 @@ def point_words(picture: LivePicture) -> str:
     if picked is None or picture.is_difference:
         return ""
     found = answer(picture.drawn_state, picked, picture.exaggeration)
-    length = float(np.linalg.norm(found.explanation.error_um))
+    length = float(np.linalg.norm(found.drawn_um))
     axes = own_axes(picture.drawn_state.scene, found.at)
     place = spell_point(axes, found.explanation.nominal_mm)
     return f"marked point: {place} mm, |E| {length:.1f} µm"
@@ -241,7 +241,9 @@ def remarks(picture: LivePicture) -> list[str]:
         picture.both_words(lambda state: reference_words(state.scene)),
         *picture_conditions(picture),
         picture.both_words(lambda state: convention_words(state.scene)),
-        "first-order model",
+        picture.both_words(
+            lambda state: "exact chain" if state.controller else "first-order model"
+        ),
         "error = actual − nominal",
         "drag to turn, wheel to zoom",
         f"warpspace {__version__}",

@@ -10,6 +10,7 @@ from warpspace.geometry.colour import ColourScale
 from warpspace.scene.model import Scene
 
 if TYPE_CHECKING:
+    from warpspace.formats.compensation.compensate import Compensation
     from warpspace.scene.concepts import ConceptPlan
 
 
@@ -109,6 +110,24 @@ class ConceptRequest:
 
 
 @dataclass(frozen=True, slots=True)
+class CompensationRequest:
+    """Maps of a compensation that are to be drawn: before, after, and what is left.
+
+    Attributes
+    ----------
+    found : Compensation
+    dark : bool
+        Light ink on a dark ground.
+    narrow : bool
+        Whether they are for a column of the page, without title and numbers; else a sheet.
+    """
+
+    found: "Compensation"
+    dark: bool
+    narrow: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Services:
     """Work the app cannot do itself; None where nobody does it.
 
@@ -121,6 +140,8 @@ class Services:
         Takes a request and an ending (".glb", ".csv"); gives the file's content.
     draw_concepts : callable or None
         As `draw_figure`, of machines side by side.
+    draw_compensation : callable or None
+        As `draw_figure`, of the maps of a compensation.
     figures : tuple of (str, str)
         Names of the figures of one scene, and what each shows.
     exports : tuple of (str, str)
@@ -130,5 +151,6 @@ class Services:
     draw_figure: Callable[[Request, threading.Event], bytes] | None = None
     write_export: Callable[[Request, str], bytes] | None = None
     draw_concepts: Callable[[ConceptRequest, threading.Event], bytes] | None = None
+    draw_compensation: Callable[[CompensationRequest, threading.Event], bytes] | None = None
     figures: tuple[tuple[str, str], ...] = ()
     exports: tuple[tuple[str, str], ...] = ()

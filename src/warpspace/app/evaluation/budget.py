@@ -7,6 +7,7 @@ import numpy as np
 
 from warpspace.analysis.explain import Explanation, explain
 from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.edits import curve_of
 from warpspace.app.state.picked import Picked
@@ -46,6 +47,8 @@ class Answer:
         From R to where things are drawn, on machines whose linear axes carry the workpiece.
     drawn_mm : ndarray, [3], mm
         Where the displaced point is drawn.
+    drawn_um : ndarray, [3], µm
+        The error that it is drawn with: the one explained, or what a table leaves of it.
     """
 
     at: Mapping[str, float]
@@ -53,6 +56,12 @@ class Answer:
     explanation: Explanation
     shift_mm: Array
     drawn_mm: Array
+    drawn_um: Array
+
+    @property
+    def is_corrected(self) -> bool:
+        """Whether a table corrects the point that is drawn."""
+        return self.drawn_um is not self.explanation.error_um
 
 
 def pick(picture: LivePicture, origin_mm: Array, direction: Array) -> Picked | None:
@@ -189,8 +198,12 @@ def answer(state: AppState, picked: Picked, exaggeration: float) -> Answer:
     if picked.point_mm is None:
         volume = state.scene.workspace.moved(state.positions)
         shift = seen_from_workpiece(model, coordinates, volume, point) - point
-    drawn = deform(found.nominal_mm + shift, found.error_um, exaggeration)
-    return Answer(at, loop, found, shift, drawn)
+    drawn_um = found.error_um
+    if state.controller is not None:
+        now, nominal = active_scene(state), found.nominal_mm
+        drawn_um = state.controller.field(coordinates, nominal, now, loop, nominal).error_um
+    drawn = deform(found.nominal_mm + shift, drawn_um, exaggeration)
+    return Answer(at, loop, found, shift, drawn, drawn_um)
 
 
 def with_picked(state: AppState, picked: Picked | None) -> AppState:

@@ -11,6 +11,7 @@ from warpspace.app.evaluation.live_picture import Compared, LivePicture
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.comparison import AFTER, BEFORE, PRESENT, Comparison, Side
 from warpspace.app.state.look import RotaryLook
+from warpspace.app.state.table import table_words
 from warpspace.geometry.colour import ColourScale
 from warpspace.picture.model import choose_scale, same_nodes, subtract_pictures
 from warpspace.picture.slices import subtract_slices
@@ -73,6 +74,8 @@ def pinned_side(state: AppState) -> Side[AppState]:
     title = state.scene.title or state.scene.name
     if edited:
         title += f" · {edited} changed"
+    if table := table_words(state):
+        title += f" · {table}"
     return Side(f"{BEFORE}: {title}", plain_state(state))
 
 
@@ -143,7 +146,9 @@ def _title(state: AppState, side: Side[AppState], beside: Side[AppState]) -> str
     if side.state:
         return side.title
     pinned = beside.state is not None and not beside.is_scene
-    return f"{AFTER if pinned else PRESENT}: {state.scene.title or state.scene.name}"
+    title = f"{AFTER if pinned else PRESENT}: {state.scene.title or state.scene.name}"
+    table = table_words(state)
+    return f"{title} · {table}" if table else title
 
 
 def _difference(a: LivePicture, b: LivePicture) -> LivePicture:

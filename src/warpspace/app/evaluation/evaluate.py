@@ -11,6 +11,7 @@ import numpy as np
 from warpspace.app.evaluation.bench import BenchSource
 from warpspace.app.evaluation.cache import Cache, Identity
 from warpspace.app.evaluation.compare import compare_pictures
+from warpspace.app.evaluation.compensated import CompensatedSource
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.slices import SliceSource
 from warpspace.app.state.app_state import AppState
@@ -53,7 +54,8 @@ class LiveModel:
 
     def __init__(self) -> None:
         self._responses: Cache[Response] = Cache(CACHE_BYTES)
-        self._slices = SliceSource()
+        self._compensated = CompensatedSource()
+        self._slices = SliceSource(self._compensated)
         self._bench = BenchSource()
 
     def response(self, state: AppState) -> Response:
@@ -87,14 +89,19 @@ class LiveModel:
         """Evaluate a state without what it is compared with."""
         response = self.response(state)
         amplitudes = np.fromiter(state.active.values(), float, len(state.amplitudes))
-        field = response.basis.evaluate(amplitudes, orientation=state.look.tilts)
+        field = self._compensated.field(state, response.grid)
+        if field is None:
+            field = response.basis.evaluate(amplitudes, orientation=state.look.tilts)
         size = picture_size_mm(state.scene, response.grid)
         factor = choose_exaggeration(state.exaggeration, None, float(field.norm_um.max()), size)
         traces = tuple(
             TraceLines(
                 group,
                 basis.nominal_mm,
-                basis.evaluate(amplitudes, orientation=False).error_um,
+                (
+                    self._compensated.trace(state, group)
+                    or basis.evaluate(amplitudes, orientation=False)
+                ).error_um,
                 factor,
             )
             for group, basis in zip(response.groups, response.trace_bases, strict=True)

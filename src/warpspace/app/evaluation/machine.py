@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import linear_positions
 from warpspace.field.evaluate import build_basis
@@ -150,6 +151,9 @@ def tool_point(picture: LivePicture) -> ToolPoint:
         nominal,
     )
     field = basis.evaluate(np.array([state.active[key] for key in basis.keys]))
+    if state.controller is not None:
+        now = active_scene(state)
+        field = state.controller.field(coordinates, nominal, now, state.loop)
     return ToolPoint(
         nominal,
         deform(nominal, field.error_um, picture.exaggeration),

@@ -1,6 +1,7 @@
 """Slices of a state: grids of their own with their own responses, kept while they stay in place."""
 
 from warpspace.app.evaluation.cache import Cache, Identity
+from warpspace.app.evaluation.compensated import CompensatedSource
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import slice_positions
 from warpspace.field.basis import ErrorBasis
@@ -15,9 +16,15 @@ CACHE_BYTES = 60_000_000
 
 
 class SliceSource:
-    """Slices of states; usable from any thread."""
+    """Slices of states; usable from any thread.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    compensated : CompensatedSource
+    """
+
+    def __init__(self, compensated: CompensatedSource) -> None:
+        self._compensated = compensated
         self._bases: Cache[tuple[Grid, ErrorBasis]] = Cache(CACHE_BYTES)
 
     def slices(
@@ -42,11 +49,14 @@ class SliceSource:
         found: list[Slice] = []
         for axis, at in slice_positions(state.scene, state.look, state.machine).items():
             grid, basis = self._basis(state, axis, at)
+            field = self._compensated.field(state, grid)
+            if field is None:
+                field = basis.evaluate(amplitudes, orientation=state.look.tilts)
             found.append(
                 Slice(
                     view=state.scene.view(state.loop),
                     grid=grid,
-                    field=basis.evaluate(amplitudes, orientation=state.look.tilts),
+                    field=field,
                     exaggeration=exaggeration,
                     component=state.component,
                     quantity=state.look.quantity,

@@ -29,6 +29,8 @@ WORDS = {
     "specification": "specification",
     "scene": "scene",
     "loaded": "scene",
+    "controller": "table of compensation",
+    "comparison": "comparison",
     "dark": "dark mode",
     "ghost": "nominal box",
     "grid_lines": "grid lines",
@@ -241,6 +243,8 @@ def spell_change(what: str) -> str:
     parts_of_machine = ("scene.model.machine", "scene.workspace")
     if "scene.name" not in paths and any(path.startswith(parts_of_machine) for path in paths):
         return "machine"
+    if "controller" in paths:
+        return WORDS["controller"]  # what it is compared with has changed with it
     for path in paths:
         parts = [part.lstrip("+-") for part in path.split(".")]
         name = next((part for part in reversed(parts) if part in PARAMETERS), "")

@@ -14,6 +14,7 @@ from warpspace.app.documents import received_files as incoming
 from warpspace.app.documents import scene_file as document
 from warpspace.app.documents.export_request import build_request, exported_words, file_stem
 from warpspace.app.documents.scene_list import dropped_words
+from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
 from warpspace.app.panels.importing import ImportWindow, accepted_endings
@@ -22,6 +23,7 @@ from warpspace.app.panels.uploading import add_upload
 from warpspace.app.readouts.html import message
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.comparison import Comparison
+from warpspace.app.state.table import drawn_tables, without_table
 from warpspace.app.viewport.camera import CameraMemory
 from warpspace.exceptions import OptionError
 from warpspace.machine.limits import MAX_SCENE_BYTES
@@ -169,7 +171,7 @@ class FilesPanel:
 
     def _alone_if_large(self, write: Callable[[AppState], str]) -> str:
         """Write the state; without what it is compared with where both are too large."""
-        state = self._context.store.state
+        state = without_table(self._context.store.state)
         try:
             return write(state)
         except OptionError as error:
@@ -181,11 +183,19 @@ class FilesPanel:
 
     def _figure(self) -> None:
         """Draw the figure in a process of its own."""
-        draw, picture = self._context.services.draw_figure, self._picture
+        draw, picture = self._context.services.draw_figure, self._bare()
         if draw is not None and picture is not None:
             kind = self._figures.get(self._kind.value, "")
             request = replace(build_request(picture), figure=kind)
-            self._make("Figure", ".png", FIGURE_S, lambda cancelled: draw(request, cancelled), kind)
+            stem = f"{file_stem(picture)}_{kind or 'figure'}"
+            self._make("Figure", stem, ".png", FIGURE_S, lambda stop: draw(request, stop))
+
+    def _bare(self) -> LivePicture | None:
+        """Give what figures and exports show: what is drawn, without a table of compensation."""
+        picture = self._picture
+        if picture is None or not drawn_tables(picture.state):
+            return picture
+        return LiveModel().evaluate(without_table(picture.state))
 
     def _view(self) -> None:
         """Have the browser render the view, and put title, factor and colour bar around it."""
@@ -204,7 +214,7 @@ class FilesPanel:
             )
             return view_png(pixels, picture, bars)
 
-        self._make("View", ".png", VIEW_S, make)
+        self._make("View", f"{file_stem(picture)}_view", ".png", VIEW_S, make)
 
     def _page(self) -> None:
         """Write the offline page of what is drawn."""
@@ -215,19 +225,18 @@ class FilesPanel:
             toml = {"scene_toml": self._alone_if_large(document.state_to_toml)}
             camera = self._context.camera.remember()
             make: Make = lambda _: build_offline_html(picture, toml, camera).encode()  # noqa: E731
-            self._make("Page", ".html", PAGE_S, make)
+            self._make("Page", file_stem(picture), ".html", PAGE_S, make)
 
     def _export(self, name: str, ending: str) -> None:
         """Write an export."""
-        write, picture = self._context.services.write_export, self._picture
+        write, picture = self._context.services.write_export, self._bare()
         if write is not None and picture is not None:
             request = build_request(picture)
-            self._make(name, ending, EXPORT_S, lambda _: write(request, ending))
+            stem = file_stem(picture)
+            self._make(name, stem, ending, EXPORT_S, lambda _: write(request, ending))
 
-    def _make(self, name: str, ending: str, usual_s: float, make: Make, kind: str = "") -> None:
+    def _make(self, name: str, stem: str, ending: str, usual_s: float, make: Make) -> None:
         """Make a file beside the session and send it."""
-        stem = "view" if self._picture is None else file_stem(self._picture)
-        stem += {"Figure": f"_{kind or 'figure'}", "View": "_view"}.get(name, "")
 
         def work(cancelled: threading.Event) -> None:
             content = make(cancelled)

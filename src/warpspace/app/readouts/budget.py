@@ -92,6 +92,7 @@ def answer_html(
 
     return render(
         "why",
+        left_um=float(np.linalg.norm(answer.drawn_um)) if answer.is_corrected else None,
         at=answer.at,
         point_mm=found.nominal_mm + answer.shift_mm,
         loop=answer.loop.value,

@@ -77,9 +77,10 @@ def slider_hint(state: AppState, row: Parameter, effect_um: float | None = None)
     function = state.scene.errors.functions.get(row.key)
     meaning = (function or Constant((0.0, 0.0))).slider_words(row.axis)
     span = state.spans[row.key]
-    effect = (
-        "" if effect_um is None else f" Alone it gives the volume an RMS of {effect_um:.3g} µm."
-    )
+    effect = ""
+    if effect_um is not None:
+        table = " and without a table" if state.controller is not None else ""
+        effect = f" Alone{table} it gives the volume an RMS of {effect_um:.3g} µm."
     return (
         f"{row.name}, {row.kind.value}: {meaning}. "
         f"{span.low:g} to {span.high:g} {row.unit}, in the scene {state.start[row.key]:g}.{effect}"

@@ -11,6 +11,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.palette import palette
 from warpspace.app.readouts.html import render
 from warpspace.app.readouts.numbers import thousands
+from warpspace.app.state.table import table_words
 from warpspace.field.basis import ErrorField
 from warpspace.geometry.colour import ColourScale, colour_table
 from warpspace.geometry.deform import round_down
@@ -136,6 +137,7 @@ def summary(picture: LivePicture, *, bars: bool = True) -> str:
         colour_bar=Markup(colour_bar(picture)),  # noqa: S704 - escaped by its template
         nodes=thousands(picture.field.norm_um.size),
         loop=picture.both_words(lambda state: state.loop.value),
+        table="" if picture.is_difference else table_words(picture.drawn_state),
         numbers={
             "mean": found.mean_um,
             "RMS": found.rms_um,
@@ -162,10 +164,13 @@ def heading(picture: LivePicture) -> str:
     """
     state = picture.drawn_state
     active, machine = state.active, state.scene.machine
+    compared = picture.compared.title if picture.compared is not None else ""
+    table = "" if picture.is_difference else table_words(state)
     return render(
         "heading",
         title=state.scene.title,
-        compared=picture.compared.title if picture.compared is not None else "",
+        compared=compared,
+        table="" if table in compared else table,
         edited=len(state.changed_keys),
         excluded=sum(1 for key, value in state.amplitudes.items() if value != active[key]),
         machine=f"{machine.title}, chain {machine.chain}",

@@ -44,6 +44,8 @@ class Tab:
 
 
 _HERE = "warpspace.app.panels"
+_NOTE = f"{_HERE}.table_note:TableNote"
+"""Heads the tabs whose numbers a table of compensation, with which the box is drawn, leaves out."""
 _TABS: dict[str, Tab] = {}
 
 
@@ -67,12 +69,12 @@ def tabs() -> tuple[Tab, ...]:
 
 for _tab in (
     Tab("Volumetric error", "results", [f"{_HERE}.summary:summary_panel"], "first"),
-    Tab("Error budget", "results", [f"{_HERE}.budget:BudgetPanel"]),
-    Tab("Repair", "results", [f"{_HERE}.repair:RepairPanel"]),
-    Tab("Sensitivities", "results", [f"{_HERE}.sensitivities:SensitivitiesPanel"]),
-    Tab("Tests", "results", [f"{_HERE}.bench:TestsPanel"]),
+    Tab("Error budget", "results", [_NOTE, f"{_HERE}.budget:BudgetPanel"]),
+    Tab("Repair", "results", [_NOTE, f"{_HERE}.repair:RepairPanel"]),
+    Tab("Sensitivities", "results", [_NOTE, f"{_HERE}.sensitivities:SensitivitiesPanel"]),
+    Tab("Tests", "results", [_NOTE, f"{_HERE}.bench:TestsPanel"]),
     Tab("Compare", "results", [f"{_HERE}.compare:ComparePanel"]),
-    Tab("Calibrate", "results", [f"{_HERE}.calibrate:CalibratePanel"]),
+    Tab("Calibrate", "results", [_NOTE, f"{_HERE}.calibrate:CalibratePanel"]),
     Tab("Files", "results", [f"{_HERE}.files:FilesPanel"]),
     Tab(
         "View",
@@ -84,11 +86,12 @@ for _tab in (
         ],
         "front",
     ),
-    Tab("Machine", "settings", [f"{_HERE}.machine:MachinePanel"]),
+    Tab("Machine", "settings", [_NOTE, f"{_HERE}.machine:MachinePanel"]),
     Tab("Machine editor", "settings", [f"{_HERE}.machine_editor:MachineEditorPanel"]),
-    Tab("Rotary axes", "settings", [f"{_HERE}.rotary_axes:RotaryAxesPanel"]),
-    Tab("Tolerances", "settings", [f"{_HERE}.tolerances:TolerancesPanel"]),
-    Tab("Concepts", "settings", [f"{_HERE}.concepts:ConceptsPanel"]),
-    Tab("Conventions", "settings", [f"{_HERE}.conventions:ConventionsPanel"]),
+    Tab("Rotary axes", "settings", [_NOTE, f"{_HERE}.rotary_axes:RotaryAxesPanel"]),
+    Tab("Tolerances", "settings", [_NOTE, f"{_HERE}.tolerances:TolerancesPanel"]),
+    Tab("Compensate", "settings", [f"{_HERE}.compensate:CompensatePanel"]),
+    Tab("Concepts", "settings", [_NOTE, f"{_HERE}.concepts:ConceptsPanel"]),
+    Tab("Conventions", "settings", [_NOTE, f"{_HERE}.conventions:ConventionsPanel"]),
 ):
     register_tab(_tab)

@@ -7,7 +7,7 @@ keep the old value in place of what is none, and note in `AppState.notes` what t
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from warpspace.app.state.bench import BenchLook
 from warpspace.app.state.comparison import Comparison
@@ -24,6 +24,9 @@ from warpspace.machine.limits import LIVE_NODES
 from warpspace.machine.parameters import parameter
 from warpspace.machine.tolerances import ToleranceSet
 from warpspace.scene.model import Scene
+
+if TYPE_CHECKING:
+    from warpspace.formats.compensation.controller import Controller
 
 NODES = Span(*LIVE_NODES, 2.0)
 """Grid nodes per axis: odd numbers."""
@@ -75,20 +78,16 @@ class AppState:
         What the tolerances are held against.
     loaded : Scene or None
         The scene as it was opened, where curves of `scene` have been edited since.
-    look : Look
-        What is shown of the field.
-    machine : MachineLook
-        The schematic machine.
-    rotary : RotaryLook
-        What is traced.
-    bench : BenchLook
-        Which standard test is run.
+    look, machine, rotary, bench : Look, MachineLook, RotaryLook, BenchLook
+        What is shown of the field and of the schematic machine, traced, and run as a test.
     picked : Picked or None
         The point whose error is explained.
     lever : str
         Key of the contribution whose axis and lever are drawn; empty for none.
     comparison : Comparison
         What is compared.
+    controller : Controller or None
+        Whose table corrects the machine that is drawn; never saved or linked.
     chosen_error : str
         Key of the error whose curve is shown: chosen, or the one moved last; empty for none yet. It
         counts in no comparison of states, and undo leaves it.
@@ -118,6 +117,7 @@ class AppState:
     picked: Picked | None = None
     lever: str = ""
     comparison: "Comparison[AppState]" = field(default_factory=Comparison[Any])
+    controller: "Controller | None" = None
     chosen_error: str = field(default="", compare=False)
     notes: tuple[str, ...] = ()
 

@@ -124,7 +124,8 @@ def describe_change(old: object, new: object) -> str:
     ----------
     old, new : object
         Frozen dataclasses of one type; nested ones, mappings and sets are looked into. Fields that
-        count in no comparison (`compare=False`) are left out.
+        count in no comparison (`compare=False`) are left out; what is equal to itself alone
+        (`eq=False`) is one thing.
 
     Returns
     -------
@@ -140,7 +141,7 @@ def _differences(old: object, new: object) -> list[str]:
     """List the dotted names of the parts that differ; "" for the values themselves."""
     if old is new:
         return []
-    if is_dataclass(old) and type(old) is type(new):
+    if is_dataclass(old) and type(old) is type(new) and type(old).__eq__ is not object.__eq__:
         parts: list[tuple[str, Any, Any]] = [
             (field.name, getattr(old, field.name), getattr(new, field.name))
             for field in fields(old)

@@ -15,12 +15,10 @@ from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
     from warpspace.analysis.statistics import Statistics
-    from warpspace.field.basis import ErrorField
     from warpspace.formats.compensation.compensate import Compensation, Plan
     from warpspace.formats.compensation.sweep import Step
     from warpspace.scene.model import Scene
 
-EXPECTED_GRID = "expected a number of points, or AXIS=NUMBER with commas between"
 EXPECTED_SWEEP = "expected numbers of points with commas between, for instance 3,5,9,17"
 
 
@@ -94,7 +92,7 @@ def compensate(
 
     --sweep 3,5,9,17 compares kinds of table by their size instead.
     """
-    from warpspace.formats.compensation.compensate import Plan
+    from warpspace.formats.compensation.compensate import Plan, read_points
     from warpspace.formats.registry import find_format
     from warpspace.scene.library import load_scene
 
@@ -109,7 +107,7 @@ def compensate(
     stem = Path(output).stem if output else "compensation"
     plan = Plan(
         kinds[0] if kinds else "",
-        _grid(grid),
+        None if grid is None else read_points(grid),
         resolution,
         sign or "",
         loop or "",
@@ -152,7 +150,7 @@ def _run(
         from warpspace.outputs.charts import write_chart
         from warpspace.outputs.charts.compensation import compensation_chart
 
-        where = f"{found.format.title} · loop {found.loop} · {_points(found)}"
+        where = f"{found.format.title} · loop {found.loop} · {found.points_words}"
         title = f"Compensation · {scene.title}"
         write_chart(compensation_chart(found, title, where), plot, overwrite=force)
     for add, target in targets.items():
@@ -169,7 +167,7 @@ def _run(
     )
     shown = {"": found, **found.directions}
     rows = [
-        (f"{word} {way}".rstrip(), *_four(numbers), *(f"{v:.2f}" for v in _tilt(found, field)))
+        (f"{word} {way}".rstrip(), *_four(numbers), *(f"{v:.2f}" for v in one.tilt_urad(field)))
         for way, one in shown.items()
         for word, numbers, field in (
             ("before", one.before_statistics, one.before),
@@ -177,7 +175,7 @@ def _run(
         )
     ]
     print_table(columns, rows)
-    print_text(f"  {found.size} numbers; corrected: {', '.join(found.axes)}; {_points(found)}")
+    print_text(f"  {found.size} numbers; corrected: {', '.join(found.axes)}; {found.points_words}")
     for text in found.assumed:
         print_text(f"  assumed: {text}")
     for text in found.notes:
@@ -257,19 +255,6 @@ def _print_sweep(steps: list["Step"]) -> None:
     print_table(columns, rows)
 
 
-def _grid(text: str | None) -> "int | dict[str, int] | None":
-    """Read points per axis."""
-    if text is None:
-        return None
-    try:
-        if "=" not in text:
-            return int(text)
-        pairs = [part.partition("=") for part in text.split(",")]
-        return {name.strip().upper(): int(count) for name, _, count in pairs}
-    except ValueError:
-        raise OptionError(f"--grid {text!r}; {EXPECTED_GRID}") from None
-
-
 def _counts(text: str) -> tuple[int, ...]:
     """Read the numbers of points of a sweep."""
     try:
@@ -300,7 +285,7 @@ def _json(found: "Compensation", files: list[str]) -> dict[str, object]:
         "after": _statistics(after),
         "worst_after_um": after.max_um,
         "orientation": {
-            word: dict(zip(("mean_urad", "max_urad"), _tilt(found, field), strict=True))
+            word: dict(zip(("mean_urad", "max_urad"), found.tilt_urad(field), strict=True))
             for word, field in (("before", found.before), ("after", found.after))
         },
         "directions": {
@@ -313,21 +298,6 @@ def _json(found: "Compensation", files: list[str]) -> dict[str, object]:
         "assumed": list(found.assumed),
         "notes": list(found.notes),
     }
-
-
-def _tilt(found: "Compensation", field: "ErrorField") -> tuple[float, float]:
-    """Give mean, by volume, and largest tilt of the tool axis, µrad."""
-    import numpy as np
-
-    tilt = np.linalg.norm(field.orientation_urad, axis=-1)
-    return float(np.sum(found.grid.weights * tilt)), float(tilt.max())
-
-
-def _points(found: "Compensation") -> str:
-    """Spell the points of a table."""
-    if found.format.grid.startswith("none"):
-        return "no grid"
-    return ", ".join(f"{axis} {count}" for axis, count in found.points.items()) + " points"
 
 
 def _four(found: "Statistics") -> tuple[str, ...]:

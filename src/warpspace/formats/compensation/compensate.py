@@ -1,37 +1,25 @@
 """A compensation from a scene to the controller and back: written, read, evaluated, applied."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-
-import numpy as np
 
 from warpspace.exceptions import OptionError
 from warpspace.field.grid import build_grid
-from warpspace.formats.compensation.corrector import Corrector, build_corrector
-from warpspace.formats.compensation.directions import (
-    WAYS,
-    BeforeAfter,
-    evaluated,
-    reversal_notes,
-    toward,
-)
+from warpspace.formats.compensation.controller import Controller, read_back
+from warpspace.formats.compensation.corrector import build_corrector
+from warpspace.formats.compensation.directions import BeforeAfter, evaluated, reversal_notes
 from warpspace.formats.compensation.wanted import Wanted
-from warpspace.formats.importing import Reading
-from warpspace.formats.kind import SIGNS, Format, ReadOptions
+from warpspace.formats.kind import SIGNS, Format
 from warpspace.formats.registry import find_format
-from warpspace.formats.source import Source, source_of_text
-from warpspace.formats.terms import Tables
-from warpspace.formats.to_scene import into_scene
-from warpspace.kinematics.model import Coordinates
-from warpspace.machine.errors import ErrorSet
+from warpspace.formats.source import source_of_text
 from warpspace.machine.travel import TravelDirection
 from warpspace.scene.model import Scene
-from warpspace.units import Array
 
 NODES = 28
 """Nodes per axis that what is left is evaluated at: between the points of usual tables."""
 RESOLUTION = (0.0, 0.1)
 """mm or degrees."""
+EXPECTED_GRID = "expected a number of points, or AXIS=NUMBER with commas between"
 
 
 @dataclass(frozen=True)
@@ -75,30 +63,79 @@ class Compensation(BeforeAfter):
         Texts by what is added to the name of the file.
     points : mapping of str to int
         Points of the table per axis.
-    size : int
-        Numbers that the controller holds.
-    loop : str
-    axes : tuple of str
-        Axes that are corrected.
-    assumed, notes : tuple of str
+    controller : Controller
+        It has read the files.
     directions : mapping of str to BeforeAfter
         "forward" and "backward", where errors depend on the direction of travel.
+    reversal : tuple of str
+        What of that the format has no place for, in words.
     """
 
     format: Format
     files: Mapping[str, str]
     points: Mapping[str, int]
-    size: int
-    loop: str
-    axes: tuple[str, ...]
-    assumed: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    controller: Controller
     directions: Mapping[str, BeforeAfter] = field(default_factory=dict[str, BeforeAfter])
+    reversal: tuple[str, ...] = ()
+
+    @property
+    def size(self) -> int:
+        """Numbers that the controller holds."""
+        return self.controller.size
+
+    @property
+    def loop(self) -> str:
+        """Structural loop that is corrected."""
+        return str(self.controller.loop)
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Axes that are corrected."""
+        return self.controller.corrector.moved
+
+    @property
+    def assumed(self) -> tuple[str, ...]:
+        """What the documentation of the format leaves open."""
+        return self.controller.assumed
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the controller cannot hold, in words."""
+        return (*self.controller.notes, *self.reversal)
+
+    @property
+    def points_words(self) -> str:
+        """Spell the points of the table."""
+        return spell_points(self.format, self.points)
 
     @property
     def bytes(self) -> int:
         """Size of the files."""
         return sum(len(text.encode()) for text in self.files.values())
+
+
+def read_points(text: str) -> int | dict[str, int]:
+    """Read points per axis as a user types them: 9, or X=9,Y=5.
+
+    Raises
+    ------
+    OptionError
+        If it is neither; whether a format takes so many is asked by `table_points`.
+    """
+    try:
+        if "=" not in text:
+            return int(text)
+        pairs = [part.partition("=") for part in text.split(",")]
+        return {name.strip().upper(): int(count) for name, _, count in pairs}
+    except ValueError:
+        raise OptionError(f"--grid {text!r}; {EXPECTED_GRID}") from None
+
+
+def spell_points(kind: Format, points: Mapping[str, int]) -> str:
+    """Spell the points of a table."""
+    if kind.grid.startswith("none"):
+        return "no grid"
+    return ", ".join(f"{axis} {count}" for axis, count in points.items()) + " points"
 
 
 def table_points(
@@ -129,7 +166,9 @@ def table_points(
     return given
 
 
-def compensate(scene: Scene, plan: Plan, nodes: int = NODES) -> Compensation:
+def compensate(
+    scene: Scene, plan: Plan, nodes: int = NODES, *, watch: Callable[[], None] | None = None
+) -> Compensation:
     """Write the compensation of a scene, have it read and evaluated, and give what is left.
 
     Parameters
@@ -138,6 +177,8 @@ def compensate(scene: Scene, plan: Plan, nodes: int = NODES) -> Compensation:
     plan : Plan
     nodes : int, optional
         Nodes per axis that what is left is evaluated at.
+    watch : callable, optional
+        Called between the steps; what it raises ends the work.
 
     Returns
     -------
@@ -162,118 +203,37 @@ def compensate(scene: Scene, plan: Plan, nodes: int = NODES) -> Compensation:
         raise OptionError(f"--sign {plan.sign!r}: expected error or correction, of a table")
     if scene.model.direction == TravelDirection.DIFFERENCE:
         scene = replace(scene, model=replace(scene.model, direction=TravelDirection.MEAN))
+    watch = watch or _go_on
     corrector = build_corrector(scene, plan.loop, orientation=plan.orientation)
     points = table_points(kind, scene, plan.points)
     wanted = Wanted(scene, corrector, points, plan.resolution, plan.sign, plan.stem)
+    watch()
     files = kind.write(wanted)
+    watch()
     grid = build_grid(scene.model, scene.workspace, nodes)
     sources = [
         source_of_text(text, f"{plan.stem}{add}{'' if add else kind.endings[0]}")
         for add, text in files.items()
     ]
-    controller = _read_back(kind, sources, wanted)
-    still = _reference(scene)
-    own = evaluated(corrector, controller.moves, grid, still)
+    label = f"{kind.name} ({spell_points(kind, points)})"
+    controller = read_back(kind, sources, wanted, label)
+    watch()
+    own = evaluated(controller, grid, scene.model.direction)
+    watch()
     directions: dict[str, BeforeAfter] = {}
-    notes = controller.notes
+    reversal: tuple[str, ...] = ()
     if scene.errors.has_directions:
         there, back = (
-            evaluated(toward(corrector, way), controller.toward(way).moves, grid, still)
-            for way in WAYS
+            evaluated(controller, grid, way)
+            for way in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
         )
         directions = {"forward": there, "backward": back}
-        notes += reversal_notes(there, back, scene.errors, scene.model.direction)
+        reversal = reversal_notes(there, back, scene.errors, scene.model.direction)
+        watch()
     return Compensation(
-        own.before,
-        own.after,
-        own.grid,
-        kind,
-        files,
-        points,
-        controller.size,
-        str(corrector.loop),
-        corrector.moved,
-        controller.assumed,
-        notes,
-        directions,
+        own.before, own.after, grid, kind, files, points, controller, directions, reversal
     )
 
 
-@dataclass(frozen=True)
-class _Controller:
-    """What a controller does with the files it has read."""
-
-    corrector: Corrector
-    tables: Tables | None
-    size: int
-    assumed: tuple[str, ...]
-    notes: tuple[str, ...]
-    direction: int
-
-    def toward(self, direction: TravelDirection) -> "_Controller":
-        """Give the controller whose axes travel in a direction."""
-        return replace(self, corrector=toward(self.corrector, direction), direction=WAYS[direction])
-
-    def moves(self, coordinates: Coordinates) -> dict[str, Array]:
-        """Give what it adds to the commanded positions."""
-        if self.tables is None:
-            return self.corrector.moves(coordinates)
-        return dict(self.tables.corrections(coordinates, self.direction))
-
-
-def _read_back(kind: Format, sources: list[Source], wanted: Wanted) -> _Controller:
-    """Read the files as the controller does."""
-    scene = wanted.scene
-    options = ReadOptions(scene.machine, sign=wanted.sign)
-    direction = WAYS.get(TravelDirection(scene.model.direction), 0)
-    if kind.tables is not None:
-        tables = kind.tables(sources, options)
-        return _Controller(
-            wanted.corrector, tables, tables.size, tables.assumed, tables.notes, direction
-        )
-    found = kind.read(sources, options)
-    bare = replace(scene, errors=ErrorSet(), uncertainty={}, measured={})
-    held = into_scene(Reading(found, kind, recognised=True), bare, scene.title, scene.name).scene
-    errors = held.errors
-    if wanted.resolution:
-        errors = _rounded(errors, wanted.resolution)
-    model = replace(held.model, direction=scene.model.direction)
-    corrector = replace(wanted.corrector, model=model, errors=errors)
-    notes = list(found.notes)
-    lost = [key for key in scene.errors if key not in errors and scene.errors.amplitude(key)]
-    if lost:
-        notes.append(f"has no place for {', '.join(lost)}")
-    partly = [
-        key
-        for key in scene.errors
-        if key in errors and set(scene.errors.arguments(key)) - set(errors.arguments(key))
-    ]
-    if partly:
-        notes.append(f"holds {', '.join(partly)} over fewer axes than the scene")
-    differing = [
-        axis
-        for axis in scene.machine.axes
-        if model.convention(axis).name != scene.model.convention(axis).name
-    ]
-    if differing:
-        notes.append(
-            f"errors of {', '.join(differing)} stand in another convention here than in the scene"
-        )
-    return _Controller(corrector, None, found.size, found.assumed, tuple(notes), direction)
-
-
-def _rounded(errors: ErrorSet, resolution: float) -> ErrorSet:
-    """Refuse: the resolution of error parameters is that of their digits."""
-    del errors
-    raise OptionError(
-        f"--resolution {resolution:g}: formats of error parameters have as many digits as they"
-        " print; expected a table of corrections"
-    )
-
-
-def _reference(scene: Scene) -> dict[str, Array] | None:
-    """Give the coordinates of the point that is held still."""
-    if scene.reference is None:
-        return None
-    still = {**scene.workspace.positions, **scene.reference}
-    return {axis: np.asarray(still[axis]) for axis in scene.machine.axes}
+def _go_on() -> None:
+    """Let the work go on."""

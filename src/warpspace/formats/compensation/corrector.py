@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpspace.exceptions import OptionError
-from warpspace.field.basis import ErrorField
 from warpspace.field.evaluate import View, evaluate_exact
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, nominal_point, tool_axis
@@ -14,7 +13,7 @@ from warpspace.kinematics.model import Coordinates, Loop, Model, batch_shape
 from warpspace.machine.axes import direction_index, is_linear
 from warpspace.machine.errors import ErrorSet
 from warpspace.scene.model import Scene
-from warpspace.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM, URAD_PER_RAD, Array
+from warpspace.units import MM_PER_UM, RAD_PER_URAD, Array
 
 STEPS = 2
 """Newton steps: an error grows by a ten-thousandth of the correction at most."""
@@ -23,6 +22,41 @@ SMALL_MM, SMALL_DEG = 1e-2, 1e-3
 CUT = 1e-3
 """Moves that act less than this share of the best one are not used."""
 LOOPS = (Loop.TOOL, Loop.RELATIVE)
+
+
+@dataclass(frozen=True)
+class Moved:
+    """Points of a machine whose axes were moved, before its errors count.
+
+    Attributes
+    ----------
+    model : Model
+    loop : Loop
+    coordinates : mapping of str to ndarray, [...], mm or degrees
+        Where the axes stand after the moves.
+    point_mm : ndarray, [..., 3], mm
+        Where the points nominally are then.
+    shift_mm : ndarray, [..., 3], mm
+        By how much they have moved from where they were commanded, as the loop sees it.
+    turn_rad : ndarray, [..., 3], rad
+        By how much the tool axis has turned.
+    """
+
+    model: Model
+    loop: Loop
+    coordinates: Coordinates
+    point_mm: Array
+    shift_mm: Array
+    turn_rad: Array
+
+    def residual(self, errors: ErrorSet) -> tuple[Array, Array]:
+        """Give what is left with errors; see `Corrector.residual`."""
+        view = View(self.loop)
+        field = evaluate_exact(self.model, errors, self.coordinates, view, self.point_mm)
+        return (
+            self.shift_mm + field.error_um * MM_PER_UM,
+            self.turn_rad + field.orientation_urad * RAD_PER_URAD,
+        )
 
 
 @dataclass(frozen=True)
@@ -53,13 +87,17 @@ class Corrector:
         """All axes that are corrected."""
         return (*self.axes, *self.tilting)
 
-    def residual(self, coordinates: Coordinates, moves: Mapping[str, Array]) -> tuple[Array, Array]:
+    def residual(
+        self, coordinates: Coordinates, moves: Mapping[str, Array], point_mm: Array | None = None
+    ) -> tuple[Array, Array]:
         """Give what is left at commanded positions after moves of the axes.
 
         Parameters
         ----------
         coordinates : mapping of str to ndarray, [...], mm or degrees
         moves : mapping of str to ndarray, [...], mm or degrees
+        point_mm : ndarray, [..., 3], mm, optional
+            Nominal points in R at the commanded positions; by default the tool point.
 
         Returns
         -------
@@ -67,25 +105,48 @@ class Corrector:
         orientation_rad : ndarray, [..., 3], rad
             Rotation vector without the part about the tool axis.
         """
-        moved = {axis: q + moves[axis] if axis in moves else q for axis, q in coordinates.items()}
-        field = evaluate_exact(self.model, self.errors, moved, View(self.loop))
-        shift, turn = self._nominal_motion(coordinates, moved)
-        return (
-            shift + field.error_um * MM_PER_UM,
-            turn + field.orientation_urad * RAD_PER_URAD,
+        return self.move(coordinates, moves, point_mm).residual(self.errors)
+
+    def move(
+        self, coordinates: Coordinates, moves: Mapping[str, Array], point_mm: Array | None = None
+    ) -> "Moved":
+        """Work out all of a residual that does not depend on the errors; see `residual`."""
+        after = {axis: q + moves[axis] if axis in moves else q for axis, q in coordinates.items()}
+        return Moved(
+            self.model, self.loop, after, *self._nominal_motion(coordinates, after, point_mm)
         )
 
-    def _nominal_motion(self, before: Coordinates, after: Coordinates) -> tuple[Array, Array]:
-        """Displacement of the tool against the commanded point, and the turn of its axis."""
-        start = nominal_point(self.model, Loop.TOOL, before)
+    def _nominal_motion(
+        self, before: Coordinates, after: Coordinates, point_mm: Array | None = None
+    ) -> tuple[Array, Array, Array]:
+        """Place of a point after a move, its displacement, and the turn of the tool axis.
+
+        The point is the tool point by default. In the workpiece loop it rides on the workpiece, in
+        the relative loop the displacement is that of the tool against the workpiece.
+        """
+        start = nominal_point(self.model, Loop.TOOL, before) if point_mm is None else point_mm
         aim, end = tool_axis(self.model, before), tool_axis(self.model, after)
-        if self.loop is Loop.RELATIVE:
-            carried = branch_pose(self.model, "workpiece", after) @ transforms.inverse(
-                branch_pose(self.model, "workpiece", before)
-            )
-            start = transforms.apply(carried, start)
-            aim = transforms.rotate(carried[..., :3, :3], aim)
-        return nominal_point(self.model, Loop.TOOL, after) - start, np.cross(aim, end)
+        if self.loop is Loop.TOOL:
+            point = self._tool_point(before, after, point_mm)
+            return point, point - start, np.cross(aim, end)
+        carried = self._carried("workpiece", before, after)
+        rides, turned = transforms.apply(carried, start), transforms.rotate(_turn(carried), aim)
+        if self.loop is Loop.WORKPIECE:
+            return rides, rides - start, np.cross(aim, turned)
+        point = self._tool_point(before, after, point_mm)
+        return point, point - rides, np.cross(turned, end)
+
+    def _tool_point(self, before: Coordinates, after: Coordinates, point_mm: Array | None) -> Array:
+        """Give where a point of the tool side nominally is after a move, [..., 3], mm."""
+        if point_mm is None:
+            return nominal_point(self.model, Loop.TOOL, after)
+        return transforms.apply(self._carried("tool", before, after), point_mm)
+
+    def _carried(self, side: str, before: Coordinates, after: Coordinates) -> Array:
+        """Motion in R of what rides on a branch, [..., 4, 4]."""
+        return branch_pose(self.model, side, after) @ transforms.inverse(
+            branch_pose(self.model, side, before)
+        )
 
     def moves(self, coordinates: Coordinates) -> dict[str, Array]:
         """Give the moves of the axes that leave nothing, or as little as they can.
@@ -127,13 +188,18 @@ class Corrector:
                 )
                 for way in (1.0, -1.0)
             )
-            for found, one, other in ((shifts, up[0], down[0]), (turns, up[1], down[1])):
+            for found, one, other in ((shifts, up[1], down[1]), (turns, up[2], down[2])):
                 found.append(np.broadcast_to((one - other) / (2.0 * small), shape))
         none = np.zeros((*shape, 0))
         return (
             np.stack(shifts, -1) if shifts else none,
             np.stack(turns, -1) if turns else none,
         )
+
+
+def _turn(pose: Array) -> Array:
+    """Give the rotation of a pose, [..., 3, 3]."""
+    return pose[..., :3, :3]
 
 
 def _inverse(matrix: Array) -> Array:
@@ -200,41 +266,3 @@ def _independent(linear: Sequence[str], scene: Scene) -> tuple[str, ...]:
     for axis in sorted(linear, key=lambda name: name not in spanning):
         found.setdefault(direction_index(axis), axis)
     return tuple(axis for axis in linear if axis in found.values())
-
-
-def field_after(
-    corrector: Corrector,
-    coordinates: Coordinates,
-    moves: Mapping[str, Array],
-    nominal_mm: Array,
-    reference: Coordinates | None,
-    reference_moves: Mapping[str, Array],
-) -> ErrorField:
-    """Give the error field that a compensation leaves, µm and µrad.
-
-    Parameters
-    ----------
-    corrector : Corrector
-    coordinates : mapping of str to ndarray, [...]
-        Commanded positions.
-    moves : mapping of str to ndarray
-        What the controller adds.
-    nominal_mm : ndarray, [..., 3], mm
-    reference : mapping of str to ndarray or None
-        The point held still, None for absolute errors.
-    reference_moves : mapping of str to ndarray
-        What the controller adds there.
-
-    Returns
-    -------
-    ErrorField
-    """
-    position, orientation = corrector.residual(coordinates, moves)
-    if reference is not None:
-        position = position - corrector.residual(reference, reference_moves)[0]
-    shape = np.broadcast_shapes(position.shape, nominal_mm.shape)
-    return ErrorField(
-        np.broadcast_to(nominal_mm, shape),
-        np.broadcast_to(position, shape) * UM_PER_MM,
-        np.broadcast_to(orientation, shape) * URAD_PER_RAD,
-    )

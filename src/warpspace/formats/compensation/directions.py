@@ -1,21 +1,16 @@
 """What a compensation does in each direction of travel, for errors that depend on it."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from warpspace.analysis.statistics import Statistics, volume_statistics
 from warpspace.field.basis import ErrorField
 from warpspace.field.grid import Grid
-from warpspace.formats.compensation.corrector import Corrector, field_after
-from warpspace.kinematics.model import Coordinates
+from warpspace.formats.compensation.controller import Controller, toward
 from warpspace.machine.errors import ErrorSet
 from warpspace.machine.travel import DIRECTION_WORDS, TravelDirection
-from warpspace.units import Array
 
-Moves = Callable[[Coordinates], Mapping[str, Array]]
-WAYS = {TravelDirection.FORWARD: 1, TravelDirection.BACKWARD: -1}
 HELD = 0.05
 """Share of the reversal that may be left where a format holds it: the steps of its table."""
 LEAST_UM = 0.01
@@ -46,33 +41,25 @@ class BeforeAfter:
         """Of what is left."""
         return volume_statistics(self.after, self.grid)
 
+    def tilt_urad(self, field: ErrorField) -> tuple[float, float]:
+        """Give mean, by volume, and largest tilt of the tool axis in one of the fields, µrad."""
+        tilt = np.linalg.norm(field.orientation_urad, axis=-1)
+        return float(np.sum(self.grid.weights * tilt)), float(tilt.max())
 
-def toward(corrector: Corrector, direction: str) -> Corrector:
-    """Give a corrector whose axes travel in a direction."""
-    return replace(corrector, model=replace(corrector.model, direction=direction))
 
-
-def evaluated(
-    corrector: Corrector, moves: Moves, grid: Grid, reference: Coordinates | None
-) -> BeforeAfter:
-    """Evaluate a scene before and after a compensation.
+def evaluated(controller: Controller, grid: Grid, direction: str) -> BeforeAfter:
+    """Evaluate a machine before and after a compensation.
 
     Parameters
     ----------
-    corrector : Corrector
-    moves : callable
-        Gives what the controller adds to commanded positions, mm or degrees.
+    controller : Controller
     grid : Grid
-    reference : mapping of str to ndarray or None
-        The point held still.
+    direction : str
+        Of travel.
     """
-    at, nominal = grid.coordinates, grid.nominal_mm
-    still = {} if reference is None else moves(reference)
-    return BeforeAfter(
-        field_after(corrector, at, {}, nominal, reference, {}),
-        field_after(corrector, at, moves(at), nominal, reference, still),
-        grid,
-    )
+    at, nominal, scene = grid.coordinates, grid.nominal_mm, toward(controller.scene, direction)
+    before = controller.without().field(at, nominal, scene)
+    return BeforeAfter(before, controller.field(at, nominal, scene), grid)
 
 
 def reversal_notes(

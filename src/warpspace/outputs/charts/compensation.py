@@ -5,6 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from matplotlib.patheffects import withStroke
 
 from warpspace.analysis.statistics import Statistics
 from warpspace.field.basis import ErrorField
@@ -33,15 +35,8 @@ def compensation_chart(found: Compensation, title: str, subtitle: str) -> Figure
     Figure
         The slices pass through the point where most is left.
     """
-    worst = np.unravel_index(int(np.argmax(found.after.norm_um)), found.grid.shape)
-    planes = [plane for plane in PLANES if all(found.grid.shape[i] > 1 for i in plane)]
-    before = max(float(found.before.norm_um.max()), LEAST_UM)
-    after = max(float(found.after.norm_um.max()), LEAST_UM)
-    columns = (
-        (f"before: {_words(found.before_statistics)}", found.before, before),
-        (f"after, same colours: {_words(found.after_statistics)}", found.after, before),
-        ("what is left, colours of its own", found.after, after),
-    )
+    planes = chart_planes(found)
+    columns = chart_fields(found)
     with style():
         height = 1.3 + ROW_IN * max(len(planes), 1)
         figure, top = sheet(WIDTH_IN, height, title, subtitle, top_in=1.0)
@@ -56,10 +51,30 @@ def compensation_chart(found: Compensation, title: str, subtitle: str) -> Figure
         )
         for row, plane in zip(axes, planes, strict=False):
             for column, (words, field, largest) in zip(row, columns, strict=True):
-                _slice(column, found, field, plane, tuple(map(int, worst)), largest)
+                mesh = draw_slice(column, found, field, plane, largest)
+                bar = figure.colorbar(mesh, ax=column, fraction=0.05, pad=0.03)
+                bar.ax.tick_params(labelsize=SMALL - 1.5)
+                bar.set_label("|E| [µm]", fontsize=SMALL - 1.0)
                 if plane is planes[0]:
                     column.set_title(words, fontsize=SMALL, color=ground().ink, loc="left")
         return figure
+
+
+def chart_planes(found: Compensation) -> list[tuple[int, int]]:
+    """List the slices there are, axes across and up of each; none of a machine with one axis."""
+    shape = found.grid.shape
+    return [plane for plane in PLANES if all(shape[i] > 1 for i in plane)]
+
+
+def chart_fields(found: Compensation) -> tuple[tuple[str, ErrorField, float], ...]:
+    """List the maps: their words, the field, and the upper end of their colours, µm."""
+    before = max(float(found.before.norm_um.max()), LEAST_UM)
+    after = max(float(found.after.norm_um.max()), LEAST_UM)
+    return (
+        (f"before: {_words(found.before_statistics)}", found.before, before),
+        (f"after, same colours: {_words(found.after_statistics)}", found.after, before),
+        ("what is left, colours of its own", found.after, after),
+    )
 
 
 def _words(found: Statistics) -> str:
@@ -67,15 +82,15 @@ def _words(found: Statistics) -> str:
     return f"mean {found.mean_um:.2f}, max {found.max_um:.2f} µm"
 
 
-def _slice(
+def draw_slice(
     axes: Axes,
     found: Compensation,
     field: ErrorField,
     plane: tuple[int, int],
-    worst: tuple[int, ...],
     largest: float,
-) -> None:
-    """Draw one slice as a map."""
+) -> AxesImage:
+    """Draw one slice, through the point where most is left, as a map."""
+    worst = np.unravel_index(int(np.argmax(found.after.norm_um)), found.grid.shape)
     across, up = plane
     rest = 3 - across - up
     values = np.take(field.norm_um, worst[rest], axis=rest)
@@ -99,13 +114,19 @@ def _slice(
     axes.set_xlabel(f"{names[across]} [{_unit(names[across])}]", fontsize=SMALL)
     axes.set_ylabel(f"{names[up]} [{_unit(names[up])}]", fontsize=SMALL)
     still = f"{names[rest]} {_along(found, rest)[worst[rest]]:.4g}" if names[rest] else ""
+    still = still.replace("-", "−")
     axes.text(
-        0.02, 0.97, still, transform=axes.transAxes, va="top", fontsize=SMALL - 1.0, color="white"
+        0.02,
+        0.97,
+        still,
+        transform=axes.transAxes,
+        va="top",
+        fontsize=SMALL - 1.0,
+        color="white",
+        path_effects=[withStroke(linewidth=1.8, foreground="#222222")],
     )
     axes.tick_params(labelsize=SMALL - 1.0)
-    bar = axes.figure.colorbar(mesh, ax=axes, fraction=0.05, pad=0.03)
-    bar.ax.tick_params(labelsize=SMALL - 1.5)
-    bar.set_label("|E| [µm]", fontsize=SMALL - 1.0)
+    return mesh
 
 
 def _unit(axis: str) -> str:

@@ -93,9 +93,8 @@ def sheet(
         (title, TITLE, 0.2, "bold", ground().ink),
         (subtitle, SUBTITLE, 0.5, "normal", ground().muted),
     ):
-        text = figure.text(
-            left, 1.0 - down / height, words, size=size, weight=weight, color=colour, va="top"
-        )
+        text = figure.text(left, 1.0 - down / height, words, size=size, weight=weight, color=colour)
+        text.set(va="top", parse_math=False)  # a $ in what a user calls a scene is a dollar
         wide = text.get_window_extent().width / figure.dpi
         if wide > width - 0.5:  # smaller, so that it does not run off the sheet
             text.set_fontsize(size * max((width - 0.5) / wide, LEAST_SHARE))

@@ -129,7 +129,8 @@ class _Header:
             self._refuse("an array is cut")
         sizes = struct.unpack(f"{self._order}{count}{letter}", begin[:need])
         blocks, size, last = sizes if self._compressed else (1, *sizes, 0)
-        if blocks > MAX_BLOCKS or blocks * size > MAX_ARRAY_BYTES or last > max(size, 1):
+        too_long = blocks > MAX_BLOCKS or blocks * size > MAX_ARRAY_BYTES or last > max(size, 1)
+        if too_long or (last and not blocks):  # VTK writes through a null pointer for the latter
             self._refuse(f"an array of {blocks:,} × {size:,} bytes")
 
 

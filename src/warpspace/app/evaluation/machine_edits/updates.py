@@ -117,6 +117,8 @@ def with_changed_scene(state: AppState, scene: Scene) -> AppState:
         ),
         picked=state.picked if same_axes else None,
         lever=state.lever if state.lever in keys else "",
+        # the table of another machine would correct nothing here
+        controller=state.controller if scene.model == state.scene.model else None,
     )
     own_curves = changed.own_curves
     start = {key: own_curves[key].amplitude if key in own_curves else 0.0 for key in keys}

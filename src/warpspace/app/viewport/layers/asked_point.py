@@ -75,7 +75,7 @@ class AskedPointLayer:
         )
         nominal = found.explanation.nominal_mm + found.shift_mm
         self._line("vector", np.stack([nominal, found.drawn_mm])[None])
-        length = float(np.linalg.norm(found.explanation.error_um))
+        length = float(np.linalg.norm(found.drawn_um))
         self._label(
             "point",
             f"{length:.1f} µm\n{spell_axes(found.at)}\n{spell_in_r(nominal)}",
