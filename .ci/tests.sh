@@ -9,6 +9,6 @@ python=.venv/bin/python
 export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 LP_NUM_THREADS=1
 
 status=0
-$python -m pytest -n 2 --dist loadfile -m "not browser and not proof" --durations=10 "$@" || status=$?
-$python -m pytest -m "browser and not proof" --durations=10 "$@" || status=$?
+$python -m pytest -n 2 --dist loadfile -m "not browser and not proof" --durations=25 "$@" || status=$?
+$python -m pytest -m "browser and not proof" --durations=25 "$@" || status=$?
 exit "$status"
