@@ -221,6 +221,17 @@ def test_orientation_is_corrected_where_the_format_has_a_place_for_it() -> None:
         compensate(load_scene("machine_gantry_mill"), Plan("csv", 5, orientation=True), NODES)
 
 
+def test_orientation_is_corrected_by_rotary_axes_under_the_workpiece_too() -> None:
+    scene = load_scene("dvf5000_first")
+    assert compensate(scene, Plan("sinumerik-cec", 5), NODES).loop == "tool"
+    both = compensate(scene, Plan("sinumerik-cec", 5, orientation=True), NODES)
+    assert both.loop == "relative"
+    assert set(both.axes) == {"X", "Y", "Z", "B", "C"}
+    assert both.tilt_urad(both.after)[0] < 0.6 * both.tilt_urad(both.before)[0]
+    with pytest.raises(OptionError, match="expected loop relative"):
+        compensate(scene, Plan("sinumerik-cec", 5, orientation=True, loop="tool"), NODES)
+
+
 def test_what_a_format_cannot_hold_is_said_and_stays() -> None:
     scene = scene_with(
         'EXY = { table2 = { axes = ["Y", "Z"], Y = [-225, 225], Z = [-480, -80],'

@@ -54,7 +54,8 @@ EXPECTED_SWEEP = "expected numbers of points with commas between, for instance 3
 @click.option(
     "--loop",
     type=click.Choice(("tool", "relative")),
-    help="Structural loop that is corrected.  [relative where a linear axis carries the workpiece]",
+    help="Structural loop that is corrected.  [relative where a linear axis, or with --orientation"
+    " all rotary axes, carry the workpiece]",
 )
 @click.option(
     "--orientation",

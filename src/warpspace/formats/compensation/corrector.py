@@ -221,7 +221,8 @@ def build_corrector(scene: Scene, loop: str = "", *, orientation: bool = False) 
     ----------
     scene : Scene
     loop : str, optional
-        "tool" or "relative"; by default relative where a linear axis carries the workpiece.
+        "tool" or "relative"; by default relative where a linear axis carries the workpiece, or
+        where the orientation is corrected and every rotary axis does.
     orientation : bool, optional
 
     Returns
@@ -242,7 +243,9 @@ def build_corrector(scene: Scene, loop: str = "", *, orientation: bool = False) 
         raise OptionError(
             f"the machine {machine.chain} has no rotary axis; --orientation needs one"
         )
-    carried = set(linear) & set(machine.chain.workpiece)
+    carried: set[str] = set(linear) & set(machine.chain.workpiece)
+    if orientation and not set(rotary) & set(machine.chain.tool):
+        carried |= set(rotary)
     chosen = Loop(loop) if loop else Loop.RELATIVE if carried else Loop.TOOL
     if chosen not in LOOPS:
         raise OptionError(f"loop {chosen}; expected tool or relative for a compensation")
