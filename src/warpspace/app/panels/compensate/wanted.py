@@ -75,8 +75,8 @@ class WantedPart:
             gui.add_dropdown(
                 "Loop corrected",
                 tuple(LOOP_WORDS),
-                hint="Suits: relative where a linear axis carries the workpiece, or where all rotary"
-                " axes that correct the orientation do; else tool.",
+                hint="Suits: relative where a linear axis carries the workpiece, or where all"
+                " rotary axes that correct the orientation do; else tool.",
             ),
             note,
         )
