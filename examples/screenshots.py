@@ -242,6 +242,7 @@ LEFT_TABS, LOWER_TABS = (
     (
         "Error curve",
         "View",
+        "Concepts",
         "Machine",
         "Machine editor",
         "Rotary axes",

@@ -29,6 +29,8 @@ PAUSE = 100
 CURVE = """() => Object.values(window.__viserTestpoints.uplots)
   .map(plot => [...plot.chart.data].map(line => [...line])).find(data => data.length === 9)"""
 """Positions, values and seven more lines of the chart of an error: other tabs have charts, too."""
+CURVE_ENDS = """() => Object.values(window.__viserTestpoints.uplots).map(plot => plot.chart)
+  .filter(chart => chart.data.length === 9).map(({scales}) => [scales.y.min, scales.y.max])[0]"""
 HISTOGRAM = """() => Object.values(window.__viserTestpoints.uplots)
   .map(plot => [...plot.chart.data].map(line => [...line])).filter(data => data.length === 4)
   .map(([at, within, beyond, limit]) => {
@@ -144,6 +146,9 @@ def test_the_shape_of_an_error_is_edited_and_its_curve_drawn(tab: Tab) -> None:
     tab.until(lambda: (lines := tab.page.evaluate(CURVE)) is not None and lines[1][-1] == -2.0)
     at, value, *_ = tab.page.evaluate(CURVE)
     np.testing.assert_allclose(value, curve.evaluate(np.array(at)), atol=1e-9)
+    low, high = tab.page.evaluate(CURVE_ENDS)  # NaN if the chart had to find them: no line then
+    assert -4.0 < low < -2.0
+    assert 8.0 < high < 10.0
     tab.written("Numbers").fill("-275 0\nbanana 8")
     tab.until(lambda: "no number" in tab.text("curve problem"))
     tab.until_shown(wanted)

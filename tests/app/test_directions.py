@@ -11,7 +11,7 @@ from warpspace.app.evaluation.conventions import costs_of, with_own_conventions,
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.resulting_scene import scene_of
 from warpspace.app.readouts.conventions import COST_WORDS, conventions_html
-from warpspace.app.readouts.curve_chart import SERIES, curve_data
+from warpspace.app.readouts.curve_chart import SERIES, curve_data, value_span
 from warpspace.app.readouts.summary import heading
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.curve_text import kind_titles, spell_rows
@@ -92,6 +92,19 @@ def test_the_chart_has_lines_bands_and_dots() -> None:
     shown = np.isfinite(dots)
     assert list(zip(at[shown], dots[shown], strict=True)) == [(-275, 1.1), (0, 2.0), (0, 2.2)]
     assert at[np.isfinite(open_dots)].tolist() == [0.0]
+
+
+def test_the_ends_of_the_chart_hold_its_numbers_whatever_there_is_none_of() -> None:
+    """The chart cannot find them where a value is NaN, and would then draw nothing."""
+    own = (SCENE.uncertainty["EYX"], SCENE.measured["EYX"])
+    for data in (
+        curve_data(curve_of(START, "EYX"), (-275.0, 275.0), *own),
+        curve_data(curve_of(START, "EXX"), (-275.0, 275.0)),
+        curve_data(None, (0.0, 1.0)),
+    ):
+        low, high = value_span(data)
+        assert low < np.nanmin(data[1:])
+        assert np.nanmax(data[1:]) < high
 
 
 def test_kinds_that_nobody_writes_are_not_offered_and_say_where_they_come_from() -> None:

@@ -39,6 +39,12 @@ main()
 """
 
 
+def heed_signals() -> None:
+    """Take signals as a program does that a user starts; tests may be started by `nohup`."""
+    for number in (signal.SIGHUP, signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_DFL)
+
+
 def start(folder: Path, *arguments: str, code: str = MAIN) -> "subprocess.Popen[bytes]":
     """Start the command; its processes carry the folder in their environment."""
     with (folder / "log").open("wb") as log:
@@ -49,6 +55,7 @@ def start(folder: Path, *arguments: str, code: str = MAIN) -> "subprocess.Popen[
             stdout=log,
             stderr=log,
             start_new_session=True,
+            preexec_fn=heed_signals,  # noqa: PLW1509 - no threads here
         )
 
 

@@ -195,6 +195,14 @@ def test_too_many_or_unsorted_rows_for_linuxcnc() -> None:
         read("0 0 0\n1 0 0\n", "joint.comp")
 
 
+def test_a_joint_beyond_those_of_linuxcnc_is_refused() -> None:
+    text = "[JOINT_9]\nCOMP_FILE = j.comp\nCOMP_FILE_TYPE = 1\n"
+    with pytest.raises(
+        SceneError, match=r"line 1: section \[JOINT_9\]; expected a joint from 0 to 8"
+    ):
+        read(text, "machine.ini")
+
+
 def test_a_second_table_of_an_axis_is_refused_not_added() -> None:
     comp = [source_of_text("0 0.001 0.002\n10 0.001 0.002\n", f"{n}_X.comp") for n in "ab"]
     with pytest.raises(SceneError, match=r"b_X\.comp: is a second table of X; expected one"):

@@ -7,8 +7,8 @@ from warpspace.app.browser.viser_private import dom_id
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
 from warpspace.app.readouts.chart_text import chart_text, describe_curve, measured_words
-from warpspace.app.readouts.charts import add_chart, chart_axis
-from warpspace.app.readouts.curve_chart import SERIES, curve_data
+from warpspace.app.readouts.charts import add_chart, chart_axis, chart_scales
+from warpspace.app.readouts.curve_chart import SERIES, curve_data, value_span
 from warpspace.app.readouts.html import message
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
@@ -172,7 +172,8 @@ class ErrorCurvePanel:
         unit = state.scene.machine.axes[row.axis].unit
         function, uncertainty, measured = drawn
         span = edits.axis_span(state, row.key)
-        self._chart.data = at, value, *_ = curve_data(function, span, uncertainty, measured)
+        data = at, value, *_ = curve_data(function, span, uncertainty, measured)
+        self._chart.data, self._chart.scales = data, chart_scales(value_span(data))
         self._words.content = chart_text(
             describe_curve(f"{row.key}, {row.name}", row.unit, unit, at, value)
             + measured_words(uncertainty, measured)

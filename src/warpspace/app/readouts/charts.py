@@ -41,13 +41,26 @@ def add_chart(
     return gui.add_uplot(
         data,
         (uplot.Series(label="along"), *lines),
-        scales={"x": uplot.Scale(time=False), WHOLE: uplot.Scale(range=(0.0, 1.0))},
+        scales=chart_scales(None),
         axes=axes,
         legend=uplot.Legend(show=False),
         height=height,
         padding=(8, 14, 0, 0),
         visible=visible,
     )
+
+
+def chart_scales(span: tuple[float, float] | None) -> dict[str, uplot.Scale]:
+    """Describe the scales of a chart.
+
+    Parameters
+    ----------
+    span : tuple of float, (2,), or None
+        Lower and upper end of the values; None where the chart is to find them itself, which it
+        cannot do where a value is NaN.
+    """
+    scales = {"x": uplot.Scale(time=False), WHOLE: uplot.Scale(range=(0.0, 1.0))}
+    return scales if span is None else {**scales, "y": uplot.Scale(range=span)}
 
 
 def chart_axis(label: str, size: int) -> uplot.Axis:

@@ -10,6 +10,8 @@ from warpspace.units import Array
 
 CURVE_COLOUR = "#4a7ab5"
 ZERO_COLOUR = "#9aa3af"
+ROOM = 0.06
+"""Share of the range of the values that is left free above and below."""
 FEW_READINGS = 2000
 """Readings that are drawn at most, evenly picked from all."""
 
@@ -65,6 +67,17 @@ def curve_data(
     half = nothing if uncertainty is None else uncertainty.evaluate(at)
     dots = [_placed(readings.get(way), at) for way in ("forward", "backward")]
     return at, value, first, last, value + half, value - half, np.zeros(at.shape), *dots
+
+
+def value_span(data: tuple[Array, ...]) -> tuple[float, float]:
+    """Give the ends of the chart of some data: what holds all its numbers, with a little room."""
+    numbers = np.concatenate(data[1:])
+    numbers = numbers[np.isfinite(numbers)]
+    if not numbers.size or not np.ptp(numbers):
+        middle = float(numbers[0]) if numbers.size else 0.0
+        return middle - 1.0, middle + 1.0
+    room = ROOM * float(np.ptp(numbers))
+    return float(numbers.min()) - room, float(numbers.max()) + room
 
 
 def _values(function: ErrorFunction | None, at: Array) -> Array:

@@ -27,7 +27,7 @@ POSITIONS, OFFSETS = "type-0", "type-1"
 NEAR = 0.1
 """Share of its range by which an actual position may be off, for a file that names no type."""
 _ROW = re.compile(r"\s*[-+0-9.]\S*\s+[-+0-9.]\S*\s+[-+0-9.]\S*\s*")
-_SECTION = re.compile(r"\[JOINT_(\d)\]")
+_SECTION = re.compile(r"\[JOINT_([0-9])\]")
 
 
 def recognise(head: str, name: str) -> bool:
@@ -55,6 +55,9 @@ def _assignment(sources: Sequence[Source]) -> tuple[dict[str, tuple[str, str]], 
                 if joint and file:
                     known[file] = (joint, kind or POSITIONS)
                 found = _SECTION.fullmatch(bare)
+                if found and int(found[1]) >= len(JOINTS):
+                    known_joints = f"expected a joint from 0 to {len(JOINTS) - 1}, {JOINTS}"
+                    source.refuse(f"section {bare}; {known_joints}", number)
                 joint, file, kind = (JOINTS[int(found[1])] if found else ""), "", ""
                 continue
             key, _, value = (part.strip() for part in bare.partition("="))
