@@ -193,7 +193,7 @@ def test_what_is_slowest_waits_until_a_drag_has_ended(monkeypatch: pytest.Monkey
         while parts.is_due(paused=False):
             parts.settle(picture, run)
     assert set(done) == {"chart"}
-    assert 5 <= len(done) <= 10
+    assert 3 <= len(done) <= 6
     clock[0] += 0.1
     while parts.is_due(paused=True):
         parts.settle(picture, run)

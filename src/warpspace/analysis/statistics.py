@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from dataclasses import field as attribute
+from functools import cache
 
 import numpy as np
 
@@ -109,16 +110,23 @@ def statistics(field: ErrorField, axes: Mapping[str, Array] | None = None) -> St
 
 
 def _cell_values(values: Array) -> Array:
-    """Interpolate values at nodes, [nx, ny, nz], to the middles of cells of equal volume."""
-    for axis, nodes in enumerate(values.shape):
-        if nodes == 1:
-            continue
-        parts = max(1, round(CELLS / (nodes - 1)))
-        first = np.moveaxis(values, axis, -1)
-        step = np.diff(first)[..., None]
-        along = first[..., :-1, None] + step * ((np.arange(parts) + 0.5) / parts)
-        values = np.moveaxis(along.reshape(*first.shape[:-1], -1), -1, axis)
+    """Interpolate values at nodes to the middles of cells of equal volume, in any order."""
+    for nodes in values.shape:
+        values = np.tensordot(values, _to_cells(nodes), axes=(0, 1))
     return values
+
+
+@cache
+def _to_cells(nodes: int) -> Array:
+    """Give the weights of nodes along an edge in the middles of its cells, [cells, nodes]."""
+    if nodes == 1:
+        return np.ones((1, 1))
+    parts = max(1, round(CELLS / (nodes - 1)))
+    share = (np.arange(parts) + 0.5) / parts
+    weights = np.zeros((nodes - 1, parts, nodes))
+    for cell in range(nodes - 1):
+        weights[cell, :, cell], weights[cell, :, cell + 1] = 1.0 - share, share
+    return weights.reshape(-1, nodes)
 
 
 def _percentile(values: Array, place: float) -> float:
