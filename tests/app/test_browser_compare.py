@@ -249,6 +249,7 @@ def test_a_linear_axis_is_turned_round_in_the_conventions(tab: Tab) -> None:
 
 @pytest.mark.slow
 @pytest.mark.own_page
+@pytest.mark.proof
 def test_opened_scenes_do_not_pile_up(tab: Tab, monkeypatch: pytest.MonkeyPatch) -> None:
     notes: list[str] = []
     # the page shows a few messages at a time, which would take minutes

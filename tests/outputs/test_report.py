@@ -197,7 +197,7 @@ def test_pdf_repeats_and_says_everything(renderer: str, tmp_path: Path, monkeypa
 
 
 @pytest.mark.render
-@pytest.mark.slow
+@pytest.mark.proof
 @pytest.mark.parametrize("ending", ["html", "pdf"])
 def test_two_scenes_within_time_and_size(ending: str, renderer: str, tmp_path: Path) -> None:
     """Processor time, since other tests run at the same time; the benchmark has the wall's."""
@@ -229,7 +229,6 @@ def test_a_machine_without_axes_in_the_loop(renderer: str, tmp_path: Path) -> No
     )
     scene = load_scene(path)
     write_report([scene], tmp_path / "a.html", replace(FAST, loop="workpiece"))
-    write_report([scene], tmp_path / "a.pdf", FAST)
 
 
 def test_without_a_renderer_nothing_is_written(tmp_path: Path, monkeypatch) -> None:
@@ -267,7 +266,7 @@ def test_bad_input_gives_one_message(arguments, words, tmp_path, monkeypatch) ->
 
 
 @pytest.mark.render
-@pytest.mark.parametrize("ending", ["html", "pdf"])
+@pytest.mark.parametrize("ending", ["html", pytest.param("pdf", marks=pytest.mark.proof)])
 def test_full_disk_gives_one_message(ending: str, renderer: str, tmp_path: Path) -> None:
     target = tmp_path / f"a.{ending}"
     fast = ("--grid", "5", "--samples", "2000")
