@@ -1,4 +1,4 @@
-# `make view` and `make test` work on a machine with git, make and Python >= 3.11 only.
+# `make view` and `make test` work on a machine with git, make and Python 3.11 to 3.14 only.
 
 PYTHON ?= python3
 VENV := .venv
@@ -16,8 +16,8 @@ SPHINX := OMP_NUM_THREADS=1 $(BIN)/python -m sphinx -d docs/_build/doctrees docs
 PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help view test proofs reliability coverage lint format bench screenshots docs linkcheck \
-    drawings dist packaging clean system-packages
+.PHONY: help view test nightly reliability coverage lint format bench screenshots docs linkcheck \
+    drawings dist packaging golden clean system-packages
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
@@ -29,8 +29,11 @@ test: system-packages $(DEV_STAMP) ## install what is missing, then lint, type-c
 	$(MAKE) --no-print-directory lint
 	bash .ci/tests.sh
 
-proofs: system-packages $(DEV_STAMP) ## run the slow proofs: kills, hostile messages, the largest page
-	$(BIN)/python -m pytest -m proof --durations=10 $(ARGS)
+nightly: system-packages $(DEV_STAMP) ## run what takes long: full products, proofs, details of pages (ARGS="--minutes 40")
+	$(BIN)/python -m pytest -m nightly --durations=10 $(ARGS)
+
+golden: $(DEV_STAMP) ## keep the outputs of the commands anew (ARGS="report thesis-json"); read the difference
+	PYTHONPATH=tests $(BIN)/python -m golden $(ARGS)
 
 reliability: system-packages $(DEV_STAMP) ## try to break it, and write docs/reliability.md (ARGS="--fraction 0.01")
 	$(PIP_INSTALL) --no-build-isolation -e '.[fuzz]' || echo "no atheris here: leave out the row coverage"

@@ -4,13 +4,13 @@ set -u
 python=$1
 
 if ! command -v "$python" >/dev/null; then
-    echo "warpspace needs Python 3.11 or newer, and '$python' was not found." >&2
+    echo "warpspace needs Python 3.11 to 3.14, and '$python' was not found." >&2
     echo "Name another one:  make PYTHON=python3.12 …" >&2
     exit 1
 fi
-if ! "$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))'; then
-    echo "warpspace needs Python 3.11 or newer; '$python' is $("$python" -V 2>&1)." >&2
-    echo "Name a newer one:  make PYTHON=python3.12 …" >&2
+if ! "$python" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))'; then
+    echo "warpspace needs Python 3.11 to 3.14; '$python' is $("$python" -V 2>&1)." >&2
+    echo "Name another one:  make PYTHON=python3.12 …" >&2
     exit 1
 fi
 if ! "$python" -c 'import ensurepip, venv' 2>/dev/null; then

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Try what is handed out: builds wheel and sdist twice, then puts the wheel into empty environments,
-# for every Python from 3.11 on that this machine has, with the newest packages and with the lowest
-# that pyproject.toml allows (where these have a wheel for that Python), and runs .ci/smoke.py in each.
+# for every Python that pyproject.toml names in its classifiers, with the newest packages and with the
+# lowest that it allows (where these have a wheel for that Python), and runs .ci/smoke.py in each. A
+# Python that this machine does not have is named as not tried.
 # A small typed program is checked against the installed wheel, the citation file against its schema.
 # Takes some minutes a Python. PYTHONS="python3.12 /opt/python3.14/bin/python" names others.
 set -u
@@ -15,6 +16,8 @@ export UV_LINK_MODE=${UV_LINK_MODE:-copy}
 python=${PYTHON:-$root/.venv/bin/python}
 log=$work/log
 failed=0
+promised=$(sed -n 's/.*"Programming Language :: Python :: 3\.\([0-9]*\)".*/\1/p' pyproject.toml)
+tried=" "
 summary=()
 
 note() { # note STATUS TEXT
@@ -24,10 +27,10 @@ note() { # note STATUS TEXT
     echo "$word  $2"
 }
 
-# The Pythons there are: the first that runs of each version.
+# The Pythons there are: the first that runs of each version that is promised.
 find_pythons() {
     local minor candidate
-    for minor in 11 12 13 14 15; do
+    for minor in $promised; do
         for candidate in "$(command -v "python3.$minor" 2>/dev/null)" "/usr/bin/python3.$minor" \
             "$HOME"/.pyenv/versions/3."$minor".*/bin/python /opt/python/cp3"$minor"*/bin/python; do
             [ -x "$candidate" ] || continue
@@ -65,9 +68,10 @@ note $? "CITATION.cff"
 note $? "metadata and readme of wheel and sdist"
 
 read -r -a pythons <<<"${PYTHONS:-$(find_pythons | tr '\n' ' ')}"
-[ ${#pythons[@]} -gt 0 ] || { echo "no Python from 3.11 on was found" >&2; exit 1; }
+[ ${#pythons[@]} -gt 0 ] || { echo "no Python that is promised was found" >&2; exit 1; }
 for interpreter in "${pythons[@]}"; do
     name=$("$interpreter" -c 'import platform; print(platform.python_version())')
+    tried+="$(echo "$name" | cut -d. -f2) "
     for resolution in highest lowest-direct; do
         environment=$work/$name-$resolution
         mkdir -p "$work/run"
@@ -81,12 +85,16 @@ for interpreter in "${pythons[@]}"; do
                 >pyrightconfig.json && "$(dirname "$python")/pyright" \
                 --pythonpath "$environment/bin/python" -p .) >"$log" 2>&1
             note $? "typed program against the wheel, pyright strict"
-            (cd "$work/run" && "$uv" tool run --quiet mypy --strict \
+            (cd "$work/run" && "$uv" tool run --quiet --python "$interpreter" mypy --strict \
                 --python-executable "$environment/bin/python" program.py) >"$log" 2>&1
             note $? "typed program against the wheel, mypy strict"
         fi
         rm -rf "$environment" "$work/run"
     done
+done
+
+for minor in $promised; do
+    [[ $tried = *" $minor "* ]] || summary+=("not tried  Python 3.$minor")
 done
 
 echo

@@ -33,7 +33,7 @@ def check_commands(version: str) -> None:
     field = json.loads(warpspace("field", "dvf5000_first", "--grid", "11", "--json"))
     assert abs(field["statistics"]["max_um"] - 51.72) < 0.005, field["statistics"]
     assert "valid" in warpspace("check", "dvf5000_first")
-    warpspace("snapshot", "dvf5000_first", "-o", "map.png", "--size", "800x600")
+    warpspace("draw", "dvf5000_first", "-o", "map.png", "--size", "800x600")
     assert Path("map.png").read_bytes().startswith(b"\x89PNG")
     for ending in ("glb", "vts", "csv", "html"):
         warpspace("export", "dvf5000_first", "-o", f"scene.{ending}", "--grid", "7")
@@ -41,7 +41,7 @@ def check_commands(version: str) -> None:
     warpspace("report", "dvf5000_first", "-o", "review.pdf", "--samples", "2000", "--grid", "7")
     assert Path("review.pdf").read_bytes().startswith(b"%PDF")
     warpspace("contributions", "dvf5000_proposed", "--sobol", "64")
-    warpspace("animate", "dvf5000_first", "-o", "bend.gif", "--frames", "2", "--size", "480x360")
+    warpspace("draw", "dvf5000_first", "-o", "bend.gif", "--frames", "2", "--size", "480x360")
 
 
 def check_python() -> None:
@@ -85,7 +85,6 @@ def main() -> None:
     names = (
         "numpy",
         "scipy",
-        "pydantic",
         "pyvista",
         "vtk",
         "matplotlib",

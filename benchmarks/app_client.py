@@ -46,16 +46,18 @@ class Tab:
         self._open = False
         self._reader: asyncio.Task[None] | None = None
 
-    async def open(self) -> None:
+    async def open(self, patience_s: float = 30.0) -> None:
         """Connect and wait until all of the page is there."""
-        self._socket = await websockets.connect(self.url.replace("http", "ws", 1), **HOW)
+        url = self.url.replace("http", "ws", 1)
+        patience = {"open_timeout": patience_s, "ping_interval": None}  # slow is not gone
+        self._socket = await websockets.connect(url, **patience, **HOW)
         self._reader = asyncio.create_task(self._read())
         await self._send(CAMERA)
-        for _ in range(600):
+        for _ in range(round(patience_s / 0.05)):
             if self.shown and self._open:
                 return
             await asyncio.sleep(0.05)
-        raise TimeoutError("the app has shown nothing for 30 s")
+        raise TimeoutError(f"the app has shown nothing for {patience_s:g} s")
 
     async def close(self) -> None:
         """Drop the connection."""
@@ -109,18 +111,21 @@ class Tab:
 
 
 @contextlib.contextmanager
-def running_app(*options: str):
+def running_app(*options: str, launcher: tuple[str, ...] = ("-m", "warpspace"), **how: object):
     """Run the app in a process of its own; give its address and process."""
     port = 8600 + secrets.randbelow(300)
     url = f"http://127.0.0.1:{port}"
-    command = [sys.executable, "-m", "warpspace", "view", "--no-browser", "--port", str(port)]
-    process = subprocess.Popen([*command, *options], stdout=subprocess.DEVNULL)
+    command = [sys.executable, *launcher, "view", "--no-browser", "--port", str(port)]
+    process = psutil.Popen([*command, *options], **{"stdout": subprocess.DEVNULL, **how})
     try:
-        for _ in range(300):
-            with contextlib.suppress(OSError), urllib.request.urlopen(url, timeout=1):
+        until = time.monotonic() + 300.0  # a busy machine takes its time
+        while True:
+            with contextlib.suppress(OSError), urllib.request.urlopen(url, timeout=5):
                 break
+            if process.poll() is not None or time.monotonic() > until:
+                raise TimeoutError(f"the app does not answer at {url}")
             time.sleep(0.1)
-        yield url, psutil.Process(process.pid)
+        yield url, process
     finally:
         process.terminate()
         process.wait(60)

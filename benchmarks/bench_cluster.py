@@ -10,11 +10,10 @@ import pickle
 import time
 
 import warpspace
-from warpspace.analysis.cases import MOST_BLOCKS, Case, sample_blocks
+from warpspace.analysis.cases import BLOCK, MOST_BLOCKS, Case, Plan, sample_blocks
+from warpspace.analysis.machines import sweep
 from warpspace.analysis.montecarlo import montecarlo_each
-from warpspace.analysis.plan import BLOCK, Plan
-from warpspace.scene.sweeps import sweep
-from warpspace.scene.verbs import scene_draws
+from warpspace.analysis.sampled import scene_draws
 
 TRILLION = 10**12
 FLEET = 100_000
@@ -61,7 +60,7 @@ def main() -> None:
         warpspace.load_scene(name)
     loading = (time.process_time() - began) / 20.0
     began = time.process_time()
-    for _ in sweep([scene] * 50, plan=Plan(1), workers=1):
+    for _ in sweep([scene] * 50, samples=1, workers=1):
         pass
     own = (time.process_time() - began) / 50.0
     print(

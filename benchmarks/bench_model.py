@@ -5,11 +5,10 @@ from table import Growth, Row, Section
 from timing import best, in_turns
 
 from warpspace import load_scene
-from warpspace.field.basis import ErrorBasis
-from warpspace.field.evaluate import amplitudes_of
+from warpspace.field.evaluate import ErrorBasis, amplitudes_of
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import Loop
-from warpspace.scene.pipeline import grid_basis
+from warpspace.scene.model import grid_basis
 
 NODES = 21
 PARAMETERS = (5, 10, 20, 40)

@@ -6,13 +6,12 @@ from table import Growth, Row, Section
 from timing import best, in_turns, python
 
 import warpspace
-from warpspace.analysis.draws import build_draws, loop_keys
-from warpspace.analysis.montecarlo import Plan, sample_chunks
-from warpspace.analysis.nodes import node_gains, reduce_nodes
-from warpspace.analysis.points import spread_places
+from warpspace.analysis.cases import Plan, Site, node_gains, reduce_nodes
+from warpspace.analysis.concepts import Concepts, compare_concepts
+from warpspace.analysis.distribution import build_draws, loop_keys
+from warpspace.analysis.montecarlo import sample_chunks
 from warpspace.field.evaluate import View
 from warpspace.kinematics.model import Loop
-from warpspace.scene.concepts import ConceptPlan, compare_concepts
 
 MACHINES, NODES = 100_000, 11
 SAMPLES = (10_000, 30_000, 100_000, 300_000, 1_000_000)
@@ -35,7 +34,7 @@ def measure() -> Section:
     scene = warpspace.load_scene("dvf5000_general")
     keys = loop_keys(scene.model, Loop.TOOL, scene.parameter_keys)
     draws = build_draws(scene.tolerances, keys, "uniform")
-    places = spread_places(scene.model, Loop.TOOL, scene.workspace, None, NODES)
+    places = Site(scene.model, scene.workspace, Loop.TOOL).spread(NODES)
     gains = node_gains(scene.model, keys, View(), places)
     amplitudes = draws.draw(np.random.default_rng(0), MACHINES)
     out = np.empty((4096, gains.shape[2]))
@@ -83,7 +82,7 @@ def measure() -> Section:
     held = 10_000_000 * len(keys) * 8 / 2**20
     rows.append(Row("memory for 10,000,000 machines", many.peak_mb, floor, held, "MB", most=1024.0))
     scenes = [warpspace.load_scene(name) for name in LIBRARY]
-    plan = ConceptPlan(samples=20_000)
+    plan = Concepts(samples=20_000)
     growth = [
         Growth(
             "montecarlo at random points",

@@ -18,7 +18,7 @@ from timing import best, in_turns
 from warpspace import load_scene
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import nominal_point
-from warpspace.kinematics.deviation import exact_error
+from warpspace.kinematics.deviation import loop_error
 from warpspace.kinematics.firstorder import jacobian
 from warpspace.kinematics.model import Loop, Model
 from warpspace.machine.axes import DIRECTIONS
@@ -144,7 +144,7 @@ def measure() -> Section:
     point = nominal_point(model, Loop.TOOL, coordinates)
 
     def ours() -> np.ndarray:
-        return exact_error(model, Loop.RELATIVE, coordinates, values, point)[0]
+        return loop_error(model, Loop.RELATIVE, coordinates, values, point)[0]
 
     rows = []
     peers: tuple[tuple[str, Callable, int], ...] = (
@@ -188,7 +188,7 @@ def measure() -> Section:
         some, errors_there = configurations(model, count)
         at = nominal_point(model, Loop.TOOL, some)
         costs.append(
-            best(lambda: exact_error(model, Loop.RELATIVE, some, errors_there, at), 2)  # noqa: B023
+            best(lambda: loop_error(model, Loop.RELATIVE, some, errors_there, at), 2)  # noqa: B023
         )
     growth = [Growth("exact errors at scattered points", "points", [*map(float, GROWING)], costs)]
     text = (

@@ -1,7 +1,7 @@
 """How long it takes until the package and the command line are there."""
 
 from table import Row, Section
-from timing import cheapest, python
+from timing import cheapest, commands_in_turns, python
 
 REPEATS = 7
 
@@ -9,18 +9,22 @@ REPEATS = 7
 def measure() -> Section:
     """Measure fresh interpreters."""
     bare = cheapest(lambda: python("-c", "pass"), REPEATS).processor_s
-    numpy = cheapest(lambda: python("-c", "import numpy"), REPEATS).processor_s
     package = cheapest(lambda: python("-c", "import warpspace"), REPEATS).processor_s
     words = cheapest(lambda: python("-m", "warpspace", "-h"), REPEATS).processor_s
-    point = cheapest(
-        lambda: python("-m", "warpspace", "field", "dvf5000_first", "--at", "X=0"), REPEATS
-    ).processor_s
+    command = ("-m", "warpspace", "field", "dvf5000_first", "--at", "X=0")
+    point, numpy = commands_in_turns(command, ("-c", "import numpy"), REPEATS)
     beside = "python -c pass"
     rows = [
         Row("import warpspace, Python included", package, beside, bare),
         Row("import warpspace alone", max(package - bare, 0.0), beside, bare, most=0.06),
         Row("warpspace -h", words, beside, bare, most=0.3),
-        Row("warpspace field SCENE --at X=0", point, "python -c 'import numpy'", numpy),
+        Row(
+            "warpspace field SCENE --at X=0",
+            point.processor_s,
+            "python -c 'import numpy'",
+            numpy.processor_s,
+            most_ratio=2.0,
+        ),
     ]
     text = "Whole processes. What an import loads is what it costs; a test says what that is."
     return Section("Start", text, rows)

@@ -4,14 +4,21 @@ Processor time does not count what else a machine is busy with, and taking turns
 of it (caches, clock) meet both sides. The shortest of several runs is the one disturbed least.
 """
 
+import atexit
+import os
+import shutil
 import subprocess
 import sys
+import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from os import wait4
 
 Run = Callable[[], object]
+Command = Sequence[object]
+"""Arguments of an interpreter."""
 PEAK = """
 import re, sys
 from pathlib import Path
@@ -55,10 +62,13 @@ def in_turns(ours: Run, beside: Run, repeats: int = 5) -> tuple[float, float]:
 
 
 def python(*arguments: object) -> Cost:
-    """Run a fresh interpreter."""
+    """Run a fresh interpreter; what it loads was compiled by the first run, as a user's is."""
     start = time.perf_counter()
     with subprocess.Popen(
-        [sys.executable, *map(str, arguments)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+        [sys.executable, *map(str, arguments)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        env=_environment(),
     ) as process:
         said = process.stderr.read().decode() if process.stderr else ""
         _, status, used = wait4(process.pid, 0)
@@ -73,6 +83,24 @@ def python(*arguments: object) -> Cost:
 def warpspace(*arguments: object) -> Cost:
     """Run the command line in a fresh interpreter, its memory measured too."""
     return python("-c", PEAK, *arguments)
+
+
+@cache
+def _environment() -> dict[str, str]:
+    kept = tempfile.mkdtemp(prefix="benchmarks-")
+    atexit.register(shutil.rmtree, kept, ignore_errors=True)
+    return {**os.environ, "PYTHONDONTWRITEBYTECODE": "", "PYTHONPYCACHEPREFIX": kept}
+
+
+def commands_in_turns(ours: Command, beside: Command, repeats: int = 3) -> tuple[Cost, Cost]:
+    """Run two commands in turns, after a run of each that warms up; give the cheapest of each."""
+    python(*ours)
+    python(*beside)
+    pairs = [(python(*ours), python(*beside)) for _ in range(repeats)]
+    first, second = (
+        min(costs, key=lambda cost: cost.processor_s) for costs in zip(*pairs, strict=True)
+    )
+    return first, second
 
 
 def cheapest(run: Callable[[], Cost], repeats: int = 3) -> Cost:

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from warpspace import evaluate, load_scene
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.chain import branch_frames, branch_pose
-from warpspace.kinematics.deviation import exact_error
+from warpspace.kinematics.deviation import loop_error
 from warpspace.kinematics.firstorder import columns
 from warpspace.kinematics.model import ComponentErrors, Loop, Model, complete_coordinates
 from warpspace.machine.description import build_machine
@@ -207,7 +207,7 @@ def conventions() -> Figure:
     for row, kind in zip(grid, kinds, strict=True):
         for axes, degrees in zip(row, (0.0, 45.0, 90.0), strict=True):
             at = complete_coordinates(machine, {"C": degrees})
-            error, _ = exact_error(
+            error, _ = loop_error(
                 Model(machine, kind), Loop.WORKPIECE, at, {"EXC": amount}, np.zeros(3)
             )
             x, y = (np.asarray(error)[:2] / amount * 0.8).round(9)

@@ -11,8 +11,7 @@ import sys
 from pathlib import Path
 
 import warpspace
-from warpspace.outputs.animation.pictures import AnimationSettings
-from warpspace.outputs.animation.write import write_animation
+from warpspace.outputs.animation import AnimationSettings, write_animation
 from warpspace.outputs.drawing.settings import FigureSettings
 
 

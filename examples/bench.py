@@ -16,12 +16,12 @@ from pathlib import Path
 import numpy as np
 
 from warpspace import load_scene, run_test
+from warpspace.bench.base import bench_names, find_test
 from warpspace.bench.kinds.positioning import Positioning
-from warpspace.bench.registry import bench_names, find_test
 from warpspace.machine.curves.directional import Directional
 from warpspace.machine.errors import ErrorSet, Poly, Ramp
-from warpspace.outputs.charts import write_chart
-from warpspace.outputs.charts.bench import bench_chart
+from warpspace.outputs.charts.paper import write_chart
+from warpspace.outputs.charts.results import bench_chart
 
 SPAN = (-275.0, 275.0)
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")

@@ -10,12 +10,12 @@ Run ``python examples/concepts.py [FILE]``; FILE ends in .png, .svg or .pdf.
 
 import sys
 
+from warpspace.analysis.concepts import Concepts
 from warpspace.outputs.drawing.settings import FigureSettings
 from warpspace.outputs.save import write_figure
-from warpspace.scene.concepts import ConceptPlan
 from warpspace.scene.starter import starter_scene
 
 target = sys.argv[1] if len(sys.argv) > 1 else "concepts.png"
 scenes = [starter_scene(chain) for chain in ("wFXYZt", "wXYFZt", "wCBFXYZt")]
-settings = FigureSettings(loop="relative", concepts=ConceptPlan(limit_um=30.0))
+settings = FigureSettings(loop="relative", concepts=Concepts(limit_um=30.0))
 write_figure(target, "concepts", scenes, settings)

@@ -25,7 +25,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from PIL import Image
 
-from warpspace.kinematics.conversion.reference_line import ReferenceLine, fit_line
+from warpspace.kinematics.conversion import ReferenceLine, fit_line
 
 TO = Path(__file__).resolve().parents[1] / "docs" / "images"
 INK, MUTED, ACTUAL, SECOND = "#1b2430", "#7b8494", "#c8283c", "#1f6fb2"

@@ -5,9 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from hypothesis import strategies as st
 
-from warpspace.kinematics.conventions.registry import convention_names
-from warpspace.kinematics.deviation import exact_error
-from warpspace.kinematics.model import Loop, Model
+from warpspace.kinematics.deviation import loop_error
+from warpspace.kinematics.model import Loop, Model, convention_names
 from warpspace.machine.axes import AXIS_NAMES, MAX_AXES, is_linear
 from warpspace.machine.description import FIXED_FRAMES, Chain, build_machine
 
@@ -78,18 +77,12 @@ def central_differences(
     coordinates: dict[str, np.ndarray],
     point_mm: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Derivatives of the exact chain, at zero errors, for single coordinates.
-
-    Returns
-    -------
-    position, orientation : ndarray, [K, 3]
-        Per unit of each parameter, like `warpspace.kinematics.firstorder.jacobian`.
-    """
+    """Derivatives of the exact chain, at zero errors, for single coordinates."""
     steps = STEP * np.eye(len(keys))
 
     def at(sign: float) -> tuple[np.ndarray, np.ndarray]:
         values = {key: sign * steps[index] for index, key in enumerate(keys)}
-        return exact_error(model, loop, coordinates, values, point_mm)
+        return loop_error(model, loop, coordinates, values, point_mm)
 
     (up, up_tilt), (down, down_tilt) = at(1.0), at(-1.0)
     shape = (len(keys), 3)

@@ -1,7 +1,11 @@
 """What every test shares: off-screen drawing, hypothesis profiles, no skips in CI."""
 
+import logging
 import os
 import sys
+import time
+import zlib
+from datetime import UTC, datetime
 
 # Both are read when matplotlib and VTK are first imported.
 os.environ["MPLBACKEND"] = "Agg"
@@ -20,6 +24,8 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
 IN_CI = bool(os.environ.get("CI"))
+BEGAN = time.monotonic()
+LATE = pytest.StashKey[list[str]]()
 
 hypothesis.settings.register_profile("local", deadline=None)
 hypothesis.settings.register_profile("ci", deadline=None, derandomize=True)
@@ -54,6 +60,16 @@ def _unavailable(what: str) -> NoReturn:
     if IN_CI:
         pytest.fail(f"CI skips nothing: {what}", pytrace=False)
     pytest.skip(what)
+
+
+@pytest.fixture(autouse=True)
+def _filters_of_logs():
+    """Undo what a program that was run here has its log filtered by."""
+    handlers = [one for one in (logging.lastResort, *logging.getLogger().handlers) if one]
+    kept = [(handler, [*handler.filters]) for handler in handlers]
+    yield
+    for handler, filters in kept:
+        handler.filters[:] = filters
 
 
 @pytest.fixture(scope="session")
@@ -104,6 +120,34 @@ def renderer() -> str:
     return name
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add a box of time."""
+    parser.addoption("--minutes", type=float, help="begin no test after so many minutes")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark what needs the browser, and put another part first each day where time may run out."""
+    for item in items:
+        if "browser" in getattr(item, "fixturenames", ()):
+            item.add_marker("browser")
+    if config.getoption("--minutes") is not None:
+        day = datetime.now(UTC).date()
+        items.sort(key=lambda item: zlib.crc32(f"{day} {item.path.name}".encode()))
+    # what drives the browser keeps an event loop in its process, which others cannot have
+    items.sort(key=lambda item: item.get_closest_marker("browser") is not None)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_protocol(item: pytest.Item) -> bool | None:
+    """Leave out what would begin too late."""
+    minutes = item.config.getoption("--minutes")
+    if minutes is None or time.monotonic() - BEGAN < 60.0 * minutes:
+        return None
+    item.config.stash.setdefault(LATE, []).append(item.nodeid)
+    return True
+
+
 def _skipped(config: pytest.Config) -> list[pytest.TestReport]:
     reporter = config.pluginmanager.get_plugin("terminalreporter")
     return reporter.stats.get("skipped", []) if reporter else []
@@ -119,7 +163,11 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
 def pytest_terminal_summary(
     terminalreporter: pytest.TerminalReporter, config: pytest.Config
 ) -> None:
-    """Say why a CI run with skipped tests failed."""
+    """Say what did not run in time, and why a CI run with skipped tests failed."""
+    if late := config.stash.get(LATE, []):
+        terminalreporter.section(f"{len(late)} tests not begun within the time")
+        for node in late:
+            terminalreporter.line(node)
     if IN_CI and (skipped := _skipped(config)):
         terminalreporter.section("skipped in CI", red=True)
         terminalreporter.line(f"{len(skipped)} skipped, and CI skips nothing: the run fails.")

@@ -6,8 +6,6 @@
 """
 
 import re
-from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from types import GenericAlias, UnionType
 from typing import TYPE_CHECKING
@@ -41,6 +39,16 @@ def prepare(folder: Path) -> None:
     (folder / "_build" / "extra").mkdir(parents=True, exist_ok=True)
 
 
+def __getattr__(name: str) -> object:
+    """Give a command by its name, since most are made from analyses and stand in no module."""
+    from warpspace.cli.registry import COMMANDS
+
+    command = COMMANDS.get(name.replace("_", "-"))
+    if command is None:
+        raise AttributeError(name)
+    return command
+
+
 def options_of(name: str) -> str:
     """Give the Markdown that shows the options of a command.
 
@@ -58,12 +66,9 @@ def options_of(name: str) -> str:
     from warpspace.cli.registry import COMMANDS
 
     command = COMMANDS[name]
-    stem = name.replace("-", "_")
-    homes = (f"warpspace.cli.commands.{module}" for module in (stem, f"{stem}_"))
-    home = import_module(next(module for module in homes if find_spec(module)))
-    attribute = next(key for key, value in vars(home).items() if value is command)
     nested = "\n   :nested: full" if isinstance(command, Group) else ""
-    return OPTIONS.format(name=name, module=home.__name__, attribute=attribute, nested=nested)
+    attribute = name.replace("-", "_")
+    return OPTIONS.format(name=name, module=__name__, attribute=attribute, nested=nested)
 
 
 def inward(text: str, depth: int) -> str:

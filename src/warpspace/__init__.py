@@ -6,48 +6,47 @@ Names are loaded when first used, so that ``import warpspace`` costs next to not
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
-
 if TYPE_CHECKING:
-    from warpspace.bench.ballbar import ballbar
-    from warpspace.bench.run import run_test
+    from warpspace.analysis.allocate import AllocateResult
+    from warpspace.analysis.catalogue import Verb
+    from warpspace.analysis.contributions import SharesResult
+    from warpspace.analysis.gains import GainsResult
+    from warpspace.analysis.machines import MachinesResult, sweep
+    from warpspace.analysis.measured import measured
+    from warpspace.analysis.thesis.table import thesis
+    from warpspace.bench.base import run_test
+    from warpspace.bench.kinds.circular import ballbar
     from warpspace.calibration.calibrate import calibrate
     from warpspace.exceptions import SceneError, WarpspaceError
-    from warpspace.field.basis import ErrorField
+    from warpspace.field.evaluate import ErrorField
     from warpspace.outputs.exports.multiblock import to_pyvista
+    from warpspace.resources import __version__
     from warpspace.scene.library import load_scene, scene_names
-    from warpspace.scene.model import Scene
-    from warpspace.scene.pipeline import evaluate
-    from warpspace.scene.sweeps import sweep
-    from warpspace.scene.verbs import (
-        allocate,
-        contributions,
-        gains,
-        measured,
-        montecarlo,
-        thesis,
-    )
+    from warpspace.scene.model import Scene, evaluate
+
+    allocate: Verb[AllocateResult]
+    contributions: Verb[SharesResult]
+    gains: Verb[GainsResult]
+    montecarlo: Verb[MachinesResult]
 
 _HOME = {
+    "__version__": "warpspace.resources",
     "ErrorField": "warpspace.field.evaluate",
     "Scene": "warpspace.scene.model",
     "SceneError": "warpspace.exceptions",
     "WarpspaceError": "warpspace.exceptions",
-    "evaluate": "warpspace.scene.pipeline",
-    "allocate": "warpspace.scene.verbs",
-    "ballbar": "warpspace.bench.ballbar",
+    "evaluate": "warpspace.scene.model",
+    "ballbar": "warpspace.bench.kinds.circular",
     "calibrate": "warpspace.calibration.calibrate",
-    "contributions": "warpspace.scene.verbs",
-    "gains": "warpspace.scene.verbs",
-    "measured": "warpspace.scene.verbs",
-    "run_test": "warpspace.bench.run",
-    "montecarlo": "warpspace.scene.verbs",
-    "sweep": "warpspace.scene.sweeps",
-    "thesis": "warpspace.scene.verbs",
+    "measured": "warpspace.analysis.measured",
+    "run_test": "warpspace.bench.base",
+    "sweep": "warpspace.analysis.machines",
+    "thesis": "warpspace.analysis.thesis.table",
     "to_pyvista": "warpspace.outputs.exports.multiblock",
     "load_scene": "warpspace.scene.library",
     "scene_names": "warpspace.scene.library",
 }
+"""Where a name comes from; any other is looked for among the analyses."""
 
 __all__ = [
     "ErrorField",
@@ -73,7 +72,12 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Load a public name from its module."""
-    if name not in _HOME:
-        raise AttributeError(f"module 'warpspace' has no attribute {name!r}")
-    return getattr(import_module(_HOME[name]), name)
+    """Load a public name from its module, or give an analysis as a function."""
+    if name in _HOME:
+        return getattr(import_module(_HOME[name]), name)
+    if not name.startswith("_"):
+        from warpspace.analysis.catalogue import entries, verb
+
+        if any(entry.name == name for entry in entries()):
+            return verb(name)
+    raise AttributeError(f"module 'warpspace' has no attribute {name!r}")

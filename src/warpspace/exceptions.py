@@ -4,7 +4,8 @@ All derive from `WarpspaceError`, whose text is fit to be shown to a user as it 
 was given, what was expected and, where there is one, the near miss.
 """
 
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
 
 SHOWN_PROBLEMS = 40
@@ -20,11 +21,26 @@ class ChainError(WarpspaceError):
 
 
 class OptionError(WarpspaceError):
-    """A value given by a user (option, argument, widget) that cannot be used."""
+    """A value given by a user (option, argument, widget) that cannot be used.
+
+    The text names an option of an analysis as ``{its_name}``; `said` puts in what it is called
+    where it is read: a flag on the command line, a label on a page.
+    """
+
+    def said(self, word: Callable[[str], str]) -> str:
+        """Give the text with the reader's word for each option it names."""
+        return re.sub(r"\{([a-z_]+)\}", lambda found: word(found[1]), super().__str__())
+
+    def __str__(self) -> str:
+        return self.said(lambda name: name)
 
 
 class RenderError(WarpspaceError):
     """A picture that could not be drawn on this system."""
+
+
+class NoRendererError(RenderError):
+    """A system that cannot draw at all; its text says what to install."""
 
 
 class OutputError(WarpspaceError):

@@ -1,40 +1,38 @@
-"""Where the bundled scenes and machines are, in a wheel as in a checkout."""
+"""What ships with the package: its version, and where the bundled scenes and machines are."""
 
 from pathlib import Path
 
+from warpspace.exceptions import WarpspaceError
+
+__version__ = "0.1.0"
 _PACKAGE_DIR = Path(__file__).resolve().parent
 
 
 def _data_root() -> Path:
-    """Folder that holds ``scenes`` and ``assets``.
-
-    Returns
-    -------
-    Path
-        ``_data`` inside the package where a wheel was installed, else the top level of the
-        repository that the package is run from.
-    """
+    """Folder that holds ``scenes`` and ``assets``."""
     installed = _PACKAGE_DIR / "_data"
     return installed if installed.is_dir() else _PACKAGE_DIR.parents[1]
 
 
 def scenes_dir() -> Path:
-    """Folder of the bundled scenes.
-
-    Returns
-    -------
-    Path
-        Absolute; holds one ``<name>.toml`` a scene.
-    """
+    """Folder of the bundled scenes."""
     return _data_root() / "scenes"
 
 
 def assets_dir() -> Path:
-    """Folder of the bundled assets.
-
-    Returns
-    -------
-    Path
-        Absolute; holds ``machines/<name>/machine.toml`` and what belongs to each machine.
-    """
+    """Folder of the bundled assets."""
     return _data_root() / "assets"
+
+
+def check_address_space(least_mb: int, what: str) -> None:
+    """Refuse work where libraries would abort for want of address space (``ulimit -v``)."""
+    try:
+        import resource
+    except ImportError:  # this system has no such limit
+        return
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if 0 <= limit < least_mb * 1_000_000:
+        raise WarpspaceError(
+            f"not enough memory: the address space is limited to {limit / 1e6:.0f} MB (ulimit -v);"
+            f" {what} needs at least {least_mb} MB"
+        )

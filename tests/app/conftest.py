@@ -60,11 +60,7 @@ def take(kept_tabs: list[Tab], viewer: Viewer, browser: "Browser") -> Tab:
 def tab(
     viewer: Viewer, browser: "Browser", kept_tabs: list[Tab], request: pytest.FixtureRequest
 ) -> Iterator[Tab]:
-    """A tab with the app at its start; fails the test if the page reported an error.
-
-    To open a page takes software rendering seconds, so that tests use one after the other, but for
-    those marked `own_page`.
-    """
+    """A tab with the app at its start; fails the test if the page reported an error."""
     own = request.node.get_closest_marker("own_page") is not None
     tab = open_page(viewer, browser) if own else take(kept_tabs, viewer, browser)
     yield tab
@@ -79,7 +75,7 @@ def tab(
 
 @pytest.fixture
 def open_tab(viewer: Viewer, browser: "Browser") -> Iterator[Callable[..., Tab]]:
-    """Open further tabs, each as a visitor of its own; takes what `open_page` takes."""
+    """Open further tabs, each as a visitor of its own, as of `open_page`; none reports an error."""
     tabs: list[Tab] = []
 
     def open_one(**how: Any) -> Tab:
@@ -89,3 +85,4 @@ def open_tab(viewer: Viewer, browser: "Browser") -> Iterator[Callable[..., Tab]]
     yield open_one
     for tab in tabs:
         tab.page.context.close()
+    assert [error for tab in tabs for error in tab.errors] == []

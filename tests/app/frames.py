@@ -1,10 +1,4 @@
-"""Frames of a page that are drawn when a test asks for one, and not sixty times a second.
-
-Software rendering takes a quarter of a second for a frame, on all cores. What tests read (vertices,
-colours, places, the camera, the page around them) is in three.js' scene whether it is drawn or not;
-so draw calls do nothing until `draw` asks for a frame. All else runs as in any page: the frames
-themselves, matrices, uploads to WebGL, shaders.
-"""
+"""Frames of a page that are drawn when a test asks for one, and not sixty times a second."""
 
 from typing import TYPE_CHECKING, Any
 

@@ -1,6 +1,5 @@
 """A tab of a real Chromium with the app in it: what tests ask of it, and do to it."""
 
-import base64
 import json
 from collections.abc import Callable
 from io import BytesIO
@@ -18,6 +17,7 @@ from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.store import StateStore
 from warpspace.app.viewport.named_views import CameraSetup
+from warpspace.geometry.colour import colour_table
 from warpspace.scene.library import load_scene
 
 if TYPE_CHECKING:
@@ -30,18 +30,12 @@ HARMLESS = (
     "Tried to update non-existent component",
 )  # fmt: skip
 VERTICES = """() => {
-  const pack = array => {
-    const bytes = new Uint8Array(Float32Array.from(array).buffer), parts = [];
-    for (let at = 0; at < bytes.length; at += 8192)
-      parts.push(String.fromCharCode(...bytes.subarray(at, at + 8192)));
-    return btoa(parts.join(''));
-  };
   const node = window.__viserMutable.nodeRefFromName['/box/surface'];
   let found = null;
   if (node) node.traverse(o => {
     if (o.isMesh && o.geometry.attributes.color) {
-      const p = o.geometry.attributes.position, c = o.geometry.attributes.color;
-      found = [pack(p.array), pack(c.array)];
+      const { position, color } = o.geometry.attributes;
+      found = [Array.from(position.array), Array.from(color.array)];
     }
   });
   return found;
@@ -60,6 +54,14 @@ DRAWN = """name => {
   });
   return found;
 }"""
+PLACE = """name => {
+  const { nodeRefFromName } = window.__viserMutable, node = nodeRefFromName[name];
+  if (!node || !node.visible) return null;
+  node.updateWorldMatrix(true, false);
+  const world = nodeRefFromName[""].matrixWorld.clone().invert();
+  const at = node.position.clone().setFromMatrixPosition(node.matrixWorld).applyMatrix4(world);
+  return at.toArray();
+}"""
 TIDY = """() => {
   history.replaceState(null, '', location.pathname + '?fixedDpr=1');
   const close = '.mantine-Notification-closeButton, #warpspace-server button';
@@ -77,10 +79,7 @@ def wait_until_open(page: "Page") -> None:
 
 
 class Tab:
-    """A browser tab with the app in it; `query` goes into its address.
-
-    Most errors of most machines are zero and hidden at first; with `everything` they are listed.
-    """
+    """A browser tab with the app in it; `query` goes into its address."""
 
     def __init__(
         self, page: "Page", viewer: Viewer, query: str = "", *, everything: bool = True
@@ -101,11 +100,6 @@ class Tab:
         """The session of this tab."""
         token = self.page.evaluate("window.__warpspaceTab")
         return next(session for session in self.viewer.sessions if session.token == token)
-
-    def state(self) -> AppState:
-        """State of the tab, once what is on its way has arrived."""
-        self.page.wait_for_timeout(200)
-        return self.session.state
 
     def list_all(self) -> None:
         """List the errors that are zero as well."""
@@ -137,10 +131,10 @@ class Tab:
         self.until(lambda: self.page.evaluate(TIDY) == 0)
         self.until(lambda: session.state == start and self.shows_state(start))
 
-    def screenshot(self) -> np.ndarray:
-        """Draw the page as it is now, and give its pixels, [height, width, 3]."""
+    def screenshot(self) -> bytes:
+        """Draw the page as it is now, and give its picture."""
         draw(self.page)
-        return np.asarray(Image.open(BytesIO(self.page.screenshot())).convert("RGB")).astype(int)
+        return self.page.screenshot()
 
     def _listen(self, message: Any) -> None:
         if message.type == "error" and not any(word in message.text for word in HARMLESS):
@@ -154,13 +148,27 @@ class Tab:
             self.page.wait_for_timeout(50)
         pytest.fail(f"did not come true within {seconds:g} s")
 
+    def still(self, read: Callable[[], Any], apart: float = 1e-6) -> Any:
+        """Wait until what is read does not change any more for half a second, and give it."""
+        last, same = read(), 0
+        for _ in range(80):
+            self.page.wait_for_timeout(250)
+            now = read()
+            fine = now is not None and np.shape(now) == np.shape(last)
+            same = same + 1 if fine and np.allclose(now, last, atol=apart) else 0
+            if same == 2:
+                return now
+            last = now
+        pytest.fail("does not come to rest")
+
+    def eye(self) -> list[float]:
+        """Where the page's camera stands."""
+        return self.page.evaluate("() => window.__viserMutable.camera.position.toArray()")
+
     def surface(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Vertices (mm) and colours of the drawn surface, read back from the browser's scene."""
         found = self.page.evaluate(VERTICES)
-        if found is None:
-            return None
-        points, colours = (np.frombuffer(base64.b64decode(part), "<f4") for part in found)
-        return points.reshape(-1, 3).astype(float), colours.reshape(-1, 3).astype(float)
+        return None if found is None else tuple(np.reshape(part, (-1, 3)) for part in found)
 
     def shows_colours(self, wanted: np.ndarray) -> bool:
         """Whether the surface drawn has these colours; not while the page loads another one."""
@@ -210,8 +218,8 @@ class Tab:
     def widget(self, label: str) -> str:
         """Id of the widget whose label begins with a word."""
         script = """label => [...document.querySelectorAll('label')]
-            .find(l => l.textContent.startsWith(label)).getAttribute('for')"""
-        return self.page.evaluate(script, label)
+            .find(l => l.textContent.startsWith(label))?.getAttribute('for')"""
+        return self.page.wait_for_function(script, arg=label).json_value()
 
     def box(self, label: str) -> Any:
         """Number box of the slider whose label begins with a word: that of an error, or viser's."""
@@ -250,6 +258,36 @@ class Tab:
             [self.widget(label), values],
         )
 
+    def press(self, *keys: str) -> None:
+        """Press keys with no widget in focus."""
+        self.page.evaluate("document.activeElement && document.activeElement.blur()")
+        for key in keys:
+            self.page.keyboard.press(key)
+
+    def button(self, name: str) -> None:
+        """Press a button."""
+        self.page.get_by_role("button", name=name, exact=True).last.click()
+
+    def arrived(self, label: str, value: str) -> None:
+        """Wait until what was put into a widget is on the server: messages may overtake it."""
+        handles = self.session._client.gui._gui_input_handle_from_uuid
+        self.until(
+            lambda: any(
+                (one.label, str(one.value)) == (label, value)
+                for one in list(handles.values())
+                if hasattr(one, "label") and hasattr(one, "value")
+            )
+        )
+
+    def tick(self, label: str) -> None:
+        """Click a check box."""
+        self.page.locator(f"[id='{self.widget(label)}']").click()
+
+    def place(self, name: str) -> np.ndarray | None:
+        """Where a node that is shown stands, in the drawing's axes, mm."""
+        found = self.page.evaluate(PLACE, name)
+        return None if found is None else 100.0 * np.array(found)
+
     def panel(self, name: str) -> None:
         """Bring a tab of a panel to the front."""
         self.page.get_by_role("tab", name=name, exact=True).click()
@@ -268,6 +306,15 @@ class Tab:
 
 SCENES = [load_scene(name) for name in ("dvf5000_first", "dvf5000_second", "teach_tilted_c")]
 """What the app with services is started with, the first of them shown."""
+
+
+def pixels_of_the_map(png: bytes) -> int:
+    """Count pixels whose colour is one of the colour map's, within three levels."""
+    shown = np.asarray(Image.open(BytesIO(png)).convert("RGB")).reshape(-1, 3).astype(np.int16)
+    table = colour_table().astype(np.int16)
+    key, counts = np.unique(shown, axis=0, return_counts=True)
+    near = np.abs(key[:, None] - table[None]).max(axis=-1).min(axis=-1) <= 3
+    return int(counts[near].sum())
 
 
 def drawn_nodes(picture: LivePicture) -> np.ndarray:

@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import itertools
 import os
 import re
 import secrets
@@ -11,7 +10,7 @@ import ssl
 import subprocess
 import sys
 import time
-from collections.abc import Awaitable, Callable, Iterator, Mapping
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -39,10 +38,6 @@ class App:
         self.headers, self.trust, self.address = dict(headers or {}), trust, address
 
     @property
-    def threads(self) -> int:
-        return self.process.num_threads()
-
-    @property
     def memory_mb(self) -> float:
         return self.process.memory_info().rss / 1e6
 
@@ -50,20 +45,13 @@ class App:
     def log(self) -> list[str]:
         return self.path.read_text("utf-8").splitlines()
 
-    def settles(self, threads: int, seconds: float = 15.0) -> int:
-        """Give how many threads there are once they are no more than so many, or time is over."""
-        until = time.monotonic() + seconds
-        while self.threads > threads and time.monotonic() < until:
-            time.sleep(0.1)
-        return self.threads
-
 
 @contextlib.contextmanager
-def running_app(folder: Path, *options: str) -> Iterator[App]:
+def running_app(folder: Path, *options: str, port: int | None = None) -> Iterator[App]:
     """Run `warpspace view` with further options; its log lies in a folder."""
     with sockets.socket() as free:
         free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+        port = port or free.getsockname()[1]
     view = ["-m", "warpspace", "view", "--no-browser", "--port", str(port), *options]
     log = folder / "log"
     with log.open("wb") as stream:
@@ -95,6 +83,7 @@ class Tab:
     def __init__(self, app: App) -> None:
         self._app = app
         self.widgets: dict[str, str] = {}
+        self.sliders: dict[str, tuple[float, float]] = {}
         self.mean = ""
         self.notices: list[str] = []
         self.is_open = False
@@ -102,19 +91,24 @@ class Tab:
     async def __aenter__(self) -> "Tab":
         self.socket = await dial(self._app)
         self._reader = asyncio.create_task(self._read())
-        await self.socket.send(pack(CAMERA))
-        await until(lambda: self.is_open and self.mean != "", 30.0)
+        try:
+            await self.socket.send(pack(CAMERA))
+            await until(lambda: self.is_open and self.mean != "", 120.0)
+        except BaseException:
+            await self.__aexit__()
+            raise
         return self
 
     async def __aexit__(self, *_: object) -> None:
         self._reader.cancel()
         self.socket.transport.abort()
+        await self.socket.wait_closed()
 
     async def answer_s(self, value: float) -> float:
         """Move a slider; give how long it takes until the mean is another."""
         before, began = self.mean, time.perf_counter()
         await self.socket.send(update(self.widgets["EAX"], {"value": value}))
-        await until(lambda: self.mean != before, 20.0)
+        await until(lambda: self.mean != before, 60.0)
         return time.perf_counter() - began
 
     async def _read(self) -> None:
@@ -125,6 +119,8 @@ class Tab:
 
     async def _take(self, message: dict[str, Any]) -> None:
         part = message.get("props") or message.get("updates") or {}
+        if message["type"] == "GuiSliderMessage":
+            self.sliders[message["uuid"]] = part["min"], part["max"]
         if message["type"].startswith("Notification"):
             self.notices.append(str(message))
         if isinstance(part.get("label"), str):
@@ -143,6 +139,18 @@ async def dial(app: App) -> websockets.ClientConnection:
     if app.address is not None:
         through = {"host": app.address[0], "port": app.address[1], "ssl": app.trust}
     return await websockets.connect(app.url, additional_headers=app.headers, **through, **HOW)
+
+
+@contextlib.asynccontextmanager
+async def connected(app: App) -> AsyncIterator[websockets.ClientConnection]:
+    """Connect; leave without a word, also where the app has closed the connection before."""
+    socket = await dial(app)
+    try:
+        with contextlib.suppress(websockets.ConnectionClosed):
+            yield socket
+    finally:
+        socket.transport.abort()
+        await socket.wait_closed()
 
 
 async def until(fine: Callable[[], bool], seconds: float) -> None:
@@ -213,12 +221,10 @@ async def send_all(app: App, messages: list[bytes]) -> None:
     """Send messages as fast as they are taken, over a new connection where the last was closed."""
     waiting = iter(messages)
     for message in waiting:
-        socket = await dial(app)
-        with contextlib.suppress(websockets.ConnectionClosed):
+        async with connected(app) as socket:
             await socket.send(message)
             for later in waiting:
                 await socket.send(later)
-        socket.transport.abort()
 
 
 def upload(button: str, name: str, content: bytes) -> list[bytes]:
@@ -238,50 +244,3 @@ async def steadily(socket: websockets.ClientConnection, messages: list[bytes]) -
         for message in messages[begin : begin + 30]:
             await socket.send(message)
         await asyncio.sleep(0.12)
-
-
-async def say_nothing(app: App) -> None:
-    (await dial(app)).transport.abort()
-
-
-async def not_even_shake_hands(app: App) -> None:
-    _, writer = await asyncio.open_connection(*app.url[5:].split(":"))
-    writer.close()
-    await writer.wait_closed()
-
-
-async def leave_at_once(app: App) -> None:
-    socket = await dial(app)
-    await socket.send(pack(CAMERA))
-    socket.transport.abort()
-
-
-async def leave_in_the_middle(app: App) -> None:
-    socket = await dial(app)
-    await socket.send(pack(CAMERA))
-    with contextlib.suppress(TimeoutError):
-        async with asyncio.timeout(0.3):
-            while True:
-                await socket.recv()
-    socket.transport.abort()
-
-
-async def break_the_clean_up(app: App) -> None:
-    """Name the attributes that viser relies on when a connection ends, then leave."""
-    async with Tab(app) as tab:
-        for uuid, name in itertools.product(
-            list(tab.widgets.values())[:60], ("parent_container_id", "uuid", "gui_api")
-        ):
-            await tab.socket.send(update(uuid, {name: []}))
-
-
-WAYS: tuple[Callable[[App], Awaitable[None]], ...] = (
-    say_nothing, not_even_shake_hands, leave_at_once, leave_in_the_middle, break_the_clean_up,
-)  # fmt: skip
-
-
-async def come_and_go(app: App, times: int) -> None:
-    """Open connections, eight at once, and let them vanish in every way."""
-    ways = [way for way, _ in zip(itertools.cycle(WAYS), range(times), strict=False)]
-    for begin in range(0, times, 8):
-        await asyncio.gather(*(way(app) for way in ways[begin : begin + 8]))

@@ -1,26 +1,16 @@
 """The page at every size, from a phone to a very large screen: all is seen, nothing is covered."""
 
-from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
-
 import numpy as np
 import pytest
 
 from app.frames import new_visitor
-from app.page_tab import TIDY, Tab, wait_until_open
+from app.page_tab import TIDY, Tab
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import start_state
 from warpspace.app.viewport.layers import SCENE_PER_MM
 from warpspace.scene.library import load_scene
 
-if TYPE_CHECKING:
-    from playwright.sync_api import Browser
-
-pytestmark = pytest.mark.browser
 PICTURE = LiveModel().evaluate(start_state(load_scene("dvf5000_first")))
-LARGEST = pytest.param((3840, 2160), marks=pytest.mark.proof)
-SIZES = [(1024, 768), (1600, 1000), LARGEST]
 PHONE = (390, 844)
 BOXES = """() => {
   const box = part => {
@@ -55,11 +45,11 @@ ACROSS = """() => {
 """The direction across the line of sight, in the drawing's own axes."""
 
 
-def overlap(a: list[float], b: list[float]) -> bool:
+def overlap(a, b):
     return a[0] < b[2] - 0.5 and b[0] < a[2] - 0.5 and a[1] < b[3] - 0.5 and b[1] < a[3] - 0.5
 
 
-def within(inner: list[float], outer: list[float]) -> bool:
+def within(inner, outer):
     return (
         inner[0] >= outer[0] - 0.5
         and inner[1] >= outer[1] - 0.5
@@ -68,55 +58,38 @@ def within(inner: list[float], outer: list[float]) -> bool:
     )
 
 
-def nodes() -> np.ndarray:
+def nodes():
     """Nominal corners and drawn nodes of the map, in units of the drawing, [n, 3]."""
     corners = np.stack(np.meshgrid(*PICTURE.grid.bounds_mm.T), axis=-1).reshape(-1, 3)
     drawn = PICTURE.drawn_mm[::4, ::4, ::4].reshape(-1, 3)
     return np.concatenate([corners, drawn]) * SCENE_PER_MM
 
 
-def extent(tab: Tab) -> list[float]:
+def extent(tab):
     """Where the box is on the page: left, top, right, bottom."""
     seen = np.array(tab.page.evaluate(PROJECT, nodes().tolist()))
     return [*seen.min(axis=0).tolist(), *seen.max(axis=0).tolist()]
 
 
-def settled(tab: Tab) -> list[float]:
+def settled(tab):
     """Wait until the camera stands still, and tell where the box is then."""
-    before = extent(tab)
-    for _ in range(40):
-        tab.page.wait_for_timeout(500)
-        now = extent(tab)
-        if np.abs(np.subtract(now, before)).max() < 0.2 and tab.session.context.camera._told:
-            return now
-        before = now
-    pytest.fail("the camera does not come to rest")
+    tab.until(lambda: tab.session.context.camera._told is not None)
+    return tab.still(lambda: extent(tab), 0.2)
 
 
-@pytest.fixture(scope="module", params=SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
-def sized(viewer: Viewer, browser: "Browser", request: pytest.FixtureRequest) -> Iterator[Tab]:
-    """A page of one size."""
-    width, height = request.param
-    context = new_visitor(browser, (width, height), device_scale_factor=1)
-    context.set_default_timeout(60_000)
-    tab = Tab(context.new_page(), viewer)
-    yield tab
-    context.close()
-    assert tab.errors == []
-
-
-def test_nothing_covers_anything_and_the_box_fills_its_room(sized: Tab) -> None:
-    box = settled(sized)
-    found = sized.page.evaluate(BOXES)
+def check_page(tab):
+    """See that nothing covers anything, and that the box fills its room."""
+    box = settled(tab)
+    found = tab.page.evaluate(BOXES)
     head, room = found["head"], found["room"]
-    page = [0.0, 0.0, *sized.page.viewport_size.values()]
+    page = [0.0, 0.0, *tab.page.viewport_size.values()]
     assert within(head, room)
     assert len(found["tabs"]) >= 11
-    for tab in found["tabs"]:
-        assert not overlap(head, tab)
-        assert within(tab, page)
+    for name in found["tabs"]:
+        assert not overlap(head, name)
+        assert within(name, page)
         # as wide and as high as a finger or a mouse wants it
-        assert min(tab[2] - tab[0], tab[3] - tab[1]) >= 20
+        assert min(name[2] - name[0], name[3] - name[1]) >= 20
     # read without a scroll or a click: mean, max and where, and the colour bar
     right = next(dock for dock in found["docks"] if dock[0] > room[0])
     for shown in (*found["shown"], found["scale"]):
@@ -129,20 +102,34 @@ def test_nothing_covers_anything_and_the_box_fills_its_room(sized: Tab) -> None:
     assert max(width / (free[2] - free[0]), height / (free[3] - free[1])) > 0.62
 
 
-def test_every_tab_can_be_chosen_by_its_whole_name(sized: Tab) -> None:
-    for tab in sized.page.get_by_role("tab").all():
-        name = tab.inner_text()
-        assert tab.get_attribute("title") == name
-        sized.page.get_by_role("tab", name=name, exact=True).click()
-        sized.until(lambda tab=tab: tab.get_attribute("aria-selected") == "true")
-    for name in ("View", "Volumetric error"):
-        sized.panel(name)
+def test_nothing_is_covered_and_the_box_fills_its_room_unless_it_was_turned(open_tab):
+    tab = open_tab(size=(1024, 768))
+    camera = tab.session.context.camera
+    check_page(tab)
+    start = camera.remember()
+    tab.page.set_viewport_size({"width": 1600, "height": 1000})
+    tab.until(lambda: not np.allclose(camera.remember().position, start.position, atol=0.1))
+    check_page(tab)
+    room = tab.page.evaluate(BOXES)["room"]
+    x, y = (room[0] + room[2]) / 2, (room[1] + room[3]) / 2
+    filled = camera.remember()
+    tab.page.mouse.move(x, y)
+    tab.page.mouse.down()
+    tab.page.mouse.move(x + 80, y + 20, steps=4)
+    tab.page.mouse.up()
+    tab.until(lambda: not np.allclose(camera.remember().position, filled.position, atol=0.1))
+    turned = tab.still(lambda: camera.remember().position)
+    told = camera._told
+    tab.page.set_viewport_size({"width": 1280, "height": 720})
+    tab.until(lambda: camera._told != told)
+    settled(tab)
+    assert np.allclose(camera.remember().position, turned, atol=1e-3)
 
 
-def bars_agree(tab: Tab) -> None:
+def bars_agree(tab):
     """Wait until both bars are as long as what they stand for, and read what they say."""
 
-    def agree() -> bool:
+    def agree():
         bars = tab.page.evaluate(BARS)
         wanted = [projected(tab, bars["mm"][0]), projected(tab, drawn_mm(bars["um"][0]))]
         return [bars["mm"][1], bars["um"][1]] == pytest.approx(wanted, abs=0.1)
@@ -156,12 +143,12 @@ def bars_agree(tab: Tab) -> None:
     assert um_text == f"{um:g} µm error, drawn ×1000"
 
 
-def drawn_mm(error_um: float) -> float:
+def drawn_mm(error_um):
     """How long an error is drawn, mm."""
     return error_um * 1e-3 * PICTURE.exaggeration
 
 
-def projected(tab: Tab, length_mm: float) -> float:
+def projected(tab, length_mm):
     """Pixels of a length across the line of sight in the middle of the volume, by three.js."""
     middle = PICTURE.grid.bounds_mm.mean(axis=0) * SCENE_PER_MM
     half = length_mm / 2 * SCENE_PER_MM * np.array(tab.page.evaluate(ACROSS))
@@ -171,138 +158,50 @@ def projected(tab: Tab, length_mm: float) -> float:
     return float(np.linalg.norm(b - a))
 
 
-def test_scale_bars_are_right_in_every_view(tab: Tab) -> None:
+VIEWS = {"Front": (0, -1, 0), "Right": (1, 0, 0), "Top": (0, 0, 1), "Iso": None}
+
+
+def test_every_view_looks_along_its_axis_through_both_lenses_with_right_scale_bars(tab):
+    camera = tab.session._client.camera
+
+    def away():
+        return camera.position - camera.look_at
+
+    def size():
+        return float(np.linalg.norm(away()) * np.tan(camera.fov / 2))
+
     settled(tab)
-    bars_agree(tab)
     lengths: set[float] = set()
-    for lens in ("perspective", "orthographic"):
-        if lens == "orthographic":
-            tab.page.get_by_role("checkbox", name="Orthographic", exact=False).check()
-        for view in ("Front", "Right", "Top", "Iso"):
-            tab.page.get_by_role("button", name=view, exact=True).click()
-            settled(tab)
-            bars_agree(tab)
-            lengths.add(round(tab.page.evaluate(BARS)["mm"][1], 1))
+    wide = camera.fov
+    for view, direction in VIEWS.items():
+        tab.button(view)
+        if direction is not None:
+            tab.until(
+                lambda direction=direction: np.allclose(
+                    away() / np.linalg.norm(away()), direction, atol=5e-3
+                )
+            )
+        settled(tab)
+        bars_agree(tab)
+        lengths.add(round(tab.page.evaluate(BARS)["mm"][1], 1))
     assert len(lengths) > 2
-    room = tab.page.evaluate(BOXES)["room"]
-    tab.page.mouse.move((room[0] + room[2]) / 2, (room[1] + room[3]) / 2)
-    tab.page.mouse.wheel(0, -600)
+    tab.still(away)  # the page has told the server where its camera has come to stand
+    before = size()
+    tab.tick("Orthographic")
+    tab.until(lambda: abs(np.rad2deg(camera.fov) - 3.0) < 1e-6)
+    tab.until(lambda: size() == pytest.approx(before, rel=5e-3))
     settled(tab)
     bars_agree(tab)
-    tab.page.get_by_role("checkbox", name="Orthographic", exact=False).uncheck()
+    tab.tick("Orthographic")
+    tab.until(lambda: abs(camera.fov - wide) < 1e-6)
+    tab.tick("Scale bars")
+    tab.until(lambda: tab.page.locator("[data-bar-scale]").count() == 0)
 
 
-def test_the_box_fills_a_room_that_grows_unless_it_was_turned(tab: Tab) -> None:
-    tab.page.keyboard.press("f")
-    before = settled(tab)
-    tab.page.set_viewport_size({"width": 1600, "height": 720})
-    wider = settled(tab)
-    assert wider[3] - wider[1] > before[3] - before[1] + 5 or wider[2] > before[2] + 5
-    room = tab.page.evaluate(BOXES)["room"]
-    x, y = (room[0] + room[2]) / 2, (room[1] + room[3]) / 2
-    start = tab.session.context.camera.remember()
-    tab.page.mouse.move(x, y)
-    tab.page.mouse.down()
-    tab.page.mouse.move(x + 80, y + 20, steps=4)
-    tab.page.mouse.up()
-    camera = tab.session.context.camera
-    tab.until(lambda: not np.allclose(camera.remember().position, start.position, atol=0.1))
-    settled(tab)
-    turned = camera.remember()
-    tab.page.set_viewport_size({"width": 1280, "height": 720})
-    settled(tab)
-    kept = tab.session.context.camera.remember()
-    assert np.allclose(kept.position, turned.position, atol=1e-3)
-
-
-def test_page_style_survives_the_collapse_of_the_left_column(tab: Tab) -> None:
-    height = "() => document.querySelector('[data-dock-tab]').offsetHeight"
-    style = "() => getComputedStyle(document.querySelector('#warpspace-room')).pointerEvents"
-    before = tab.page.evaluate("() => document.querySelectorAll('head style[id]').length")
-    tabs = tab.page.get_by_role("tab", name="Sensitivities", exact=True)
-    padding = "tab => getComputedStyle(tab).paddingLeft"
-    own = tabs.evaluate(padding)
-    tab.page.locator("[data-dock-region-handle=left]").click(position={"x": 30, "y": 5})
-    tab.until(lambda: tab.page.get_by_text("Find an error", exact=True).count() == 0)
-    assert tabs.evaluate(padding) == own
-    assert tab.page.evaluate(style) == "none"
-    assert tab.page.evaluate("() => document.querySelectorAll('head style[id]').length") == before
-    assert tab.page.evaluate(height) > 0
-    tab.page.locator("[data-dock-region=left] [data-dock-minimize-all]").click()
-    tab.page.wait_for_selector("text=Find an error")
-
-
-def ghosts(tab: Tab) -> bool:
-    """Whether the ghost of the machine is drawn."""
-    return tab.drawn("/ghost_machine/R_bed") is not None
-
-
-@pytest.mark.own_page
-def test_the_machine_is_there_at_the_first_visit_and_stays_hidden_when_hidden(tab: Tab) -> None:
-    tab.until(lambda: ghosts(tab))
-    tab.page.get_by_role("button", name="Hide machine", exact=True).click()
-    tab.until(lambda: not ghosts(tab))
-    assert not tab.state().machine.ghost
-    # another page of the same browser
-    page = tab.page.context.new_page()
-    page.goto(f"{tab.viewer.url}/?fixedDpr=1")
-    wait_until_open(page)
-    button = page.get_by_role("button", name="Show machine", exact=True)
-    button.wait_for(timeout=15_000)
-    page.close()
-    tab.page.get_by_role("button", name="Show machine", exact=True).click()
-    tab.until(lambda: ghosts(tab))
-
-
-def test_isolines_carry_few_values_on_plates_that_suit_the_page(tab: Tab) -> None:
-    def plates() -> list[Any]:
-        return tab.page.evaluate(
-            "() => [...document.querySelectorAll('.ws-room-labels > span')].map(label => {"
-            " const r = label.getBoundingClientRect(), s = getComputedStyle(label);"
-            " return [label.textContent, r.left, r.top, r.right, r.bottom, s.backgroundColor]; })"
-        )
-
-    assert plates() == []
-    tab.page.get_by_role("checkbox", name="Isolines", exact=True).check()
-    tab.until(lambda: len(plates()) >= 4)
-    found = plates()
-    assert len(found) <= 12
-    ticks = {f"{tick:g} µm" for tick in PICTURE.scale.ticks}
-    assert {text for text, *_ in found} <= ticks
-    boxes = [rest[:4] for _, *rest in found]
-    for number, one in enumerate(boxes):
-        assert not any(overlap(one, other) for other in boxes[:number])
-    light = found[0][5]
-    tab.page.get_by_role("checkbox", name="Dark mode", exact=True).check()
-    tab.until(lambda: plates() and plates()[0][5] != light)
-    # the labels of the drawing itself, too
-    tab.until(
-        lambda: (
-            tab.page.evaluate(
-                "() => { let dark = 0; window.__viserMutable.scene.traverse(({ material }) => {"
-                " if (material?.uniforms?.uLabelData)"
-                "   dark += /0\\.10, 0\\.11|0\\.86, 0\\.89/.test(material.fragmentShader);"
-                " }); return dark; }"
-            )
-            >= 2
-        )
-    )
-
-
-@pytest.fixture
-def phone(viewer: Viewer, browser: "Browser") -> Iterator[Tab]:
-    """A page on a phone."""
+def test_a_phone_shows_drawing_and_numbers_with_the_panels_in_a_sheet(viewer, browser):
     context = new_visitor(browser, PHONE, device_scale_factor=1, is_mobile=True, has_touch=True)
     # the sheet of panels folds by itself, and what is in it is not there then
-    tab = Tab(context.new_page(), viewer, everything=False)
-    yield tab
-    context.close()
-    assert tab.errors == []
-
-
-def test_a_phone_shows_drawing_and_numbers_with_the_panels_in_a_sheet(
-    phone: Tab, find: Callable[[Tab, str], Any]
-) -> None:
+    phone = Tab(context.new_page(), viewer, everything=False)
     box = settled(phone)
     found = phone.page.evaluate(BOXES)
     free = [found["room"][0], found["head"][3], found["room"][2], found["foot"][1]]
@@ -317,7 +216,7 @@ def test_a_phone_shows_drawing_and_numbers_with_the_panels_in_a_sheet(
     assert within(found["foot"], [0, 0, *PHONE])
     # the sheet is opened: the drawing stays in view above it
     phone.until(lambda: phone.page.evaluate(TIDY) == 0)
-    find(phone, "Errors").tap()
+    phone.page.get_by_text("Errors", exact=True).first.tap()
     phone.page.wait_for_selector("text=Find an error")
     sheet = phone.page.get_by_text("Find an error", exact=True)
     phone.until(lambda: extent(phone)[3] < sheet.bounding_box()["y"])
@@ -335,9 +234,5 @@ def test_a_phone_shows_drawing_and_numbers_with_the_panels_in_a_sheet(
             at = tab.bounding_box()
             assert at["x"] >= 0
             assert at["x"] + at["width"] <= PHONE[0]
-
-
-@pytest.fixture
-def find() -> Callable[[Tab, str], Any]:
-    """Find a heading of the sheet."""
-    return lambda tab, word: tab.page.get_by_text(word, exact=True).first
+    context.close()
+    assert phone.errors == []

@@ -1,13 +1,17 @@
-"""Conventions: every choice is applied, measured against the scene's own, and undone."""
+"""Conventions: every choice is applied, measured against the scene's own, said, kept and undone."""
 
-from collections.abc import Callable
-from types import SimpleNamespace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from markupsafe import Markup
 
+from warpspace.analysis.adjusting import Objective
+from warpspace.analysis.repair import repaired
+from warpspace.app.documents.conditions import order_conditions, picture_conditions
+from warpspace.app.documents.files import build_request
 from warpspace.app.documents.scene_file import open_text, state_to_toml
+from warpspace.app.documents.view_settings import settings_line, with_settings
 from warpspace.app.evaluation.conventions import (
     Effects,
     choices,
@@ -15,17 +19,20 @@ from warpspace.app.evaluation.conventions import (
     with_choice,
     with_own_conventions,
     with_reference,
+    with_travel,
 )
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.panels import conventions as panel_module
-from warpspace.app.panels.conventions import ConventionsPanel
+from warpspace.app.evaluation.repair import ask
+from warpspace.app.evaluation.resulting_scene import scene_of
 from warpspace.app.readouts.conventions import conventions_html
-from warpspace.app.server import display as display_module
-from warpspace.app.server.display import Display
-from warpspace.app.state.app_state import AppState, start_state
+from warpspace.app.readouts.summary import heading, summary
+from warpspace.app.state.app_state import start_state
+from warpspace.machine.axes import TravelDirection
 from warpspace.picture.mesh import edge_pieces
-from warpspace.scene.library import load_scene
+from warpspace.picture.scene_picture import evaluate_picture
+from warpspace.scene.library import load_scene, parse_scene
+from warpspace.scene.model import evaluate
+from warpspace.scene.save import scene_to_toml
 
 LIVE = LiveModel()
 START = start_state(load_scene("dvf5000_first"), nodes=7)
@@ -33,7 +40,7 @@ WEIGHTS = LIVE.evaluate(START).grid.weights
 
 
 @pytest.mark.parametrize("choice", choices(START))
-def test_every_choice_can_be_made_and_measures_its_change(choice: str) -> None:
+def test_every_choice_can_be_made_and_measures_its_change(choice):
     state = with_choice(START, choice)
     assert choice in chosen(state)
     effect = Effects().of(START)[choice]
@@ -44,7 +51,7 @@ def test_every_choice_can_be_made_and_measures_its_change(choice: str) -> None:
 
 
 @pytest.mark.parametrize("nodes", [5, 21])
-def test_effects_are_those_of_the_nodes_of_the_result_whatever_was_moved_before(nodes: int) -> None:
+def test_effects_are_those_of_the_nodes_of_the_result_whatever_was_moved_before(nodes):
     effects = Effects()
     state = START.with_nodes(nodes)
     effects.of(state)
@@ -63,144 +70,128 @@ def test_effects_are_those_of_the_nodes_of_the_result_whatever_was_moved_before(
     assert all(effect.max_um == 0.0 for effect in effects.of(state.zeroed()).values())
 
 
-def test_nonsense_changes_nothing() -> None:
+def test_nonsense_changes_nothing():
     for word in ("", "loop=all", "direction Q=1", "direction C=2", "reference=<b>", "x" * 500):
         assert with_choice(START, word) is START
 
 
-def test_a_reference_is_held_still_clamped_and_taken_back() -> None:
+def test_a_reference_is_held_still_clamped_and_taken_back():
     state = with_reference(START, {"X": 0.0, "Y": 0.0, "Z": -280.0})
     picture = LIVE.evaluate(state)
     assert np.abs(picture.field.error_um[3, 3, 3]).max() < 1e-9
     assert with_own_conventions(state) == START
     wild = with_reference(START, {"X": 1e9, "Y": float("nan")})
-    assert wild.scene.reference is not None
     assert wild.scene.reference["X"] == 275.0
     assert wild.scene.reference["Y"] == 0.0
     assert len(wild.notes) == 2
 
 
-def test_reset_of_the_errors_keeps_the_conventions() -> None:
-    state = with_choice(START, "component_errors=before_motion").with_amplitude("EAX", 1.0)
-    assert "component_errors=before_motion" in chosen(state.reset())
-    assert state.reset().amplitudes == START.amplitudes
-
-
-def test_the_effect_of_all_choices_is_that_of_the_state() -> None:
-    state = with_choice(with_choice(START, "component_errors=before_motion"), "loop=workpiece")
-    change = LIVE.evaluate(state).field.error_um - LIVE.evaluate(START).field.error_um
-    found = Effects().of(state)["all"]
-    assert found.max_um == pytest.approx(float(np.linalg.norm(change, axis=-1).max()))
-
-
-def test_the_switchboard_marks_what_is_in_force() -> None:
-    state = with_choice(START, "loop=relative")
-    text = conventions_html(state, {}, lambda word, role: Markup(f'role="{role}"'))
-    assert 'data-choice="loop=relative" aria-checked="true"' in text
-    assert 'data-choice="loop=tool" aria-checked="false"' in text
-
-
-def test_linear_axes_have_a_direction_like_rotary_ones() -> None:
-    text = conventions_html(START, {}, lambda word, role: Markup())
-    table, linear = text.index("Table direction"), text.index("Direction of linear axes")
-    for axis, begin, end in (
-        ("B", table, linear),
-        ("C", table, linear),
-        ("X", linear, len(text)),
-        ("Z", linear, len(text)),
-    ):
-        assert begin < text.index(f'data-choice="direction {axis}=-1"') < end
-    turned = with_choice(START, "direction X=-1")
-    assert turned.scene.machine.axes["X"].direction == -1
-    along_x = LIVE.evaluate(turned).grid.nominal_mm[:, 0, 0, 0]
-    assert along_x[0] > along_x[-1]
-    assert Effects().of(START)["direction Z=-1"].max_um > 0.0
-    assert with_own_conventions(turned) == START
-
-
-def test_lines_stay_on_the_outside_of_a_mirrored_volume() -> None:
+def test_lines_stay_on_the_outside_of_a_mirrored_volume():
     picture = LIVE.evaluate(with_choice(START.zeroed(), "direction X=-1"))
     lines, nodes = edge_pieces(picture).reshape(-1, 3), picture.grid.nominal_mm.reshape(-1, 3)
     assert (lines.max(axis=0) > nodes.max(axis=0)).all()
     assert (lines.min(axis=0) < nodes.min(axis=0)).all()
 
 
-def test_files_keep_the_direction_of_a_linear_axis() -> None:
-    turned = with_choice(START, "direction Y=-1")
-    back, _ = open_text(state_to_toml(turned), "dvf5000_first", "x.toml")
-    assert back.scene.machine.axes["Y"].direction == -1
-    assert back.scene.model == turned.scene.model
+TWO_WAYS = parse_scene(
+    """title = "two ways"
+machine = "dvf5000"
+[workspace]
+X = [-275, 275]
+Y = [-225, 225]
+Z = [-480, -80]
+[errors]
+EXX = { table2 = { axes = ["X", "Z"], X = [-275, 275], Z = [-480, -80], values = [
+  [0, 4], [3, 9]] } }
+EYX = { forward = { table = [[-275, 1], [275, 3]] }, backward = { ramp = 2 } }
+[uncertainty]
+EYX = 0.4
+[measured.EYX]
+runs = [
+  { direction = "+", points = [[-275, 1.1], [0, 2], [0, 2.2]] },
+  { direction = "-", points = [[0, 1]] },
+]
+""",
+    "two_ways",
+)
+TWO = start_state(TWO_WAYS, nodes=5)
 
 
-def test_the_panel_does_nothing_while_a_slider_moves(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is shown on every slider move of every tab."""
-    calls: list[str] = []
-    monkeypatch.setattr(
-        panel_module,
-        "conventions_html",
-        lambda *_: calls.append("written") or f"text {len(calls)}",
+@pytest.mark.parametrize("way", TravelDirection)
+def test_the_box_the_heading_and_files_have_the_direction(way):
+    state = with_travel(TWO, way)
+    picture = LIVE.evaluate(state)
+    words = "reversal" if way == "difference" else {"mean": "mean of both"}.get(way, way)
+    assert words in heading(picture)
+    assert words in picture_conditions(picture)[0]
+    shares = {"mean": 3.25, "forward": 3.0, "backward": 2.0, "difference": 1.0}
+    at_end = float(picture.field.error_um[-1, 0, 0, 1])
+    assert at_end == pytest.approx(2.5 if way == "mean" else shares[way])
+    back, _ = open_text(state_to_toml(state), "two_ways", "x.toml")
+    assert back.scene.model.direction == way
+    assert with_own_conventions(state).scene == TWO_WAYS
+
+
+def test_readings_and_uncertainties_are_saved_with_what_is_changed():
+    changed = TWO.with_amplitude("EYX", 6.0)
+    back, _ = open_text(state_to_toml(changed), "two_ways", "x.toml")
+    assert back.scene.measured == TWO_WAYS.measured
+    assert back.scene.uncertainty == TWO_WAYS.uncertainty
+    assert changed.reset().scene == TWO_WAYS
+
+
+WORDS = "placement of the workpiece fitted out"
+SECOND = load_scene("dvf5000_second")
+PLACED = replace(start_state(SECOND), placed=True, nodes=5).with_loop("relative")
+
+
+def test_the_drawn_field_is_that_of_the_command():
+    picture = LIVE.evaluate(PLACED)
+    wanted = evaluate(SECOND, grid=5, loop="relative", placed=True)
+    np.testing.assert_allclose(picture.field.error_um, wanted.error_um, atol=1e-9)
+    assert (
+        picture.statistics.rms_um
+        < 0.5 * LIVE.evaluate(replace(PLACED, placed=False)).statistics.rms_um
     )
-    panel = object.__new__(ConventionsPanel)
-    panel._built_for = panel_module._axes_of(START)
-    panel._known, panel._at, panel._asked, panel._costs = {}, {}, None, ()
-    panel._context = SimpleNamespace(act=lambda step: step())
-    panel._effects, panel._text = Effects(), SimpleNamespace(content="")
-    panel._clicks = SimpleNamespace(attributes=None)
-    parts = Display()
-    parts.add(LIVE.evaluate(START), panels=[panel])
-    assert calls == ["written"]
-    moved = START
-    for value in (1.0, 2.0, 3.0):
-        moved = moved.with_amplitude("EXX", value)
-        parts.show(LIVE.evaluate(moved))
-    assert calls == ["written"]
-    panel.rest(LIVE.evaluate(moved))
-    assert len(calls) == 2
-    panel.rest(LIVE.evaluate(moved))
-    assert len(calls) == 2
-    parts.show(LIVE.evaluate(with_choice(moved, "loop=relative")))
-    assert len(calls) == 3
+    assert WORDS in summary(picture)
+    assert WORDS in picture_conditions(picture)
+    assert WORDS not in summary(LIVE.evaluate(PLACED.with_loop("tool")))
 
 
-def test_what_is_slowest_waits_until_a_drag_has_ended(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Worked out with every chart it took a third of what a drag costs the server."""
-    clock, done = [100.0], []
-    monkeypatch.setattr(display_module, "time", SimpleNamespace(monotonic=lambda: clock[0]))
+def test_files_and_links_keep_it():
+    assert "placed=1" in settings_line(PLACED)
+    assert with_settings(start_state(SECOND), settings_line(PLACED)).placed
+    scene = scene_of(PLACED)
+    assert start_state(parse_scene(scene_to_toml(scene), "x")).placed
+    request = build_request(LIVE.evaluate(PLACED))
+    exported = evaluate_picture(request.scene, grid=request.nodes, loop=request.loop)
+    np.testing.assert_allclose(
+        exported.field.error_um, LIVE.evaluate(PLACED).field.error_um, atol=1e-9
+    )
+    assert WORDS in exported.conditions
 
-    class Charts:
-        """Follows in a drag now and then; its slow part does not."""
 
-        def read(self, state: AppState) -> AppState:
-            return state
+def test_turned_axes_carry_the_volume_that_is_fitted():
+    turned = PLACED.with_position("C", 90.0).with_position("B", -40.0)
+    shown, exported = LIVE.evaluate(turned), evaluate(scene_of(turned), grid=5, loop="relative")
+    np.testing.assert_allclose(shown.field.error_um, exported.error_um, atol=1e-9)
 
-        def show(self, picture: LivePicture) -> None:
-            """Nothing at once."""
 
-        def settle(self, picture: LivePicture) -> None:
-            done.append("chart")
+def test_repair_asks_for_the_shape_of_a_part():
+    before = ask(PLACED, Objective.RMS, any_error=False, limit=200.0).answer().before
+    wanted = evaluate(SECOND, grid=5, loop="relative", placed=True)
+    assert before.max_um == pytest.approx(wanted.norm_um.max())
 
-        def rest(self, picture: LivePicture) -> None:
-            done.append("slow")
 
-    def run(step: Callable[[], object]) -> None:
-        step()
-
-    picture, parts = LIVE.evaluate(START), Display()
-    parts.add(picture, panels=[Charts()])
-    for _ in range(40):  # two seconds of a drag
-        parts.show(picture)
-        clock[0] += 0.05
-        while parts.is_due(paused=False):
-            parts.settle(picture, run)
-    assert set(done) == {"chart"}
-    assert 3 <= len(done) <= 6
-    clock[0] += 0.1
-    while parts.is_due(paused=True):
-        parts.settle(picture, run)
-    assert "slow" not in done
-    assert parts.pause_s == pytest.approx(0.35)
-    clock[0] += 0.4
-    while parts.is_due(paused=True):
-        parts.settle(picture, run)
-    assert done.count("slow") == 1
-    assert parts.pause_s is None
+def test_the_heading_and_files_say_when_the_first_order_is_not_enough():
+    measured = load_scene("dvf5000_first")
+    assert order_conditions(LIVE.evaluate(start_state(measured))) == ()
+    large = start_state(repaired(measured, {"EC0Y": 3000.0, "EA0Z": 3000.0}))
+    picture = LIVE.evaluate(large)
+    (words,) = order_conditions(picture)
+    assert words.startswith("first order; the exact chain differs by up to")
+    assert words in picture_conditions(picture)
+    assert words in heading(picture, words)
+    # what is excluded does not count
+    excluded = replace(large.exclusions, excluded=frozenset({"EC0Y", "EA0Z"}))
+    assert order_conditions(LIVE.evaluate(replace(large, exclusions=excluded))) == ()

@@ -1,60 +1,71 @@
-"""Files and links: a state comes back identical, and what is hostile is refused or clamped."""
+"""Files, links, kept tabs and lists of scenes: identical, or refused with one message."""
 
 import base64
+import json
+import tracemalloc
 import zlib
 from dataclasses import fields, replace
+from urllib.parse import urlencode
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from warpspace.app.documents.received_files import safe_file_name, safe_name, upload_text
+from warpspace.app.browser.lost_server import keep_script, say_script
+from warpspace.app.documents.files import pack, safe_file_name, safe_name, unpack, upload_text
+from warpspace.app.documents.kept_tab import (
+    COMPARISON,
+    FILE,
+    LINK,
+    NEVER_KEPT,
+    START_VALUES,
+    kept_text,
+    read_kept,
+)
 from warpspace.app.documents.scene_file import (
     MAX_PACKED_TEXT,
+    MOST_OPENED,
+    SceneList,
+    is_looked_at,
     open_link,
     open_text,
     state_to_link,
     state_to_toml,
 )
-from warpspace.app.documents.view_settings import camera_of, settings_line, with_settings
-from warpspace.app.evaluation.budget import Picked
+from warpspace.app.documents.view_settings import (
+    NAMES,
+    PREFIX,
+    camera_of,
+    settings_line,
+    with_settings,
+)
+from warpspace.app.evaluation.compare import pinned_side, scene_side, with_pin, with_sides
 from warpspace.app.evaluation.conventions import with_choice, with_reference
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.resulting_scene import scene_of
 from warpspace.app.state import edits
-from warpspace.app.state.app_state import AppState, Shown, start_state
+from warpspace.app.state.app_state import Shown, start_state
+from warpspace.app.state.comparison import Comparison, Side
 from warpspace.app.state.look import Look, MachineLook, RotaryLook
+from warpspace.app.state.picked import Picked
 from warpspace.app.state.specification import Specification
 from warpspace.app.viewport.camera import CameraMemory
-from warpspace.exceptions import OptionError, SceneError
-from warpspace.machine.errors import Ramp
+from warpspace.exceptions import OptionError, SceneError, WarpspaceError
+from warpspace.kinematics.model import Loop
+from warpspace.machine.errors import Ramp, Table
 from warpspace.machine.limits import MAX_ERROR
 from warpspace.scene.library import load_scene, scene_names
 
-SCENE = load_scene("dvf5000_first")
-START = start_state(SCENE)
-EVIL_CSV = """title = "x"
-machine = "dvf5000"
-[errors]
-EXX = { csv = "/etc/passwd", column = "a" }
-"""
+KNOWN = FIRST, SECOND = (load_scene("dvf5000_first"), load_scene("dvf5000_second"))
+START = start_state(FIRST)
 CAMERA = CameraMemory((10.0, -20.0, 12.0), (0.0, 0.5, 1.5), (0.0, 0.0, 1.0), 0.384)
-LOOKED = {
-    "amplitudes",
-    "positions",
-    "exaggeration",
-    "component",
-    "loop",
-    "nodes",
-    "shown",
-    "exclusions",
-    "tolerances",
-    "specification",
-    "look",
-    "machine",
-    "rotary",
-    "picked",
-    "lever",
-}
+LOOKED = (
+    "amplitudes positions exaggeration component loop placed nodes shown exclusions tolerances"
+    " specification look machine rotary picked lever"
+)
 
 
-def busy() -> AppState:
+def busy():
     """A state in which nearly everything differs from the scene as opened."""
     state = START.with_amplitude("EXX", 3.3).with_amplitude("EBZ", 1.0 / 3.0)
     state = edits.with_curve(state, "EYY", Ramp(edits.axis_span(state, "EYY"), 2.5))
@@ -69,6 +80,7 @@ def busy() -> AppState:
     span = edits.Span(-275.0, 275.0, 1.0)
     state = replace(
         state,
+        placed=True,
         look=look.with_slice("X", 10.0, span),
         machine=state.machine.switched(shown=True, bent=False, ghost=False).with_linear(
             "X", 20.0, span
@@ -77,7 +89,7 @@ def busy() -> AppState:
         .with_own((10.0, 20.0, 30.5))
         .with_held("B", (-15.0, 0.0)),
         specification=Specification(
-            25.0, "max", "normal", 99.0, frozenset({"EXX", "EAZ"}), "EA0Z=4,EXY=0.5"
+            25.0, "sampled", "normal", 99.0, frozenset({"EXX", "EAZ"}), "EA0Z=4,EXY=0.5"
         ),
         picked=Picked({"X": 1.5, "Y": -2.0, "Z": -100.0}),
         lever="EAX",
@@ -87,26 +99,37 @@ def busy() -> AppState:
 
 
 @pytest.mark.parametrize("way", ["file", "link"])
-def test_everything_looked_at_comes_back_identical(way: str) -> None:
-    state = busy()
+def test_everything_looked_at_and_compared_comes_back_identical(way):
+    # what no other machine knows by name is stored with its content
+    curve = Table((-275.0, 275.0), ((-275.0, 0.0), (0.0, 8.0), (275.0, -2.0)))
+    pinned = with_pin(with_choice(edits.with_curve(START, "EXX", curve), "direction C=-1"))
+    opened = replace(SECOND, name="shop floor", title="Shop floor, machine 7")
+    compared = with_sides(pinned, scene_side(opened), pinned.comparison.a).comparison
+    state = replace(busy(), comparison=compared.with_shown("difference"))
     if way == "file":
         back, camera = open_text(state_to_toml(state, CAMERA), "dvf5000_first", "x.toml")
     else:
-        back, camera = open_link(state_to_link(state, CAMERA, [SCENE]), [SCENE])
+        back, camera = open_link(state_to_link(state, CAMERA, KNOWN), KNOWN)
     assert back.notes == ()
     assert camera == CAMERA
-    for name in LOOKED:
+    for name in LOOKED.split():
         assert getattr(back, name) == getattr(state, name), name
     assert back.scene.model == state.scene.model
     assert back.scene.reference == state.scene.reference
     assert {k: edits.curve_of(back, k) for k in back.amplitudes} == {
         k: edits.curve_of(state, k) for k in state.amplitudes
     }
+    assert back.comparison.a == state.comparison.a
+    assert back.comparison.pinned is back.comparison.b
+    pictures = [LiveModel().evaluate(one.with_nodes(5)) for one in (state, back)]
+    assert pictures[0].statistics == pictures[1].statistics
+    assert (pictures[0].drawn_mm == pictures[1].drawn_mm).all()
+    assert pictures[0].compared.titles == pictures[1].compared.titles
 
 
-def test_every_setting_is_written() -> None:
-    """A field added to the look of things must find its way into files and links."""
-    line = settings_line(replace(busy(), scene=SCENE, loaded=None))
+def test_every_setting_is_written():
+    """A field added to what is looked at or compared must find its way into files and links."""
+    line = settings_line(replace(busy(), scene=FIRST, loaded=None))
     for group, kind in (
         ("shown", Shown),
         ("look", Look),
@@ -116,21 +139,27 @@ def test_every_setting_is_written() -> None:
         for field in fields(kind):
             assert f"{group}.{field.name}" in line, field.name
     assert {field.name for field in fields(RotaryLook)} == {"off", "own_mm", "held", "chosen"}
+    named = {name for name in NAMES if "." not in name}
+    assert {field.name for field in fields(Comparison)} == named
+    assert {field.name for field in fields(Side)} == {"title", "state", "is_scene"}
+    assert {field.name for field in fields(Picked)} == {"at", "loop", "point_mm"}
 
 
 @pytest.mark.parametrize("name", scene_names())
-def test_every_bundled_scene_opens_from_its_saved_state(name: str) -> None:
+def test_every_bundled_scene_opens_from_its_saved_state(name):
     state = start_state(load_scene(name))
     back, _ = open_text(state_to_toml(state), name, name)
     assert back == state
 
 
-def test_a_link_to_a_known_scene_is_short_and_readable() -> None:
-    link = state_to_link(START.with_amplitude("EXX", 2.5), None, [SCENE])
+def test_a_link_to_a_known_scene_is_short_and_readable():
+    link = state_to_link(START.with_amplitude("EXX", 2.5), None, [FIRST])
     assert link == "scene=dvf5000_first&EXX=2.5"
-    back, camera = open_link(link, [SCENE])
+    back, camera = open_link(link, [FIRST])
     assert back == START.with_amplitude("EXX", 2.5)
     assert camera is None
+    link = state_to_link(with_sides(START, Side(), scene_side(SECOND)), None, KNOWN)
+    assert link == "scene=dvf5000_first&compare.b=scene%3Ddvf5000_second"
 
 
 @pytest.mark.parametrize(
@@ -146,12 +175,12 @@ def test_a_link_to_a_known_scene_is_short_and_readable() -> None:
         "&".join(f"a{n}=1" for n in range(1000)),
     ],
 )
-def test_hostile_links_are_refused_with_a_message(link: str) -> None:
+def test_hostile_links_are_refused_with_a_message(link):
     with pytest.raises((OptionError, SceneError)):
-        open_link(link, [SCENE])
+        open_link(link, [FIRST])
 
 
-def test_hostile_settings_are_clamped_or_left_out_and_named() -> None:
+def test_hostile_settings_are_clamped_or_left_out_and_named():
     line = (
         "EXX=1e9&EYX=nan&B=500&nodes=1e6&exaggeration=-3&component=<b>&loop=all&look.surface=evil"
         "&shown.dark=maybe&rotary.off=0,99,-1&rotary.held.B=inf&excluded=EXX,evil&why.X=1e9"
@@ -166,7 +195,6 @@ def test_hostile_settings_are_clamped_or_left_out_and_named() -> None:
     assert back.look.surface == "surface"
     assert back.rotary.off == frozenset({0})
     assert back.exclusions.excluded == frozenset({"EXX"})
-    assert back.picked is not None
     assert abs(back.picked.at["X"]) <= 300.0
     assert any("left out" in note for note in back.notes)
     assert with_settings(START, "x" * 20_000) == START
@@ -185,42 +213,34 @@ def test_hostile_settings_are_clamped_or_left_out_and_named() -> None:
         "5,5,5,0,0,0,0,0,1,x",
     ],
 )
-def test_cameras_that_see_nothing_are_not_taken(numbers: str) -> None:
+def test_cameras_that_see_nothing_are_not_taken(numbers):
     assert camera_of(f"camera={numbers}") is None
 
 
 @pytest.mark.parametrize(
-    ("given", "kept"),
+    ("safe", "given", "kept"),
     [
-        ("../../etc/passwd", "passwd"),
-        ("..\\..\\evil.toml", "evil"),
-        ("a<script>.toml", "a_script"),
-        ("", "scene"),
-        ("...", "scene"),
-        ("\x00\n", "scene"),
-        ("x" * 300, "x" * 60),
-        ("my machine.v2.toml", "my machine.v2"),
+        (safe_name, "../../etc/passwd", "passwd"),
+        (safe_name, "..\\..\\evil.toml", "evil"),
+        (safe_name, "a<script>.toml", "a_script"),
+        (safe_name, "", "scene"),
+        (safe_name, "...", "scene"),
+        (safe_name, "\x00\n", "scene"),
+        (safe_name, "x" * 300, "x" * 60),
+        (safe_name, "my machine.v2.toml", "my machine.v2"),
+        # those of received data keep their ending
+        (safe_file_name, "a b.CSV", "a b.CSV"),
+        (safe_file_name, "../../<img src=x>.csv", "img src_x.csv"),
+        (safe_file_name, "noending", "noending.txt"),
+        (safe_file_name, "x.c/../sv", "sv.txt"),
+        (safe_file_name, ".", "file.txt"),
     ],
 )
-def test_names_from_a_browser_are_made_safe(given: str, kept: str) -> None:
-    assert safe_name(given) == kept
+def test_names_from_a_browser_are_made_safe(safe, given, kept):
+    assert safe(given) == kept
 
 
-@pytest.mark.parametrize(
-    ("given", "kept"),
-    [
-        ("a b.CSV", "a b.CSV"),
-        ("../../<img src=x>.csv", "img src_x.csv"),
-        ("noending", "noending.txt"),
-        ("x.c/../sv", "sv.txt"),
-        (".", "file.txt"),
-    ],
-)
-def test_file_names_of_received_data_keep_their_ending(given: str, kept: str) -> None:
-    assert safe_file_name(given) == kept
-
-
-def test_uploads_that_are_no_scene_are_refused_with_every_problem() -> None:
+def test_uploads_that_are_no_scene_are_refused_with_every_problem():
     with pytest.raises(OptionError, match="at most 4 MB"):
         upload_text(b"x" * (4 * 2**20 + 1), "big.toml")
     with pytest.raises(OptionError, match="not UTF-8"):
@@ -230,7 +250,274 @@ def test_uploads_that_are_no_scene_are_refused_with_every_problem() -> None:
     assert len(caught.value.problems) >= 3
     with pytest.raises(SceneError, match="CSV files are not read"):
         open_text(
-            EVIL_CSV,
-            "x",
-            "x.toml",
+            'machine = "dvf5000"\nerrors.EXX = { csv = "/etc/passwd", column = "a" }\n', "x", "x"
         )
+
+
+def edited():
+    return START.with_amplitude("EXX", 7.125).with_position("B", -20.0).with_component("z")
+
+
+@pytest.mark.parametrize(
+    "state",
+    [
+        edited(),
+        with_pin(edited()).with_amplitude("EXX", 1.0),
+        edits.with_curve(edited(), "EYX", Table((-275.0, 275.0), ((-275.0, 1.0), (0.0, -3.0)))),
+    ],
+    ids=["known scene", "comparison", "edited curve"],
+)
+def test_a_tab_comes_back_whole_with_its_camera(state):
+    found = read_kept(kept_text(state, CAMERA, KNOWN), KNOWN)
+    assert scene_of(found.state).errors == scene_of(state).errors
+    if state.loaded is None:  # so that Reset goes where it went
+        assert found.state == state
+    assert found.camera == CAMERA
+    assert found.missing[: len(NEVER_KEPT)] == NEVER_KEPT
+
+
+def test_scene_that_the_server_has_no_more_comes_back_from_its_file():
+    found = read_kept(kept_text(edited(), None, KNOWN), KNOWN[1:])
+    assert scene_of(found.state).errors == scene_of(edited()).errors
+    assert found.state.component == "z"
+    assert found.missing == (*NEVER_KEPT, START_VALUES)
+    # and so does one that has changed under its name
+    other = replace(KNOWN[1], name="dvf5000_first")
+    found = read_kept(kept_text(edited(), None, KNOWN), [other])
+    assert scene_of(found.state).errors == scene_of(edited()).errors
+
+
+def test_comparison_that_is_too_large_is_left_out_and_named(monkeypatch):
+    state = with_pin(edited()).with_amplitude("EXX", 1.0)
+    alone = kept_text(START.with_amplitude("EXX", 1.0), None, KNOWN)
+    monkeypatch.setattr("warpspace.app.documents.kept_tab.MAX_KEPT_TEXT", len(alone) + 300)
+    found = read_kept(kept_text(state, None, KNOWN), KNOWN)
+    assert found.state.comparison.b is None
+    assert found.state.amplitudes["EXX"] == 1.0
+    assert COMPARISON in found.missing
+    monkeypatch.setattr("warpspace.app.documents.kept_tab.MAX_KEPT_TEXT", 10)
+    assert kept_text(state, None, KNOWN) == ""
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "{", "[]", "7", "[" * 100_000, json.dumps({FILE: 7}), json.dumps({FILE: "x = ["}),
+     json.dumps({LINK: "scene=../../etc", FILE: "\x00"}), "x" * 800_000],
+    ids=range(9),
+)  # fmt: skip
+def test_anything_may_come_from_a_page(text):
+    with pytest.raises(WarpspaceError):
+        read_kept(text, KNOWN)
+
+
+def test_scripts_spell_texts_so_that_they_stay_texts():
+    hostile = 'x"</script><script>alert(1)//'
+    for script in (keep_script(hostile), say_script(hostile, [hostile])):
+        assert "</script>" not in script
+        assert "\\u003c/script>" in script
+
+
+def test_opened_scenes_are_bounded_and_the_oldest_goes():
+    scenes = SceneList({FIRST.title: FIRST})
+    opened = [replace(SECOND, name=f"upload {n}", title=f"Upload {n}") for n in range(23)]
+    dropped = [scenes.add(scene)[1] for scene in opened]
+    assert dropped == [""] * MOST_OPENED + ["Upload 0", "Upload 1", "Upload 2"]
+    assert list(scenes) == [FIRST.title, *(f"Upload {n}" for n in range(3, 23))]
+    assert len(scenes) == MOST_OPENED + 1
+    assert scenes.fixed == (FIRST,)
+    # one that has left and is shown again (undo) comes back as the newest
+    assert scenes.add(opened[0]) == ("Upload 0", "Upload 3")
+    assert list(scenes)[-1] == "Upload 0"
+
+
+def test_titles_are_unique_and_never_words_of_the_page():
+    scenes = SceneList({FIRST.title: FIRST})
+    again = replace(FIRST, name="other")
+    assert scenes.add(again) == (f"{FIRST.title} (2)", "")
+    assert scenes.add(replace(SECOND, title="present errors"))[0] == "present errors (2)"
+    assert scenes.add(replace(SECOND, title="", name="nothing"))[0] == "nothing (2)"
+    assert scenes[f"{FIRST.title} (2)"] is again
+    assert scenes.add(load_scene("dvf5000_first")) == (FIRST.title, "")  # an equal one needs none
+
+
+KNOWN_SCENES = (*KNOWN, load_scene("teach_tilted_c"))
+TRACE = Picked(
+    {"X": 0.0, "Y": 0.0, "Z": -280.0, "B": -30.0, "C": 1.0 / 3.0}, Loop.WORKPIECE, (275.0, 0.1, 0.0)
+)
+KEYS = st.sampled_from(["EXX", "EYX", "EAX", "EC0Y", "EBZ", "EXC"])
+EDITS = st.lists(st.tuples(KEYS, st.floats(-20.0, 20.0)), max_size=3)
+
+
+def saved(state):
+    """The state as a scene of its own: what a file can hold of it."""
+    scene = scene_of(state)
+    return replace(
+        state,
+        scene=scene,
+        loaded=None,
+        start=start_state(scene).start,
+        spans=start_state(scene).spans,
+        position_spans=start_state(scene).position_spans,
+    )
+
+
+@st.composite
+def plain_states(draw, scene=None):
+    state = start_state(scene or draw(st.sampled_from(KNOWN_SCENES)))
+    for key, value in draw(EDITS):
+        state = state.with_amplitude(key, value)
+    for axis in state.positions:
+        state = state.with_position(axis, draw(st.floats(-90.0, 90.0)))
+    state = state.with_loop(draw(st.sampled_from([*Loop]))).with_nodes(draw(st.integers(3, 31)))
+    state = state.with_component(draw(st.sampled_from(["norm", "x", "y", "z"])))
+    state = state.with_exaggeration(draw(st.none() | st.floats(1.0, 1e5)))
+    own = draw(st.none() | st.tuples(*[st.floats(-500.0, 500.0)] * 3))
+    return replace(state, rotary=state.rotary.with_own(own)).without_notes()
+
+
+@st.composite
+def states(draw):
+    state = draw(plain_states())
+    at = draw(st.sampled_from([None, Picked({"X": 1.5, "Y": -0.1, "Z": -100.0}), TRACE]))
+    if at is not None and at.at.keys() <= state.scene.machine.axes.keys():
+        lever = draw(st.sampled_from(["", "EAX", "EC0Y"]))
+        state = replace(state, picked=at, lever=lever)
+    pinned = draw(st.none() | plain_states().map(pinned_side))
+    sides = [Side(), *map(scene_side, KNOWN_SCENES), *([pinned] if pinned else [])]
+    a, b = (draw(st.sampled_from(sides)) for _ in range(2))
+    comparison = Comparison(a, b, draw(st.sampled_from(["a", "b", "difference"])), pinned=pinned)
+    if draw(st.booleans()):
+        comparison = comparison.off()
+    return replace(state, comparison=replace(comparison, ghost=draw(st.booleans())))
+
+
+@settings(max_examples=60, deadline=None)
+@given(states())
+def test_link_gives_the_identical_state(state):
+    assert open_link(state_to_link(state, None, KNOWN_SCENES), KNOWN_SCENES)[0] == state
+
+
+@settings(max_examples=60, deadline=None)
+@given(states())
+def test_file_gives_the_identical_state(state):
+    back, _ = open_text(state_to_toml(state), state.scene.name, "x.toml")
+    assert back == saved(state)
+    # and what is saved then is the same text
+    assert state_to_toml(back) == state_to_toml(state)
+
+
+def packed(text):
+    return base64.urlsafe_b64encode(zlib.compress(text.encode())).decode().rstrip("=")
+
+
+def comparing(**given):
+    """The end of a link that compares."""
+    return urlencode([(PREFIX + name.replace("_", "."), value) for name, value in given.items()])
+
+
+BOMB = "file=" + packed("x = 1\n" * 1_000_000)
+NESTED = "scene=dvf5000_first&" + urlencode({"compare.pinned": "scene=nobody"})
+
+
+@pytest.mark.parametrize(
+    "pairs",
+    [
+        {"b": "scene=nobody"},
+        {"b": "scene=../../etc/passwd"},
+        {"b": "?"},
+        {"b": "pinned"},
+        {"b": "file=!!!"},
+        {"b": BOMB},
+        {"b": "file=" + packed('title = "x"')},
+        {"b": "now", "shown": "<script>"},
+        {"b": "now", "ghost": "maybe"},
+        {"b": "now", "evil": "1"},
+        {"pinned": "&".join(f"a{n}=1" for n in range(1000))},
+    ],
+)
+@pytest.mark.parametrize("way", ["file", "link"])
+def test_a_comparison_that_means_nothing_is_refused(way, pairs):
+    line = comparing(**pairs)
+    text = f"# warpspace-compare: {line}\n{state_to_toml(START)}"
+    link = f"scene=dvf5000_first&{line}"
+    with pytest.raises(WarpspaceError) as caught:
+        open_text(text, "x", "x.toml") if way == "file" else open_link(link, KNOWN_SCENES)
+    assert isinstance(caught.value, (OptionError, SceneError))
+    assert len(str(caught.value)) < 400
+
+
+@pytest.mark.parametrize(("old", "new"), [("a", "b"), ("b", "a"), ("difference", "difference")])
+def test_an_older_link_with_a_snapshot_shows_the_same_change(old, new):
+    """It had what is steered as A and the snapshot as B, and drew A − B."""
+    given = {"b": "pinned", "shown": old, "pinned": "scene=dvf5000_second"}
+    line = comparing(**given, pinned_title="snapshot: DVF5000 · 2 changed")
+    back, _ = open_link(f"scene=dvf5000_first&{line}", KNOWN_SCENES)
+    found = back.comparison
+    assert (found.shown, found.a, found.b) == (new, found.pinned, Side())
+    assert found.pinned.title == "before: DVF5000 · 2 changed"
+    again, _ = open_link(state_to_link(back, None, KNOWN_SCENES), KNOWN_SCENES)
+    assert again.comparison == found
+
+
+def test_in_a_comparison_no_other_is_looked_at_and_wild_numbers_are_clamped_and_named():
+    back, _ = open_link(f"scene=dvf5000_first&{comparing(pinned=NESTED, b='pinned')}", KNOWN_SCENES)
+    assert back.comparison.b.state == START
+    line = comparing(pinned="scene=dvf5000_first&EXX=1e9", b="pinned")
+    back, _ = open_link(f"scene=dvf5000_first&{line}", KNOWN_SCENES)
+    assert back.comparison.b.state.amplitudes["EXX"] == MAX_ERROR
+    assert any(note.startswith("before: EXX") for note in back.notes)
+
+
+@pytest.mark.parametrize("title", ["now", "present errors", "nothing", "", "x" * 1_000])
+def test_titles_from_a_link_cannot_pose_as_something_else(title):
+    line = comparing(
+        b="scene=dvf5000_second", b_title=title, pinned="scene=dvf5000_first", pinned_title=title
+    )
+    back, _ = open_link(f"scene=dvf5000_first&{line}", KNOWN_SCENES)
+    for side in (back.comparison.b, back.comparison.pinned):
+        assert side.title not in ("now", "present errors", "nothing", "")
+        assert len(side.title) <= 200
+
+
+@pytest.mark.parametrize(
+    "text", ["all,1,2,3", "workpiece,1,2", "workpiece,1,2,nan", "workpiece,1e9,0,0", ",,,", ""]
+)
+def test_a_trace_that_means_nothing_is_left_out_and_named(text):
+    back, _ = open_link(
+        f"scene=dvf5000_first&{urlencode({'why.trace': text, 'why.C': '3'})}", KNOWN_SCENES
+    )
+    assert back.picked is None
+    assert any("left out" in note for note in back.notes)
+
+
+def test_a_link_to_a_scene_that_only_this_tab_has_carries_it():
+    mine = start_state(replace(SECOND, name="dvf5000_first", title="Mine"))
+    back, _ = open_link(state_to_link(mine, None, KNOWN_SCENES), KNOWN_SCENES)
+    assert back == mine
+
+
+def test_a_short_link_with_one_key_of_many_parts_is_refused_at_once():
+    """Such a link of 419 characters took 7.7 GB."""
+    text = 'machine = "dvf5000"\na' + ".a" * 40_000 + " = 1\n"
+    link = urlencode({"name": "x", "file": packed(text)})
+    assert len(link) < 600
+    with pytest.raises(SceneError, match="the scene in the link: line 2: a key of over 8 parts"):
+        open_link(link, KNOWN_SCENES)
+    with pytest.raises(SceneError, match=r"x.toml: line 2: a key of over 8 parts"):
+        open_text(text, "x", "x.toml")
+
+
+def test_a_link_longer_than_an_address_is_not_unpacked():
+    with pytest.raises(OptionError, match="expected at most 8,000"):
+        unpack("A" * 8_001)
+    assert unpack(pack("scene=dvf5000_first")) == "scene=dvf5000_first"
+
+
+@pytest.mark.parametrize("text", ["\n" * 300_000, "#\n" * 200_000, "# warpspace-view: a\n" * 9])
+def test_remarks_at_the_head_of_a_file_take_little_memory(text):
+    tracemalloc.start()
+    try:
+        is_looked_at(text)
+        assert tracemalloc.get_traced_memory()[1] < 5e6
+    finally:
+        tracemalloc.stop()

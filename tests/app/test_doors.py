@@ -1,20 +1,23 @@
 """Requests of foreign pages, under foreign names and without the token are refused, raw."""
 
 import logging
+import os
 import socket
-from collections.abc import Iterator
-from contextlib import closing, contextmanager, nullcontext
+import time
+from contextlib import closing, contextmanager, nullcontext, suppress
+from pathlib import Path
+from types import SimpleNamespace
 
 import msgspec.msgpack
 import pytest
 from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosedError
 from websockets.protocol import State
-from websockets.sync.client import ClientConnection
 
 from app.wire import dial
 from page_protocol import PROTOCOL
-from warpspace.app.server import guard, network, viewer
+from reliability.doors import GUESSES, HOSTS, ORIGINS, PATHS, TOKEN
+from warpspace.app.server import guard, network, run, viewer
 from warpspace.app.server.doors import Access, Asked, Doors, Place, read_place
 from warpspace.app.server.guard import Limits, Rate
 from warpspace.app.server.network import draw_code, reachable_address, served_names
@@ -22,7 +25,6 @@ from warpspace.app.server.viewer import Viewer
 from warpspace.exceptions import OptionError
 from warpspace.scene.library import load_scene
 
-TOKEN = "a-token-of-a-test"
 UPGRADE = {
     "Upgrade": "websocket",
     "Connection": "Upgrade",
@@ -35,25 +37,19 @@ SCENE = load_scene("dvf5000_nominal")
 
 
 @pytest.fixture(scope="module", params=[False, True], ids=["own", "shared"])
-def running(request: pytest.FixtureRequest) -> Iterator[Viewer]:
+def running(request):
     with Viewer(SCENE, shared=request.param) as found:
         yield found
 
 
 @pytest.fixture(scope="module")
-def guarded() -> Iterator[Viewer]:
+def guarded():
     """An app that asks for a token and stands behind a proxy."""
     with Viewer(SCENE, access=Access(("review.example",), TOKEN)) as found:
         yield found
 
 
-def ask(
-    running: Viewer,
-    path: str = "/",
-    /,
-    upgrade: dict[str, str] | None = None,
-    **headers: str | None,
-) -> tuple[int, dict[str, str], str]:
+def ask(running, path="/", /, upgrade=None, **headers):
     """Send a request as it stands; give status, headers (in lower case) and the text after them."""
     sent = {"Host": f"127.0.0.1:{running.port}", **(upgrade or {}), **headers}
     lines = [f"{name}: {value}" for name, value in sent.items() if value is not None]
@@ -75,35 +71,21 @@ def ask(
     )
 
 
-def good(upgrade: dict[str, str]) -> int:
+def good(upgrade):
     return 101 if upgrade else 200
 
 
 @KINDS
 @pytest.mark.parametrize("name", ["127.0.0.1", "localhost", "LOCALHOST", "[::1]"])
-def test_the_page_itself_is_answered(running: Viewer, upgrade: dict[str, str], name: str) -> None:
+def test_the_page_itself_is_answered(running, upgrade, name):
     host = f"{name}:{running.port}"
     assert ask(running, upgrade=upgrade, Host=host)[0] == good(upgrade)
     assert ask(running, upgrade=upgrade, Host=host, Origin=f"http://{host}")[0] == good(upgrade)
 
 
 @KINDS
-@pytest.mark.parametrize(
-    "origin",
-    [
-        "http://evil.example",
-        "null",
-        "",
-        "file://",
-        "http://127.0.0.1:1",
-        "http://127.0.0.1",
-        "http://localhost:{port}",
-        "https://127.0.0.1:1@127.0.0.1:{port}",
-        "http://127.0.0.1:{port}.evil.example",
-        "chrome-extension://abcdef",
-    ],
-)
-def test_a_foreign_page_is_refused(running: Viewer, upgrade: dict[str, str], origin: str) -> None:
+@pytest.mark.parametrize("origin", ORIGINS)
+def test_a_foreign_page_is_refused(running, upgrade, origin):
     status, headers, text = ask(running, upgrade=upgrade, Origin=origin.format(port=running.port))
     assert status == 403
     assert "own page" in text
@@ -111,25 +93,8 @@ def test_a_foreign_page_is_refused(running: Viewer, upgrade: dict[str, str], ori
 
 
 @KINDS
-@pytest.mark.parametrize(
-    "host",
-    [
-        "evil.example",
-        "evil.example:{port}",
-        "127.0.0.1.evil.example",
-        "2130706433",
-        "",
-        None,
-        "192.0.2.7:{port}",
-        "evil@127.0.0.1",
-        "[::1",
-        "127.0.0.1:port",
-        "review.example",
-    ],
-)
-def test_a_foreign_name_is_refused(
-    running: Viewer, upgrade: dict[str, str], host: str | None
-) -> None:
+@pytest.mark.parametrize("host", [*HOSTS, None, "review.example"])
+def test_a_foreign_name_is_refused(running, upgrade, host):
     """A name of a foreign page that has been made to point here, with the Origin to it."""
     host = host and host.format(port=running.port)
     assert ask(running, upgrade=upgrade, Host=host)[0] == 403
@@ -138,11 +103,12 @@ def test_a_foreign_name_is_refused(
     assert "--allow-host" in text
 
 
-def test_no_answer_can_be_framed(running: Viewer) -> None:
+def test_no_answer_can_be_framed(running):
     for path in ("/", "/nothing", "/?token=x"):
         _, headers, _ = ask(running, path)
         assert headers["x-frame-options"] == "DENY"
-        assert "frame-ancestors 'none'" in headers["content-security-policy"]
+        policy = headers["content-security-policy"].split("; ")
+        assert {"default-src 'self'", "frame-ancestors 'none'", "object-src 'none'"} <= set(policy)
 
 
 @pytest.mark.parametrize(
@@ -156,13 +122,13 @@ def test_no_answer_can_be_framed(running: Viewer) -> None:
         "playbackPath=data:x",
     ],
 )
-def test_a_link_leads_the_page_to_no_other_server(running: Viewer, query: str) -> None:
+def test_a_link_leads_the_page_to_no_other_server(running, query):
     assert ask(running, f"/?{query}")[0] == 403
     own = f"websocket=ws://127.0.0.1:{running.port}/"
     assert ask(running, f"/?{own}")[0] == 200
 
 
-def test_each_kind_is_logged_once(caplog: pytest.LogCaptureFixture) -> None:
+def test_each_kind_is_logged_once(caplog):
     with caplog.at_level(logging.WARNING), Viewer(SCENE) as running:
         for number in range(5):
             ask(running, Host=f"evil{number}.example\xe9")
@@ -172,8 +138,8 @@ def test_each_kind_is_logged_once(caplog: pytest.LogCaptureFixture) -> None:
 
 
 @KINDS
-def test_a_token_is_asked_for(guarded: Viewer, upgrade: dict[str, str]) -> None:
-    for path in ("/", "/?token=", "/?token=wrong", f"/?token={TOKEN}x", "/?token=%ff", "/assets"):
+def test_a_token_is_asked_for(guarded, upgrade):
+    for path in (*PATHS, "/assets", *(f"/?token={guess}" for guess in GUESSES)):
         status, headers, text = ask(guarded, path, upgrade=upgrade)
         assert status == 403
         assert "token" in text
@@ -182,10 +148,16 @@ def test_a_token_is_asked_for(guarded: Viewer, upgrade: dict[str, str]) -> None:
     assert ask(guarded, f"/?view=x&token={TOKEN}", upgrade=upgrade)[0] == good(upgrade)
 
 
-def test_the_cookie_of_the_page_is_enough_for_its_websocket(guarded: Viewer) -> None:
+def test_the_cookie_of_the_page_is_enough_for_its_websocket(guarded):
     _, headers, _ = ask(guarded, f"/?token={TOKEN}")
     cookie, *attributes = headers["set-cookie"].split("; ")
     assert set(attributes) == {"Path=/", "HttpOnly", "SameSite=Strict"}
+    assert TOKEN not in cookie
+    name, _, value = cookie.partition("=")
+    assert ask(guarded, f"/?token={value}")[0] == 403
+    assert ask(guarded, Cookie=f"{name}={TOKEN}")[0] == 403
+    # of a server behind the same proxy that asks for the same token
+    assert ask(guarded, Cookie=f"warpspace_token_1={value}")[0] == 200
     for upgrade in ({}, UPGRADE):
         assert ask(guarded, upgrade=upgrade, Cookie=f"x=y; {cookie}")[0] == good(upgrade)
         assert ask(guarded, upgrade=upgrade, Cookie=f"{cookie}x")[0] == 403
@@ -194,7 +166,42 @@ def test_the_cookie_of_the_page_is_enough_for_its_websocket(guarded: Viewer) -> 
     assert guarded.link == f"{guarded.url}/?token={TOKEN}"
 
 
-def test_a_proxy_is_allowed(guarded: Viewer) -> None:
+@pytest.mark.skipif(os.name != "posix", reason="accounts as POSIX has them")
+@pytest.mark.parametrize(
+    ("uid", "shell", "logged_in", "others"),
+    [
+        (1000, "/bin/bash", ["1000"], False),
+        (1001, "/usr/bin/zsh", [], True),
+        (1001, "/usr/sbin/nologin", [], False),
+        (33, "/bin/sh", ["33"], False),
+        (65534, "/bin/sh", [], False),
+        (1000, "/bin/bash", ["1000", "250123"], True),
+    ],
+)
+def test_other_users_of_the_machine_are_known(monkeypatch, uid, shell, logged_in, others):
+    entry = SimpleNamespace(pw_uid=uid, pw_shell=shell)
+    monkeypatch.setattr("pwd.getpwall", lambda: [entry])
+    monkeypatch.setattr(network.Path, "iterdir", lambda _: map(Path, logged_in))
+    monkeypatch.setattr("os.getuid", lambda: 1000)
+    assert network.has_other_users() is others
+
+
+@pytest.mark.parametrize(("token", "said"), [(None, 1), (TOKEN, 0)])
+def test_a_shared_machine_is_offered_a_token(monkeypatch, token, said):
+    def interrupt(_):
+        raise KeyboardInterrupt
+
+    warnings: list[str] = []
+    monkeypatch.setattr(run, "has_other_users", lambda: True)
+    monkeypatch.setattr(run, "open_browser", interrupt)
+    monkeypatch.setattr(run, "limit_log", lambda: None)
+    access = Access(token=token)
+    run.run_viewer(SCENE, {}, host="127.0.0.1", port=None, access=access, browser=True,
+                   say=lambda _: None, warn=warnings.append)  # fmt: skip
+    assert sum("--token TEXT" in text for text in warnings) == said
+
+
+def test_a_proxy_is_allowed(guarded):
     path, proxy = f"/?token={TOKEN}", "https://review.example"
     kept = ask(guarded, path, UPGRADE, Host="review.example", Origin=proxy)
     changed = ask(guarded, path, UPGRADE, Origin=proxy)  # a proxy that puts its own Host there
@@ -202,11 +209,11 @@ def test_a_proxy_is_allowed(guarded: Viewer) -> None:
     assert ask(guarded, path, UPGRADE, Origin="https://review.example:1")[0] == 403
 
 
-def asked(host: str, arrived_at: str = "127.0.0.1", **headers: str) -> Asked:
+def asked(host, arrived_at="127.0.0.1", **headers):
     return Asked("/", Headers(Host=host, **headers), arrived_at)
 
 
-def test_all_addresses_of_a_machine_are_served_but_not_all_names() -> None:
+def test_all_addresses_of_a_machine_are_served_but_not_all_names():
     doors = Doors(served_names("0.0.0.0", "0.0.0.0"), 8080, everywhere=True)
     for host in ("localhost:8080", "192.0.2.7", f"{socket.gethostname()}:8080"):
         assert doors.check(asked(host, "192.0.2.7")) is None
@@ -214,9 +221,7 @@ def test_all_addresses_of_a_machine_are_served_but_not_all_names() -> None:
         assert doors.check(asked(host, "192.0.2.7")) is not None
 
 
-def test_one_address_of_a_machine_is_served_under_its_name(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_one_address_of_a_machine_is_served_under_its_name(monkeypatch):
     monkeypatch.setattr(network.socket, "gethostname", lambda: "Lathe")
     found = [(0, 0, 0, "", ("192.0.2.7", 0))]
     monkeypatch.setattr(network.socket, "getaddrinfo", lambda *_: found)
@@ -224,14 +229,14 @@ def test_one_address_of_a_machine_is_served_under_its_name(
     assert served_names("192.0.2.8", "192.0.2.8") == {"192.0.2.8"}
 
 
-def test_places() -> None:
+def test_places():
     assert read_place("[::ffff:127.0.0.1]:80") == Place("127.0.0.1", 80)
     assert read_place("Review.Example:8443") == Place("review.example", 8443)
     for text in ("", "a b", "a/b", "[zz]", "a:", "a:b", "x@y", "a\0"):
         assert read_place(text) is None
 
 
-def test_a_token_is_made_where_others_reach_the_app() -> None:
+def test_a_token_is_made_where_others_reach_the_app():
     assert Access().choose_token(local=True) is None
     first, second = (Access().choose_token(local=False) for _ in range(2))
     assert first is not None
@@ -250,33 +255,30 @@ def test_a_token_is_made_where_others_reach_the_app() -> None:
         (Access(allow_hosts=("http://review.example",)), "--allow-host 'http"),
     ],
 )
-def test_access_that_cannot_be_given(access: Access, problem: str) -> None:
+def test_access_that_cannot_be_given(access, problem):
     with pytest.raises(OptionError, match=problem):
         Viewer(SCENE, access=access)
 
 
-def test_the_code_holds_the_link() -> None:
+def test_the_code_holds_the_link():
     assert len(draw_code("http://192.0.2.7:8080/?token=" + TOKEN).splitlines()) > 10
     assert reachable_address("192.0.2.7") == "192.0.2.7"
 
 
-def test_an_app_that_cannot_be_guarded_does_not_start(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_app_that_cannot_be_guarded_does_not_start(monkeypatch):
     monkeypatch.setattr(viewer, "serve_with", lambda _: nullcontext(list[bool]()))
     with pytest.raises(OptionError, match="cannot be guarded"):
         Viewer(SCENE)
 
 
-# --- limits ------------------------------------------------------------------------------------
-
-
 @contextmanager
-def limited(monkeypatch: pytest.MonkeyPatch, limits: Limits) -> Iterator[Viewer]:
+def limited(monkeypatch, limits):
     monkeypatch.setattr(viewer, "Guard", lambda doors: guard.Guard(doors, limits))
     with Viewer(SCENE) as running:
         yield running
 
 
-def drain(wire: ClientConnection) -> ConnectionClosedError:
+def drain(wire):
     """Read until the other side has closed the connection."""
     try:
         while True:
@@ -285,26 +287,23 @@ def drain(wire: ClientConnection) -> ConnectionClosedError:
         return closed
 
 
-def test_sessions_are_limited(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_sessions_are_limited(monkeypatch, caplog):
     with limited(monkeypatch, Limits(sessions=1)) as running:
         with dial(running):
             for upgrade in ({}, UPGRADE):
                 status, _, text = ask(running, upgrade=upgrade)
                 assert status == 503
                 assert "close one" in text
-        for _ in range(100):
-            if ask(running)[0] == 200:
+        for _ in range(200):  # until the tab that was closed counts no more
+            status, *_ = ask(running)
+            if status == 200:
                 break
-        else:
-            pytest.fail("a tab that was closed still counts")
+            time.sleep(0.1)
+        assert status == 200
     assert caplog.text.count("1 tabs") == 1
 
 
-def test_the_rate_of_messages_is_limited(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_the_rate_of_messages_is_limited(monkeypatch, caplog):
     message = msgspec.msgpack.encode(
         {"type": "GuiUpdateMessage", "uuid": "none", "updates": {"value": 1}}
     )
@@ -312,10 +311,10 @@ def test_the_rate_of_messages_is_limited(
     with limited(monkeypatch, limits) as running, dial(running) as honest, dial(running) as flood:
         for _ in range(20):
             honest.send(message)
-        for _ in range(50):
-            flood.send(message)
+        with suppress(ConnectionClosedError):  # it may be shut out before all is sent
+            for _ in range(50):
+                flood.send(message)
         closed = drain(flood)
-        assert closed.rcvd is not None
         assert closed.rcvd.code == 1008
         assert closed.rcvd.reason == "more than 0.001 messages a second"
         honest.ping().wait(20.0)
@@ -323,21 +322,15 @@ def test_the_rate_of_messages_is_limited(
     assert caplog.text.count("messages a second") == 1
 
 
-def test_the_size_of_messages_is_limited(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    with (
-        limited(monkeypatch, Limits(message_bytes=1000)) as running,
-        dial(running) as wire,
-    ):
+def test_the_size_of_messages_is_limited(monkeypatch, caplog):
+    with limited(monkeypatch, Limits(message_bytes=1000)) as running, dial(running) as wire:
         wire.send(b"x" * 1001)
         closed = drain(wire)
-        assert closed.rcvd is not None
         assert closed.rcvd.code == 1009
     assert caplog.text.count("too large") == 1
 
 
-def test_a_rate_may_be_exceeded_for_a_moment() -> None:
+def test_a_rate_may_be_exceeded_for_a_moment():
     now = [0.0]
     rate = Rate(10.0, 5, lambda: now[0])
     assert [rate.take() for _ in range(6)] == [True] * 5 + [False]

@@ -1,67 +1,106 @@
-"""Views, machine and traces as numbers, without a browser."""
+"""From a state to a picture: field, views, slices, machine, traces, colours, camera, room."""
 
-import threading
-import time
 from dataclasses import replace
+from io import BytesIO
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
 
+from warpspace.app.browser.room import read_room
+from warpspace.app.documents.view_image import HEAD_PX, view_png
+from warpspace.app.evaluation.cache import Cache
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.evaluation.machine import drawn_bodies, machine_room_mm, tool_point
-from warpspace.app.evaluation.rotation import played_axis, played_position, points_on_traces
-from warpspace.app.readouts.circles import circle_rows, circle_table
+from warpspace.app.evaluation.machine import drawn_bodies, tool_point
+from warpspace.app.evaluation.rotation import (
+    chosen_trace,
+    moved_traces,
+    played_axis,
+    played_position,
+    points_on_traces,
+)
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.look import (
-    SURFACES,
     Look,
-    default_held,
     linear_positions,
     linear_spans,
     parse_positions,
-    quarters,
-    slice_positions,
     slice_spans,
 )
 from warpspace.app.state.ranges import Span
-from warpspace.app.viewport.layers.annotations import carries_worst
-from warpspace.app.viewport.named_views import VIEWS, CameraSetup, change_lens, clipping, view_pose
-from warpspace.app.viewport.rotation_player import Player
-from warpspace.geometry.surfaces import box_edges, outer_surface, segments
-from warpspace.picture.marks import corner_arrows, worst_point
+from warpspace.app.viewport.camera import fit_camera
+from warpspace.app.viewport.named_views import VIEWS, CameraSetup, clipping, view_pose
+from warpspace.app.viewport.tone_map import inverse_tone_map, line_colour, tone_map
+from warpspace.field.evaluate import evaluate_first_order
+from warpspace.geometry.colour import colour_table, linear_to_srgb, srgb_to_linear
+from warpspace.geometry.surfaces import isoline_levels
 from warpspace.picture.mesh import (
-    edge_pieces,
-    grid_pieces,
-    isoline_pieces,
-    line_mesh,
-    map_mesh,
+    isoline_labels,
 )
-from warpspace.picture.topology import topology
 from warpspace.scene.library import load_scene
-from warpspace.scene.pipeline import evaluate
+from warpspace.scene.model import evaluate
 
-LIVE = LiveModel()
 SCENE = load_scene("dvf5000_first")
 START = start_state(SCENE)
+LIVE = LiveModel()
+
+
+@pytest.fixture(scope="module")
+def picture():
+    return LIVE.evaluate(START)
+
+
+def test_field_is_that_of_the_scene_and_of_a_changed_set(picture):
+    np.testing.assert_allclose(picture.field.error_um, evaluate(SCENE, grid=21).error_um, atol=1e-9)
+    state, changed = START.with_nodes(5), SCENE.errors
+    for key, value in (("EXX", 7.0), ("EAY", 10.0)):
+        state = state.with_amplitude(key, value)
+        changed = changed.with_amplitude(key, value, (0.0, 1.0))
+    moved = LIVE.evaluate(state)
+    wanted = evaluate_first_order(SCENE.model, changed, moved.grid.coordinates)
+    np.testing.assert_allclose(moved.field.error_um, wanted.error_um, atol=1e-9)
+
+
+def test_exaggeration_auto_number_and_true_scale(picture):
+    assert picture.exaggeration == 1000.0
+    for factor in (1.0, 250.0):
+        drawn = LIVE.evaluate(START.with_exaggeration(factor))
+        shift = drawn.drawn_mm - drawn.grid.nominal_mm
+        np.testing.assert_allclose(shift, factor * 1e-3 * picture.field.error_um, atol=1e-9)
+
+
+def test_traces_that_no_error_moves_are_not_drawn():
+    assert LIVE.evaluate(START).traces
+    assert moved_traces(LIVE.evaluate(START)) == {}
+    assert chosen_trace(LIVE.evaluate(START)) == ""
+    moved = LIVE.evaluate(START.with_amplitude("EXC", 2.0).with_nodes(3))
+    assert set(moved_traces(moved)) == {
+        *(f"C at B {b}°, point (275, 0, 0) mm" for b in ("−30", "0", "30")),
+        "B at C 0°, point (275, 0, 0) mm",
+        *(f"C at B {b}°, point (0, 275, 450) mm" for b in ("−30", "0", "30")),
+        "B at C 0°, point (0, 275, 450) mm",
+    }
+    assert chosen_trace(moved) == "C at B 0°, point (275, 0, 0) mm"
+    assert moved_traces(LIVE.evaluate(moved.state.with_shown(traces=False))) == {}
+
+
+def test_kept_results_are_dropped_oldest_first():
+    kept: Cache[str] = Cache(10)
+    built: list[str] = []
+
+    def build(name):
+        built.append(name)
+        return name
+
+    for name in "abacb":
+        kept.get(name, lambda name=name: build(name), lambda _: 5)
+    assert built == ["a", "b", "c", "b"]
 
 
 def looking(**changes):
     return replace(START, look=replace(START.look, **changes))
-
-
-def test_whole_surface_is_the_outer_surface_with_its_edges():
-    found, plain = topology((5, 7, 3)), outer_surface((5, 7, 3))
-    assert np.array_equal(found.surface.nodes, plain.nodes)
-    assert {frozenset(t) for t in found.surface.triangles.tolist()} == {
-        frozenset(t) for t in plain.triangles.tolist()
-    }
-    edges = segments(box_edges((5, 7, 3)))
-    assert {frozenset(e) for e in found.edge_segments.tolist()} == {
-        frozenset(e) for e in edges.tolist()
-    }
-    at_corner = found.edge_outwards[found.edge_segments == 0]
-    assert len(at_corner) == 3
-    assert (at_corner == -1).all()
 
 
 def test_cut_octant_opens_the_corner_towards_the_operator():
@@ -72,17 +111,6 @@ def test_cut_octant_opens_the_corner_towards_the_operator():
     assert np.linalg.norm(nodes - right_front_top, axis=-1).min() > 150.0
     middle = (low + high) / 2.0
     assert np.linalg.norm(nodes - middle, axis=-1).min() < 1e-9
-
-
-@pytest.mark.parametrize("surface", SURFACES)
-def test_every_way_of_drawing_stays_within_the_model(surface):
-    picture = LIVE.evaluate(looking(surface=surface))
-    mesh = line_mesh(picture) if surface == "grid" else map_mesh(picture)
-    assert mesh.triangles.max() == len(mesh.vertices_mm) - 1 == len(mesh.values) - 1
-    for pieces in (grid_pieces(picture), edge_pieces(picture), isoline_pieces(picture)):
-        assert len(pieces) > 10
-        near = np.linalg.norm(pieces[:, 0] - pieces[:, 1], axis=-1)
-        assert near.max() < 60.0
 
 
 def test_slices_lie_where_they_are_put_and_have_the_models_errors():
@@ -99,13 +127,6 @@ def test_slices_lie_where_they_are_put_and_have_the_models_errors():
         assert part.drawn_mm == pytest.approx(expected, abs=1e-6)
 
 
-def test_slices_follow_the_tool_point():
-    state = looking(surface="slices", follow=True)
-    machine = state.machine.with_linear("X", 120.0, linear_spans(SCENE)["X"])
-    at = slice_positions(SCENE, state.look, machine)
-    assert at == {"X": 120.0, "Y": 0.0, "Z": -280.0}
-
-
 @pytest.mark.parametrize("value", [float("nan"), 1e9, -1e9, float("inf")])
 def test_wild_numbers_are_brought_into_their_ranges(value):
     look = Look().with_slice("X", value, slice_spans(SCENE)["X"]).with_top(value)
@@ -116,9 +137,6 @@ def test_wild_numbers_are_brought_into_their_ranges(value):
     own = START.rotary.with_own((value, value, value)).own_mm
     assert own is not None
     assert np.abs(own).max() <= 2000.0
-
-
-def test_unknown_words_change_nothing():
     assert Look().with_choice(surface="x", quantity="y", range_mode="z") == Look()
 
 
@@ -145,14 +163,11 @@ def test_colour_ranges():
 
 
 def test_tool_point_lies_in_the_deformed_grid_and_the_tool_ends_in_it():
-    scene = load_scene("dvf5000_first")
-    grid_state = start_state(scene)
-    spans = linear_spans(scene)
-    machine = grid_state.machine.switched(shown=True)
+    spans, machine = linear_spans(SCENE), START.machine.switched(shown=True)
     for axis, node in (("X", 5), ("Y", 12), ("Z", 17)):
-        low, high = scene.workspace.ranges[axis]
+        low, high = SCENE.workspace.ranges[axis]
         machine = machine.with_linear(axis, low + node * (high - low) / 20.0, spans[axis])
-    picture = LIVE.evaluate(replace(grid_state, machine=machine))
+    picture = LIVE.evaluate(replace(START, machine=machine))
     found = tool_point(picture)
     assert found.drawn_mm == pytest.approx(picture.drawn_mm[5, 12, 17], abs=1e-9)
     assert found.value == pytest.approx(picture.values[5, 12, 17], abs=1e-9)
@@ -161,53 +176,27 @@ def test_tool_point_lies_in_the_deformed_grid_and_the_tool_ends_in_it():
     assert np.linalg.norm(tip - found.drawn_mm) < 9.0  # the rim of the tool's end, 8 mm
 
 
-def test_bodies_move_with_their_axes_and_bend_only_where_chosen():
-    def vertices(**machine):
-        state = replace(START, machine=replace(START.machine, shown=True, **machine))
-        return {p.body.name: p.vertices_mm for p in drawn_bodies(LIVE.evaluate(state))}
-
-    still = vertices(bent=False)
-    moved = vertices(bent=False, linear_mm={"X": 100.0})
-    for name in ("X_saddle", "Y_saddle", "Z_ram", "S_spindle", "t_tool"):
-        assert moved[name] - still[name] == pytest.approx(
-            np.broadcast_to((100.0, 0, 0), still[name].shape)
-        )
-    for name in ("R_bed", "R_column", "B_cradle", "C_table"):
-        assert np.array_equal(moved[name], still[name])
-    bent = vertices(bent=True)
-    assert np.abs(bent["t_tool"] - still["t_tool"]).max() > 1.0
-    assert np.array_equal(bent["R_bed"], still["R_bed"])
-    room = machine_room_mm(LIVE.evaluate(START))
-    assert np.ptp(room, axis=0).min() > 1000.0
+def seen(pose, points):
+    """Where points are in a picture: to the right and up, in halves of its height, and how deep."""
+    back = (pose.position - pose.look_at) / np.linalg.norm(pose.position - pose.look_at)
+    right = np.cross((0, 0, 1), back) / np.linalg.norm(np.cross((0, 0, 1), back))
+    away = points - pose.position
+    depth = -(away @ back)
+    half = depth * np.tan(pose.fov_rad / 2.0)
+    return away @ right / half, away @ np.cross(back, right) / half, depth, back
 
 
 @pytest.mark.parametrize("view", VIEWS)
 @pytest.mark.parametrize("orthographic", [False, True])
 def test_named_views_show_everything_from_their_side(view, orthographic):
     points = np.random.default_rng(1).uniform((-3, -2, -1), (3, 2, 4), (50, 3))
-    stand = CameraSetup(view, orthographic)
-    pose = view_pose(points, 1.5, stand)
-    back = pose.position - pose.look_at
-    back /= np.linalg.norm(back)
-    wanted = np.array(VIEWS[view]) / np.linalg.norm(VIEWS[view])
-    assert back == pytest.approx(wanted, abs=1e-9)
-    right = np.cross((0, 0, 1), back) / np.linalg.norm(np.cross((0, 0, 1), back))
-    up = np.cross(back, right)
-    seen = points - pose.position
-    depth = -(seen @ back)
-    half = np.tan(pose.fov_rad / 2.0)
-    assert np.abs(seen @ up / depth).max() <= half
-    assert np.abs(seen @ right / depth).max() <= 1.5 * half
+    pose = view_pose(points, 1.5, CameraSetup(view, orthographic))
+    x, y, depth, back = seen(pose, points)
+    assert back == pytest.approx(np.array(VIEWS[view]) / np.linalg.norm(VIEWS[view]), abs=1e-9)
+    assert np.abs(y).max() <= 1.0
+    assert np.abs(x).max() <= 1.5
     near, far = clipping(pose.position, points, orthographic=orthographic)
     assert near < depth.min() < depth.max() < far
-
-
-def test_telephoto_keeps_what_is_looked_at_as_large():
-    at, eye = np.array([1.0, 2.0, 3.0]), np.array([5.0, -6.0, 7.0])
-    there = change_lens(eye, at, 0.4, 0.05)
-    before = np.linalg.norm(eye - at) * np.tan(0.2)
-    assert np.linalg.norm(there - at) * np.tan(0.025) == pytest.approx(before)
-    assert change_lens(there, at, 0.05, 0.4) == pytest.approx(eye)
 
 
 @pytest.mark.parametrize(
@@ -226,38 +215,6 @@ def test_positions_are_read_as_people_type_them(text, kept, noted):
     found, note = parse_positions(text, Span(-120.0, 30.0, 1.0))
     assert found == kept
     assert bool(note) == noted
-
-
-def test_traces_run_over_c_at_several_b_and_over_b_at_several_c():
-    assert default_held(SCENE, START.rotary, {"B": 0.0, "C": 0.0}) == {
-        "C": (0.0,), "B": (-30.0, 0.0, 30.0),
-    }  # fmt: skip
-    assert quarters(SCENE, "C") == (0.0, 90.0, 180.0, 270.0)
-    rotary = START.rotary.with_held("C", (0.0, 90.0, 180.0)).with_held("B", (-60.0, 15.0))
-    rows = circle_rows(LIVE.evaluate(replace(START, rotary=rotary.with_point(1, on=False))))
-    assert [(row.trace.axis, *row.trace.at.items()) for row in rows] == [
-        ("B", ("C", 0.0)), ("B", ("C", 90.0)), ("B", ("C", 180.0)),
-        ("C", ("B", -60.0)), ("C", ("B", 15.0)),
-    ]  # fmt: skip
-
-
-def test_circle_numbers_are_those_of_a_tilted_axis():
-    scene = load_scene("teach_tilted_c")
-    state = replace(start_state(scene), rotary=START.rotary.with_own((100.0, 0.0, 50.0)))
-    rows = [row for row in circle_rows(LIVE.evaluate(state)) if row.trace.axis == "C"]
-    tilts = [row.deviation.tilt_urad for row in rows if row.deviation]
-    wanted = np.hypot(scene.errors.amplitude("EA0C"), scene.errors.amplitude("EB0C"))
-    assert tilts == pytest.approx([wanted] * len(tilts), rel=1e-6)
-    text = circle_table(rows)
-    for words in ("µrad", "µm", "C at B −30°", "point (100, 0, 50) mm"):
-        assert words in text
-
-
-def test_point_on_its_axis_has_no_circle():
-    state = replace(START, rotary=START.rotary.with_own((0.0, 0.0, 80.0)))
-    rows = circle_rows(LIVE.evaluate(state))
-    assert any(row.deviation is None for row in rows)
-    assert "on the axis" in circle_table(rows)
 
 
 def test_played_points_stay_on_their_circles():
@@ -281,52 +238,85 @@ def test_played_points_stay_on_their_circles():
         assert point == pytest.approx(turned, abs=1e-6)
 
 
-def test_player_turns_pauses_and_rewinds():
-    asked = threading.Event()
-    player = Player(asked.set)
-    player.play()
-    player.play()
-    assert asked.wait(2.0)
-    player.pause()
-    angle = player.angle_deg
-    assert 0.0 < angle < 60.0
-    asked.clear()
-    assert not asked.wait(0.4)
-    assert player.angle_deg == angle
-    assert player.rewind()
-    assert not player.rewind()
-    assert not player.playing
-    time.sleep(0.2)
-    assert not [t for t in threading.enumerate() if t.name == "warpspace-rotation"]
+@pytest.mark.parametrize("diverging", [False, True])
+def test_tone_map_turns_the_sent_colours_into_the_wanted_ones(diverging):
+    wanted = colour_table(diverging=diverging)
+    arrived = linear_to_srgb(tone_map(inverse_tone_map(wanted).astype(float))) * 255.0
+    assert np.abs(arrived - wanted).max() < 0.6
 
 
-@pytest.mark.parametrize("name", ["teach_squareness", "dvf5000_nominal", "teach_wobbling_table"])
-def test_other_scenes_can_be_looked_at_in_every_way(name):
-    state = start_state(load_scene(name))
-    for surface in SURFACES:
-        picture = LIVE.evaluate(replace(state, look=replace(state.look, surface=surface)))
-        assert np.isfinite(map_mesh(picture).vertices_mm).all()
-        isoline_pieces(picture)
-        tool_point(picture)
-    assert np.isfinite(LIVE.evaluate(state.with_scene(SCENE)).drawn_mm).all()
+@given(st.tuples(*[st.integers(min_value=0, max_value=225)] * 3))
+def test_grey_and_dark_line_colours_arrive(rgb):
+    grey = (max(rgb), max(rgb), max(rgb))
+    sent = srgb_to_linear(np.array(line_colour(grey)) / 255.0)
+    arrived = linear_to_srgb(tone_map(sent)) * 255.0
+    assert np.abs(arrived - np.array(grey)).max() < 4.0
+
+
+@given(
+    st.floats(min_value=0.3, max_value=4.0),
+    st.floats(min_value=0.0, max_value=0.3),
+    st.floats(min_value=0.0, max_value=0.45),
+    st.lists(st.tuples(*[st.floats(min_value=-500, max_value=500)] * 3), min_size=2, max_size=12),
+)
+def test_camera_sees_every_point_between_heading_and_foot(aspect, top, bottom, points):
+    spread = np.array([*points, (600.0, 0.0, 0.0), (-600.0, 0.0, 0.0)])
+    x, y, depth, _ = seen(fit_camera(spread, aspect, top=top, bottom=bottom), spread)
+    assert (depth > 0).all()
+    assert np.abs(x).max() <= 1.02 * aspect
+    assert y.min() >= -1.02 + 2 * bottom
+    assert y.max() <= 1.02 - 2 * top
+
+
+COARSE = START.with_nodes(9)
 
 
 @pytest.mark.parametrize(
-    ("changes", "component", "hidden"),
+    "text",
     [
-        ({}, "norm", 1),
-        ({"worst": False}, "norm", 0),
-        ({"quantity": "orientation"}, "norm", 0),  # the mark then says µrad
-        ({}, "z", 0),
+        "",
+        "1,2,3,4",
+        "1,900,700,80,-5",
+        "1,nan,700,80,50",
+        "1,50,700,80,50",
+        "1,9e9,7,8,5",
+        "²,9,9,9,9",
     ],
 )
-def test_a_corner_is_silent_only_where_the_worst_point_says_its_number(changes, component, hidden):
-    picture = LIVE.evaluate(looking(arrows=True, **changes).with_component(component))
-    grid = picture.grid
-    arrows = corner_arrows(
-        grid.shape, grid.nominal_mm, picture.field.error_um, picture.exaggeration
+def test_a_room_that_cannot_be_is_none(text):
+    assert read_room(text) is None
+
+
+def test_the_bars_of_a_picture_have_their_length():
+    picture = LIVE.evaluate(COARSE)
+    pixels = np.zeros((300, 600, 4), np.uint8)
+    plain, drawn = (
+        np.asarray(Image.open(BytesIO(view_png(pixels, picture, px)))).astype(int)
+        for px in (None, 0.7)
     )
-    worst = worst_point(picture.values, grid.nominal_mm, picture.drawn_mm)
-    silent = carries_worst(picture, arrows, worst)
-    assert silent.sum() == hidden
-    assert (arrows.norm_um[silent] == picture.statistics.max_um).all()
+    # at most 150 px: 200 mm at 0.7 px, and 200 µm drawn ×1000, 140 px each, from 16 px on
+    assert picture.exaggeration == 1000.0
+    for line in (HEAD_PX + 300 - 18, HEAD_PX + 300 - 42):
+        inked = np.flatnonzero(np.abs(drawn[line] - plain[line]).sum(axis=-1) > 300)
+        row = inked[inked < 16 + 145]
+        assert (row.min(), row.max()) == (pytest.approx(16, abs=1), pytest.approx(156, abs=1))
+
+
+def test_labels_of_isolines_stand_on_lines_of_their_value():
+    picture = LIVE.evaluate(COARSE)
+    labels = isoline_labels(picture)
+    assert {label.value for label in labels} <= set(isoline_levels(picture.scale))
+    assert len({label.value for label in labels}) >= 3
+    low, high = picture.grid.bounds_mm
+    seen: set[tuple[float, ...]] = set()
+    for label in labels:
+        # the field there, computed from the nodes around it: the nominal point by undoing the bend
+        nearest = np.linalg.norm(picture.drawn_mm - label.at_mm, axis=-1)
+        index = np.unravel_index(np.argsort(nearest, axis=None)[:8], picture.shape)
+        assert picture.values[index].min() - 3.0 <= label.value <= picture.values[index].max() + 3.0
+        face = (*label.outward, label.value)
+        assert face not in seen
+        seen.add(face)
+        axis = int(np.abs(label.outward).argmax())
+        side = high if label.outward[axis] > 0 else low
+        assert abs(label.at_mm[axis] - side[axis]) < 0.12 * picture.size_mm

@@ -1,7 +1,5 @@
 """Changing the machine of a state: what is kept, what goes, what undo brings back."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import trimesh
@@ -9,14 +7,15 @@ from markupsafe import Markup
 
 from warpspace.app.documents.scene_file import open_text, state_to_toml
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.evaluation.machine_edits.guides import guide_errors
-from warpspace.app.evaluation.machine_edits.library import machine_types
-from warpspace.app.evaluation.machine_edits.updates import with_own_machine, with_word
-from warpspace.app.panels.commands import spell_change
-from warpspace.app.readouts.machine_editor.boxes import editor_html, editor_rows
-from warpspace.app.readouts.machine_editor.types import small_picture
+from warpspace.app.evaluation.machine_edits import (
+    guide_errors,
+    machine_types,
+    with_own_machine,
+    with_word,
+)
+from warpspace.app.readouts.machine_editor import editor_html
 from warpspace.app.state import edits
-from warpspace.app.state.app_state import AppState, start_state
+from warpspace.app.state.app_state import start_state
 from warpspace.app.state.edits import (
     with_curve,
     with_excluded,
@@ -24,21 +23,20 @@ from warpspace.app.state.edits import (
     with_scene_tolerances,
     with_typed_amplitude,
 )
-from warpspace.app.state.history import History, describe_change
+from warpspace.app.state.store import History
 from warpspace.bodies.placed import load_bodies
 from warpspace.machine.errors import Constant, Directional, Ramp
-from warpspace.scene.library import load_scene, parse_scene
-from warpspace.scene.machines import machine_picture
+from warpspace.scene.library import load_scene
 
 LIVE = LiveModel()
 
 
 @pytest.fixture
-def state() -> AppState:
+def state():
     return start_state(load_scene("dvf5000_first"))
 
 
-def test_another_chain_keeps_changed_errors_and_drops_those_of_axes_that_go(state: AppState):
+def test_another_chain_keeps_changed_errors_and_drops_those_of_axes_that_go(state):
     state = with_typed_amplitude(state, "EAX", 33.0)
     state = with_typed_amplitude(state, "EXC", 4.0)
     state = with_half_width(state, "EAX", 7.0)
@@ -58,20 +56,7 @@ def test_another_chain_keeps_changed_errors_and_drops_those_of_axes_that_go(stat
     LIVE.evaluate(changed)
 
 
-def test_the_box_follows_the_volume_and_the_offset(state: AppState):
-    before = LIVE.evaluate(state).grid.bounds_mm
-    low, high = state.scene.workspace.ranges["X"]
-    wider = with_word(state, f"volume X 1 {high + 50:g}")
-    grown = LIVE.evaluate(wider).grid.bounds_mm
-    np.testing.assert_allclose(grown[1] - before[1], [50.0, 0.0, 0.0], atol=1e-9)
-    z = state.scene.machine.axes["Z"].offset_mm[2]
-    higher = with_word(state, f"offset Z 2 {z + 25:g}")
-    moved = LIVE.evaluate(higher).grid.bounds_mm
-    np.testing.assert_allclose(moved - before, [[0.0, 0.0, 25.0]] * 2, atol=1e-9)
-    assert low < high
-
-
-def test_curves_that_were_scaled_stay_the_same_functions_of_the_position(state: AppState):
+def test_curves_that_were_scaled_stay_the_same_functions_of_the_position(state):
     key = "EAX"
     state = with_typed_amplitude(state, key, 2.5 * state.amplitudes[key])
     changed = with_word(state, "volume X 1 400")
@@ -85,7 +70,7 @@ def test_curves_that_were_scaled_stay_the_same_functions_of_the_position(state: 
     assert reset.scene.workspace == changed.scene.workspace
 
 
-def test_the_machine_of_the_scene_comes_back_with_the_errors_of_its_axes(state: AppState):
+def test_the_machine_of_the_scene_comes_back_with_the_errors_of_its_axes(state):
     changed = with_word(with_word(state, "chain wFXYZt"), "offset X 0 12")
     assert with_word(changed, "own").scene == state.scene
     back = with_own_machine(changed)
@@ -93,7 +78,7 @@ def test_the_machine_of_the_scene_comes_back_with_the_errors_of_its_axes(state: 
     assert back.loaded is None
     assert back.tolerances == state.tolerances
     assert with_own_machine(state) is state
-    other = with_word(with_word(state, "type gantry_mill"), "volume X 1 400")
+    other = with_word(with_word(state, "chain wFXYZt"), "volume X 1 200")
     assert other.scene.workspace != state.scene.workspace
     assert other.changed_keys == ()
     back = with_own_machine(other)
@@ -106,7 +91,7 @@ def test_the_machine_of_the_scene_comes_back_with_the_errors_of_its_axes(state: 
     assert back.amplitudes["EAX"] == pytest.approx(2.0 * state.amplitudes["EAX"])
 
 
-def test_undo_takes_each_change_back(state: AppState):
+def test_undo_takes_each_change_back(state):
     history = History(state)
     for number, word in enumerate(("left Y", "side X", "turn C", "chain wXFYt", "type scara")):
         history = history.push(with_word(history.present, word).without_notes(), 10.0 * number)
@@ -129,7 +114,7 @@ def test_undo_takes_each_change_back(state: AppState):
         "volume B 1 40",
     ],
 )
-def test_what_cannot_be_is_refused_with_a_note_and_nothing_is_lost(state: AppState, word: str):
+def test_what_cannot_be_is_refused_with_a_note_and_nothing_is_lost(state, word):
     changed = with_word(state, word)
     assert changed.without_notes() == state
     assert len(changed.notes) == 1
@@ -138,114 +123,34 @@ def test_what_cannot_be_is_refused_with_a_note_and_nothing_is_lost(state: AppSta
 @pytest.mark.parametrize(
     "word", ["", "own x", "type ../..", "offset X 7 1", "offset X", "turn Q", "__class__ X 0 1"]
 )
-def test_words_that_are_none_change_nothing(state: AppState, word: str):
+def test_words_that_are_none_change_nothing(state, word):
     assert with_word(state, word) is state
 
 
-def test_a_number_beyond_the_limits_is_clamped_and_said(state: AppState):
-    changed = with_word(state, "offset X 0 1e9")
-    assert changed.scene.machine.axes["X"].offset_mm[0] == 1e5
-    assert "clamped" in changed.notes[0]
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("chain wC2XFZC1t",),
-        ("travel X 1 400", "turn C"),
-        ("offset X 0 12,5", "rotation B 0 45", "volume Z 0 -600"),
-        ("remove C", "side Y"),
-    ],
-)
-def test_a_saved_file_opens_to_the_same_state(state: AppState, words: tuple[str, ...]):
-    state = with_typed_amplitude(state, "EAX", 21.0)
-    for word in words:
-        state = with_word(state, word).without_notes()
-    opened, _ = open_text(state_to_toml(state), state.scene.name, "file")
-    assert opened.scene.machine == state.scene.machine
-    assert opened.scene.workspace == state.scene.workspace
-    assert opened.amplitudes == state.amplitudes
-    assert opened.positions == state.positions
-
-
-def test_every_machine_of_the_library_can_be_taken_and_drawn(state: AppState):
+def test_every_machine_of_the_library_starts_with_its_own_scene(state):
+    state = with_typed_amplitude(state, "EAX", 33.0)
     names = [entry.name for entry in machine_types()]
     assert "dvf5000" in names
     assert len(names) == len(set(names))
-    for name in names:
-        changed = with_word(state, f"type {name}")
+    for entry in machine_types():
+        changed = with_word(state, f"type {entry.name}")
         LIVE.evaluate(changed)
-        assert changed.scene.title == state.scene.title
+        if entry.name == "dvf5000":  # as it was opened, with all that has been entered
+            assert changed is state
+            continue
+        assert changed.scene == changed.origin == entry.scene
+        assert changed.amplitudes == start_state(entry.scene).amplitudes
+        assert entry.scene.title in changed.notes[0]
+        assert state.scene.title in changed.notes[0]
 
 
-def test_the_sizes_of_a_new_machine_suit_any_chain(state: AppState):
-    for chain in ("wC2XFZC1t", "wBFXYZt", "wFC1C2Zt", "wXYZFt"):
-        changed = with_word(with_word(state, f"chain {chain}"), "sizes")
-        assert str(changed.scene.machine.chain) == chain
-        assert LIVE.evaluate(changed).grid.extent_mm.max() > 100.0
-        opened, _ = open_text(state_to_toml(changed), state.scene.name, "file")
-        for part in ("model", "workspace", "tolerances", "trace_points_mm", "notes"):
-            assert getattr(opened.scene, part) == getattr(changed.scene, part)
-        assert opened.amplitudes == pytest.approx(changed.amplitudes, rel=1e-12)
-
-
-def test_undo_says_that_it_was_the_machine(state: AppState):
-    changed = with_word(state, "chain wBFXYZt").without_notes()
-    assert spell_change(describe_change(state, changed)) == "machine"
-    other = state.with_scene(load_scene("teach_tilted_c"))
-    assert spell_change(describe_change(state, other)) == "scene"
-
-
-def test_the_editor_escapes_what_was_typed_and_names_every_box(state: AppState):
-    text = editor_html(
-        state.scene,
-        lambda word: Markup(f'data-word="{word}"'),
-        lambda word: Markup(""),
-        "<script>",
-        "no <chain>",
-    )
+def test_the_editor_escapes_what_was_typed(state):
+    text = editor_html(state.scene, Markup, lambda _: Markup(""), "<script>", "no <chain>")
     assert "<script>" not in text
     assert "no &lt;chain&gt;" in text
-    assert (
-        text.count("<input")
-        == text.count("aria-label=") - text.count("<section") - (text.count("<button")) + 1
-    )
-    assert 'data-word="left B"' in text
-    assert [row.name for row in editor_rows(state.scene)] == [*"wCBXYZSt"]
 
 
-def test_every_machine_has_a_small_picture():
-    for entry in machine_types():
-        picture = small_picture(entry.name)
-        if machine_picture(entry.name) is not None:
-            assert picture.startswith("data:image/jpeg;base64,")
-            assert len(picture) < 40_000
-
-
-def test_a_volume_spanned_by_rotary_axes_keeps_its_size():
-    scara = start_state(
-        parse_scene(
-            """
-[machine]
-chain = "wFC1C2Zt"
-[machine.offset_mm]
-C2 = [300, 0, 0]
-t = [200, 0, 0]
-[workspace]
-C1 = [-60, 60]
-C2 = [20, 120]
-Z = [-50, 50]
-""",
-            "scara",
-        )
-    )
-    assert LIVE.evaluate(scara).grid.shape == (21, 21, 21)
-    wider = with_word(scara, "volume C1 0 -80")
-    assert LIVE.evaluate(wider).grid.shape == (21, 21, 21)
-    assert wider.scene.workspace.ranges["C1"] == (-80.0, 60.0)
-
-
-def test_a_gantry_is_made_its_guides_are_set_and_their_distance_keeps_them(state: AppState):
+def test_a_gantry_is_made_its_guides_are_set_and_their_distance_keeps_them(state):
     made = with_word(state, "gantry X")
     gantry = made.scene.machine.gantries["X"]
     assert (gantry.span_mm, gantry.across) == (450.0, "y")  # as far as Y travels
@@ -266,7 +171,7 @@ def test_a_gantry_is_made_its_guides_are_set_and_their_distance_keeps_them(state
     assert guide_errors(opened, "X") == pytest.approx((4.0, 13.0))
 
 
-def test_guides_share_the_curve_of_the_axis_and_other_curves_are_said(state: AppState):
+def test_guides_share_the_curve_of_the_axis_and_other_curves_are_said(state):
     made = with_word(state, "gantry Y")
     ramp = Ramp(edits.axis_span(made, "EYY"), 8.0)
     made = with_curve(with_typed_amplitude(made, "ECY", 0.0), "EYY", ramp)
@@ -301,15 +206,7 @@ def test_words_about_guides_and_meshes_that_are_not_there_change_nothing(state, 
     assert said in " ".join(changed.notes)
 
 
-def test_spans_are_clamped_and_what_is_no_number_is_said(state: AppState):
-    made = with_word(state, "gantry X")
-    assert with_word(made, "span X 0 -5").scene.machine.gantries["X"].span_mm == 1.0
-    assert "clamped" in with_word(made, "span X 0 1e30").notes[-1]
-    for word in ("span X 0 wide", "guide X 0 nan"):
-        assert "expected a number" in with_word(made, word).notes[-1]
-
-
-def test_meshes_of_the_scene_are_listed_without_their_folder_and_go(tmp_path: Path):
+def test_meshes_of_the_scene_are_listed_without_their_folder_and_go(tmp_path):
     trimesh.creation.box(extents=(20.0, 30.0, 40.0)).export(tmp_path / "pillar.stl")
     path = tmp_path / "own.toml"
     text = state_to_toml(start_state(load_scene("machine_c_frame_mill")))

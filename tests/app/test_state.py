@@ -1,31 +1,37 @@
-"""The state of a session: pure updates, and nothing wild gets in."""
+"""State of a session: pure updates, stores, undo, exclusions, edits."""
 
-import math
+import threading
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from warpspace.app.state.app_state import EXAGGERATION, NODES, AppState, start_state
-from warpspace.app.state.ranges import amplitude_span, round_up
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.state import edits
+from warpspace.app.state.app_state import EXAGGERATION, NODES, start_state
+from warpspace.app.state.ranges import Exclusions
+from warpspace.app.state.store import SAME_STEP_S, STEPS, History, StateStore
 from warpspace.kinematics.model import Loop
-from warpspace.machine.tolerances import Tolerance
+from warpspace.machine.errors import Constant, Ramp, Table
 from warpspace.scene.library import load_scene, scene_names
 
 FIRST = start_state(load_scene("dvf5000_first"))
 ANY_NUMBER = st.floats(allow_nan=True, allow_infinity=True)
 
 
-def test_starts_as_the_scene_says() -> None:
+def test_starts_as_the_scene_says():
     assert FIRST.amplitudes["EAY"] == -43.7
     assert len(FIRST.amplitudes) == 41
     assert FIRST.positions == {"B": 0.0, "C": 0.0}
     assert FIRST.exaggeration is None
     assert FIRST.loop is Loop.TOOL
+    # with errors of the table only
+    assert start_state(load_scene("teach_tilted_c")).loop is Loop.RELATIVE
 
 
 @pytest.mark.parametrize("name", scene_names())
-def test_every_start_lies_within_the_ranges_of_its_controls(name: str) -> None:
+def test_every_start_lies_within_the_ranges_of_its_controls(name):
     state = start_state(load_scene(name))
     for key, value in state.amplitudes.items():
         span = state.spans[key]
@@ -35,21 +41,8 @@ def test_every_start_lies_within_the_ranges_of_its_controls(name: str) -> None:
         assert state.position_spans[axis].low <= value <= state.position_spans[axis].high
 
 
-def test_a_scene_with_errors_of_the_table_only_starts_in_the_relative_loop() -> None:
-    assert start_state(load_scene("teach_tilted_c")).loop is Loop.RELATIVE
-    assert start_state(load_scene("dvf5000_nominal")).loop is Loop.TOOL
-
-
-def test_updates_leave_the_old_state_alone() -> None:
-    moved = FIRST.with_amplitude("EXX", 4.0)
-    assert (FIRST.amplitudes["EXX"], moved.amplitudes["EXX"]) == (0.0, 4.0)
-    assert moved.notes == ()
-    assert moved.changed_keys == ("EXX",)
-    assert list(moved.amplitudes) == list(FIRST.amplitudes)
-
-
 @given(ANY_NUMBER)
-def test_any_amplitude_is_brought_into_its_range(value: float) -> None:
+def test_any_amplitude_is_brought_into_its_range(value):
     span = FIRST.spans["EAX"]
     state = FIRST.with_amplitude("EAX", value)
     kept = state.amplitudes["EAX"]
@@ -58,21 +51,13 @@ def test_any_amplitude_is_brought_into_its_range(value: float) -> None:
 
 
 @given(ANY_NUMBER)
-def test_any_factor_density_and_position_is_brought_into_its_range(value: float) -> None:
+def test_any_factor_density_and_position_is_brought_into_its_range(value):
     factor = FIRST.with_exaggeration(value).exaggeration
     assert factor is None or EXAGGERATION.low <= factor <= EXAGGERATION.high
     nodes = FIRST.with_nodes(value).nodes
     assert NODES.low <= nodes <= NODES.high
     assert nodes % 2 == 1
     assert -120.0 <= FIRST.with_position("B", value).positions["B"] <= 30.0
-
-
-def test_what_is_no_number_leaves_the_value_as_it_was_and_says_so() -> None:
-    state = FIRST.with_amplitude("EAY", math.nan)
-    assert state.amplitudes["EAY"] == -43.7
-    assert "EAY = nan" in state.notes[0]
-    assert FIRST.with_exaggeration(math.nan).exaggeration is None
-    assert FIRST.with_exaggeration(math.nan).notes
 
 
 @pytest.mark.parametrize(
@@ -84,12 +69,12 @@ def test_what_is_no_number_leaves_the_value_as_it_was_and_says_so() -> None:
         FIRST.with_loop("loop"),
     ],
 )
-def test_unknown_names_change_nothing_and_are_noted(state: AppState) -> None:
+def test_unknown_names_change_nothing_and_are_noted(state):
     assert state.without_notes() == FIRST
     assert state.notes
 
 
-def test_reset_and_zero_of_one_axis_and_of_all() -> None:
+def test_reset_and_zero_of_one_axis_and_of_all():
     edited = FIRST.with_amplitude("EAY", 10.0).with_amplitude("EXX", 5.0)
     assert edited.reset("X").changed_keys == ("EAY",)
     assert edited.reset().amplitudes == FIRST.amplitudes
@@ -98,23 +83,237 @@ def test_reset_and_zero_of_one_axis_and_of_all() -> None:
     assert not any(edited.zeroed().amplitudes.values())
 
 
-def test_another_scene_keeps_how_it_is_looked_at() -> None:
+def test_another_scene_keeps_how_it_is_looked_at():
     state = FIRST.with_component("z").with_nodes(11).with_shown(traces=False)
     other = state.with_scene(load_scene("dvf5000_second"))
     assert (other.component, other.nodes, other.shown.traces) == ("z", 11, False)
     assert other.amplitudes["EAY"] != FIRST.amplitudes["EAY"]
 
 
-def test_slider_range_holds_tolerance_and_twice_the_value() -> None:
-    assert amplitude_span("EXX", 0.0, None).high == 20.0
-    assert amplitude_span("EAX", 0.0, None).high == 50.0
-    assert amplitude_span("EAX", 0.0, Tolerance(-8.0, 6.0)).high == 20.0
-    assert amplitude_span("EAY", -43.7, Tolerance(0.0, 20.0)).high == 100.0
-    assert amplitude_span("EXX", 0.0, Tolerance(0.0, 0.0)).high == 20.0
+def moved(key, value):
+    return lambda state: state.with_amplitude(key, value)
 
 
-@given(st.floats(min_value=1e-6, max_value=1e9))
-def test_round_up_gives_the_next_round_number(value: float) -> None:
-    found = round_up(value)
-    assert value * (1 - 1e-8) <= found <= 2.5 * value * (1 + 1e-8)
-    assert f"{found:e}"[0] in "125"
+def test_undo_and_redo_name_what_they_do_and_notes_are_not_kept():
+    store = StateStore(FIRST)
+    assert "clamped" in store.apply(moved("EAX", 1e9))[0]
+    assert store.state.notes == ()
+    assert store.state.amplitudes["EAX"] == 20.0
+    assert FIRST.amplitudes["EAX"] != 20.0
+    assert store.undo() == "amplitudes.EAX"
+    assert store.state == FIRST
+    assert store.redo() == "amplitudes.EAX"
+    assert store.state.amplitudes["EAX"] == 20.0
+    assert store.redo() == ""
+
+
+def test_everybody_else_is_told():
+    store, told = StateStore(FIRST), []
+    one, two = (lambda: told.append("one")), (lambda: told.append("two"))
+    store.subscribe(one)
+    store.subscribe(two)
+    store.apply(moved("EAX", 1.0), by=one)
+    assert told == ["two"]
+    store.apply(lambda state: state, by=one)
+    assert told == ["two"]
+    store.undo()
+    assert sorted(told) == ["one", "two", "two"]
+    store.unsubscribe(two)
+    store.redo()
+    assert told.count("two") == 2
+
+
+def test_a_busy_server_does_not_make_two_steps_of_one_drag():
+    store = StateStore(FIRST)
+    for value, at in ((1.0, 10.0), (2.0, 10.3), (3.0, 12.0)):  # however much later it is applied
+        store.apply(moved("EAX", value), at=at)
+    assert len(store.history.past) == 2
+
+
+def test_what_raises_changes_nothing_and_blocks_nobody():
+    store = StateStore(FIRST)
+
+    def broken(state):
+        raise RuntimeError("a wheel came off")
+
+    with pytest.raises(RuntimeError):
+        store.apply(broken)
+    store.apply(moved("EAX", 1.0))
+    assert store.state.amplitudes["EAX"] == 1.0
+
+
+def test_many_steer_one_store_and_nothing_is_lost():
+    store = StateStore(FIRST)
+    keys = ("EXX", "EYX", "EZX", "EAX", "EBX", "ECX")
+
+    def steer(key):
+        for value in range(60):
+            store.apply(moved(key, value / 10.0))
+
+    threads = [threading.Thread(target=steer, args=(key,)) for key in keys]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert all(store.state.amplitudes[key] == 5.9 for key in keys)
+    assert len(store.history.past) <= STEPS
+
+
+def test_a_copy_goes_its_own_way():
+    store = StateStore(FIRST)
+    store.apply(moved("EAX", 1.0))
+    copy = store.copy()
+    store.apply(moved("EAX", 2.0))
+    assert copy.state.amplitudes["EAX"] == 1.0
+    copy.undo()
+    assert copy.state == FIRST
+
+
+def test_a_drag_is_one_step():
+    history = History(FIRST)
+    for tick in range(40):
+        history = history.push(FIRST.with_amplitude("EAX", 0.1 * (tick + 1)), at=tick * 0.05)
+    assert len(history.past) == 1
+    assert history.undo().present == FIRST
+    assert history.undo().redo().present == FIRST.with_amplitude("EAX", 4.0)
+
+
+def test_a_pause_and_another_slider_begin_another_step():
+    history = History(FIRST).push(FIRST.with_amplitude("EAX", 1.0), 0.0)
+    later = history.push(FIRST.with_amplitude("EAX", 2.0), SAME_STEP_S + 0.1)
+    assert len(later.past) == 2
+    other = history.push(history.present.with_amplitude("EBX", 1.0), 0.01)
+    assert other.undoes == "amplitudes.EBX"
+    assert other.undo().undoes == "amplitudes.EAX"
+
+
+def test_a_change_after_undo_forgets_the_future():
+    history = History(FIRST).push(FIRST.with_amplitude("EAX", 1.0), 0.0).undo()
+    assert history.redoes == "amplitudes.EAX"
+    history = history.push(FIRST.with_amplitude("EAX", 3.0), 0.1)
+    assert history.redo() is history
+    assert history.undo().present == FIRST
+
+
+def test_the_past_is_bounded():
+    history = History(FIRST, limit=10)
+    for tick in range(50):
+        history = history.push(FIRST.with_amplitude("EAX", 0.1 * (tick + 1)), at=10.0 * tick)
+    assert len(history.past) == 10
+
+
+def test_what_changes_nothing_is_no_step():
+    history = History(FIRST)
+    assert history.push(FIRST, 1.0) is history.undo() is history.redo() is history
+
+
+@given(
+    st.lists(
+        st.one_of(
+            st.tuples(st.sampled_from(["EAX", "EBX"]), st.integers(-3, 3)),
+            st.sampled_from(["undo", "redo"]),
+        ),
+        max_size=40,
+    )
+)
+def test_undo_and_redo_are_inverse(actions):
+    history, at = History(FIRST), 0.0
+    for action in actions:
+        at += 1.0
+        if action == "undo":
+            history = history.undo()
+        elif action == "redo":
+            history = history.redo()
+        else:
+            history = history.push(history.present.with_amplitude(action[0], float(action[1])), at)
+    if history.past:
+        assert history.undo().redo().present == history.present
+    back = history
+    while back.past:
+        back = back.undo()
+    assert back.present == FIRST
+
+
+AMPLITUDES = {"EAX": 5.0, "EBX": -2.0, "EC0Y": 23.1}
+
+
+def test_what_is_excluded_is_zero_and_only_takes_part_alone():
+    assert Exclusions().effective(AMPLITUDES) is AMPLITUDES
+    excluded = Exclusions().with_excluded("EAX", True)
+    assert excluded.effective(AMPLITUDES) == {**AMPLITUDES, "EAX": 0.0}
+    only = Exclusions().with_only("EAX", True)
+    assert only.effective(AMPLITUDES) == {"EAX": 5.0, "EBX": 0.0, "EC0Y": 0.0}
+    two = only.with_only("EBX", True)
+    assert two.effective(AMPLITUDES) == {"EAX": 5.0, "EBX": -2.0, "EC0Y": 0.0}
+    both = only.with_excluded("EAX", True)
+    assert set(both.effective(AMPLITUDES).values()) == {0.0}
+    assert not both.with_only("EAX", False).with_excluded("EAX", False)
+
+
+def test_what_another_machine_lacks_is_forgotten():
+    exclusions = Exclusions(frozenset({"EAX"}), frozenset({"EXA"}))
+    assert exclusions.within(AMPLITUDES) == Exclusions(frozenset({"EAX"}))
+
+
+LIVE = LiveModel()
+SPAN = (-275.0, 275.0)
+
+
+def test_a_curve_moves_amplitude_slider_and_picture():
+    curve = Table(SPAN, ((-275.0, 0.0), (0.0, 30.0), (275.0, -4.0)))
+    state = edits.with_curve(FIRST, "EXX", curve)
+    assert state.amplitudes["EXX"] == 30.0
+    assert state.spans["EXX"].high >= 30.0
+    assert edits.curve_of(state, "EXX") == curve
+    before, after = LIVE.evaluate(FIRST), LIVE.evaluate(state)
+    moved = (after.field.error_um - before.field.error_um)[:, 10, 10, 0]
+    np.testing.assert_allclose(moved[[0, 10, 20]], [0.0, 30.0, -4.0], atol=1e-9)
+    assert edits.with_curve(state, "EXX", curve) is state
+    # and its slider scales it
+    assert edits.curve_of(state.with_amplitude("EXX", 8.0), "EXX").amplitude == pytest.approx(8.0)
+
+
+def test_a_constant_parameter_takes_constants_only():
+    state = edits.with_curve(FIRST, "EC0Y", Ramp((-225.0, 225.0), 3.0))
+    assert state.amplitudes == FIRST.amplitudes
+    assert "constant" in state.notes[0]
+    assert edits.with_curve(FIRST, "EC0Y", Constant((-225.0, 225.0), 3.0)).amplitudes["EC0Y"] == 3.0
+
+
+def test_reset_brings_curves_back_and_forgets_that_any_was_edited():
+    state = edits.with_curve(FIRST, "EAX", Constant(SPAN, 3.0))
+    state = edits.with_curve(state, "EAY", Constant((-225.0, 225.0), 2.0))
+    assert state.origin is FIRST.scene
+    half = state.reset("X")
+    assert edits.curve_of(half, "EAX") == edits.curve_of(FIRST, "EAX")
+    assert edits.curve_of(half, "EAY") == Constant((-225.0, 225.0), 2.0)
+    whole = half.reset()
+    assert whole.scene is FIRST.scene
+    assert whole.loaded is None
+
+
+@pytest.mark.parametrize(
+    ("given", "kept"), [(3.0, 3.0), (-5.0, 0.0), (1e9, 1000.0), (float("nan"), 20.0)]
+)
+def test_half_widths_are_clamped_and_the_centre_stays(given, kept):
+    state = edits.with_half_width(FIRST, "EAX", given)
+    assert edits.half_width_of(state, "EAX") == kept
+    assert bool(state.notes) == (given != kept)
+    assert edits.with_scene_tolerances(state).tolerances == FIRST.scene.tolerances
+    proposed = start_state(load_scene("dvf5000_proposed"))
+    assert edits.with_half_width(proposed, "EAX", 1.0).tolerances.get("EAX").centre == -8.0
+
+
+def test_unknown_keys_change_nothing():
+    assert edits.with_excluded(FIRST, "EXA", True) is FIRST
+    assert edits.with_only(FIRST, "EXA", True) is FIRST
+    assert edits.with_half_width(FIRST, "EXA", 1.0).tolerances == FIRST.tolerances
+    assert edits.with_curve(FIRST, "EXA", Constant(SPAN, 1.0)).amplitudes == FIRST.amplitudes
+
+
+@pytest.mark.parametrize("limit", [float("nan"), float("inf"), -3.0, 1e9])
+def test_the_specification_is_clamped(limit):
+    wanted = FIRST.specification.with_limit(limit)
+    assert 1.0 <= wanted.limit_um <= 300.0
+    assert wanted.with_over("<script>") == wanted
+    assert wanted.with_distribution("cauchy") == wanted

@@ -2,16 +2,20 @@
 
 import re
 import secrets
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from websockets.sync.client import ClientConnection, connect
 
 from page_protocol import CAMERA, HOW, pack, unpack, update
 from warpspace.app.browser.arrivals import CARRIER
-from warpspace.app.browser.opening import stage_script
+from warpspace.app.browser.page import stage_script
+from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
 from warpspace.machine.parameters import PARAMETERS
+from warpspace.scene.model import Scene
 
 OPEN = stage_script("open")
 """The script by which a page learns that it has all."""
@@ -44,11 +48,15 @@ class Wire:
 
     def read_until(self, fine: Callable[[], bool], seconds: float = 20.0) -> bool:
         """Read until something holds; tell whether it did before nothing came any more."""
+        heard = time.monotonic()
         while not fine():
             try:
-                raw = self._socket.recv(timeout=seconds)
-            except TimeoutError:
-                return False
+                raw = self._socket.recv(timeout=0.1)
+            except TimeoutError:  # what is waited for may come without a message
+                if time.monotonic() - heard > seconds:
+                    return fine()
+                continue
+            heard = time.monotonic()
             for message in unpack(raw):
                 self._take(message)
         return True
@@ -80,3 +88,23 @@ class Wire:
             "".join(self.scripts),
         )
         return [pair for pair in found if pair[0]][-1]
+
+
+def end_work(viewer: Viewer) -> None:
+    """End what an app does for its pages: viser warns of what is done once it has stopped."""
+    sessions = viewer.sessions
+    for session in sessions:
+        session.stop()
+    for session in sessions:
+        session._worker.join(60.0)
+
+
+@contextmanager
+def opened(scene: Scene, **how: Any) -> Iterator[tuple[Wire, Session, dict[str, Any]]]:
+    """Open a page on an app of its own; give it, its session and its panels by their class."""
+    with Viewer(scene, **how) as viewer, dial(viewer) as socket:
+        wire = Wire(socket)
+        assert wire.read_until(lambda: OPEN in wire.scripts, seconds=60.0)
+        (session,) = viewer.sessions
+        yield wire, session, {type(panel).__name__: panel for panel in session.display.panels}
+        end_work(viewer)

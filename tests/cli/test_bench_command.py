@@ -1,11 +1,8 @@
 """The command `test`: keys of the contract, data beside the model, refusals that leave nothing."""
 
 import json
-from pathlib import Path
 
 import pytest
-
-from warpspace.bench.registry import bench_names
 
 RUNS = "run,direction,target_mm,deviation_um\n" + "".join(
     f"{run},{sign},{target},{target / 100 + (0.5 if sign == '-' else 0.0) + 0.1 * run}\n"
@@ -13,29 +10,7 @@ RUNS = "run,direction,target_mm,deviation_um\n" + "".join(
 )  # fmt: skip
 
 
-def test_every_test_is_listed(warpspace) -> None:
-    out = warpspace("test", "--list").out
-    assert [name for name in bench_names() if name not in out] == []
-    assert "ISO 230-2" in out
-
-
-def test_no_name_and_a_misspelt_one(warpspace) -> None:
-    warpspace("test").refused("--list")
-    warpspace("test", "positionin", "dvf5000_first").refused("positionin", "positioning")
-
-
-@pytest.mark.parametrize("name", bench_names())
-def test_every_test_prints_json_and_explains_itself(warpspace, name: str) -> None:
-    assert "--data" in warpspace("test", name, "--help").out
-    found = json.loads(warpspace("test", name, "dvf5000_first", "--json").out)
-    assert found["test"] == name
-    assert found["of"] == "model"
-    assert found["notes"] == []
-    lines = warpspace("test", name, "dvf5000_first").out.splitlines()
-    assert "DVF5000" in lines[0]
-
-
-def test_json_of_positioning_data_has_the_keys_of_the_contract(warpspace, tmp_path: Path) -> None:
+def test_json_of_positioning_data_has_the_keys_of_the_contract(warpspace, tmp_path):
     data = tmp_path / "runs.csv"
     data.write_text(RUNS, encoding="utf-8")
     found = json.loads(
@@ -52,7 +27,7 @@ def test_json_of_positioning_data_has_the_keys_of_the_contract(warpspace, tmp_pa
     assert 1.0 < found["rms_difference"] < 1.5  # a slope of 1 µm in 100 mm; the zero is free
 
 
-def test_figure_with_data_over_the_model(warpspace, tmp_path: Path) -> None:
+def test_figure_with_data_over_the_model(warpspace, tmp_path):
     data, plot = tmp_path / "runs.csv", tmp_path / "plot.svg"
     data.write_text(RUNS, encoding="utf-8")
     arguments = ("test", "positioning", "dvf5000_first", "--data", data, "--plot", plot)
@@ -68,7 +43,7 @@ def test_figure_with_data_over_the_model(warpspace, tmp_path: Path) -> None:
     warpspace("test", "positioning", "dvf5000_first", "--data", plot).refused("no such file")
 
 
-def test_readings_in_another_unit_are_said(warpspace, tmp_path: Path) -> None:
+def test_readings_in_another_unit_are_said(warpspace, tmp_path):
     data = tmp_path / "circle.csv"
     rows = "".join(f"{angle},{(angle % 7) * 1000.0}\n" for angle in range(0, 360, 5))
     data.write_text("angle_deg,radial_um\n" + rows, encoding="utf-8")
@@ -76,20 +51,3 @@ def test_readings_in_another_unit_are_said(warpspace, tmp_path: Path) -> None:
     assert run.status == 0
     assert "are they in nm?" in run.err
     assert json.loads(run.out)["notes"]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "fragments"),
-    [
-        (("sphere", "--ball", "1,2"), ("--ball '1,2'", "expected three numbers")),
-        (("sphere", "--ball", "1,2,inf"), ("--ball '1,2,inf'", "expected three numbers")),
-        (("sphere", "--at", "Q=1"), ("unknown axis Q",)),
-        (("circular", "--plane", "AB"), ("--plane", "'AB'", "XY")),
-        (("circular", "--radius", "900"), ("leaves the working volume",)),
-        (("positioning", "--axis", "W"), ("axis 'W'",)),
-        (("rotary-axis", "--points", "3"), ("--points: 3; expected 8",)),
-    ],
-)
-def test_options_that_cannot_be(warpspace, arguments: tuple, fragments: tuple) -> None:
-    name, *options = arguments
-    warpspace("test", name, "dvf5000_first", *options).refused(*fragments)

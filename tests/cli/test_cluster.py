@@ -7,19 +7,58 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import psutil
 import pytest
 
 import warpspace as package
-from dask_cluster import dask_cluster
 from lost_process import square
-from warpspace.analysis.plan import BLOCK
-from warpspace.cli import pools
-from warpspace.cli.pools import find_workers
+from warpspace.analysis.cases import BLOCK
+from warpspace.cli import machines
+from warpspace.cli.machines import find_workers
 from warpspace.exceptions import OptionError, WorkersLostError
 from warpspace.outputs.processes import ProcessPool
+
+SERVE = """
+import sys
+from distributed import LocalCluster
+if __name__ == "__main__":
+    with LocalCluster(
+        n_workers=int(sys.argv[1]), threads_per_worker=1, processes=True, host="127.0.0.1",
+        dashboard_address=None, memory_limit=0, worker_dashboard_address=None,
+    ) as cluster:
+        print(cluster.scheduler_address, flush=True)
+        sys.stdin.read()
+"""
+
+
+@contextmanager
+def dask_cluster(workers: int, folder: Path) -> Iterator[str]:
+    """Start a scheduler and workers; give the address. Their files lie in a folder."""
+    path = folder / "serve.py"
+    path.write_text(SERVE, encoding="utf-8")
+    process = subprocess.Popen(
+        [sys.executable, str(path), str(workers)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        cwd=folder,
+        env={**os.environ, "DASK_TEMPORARY_DIRECTORY": str(folder)},
+    )
+    try:
+        yield process.stdout.readline().strip()
+    finally:
+        process.stdin.close()
+        try:
+            process.wait(20)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+        process.stdout.close()
+
 
 distributed = pytest.importorskip("distributed")
 RUN = (
@@ -28,14 +67,12 @@ RUN = (
 
 
 @pytest.fixture(scope="module")
-def scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+def scheduler(tmp_path_factory):
     with dask_cluster(2, tmp_path_factory.mktemp("dask")) as address:
         yield address
 
 
-def test_a_cluster_gives_the_same_numbers_to_the_last_bit(
-    warpspace, scheduler: str, tmp_path: Path
-) -> None:
+def test_a_cluster_gives_the_same_numbers_to_the_last_bit(warpspace, scheduler, tmp_path):
     pq = pytest.importorskip("pyarrow.parquet")
     tables = [tmp_path / "here.parquet", tmp_path / "there.parquet"]
     run = (*RUN, "--samples", str(33 * BLOCK + 5))
@@ -49,7 +86,7 @@ def test_a_cluster_gives_the_same_numbers_to_the_last_bit(
     assert max(first["error_um"].to_pylist()) == json.loads(here.out)["max_um"]
 
 
-def test_a_sweep_of_a_fleet_on_a_cluster(warpspace, scheduler: str) -> None:
+def test_a_sweep_of_a_fleet_on_a_cluster(warpspace, scheduler):
     sweep = ("sweep", "dvf5000_general", "dvf5000_proposed", "--samples", "5000")
     steps = ("--tolerance", "rotation=10:30:3", "--limit-um", "40", "--json")
     here, there = warpspace(*sweep, *steps), warpspace(*sweep, *steps, "--scheduler", scheduler)
@@ -58,32 +95,27 @@ def test_a_sweep_of_a_fleet_on_a_cluster(warpspace, scheduler: str) -> None:
     assert len(json.loads(there.out)["rows"]) == 6
 
 
-def test_a_mistake_is_said_as_at_home(warpspace, scheduler: str) -> None:
+def test_a_mistake_is_said_as_at_home(warpspace, scheduler):
     run = ("montecarlo", "dvf5000_nominal", "--scheduler", scheduler)
     warpspace(*run).refused("dvf5000_nominal: has no tolerances")
 
 
-def test_workers_and_a_scheduler_exclude_each_other(warpspace) -> None:
-    run = ("montecarlo", "dvf5000_general", "--workers", "2", "--scheduler", "tcp://127.0.0.1:1")
-    warpspace(*run).refused("exclude each other")
-
-
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nowhere", "gopher://x:1", ""])
-def test_a_scheduler_that_is_none_is_refused(warpspace, monkeypatch, address: str) -> None:
-    monkeypatch.setattr(pools, "CONNECT_S", 0.3)
+def test_a_scheduler_that_is_none_is_refused(warpspace, monkeypatch, address):
+    monkeypatch.setattr(machines, "CONNECT_S", 0.3)
     warpspace("montecarlo", "dvf5000_general", "--scheduler", address).refused(
         f"--scheduler {address!r}", "expected the address of a Dask scheduler"
     )
 
 
-def test_without_dask_it_is_said_what_to_install(warpspace, monkeypatch) -> None:
+def test_without_dask_it_is_said_what_to_install(warpspace, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     run = ("montecarlo", "dvf5000_general", "--scheduler", "tcp://127.0.0.1:8786")
     warpspace(*run).refused("warpspace[cluster]")
 
 
-@pytest.mark.proof
-def test_a_worker_killed_half_way_changes_nothing(tmp_path: Path) -> None:
+@pytest.mark.nightly
+def test_a_worker_killed_half_way_changes_nothing(tmp_path):
     samples = 2_500_000
     scene = package.load_scene("dvf5000_general")
     alone = package.montecarlo(scene, samples=samples, seed=4, spec_um=40.0)
@@ -93,7 +125,7 @@ def test_a_worker_killed_half_way_changes_nothing(tmp_path: Path) -> None:
     ):
         killed: list[int] = []
 
-        def kill_one(done: int) -> None:
+        def kill_one(done):
             counted.append(done)
             if not killed and sum(counted) > samples // 2:
                 killed.append(next(iter(client.run(os.getpid).values())))
@@ -118,41 +150,41 @@ def test_a_worker_killed_half_way_changes_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
-def test_workers_that_die_again_and_again_end_the_run_with_a_message(tmp_path: Path) -> None:
-    said = f"died {pools.LOSSES + 1} times .out of memory... run again with fewer --workers"
+def test_workers_that_die_again_and_again_end_the_run_with_a_message(tmp_path):
+    said = f"died {machines.LOSSES + 1} times .out of memory... run again with fewer --workers"
 
-    def run() -> None:
-        with find_workers(None, 2, pools.WORTH_A_POOL) as found:
-            assert found.executor is not None
-            found.executor.submit(square, 3, str(tmp_path), "always").result(120)
+    def run():
+        with find_workers(None, 2, machines.WORTH_A_POOL) as found:
+            found[0].submit(square, 3, str(tmp_path), "always").result(120)
 
     with pytest.raises(WorkersLostError, match=said):
         run()
 
 
-def test_a_large_run_gets_processes_and_a_small_one_threads() -> None:
-    with find_workers(None, None, pools.WORTH_A_POOL - 1) as few:
-        assert few.executor is None
+def test_a_large_run_gets_processes_and_a_small_one_threads():
+    with find_workers(None, None, machines.WORTH_A_POOL - 1) as few:
+        assert few[0] is None
     with find_workers(None, 1, 10**9) as alone:
-        assert alone.executor is None
-    with find_workers(None, 2, pools.WORTH_A_POOL) as many:
-        assert isinstance(many.executor, ProcessPool)
-        assert many.number == 2
+        assert alone[0] is None
+    with find_workers(None, 2, machines.WORTH_A_POOL) as many:
+        assert isinstance(many[0], ProcessPool)
+        assert many[1] == 2
     with pytest.raises(OptionError, match="workers: 513"), find_workers(None, 513, 1):
         pass
 
 
-def test_processes_give_the_same_numbers(warpspace, monkeypatch) -> None:
+@pytest.mark.nightly
+def test_processes_give_the_same_numbers(warpspace, monkeypatch):
     run = (*RUN, "--samples", str(20 * BLOCK))
-    monkeypatch.setattr(pools, "WORTH_A_POOL", 1)
+    monkeypatch.setattr(machines, "WORTH_A_POOL", 1)
     here, there = warpspace(*run, "--workers", "1"), warpspace(*run, "--workers", "2")
     assert there.status == 0, there.err
     assert here.out == there.out
 
 
-@pytest.mark.proof
+@pytest.mark.nightly
 @pytest.mark.skipif(sys.platform != "linux", reason="signals")
-def test_a_run_that_is_interrupted_leaves_no_process_and_no_file(tmp_path: Path) -> None:
+def test_a_run_that_is_interrupted_leaves_no_process_and_no_file(tmp_path):
     target = tmp_path / "x.parquet"
     run = ("-m", "warpspace", "montecarlo", "dvf5000_general", "--samples", "50000000")
     process = subprocess.Popen(

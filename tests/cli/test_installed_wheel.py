@@ -7,7 +7,6 @@ import sysconfig
 import tarfile
 import venv
 import zipfile
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,7 +18,7 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 BORROWED = sysconfig.get_path("purelib"), sysconfig.get_path("platlib")
 
 
-def run(command: Sequence[str | Path], folder: Path) -> str:
+def run(command, folder):
     environment = {k: v for k, v in os.environ.items() if k not in {"PYTHONPATH", "PYTHONHOME"}}
     result = subprocess.run(
         command,
@@ -40,15 +39,15 @@ class Installation:
     root: Path
     elsewhere: Path
 
-    def python(self, *arguments: str) -> str:
+    def python(self, *arguments):
         return run([self.bin / "python", *arguments], self.elsewhere)
 
-    def warpspace(self, *arguments: str) -> str:
+    def warpspace(self, *arguments):
         return run([self.bin / "warpspace", *arguments], self.elsewhere)
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def wheel(tmp_path_factory):
     folder = tmp_path_factory.mktemp("wheel")
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "wheel", "--no-deps"]
     run([*pip, "--no-build-isolation", "--wheel-dir", str(folder), str(REPOSITORY)], folder)
@@ -57,7 +56,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def installation(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Installation:
+def installation(wheel, tmp_path_factory):
     root = tmp_path_factory.mktemp("installed")
     venv.create(root, with_pip=False, symlinks=True)
     python = root / "bin" / "python"
@@ -69,7 +68,7 @@ def installation(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Insta
     return Installation(python.parent, root, tmp_path_factory.mktemp("elsewhere"))
 
 
-def bundled() -> list[str]:
+def bundled():
     files = (
         path.relative_to(REPOSITORY).as_posix()
         for folder in ("scenes", "assets")
@@ -78,7 +77,7 @@ def bundled() -> list[str]:
     return sorted(files)
 
 
-def test_wheel_carries_scenes_and_machines(wheel: Path):
+def test_wheel_carries_scenes_and_machines(wheel):
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
     assert "warpspace/py.typed" in names
@@ -86,7 +85,7 @@ def test_wheel_carries_scenes_and_machines(wheel: Path):
     assert {f"warpspace/_data/{name}" for name in bundled()} <= names
 
 
-def test_sdist_carries_scenes_and_machines(tmp_path: Path):
+def test_sdist_carries_scenes_and_machines(tmp_path):
     build = "import sys; from hatchling.build import build_sdist; build_sdist(sys.argv[1])"
     run([sys.executable, "-c", build, str(tmp_path)], REPOSITORY)
     (sdist,) = tmp_path.glob("*.tar.gz")
@@ -95,16 +94,16 @@ def test_sdist_carries_scenes_and_machines(tmp_path: Path):
     assert set(bundled()) <= names
 
 
-def test_data_comes_from_the_installed_package(installation: Installation):
+def test_data_comes_from_the_installed_package(installation):
     code = "from warpspace import resources as r; print(r.scenes_dir(), r.assets_dir(), sep='\\n')"
     folders = [Path(line) for line in installation.python("-c", code).splitlines()]
     assert all(folder.is_relative_to(installation.root.resolve()) for folder in folders)
     assert all(folder.is_dir() for folder in folders)
 
 
-def test_module_lists_scenes_elsewhere(installation: Installation):
+def test_module_lists_scenes_elsewhere(installation):
     assert "dvf5000_first" in installation.python("-m", "warpspace", "scenes")
 
 
-def test_command_checks_a_bundled_scene_elsewhere(installation: Installation):
+def test_command_checks_a_bundled_scene_elsewhere(installation):
     installation.warpspace("check", "dvf5000_first")

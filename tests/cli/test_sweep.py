@@ -2,7 +2,6 @@
 
 import csv
 import json
-from pathlib import Path
 
 import pytest
 
@@ -13,7 +12,7 @@ from warpspace.resources import scenes_dir
 FEW = ("--samples", "3000")
 
 
-def test_a_row_is_what_montecarlo_gives_for_the_same_scene(warpspace, tmp_path: Path) -> None:
+def test_a_row_is_what_montecarlo_gives_for_the_same_scene(warpspace, tmp_path):
     steps = ("--tolerance", "EAX=5:20:2", "--tolerance", "translation=4,8")
     found = json.loads(
         warpspace("sweep", "dvf5000_general", *steps, "--limit-um", "40", *FEW, "--json").out
@@ -35,15 +34,7 @@ def test_a_row_is_what_montecarlo_gives_for_the_same_scene(warpspace, tmp_path: 
     assert rows[3]["probability"] == alone["specification"]["probability"]
 
 
-def test_a_wider_tolerance_gives_a_larger_error(warpspace) -> None:
-    steps = ("--tolerance", "squareness=0:50:6")
-    rows = json.loads(warpspace("sweep", "dvf5000_general", *steps, *FEW, "--json").out)["rows"]
-    rms = [row["rms_um"] for row in rows]
-    assert rms == sorted(rms)
-    assert rms[-1] > 1.2 * rms[0]
-
-
-def test_a_fleet_of_a_folder(warpspace, tmp_path: Path) -> None:
+def test_a_fleet_of_a_folder(warpspace, tmp_path):
     for name, width in (("b", 20), ("a", 10)):
         (tmp_path / f"{name}.toml").write_text(
             f'title = "=machine {name}"\nmachine = "dvf5000"\n[tolerances]\n'
@@ -63,7 +54,7 @@ def test_a_fleet_of_a_folder(warpspace, tmp_path: Path) -> None:
     warpspace("sweep", tmp_path, *FEW, "-o", target).refused("--force")
 
 
-def test_every_machine_is_written(warpspace, tmp_path: Path) -> None:
+def test_every_machine_is_written(warpspace, tmp_path):
     pq = pytest.importorskip("pyarrow.parquet")
     target = tmp_path / "m.parquet"
     run = ("montecarlo", "dvf5000_general", "dvf5000_proposed", "--samples", "9000", "--json")
@@ -78,46 +69,12 @@ def test_every_machine_is_written(warpspace, tmp_path: Path) -> None:
     assert values[9000:].mean() == pytest.approx(found[1]["mean_um"], rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("steps", "said"),
-    [
-        ("EAX", "KEY=FROM:TO:N"),
-        ("EAX=", "KEY=FROM:TO:N"),
-        ("=1", "KEY=FROM:TO:N"),
-        ("EAX=1:2", "KEY=FROM:TO:N"),
-        ("EAX=1:2:0", "KEY=FROM:TO:N"),
-        ("EAX=1:2:x", "KEY=FROM:TO:N"),
-        ("EAX=1:inf:3", "KEY=FROM:TO:N"),
-        ("EAX=nan", "half width nan"),
-        ("EAX=-1", "half width -1"),
-        ("EAX=1e9", "half width 1e+09"),
-        ("EAX=1:2:2000000", "KEY=FROM:TO:N"),
-        ("EAQ=1", "did you mean 'EA"),
-        ("rotatoin=1", "did you mean 'rotation'"),
-    ],
-)
-def test_steps_that_are_none(warpspace, steps: str, said: str) -> None:
-    warpspace("sweep", "dvf5000_general", "--tolerance", steps, *FEW).refused(said)
-
-
-def test_what_is_refused_before_anything_is_sampled(warpspace, tmp_path: Path) -> None:
-    run = ("sweep", "dvf5000_general", "--tolerance", "EAX=1:2:2")
-    warpspace(*run, "--tolerance", "EAX=3").refused("EAX is given twice")
-    many = ("--tolerance", "EAX=1:2:2000", "--tolerance", "EAY=1:2:2000")
-    warpspace("sweep", "dvf5000_general", *many).refused("4,000,000 combinations")
-    warpspace("sweep", tmp_path).refused("a folder without .toml files")
+def test_a_folder_with_a_scene_that_is_none_is_refused(warpspace, tmp_path):
     (tmp_path / "bad.toml").write_text("machine = 3")
     warpspace("sweep", "dvf5000_general", tmp_path).refused("bad.toml")
-    target = tmp_path / "x.txt"
-    warpspace(*run, "-o", target).refused("unknown ending '.txt'")
-    run = ("montecarlo", "dvf5000_general", "dvf5000_proposed")
-    warpspace(*run, "--plot", tmp_path / "x.svg").refused("--plot draws one machine")
-    long = ("--samples", "20000000", "-o", tmp_path / "x.csv")
-    warpspace("montecarlo", "dvf5000_general", *long).refused("20,000,000 rows")
-    assert not target.exists()
 
 
-def test_the_same_from_python() -> None:
+def test_the_same_from_python():
     scene = package.load_scene("dvf5000_general")
     points = list(package.sweep(iter([scene]), {"EAX": [5.0, 20.0]}))
     assert [point.half_widths for point in points] == [{"EAX": 5.0}, {"EAX": 20.0}]

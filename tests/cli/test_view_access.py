@@ -5,11 +5,9 @@ import subprocess
 import sys
 import urllib.error
 import urllib.request
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import contextmanager
 from typing import Any
-
-import pytest
 
 from warpspace.app.server import run
 from warpspace.app.server.doors import Access
@@ -17,21 +15,7 @@ from warpspace.app.server.doors import Access
 Command = Callable[..., Any]
 
 
-@pytest.mark.parametrize(
-    ("words", "fragment"),
-    [
-        (("--token", "short"), "--token: expected 12 to 200"),
-        (("--token", "x" * 12, "--no-token"), "exclude each other"),
-        (("--allow-host", "http://a b"), "--allow-host 'http://a b'"),
-    ],
-)
-def test_access_that_cannot_be_given(
-    warpspace: Command, words: tuple[str, ...], fragment: str
-) -> None:
-    warpspace("view", "teach_tilted_c", "--no-browser", *words).refused(fragment)
-
-
-def test_options_reach_the_app(warpspace: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_options_reach_the_app(warpspace, monkeypatch):
     given: list[dict[str, Any]] = []
     monkeypatch.setattr(run, "run_viewer", lambda *_, **words: given.append(words))
     hosts = ("--allow-host", "a.example", "--allow-host", "b.example:1")
@@ -43,7 +27,7 @@ def test_options_reach_the_app(warpspace: Command, monkeypatch: pytest.MonkeyPat
 
 
 @contextmanager
-def app(*words: str) -> Iterator[subprocess.Popen[str]]:
+def app(*words):
     """Run the command; it ends as by Ctrl-C."""
     command = [sys.executable, "-m", "warpspace", "view", "teach_tilted_c", "--no-browser", *words]
     with subprocess.Popen(
@@ -56,7 +40,7 @@ def app(*words: str) -> Iterator[subprocess.Popen[str]]:
             process.wait(20)
 
 
-def status(link: str) -> int:
+def status(link):
     try:
         with urllib.request.urlopen(link, timeout=20) as answer:
             return answer.status
@@ -64,9 +48,8 @@ def status(link: str) -> int:
         return error.code
 
 
-def test_beyond_this_machine_the_printed_link_carries_a_token() -> None:
+def test_beyond_this_machine_the_printed_link_carries_a_token():
     with app("--host", "0.0.0.0") as process:
-        assert process.stdout is not None
         first, second = (process.stdout.readline() for _ in range(2))
         link = first.partition(" is shown at ")[2].split()[0]
         assert "/?token=" in link
@@ -76,10 +59,8 @@ def test_beyond_this_machine_the_printed_link_carries_a_token() -> None:
         assert status(link.partition("?")[0]) == status(link + "x") == 403
 
 
-def test_without_a_token_the_command_says_what_it_means() -> None:
+def test_without_a_token_the_command_says_what_it_means():
     with app("--host", "0.0.0.0", "--no-token") as process:
-        assert process.stdout is not None
-        assert process.stderr is not None
         link = process.stdout.readline().partition(" is shown at ")[2].split()[0]
         assert "token" not in link
         assert status(link) == 200

@@ -5,7 +5,7 @@ import re
 import runpy
 import shlex
 import sys
-from pathlib import Path
+import tomllib
 
 import pytest
 
@@ -13,26 +13,29 @@ import warpspace
 from doc_pages import DOCS, ROOT, anchors, blocks, entries, links, pages, section
 from warpspace.app.server.tabs import tabs
 from warpspace.cli.registry import COMMANDS
+from warpspace.kinematics.model import convention_names
+from warpspace.machine.curves.registry import curve_kinds
+from warpspace.scene.library import load_scene
+from warpspace.scene.schema import CONVENTION, POINTS, VIEW
 
-GENERATED = {"gallery/index", "reference/index"}
 WORDS_OF_A_HOW_TO = 25
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 LEFT_TAB = "Error curve"
 
 
-def site_part(name: str) -> dict[str, object]:
+def site_part(name):
     """Give the names of a module of the site."""
     return runpy.run_path(str(DOCS / "_ext" / f"{name}.py"))
 
 
 @pytest.fixture
-def configuration(monkeypatch: pytest.MonkeyPatch) -> dict[str, object]:
+def configuration(monkeypatch):
     """Give the settings of the site."""
     monkeypatch.setattr(sys, "path", list(sys.path))
     return runpy.run_path(str(DOCS / "conf.py"))
 
 
-def test_the_configuration_loads_and_finds_what_it_names(configuration) -> None:
+def test_the_configuration_loads_and_finds_what_it_names(configuration):
     assert configuration["version"] == warpspace.__version__
     for name in configuration["html_css_files"]:
         assert (DOCS / "_static" / name).is_file()
@@ -40,7 +43,19 @@ def test_the_configuration_loads_and_finds_what_it_names(configuration) -> None:
         assert (DOCS / folder).is_dir()
 
 
-def test_every_page_is_in_a_table_of_contents() -> None:
+def test_the_pythons_that_are_promised_are_those_that_were_tried():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    named = re.findall(r"Python :: 3\.(\d+)", " ".join(project["classifiers"]))
+    assert project["requires-python"] == f">=3.{named[0]},<3.{int(named[-1]) + 1}"
+    for name in ("README.md", "docs/tutorial.md", "Makefile", ".ci/check-python.sh"):
+        assert f"Python 3.{named[0]} to 3.{named[-1]}" in (ROOT / name).read_text("utf-8"), name
+    tried = (DOCS / "site/evidence.md").read_text("utf-8")
+    rows = re.findall(r"^\| 3\.(\d+)\.\d+ \| (\w+) \|", tried, re.MULTILINE)
+    for which in ("newest", "lowest"):
+        assert [minor for minor, one in rows if one == which] == named
+
+
+def test_every_page_is_in_a_table_of_contents():
     contained = {(DOCS / "index.md").resolve()}
     for page in pages():
         for entry in entries(page):
@@ -55,7 +70,7 @@ def test_every_page_is_in_a_table_of_contents() -> None:
     )
 
 
-def test_the_reference_has_every_public_name_and_every_room() -> None:
+def test_the_reference_has_every_public_name_and_every_room():
     listed = set(
         re.findall(r"^   (\w+)$", (DOCS / "reference/index.md").read_text("utf-8"), re.MULTILINE)
     )
@@ -64,7 +79,7 @@ def test_the_reference_has_every_public_name_and_every_room() -> None:
     assert rooms - {"app", "cli"} <= listed, "name the package in docs/reference/index.md"
 
 
-def test_every_command_has_a_how_to() -> None:
+def test_every_command_has_a_how_to():
     for name in COMMANDS:
         page = DOCS / "commands" / f"{name}.md"
         assert page.is_file(), (
@@ -79,12 +94,12 @@ def test_every_command_has_a_how_to() -> None:
     assert {path.stem for path in (DOCS / "commands").glob("*.md")} == {*COMMANDS, "index"}
 
 
-def test_the_list_of_commands_leads_to_each() -> None:
+def test_the_list_of_commands_leads_to_each():
     listed = {file for file, _ in links(DOCS / "commands" / "index.md")}
     assert {f"{name}.md" for name in COMMANDS} <= listed
 
 
-def test_every_tab_has_a_how_to() -> None:
+def test_every_tab_has_a_how_to():
     for tab in ("Errors", LEFT_TAB, *(tab.name for tab in tabs())):
         text = section(DOCS / "app.md", tab)
         assert text is not None, f"docs/app.md has no section {tab}: say what a user does there"
@@ -92,7 +107,7 @@ def test_every_tab_has_a_how_to() -> None:
         assert len(words) >= WORDS_OF_A_HOW_TO, f"docs/app.md, {tab}: say what a user does there"
 
 
-def command_lines() -> list[str]:
+def command_lines():
     found = []
     for page in pages():
         text = page.read_text("utf-8")
@@ -107,7 +122,7 @@ def command_lines() -> list[str]:
 
 
 @pytest.mark.parametrize("line", command_lines())
-def test_commands_of_the_pages_are_understood(line: str) -> None:
+def test_commands_of_the_pages_are_understood(line):
     words = shlex.split(line, comments=True)[1:]
     if words[0].startswith("-") or words[0].isupper():
         return
@@ -123,7 +138,7 @@ def test_commands_of_the_pages_are_understood(line: str) -> None:
 
 
 @pytest.mark.parametrize("page", pages(), ids=lambda page: page.relative_to(ROOT).as_posix())
-def test_links_lead_somewhere(page: Path) -> None:
+def test_links_lead_somewhere(page):
     for file, anchor in links(page):
         target = (page.parent / file).resolve() if file else page
         if file in {"gallery/index", "/gallery/index"}:
@@ -138,7 +153,7 @@ def test_links_lead_somewhere(page: Path) -> None:
 
 
 @pytest.mark.parametrize("script", EXAMPLES, ids=lambda script: script.stem)
-def test_every_example_has_a_title_for_the_gallery(script: Path) -> None:
+def test_every_example_has_a_title_for_the_gallery(script):
     if script.stem in site_part("gallery_pictures")["TOOLS"]:
         return
     text = ast.get_docstring(ast.parse(script.read_text("utf-8")), clean=False) or ""
@@ -149,7 +164,7 @@ def test_every_example_has_a_title_for_the_gallery(script: Path) -> None:
     assert len(line) == len(title)
 
 
-def test_drawings_are_those_of_the_model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_drawings_are_those_of_the_model(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "path", [str(DOCS), *sys.path])
     module = runpy.run_path(str(DOCS / "drawings.py"), run_name="drawings")
     shown = set(re.findall(r"\(images/model_(\w+)\.svg\)", (DOCS / "model.md").read_text("utf-8")))
@@ -161,3 +176,73 @@ def test_drawings_are_those_of_the_model(tmp_path: Path, monkeypatch: pytest.Mon
         words = [re.findall(r"<text[^>]*>([^<]*)<", text) for text in (drawn, kept)]
         assert words[0] == words[1], f"{name}: run docs/drawings.py"
         assert words[0]
+
+
+def test_documented_scene_loads_and_names_every_key(tmp_path):
+    (text, machine) = blocks((ROOT / "docs/scenes.md").read_text("utf-8"), "toml")
+    (tmp_path / "xm60_x.csv").write_text("X,pitch\n-275,0\n275,3.5\n")
+    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
+    scene = load_scene(tmp_path / "mine.toml")
+    assert scene.errors.amplitude("EBX") == 3.5
+    for part in (CONVENTION, POINTS, VIEW):
+        for key in part.fields:
+            assert re.search(rf"^{key} = ", text, re.MULTILINE), key
+    (tmp_path / "own.toml").write_text(machine, encoding="utf-8")
+    assert str(load_scene(tmp_path / "own.toml").machine.chain) == "wAXFYZt"
+
+
+def test_readme_snippet_prints_what_it_says(capsys):
+    (snippet,) = blocks((ROOT / "README.md").read_text("utf-8"), "python")
+    exec(snippet, {})
+    printed = capsys.readouterr().out.split()
+    claimed = re.search(r"# ([\d.]+) µm", snippet)
+    assert float(printed[0]) == pytest.approx(float(claimed.group(1)), abs=0.005)
+
+
+def test_readme_names_every_command():
+    page = (ROOT / "README.md").read_text("utf-8")
+    table = page[page.index("| command") : page.index("Shell completion")]
+    assert set(re.findall(r"`([\w-]+)`", re.sub(r"\|[^|]*\|\n", "|\n", table))) == {*COMMANDS}
+
+
+def test_every_picture_that_is_linked_exists_and_every_other_picture_is_linked():
+    linked = {
+        (page.parent / target).resolve()
+        for page in (ROOT / "README.md", ROOT / "CONVENTIONS.md", *DOCS.glob("*.md"))
+        for target in re.findall(r"!\[[^\]]+\]\(([^)]+\.png)\)", page.read_text("utf-8"))
+    }
+    machines = (ROOT / "assets" / "machines").glob("*/picture.png")
+    assert linked == {*(ROOT / "docs" / "images").glob("*.png"), *machines}
+
+
+def test_pictures_are_small():
+    sizes = [path.stat().st_size for path in (ROOT / "docs" / "images").glob("*.png")]
+    assert sum(sizes) < 3.5e6
+    machines = [p.stat().st_size for p in (ROOT / "assets/machines").glob("*/picture.png")]
+    assert max(machines) < 2e5
+
+
+def test_there_is_one_picture_of_every_tab():
+    server = ROOT / "src/warpspace/app/server"
+    layout = "".join((server / name).read_text("utf-8") for name in ("tabs.py", "page_steps.py"))
+    named = re.findall(r'(?:add_tab|set_panel_label)\("([^"]+)"\)', layout)
+    every = {tab.name for tab in tabs()} | set(named) - {"warpspace"}
+    script = (ROOT / "examples/screenshots.py").read_text("utf-8")
+    visits = re.findall(r'"tab_(\w+)": Visit\(\w+, "([^"]+)"', script)
+    # the heading is on every picture
+    assert sorted(tab for _, tab in visits) == sorted(every)
+    assert len(visits) > 10
+    page = (ROOT / "docs/app.md").read_text("utf-8")
+    for name, tab in visits:
+        assert name == tab.lower().replace(" ", "_")
+        assert f"](images/tab_{name}.png)" in page
+
+
+def test_every_kind_of_curve_and_every_convention_is_documented():
+    for page in ("docs/scenes.md", "CONVENTIONS.md"):
+        text = (ROOT / page).read_text("utf-8")
+        for kind in curve_kinds():
+            for form in kind.forms:
+                assert f"{{ {form[0]}" in text, (page, form)
+        for name in convention_names():
+            assert f'"{name}"' in text, (page, name)

@@ -11,22 +11,19 @@ import pytest
 from PIL import Image
 
 from warpspace.app.documents.conditions import picture_conditions
-from warpspace.app.documents.export_request import build_request
+from warpspace.app.documents.files import build_request
 from warpspace.app.documents.offline_page import build_offline_html
 from warpspace.app.documents.view_image import view_png
 from warpspace.app.evaluation.compare import scene_side, with_sides
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.state.app_state import AppState, start_state
+from warpspace.app.state.app_state import start_state
 from warpspace.app.state.comparison import Side
 from warpspace.app.state.picked import Picked
 from warpspace.app.viewport.camera import CameraMemory
 from warpspace.cli.services import write_export
-from warpspace.outputs.animation.write import shared_palette
+from warpspace.outputs.animation import shared_palette
 from warpspace.outputs.drawing.settings import FigureSettings
 from warpspace.outputs.figures.catalogue import draw_figure
-from warpspace.picture.coordinates import own_axes, spell_at, spell_point
-from warpspace.picture.scene_picture import evaluate_picture
 from warpspace.picture.words import range_words
 from warpspace.scene.library import load_scene
 
@@ -35,24 +32,15 @@ FIRST, SECOND = (load_scene(f"dvf5000_{name}") for name in ("first", "second"))
 START = start_state(FIRST, nodes=5)
 
 
-def without(key: str, state: AppState = START) -> AppState:
+def without(key, state=START):
     return replace(state, exclusions=state.exclusions.with_excluded(key, excluded=True))
 
 
-def fixed(state: AppState) -> LivePicture:
+def fixed(state):
     return LIVE.evaluate(replace(state, look=state.look.with_top(50.0)))
 
 
-def test_a_point_is_named_in_both_ways_and_as_an_argument() -> None:
-    found = evaluate_picture(FIRST, grid=5).statistics
-    own = own_axes(FIRST, found.max_at_axes)
-    words = f"{spell_point(own, found.max_at_mm)} mm"
-    assert words == "axes X 275 Y −225 Z −480 · in R x 275 y −225 z −51 mm"
-    assert spell_at(own) == "X=275,Y=-225,Z=-480"
-    assert spell_at(own_axes(FIRST, {"X": 1.0, "B": 30.0, "C": 0.0})) == "X=1,B=30"
-
-
-def test_conditions_name_what_is_excluded_and_the_range() -> None:
+def test_conditions_name_what_is_excluded_and_the_range():
     assert picture_conditions(LIVE.evaluate(START)) == ()
     both = without("EA0Z", without("EAX"))
     assert picture_conditions(fixed(both)) == ("excluded: EAX, EA0Z", "range fixed 0–50 µm")
@@ -63,7 +51,7 @@ def test_conditions_name_what_is_excluded_and_the_range() -> None:
     assert range_words(-20.0, 20.0, "µm") == "range fixed −20 to 20 µm"
 
 
-def test_exports_of_the_app_say_the_conditions() -> None:
+def test_exports_of_the_app_say_the_conditions():
     picture = fixed(without("EA0Z"))
     request = build_request(picture)
     rows = list(csv.DictReader(io.StringIO(write_export(request, ".csv").decode())))
@@ -79,7 +67,7 @@ def test_exports_of_the_app_say_the_conditions() -> None:
     assert "excluded: EA0Z" in view.info["Description"]
 
 
-def test_a_comparison_says_the_conditions_of_each_side() -> None:
+def test_a_comparison_says_the_conditions_of_each_side():
     state = with_sides(without("EA0Z"), Side(), scene_side(SECOND))
     picture = LIVE.evaluate(replace(state, comparison=state.comparison.with_shown("difference")))
     assert picture_conditions(picture) == ("A excluded: EA0Z",)
@@ -88,7 +76,7 @@ def test_a_comparison_says_the_conditions_of_each_side() -> None:
     assert build_request(picture).pair_conditions == ("A excluded: EA0Z",)
 
 
-def test_a_page_keeps_the_camera_and_the_point() -> None:
+def test_a_page_keeps_the_camera_and_the_point():
     at = {"X": 275.0, "Y": -225.0, "Z": -480.0}
     picture = LIVE.evaluate(replace(START, picked=Picked(at)))
     camera = CameraMemory((9.25, 1.5, 2.5), (0.5, 0.25, 0.125), (0.0, 0.0, 1.0), 0.5)
@@ -99,7 +87,7 @@ def test_a_page_keeps_the_camera_and_the_point() -> None:
 
 @pytest.mark.render
 @pytest.mark.parametrize("figure", ["error-map", "slices", "orientation-map", "error-curves"])
-def test_figures_say_what_is_excluded(renderer: str, figure: str) -> None:
+def test_figures_say_what_is_excluded(renderer, figure):
     settings = FigureSettings(
         grid=5, range_top=50.0, range_fixed=True, conditions=("excluded: EA0Z",)
     )
@@ -114,16 +102,16 @@ def test_figures_say_what_is_excluded(renderer: str, figure: str) -> None:
 
 @pytest.mark.render
 @pytest.mark.parametrize(("name", "panels"), [("dvf5000_first", 3), ("teach_squareness", 0)])
-def test_error_curves_have_no_empty_panels(renderer: str, name: str, panels: int) -> None:
+def test_error_curves_have_no_empty_panels(renderer, name, panels):
     # first machine: EAX, EAY, ECY and EAZ are curves; squareness is a constant beside them
     scene = replace(load_scene(name), tolerances=type(FIRST.tolerances)())
     figure = draw_figure("error-curves", [scene], FigureSettings()).figure
-    texts = [text.get_text() for axes in figure.axes for text in axes.texts]
+    texts = [text.get_text() for text in figure.texts]
     heads = [text for text in texts if text.startswith(("translation of", "rotation of"))]
     assert len(heads) == panels
 
 
-def test_all_pictures_of_a_gif_share_one_palette() -> None:
+def test_all_pictures_of_a_gif_share_one_palette():
     colours = [(250, 10, 10), (10, 250, 10), (10, 10, 250)]
     pictures = [Image.new("RGB", (8, 8), colour) for colour in colours]
     palette = shared_palette(pictures)

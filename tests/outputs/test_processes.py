@@ -4,9 +4,7 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Iterator
 from concurrent.futures import CancelledError
-from pathlib import Path
 
 import psutil
 import pytest
@@ -19,7 +17,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
 
 
 @pytest.fixture
-def children() -> Iterator[None]:
+def children():
     """Check that a test leaves no process."""
     before = set(psutil.Process().children(recursive=True))
     yield
@@ -28,7 +26,7 @@ def children() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("children")
-def test_a_task_of_a_process_that_died_is_done_again(tmp_path: Path) -> None:
+def test_a_task_of_a_process_that_died_is_done_again(tmp_path):
     pool = ProcessPool(2, losses=1)
     futures = [pool.submit(square, number, str(tmp_path), "once") for number in range(8)]
     assert [future.result(60) for future in futures] == [number**2 for number in range(8)]
@@ -37,7 +35,7 @@ def test_a_task_of_a_process_that_died_is_done_again(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("children")
-def test_processes_that_die_too_often_are_not_replaced(tmp_path: Path) -> None:
+def test_processes_that_die_too_often_are_not_replaced(tmp_path):
     pool = ProcessPool(1, losses=2)
     for _ in range(2):  # the second time no process is started any more
         with pytest.raises(
@@ -49,7 +47,7 @@ def test_processes_that_die_too_often_are_not_replaced(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("children")
 @pytest.mark.parametrize("size", [100, 1_000_000])
-def test_half_an_answer_is_not_waited_for(size: int, tmp_path: Path) -> None:
+def test_half_an_answer_is_not_waited_for(size, tmp_path):
     pool = ProcessPool(2)
     other = pool.submit(square, 2, str(tmp_path), "never")
     with pytest.raises(WorkersLostError, match="died once"):
@@ -59,7 +57,7 @@ def test_half_an_answer_is_not_waited_for(size: int, tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("children")
-def test_killing_a_pool_does_not_wait_for_its_tasks(tmp_path: Path) -> None:
+def test_killing_a_pool_does_not_wait_for_its_tasks(tmp_path):
     pool = ProcessPool(1)
     begun, waiting = (pool.submit(sleep_after, str(tmp_path / name)) for name in ("a", "b"))
     while not (tmp_path / "a").exists():
@@ -75,7 +73,7 @@ def test_killing_a_pool_does_not_wait_for_its_tasks(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("children")
-def test_a_process_is_replaced_after_its_number_of_tasks() -> None:
+def test_a_process_is_replaced_after_its_number_of_tasks():
     pool = ProcessPool(1, tasks_per_process=2)
     pids = [pool.submit(os.getpid).result(60) for _ in range(4)]
     assert pids[0] == pids[1] != pids[2] == pids[3]
@@ -83,7 +81,7 @@ def test_a_process_is_replaced_after_its_number_of_tasks() -> None:
 
 
 @pytest.mark.usefixtures("children")
-def test_what_cannot_be_sent_is_an_error_and_ends_nothing(tmp_path: Path) -> None:
+def test_what_cannot_be_sent_is_an_error_and_ends_nothing(tmp_path):
     pool = ProcessPool(1)
     with pytest.raises(TypeError, match="pickle"):  # the task
         pool.submit(square, threading.Lock(), "", "").result(60)

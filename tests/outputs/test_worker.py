@@ -3,6 +3,7 @@
 import os
 import signal
 import subprocess
+import sys
 import threading
 import time
 
@@ -10,9 +11,8 @@ import pytest
 
 from warpspace import load_scene
 from warpspace.exceptions import OptionError, RenderError
-from warpspace.outputs import worker as workers
 from warpspace.outputs.drawing.settings import FigureSettings
-from warpspace.outputs.worker import FigureWorker, probe_renderer
+from warpspace.outputs.worker import FigureWorker
 from warpspace.scene.library import parse_scene
 
 pytestmark = [pytest.mark.render, pytest.mark.usefixtures("renderer")]
@@ -20,8 +20,7 @@ SMALL = FigureSettings(size=(400, 300), grid=3)
 LARGE = FigureSettings(size=(8000, 6000))
 
 
-def test_a_crash_loses_one_figure_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(workers, "probe_renderer", lambda: "")
+def test_a_crash_loses_one_figure_only():
     scene = load_scene("dvf5000_first")
     with FigureWorker() as worker:
         first = worker.render("error-map", [scene], SMALL)
@@ -32,7 +31,7 @@ def test_a_crash_loses_one_figure_only(monkeypatch: pytest.MonkeyPatch) -> None:
         assert worker.render("error-map", [scene], SMALL) == first
 
 
-def test_messages_come_through() -> None:
+def test_messages_come_through():
     scene = parse_scene('title="x"\n[machine]\nchain="wFXt"\n[workspace]\nX=[0,9]\n', "x")
     with FigureWorker() as worker:
         with pytest.raises(OptionError, match="does not extend along X, Y and Z"):
@@ -44,7 +43,7 @@ def test_messages_come_through() -> None:
         assert worker.render("error-map", [scene], SMALL).startswith(b"\x89PNG")
 
 
-def test_concurrent_requests_queue() -> None:
+def test_concurrent_requests_queue():
     scene = load_scene("dvf5000_first")
     found: list[bytes] = []
     with FigureWorker() as worker:
@@ -62,7 +61,7 @@ def test_concurrent_requests_queue() -> None:
     assert len(set(found)) == 1
 
 
-def test_a_figure_that_takes_too_long_is_given_up() -> None:
+def test_a_figure_that_takes_too_long_is_given_up():
     with FigureWorker(timeout_s=0.05) as worker:
         started = time.monotonic()
         with pytest.raises(RenderError, match="given up"):
@@ -70,12 +69,11 @@ def test_a_figure_that_takes_too_long_is_given_up() -> None:
         assert time.monotonic() - started < 20.0
 
 
-def test_a_system_without_opengl_is_told_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    gone = subprocess.CompletedProcess([], -11, b"", b"libEGL.so.1: cannot open")
-    monkeypatch.setattr(workers.subprocess, "run", lambda *_, **__: gone)
-    assert "apt-get install libegl1 libgl1-mesa-dri" in probe_renderer()
-    assert "libEGL.so.1" in probe_renderer()
-
-
-def test_the_probe_works_here() -> None:
-    assert probe_renderer() == ""
+def test_a_system_without_opengl_is_told_what_to_install():
+    code = "from warpspace.outputs.drawing.render import check_renderer; check_renderer()"
+    bare = {**os.environ, "__EGL_VENDOR_LIBRARY_FILENAMES": "/nowhere"}
+    done = subprocess.run([sys.executable, "-c", code], env=bare, capture_output=True, check=False)
+    assert done.returncode == 1
+    said = done.stderr.decode()
+    assert "NoRendererError" in said
+    assert "apt-get install libegl1 libgl1-mesa-dri" in said

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from warpspace.bench.base import bench_names, find_test
 from warpspace.bench.readings import respond, simulate
-from warpspace.bench.registry import bench_names, find_test
 from warpspace.machine.errors import ErrorSet
 from warpspace.machine.parameters import parameter
 from warpspace.scene.library import load_scene
@@ -17,7 +17,7 @@ SMALL = {"circular": {"points": 12}, "cone-frustum": {"points": 12}, "ball-plate
 
 @pytest.mark.parametrize("scene_name", SCENES)
 @pytest.mark.parametrize("name", bench_names())
-def test_response_is_the_derivative_of_the_exact_readings(scene_name: str, name: str) -> None:
+def test_response_is_the_derivative_of_the_exact_readings(scene_name, name):
     scene = load_scene(scene_name)
     test = find_test(name)(**SMALL.get(name, {}))
     plan = test.plan(scene)
@@ -37,7 +37,7 @@ def test_response_is_the_derivative_of_the_exact_readings(scene_name: str, name:
 
 
 @pytest.mark.parametrize("name", bench_names())
-def test_set_up_gives_readings_of_its_own(name: str) -> None:
+def test_set_up_gives_readings_of_its_own(name):
     plan = find_test(name)(**SMALL.get(name, {})).plan(load_scene("dvf5000_first"))
     design = np.stack(list(plan.setup.values()), -1)
     assert design.shape[0] == plan.readings

@@ -15,11 +15,10 @@ from warpspace.field.evaluate import (
     evaluate_exact,
     evaluate_first_order,
 )
-from warpspace.kinematics.model import Loop, Model
-from warpspace.machine.curves.curve import ErrorFunction
+from warpspace.kinematics.model import Loop
+from warpspace.machine.axes import TravelDirection
 from warpspace.machine.errors import Constant, Directional, ErrorSet, Ramp, Table, TwoArguments
 from warpspace.machine.parameters import axis_parameters
-from warpspace.machine.travel import TravelDirection
 
 SPAN = (-500.0, 500.0)
 STEP = 10.0
@@ -28,11 +27,11 @@ VALUES = st.integers(1, 40).map(float)
 
 
 @st.composite
-def functions(draw: st.DrawFn, model: Model, axis: str) -> ErrorFunction:
+def functions(draw, model, axis):
     """Errors that depend on two axes, on the direction of travel, or on both."""
     others = [name for name in model.machine.axes if name != axis]
 
-    def one() -> ErrorFunction:
+    def one():
         if not others or draw(st.booleans()):
             return Table(SPAN, ((-400.0, draw(VALUES)), (10.0, draw(VALUES)), (300.0, 3.0)))
         rows = tuple(tuple(draw(VALUES) for _ in range(3)) for _ in range(2))
@@ -45,7 +44,7 @@ def functions(draw: st.DrawFn, model: Model, axis: str) -> ErrorFunction:
 
 
 @st.composite
-def cases(draw: st.DrawFn) -> tuple[Model, ErrorSet]:
+def cases(draw):
     """A model looked at in some direction, and a set of such errors on one of its axes."""
     model = draw(models())
     axis = draw(st.sampled_from([*model.machine.axes]))
@@ -57,7 +56,7 @@ def cases(draw: st.DrawFn) -> tuple[Model, ErrorSet]:
 
 @settings(max_examples=40)
 @given(data=st.data())
-def test_a_batch_gives_what_a_loop_over_its_points_gives(data: st.DataObject) -> None:
+def test_a_batch_gives_what_a_loop_over_its_points_gives(data):
     model, errors = data.draw(cases())
     view = View(data.draw(st.sampled_from(Loop)))
     batch = data.draw(positions(model, (2, 3)))
@@ -74,7 +73,7 @@ def test_a_batch_gives_what_a_loop_over_its_points_gives(data: st.DataObject) ->
 
 @settings(max_examples=40)
 @given(data=st.data())
-def test_a_grid_gives_what_its_points_give(data: st.DataObject) -> None:
+def test_a_grid_gives_what_its_points_give(data):
     model, errors = data.draw(cases())
     one = data.draw(positions(model, (3,)))
     names = [*one]
@@ -88,9 +87,7 @@ def test_a_grid_gives_what_its_points_give(data: st.DataObject) -> None:
 
 @settings(max_examples=40)
 @given(data=st.data())
-def test_the_response_is_the_derivative_of_the_exact_field_by_the_amplitude(
-    data: st.DataObject,
-) -> None:
+def test_the_response_is_the_derivative_of_the_exact_field_by_the_amplitude(data):
     model, errors = data.draw(cases())
     view = View(data.draw(st.sampled_from(Loop)))
     at = data.draw(positions(model, (4,)))
@@ -109,7 +106,7 @@ def test_the_response_is_the_derivative_of_the_exact_field_by_the_amplitude(
 
 @settings(max_examples=40)
 @given(data=st.data())
-def test_amplitudes_scale_the_field_and_zero_is_none(data: st.DataObject) -> None:
+def test_amplitudes_scale_the_field_and_zero_is_none(data):
     model, errors = data.draw(cases())
     at = data.draw(positions(model, (4,)))
     keys = tuple(errors)
@@ -124,7 +121,7 @@ def test_amplitudes_scale_the_field_and_zero_is_none(data: st.DataObject) -> Non
 
 @settings(max_examples=40)
 @given(data=st.data())
-def test_every_parameter_with_such_a_curve_moves_some_point(data: st.DataObject) -> None:
+def test_every_parameter_with_such_a_curve_moves_some_point(data):
     model = data.draw(models())
     axis = data.draw(st.sampled_from([*model.machine.axes]))
     function = data.draw(functions(model, axis))
@@ -140,9 +137,7 @@ def test_every_parameter_with_such_a_curve_moves_some_point(data: st.DataObject)
 @pytest.mark.parametrize("curve", [Constant(SPAN, 3.0), Ramp(SPAN, 3.0)])
 @settings(max_examples=10)
 @given(data=st.data())
-def test_errors_without_a_direction_have_no_reversal(
-    curve: ErrorFunction, data: st.DataObject
-) -> None:
+def test_errors_without_a_direction_have_no_reversal(curve, data):
     model = replace(data.draw(models()), direction=TravelDirection.DIFFERENCE)
     errors = ErrorSet(dict.fromkeys(model.machine.allowed_keys, curve))
     at = data.draw(positions(model))

@@ -2,7 +2,6 @@
 
 import json
 import math
-from collections.abc import Iterator
 from dataclasses import fields, replace
 
 import numpy as np
@@ -18,32 +17,28 @@ from warpspace.app.evaluation.budget import answer, pick, with_picked
 from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.conventions import Effects
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.sensitivities import rank_picture
+from warpspace.app.panels.sensitivities import spell_ranking
 from warpspace.app.readouts.budget import answer_html
-from warpspace.app.readouts.circles import circle_rows, circle_table
-from warpspace.app.readouts.comparison import comparison_html
 from warpspace.app.readouts.conventions import conventions_html
-from warpspace.app.readouts.gains import spell_ranking
-from warpspace.app.readouts.summary import heading, summary
-from warpspace.app.state.app_state import AppState, start_state
+from warpspace.app.readouts.rotary_axes import circle_rows, circle_table
+from warpspace.app.readouts.summary import comparison_html, heading, summary
+from warpspace.app.state.app_state import start_state
 from warpspace.app.state.look import QUANTITIES, SURFACES
 from warpspace.app.state.picked import Picked
 from warpspace.app.viewport.layers.annotations import AnnotationsLayer
 from warpspace.app.viewport.layers.asked_point import AskedPointLayer
 from warpspace.app.viewport.layers.axes import AxesLayer, axes_room_mm
-from warpspace.app.viewport.layers.box import BoxLayer, ghost_dashes
+from warpspace.app.viewport.layers.box import BoxLayer, OtherSideLayer, ghost_dashes
 from warpspace.app.viewport.layers.machine import MachineLayer
-from warpspace.app.viewport.layers.other_side import OtherSideLayer
 from warpspace.app.viewport.layers.traces import TracesLayer
 from warpspace.app.viewport.named_views import VIEWS, CameraSetup, view_pose
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
+from warpspace.outputs.exports.fields import build_vts
 from warpspace.outputs.exports.glb import build_glb
-from warpspace.outputs.exports.vts import build_vts
 from warpspace.picture.mesh import edge_pieces, grid_pieces, isoline_pieces, line_mesh, map_mesh
 from warpspace.picture.scene_picture import evaluate_picture
-from warpspace.scene.model import Scene
 
 LAYERS = (
     BoxLayer,
@@ -63,7 +58,7 @@ SIDE_NODES = 3
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[viser.ViserServer]:
+def server():
     """A server that nobody looks at; what is drawn replaces what was drawn before."""
     running = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     yield running
@@ -71,7 +66,7 @@ def server() -> Iterator[viser.ViserServer]:
 
 
 @st.composite
-def states(draw: st.DrawFn) -> AppState:
+def states(draw):
     """Ways to look at a scene."""
     opened = replace(start_state(draw(scenes())), nodes=SIDE_NODES)
     look = replace(
@@ -97,7 +92,7 @@ def states(draw: st.DrawFn) -> AppState:
 
 @settings(SLOW, max_examples=60)
 @given(state=states())
-def test_every_state_has_a_finite_picture(server: viser.ViserServer, state: AppState) -> None:
+def test_every_state_has_a_finite_picture(server, state):
     picture = LiveModel().evaluate(state)
     _check_finite(picture)
     for layer in LAYERS:
@@ -108,7 +103,7 @@ def test_every_state_has_a_finite_picture(server: viser.ViserServer, state: AppS
         assert math.dist(pose.position, pose.look_at) > 0.0
 
 
-def _check_finite(picture: LivePicture) -> None:
+def _check_finite(picture):
     """Look at all numbers that are drawn."""
     assert math.isfinite(picture.exaggeration)
     assert picture.size_mm > 0.0
@@ -133,7 +128,7 @@ def _check_finite(picture: LivePicture) -> None:
 
 @settings(SLOW, max_examples=25)
 @given(state=states())
-def test_every_panel_has_words_for_it(state: AppState) -> None:
+def test_every_panel_has_words_for_it(state):
     picture = LiveModel().evaluate(state)
     at = {name: 0.0 for name in state.scene.machine.axes if is_linear(name)}
     said = [
@@ -152,7 +147,7 @@ def test_every_panel_has_words_for_it(state: AppState) -> None:
 
 @settings(SLOW, max_examples=25)
 @given(scene=scenes())
-def test_what_is_drawn_can_be_picked(scene: Scene) -> None:
+def test_what_is_drawn_can_be_picked(scene):
     state = replace(start_state(scene), nodes=SIDE_NODES)
     picture = LiveModel().evaluate(state)
     mesh = map_mesh(picture)
@@ -165,7 +160,7 @@ def test_what_is_drawn_can_be_picked(scene: Scene) -> None:
 
 @settings(SLOW, max_examples=15)
 @given(scene=scenes())
-def test_every_scene_is_exported(scene: Scene) -> None:
+def test_every_scene_is_exported(scene):
     picture = evaluate_picture(scene, grid=SIDE_NODES)
     data = build_glb(picture)
     length = int.from_bytes(data[12:16], "little")
@@ -178,6 +173,6 @@ def test_every_scene_is_exported(scene: Scene) -> None:
 
 @settings(SLOW, max_examples=3)
 @given(scene=scenes())
-def test_every_scene_has_an_offline_page(scene: Scene) -> None:
+def test_every_scene_has_an_offline_page(scene):
     page = build_offline_html(offline_picture(scene, exaggeration=100.0, nodes=SIDE_NODES))
     assert "×100" in page

@@ -4,20 +4,19 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from warpspace.analysis.distribution import Stream
-from warpspace.analysis.draws import Distribution, build_draws, loop_keys
-from warpspace.analysis.montecarlo import Plan, montecarlo
-from warpspace.analysis.nodes import Over, reduce_nodes
+from warpspace.analysis.cases import Case, Over, Plan, reduce_nodes
+from warpspace.analysis.distribution import Distribution, Stream, build_draws, loop_keys
+from warpspace.analysis.montecarlo import montecarlo
 from warpspace.field.evaluate import View
 from warpspace.field.grid import Workspace
 from warpspace.kinematics.model import Loop, Model
 from warpspace.machine.description import build_machine
-from warpspace.machine.tolerances import ToleranceSet
+from warpspace.machine.errors import ToleranceSet
 
 CHAINS = ("wCBFXYZt", "wYFXZAt", "wFXYZt", "wAFZt", "wZABFXYCt")
 
 
-def run(chain: str, loop: Loop, scale: float, **plan):
+def run(chain, loop, scale, **plan):
     model = Model(build_machine(chain), workpiece_point_mm=(0.0, 100.0, 200.0))
     ranges = {
         name: axis.travel if axis.is_linear else (0.0, 0.0)
@@ -26,7 +25,7 @@ def run(chain: str, loop: Loop, scale: float, **plan):
     widths = {"translation": 10 * scale, "rotation": 20 * scale, "squareness": 25 * scale}
     keys = loop_keys(model, loop, model.machine.parameter_keys)
     draws = build_draws(ToleranceSet(widths), keys, Distribution.UNIFORM)
-    return montecarlo(model, draws, Workspace(ranges), View(loop), Plan(**plan))
+    return montecarlo(Case(model, draws, Workspace(ranges), View(loop), Plan(**plan)))
 
 
 @settings(max_examples=30)
@@ -37,9 +36,7 @@ def run(chain: str, loop: Loop, scale: float, **plan):
     st.integers(0, 2**32),
     st.floats(0.1, 10.0),
 )
-def test_errors_scale_with_the_tolerance_and_quantiles_are_in_order(
-    chain, loop, over, seed, scale
-) -> None:
+def test_errors_scale_with_the_tolerance_and_quantiles_are_in_order(chain, loop, over, seed, scale):
     plan = {"samples": 300, "seed": seed, "over": over, "nodes": 3, "spec_um": 20.0 * scale}
     one, scaled = run(chain, loop, 1.0, **plan), run(chain, loop, scale, **plan)
     np.testing.assert_allclose(scaled.mean_um, scale * one.mean_um, rtol=1e-9)
@@ -52,7 +49,7 @@ def test_errors_scale_with_the_tolerance_and_quantiles_are_in_order(
 
 @settings(max_examples=30)
 @given(st.integers(1, 400), st.integers(1, 12), st.integers(1, 2000), st.integers(0, 2**32))
-def test_blocks_of_any_size_give_what_one_product_gives(machines, keys, nodes, seed) -> None:
+def test_blocks_of_any_size_give_what_one_product_gives(machines, keys, nodes, seed):
     rng = np.random.default_rng(seed)
     amplitudes, gains = rng.standard_normal((machines, keys)), rng.standard_normal((3, keys, nodes))
     whole = np.linalg.norm(np.einsum("nk,ckm->cnm", amplitudes, gains), axis=0)
@@ -61,7 +58,7 @@ def test_blocks_of_any_size_give_what_one_product_gives(machines, keys, nodes, s
 
 
 @given(st.lists(st.floats(0.0, 1e5), min_size=1, max_size=200), st.integers(1, 7))
-def test_a_stream_does_not_depend_on_how_it_is_cut(values, parts) -> None:
+def test_a_stream_does_not_depend_on_how_it_is_cut(values, parts):
     whole, cut = Stream(len(values)), Stream(len(values))
     whole.add(np.array(values))
     for chunk in np.array_split(np.array(values), parts):

@@ -1,9 +1,4 @@
-"""Fields evaluated axis by axis and in pieces are those of the plain formulas, point by point.
-
-First order against the basis, which holds the response to every parameter; the exact chain against
-whole poses multiplied out. Scenes have gantries, volumes that rotary axes span, and curves of all
-kinds.
-"""
+"""Fields evaluated axis by axis and in pieces are those of the plain formulas, point by point."""
 
 import itertools
 from dataclasses import replace
@@ -13,7 +8,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from plain_chain import plain_exact_error
 from random_scenes import scenes
 from warpspace import evaluate, load_scene
 from warpspace.field.evaluate import (
@@ -24,11 +18,58 @@ from warpspace.field.evaluate import (
     evaluate_first_order,
 )
 from warpspace.field.grid import build_grid
-from warpspace.kinematics.model import Loop, Model
+from warpspace.kinematics import transforms
+from warpspace.kinematics.chain import ErrorValues, branch_pose, tool_axis
+from warpspace.kinematics.model import Coordinates, Loop, Model
 from warpspace.machine.errors import ErrorSet, Table
 from warpspace.scene.library import scene_names
-from warpspace.scene.model import Scene
-from warpspace.scene.pipeline import choose_view, grid_basis
+from warpspace.scene.model import choose_view, grid_basis
+from warpspace.units import UM_PER_MM, URAD_PER_RAD, Array
+
+
+def plain_exact_error(
+    model: Model, loop: Loop, coordinates: Coordinates, values: ErrorValues, point_mm: Array
+) -> tuple[Array, Array]:
+    """Position error in µm and rotation vector of the tool axis in µrad, [..., 3] each."""
+    point = np.asarray(point_mm, dtype=float)
+    nominal_axis = tool_axis(model, coordinates)
+    moved = {side: np.eye(4) for side in ("tool", "workpiece")}
+    for side in moved:
+        if loop in (Loop.RELATIVE, Loop(side)):
+            actual = branch_pose(model, side, coordinates, values)
+            moved[side] = actual @ transforms.inverse(branch_pose(model, side, coordinates))
+    tool, workpiece = moved["tool"], moved["workpiece"]
+    if loop is Loop.WORKPIECE:
+        shift, actual_axis = _shift(workpiece, point), _turned(workpiece, nominal_axis)
+        rotation = _between(nominal_axis, actual_axis)
+    else:
+        shift = _shift(tool, point) - _shift(workpiece, point)
+        rotation = _between(_turned(workpiece, nominal_axis), _turned(tool, nominal_axis))
+    shape = np.broadcast_shapes(shift.shape, rotation.shape, point.shape)
+    return (
+        np.broadcast_to(shift * UM_PER_MM, shape).copy(),
+        np.broadcast_to(rotation * URAD_PER_RAD, shape).copy(),
+    )
+
+
+def _shift(moved: Array, point: Array) -> Array:
+    """Displacement of a point by a small rigid motion, without cancellation of large numbers."""
+    return transforms.rotate(moved[..., :3, :3] - np.eye(3), point) + moved[..., :3, 3]
+
+
+def _turned(moved: Array, direction: Array) -> Array:
+    """Turn directions by the rotation part of a transformation."""
+    return transforms.rotate(moved[..., :3, :3], direction)
+
+
+def _between(start: Array, end: Array) -> Array:
+    """Rotation vector that takes one unit vector to another the short way, rad, [..., 3]."""
+    cross = np.cross(start, end)
+    sine = np.linalg.norm(cross, axis=-1, keepdims=True)
+    cosine = np.sum(start * end, axis=-1, keepdims=True)
+    angle = np.arctan2(sine, cosine)
+    return cross * np.where(sine > 0.0, angle / np.where(sine > 0.0, sine, 1.0), 1.0)
+
 
 NODES = (3, 2, 3)
 FRAMES = ("machine", "workpiece")
@@ -36,14 +77,14 @@ AGREE_UM = 1e-9
 ROUNDING = 32 * np.finfo(float).eps
 
 
-def reach_mm(scene: Scene, point_mm: np.ndarray) -> float:
+def reach_mm(scene, point_mm):
     """Longest length that the chain of a scene adds up, mm."""
     offsets = sum(float(np.abs(axis.offset_mm).sum()) for axis in scene.machine.axes.values())
     ends = float(np.abs([scene.model.tool_point_mm, scene.model.workpiece_point_mm]).sum())
     return offsets + ends + float(np.abs(point_mm).max())
 
 
-def check(scene: Scene, loop: Loop, frame: str) -> None:
+def check(scene, loop, frame):
     """Hold both fields of a scene against the plain formulas."""
     grid = build_grid(scene.model, scene.workspace, NODES)
     view = choose_view(scene, loop, frame)
@@ -65,13 +106,13 @@ def check(scene: Scene, loop: Loop, frame: str) -> None:
 
 @settings(max_examples=150, deadline=None)
 @given(data=st.data())
-def test_fields_of_random_scenes_are_those_of_the_plain_formulas(data: st.DataObject) -> None:
+def test_fields_of_random_scenes_are_those_of_the_plain_formulas(data):
     scene = data.draw(scenes(everything=True))
     check(scene, data.draw(st.sampled_from(Loop)), data.draw(st.sampled_from(FRAMES)))
 
 
 @pytest.mark.parametrize("name", scene_names())
-def test_fields_of_bundled_scenes_are_those_of_the_plain_formulas(name: str) -> None:
+def test_fields_of_bundled_scenes_are_those_of_the_plain_formulas(name):
     scene = load_scene(name)
     for loop, frame in itertools.product(Loop, FRAMES):
         check(scene, loop, frame)
@@ -79,7 +120,7 @@ def test_fields_of_bundled_scenes_are_those_of_the_plain_formulas(name: str) -> 
 
 @settings(max_examples=40, deadline=None)
 @given(data=st.data())
-def test_batch_gives_what_a_loop_over_its_points_gives(data: st.DataObject) -> None:
+def test_batch_gives_what_a_loop_over_its_points_gives(data):
     scene = data.draw(scenes(everything=True))
     model, errors = scene.model, scene.errors
     rng = np.random.default_rng(data.draw(st.integers(0, 99)))
@@ -106,12 +147,12 @@ def test_batch_gives_what_a_loop_over_its_points_gives(data: st.DataObject) -> N
             )
 
 
-def test_an_error_of_several_axes_is_a_field_too(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_error_of_several_axes_is_a_field_too(monkeypatch):
     """Values that no axis has for itself: the evaluation only sees arrays over several axes."""
     scene = load_scene("dvf5000_first")
     grid = build_grid(scene.model, scene.workspace, (3, 4, 5))
 
-    def together(model: Model, errors: ErrorSet, coordinates: dict) -> dict:
+    def together(model, errors, coordinates):
         x, z = coordinates["X"], coordinates["Z"]
         return {"EYX": 1e-4 * x * z, "EAX": 0.02 * np.abs(x + z)}
 
@@ -119,7 +160,7 @@ def test_an_error_of_several_axes_is_a_field_too(monkeypatch: pytest.MonkeyPatch
     values = together(scene.model, scene.errors, grid.coordinates)
     plain, _ = plain_exact_error(scene.model, Loop.TOOL, grid.coordinates, values, grid.point_mm)
     for most in (1, 4, 10_000):
-        monkeypatch.setattr("warpspace.field.pieces.NODES", most)
+        monkeypatch.setattr("warpspace.field.grid.NODES", most)
         exact = evaluate(scene, grid=(3, 4, 5), exact=True).error_um
         first = evaluate(scene, grid=(3, 4, 5)).error_um
         np.testing.assert_allclose(exact, plain, rtol=0, atol=1e-8)
@@ -127,7 +168,7 @@ def test_an_error_of_several_axes_is_a_field_too(monkeypatch: pytest.MonkeyPatch
         assert np.ptp(first[:, 0, :, 1]) > 1.0
 
 
-def test_a_table_between_its_points_is_as_its_curve_says() -> None:
+def test_a_table_between_its_points_is_as_its_curve_says():
     """A number by hand: EYX moves the tool along y by the value of the table, whatever Y and Z."""
     scene = load_scene("dvf5000_first")
     curve = Table((-275.0, 275.0), ((-275.0, 0.0), (275.0, 11.0)))

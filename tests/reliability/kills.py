@@ -1,8 +1,4 @@
-"""Writers that are killed at any moment: the old file or the new one, never a piece, no litter.
-
-A process that has loaded the writers forks one for each kill, so that it is hit while it
-writes. Every writer writes the files of two scenes in turn, whose bytes are known beforehand.
-"""
+"""Writers that are killed at any moment: the old file or the new one, never a piece, no litter."""
 
 import os
 import random
@@ -15,7 +11,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from reliability.row import Outcome
+from reliability.outcome import Outcome
 
 HERE = Path(__file__).resolve().parents[1]
 SCENES = ("dvf5000_first", "dvf5000_second")
@@ -23,11 +19,10 @@ LONGEST_S = 0.2
 
 
 def _writers() -> dict[str, Callable[[int, Path], None]]:
-    """Give what writes a file, by its name; the number chooses between two contents."""
     import numpy as np
 
+    from warpspace.outputs.exports.fields import write_rows
     from warpspace.outputs.exports.formats import write_export
-    from warpspace.outputs.exports.rows import write_rows
     from warpspace.outputs.files import write_atomically
     from warpspace.picture.scene_picture import evaluate_picture
     from warpspace.scene.library import load_scene
@@ -76,7 +71,6 @@ def run(count: int) -> Outcome:
 
 
 def _serve(count: int, folder: Path) -> None:
-    """Fork writers and kill them."""
     writers = _writers()
     chance = random.Random(14)
     allowed: dict[str, list[bytes]] = {}

@@ -1,18 +1,25 @@
-"""Hostile messages to the running app, while an honest tab goes on working."""
+"""Hostile messages, and tabs that drag without an end, while an honest tab goes on working."""
 
 import asyncio
-import contextlib
 import itertools
 import random
 import tempfile
 from pathlib import Path
 
-import websockets
-
-from app.raw_client import App, Tab, dial, nonsense, pack, running_app, send_all, steadily, update
+from app.raw_client import (
+    App,
+    Tab,
+    connected,
+    nonsense,
+    pack,
+    running_app,
+    send_all,
+    steadily,
+    update,
+)
 from page_protocol import CAMERA
-from reliability.lag import Lag
-from reliability.row import Outcome
+from reliability.outcome import Lag, Outcome
+from reliability.reading import mutate
 
 LONGEST_S = 1.0
 """What the honest tab may wait for an answer."""
@@ -22,6 +29,8 @@ SLOW = 4
 """Clients that read nothing of what they are sent."""
 FLOOD = 5000
 """Messages of one flood: more than the app takes of one client at once."""
+TABS = 4
+"""Tabs that move all their sliders as often as a page may."""
 
 
 def run(count: int) -> Outcome:
@@ -46,7 +55,6 @@ def run(count: int) -> Outcome:
 
 
 async def _attack(app: App, count: int, lag: Lag) -> tuple[int, list[float], float]:
-    """Send in every way at once, and drag a slider meanwhile."""
     chance = random.Random(14)
     async with Tab(app) as honest, Tab(app) as hostile:
         kinds = nonsense(list(hostile.widgets.values())[:12])
@@ -54,12 +62,17 @@ async def _attack(app: App, count: int, lag: Lag) -> tuple[int, list[float], flo
         before = app.memory_mb
         slow = [asyncio.create_task(_read_nothing(app, chance)) for _ in range(SLOW)]
         steady = count // 10
+        drags = steady // TABS * TABS
         floods = max(1, count // 10 // FLOOD) if count >= 10 * FLOOD else 0
-        rest = count - steady - floods * FLOOD
-        shuffled = [_bend(chance.choice(kinds), chance) for _ in range(rest)]
+        rest = count - steady - drags - floods * FLOOD
+        shuffled = [chance.choice(kinds) for _ in range(rest)]
+        shuffled = [
+            mutate([m], [], chance)[:20_000] if chance.random() < 0.6 else m for m in shuffled
+        ]
         counts = {"flood": 0}
         work = [
-            asyncio.create_task(steadily(hostile.socket, _cycle(kinds, steady))),
+            asyncio.create_task(steadily(hostile.socket, cycle(kinds, steady))),
+            *(asyncio.create_task(_move_all(app, steady // TABS)) for _ in range(TABS)),
             asyncio.create_task(send_all(app, shuffled)),
             asyncio.create_task(_flood(app, hostile.widgets["EAX"], floods, counts)),
         ]
@@ -76,44 +89,36 @@ async def _attack(app: App, count: int, lag: Lag) -> tuple[int, list[float], flo
         await asyncio.gather(*slow, return_exceptions=True)
         taken.append(await honest.answer_s(15.0))
         taken.append(await hostile.answer_s(12.0))
-        return steady + rest + counts["flood"], taken, app.memory_mb - before
+        return steady + drags + rest + counts["flood"], taken, app.memory_mb - before
 
 
-def _cycle(kinds: list[bytes], count: int) -> list[bytes]:
+def cycle(kinds: list[bytes], count: int) -> list[bytes]:
     """Take messages in turn."""
     return list(itertools.islice(itertools.cycle(kinds), count))
 
 
-def _bend(message: bytes, chance: random.Random) -> bytes:
-    """Leave a message as it is, cut it, or change some of its bytes."""
-    if not message or chance.random() < 0.4:
-        return message
-    if chance.random() < 0.3:
-        return message[: chance.randrange(len(message))]
-    content = bytearray(message[:20_000])
-    for _ in range(chance.choice((1, 2, 8))):
-        content[chance.randrange(len(content))] = chance.randrange(256)
-    return bytes(content)
-
-
 async def _flood(app: App, widget: str, times: int, counts: dict[str, int]) -> None:
-    """Send valid messages faster than they are taken; the app ends such a connection."""
     for _ in range(times):
-        socket = await dial(app)
-        with contextlib.suppress(websockets.ConnectionClosed):
+        async with connected(app) as socket:
             await socket.send(pack(CAMERA))
             for number in range(FLOOD):
                 await socket.send(update(widget, {"value": number % 20 / 2.0}))
                 counts["flood"] += 1
-        socket.transport.abort()
 
 
 async def _read_nothing(app: App, chance: random.Random) -> None:
-    """Ask for the page and never take what comes."""
     while True:
-        socket = await dial(app)
-        with contextlib.suppress(websockets.ConnectionClosed):
+        async with connected(app) as socket:
             await socket.send(pack(CAMERA))
             socket.transport.pause_reading()
             await asyncio.sleep(chance.uniform(2.0, 5.0))
-        socket.transport.abort()
+
+
+async def _move_all(app: App, count: int) -> None:
+    async with Tab(app) as tab:
+        sliders = list(tab.sliders.items())
+        moves = (
+            update(widget, {"value": low + (high - low) * (number * 0.377 % 1.0)})
+            for number, (widget, (low, high)) in enumerate(itertools.cycle(sliders))
+        )
+        await steadily(tab.socket, list(itertools.islice(moves, count)))

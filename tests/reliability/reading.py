@@ -1,51 +1,112 @@
-"""Reads files in a watched process: no traceback, no hang, no more memory than there may be.
-
-Time is that of the processor, so that a busy machine does not look like a hang; a file that takes
-a minute of the clock all the same is one, too.
-"""
+"""Reads files in a watched process: no traceback, no hang, no more memory than there may be."""
 
 import argparse
 import json
 import os
 import random
-import resource
+import re
 import subprocess
 import sys
 import tempfile
 import time
 import warnings
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
-from reliability.mutate import mutate
-from reliability.row import Outcome
+from reliability.outcome import Outcome
 
 LONGEST_S = 1.0
 LARGEST_MB = 500.0
-SILENT_S = 60.0
+SILENT_S = 180.0
 HERE = Path(__file__).resolve().parents[1]
 PORTION = 5000
 """Files that one process reads, so that what it keeps is not counted for ever."""
 WAYS = ("bytes", "hypothesis", "atheris")
 
 
+NOTHING = {"by_format": {}, "read": {}, "slowest_s": 0.0, "most_mb": 0.0, "faults": []}
+
+
+_NUMBER = re.compile(rb"-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
+_INTERESTING = [0, 1, 0x7F, 0x80, 0xFF, 0x0A, 0x22, 0x5B, 0x7B]
+LARGEST = 200_000
+
+
+def mutate(seeds: Sequence[bytes], words: Sequence[bytes], chance: random.Random) -> bytes:
+    """Change a good file in one to eight places."""
+    content = bytearray(chance.choice(seeds))
+    for _ in range(chance.choice((1, 1, 1, 2, 3, 5, 8))):
+        _change(content, seeds, words, chance)
+    return bytes(content[:LARGEST])
+
+
+def _change(
+    content: bytearray, seeds: Sequence[bytes], words: Sequence[bytes], chance: random.Random
+) -> None:
+    at, length = chance.randrange(len(content) + 1), chance.choice((1, 2, 4, 16, 64, 512))
+    kind = chance.randrange(9 if words else 6)
+    if kind == 0 and content:
+        content[at % len(content)] ^= 1 << chance.randrange(8)
+    elif kind == 1 and content:
+        content[at % len(content)] = chance.choice(_INTERESTING)
+    elif kind == 2:
+        del content[at : at + length]
+    elif kind == 3:
+        content[at:at] = content[at : at + length] * chance.choice((1, 2, 50))
+    elif kind == 4:
+        other = chance.choice(seeds)
+        begin = chance.randrange(len(other) + 1)
+        content[at : at + length] = other[begin : begin + length]
+    elif kind == 5:
+        content[at : at + 4] = chance.choice(
+            (b"\xff" * 4, b"\0" * 4, b"\x7f\xff\xff\xff", b"\0\0\x80\x7f", chance.randbytes(4))
+        )
+    elif kind == 6:
+        content[at:at] = chance.choice(words)
+    elif kind == 7:
+        _replace_number(content, words, chance)
+    else:
+        _swap_lines(content, chance)
+
+
+def _replace_number(content: bytearray, words: Sequence[bytes], chance: random.Random) -> None:
+    found = list(_NUMBER.finditer(bytes(content)))
+    if not found:
+        return
+    place = chance.choice(found)
+    value = chance.choice(
+        (
+            str(chance.uniform(-1e6, 1e6)).encode(),
+            f"{10.0 ** chance.uniform(-330, 308):e}".encode(),
+            str(chance.randrange(-(10**20), 10**20)).encode(),
+            chance.choice(words),
+        )
+    )
+    content[place.start() : place.end()] = value
+
+
+def _swap_lines(content: bytearray, chance: random.Random) -> None:
+    lines = bytes(content).split(b"\n")
+    line = lines[chance.randrange(len(lines))]
+    lines.insert(chance.randrange(len(lines) + 1), line)
+    content[:] = b"\n".join(lines)
+
+
 def read_many(way: str, count: int, seed: int) -> Outcome:
     """Read so many changed files, in processes of their own; give what came of it."""
-    total, good, done = Counter[str](), Counter[str](), 0
+    total, good = Counter[str](), Counter[str]()
     slowest, most_mb = 0.0, 0.0
     faults: list[str] = []
-    while done < count:
+    while (done := sum(total.values())) < count:
         portion = min(PORTION, count - done)
-        command = [sys.executable, "-m", "reliability.reading", way, str(portion), str(seed + done)]
-        found = _watch(command)
+        found = _watch([way, str(portion), str(seed + done)])
         total.update(found["by_format"])
         good.update(found["read"])
-        slowest = max(slowest, float(found["slowest_s"]))
-        most_mb = max(most_mb, float(found["most_mb"]))
+        slowest, most_mb = max(slowest, found["slowest_s"]), max(most_mb, found["most_mb"])
         faults += found["faults"]
-        read = sum(found["by_format"].values())
-        done += read
-        if read < portion:  # its process has ended in the midst
+        if sum(total.values()) < done + portion:  # its process has ended in the midst
             break
     spelt = ", ".join(
         f"{name} {100.0 * good[name] / number:.0f} % of {number:,}"
@@ -58,17 +119,14 @@ def read_many(way: str, count: int, seed: int) -> Outcome:
     return Outcome(sum(total.values()), result, faults)
 
 
-def _watch(command: list[str]) -> dict[str, object]:  # pyright: ignore[reportReturnType]
-    """Run a reader; end it where it says nothing for long."""
-    with tempfile.TemporaryDirectory() as folder:
-        log = Path(folder) / "log"
+def _watch(given: list[str]) -> dict[str, Any]:
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        log, state, current = (folder / name for name in ("log", "state.json", "current"))
         with log.open("w") as stream:
-            process = subprocess.Popen(
-                [*command, folder], cwd=HERE, stdout=stream, stderr=subprocess.STDOUT
-            )
-        state = Path(folder) / "state.json"
-        last = time.monotonic()
-        seen = 0
+            command = [sys.executable, "-m", "reliability.reading", *given, place]
+            process = subprocess.Popen(command, cwd=HERE, stdout=stream, stderr=subprocess.STDOUT)
+        last, seen = time.monotonic(), 0
         while process.poll() is None:
             time.sleep(0.1)
             now = state.stat().st_mtime_ns if state.exists() else 0
@@ -77,14 +135,9 @@ def _watch(command: list[str]) -> dict[str, object]:  # pyright: ignore[reportRe
             if time.monotonic() - last > SILENT_S:
                 process.kill()
                 process.wait()
-        found = (
-            json.loads(state.read_text())
-            if state.exists()
-            else {"by_format": {}, "read": {}, "slowest_s": 0.0, "most_mb": 0.0, "faults": []}
-        )
+        found = json.loads(state.read_text() if state.exists() else json.dumps(NOTHING))
         if not found.get("ended"):
             said = log.read_text(errors="replace")[-2000:]
-            current = Path(folder) / "current"
             name, _, content = (current.read_bytes() if current.exists() else b"").partition(b"\n")
             kept = keep(name.decode(), content)
             found["faults"].append(f"the reader ended with {process.returncode}: {kept} {said}")
@@ -100,11 +153,7 @@ def keep(name: str, content: bytes) -> Path:
 
 
 class Reader:
-    """Reads files and keeps count of what went wrong.
-
-    A process of its own may have 500 MB; one that is larger from the start, as a test's is, 250 MB
-    more than it has.
-    """
+    """Reads files and keeps count of what went wrong."""
 
     def __init__(self, folder: Path) -> None:
         from reliability.formats import FORMATS
@@ -144,41 +193,24 @@ class Reader:
 
     @property
     def most_mb(self) -> float:
-        """Memory the process has ever had, MB.
-
-        Linux lets a process inherit `ru_maxrss` from the one that started it; VmHWM begins anew.
-        """
-        status = Path("/proc/self/status")
-        if status.exists():
-            line = next(x for x in status.read_text().splitlines() if x.startswith("VmHWM"))
-            return float(line.split()[1]) / 1024.0
-        scale = 1024.0 if sys.platform == "linux" else 1024.0**2
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / scale
+        """Memory the process has ever had, MB; of Linux."""
+        status = Path("/proc/self/status").read_text()
+        return float(status.partition("VmHWM:")[2].split()[0]) / 1024.0
 
     def say(self, *, ended: bool = False) -> None:
         """Write down how far it is."""
         self._said = time.monotonic()
-        text = json.dumps(
-            {
-                "by_format": self.by_format,
-                "read": self.good,
-                "slowest_s": self.slowest_s,
-                "most_mb": self.most_mb,
-                "faults": self.faults[:20],
-                "ended": ended,
-            }
-        )
+        said = NOTHING | {"by_format": self.by_format, "read": self.good, "ended": ended}
+        said |= {"slowest_s": self.slowest_s, "most_mb": self.most_mb, "faults": self.faults[:20]}
         path = self._folder / "state.new"
-        path.write_text(text)
+        path.write_text(json.dumps(said))
         path.replace(self._folder / "state.json")
 
     def _fault(self, name: str, content: bytes, what: str) -> None:
-        """Keep what must not be, with the file that shows it."""
         self.faults.append(f"{name}: {what} ({keep(name, content)})")
 
 
 def _read_bytes(reader: Reader, count: int, seed: int) -> None:
-    """Change bytes and words of good files."""
     from reliability.formats import FORMATS, WORDS
 
     chance = random.Random(seed)
@@ -191,7 +223,6 @@ def _read_bytes(reader: Reader, count: int, seed: int) -> None:
 
 
 def _read_hypothesis(reader: Reader, count: int, seed: int) -> None:
-    """Read whole scenes of hypothesis's making, as they are and with changes."""
     from hypothesis import HealthCheck, Phase, given, settings
     from hypothesis import seed as seeded
     from hypothesis import strategies as st
@@ -208,17 +239,13 @@ def _read_hypothesis(reader: Reader, count: int, seed: int) -> None:
 
     while (done := sum(reader.by_format.values())) < count:
         chosen = settings(
-            max_examples=count - done,
-            database=None,
-            deadline=None,
-            phases=[Phase.generate],
+            max_examples=count - done, database=None, deadline=None, phases=[Phase.generate],
             suppress_health_check=list(HealthCheck),
-        )
+        )  # fmt: skip
         seeded(seed + done)(chosen(given(scene_texts(), st.integers(0, 2**32))(read)))()
 
 
 def _read_atheris(reader: Reader, count: int, seed: int) -> None:
-    """Let a coverage-guided fuzzer choose what is read; it learns which bytes reach new code."""
     import atheris
 
     from reliability.formats import FORMATS, WORDS
@@ -249,10 +276,7 @@ def _read_atheris(reader: Reader, count: int, seed: int) -> None:
             os._exit(0)
 
     options = [f"-seed={seed % 2**31 or 1}", "-max_len=60000", "-rss_limit_mb=2000"]
-    atheris.Setup(
-        [sys.argv[0], *options, f"-dict={words}", "-timeout=60", str(corpus)],
-        read,
-    )
+    atheris.Setup([sys.argv[0], *options, f"-dict={words}", "-timeout=60", str(corpus)], read)
     atheris.Fuzz()
 
 

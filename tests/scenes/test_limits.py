@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from warpspace import evaluate
-from warpspace.analysis.montecarlo import Plan
+from warpspace.analysis.cases import Plan
 from warpspace.app.documents.scene_file import open_text, state_to_toml
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import EXAGGERATION, NODES, start_state
@@ -35,12 +35,12 @@ class Case:
     beyond: tuple[float, ...]
 
 
-def above(value: float) -> float:
+def above(value):
     """The next number that a file can hold."""
     return math.nextafter(value, math.inf)
 
 
-def below(value: float) -> float:
+def below(value):
     """The number before."""
     return math.nextafter(value, -math.inf)
 
@@ -84,12 +84,12 @@ WITHIN = [(name, value) for name, case in CASES.items() for value in case.within
 BEYOND = [(name, value) for name, case in CASES.items() for value in case.beyond]
 
 
-def text_of(name: str, value: float) -> str:
+def text_of(name, value):
     return f'machine = "dvf5000"\n{CASES[name].line.format(repr(value))}\n'
 
 
 @pytest.mark.parametrize(("name", "value"), WITHIN)
-def test_an_end_passes_through_the_program(name: str, value: float) -> None:
+def test_an_end_passes_through_the_program(name, value):
     scene = parse_scene(text_of(name, value), "x")
     assert np.isfinite(evaluate(scene, grid=3).error_um).all()
     picture = evaluate_for(FigureSettings(grid=3, exaggeration=scene.exaggeration), scene)
@@ -109,7 +109,7 @@ def test_an_end_passes_through_the_program(name: str, value: float) -> None:
 
 
 @pytest.mark.parametrize(("name", "value"), BEYOND)
-def test_just_beyond_is_refused_in_one_line(name: str, value: float) -> None:
+def test_just_beyond_is_refused_in_one_line(name, value):
     with pytest.raises(SceneError) as caught:
         parse_scene(text_of(name, value), "x", "folder/x.toml")
     message = str(caught.value)
@@ -119,7 +119,7 @@ def test_just_beyond_is_refused_in_one_line(name: str, value: float) -> None:
     assert "\n" not in message
 
 
-def test_every_number_that_a_slider_gives_can_be_saved() -> None:
+def test_every_number_that_a_slider_gives_can_be_saved():
     text = 'machine = "dvf5000"\nerrors.EXX = 90000\ntolerances.EXX = 90000\n'
     state = start_state(parse_scene(text, "x"))
     state = with_half_width(state.with_amplitude("EXX", 1e9), "EXX", 1e9)
@@ -130,7 +130,7 @@ def test_every_number_that_a_slider_gives_can_be_saved() -> None:
     assert open_text(state_to_toml(tiny), "x", "x.toml")[0].tolerances.own["EXX"].half_width == 0.0
 
 
-def test_widgets_and_options_take_the_limits_of_files() -> None:
+def test_widgets_and_options_take_the_limits_of_files():
     assert (EXAGGERATION.low, EXAGGERATION.high) == limits.EXAGGERATION
     assert (RANGE_TOP.low, RANGE_TOP.high) == limits.RANGE_TOP
     assert (NODES.low, NODES.high) == limits.LIVE_NODES
@@ -146,7 +146,7 @@ def test_widgets_and_options_take_the_limits_of_files() -> None:
     ],
     ids=["exaggeration", "range", "grid", "samples"],
 )
-def test_options_take_both_ends_and_refuse_what_lies_beyond(make, pair) -> None:
+def test_options_take_both_ends_and_refuse_what_lies_beyond(make, pair):
     low, high = pair
     for end in pair:
         make(end)
@@ -156,7 +156,7 @@ def test_options_take_both_ends_and_refuse_what_lies_beyond(make, pair) -> None:
             make(value)
 
 
-def test_figures_take_both_ends_of_their_size() -> None:
+def test_figures_take_both_ends_of_their_size():
     width, height = limits.MIN_FIGURE_PX
     side = limits.MAX_FIGURE_SIDE_PX
     other = limits.MAX_FIGURE_AREA_PX // side
@@ -167,7 +167,7 @@ def test_figures_take_both_ends_of_their_size() -> None:
             check_size(size)
 
 
-def test_the_peak_of_a_curve_is_looked_for_once_and_costs_no_more_than_a_limit() -> None:
+def test_the_peak_of_a_curve_is_looked_for_once_and_costs_no_more_than_a_limit():
     """36 curves of 64 terms took 10 s to open, and each later step as long."""
     wave = Harmonics((-1e5, 1e5), tuple((1000.0, 1.0, float(n)) for n in range(limits.MAX_TERMS)))
     assert wave.cosines <= 2_000_000
@@ -184,7 +184,7 @@ def test_the_peak_of_a_curve_is_looked_for_once_and_costs_no_more_than_a_limit()
     assert len(calls) == 1
 
 
-def test_many_fine_harmonics_are_remarked_on() -> None:
+def test_many_fine_harmonics_are_remarked_on():
     terms = ", ".join(f"[{900 + n}, 0.1, 0]" for n in range(64))
     keys = [f"E{d}{axis}" for axis in "XYZ" for d in "XYZABC"]
     lines = "\n".join(f"{key} = {{ harmonics = [{terms}] }}" for key in keys)

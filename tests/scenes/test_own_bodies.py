@@ -2,14 +2,11 @@
 
 import numpy as np
 import pytest
-from trimesh import Trimesh, creation
+from trimesh import creation
 
 from warpspace import SceneError, load_scene
-from warpspace.bodies.own_meshes import check_meshes
-from warpspace.bodies.placed import load_bodies
-from warpspace.exceptions import OptionError
+from warpspace.bodies.placed import load_bodies, place_bodies, scene_motions
 from warpspace.kinematics.model import Loop
-from warpspace.picture.bodies import place_bodies, scene_motions
 from warpspace.scene.library import parse_scene
 from warpspace.scene.save import scene_to_toml
 
@@ -90,78 +87,8 @@ def test_an_upload_keeps_the_names_says_so_and_draws_generated_bodies():
     assert parse_scene(scene_to_toml(scene), "mine") == scene
 
 
-@pytest.mark.parametrize(
-    ("bodies", "expected"),
-    [
-        ('X = "none.stl"', 'bodies.X = "none.stl": there is no such file beside this one'),
-        ('X = "../out.stl"', 'bodies.X = "../out.stl": leads out of the folder'),
-        ('X = "/etc/out.stl"', "leads out of the folder"),
-        ('X = "parts/../../out.stl"', "leads out of the folder"),
-        (
-            'X = "column.step"',
-            "unknown ending; expected a mesh that ends in .stl, .obj, .ply, .glb",
-        ),
-        ('Y2 = "column.stl"', "bodies.Y2: unknown frame of this machine"),
-        ("X = 3", "bodies.X = 3: expected a table"),
-        ('X = { file = "column.stl", unit = "ft" }', 'expected one of "mm", "cm", "m", "in"'),
-        ('X = { file = "column.stl", offset_mm = [0, 0] }', "expected [x, y, z]"),
-        ('X = { file = "column.stl", size = 3 }', "bodies.X.size: unknown key"),
-        ('X = { shape = "probe" }', "only the tool t has one"),
-        ('t = { shape = "saw" }', 'expected one of "cutter"'),
-        ("X = { }", "expected a file, or the shape of a tool"),
-        ('t = { file = "column.stl", shape = "probe" }', "expected a file, or the shape"),
-    ],
-)
-def test_a_wrong_entry_gives_one_message(folder, bodies, expected):
-    (folder.parent / "out.stl").write_bytes((folder / "column.stl").read_bytes())
-    with pytest.raises(SceneError) as caught:
-        scene_of(folder, bodies)
-    assert len(caught.value.problems) == 1
-    assert expected in caught.value.problems[0]
-
-
 def test_a_link_out_of_the_folder_is_refused(folder):
     box(folder.parent / "out.stl")
     (folder / "link.stl").symlink_to(folder.parent / "out.stl")
     with pytest.raises(SceneError, match="leads out of the folder"):
         scene_of(folder, 'X = "link.stl"')
-
-
-def empty(path):
-    path.write_bytes(b"")
-
-
-def metres(path):
-    box(path, (0.5, 0.3, 0.2))
-
-
-def huge(path):
-    with path.open("wb") as file:
-        file.truncate(200_000_000)
-
-
-@pytest.mark.parametrize(
-    ("write", "expected"),
-    [
-        (empty, "the file is empty"),
-        (metres, "It is probably in m; give its unit"),
-        (huge, "200 MB; a STL file may have up to 50 MB"),
-    ],
-)
-def test_a_mesh_that_cannot_be_drawn_gives_one_message(folder, write, expected):
-    write(folder / "bad.stl")
-    scene = scene_of(folder, 'X = "bad.stl"')
-    for ask in (check_meshes, load_bodies):
-        with pytest.raises(OptionError, match=expected) as caught:
-            ask(scene.machine)
-        assert str(caught.value).startswith("bodies.X: ")
-
-
-def test_an_open_mesh_is_drawn_and_remarked_on(folder):
-    whole = creation.box(extents=(100.0, 60.0, 40.0))
-    Trimesh(whole.vertices, whole.faces[:-1]).export(folder / "open.stl")
-    scene = scene_of(folder, 'X = "open.stl"')
-    (warning,) = check_meshes(scene.machine)
-    assert "bodies.X: " in warning
-    assert "not closed" in warning
-    assert "X_open" in {body.name for body in load_bodies(scene.machine)}

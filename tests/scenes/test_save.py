@@ -8,9 +8,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from warpspace import evaluate, load_scene, scene_names
-from warpspace.machine.errors import Constant, ErrorSet, Harmonics, Poly, Ramp, Table
+from warpspace.machine.errors import (
+    Constant,
+    ErrorSet,
+    Harmonics,
+    Poly,
+    Ramp,
+    Table,
+    Tolerance,
+    ToleranceSet,
+)
 from warpspace.machine.limits import MIN_HALF_WIDTH
-from warpspace.machine.tolerances import Tolerance, ToleranceSet
 from warpspace.scene.library import parse_scene
 from warpspace.scene.save import scene_to_toml
 
@@ -18,7 +26,7 @@ finite = st.floats(-1e3, 1e3, allow_subnormal=False)
 
 
 @pytest.mark.parametrize("name", scene_names())
-def test_every_bundled_scene_reloads_identically(name: str) -> None:
+def test_every_bundled_scene_reloads_identically(name):
     scene = load_scene(name)
     assert parse_scene(scene_to_toml(scene), name) == scene
 
@@ -32,7 +40,7 @@ def test_every_bundled_scene_reloads_identically(name: str) -> None:
     rows=st.lists(st.tuples(finite, finite), min_size=1, max_size=20, unique_by=lambda row: row[0]),
     exaggeration=st.none() | st.floats(1e-3, 1e6),
 )
-def test_any_numbers_and_any_title_survive(title, value, centre, half, rows, exaggeration) -> None:
+def test_any_numbers_and_any_title_survive(title, value, centre, half, rows, exaggeration):
     scene = load_scene("dvf5000_nominal")
     x, c = scene.workspace.ranges["X"], scene.machine.axes["C"].travel
     changed = replace(
@@ -57,7 +65,7 @@ def test_any_numbers_and_any_title_survive(title, value, centre, half, rows, exa
     assert parse_scene(scene_to_toml(changed), scene.name) == changed
 
 
-def test_an_inline_machine_is_written_inline() -> None:
+def test_an_inline_machine_is_written_inline():
     text = """
 title = "three axes"
 [machine]
@@ -78,7 +86,7 @@ EB0Z = 12.5
     assert again.machine.axes["Z"].direction == -1
 
 
-def test_a_ramp_over_another_range_keeps_its_values() -> None:
+def test_a_ramp_over_another_range_keeps_its_values():
     scene = load_scene("dvf5000_nominal")
     moved = replace(scene, errors=ErrorSet({"EAX": Ramp((-100.0, 300.0), 7.0)}))
     again = parse_scene(scene_to_toml(moved), scene.name)
@@ -87,7 +95,7 @@ def test_a_ramp_over_another_range_keeps_its_values() -> None:
     )
 
 
-def test_errors_carry_symbol_name_and_unit_as_remarks() -> None:
+def test_errors_carry_symbol_name_and_unit_as_remarks():
     text = scene_to_toml(load_scene("dvf5000_first"))
     assert "EAX = { ramp = 5.5 }  # ε_xX, roll of X, µrad" in text
     assert 'machine = "dvf5000"' in text

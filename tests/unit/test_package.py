@@ -1,4 +1,4 @@
-"""The public names of the package."""
+"""The package: public names, units, errors."""
 
 import os
 import re
@@ -10,28 +10,29 @@ from pathlib import Path
 import pytest
 
 import warpspace
+from warpspace.exceptions import (
+    SHOWN_PROBLEMS,
+    ChainError,
+    OptionError,
+    OutputError,
+    RenderError,
+    SceneError,
+    UnknownNameError,
+    WarpspaceError,
+    near_miss,
+)
 
 ROOT = Path(__file__).parents[2]
 
 
-def test_every_public_name_can_be_had() -> None:
+def test_every_public_name_can_be_had():
     for name in warpspace.__all__:
         assert getattr(warpspace, name) is not None
-
-
-def test_unknown_name_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
         warpspace.nonsense  # noqa: B018
 
 
-def test_import_loads_nothing_heavy() -> None:
-    heavy = "numpy pydantic viser pyvista vtk matplotlib trimesh scipy"
-    code = f"import sys, warpspace; print([n for n in {heavy.split()} if n in sys.modules])"
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert found.stdout.strip() == "[]"
-
-
-def test_import_loads_the_standard_library_and_one_file() -> None:
+def test_import_loads_the_standard_library_and_one_file():
     """What costs time at the start of a program is what is imported."""
     code = "import sys; old = {*sys.modules}; import warpspace; print(*{*sys.modules} - old)"
     command = [sys.executable, "-S", "-c", code]
@@ -46,21 +47,14 @@ def test_import_loads_the_standard_library_and_one_file() -> None:
     ]
 
 
-def test_help_of_the_command_line_loads_no_numerics_and_no_renderer() -> None:
-    heavy = "numpy pydantic viser pyvista vtk matplotlib trimesh scipy"
-    code = f"import sys, warpspace.cli; print([n for n in {heavy.split()} if n in sys.modules])"
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert found.stdout.strip() == "[]"
-
-
-def test_the_typed_program_runs() -> None:
+def test_the_typed_program_runs():
     program = runpy.run_path(str(ROOT / "tests" / "typed" / "program.py"))
     largest, key, mean = program["main"]()
     assert (round(largest, 2), key) == (51.72, "EA0Z")
     assert 25 < mean < 32
 
 
-def test_version_changelog_and_citation_agree() -> None:
+def test_version_changelog_and_citation_agree():
     version = re.escape(warpspace.__version__)
     changelog = (ROOT / "CHANGELOG.md").read_text("utf-8")
     assert re.search(rf"^## {version} \(.+\)$", changelog, re.MULTILINE), "CHANGELOG.md"
@@ -72,16 +66,47 @@ def test_version_changelog_and_citation_agree() -> None:
     assert "MIT License" in (ROOT / "LICENSE").read_text("utf-8")
 
 
-@pytest.mark.parametrize("options", [("--at", "X=0"), ("--grid", "3", "-o", "x.npz")])
-def test_a_field_loads_no_statistics_of_scipy_and_no_renderer(
-    options: tuple[str, ...], tmp_path: Path
-) -> None:
-    """Half of what the command took was scipy.stats, which only uncertainties need."""
-    heavy = "scipy.stats viser pyvista vtkmodules matplotlib trimesh pandas pyarrow"
+RENDERERS = "viser pyvista vtkmodules matplotlib trimesh"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "heavy"),
+    [
+        ("", f"numpy scipy {RENDERERS}"),
+        # half of what the command took was scipy.stats, which only uncertainties need
+        ("field dvf5000_first --at X=0", f"scipy.stats pandas pyarrow {RENDERERS}"),
+        ("field dvf5000_first --grid 3 -o x.npz", f"scipy.stats pandas pyarrow {RENDERERS}"),
+    ],
+)
+def test_a_command_loads_nothing_heavy_that_it_does_not_need(arguments, heavy, tmp_path):
     code = (
-        "import sys; from warpspace.cli import main; main();"
+        "import sys; from warpspace.cli import main; sys.argv[1:] and main();"
         f" print([n for n in {heavy.split()} if n in sys.modules])"
     )
-    command = [sys.executable, "-c", code, "field", "dvf5000_first", *options]
+    command = [sys.executable, "-c", code, *arguments.split()]
     found = subprocess.run(command, capture_output=True, text=True, check=True, cwd=tmp_path)
     assert found.stdout.splitlines()[-1] == "[]"
+
+
+def test_near_names_are_told_ignoring_case_or_the_short_list_of_all():
+    for kind in (ChainError, OptionError, OutputError, RenderError, SceneError, UnknownNameError):
+        assert issubclass(kind, WarpspaceError)
+    assert near_miss("eay", ["EAX", "EAY"]) == ": did you mean 'EAY' or 'EAX'?"
+    assert near_miss("EA", ["EAX", "EAY", "EAZ"]).count(" or ") == 1
+    assert near_miss("?", ["one", "two"]) == "; expected one of one, two"
+    assert near_miss("?", [f"name{number}" for number in range(25)]) == near_miss("?", []) == ""
+    error = UnknownNameError("axis", "Q", ["X", "Y"])
+    assert (error.name, error.known) == ("Q", ("X", "Y"))
+    assert str(error) == "unknown axis 'Q'; expected one of X, Y"
+
+
+def test_one_problem_is_one_line_and_several_are_a_list_that_is_cut():
+    assert str(SceneError("a.toml", ["title = 5: expected a text"])).count("\n") == 0
+    error = SceneError("a.toml", ["one", "two"])
+    assert str(error) == "a.toml: 2 problems\n  - one\n  - two"
+    assert error.problems == ("one", "two")
+    problems = [f"problem {number}" for number in range(SHOWN_PROBLEMS + 3)]
+    error = SceneError("a.toml", problems)
+    assert str(error).endswith("\n  … and 3 more")
+    assert str(error).count("\n") == SHOWN_PROBLEMS + 1
+    assert len(error.problems) == len(problems)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bench_scenes import scene_with
-from warpspace.bench.base import BenchTest
+from warpspace.bench.base import Run, run_test
 from warpspace.bench.kinds.ball_plate import BallPlate
 from warpspace.bench.kinds.circular import Circular
 from warpspace.bench.kinds.cone_frustum import ConeFrustum
@@ -15,21 +15,19 @@ from warpspace.bench.kinds.sphere import Sphere
 from warpspace.bench.kinds.squareness import Squareness
 from warpspace.bench.kinds.straightness import Straightness
 from warpspace.bench.readings import simulate
-from warpspace.bench.run import Run
 from warpspace.machine.curves.directional import Directional
 from warpspace.machine.errors import Constant, Harmonics, Poly, Table
-from warpspace.scene.model import Scene
 
 EXACT = {"rel": 1e-6, "abs": 1e-9}
 
 
-def run(scene: Scene, test: BenchTest, *, exact: bool = False) -> Run:
+def run(scene, test, *, exact=False):
     plan = test.plan(scene)
     readings = simulate(scene, plan, exact=exact)
     return Run("model", plan, readings, test.evaluate(plan, readings))
 
 
-def backlash(value: float) -> Directional:
+def backlash(value):
     span = (0.0, 1.0)
     return Directional(span, Constant(span, value / 2.0), Constant(span, -value / 2.0))
 
@@ -38,14 +36,14 @@ def backlash(value: float) -> Directional:
 
 
 @pytest.mark.parametrize("axis", ["X", "Y", "Z"])
-def test_positioning_of_a_ramp(axis: str) -> None:
+def test_positioning_of_a_ramp(axis):
     found = run(scene_with(**{f"E{axis}{axis}": ("ramp", 11.0)}), Positioning(axis=axis)).outcome
     for key in ("A_um", "E_um", "M_um", "A_forward_um", "E_backward_um"):
         assert found[key] == pytest.approx(11.0, **EXACT)
     assert found["R_um"] == found["B_um"] == 0.0
 
 
-def test_positioning_of_rotary_axes() -> None:
+def test_positioning_of_rotary_axes():
     for axis, key in (("C", "ECC"), ("B", "EBB")):
         scene = scene_with(**{key: Harmonics((0.0, 360.0), ((1, 20.0, 0.0),))})
         found = run(scene, Positioning(axis=axis, targets=361, start=0.0, end=30.0))
@@ -54,7 +52,7 @@ def test_positioning_of_rotary_axes() -> None:
         assert found.readings[0] == pytest.approx(20.0, **EXACT)
 
 
-def test_abbe_error_of_positioning() -> None:
+def test_abbe_error_of_positioning():
     # a pitch ramp of 10 µrad on the lever from the X frame down to the tool point
     scene = scene_with(EBX=("ramp", 10.0))
     short = run(scene, Positioning(axis="X")).outcome["E_um"]
@@ -63,7 +61,7 @@ def test_abbe_error_of_positioning() -> None:
 
 
 @pytest.mark.parametrize("exact", [True, False])
-def test_backlash_is_the_reversal(exact: bool) -> None:
+def test_backlash_is_the_reversal(exact):
     scene = scene_with(EXX=backlash(6.0))
     found = run(scene, Positioning(axis="X"), exact=exact).outcome
     assert found["B_um"] == found["R_um"] == found["A_um"] == pytest.approx(6.0, **EXACT)
@@ -75,7 +73,7 @@ def test_backlash_is_the_reversal(exact: bool) -> None:
 
 
 @pytest.mark.parametrize(("plane", "key"), [("XY", "EC0Y"), ("XZ", "EB0Z"), ("YZ", "EA0Z")])
-def test_squareness_is_an_ellipse_at_45_degrees(plane: str, key: str) -> None:
+def test_squareness_is_an_ellipse_at_45_degrees(plane, key):
     found = run(scene_with(**{key: 30.0}), Circular(plane=plane, radius_mm=150.0, points=360))
     assert found.outcome["squareness_urad"] == pytest.approx(30.0, **EXACT)
     assert found.outcome["circular_deviation_um"] == pytest.approx(4.5, **EXACT)
@@ -94,7 +92,7 @@ LAYOUTS = {
 
 @pytest.mark.parametrize("scene", LAYOUTS)
 @pytest.mark.parametrize("number", range(3))
-def test_squareness_of_every_layout_is_the_same_in_every_test(scene: str, number: int) -> None:
+def test_squareness_of_every_layout_is_the_same_in_every_test(scene, number):
     plane, key = (("XY", "EC0Y"), ("XZ", "EB0Z"), ("YZ", "EA0Z"))[number]
     seen = pytest.approx(LAYOUTS[scene][number], **EXACT)
     bent = scene_with(scene, **{key: 20.0})
@@ -107,7 +105,7 @@ def test_squareness_of_every_layout_is_the_same_in_every_test(scene: str, number
         assert run(bent, Diagonals(kind=kind)).outcome[f"squareness_{key}_urad"] == seen
 
 
-def test_backlash_steps_on_the_circle() -> None:
+def test_backlash_steps_on_the_circle():
     # +3 µm while X moves upwards, −3 µm while downwards: ±3·cos φ on the two halves
     found = run(scene_with(EXX=backlash(6.0)), Circular(radius_mm=100.0, points=360))
     marks = found.plan.marks
@@ -118,7 +116,49 @@ def test_backlash_steps_on_the_circle() -> None:
     assert found.outcome["hysteresis_um"] == pytest.approx(6.0 * np.cos(np.deg2rad(1.0)), **EXACT)
 
 
-def test_partial_arcs() -> None:
+def test_each_sense_has_its_own_centre_and_radii_count_from_the_nominal_one():
+    # ISO 230-4:2005: a circle of radius R + 5 µm about (4, 0) µm, back R + 3 µm about (−4, 0) µm,
+    # both with a squareness: r = 5 + 4 cos φ − 2 sin 2φ and r = 3 − 4 cos φ − 2 sin 2φ
+    test = Circular(radius_mm=100.0, points=720)
+    plan = test.plan(scene_with())
+    phi, sense = np.deg2rad(plan.marks["angle_deg"]), plan.marks["sense"]
+    readings = 4.0 + sense * (1.0 + 4.0 * np.cos(phi)) - 2.0 * np.sin(2.0 * phi)
+    found = test.evaluate(plan, readings)
+    assert found["circular_deviation_counter_clockwise_um"] == pytest.approx(4.0, **EXACT)  # G
+    assert found["circular_deviation_clockwise_um"] == pytest.approx(4.0, **EXACT)
+    # G(b): the two displacements cancel, the common centre is the nominal one
+    assert found["circular_deviation_um"] == pytest.approx(np.ptp(readings), **EXACT)
+    assert found["radial_deviation_max_um"] == pytest.approx(readings.max(), **EXACT)  # Fmax
+    assert found["radial_deviation_min_um"] == pytest.approx(readings.min(), **EXACT)  # Fmin
+    assert found["mean_radial_deviation_um"] == pytest.approx(4.0, **EXACT)  # D
+    assert found["hysteresis_um"] == pytest.approx(10.0, **EXACT)  # H: 2·(1 + 4) at φ = 0
+
+
+def test_an_eccentric_circle_is_round_but_not_where_it_should_be():
+    # a ball 7 µm off along +x and 2 µm up: F keeps what G takes out
+    test = Circular(radius_mm=100.0, points=360)
+    plan = test.plan(scene_with())
+    phi = np.deg2rad(plan.marks["angle_deg"])
+    found = test.evaluate(plan, 7.0 * np.cos(phi) + 2.0)
+    assert found["circular_deviation_um"] == pytest.approx(0.0, abs=1e-9)
+    assert found["circular_deviation_clockwise_um"] == pytest.approx(0.0, abs=1e-9)
+    assert found["radial_deviation_max_um"] == pytest.approx(9.0, **EXACT)
+    assert found["radial_deviation_min_um"] == pytest.approx(-5.0, **EXACT)
+    assert found["mean_radial_deviation_um"] == pytest.approx(2.0, **EXACT)
+
+
+def test_one_sense_alone_has_no_bidirectional_figures(tmp_path):
+    rows = [f"+,{angle},{3.0 + np.cos(np.deg2rad(2 * angle))}" for angle in range(0, 360, 5)]
+    data = tmp_path / "one.csv"
+    data.write_text("direction,angle_deg,radial_um\n" + "\n".join(rows) + "\n")
+    found = run_test(scene_with(), Circular(radius_mm=100.0), data).measured.outcome
+    labels = {quantity.key: quantity.name for quantity in found.quantities}
+    assert labels["circular_deviation_um"] == "circular deviation G"
+    assert not labels.keys() & {"mean_radial_deviation_um", "hysteresis_um"}
+    assert found["circular_deviation_um"] == pytest.approx(2.0, **EXACT)
+
+
+def test_partial_arcs():
     bent = scene_with(EC0Y=30.0)
     half = run(bent, Circular(radius_mm=150.0, start_deg=0.0, end_deg=180.0, points=181)).outcome
     assert half["squareness_urad"] == pytest.approx(30.0, **EXACT)
@@ -126,7 +166,7 @@ def test_partial_arcs() -> None:
     assert not any(quantity.key == "squareness_urad" for quantity in quarter.quantities)
 
 
-def test_circle_that_follows_a_rotary_axis() -> None:
+def test_circle_that_follows_a_rotary_axis():
     # a table that runs out by 5 µm along x in R is seen by the radial bar as −5·cos θ,
     # by the tangential one as +5·sin θ; an axial bar sees EA0C · R · sin θ
     for bar, expected in (
@@ -145,7 +185,7 @@ def test_circle_that_follows_a_rotary_axis() -> None:
 # --- diagonals ------------------------------------------------------------------------------------
 
 
-def test_body_diagonals_differ_by_squareness() -> None:
+def test_body_diagonals_differ_by_squareness():
     # edges 550 × 450 × 400: γ·a·b/L each way
     length = np.linalg.norm([550.0, 450.0, 400.0])
     found = run(scene_with(EC0Y=40.0), Diagonals())
@@ -160,7 +200,7 @@ def test_body_diagonals_differ_by_squareness() -> None:
     assert found.outcome["length_difference_um"] == pytest.approx(2.0 * change, **EXACT)
 
 
-def test_face_diagonals_and_scale() -> None:
+def test_face_diagonals_and_scale():
     found = run(scene_with(EXX=("ramp", 11.0)), Diagonals(kind="face"))
     rows = {row["diagonal"]: row for row in found.outcome.details["diagonals"]}
     share = 550.0 / np.hypot(550.0, 450.0)
@@ -169,7 +209,7 @@ def test_face_diagonals_and_scale() -> None:
     assert rows["YZ:PP"]["length_deviation_um"] == pytest.approx(0.0, abs=1e-9)
 
 
-def test_step_diagonals_tell_the_axes_apart() -> None:
+def test_step_diagonals_tell_the_axes_apart():
     length = np.linalg.norm([550.0, 450.0, 400.0])
     found = run(scene_with(EYY=("ramp", 9.0)), Diagonals(kind="step"))
     for row in found.outcome.details["diagonals"]:
@@ -177,7 +217,7 @@ def test_step_diagonals_tell_the_axes_apart() -> None:
         assert row["by_axis_um"]["Y"] == pytest.approx(9.0 * 450.0 / length, **EXACT)
 
 
-def test_backlash_along_diagonals() -> None:
+def test_backlash_along_diagonals():
     length = np.linalg.norm([550.0, 450.0, 400.0])
     found = run(scene_with(EXX=backlash(6.0)), Diagonals()).outcome
     assert found["B_um"] == pytest.approx(6.0 * 550.0 / length, **EXACT)
@@ -186,14 +226,14 @@ def test_backlash_along_diagonals() -> None:
 # --- straightness ---------------------------------------------------------------------------------
 
 
-def test_parabola_has_the_same_straightness_by_every_line() -> None:
+def test_parabola_has_the_same_straightness_by_every_line():
     scene = scene_with(EYX=Poly((-275.0, 275.0), (0.0, 0.0, 1e-4)))
     found = run(scene, Straightness(axis="X", across="y")).outcome
     for name in ("end_points", "least_squares", "minimum_zone"):
         assert found[f"{name}_um"] == pytest.approx(1e-4 * 275.0**2, **EXACT)
 
 
-def test_reference_lines_of_a_kink() -> None:
+def test_reference_lines_of_a_kink():
     # three points 0, 0, 8: the middle one lies 4 below the line through the ends
     scene = scene_with(EZX=Table((-275.0, 275.0), ((-275.0, 0.0), (0.0, 0.0), (275.0, 8.0))))
     found = run(scene, Straightness(axis="X", across="z", points=3))
@@ -205,7 +245,7 @@ def test_reference_lines_of_a_kink() -> None:
         assert slope[name] == pytest.approx(8.0 / 0.55, **EXACT)
 
 
-def test_squareness_is_no_straightness() -> None:
+def test_squareness_is_no_straightness():
     found = run(scene_with(EC0Y=50.0), Straightness(axis="Y", across="x")).outcome
     assert max(quantity.value for quantity in found.quantities) < 1e-9
 
@@ -213,7 +253,7 @@ def test_squareness_is_no_straightness() -> None:
 # --- rotary axis ----------------------------------------------------------------------------------
 
 
-def test_error_motions_of_a_table() -> None:
+def test_error_motions_of_a_table():
     wave = Harmonics((0.0, 360.0), ((2, 3.0, 0.0),))
     assert run(scene_with(EZC=wave), RotaryAxis()).outcome["axial_um"] == pytest.approx(
         6.0, **EXACT
@@ -234,7 +274,7 @@ def test_error_motions_of_a_table() -> None:
     ("C", ("EX0C_um", "EY0C_um", "EA0C_urad", "EB0C_urad")),
     ("B", ("EZ0B_um", "EX0B_um", "EC0B_urad", "EA0B_urad")),
 ])  # fmt: skip
-def test_axis_average_line_of_a_table(axis: str, keys: tuple[str, ...]) -> None:
+def test_axis_average_line_of_a_table(axis, keys):
     for key in keys:
         scene = scene_with(**{key.partition("_")[0]: 7.0})
         found = run(scene, RotaryAxis(axis=axis, height_mm=0.0)).outcome
@@ -247,7 +287,7 @@ def test_axis_average_line_of_a_table(axis: str, keys: tuple[str, ...]) -> None:
 # --- sphere ---------------------------------------------------------------------------------------
 
 
-def test_tilted_c_on_the_r_test() -> None:
+def test_tilted_c_on_the_r_test():
     # the ball at radius 100, height 60 above the axis' origin: α·h along y, −α·R·sin θ along z
     found = run(scene_with(EA0C=25.0), Sphere(axis="C", ball=(100.0, 0.0, 60.0)))
     theta = np.deg2rad(found.plan.marks["angle_deg"][:73])
@@ -258,7 +298,7 @@ def test_tilted_c_on_the_r_test() -> None:
     assert found.outcome["z_um"] == pytest.approx(5.0, **EXACT)
 
 
-def test_location_of_c_on_the_r_test() -> None:
+def test_location_of_c_on_the_r_test():
     found = run(scene_with(EX0C=8.0), Sphere(axis="C", ball=(100.0, 0.0, 60.0)))
     x, y, _ = found.readings.reshape(3, -1)
     np.testing.assert_allclose(x, -8.0, rtol=1e-9)
@@ -269,7 +309,7 @@ def test_location_of_c_on_the_r_test() -> None:
     assert turned["x_um"] == pytest.approx(16.0, **EXACT)
 
 
-def test_a_ball_that_stands_elsewhere_is_fitted_away() -> None:
+def test_a_ball_that_stands_elsewhere_is_fitted_away():
     test = Sphere(axis="C", ball=(100.0, 0.0, 60.0))
     scene = scene_with()
     plan = test.plan(scene)
@@ -282,7 +322,7 @@ def test_a_ball_that_stands_elsewhere_is_fitted_away() -> None:
 # --- ball plate and cone --------------------------------------------------------------------------
 
 
-def test_ball_plate_of_a_ramp_and_of_a_roll() -> None:
+def test_ball_plate_of_a_ramp_and_of_a_roll():
     found = run(scene_with(EXX=("ramp", 11.0)), BallPlate()).outcome
     assert found["scale_X_um_per_m"] == pytest.approx(20.0, **EXACT)
     assert found["length_error_um"] == pytest.approx(11.0, **EXACT)
@@ -292,7 +332,7 @@ def test_ball_plate_of_a_ramp_and_of_a_roll() -> None:
         assert level["length_error_um"] == pytest.approx(0.0, abs=1e-9)
 
 
-def test_cone_of_a_scale_and_of_a_squareness_in_the_level_plane() -> None:
+def test_cone_of_a_scale_and_of_a_squareness_in_the_level_plane():
     # a cone that stands level and is no cone at all is a circle: γ·R of circular deviation
     level = ConeFrustum(half_apex_deg=0.0, tilt_deg=0.0, radius_mm=100.0)
     found = run(scene_with(EC0Y=30.0), level).outcome
@@ -302,7 +342,7 @@ def test_cone_of_a_scale_and_of_a_squareness_in_the_level_plane() -> None:
     assert run(scene_with(EZC=5.0), level).outcome["circular_deviation_um"] < 1e-9
 
 
-def test_tool_stands_along_the_flank_of_the_cone() -> None:
+def test_tool_stands_along_the_flank_of_the_cone():
     from warpspace.kinematics import transforms
     from warpspace.kinematics.chain import branch_pose, tool_axis
 

@@ -21,7 +21,7 @@ def scene_with(**errors):
 @pytest.mark.parametrize("plane", KEYS)
 @pytest.mark.parametrize("put_in", [23.1, -18.1, 0.0, 33.9])
 @pytest.mark.parametrize("centre", [None, {"X": 60.0, "Y": -30.0, "Z": -250.0}])
-def test_squareness_comes_back(plane, put_in, centre) -> None:
+def test_squareness_comes_back(plane, put_in, centre):
     scene = scene_with(**{KEYS[plane]: put_in})
     found = warpspace.ballbar(scene, plane=plane, radius_mm=100, centre=centre)
     assert found.squareness_urad == pytest.approx(put_in, abs=0.1)
@@ -30,13 +30,13 @@ def test_squareness_comes_back(plane, put_in, centre) -> None:
 
 
 @pytest.mark.parametrize("plane", KEYS)
-def test_other_planes_do_not_disturb(plane) -> None:
+def test_other_planes_do_not_disturb(plane):
     scene = scene_with(EC0Y=10.0, EB0Z=20.0, EA0Z=-30.0, EXX=4.0, EYY=-3.0, EZZ=2.0)
     found = warpspace.ballbar(scene, plane=plane, radius_mm=150)
     assert found.squareness_urad == pytest.approx(found.given_urad, abs=0.1)
 
 
-def test_a_long_x_axis_is_an_ellipse_along_x() -> None:
+def test_a_long_x_axis_is_an_ellipse_along_x():
     scene = warpspace.load_scene("dvf5000_nominal")
     scene = replace(scene, errors=ErrorSet({"EXX": Ramp((-275.0, 275.0), 11.0)}))
     found = warpspace.ballbar(scene, plane="XY", radius_mm=200)
@@ -47,14 +47,14 @@ def test_a_long_x_axis_is_an_ellipse_along_x() -> None:
     assert found.squareness_urad == pytest.approx(0.0, abs=1e-9)
 
 
-def test_both_directions_trace_the_same() -> None:
+def test_both_directions_trace_the_same():
     found = warpspace.ballbar(warpspace.load_scene("dvf5000_first"), plane="XY", radius_mm=150)
     assert found.both_alike
     np.testing.assert_allclose(found.clockwise_um[1:], found.radial_um[1:][::-1])
     assert found.clockwise_um[0] == found.radial_um[0]
 
 
-def test_axes_that_move_against_their_name_give_the_same_squareness() -> None:
+def test_axes_that_move_against_their_name_give_the_same_squareness():
     from warpspace.machine.description import build_machine
 
     scene = scene_with(EC0Y=20.0)
@@ -73,7 +73,7 @@ def test_axes_that_move_against_their_name_give_the_same_squareness() -> None:
 
 @pytest.mark.parametrize("scene_name", ["dvf5000_first", "dvf5000_second"])
 @pytest.mark.parametrize("plane", KEYS)
-def test_the_bench_finds_what_the_ball_bar_does(scene_name: str, plane: str) -> None:
+def test_the_bench_finds_what_the_ball_bar_does(scene_name, plane):
     # figures 5-3, 5-9 and 5-14 of the thesis are circles of the measured machines
     from warpspace.bench.kinds.circular import Circular
 

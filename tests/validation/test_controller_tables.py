@@ -1,36 +1,22 @@
-"""Tables of controllers: what their manuals print, and what they do with it, by hand.
-
-Sources: Siemens SINUMERIK Function Manual Extended Functions (03/2013), K3; FANUC A-79351E, page 3;
-LinuxCNC documentation of COMP_FILE and matrixkins(9); Klipper documentation, Skew Correction; ISG
-kernel documentation, FCT-C26; HEIDENHAIN Technical Manual TNC 306, page 4-21; ISO 230-2.
-"""
+"""Tables of controllers: what their manuals print, and what they do with it, by hand."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from warpspace.formats.importing import read_errors
 from warpspace.formats.kind import ReadOptions
-from warpspace.formats.kinds import (
-    fanuc_3d,
-    heidenhain,
-    linuxcnc_comp,
-    linuxcnc_matrix,
-    marlin,
-    sinumerik_cec,
-    sinumerik_enc,
-)
+from warpspace.formats.kinds.linuxcnc import squareness
+from warpspace.formats.kinds.skew import skew_factor, skew_lengths
 from warpspace.formats.measured import BACKWARD, FORWARD
-from warpspace.formats.parts.skew import skew_factor, skew_lengths
+from warpspace.formats.registry import find_format, read_errors
 from warpspace.formats.source import source_of_text
 from warpspace.formats.terms import Product, trilinear
 
 PLAIN = ReadOptions()
 
 
-def sources(*texts: str, names: tuple[str, ...] = ()):
+def sources(*texts, names=()):
     """Give texts as files."""
     given = names or tuple(f"file{i}.txt" for i in range(len(texts)))
     return [source_of_text(text, name) for text, name in zip(texts, given, strict=True)]
@@ -41,7 +27,7 @@ def sources(*texts: str, names: tuple[str, ...] = ()):
 PRINTED = {0: "0.003", 1: "0.01", 2: "0.012", 800: "-0.0"}
 
 
-def sinumerik_242() -> str:
+def sinumerik_242():
     """Give the printed example; the points that it leaves out with dots are zero."""
     lines = ["%_N_AX_EEC_INI", "CHANDATA(1)"]
     for index in range(801):
@@ -59,15 +45,15 @@ def sinumerik_242() -> str:
     )
 
 
-def test_sinumerik_page_242_interpolates_linearly_and_holds_its_ends() -> None:
-    (table,) = sinumerik_enc.read_tables(sources(sinumerik_242()), PLAIN).terms
+def test_sinumerik_page_242_interpolates_linearly_and_holds_its_ends():
+    (table,) = find_format("sinumerik-enc").tables(sources(sinumerik_242()), PLAIN).terms
     at = np.array([-300.0, -200.0, -199.5, -199.0, -198.25, 600.0, 900.0])
     # a positive value makes the axis move in the negative direction (page 238)
     expected = -np.array([0.003, 0.003, 0.0065, 0.01, 0.0115, 0.0, 0.0])
     assert table.corrections({"X": at})["X"] == pytest.approx(expected, abs=1e-12)
 
 
-def test_sinumerik_page_242_is_a_positioning_error_in_um() -> None:
+def test_sinumerik_page_242_is_a_positioning_error_in_um():
     found = read_errors(sources(sinumerik_242()), PLAIN).found
     (one,) = found.series
     assert one.key == "EXX"
@@ -75,13 +61,13 @@ def test_sinumerik_page_242_is_a_positioning_error_in_um() -> None:
     assert (one.positions[0], one.positions[-1], len(one.positions)) == (-200.0, 600.0, 801)
 
 
-def test_sinumerik_modulo_repeats_the_table() -> None:
+def test_sinumerik_modulo_repeats_the_table():
     text = (
         "$AA_ENC_COMP[0,0,C]=0.0\n$AA_ENC_COMP[0,1,C]=0.01\n$AA_ENC_COMP[0,2,C]=0.0\n"
         "$AA_ENC_COMP_STEP[0,C]=180\n$AA_ENC_COMP_MIN[0,C]=0\n$AA_ENC_COMP_MAX[0,C]=360\n"
         "$AA_ENC_COMP_IS_MODULO[0,C]=1\nM17\n"
     )
-    (table,) = sinumerik_enc.read_tables(sources(text), PLAIN).terms
+    (table,) = find_format("sinumerik-enc").tables(sources(text), PLAIN).terms
     at = np.array([-90.0, 90.0, 450.0, 360.0])
     assert table.corrections({"C": at})["C"] == pytest.approx([-0.005, -0.005, -0.005, 0.0])
 
@@ -110,8 +96,8 @@ M17
 """
 
 
-def test_sinumerik_cec_adds_tables_and_the_product_of_two() -> None:
-    tables = sinumerik_cec.read_tables(sources(CEC.format(direction=0, other=2)), PLAIN)
+def test_sinumerik_cec_adds_tables_and_the_product_of_two():
+    tables = find_format("sinumerik-cec").tables(sources(CEC.format(direction=0, other=2)), PLAIN)
     at = {"Y": np.array(-200.0), "Z": np.array(50.0)}
     # 0.005 of table 0, 0.5 of table 1, and their product is added (page 249)
     assert tables.corrections(at)["X"] == pytest.approx(-(0.005 + 0.5 + 0.005 * 0.5))
@@ -119,8 +105,8 @@ def test_sinumerik_cec_adds_tables_and_the_product_of_two() -> None:
     assert product.corrections(at)["X"] == pytest.approx(-0.0025)
 
 
-def test_sinumerik_cec_direction_acts_in_one_direction_of_travel() -> None:
-    tables = sinumerik_cec.read_tables(sources(CEC.format(direction=1, other=0)), PLAIN)
+def test_sinumerik_cec_direction_acts_in_one_direction_of_travel():
+    tables = find_format("sinumerik-cec").tables(sources(CEC.format(direction=1, other=0)), PLAIN)
     at = {"Y": np.array(400.0), "Z": np.array(0.0)}
     assert tables.corrections(at, 1)["X"] == pytest.approx(-0.012)
     assert tables.corrections(at, -1)["X"] == pytest.approx(0.0)
@@ -135,7 +121,7 @@ def test_sinumerik_cec_direction_acts_in_one_direction_of_travel() -> None:
 # --- FANUC: one cell by hand ---------------------------------------------------------------------
 
 
-def test_fanuc_trilinear_formula_for_one_cell() -> None:
+def test_fanuc_trilinear_formula_for_one_cell():
     corners = np.array([3.0, 7.0, -2.0, 5.0, 11.0, -6.0, 4.0, 9.0])
     values = corners.reshape(2, 2, 2, 1)
     places = ((0.0, 10.0), (0.0, 20.0), (0.0, 40.0))
@@ -155,7 +141,7 @@ def test_fanuc_trilinear_formula_for_one_cell() -> None:
     assert expected == pytest.approx(2.77, abs=1e-9)
 
 
-def test_fanuc_counts_are_detection_units_times_the_magnification() -> None:
+def test_fanuc_counts_are_detection_units_times_the_magnification():
     rows = [
         "# three-dimensional error compensation",
         "# detection unit = 0.0001 mm",
@@ -168,7 +154,7 @@ def test_fanuc_counts_are_detection_units_times_the_magnification() -> None:
             for x in (0, 1):
                 number += 1
                 rows.append(f"{number},{x * 10},{y * 10},{z * 10},{number},0,{-number}")
-    tables = fanuc_3d.read_tables(sources("\n".join(rows)), PLAIN)
+    tables = find_format("fanuc-3d").tables(sources("\n".join(rows)), PLAIN)
     at = {"X": np.array(10.0), "Y": np.array(0.0), "Z": np.array(0.0)}
     found = tables.corrections(at)
     assert (found["X"], found["Z"]) == (pytest.approx(6e-4), pytest.approx(-6e-4))
@@ -180,9 +166,9 @@ TYPE_0 = "-1.000 -1.005 -0.995\n0.000 0.002 -0.003\n1.000 1.003 0.998\n"
 TYPE_1 = "-1.000 0.005 -0.005\n0.000 0.002 -0.003\n1.000 0.003 -0.004\n"
 
 
-def test_linuxcnc_type_0_example_adds_nominal_minus_actual() -> None:
+def test_linuxcnc_type_0_example_adds_nominal_minus_actual():
     options = ReadOptions(axis="X", variant="type-0")
-    (table,) = linuxcnc_comp.read_tables(sources(TYPE_0), options).terms
+    (table,) = find_format("linuxcnc-comp").tables(sources(TYPE_0), options).terms
     at = np.array([-2.0, -1.0, -0.5, 0.0, 1.0, 5.0])
     forward = table.corrections({"X": at}, 1)["X"]
     reverse = table.corrections({"X": at}, -1)["X"]
@@ -190,26 +176,28 @@ def test_linuxcnc_type_0_example_adds_nominal_minus_actual() -> None:
     assert reverse == pytest.approx([-0.005, -0.005, -0.001, 0.003, 0.002, 0.002])
 
 
-def test_linuxcnc_type_1_example_is_added_as_it_stands() -> None:
+def test_linuxcnc_type_1_example_is_added_as_it_stands():
     options = ReadOptions(axis="X", variant="type-1")
-    (table,) = linuxcnc_comp.read_tables(sources(TYPE_1), options).terms
+    (table,) = find_format("linuxcnc-comp").tables(sources(TYPE_1), options).terms
     at = np.array([-1.0, 0.0, 1.0])
     assert table.corrections({"X": at}, 1)["X"] == pytest.approx([0.005, 0.002, 0.003])
     assert table.corrections({"X": at}, -1)["X"] == pytest.approx([-0.005, -0.003, -0.004])
     # both directions: the first rows of the two examples mean the same
-    zero = linuxcnc_comp.read_tables(
-        sources(TYPE_0), ReadOptions(axis="X", variant="type-0")
-    ).terms[0]
+    zero = (
+        find_format("linuxcnc-comp")
+        .tables(sources(TYPE_0), ReadOptions(axis="X", variant="type-0"))
+        .terms[0]
+    )
     assert table.corrections({"X": at[:1]}, 1)["X"] == pytest.approx(
         zero.corrections({"X": at[:1]}, 1)["X"]
     )
 
 
-def test_matrixkins_squareness_of_printed_diagonals() -> None:
-    assert linuxcnc_matrix.squareness(140.4, 142.8) == pytest.approx(0.016950, abs=5e-7)
+def test_matrixkins_squareness_of_printed_diagonals():
+    assert squareness(140.4, 142.8) == pytest.approx(0.016950, abs=5e-7)
 
 
-def test_matrixkins_shear_is_the_squareness_of_y() -> None:
+def test_matrixkins_shear_is_the_squareness_of_y():
     text = "setp matrixkins.C_xx 1\nsetp matrixkins.C_xy 0.01695\nsetp matrixkins.C_yy 1.0001\n"
     found = read_errors(sources(text), PLAIN).found
     assert found.constants == {"EC0Y": pytest.approx(16950.0)}
@@ -220,7 +208,7 @@ def test_matrixkins_shear_is_the_squareness_of_y() -> None:
 # --- Klipper and Marlin --------------------------------------------------------------------------
 
 
-def test_klipper_printed_lengths() -> None:
+def test_klipper_printed_lengths():
     # by hand: side² = (2·140.4² + 2·142.8² − 4·99.8²) / 4, then cot of the angle at A
     ac, bd, ad = 140.4, 142.8, 99.8
     side = math.sqrt((2 * ac**2 + 2 * bd**2 - 4 * ad**2) / 4)
@@ -235,12 +223,12 @@ def test_klipper_printed_lengths() -> None:
 
 
 @pytest.mark.parametrize("factor", [-0.3, -1e-5, 0.0, 2e-4, 0.1])
-def test_skew_lengths_are_the_inverse_of_the_factor(factor: float) -> None:
+def test_skew_lengths_are_the_inverse_of_the_factor(factor):
     assert skew_factor(*skew_lengths(factor)) == pytest.approx(factor, abs=1e-12)
 
 
-def test_marlin_corrects_x_over_z_by_both_factors() -> None:
-    tables = marlin.read_tables(sources("M852 I0.01 J0.02 K0.03\n"), PLAIN)
+def test_marlin_corrects_x_over_z_by_both_factors():
+    tables = find_format("marlin").tables(sources("M852 I0.01 J0.02 K0.03\n"), PLAIN)
     at = {"X": np.array(0.0), "Y": np.array(10.0), "Z": np.array(100.0)}
     found = tables.corrections(at)
     # planner.h: x −= y·xy + z·(xz − xy·yz), y −= z·yz
@@ -267,10 +255,10 @@ NR    ACTIVE      Y           Z
 """
 
 
-def test_heidenhain_y_over_z_of_the_manual_interpolates_lines_without_entry() -> None:
+def test_heidenhain_y_over_z_of_the_manual_interpolates_lines_without_entry():
     # TNC 306, page 4-21: Y = F(Z), lines 3 and 4 without entry
     files = sources(COM, CMA, names=("TAB_Z.COM", "CONFIG.CMA"))
-    (table,) = heidenhain.read_tables(files, PLAIN).terms
+    (table,) = find_format("heidenhain").tables(files, PLAIN).terms
     assert (table.source, table.target) == ("Z", "Y")
     at = np.array([-1000.0, -981.808, -940.848, -924.464, -908.08, 0.0])
     assert table.corrections({"Z": at})["Y"] == pytest.approx(
@@ -307,19 +295,16 @@ Z      X      EXX    EYX    EZX    EAX    EBX    ECX
 """
 
 
-def test_etalon_example_in_um_and_urad() -> None:
+def test_etalon_example_in_um_and_urad():
     found = read_errors(sources(ETALON), PLAIN).found
-    assert found.constants == {
-        "EC0B": pytest.approx(22.355737),
-        "EA0B": pytest.approx(47.622950),
-    }
+    assert found.constants == {"EC0B": pytest.approx(22.355737), "EA0B": pytest.approx(47.622950)}
     (one,) = found.series
     assert one.key == "EXY"
     assert one.values[0] == pytest.approx(-1.358635132)
     assert one.positions == (-280.0, -270.0, -260.0, 260.0, 270.0)
 
 
-def test_isg_example_of_two_arguments() -> None:
+def test_isg_example_of_two_arguments():
     found = read_errors(sources(ISG_TWO), PLAIN).found
     assert [plane.key for plane in found.planes] == ["EXX", "EYX", "EZX", "EAX", "EBX", "ECX"]
     first = found.planes[0]
@@ -332,7 +317,7 @@ def test_isg_example_of_two_arguments() -> None:
 # --- ISO 230-2: five targets, five runs, both directions -----------------------------------------
 
 
-def test_mean_reversal_and_repeatability_of_five_targets_and_five_runs(tmp_path: Path) -> None:
+def test_mean_reversal_and_repeatability_of_five_targets_and_five_runs(tmp_path):
     targets = (0.0, 100.0, 200.0, 300.0, 400.0)
     rng = np.random.default_rng(230)
     there = np.round(rng.normal(2.0, 0.5, (5, 5)), 1)

@@ -17,7 +17,7 @@ STEP_BACKWARD = (0.4, 0.2, 0.2, 0.8, 0.2)
 S = 1.5811388300841898
 
 
-def csv_text(directions: str = "+-") -> str:
+def csv_text(directions="+-"):
     rows = ["run,direction,target_mm,deviation_um"]
     for run in range(5):
         for sign in directions:
@@ -29,14 +29,14 @@ def csv_text(directions: str = "+-") -> str:
     return "\n".join(rows) + "\n"
 
 
-def evaluated(text: str):
+def evaluated(text):
     scene, test = scene_with(), Positioning(axis="X")
     table = parse_table(text, test.data_columns(scene), "data.csv")
     plan, readings = test.plan_data(scene, table)
     return test.evaluate(plan, readings)
 
 
-def test_every_number_of_the_standard() -> None:
+def test_every_number_of_the_standard():
     found = evaluated(csv_text())
     # B_i = x̄↑ − x̄↓ = 2, 3, 4, 3, 3
     assert found["B_um"] == pytest.approx(4.0)
@@ -63,13 +63,13 @@ def test_every_number_of_the_standard() -> None:
     assert row["s_forward_um"] == pytest.approx(0.2 * S)
 
 
-def test_one_direction_gives_the_one_directional_numbers_only() -> None:
+def test_one_direction_gives_the_one_directional_numbers_only():
     found = evaluated(csv_text("+"))
     keys = {quantity.key for quantity in found.quantities}
     assert keys == {"A_forward_um", "E_forward_um", "R_forward_um"}
 
 
-def test_bands_of_the_figure_are_two_standard_deviations_wide() -> None:
+def test_bands_of_the_figure_are_two_standard_deviations_wide():
     from warpspace.bench.base import Run
 
     scene, test = scene_with(), Positioning(axis="X")

@@ -1,7 +1,4 @@
-"""Mean volumetric errors of sampled machines, and the analytical check of E|E|².
-
-Reference values were computed independently of this program.
-"""
+"""Mean volumetric errors of sampled machines, and the analytical check of E|E|²."""
 
 import math
 
@@ -9,12 +6,13 @@ import numpy as np
 import pytest
 
 import warpspace
-from warpspace.analysis import montecarlo as engine
+from warpspace.analysis.cases import Case, Plan
 from warpspace.analysis.contributions import expected_square
-from warpspace.analysis.draws import build_draws, loop_keys
+from warpspace.analysis.distribution import build_draws, loop_keys
+from warpspace.analysis.machines import case_of
+from warpspace.analysis.montecarlo import montecarlo
 from warpspace.field.evaluate import View
 from warpspace.kinematics.model import Loop
-from warpspace.scene.verbs import scene_draws
 
 MEANS = [
     ("dvf5000_general", "tool", "uniform", 41.1, 0.5),
@@ -26,7 +24,7 @@ MEANS = [
 
 
 @pytest.mark.parametrize(("name", "loop", "distribution", "mean", "within"), MEANS)
-def test_mean_of_sampled_machines(name, loop, distribution, mean, within) -> None:
+def test_mean_of_sampled_machines(name, loop, distribution, mean, within):
     result = warpspace.montecarlo(
         warpspace.load_scene(name), loop=loop, distribution=distribution, samples=100_000
     )
@@ -36,35 +34,30 @@ def test_mean_of_sampled_machines(name, loop, distribution, mean, within) -> Non
 @pytest.mark.parametrize("loop", ["tool", "workpiece", "relative"])
 @pytest.mark.parametrize(("distribution", "clip"), [("uniform", False), ("normal", True)])
 @pytest.mark.parametrize("name", ["dvf5000_general", "dvf5000_proposed"])
-def test_sampled_mean_square_is_the_trace(name, loop, distribution, clip) -> None:
+def test_sampled_mean_square_is_the_trace(name, loop, distribution, clip):
     scene = warpspace.load_scene(name)
     result = warpspace.montecarlo(
         scene, loop=loop, distribution=distribution, clip=clip, samples=200_000, seed=5
     )
-    draws = scene_draws(scene, Loop(loop), distribution, clip=clip)
-    variance, offset = expected_square(
-        scene.model, draws, scene.workspace, result.view, result.plan
-    )
+    variance, offset = expected_square(case_of(scene, result))
     assert result.rms_um == pytest.approx(math.sqrt(variance.sum() + offset), rel=0.005)
 
 
 @pytest.mark.parametrize("over", ["sampled", "max", "mean"])
 @pytest.mark.parametrize("clip", [False, True])
 @pytest.mark.parametrize("distribution", ["uniform", "normal"])
-def test_every_mode_has_the_mean_square_of_the_trace_at_a_single_point(
-    over, distribution, clip
-) -> None:
+def test_every_mode_has_the_mean_square_of_the_trace_at_a_single_point(over, distribution, clip):
     scene = warpspace.load_scene("dvf5000_proposed")
     point = scene.workspace.moved({"X": 50.0, "Y": -100.0, "Z": -300.0})
     keys = loop_keys(scene.model, Loop.TOOL, scene.parameter_keys)
     draws = build_draws(scene.tolerances, keys, distribution, clip=clip)
-    plan = engine.Plan(samples=200_000, over=over, seed=2)
-    result = engine.montecarlo(scene.model, draws, point, View(), plan)
-    variance, offset = expected_square(scene.model, draws, point, View(), plan)
+    case = Case(scene.model, draws, point, plan=Plan(samples=200_000, over=over, seed=2))
+    result = montecarlo(case)
+    variance, offset = expected_square(case)
     assert result.rms_um == pytest.approx(math.sqrt(variance.sum() + offset), rel=0.005)
 
 
-def test_wilson_interval_covers_the_truth_of_a_large_sample() -> None:
+def test_wilson_interval_covers_the_truth_of_a_large_sample():
     scene = warpspace.load_scene("dvf5000_general")
     truth = warpspace.montecarlo(scene, spec_um=50, samples=400_000, seed=99).probability
     inside = 0
@@ -74,22 +67,16 @@ def test_wilson_interval_covers_the_truth_of_a_large_sample() -> None:
     assert inside >= 16
 
 
-def test_max_over_the_corners_is_the_max_over_the_grid() -> None:
+def test_max_over_the_corners_is_the_max_over_the_grid():
     scene = warpspace.load_scene("dvf5000_general")
     keys = loop_keys(scene.model, Loop.TOOL, scene.parameter_keys)
     draws = build_draws(scene.tolerances, keys, "uniform")
-    from warpspace.analysis.nodes import Over, node_gains, reduce_nodes
-    from warpspace.analysis.points import extreme_places, spread_places
+    from warpspace.analysis.cases import Over, Site, node_gains, reduce_nodes
 
+    site = Site(scene.model, scene.workspace, Loop.TOOL)
     machines = draws.draw(np.random.default_rng(0), 500)
     found = [
-        reduce_nodes(
-            machines,
-            node_gains(
-                scene.model, keys, View(), find(scene.model, Loop.TOOL, scene.workspace, None, 7)
-            ),
-            Over.MAX,
-        )
-        for find in (extreme_places, spread_places)
+        reduce_nodes(machines, node_gains(scene.model, keys, View(), find(7)), Over.MAX)
+        for find in (site.extreme, site.spread)
     ]
     np.testing.assert_allclose(found[0], found[1], rtol=1e-12)

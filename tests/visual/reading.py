@@ -5,11 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpspace.geometry.colour import ColourScale, colour_table
-from warpspace.geometry.faces import crease_lines
-from warpspace.geometry.surfaces import Surface, triangulate
-from warpspace.outputs.drawing.content import DrawnMap
+from warpspace.geometry.surfaces import Surface, crease_lines, triangulate
 from warpspace.outputs.drawing.render import Raster
-from warpspace.picture.topology import map_faces
+from warpspace.outputs.drawing.sheet import DrawnMap
+from warpspace.picture.model import map_faces
 from warpspace.units import Array
 
 SLOPE_TOLERANCE = 0.005
@@ -22,15 +21,7 @@ EDGE_PX = 3.0
 
 @dataclass(frozen=True)
 class Reading:
-    """What was read at the nodes that can be seen.
-
-    Attributes
-    ----------
-    read, known : ndarray, [n]
-        Values by colour and by the model.
-    depth_mm : ndarray, [n]
-        How far the drawn surface lies behind (+) or before the expected node.
-    """
+    """What was read at the nodes that can be seen."""
 
     read: Array
     known: Array
@@ -74,20 +65,7 @@ def read_map(
     *,
     diverging: bool | None = None,
 ) -> Reading:
-    """Read a drawn map at the nodes that the model says are visible.
-
-    Parameters
-    ----------
-    drawn : DrawnMap
-        From the figure: only pixels, depth, projection and colour bar are used.
-    expected_mm : ndarray, [nx, ny, nz, 3], mm
-        Where the nodes should be drawn.
-    known : ndarray, [nx, ny, nz]
-        What the colour should show.
-    view : str
-    diverging : bool, optional
-        Read with this kind of colour map instead of the figure's.
-    """
+    """Read a drawn map at the nodes that the model says are visible."""
     assert drawn.raster is not None
     raster, projection = drawn.raster, drawn.projection
     shape = known.shape

@@ -5,31 +5,30 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from visual.reading import Reading, read_map
+from products import pairwise
+from visual.reading import read_map
 from warpspace import load_scene
 from warpspace.geometry.colour import component_values
 from warpspace.outputs.drawing.settings import FigureSettings
 from warpspace.outputs.figures.catalogue import draw_figure
-from warpspace.picture.scene_picture import ScenePicture, evaluate_picture
-from warpspace.units import MM_PER_UM, Array
+from warpspace.picture.scene_picture import evaluate_picture
+from warpspace.units import MM_PER_UM
 
 pytestmark = [pytest.mark.render, pytest.mark.usefixtures("renderer")]
 SCENES = ("dvf5000_first", "dvf5000_second", "teach_squareness", "teach_pitching_axis")
 
 
 @pytest.fixture(scope="module")
-def truth() -> ScenePicture:
+def truth():
     return evaluate_picture(load_scene("dvf5000_first"))
 
 
-def expected(picture: ScenePicture, exaggeration: float) -> Array:
+def expected(picture, exaggeration):
     """Where the nodes should be drawn."""
     return picture.grid.nominal_mm + exaggeration * MM_PER_UM * picture.field.error_um
 
 
-def read(
-    picture: ScenePicture, settings: FigureSettings, *, exaggeration: float | None = None, **options
-) -> Reading:
+def read(picture, settings, *, exaggeration=None, **options):
     scene = options.pop("drawn_scene", picture.scene)
     drawn = draw_figure("error-map", [scene], settings).maps[0]
     known = component_values(picture.field.error_um, settings.component)
@@ -38,7 +37,7 @@ def read(
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_colours_and_shape_are_the_models(name: str) -> None:
+def test_colours_and_shape_are_the_models(name):
     picture = evaluate_picture(load_scene(name))
     reading = read(picture, FigureSettings())
     assert len(reading.known) > 300
@@ -47,9 +46,10 @@ def test_colours_and_shape_are_the_models(name: str) -> None:
     assert reading.agrees()
 
 
-@pytest.mark.parametrize("view", ["iso", "front", "right", "top"])
-@pytest.mark.parametrize("component", ["norm", "x", "y", "z"])
-def test_every_view_and_component(truth: ScenePicture, view: str, component: str) -> None:
+@pytest.mark.parametrize(
+    ("view", "component"), pairwise(["iso", "front", "right", "top"], ["norm", "x", "y", "z"])
+)
+def test_every_view_and_component(truth, view, component):
     reading = read(truth, FigureSettings(component=component, view=view))
     assert len(reading.known) > 60
     if (view, component) == ("top", "x"):
@@ -61,12 +61,12 @@ def test_every_view_and_component(truth: ScenePicture, view: str, component: str
 
 
 @pytest.mark.parametrize("size", [(400, 300), (1000, 1600), (3200, 2400)])
-def test_every_size(truth: ScenePicture, size: tuple[int, int]) -> None:
+def test_every_size(truth, size):
     reading = read(truth, FigureSettings(size=size))
     assert abs(reading.slope - 1.0) < 0.01 if size[0] < 800 else reading.agrees()
 
 
-def scaled(scene, factor: float):
+def scaled(scene, factor):
     functions = {key: f.scaled(factor) for key, f in scene.errors.functions.items()}
     return replace(scene, errors=replace(scene.errors, functions=functions))
 
@@ -75,53 +75,49 @@ def scaled(scene, factor: float):
 
 
 @pytest.mark.parametrize("factor", [1.02, 0.98])
-def test_an_error_change_of_two_percent_is_noticed(truth: ScenePicture, factor: float) -> None:
+def test_an_error_change_of_two_percent_is_noticed(truth, factor):
     reading = read(
-        truth,
-        FigureSettings(exaggeration=1000.0),
-        drawn_scene=scaled(truth.scene, factor),
+        truth, FigureSettings(exaggeration=1000.0), drawn_scene=scaled(truth.scene, factor)
     )
     assert reading.slope == pytest.approx(factor, abs=0.006)
     assert not reading.agrees()
 
 
 @pytest.mark.parametrize("factor", [1.03, 0.97])
-def test_an_exaggeration_change_of_three_percent_is_noticed(
-    truth: ScenePicture, factor: float
-) -> None:
+def test_an_exaggeration_change_of_three_percent_is_noticed(truth, factor):
     reading = read(truth, FigureSettings(exaggeration=1000.0 * factor), exaggeration=1000.0)
     assert np.abs(reading.depth_mm).max() > 1.0
     assert not reading.agrees()
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_a_flipped_axis_is_noticed(truth: ScenePicture, axis: int) -> None:
+def test_a_flipped_axis_is_noticed(truth, axis):
     flipped = replace(
         truth, field=replace(truth.field, error_um=np.flip(truth.field.error_um, axis=axis))
     )
     assert not read(flipped, FigureSettings()).agrees()
 
 
-def test_a_sign_change_of_an_axis_is_noticed(truth: ScenePicture) -> None:
+def test_a_sign_change_of_an_axis_is_noticed(truth):
     mirrored = truth.field.error_um * np.array([1.0, -1.0, 1.0])
     wrong = replace(truth, field=replace(truth.field, error_um=mirrored))
     assert not read(wrong, FigureSettings()).agrees()
 
 
 @pytest.mark.parametrize("component", ["norm", "y"])
-def test_a_wrong_colour_map_is_noticed(truth: ScenePicture, component: str) -> None:
+def test_a_wrong_colour_map_is_noticed(truth, component):
     settings = FigureSettings(component=component)
     assert not read(truth, settings, diverging=component == "norm").agrees()
 
 
-def test_a_wrong_scale_is_noticed(truth: ScenePicture) -> None:
+def test_a_wrong_scale_is_noticed(truth):
     drawn = draw_figure("error-map", [truth.scene], FigureSettings()).maps[0]
     wrong = replace(drawn, scale=replace(drawn.scale, high=drawn.scale.high * 1.02))
     reading = read_map(wrong, expected(truth, drawn.exaggeration), truth.field.norm_um)
     assert not reading.agrees()
 
 
-def test_the_png_holds_the_very_pixels(truth: ScenePicture) -> None:
+def test_the_png_holds_the_very_pixels(truth):
     """Where nothing is drawn over the body, the file has the renderer's colours."""
     import io
 

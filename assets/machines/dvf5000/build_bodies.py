@@ -10,14 +10,25 @@ All sizes are in R, mm, with every axis at zero: the tool point is then at (0, 0
 nose at z = 579, the table's top at z = 0 and the B axis along y at z = 50.
 """
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from trimesh import util
 
-from warpspace.bodies.body_file import BODY_FILE, frame_of, write_bodies
-from warpspace.bodies.mesh import DARK, LIGHT, METAL, MIDDLE
-from warpspace.bodies.schematic import box, cone, cylinder, join_shapes
-from warpspace.kinematics.bodies import body_motions
+from warpspace.bodies.gltf import Material, Part, build_gltf
+from warpspace.bodies.mesh import DARK, LIGHT, METAL, MIDDLE, Body, build_body
+from warpspace.bodies.schematic import (
+    BODY_FILE,
+    LINES,
+    Shape,
+    box,
+    cone,
+    cylinder,
+    frame_of,
+)
+from warpspace.kinematics.firstorder import body_motions
 from warpspace.kinematics.model import Model
 from warpspace.kinematics.transforms import axis_rotation
 from warpspace.scene.machines import load_machine
@@ -90,6 +101,33 @@ def table_slots() -> Array:
     mark = np.array([[(249.0, -7.0, ABOVE_TOP), tip], [tip, (249.0, 7.0, ABOVE_TOP)]])
     angles = np.arange(SLOTS) * 2.0 * np.pi / SLOTS
     return np.concatenate([*(slot @ axis_rotation(2, angle).T for angle in angles), mark])
+
+
+def join_shapes(
+    name: str, colour: tuple[int, int, int], shapes: Sequence[Shape], origin_mm: Array
+) -> Body:
+    """Join closed shapes to a body in its own frame."""
+    for shape in shapes:
+        if not shape.is_watertight or shape.volume <= 0.0:
+            raise ValueError(f"{name}: a shape of volume {shape.volume} is open or inside out")
+    mesh: Any = util.concatenate(list(shapes))
+    mesh.apply_translation(-origin_mm)
+    return build_body(mesh, name, frame_of(name), colour)
+
+
+def write_bodies(
+    path: Path, bodies: Sequence[Body], lines_mm: Mapping[str, Array] | None = None
+) -> None:
+    """Write a file of bodies."""
+    parts: list[Part] = []
+    for body in bodies:
+        material = Material(body.name, body.colour)
+        parts.append(Part(body.name, body.vertices_mm, body.triangles, material))
+        further = (lines_mm or {}).get(body.name)
+        if further is not None:
+            pairs = np.arange(2 * len(further)).reshape(-1, 2)
+            parts.append(Part(body.name + LINES, further.reshape(-1, 3), pairs, material))
+    path.write_bytes(build_gltf(parts, root="bodies, mm, Z up"))
 
 
 def main() -> None:

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpspace.analysis.circles import fit_circle
-from warpspace.units import Array
+from warpspace.units import MM_PER_UM, URAD_PER_RAD, Array
 
 LEVER_MM = 1000.0
 """Distance along the axis of the second point that the tilt is taken from: 1 µm there is 1 µrad."""
@@ -17,30 +16,15 @@ LEAST = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """One deviation over the turn.
+    """One deviation over the turn."""
 
-    Attributes
-    ----------
-    name : str
-        "radial", "axial" or "tilt".
-    iso : str
-        What ISO 230-7 calls it.
-    unit : str
-        µm or µrad.
-    values : ndarray, [n], µm or µrad
-        Actual − nominal at every position.
-    about_line : ndarray, [n], µm or µrad
-        What remains about the axis average line.
-    times_a_turn : int or None
-        Strongest harmonic of the deviation; None where it does not vary, or the axis does not go
-        round.
-    """
-
-    name: str
-    iso: str
-    unit: str
-    values: Array
-    about_line: Array
+    name: str  # "radial", "axial" or "tilt"
+    iso: str  # what ISO 230-7 calls it
+    unit: str  # µm or µrad
+    values: Array  # [n], µm or µrad; actual − nominal at every position
+    about_line: Array  # [n], µm or µrad; what remains about the axis average line
+    # strongest harmonic of the deviation; None where it does not vary, or the axis does not go
+    # round
     times_a_turn: int | None
 
     @property
@@ -56,24 +40,13 @@ class Motion:
 
 @dataclass(frozen=True, slots=True)
 class AxisMotion:
-    """How an axis carries one point round.
+    """How an axis carries one point round."""
 
-    Attributes
-    ----------
-    angle_deg : ndarray, [n], degrees
-        Position of the axis.
-    closed : bool
-        Whether that is a full turn.
-    radius_mm : float, mm
-        Distance of the point from the axis.
-    radial, axial, tilt : Motion
-        Of the axis at the height of the point: towards the point, along the axis, and as the
-        inclination of the axis towards the point.
-    """
-
-    angle_deg: Array
-    closed: bool
-    radius_mm: float
+    angle_deg: Array  # [n]; position of the axis
+    closed: bool  # whether that is a full turn
+    radius_mm: float  # distance of the point from the axis
+    # of the axis at the height of the point: towards the point, along the axis, and as the
+    # inclination of the axis towards the point
     radial: Motion
     axial: Motion
     tilt: Motion
@@ -89,21 +62,10 @@ def axis_motion(
 ) -> AxisMotion:
     """Take the error motion of a rotating body apart, in the direction of one of its points.
 
-    Parameters
-    ----------
-    nominal_mm : ndarray, [n, 3], mm
-        Nominal circle or arc of the point, at least five places and not all in one line.
-    angle_deg : ndarray, [n], degrees
-        Position of the axis there, rising.
-    on_axis_um, above_um : ndarray, [n, 3], µm
-        Error of the body where the axis meets the plane of the circle, and `LEVER_MM` above that
-        along the axis (see `points_on_axis`).
-    closed : bool
-        Whether the first place is the last one.
-
-    Returns
-    -------
-    AxisMotion
+    The nominal circle or arc of the point, [n, 3], has five places or more, not all in one line, at
+    rising positions of the axis. The errors are those of the body where the axis meets the plane of
+    the circle, and `LEVER_MM` above that along the axis (see `points_on_axis`), [n, 3], µm. Closed
+    is a turn whose last place is the first.
 
     Notes
     -----
@@ -129,7 +91,6 @@ def subtract_motions(one: AxisMotion, other: AxisMotion) -> AxisMotion:
 def _assemble(
     angle_deg: Array, radius_mm: float, deviations: tuple[Array, Array, Array], *, closed: bool
 ) -> AxisMotion:
-    """Find what remains of each deviation about the axis average line."""
     theta = np.deg2rad(angle_deg)
     kept = slice(None, -1 if closed else None)  # the last place of a turn is the first one
     once = np.stack([np.ones_like(theta), np.cos(theta), np.sin(theta)], -1)
@@ -151,17 +112,9 @@ def _assemble(
 
 
 def points_on_axis(nominal_mm: Array) -> tuple[Array, Array]:
-    """Give the nominal points whose errors `axis_motion` needs.
+    """Give the nominal points whose errors `axis_motion` needs, [n, 3] each, mm.
 
-    Parameters
-    ----------
-    nominal_mm : ndarray, [n, 3], mm
-        Nominal circle or arc.
-
-    Returns
-    -------
-    tuple of ndarray, [n, 3], mm
-        The centre of the circle, and the point `LEVER_MM` above it, each at all places.
+    The centre of the circle, and the point `LEVER_MM` above it, each at all places.
     """
     centre, _, normal = fit_circle(nominal_mm)
     shape = nominal_mm.shape
@@ -169,19 +122,79 @@ def points_on_axis(nominal_mm: Array) -> tuple[Array, Array]:
 
 
 def times_a_turn(values: Array) -> int | None:
-    """Find how often a deviation comes back in a turn.
-
-    Parameters
-    ----------
-    values : ndarray, [n]
-        Over a full turn, the last equal to the first.
-
-    Returns
-    -------
-    int or None
-        Number of the strongest harmonic; None where nothing varies.
-    """
+    """Find the strongest harmonic of a deviation over a full turn, the last equal to the first."""
     strength = np.abs(np.fft.rfft(values[:-1]))[1 : MOST_A_TURN + 1] * 2.0 / (len(values) - 1)
     if len(strength) == 0 or strength.max() < LEAST:
         return None
     return int(np.argmax(strength > strength.max() * (1.0 - 1e-9))) + 1
+
+
+# --- Circles through traced points ---------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class CircleDeviation:
+    """How the trace of a point differs from its nominal circle or arc."""
+
+    radius_mm: float  # nominal radius
+    centre_um: float  # displacement of the centre in the plane of the circle
+    radial_um: float  # peak to valley of the radial error once centre and radius are fitted
+    axial_um: float  # peak to valley of the axial error once offset and tilt are fitted
+    axial_offset_um: float  # mean displacement along the axis
+    tilt_urad: float  # tilt of the plane of the trace
+
+
+def circle_deviation(nominal_mm: Array, error_um: Array) -> CircleDeviation:
+    """Take the error of a trace, [n, 3], µm, apart into displacement, tilt and what remains.
+
+    The nominal points, [n, 3], mm, lie on a circle or arc in order, at least five and not all in
+    one line.
+
+    Notes
+    -----
+    Least squares of ``1, cos θ, sin θ`` to the radial and to the axial error; first order in
+    error/radius.
+    """
+    centre_mm, radius, normal = fit_circle(nominal_mm)
+    outwards = (nominal_mm - centre_mm) / radius
+    first = outwards[0]
+    angle = np.arctan2(outwards @ np.cross(normal, first), outwards @ first)
+    harmonic = np.stack([np.ones_like(angle), np.cos(angle), np.sin(angle)], -1)
+    radial = np.sum(error_um * outwards, axis=-1)
+    axial = error_um @ normal
+    around, *_ = np.linalg.lstsq(harmonic, radial, rcond=None)
+    along, *_ = np.linalg.lstsq(harmonic, axial, rcond=None)
+    return CircleDeviation(
+        radius,
+        float(np.hypot(*around[1:])),
+        float(np.ptp(radial - harmonic @ around)),
+        float(np.ptp(axial - harmonic @ along)),
+        float(along[0]),
+        float(np.hypot(*along[1:]) * MM_PER_UM / radius * URAD_PER_RAD),
+    )
+
+
+def fit_circle(points_mm: Array) -> tuple[Array, float, Array]:
+    """Find centre, [3], radius and normal, [3], of points, [n, 3], that lie on a circle, mm.
+
+    The normal is right-handed with the order of the points.
+    """
+    middle = points_mm.mean(axis=0)
+    _, _, axes = np.linalg.svd(points_mm - middle, full_matrices=False)
+    flat, radius = fit_flat_circle((points_mm - middle) @ axes[:2].T)
+    centre = middle + flat @ axes[:2]
+    normal = np.cross(axes[0], axes[1])
+    turning = np.cross(points_mm[:-1] - centre, points_mm[1:] - centre).sum(axis=0)
+    return centre, radius, normal if turning @ normal >= 0.0 else -normal
+
+
+def fit_flat_circle(points_mm: Array) -> tuple[Array, float]:
+    """Fit centre, [2], and radius of a circle to points of a plane, [n, 2], mm.
+
+    Algebraic least squares: x² + y² = 2·a·x + 2·b·y + c, about the mean of the points.
+    """
+    middle = points_mm.mean(axis=0)
+    flat = points_mm - middle
+    system = np.column_stack([2.0 * flat, np.ones(len(flat))])
+    solution, *_ = np.linalg.lstsq(system, np.sum(flat**2, axis=-1), rcond=None)
+    return middle + solution[:2], float(np.sqrt(solution[2] + solution[:2] @ solution[:2]))

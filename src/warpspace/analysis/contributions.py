@@ -1,20 +1,32 @@
 """Which tolerances matter: how the parameters share the variance of the volumetric error."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpspace.analysis.draws import Draws
-from warpspace.analysis.montecarlo import Plan
-from warpspace.analysis.nodes import Over, node_gains, reduce_nodes
-from warpspace.analysis.points import Places, average_places, choose_cylinder, spread_places
+from warpspace.analysis.blocks import (
+    Bars,
+    Block,
+    Column,
+    Panel,
+    Role,
+    Series,
+    Table,
+    number_columns,
+)
+from warpspace.analysis.cases import Case, Over, Plan, reduce_nodes
+from warpspace.analysis.description import Result, Watch
+from warpspace.analysis.options import option
+from warpspace.analysis.sampled import Sampled
+from warpspace.analysis.typed import error_words
 from warpspace.exceptions import OptionError
-from warpspace.field.evaluate import View
-from warpspace.field.grid import Workspace
-from warpspace.kinematics.model import Loop, Model
 from warpspace.machine.parameters import parameter
 from warpspace.units import Array
+
+if TYPE_CHECKING:
+    from warpspace.scene.model import Scene
 
 CHECK_MACHINES = 20_000
 CHECK_NODES = 512
@@ -24,27 +36,14 @@ DEFAULT_SOBOL, MAX_SOBOL = 1024, 65_536
 
 @dataclass(frozen=True, slots=True)
 class Contribution:
-    """What one parameter's tolerance adds.
-
-    Attributes
-    ----------
-    key : str
-    half_width : float, µm or µrad
-    variance_um2 : float, µm²
-        Its part of trace(J Σ Jᵀ), averaged over the points.
-    share : float
-        The same over the sum of all.
-    sampled_share : float
-        The share estimated from sampled machines, see `variance_contributions`.
-    sobol_first, sobol_total, sobol_total_confidence : float or None
-        Sobol indices of the mean |E| of a machine; half width of the 95 % interval of the total.
-    """
+    """What one parameter's tolerance adds."""
 
     key: str
-    half_width: float
-    variance_um2: float
-    share: float
-    sampled_share: float
+    half_width: float  # µm or µrad
+    variance_um2: float  # µm²; its part of trace(J Σ Jᵀ), averaged over the points
+    share: float  # the same over the sum of all
+    sampled_share: float  # the share estimated from sampled machines, see `variance_contributions`
+    # sobol indices of the mean |E| of a machine; half width of the 95 % interval of the total
     sobol_first: float | None = None
     sobol_total: float | None = None
     sobol_total_confidence: float | None = None
@@ -55,83 +54,23 @@ class Contribution:
         return parameter(self.key).unit
 
 
-@dataclass(frozen=True, slots=True)
-class Contributions:
-    """Variance shares of all parameters.
+def expected_square(case: Case) -> tuple[Array, float]:
+    """Compute E|E|² of the linear model without sampling, averaged over the points.
 
-    Attributes
-    ----------
-    rows : tuple of Contribution
-        Largest share first.
-    variance_um2 : float, µm²
-        trace(J Σ Jᵀ) averaged over the points: the variance of E between machines.
-    rms_um : float, µm
-        Root of E|E|²: the variance, and the mean error that centres off zero give, together.
+    The variance is that of each parameter, var(aₖ)·|Jₖ|², [K]; beside it |J·centre|², µm².
     """
-
-    rows: tuple[Contribution, ...]
-    variance_um2: float
-    rms_um: float
-
-
-def expected_square(
-    model: Model, draws: Draws, workspace: Workspace, view: View, plan: Plan
-) -> tuple[Array, float]:
-    """Compute E|E|² of the linear model without sampling.
-
-    Parameters
-    ----------
-    model : Model
-    draws : Draws
-    workspace : Workspace
-    view : View
-    plan : Plan
-        Its cylinder is used for the workpiece loop.
-
-    Returns
-    -------
-    variance_um2 : ndarray, [K], µm²
-        Diagonal part of each parameter: var(aₖ)·|Jₖ|², averaged over the points.
-    offset_um2 : float, µm²
-        |J·centre|², averaged over the points.
-    """
-    cylinder = choose_cylinder(model, plan.cylinder) if view.loop is Loop.WORKPIECE else None
-    places = average_places(model, view.loop, workspace, cylinder)
-    gains = node_gains(model, draws.keys, view, places)
+    draws, gains = case.draws, _average_gains(case)
     variance = draws.variance * np.mean(np.sum(gains**2, axis=0), axis=1)
     middle = np.einsum("k,ckn->cn", draws.centre, gains)
     return variance, float(np.mean(np.sum(middle**2, axis=0)))
 
 
-def variance_contributions(
-    model: Model,
-    draws: Draws,
-    workspace: Workspace,
-    view: View | None = None,
-    plan: Plan | None = None,
-    sobol: int | None = None,
-) -> Contributions:
+def _average_gains(case: Case) -> Array:
+    return case.responses(case.site.average())
+
+
+def variance_contributions(case: Case, sobol: int | None = None) -> "SharesResult":
     """Share out the variance of the volumetric error.
-
-    Parameters
-    ----------
-    model : Model
-    draws : Draws
-    workspace : Workspace
-    view : View, optional
-    plan : Plan, optional
-        Seed and cylinder.
-    sobol : int, optional
-        Base samples (a power of two) of a Sobol analysis of the mean |E|; absent is none.
-
-    Returns
-    -------
-    Contributions
-
-    Raises
-    ------
-    OptionError
-        If no tolerance has a width or `sobol` is out of range.
 
     Notes
     -----
@@ -139,13 +78,13 @@ def variance_contributions(
     behind them. `sampled_share` repeats them from 20,000 sampled machines through the covariance of
     each parameter with E, cov(aₖ, E)² / var aₖ.
     """
-    view, plan = view or View(), plan or Plan()
-    variance, offset = expected_square(model, draws, workspace, view, plan)
+    draws = case.draws
+    variance, offset = expected_square(case)
     total = float(variance.sum())
     if not total > 0.0:
         raise OptionError("no parameter of this loop has a tolerance above zero")
-    sampled = _sampled_variance(model, draws, workspace, view, plan)
-    indices = _sobol(model, draws, workspace, view, plan, sobol) if sobol else {}
+    sampled = _sampled_variance(case)
+    indices = _sobol(case, sobol) if sobol else {}
     rows = [
         Contribution(
             key,
@@ -158,24 +97,16 @@ def variance_contributions(
         for index, key in enumerate(draws.keys)
     ]
     rows.sort(key=lambda row: -row.share)
-    return Contributions(tuple(rows), total, float(np.sqrt(total + offset)))
+    return SharesResult(
+        contributions=tuple(rows), variance_um2=total, rms_um=float(np.sqrt(total + offset))
+    )
 
 
-def _spread(model: Model, workspace: Workspace, view: View, plan: Plan, nodes: int) -> Places:
-    """Give the places that a mean over the points of a machine is taken over."""
-    cylinder = choose_cylinder(model, plan.cylinder) if view.loop is Loop.WORKPIECE else None
-    return spread_places(model, view.loop, workspace, cylinder, nodes)
-
-
-def _sampled_variance(
-    model: Model, draws: Draws, workspace: Workspace, view: View, plan: Plan
-) -> Array:
+def _sampled_variance(case: Case) -> Array:
     """Estimate each parameter's variance of E from sampled machines, [K], µm²."""
-    cylinder = choose_cylinder(model, plan.cylinder) if view.loop is Loop.WORKPIECE else None
-    places = average_places(model, view.loop, workspace, cylinder)
-    gains = node_gains(model, draws.keys, view, places)
+    draws, gains = case.draws, _average_gains(case)
     gains = gains[:, :, :: max(1, gains.shape[2] // CHECK_NODES)]
-    values = draws.draw(np.random.default_rng(plan.seed), CHECK_MACHINES)
+    values = draws.draw(np.random.default_rng(case.plan.seed), CHECK_MACHINES)
     centred = values - values.mean(axis=0)
     spread = centred.var(axis=0)
     spread = np.where(spread > 0.0, spread, 1.0)
@@ -186,21 +117,14 @@ def _sampled_variance(
     return found
 
 
-def _sobol(
-    model: Model, draws: Draws, workspace: Workspace, view: View, plan: Plan, base: int
-) -> Mapping[str, tuple[float, float, float]]:
-    """Run a Sobol analysis of a machine's mean |E| through SALib.
-
-    Returns
-    -------
-    mapping of str to (first order, total, half width of the total's 95 % interval)
-    """
+def _sobol(case: Case, base: int) -> Mapping[str, tuple[float, float, float]]:
+    """Run a Sobol analysis of a machine's mean |E| through SALib."""
     from SALib.analyze import sobol as analysis
     from SALib.sample import sobol as sampling
 
     if not 2 <= base <= MAX_SOBOL or base & (base - 1):
         raise OptionError(f"sobol: {base}; expected a power of two from 2 to {MAX_SOBOL:,}")
-    seed = plan.seed + 1  # SALib takes 0 for no seed
+    draws, seed = case.draws, case.plan.seed + 1  # SALib takes 0 for no seed
     wide = [index for index, width in enumerate(draws.half_width) if width > 0.0]
     problem = {
         "num_vars": len(wide),
@@ -211,8 +135,10 @@ def _sobol(
     drawn = sampling.sample(problem, base, calc_second_order=False, seed=seed)
     unit = np.repeat(unit, len(drawn), axis=0)
     unit[:, wide] = drawn
-    places = _spread(model, workspace, view, plan, SOBOL_NODES)
-    gains = node_gains(model, draws.keys, view, places)
+    places = replace(
+        case, plan=replace(case.plan, over=Over.MEAN, nodes=SOBOL_NODES)
+    ).common_places()
+    gains = case.responses(places)
     result = reduce_nodes(draws.from_unit(unit), gains, Over.MEAN, places.weights)
     found = analysis.analyze(problem, result, calc_second_order=False, seed=seed)
     columns = zip(found["S1"], found["ST"], found["ST_conf"], strict=True)
@@ -220,3 +146,112 @@ def _sobol(
         draws.keys[index]: (float(first), float(total), float(spread))
         for index, (first, total, spread) in zip(wide, columns, strict=True)
     }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shares(Sampled):
+    """Show which tolerances the volumetric error comes from.
+
+    The variance of the volumetric error is shared out over the tolerances of SCENE, in percent.
+    The model is linear and the parameters independent: the shares of trace(J Σ Jᵀ), averaged over
+    the points, are exact. Beside them stands what 20,000 sampled machines give. Sobol indices look
+    at the length |E| instead, which is not linear: the total index counts interactions, so that
+    their sum is above 1.
+    """
+
+    name = "contributions"
+    task = "design"
+    doing = "sampling"
+    has_chart = True
+    sobol: int | None = option(
+        None,
+        "Sobol indices of a machine's mean |E| beside the exact shares, from this many base"
+        " samples, a power of two such as 1024",
+        unset="none",
+    )
+
+    def run(self, scene: "Scene", watch: Watch, /) -> "SharesResult":
+        """Share out the variance."""
+        if self.sobol is not None and self.sobol < 2:
+            raise OptionError(f"{{sobol}} {self.sobol}; expected a power of two, 2 or above")
+        plan = Plan(seed=self.seed, cylinder=self.cylinder)
+        plan.check()
+        found = variance_contributions(self.case(scene, plan), self.sobol)
+        watch(1.0)
+        where = f"{self.loop} loop · {self.drawn} · RMS |E| {found.rms_um:.1f} µm"
+        return replace(found, title=scene.title, where=where)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SharesResult(Result):
+    """Shares of the variance by parameter, largest first."""
+
+    keys = ("contributions", "variance_um2", "rms_um")
+    contributions: tuple[Contribution, ...]
+    # µm²; trace(J Σ Jᵀ) averaged over the points: the variance of E between machines
+    variance_um2: float
+    # root of E|E|²: the variance, and the mean error that centres off zero give, together
+    rms_um: float
+    title: str = ""
+    where: str = ""
+
+    @property
+    def rows(self) -> tuple[Contribution, ...]:
+        """The shares."""
+        return self.contributions
+
+    def blocks(self) -> Iterator[Block]:
+        """Say the shares, and the Sobol indices where they were asked for."""
+        with_sobol = any(row.sobol_total is not None for row in self.rows)
+        columns = (
+            Column("key", leads=True),
+            *number_columns(("half width",), "g"),
+            Column("unit"),
+            Column("variance", ".1f", "µm²"),
+            *number_columns(("share", "sampled"), ".2f", "%"),
+            *(number_columns(("Sobol first", "total", "± (95 %)"), ".3f") if with_sobol else ()),
+        )
+        cells = [
+            (
+                row.key, row.half_width, row.unit, row.variance_um2, 100.0 * row.share,
+                100.0 * row.sampled_share,
+                *((row.sobol_first, row.sobol_total, row.sobol_total_confidence)[: 3 * with_sobol]),
+            )
+            for row in self.rows
+        ]  # fmt: skip
+        yield f"{self.title} · {self.where}"
+        yield Table(columns, cells)
+        title = f"Which tolerances matter · {self.title}"
+        yield share_bars(self.rows, title, self.where)
+
+
+def share_bars(rows: tuple[Contribution, ...], title: str, subtitle: str) -> Bars:
+    """Give the chart of shares; Sobol indices beside them where there are any."""
+    shares = Series([100.0 * row.share for row in rows], "exact", "key", form=".1f")
+    sampled = [100.0 * row.sampled_share for row in rows]
+    panels = [
+        Panel(
+            "share of the variance of E",
+            (shares, Series(sampled, f"from {CHECK_MACHINES:,} sampled machines", as_mark=True)),
+            "%",
+        )
+    ]
+    if any(row.sobol_total is not None for row in rows):
+        total = [row.sobol_total or 0.0 for row in rows]
+        spread = [row.sobol_total_confidence or 0.0 for row in rows]
+        first = [max(row.sobol_first or 0.0, 0.0) for row in rows]
+        indices = (
+            Series(total, "Sobol total, 95 % interval", spread=spread),
+            Series(first, as_mark=True),
+        )
+        panels.append(Panel("Sobol index of the mean |E| of a machine", indices))
+    legend: list[tuple[str, Role]] = [
+        ("exact share", "key"),
+        (f"stroke: from {CHECK_MACHINES:,} sampled machines", "none"),
+    ]
+    if len(panels) > 1:
+        legend.append(("Sobol index, total with its 95 % interval; stroke: first order", "plain"))
+    return Bars(
+        title, subtitle, [error_words(row.key) for row in rows], tuple(panels),
+        legend=tuple(legend),
+    )  # fmt: skip

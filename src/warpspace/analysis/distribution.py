@@ -1,13 +1,17 @@
 """The distribution of a sampled quantity, collected as a stream in bounded memory."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage, stats
 
+from warpspace.exceptions import OptionError, SceneError
+from warpspace.kinematics.model import Loop, Model
+from warpspace.machine.errors import ToleranceSet
+from warpspace.machine.parameters import parameter
 from warpspace.units import Array
 
 EXACT_SAMPLES = 1_000_000
@@ -22,62 +26,34 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True, slots=True)
 class Histogram:
-    """Counts in bins of equal width.
+    """Counts in bins of equal width."""
 
-    Attributes
-    ----------
-    edges_um : ndarray, [n + 1], µm
-    counts : ndarray of int, [n]
-    """
-
-    edges_um: Array
-    counts: NDArray[np.int64]
+    edges_um: Array  # [n + 1]
+    counts: NDArray[np.int64]  # [n]
 
 
 @dataclass(frozen=True, slots=True)
 class Probability:
-    """Share of machines that stay within a specification.
-
-    Attributes
-    ----------
-    spec_um : float, µm
-    probability : float
-        Share of the samples.
-    low, high : float
-        Wilson score interval at `CONFIDENCE`.
-    """
+    """Share of machines that stay within a specification."""
 
     spec_um: float
-    probability: float
-    low: float
+    probability: float  # share of the samples
+    low: float  # wilson score interval at `CONFIDENCE`
     high: float
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Some blocks of samples, as little of them as a stream needs.
+    """Some blocks of samples, as little of them as a stream needs."""
 
-    Attributes
-    ----------
-    count : int
-        How many samples.
-    sums, square_sums : tuple of float
-        Of each block in order; added up one by one, so that grouping blocks does not change a bit.
-    largest : float, µm
-    within : int
-        Samples not above the specification.
-    values : ndarray, [count], or None, µm
-        The samples themselves.
-    bins, counts : ndarray of int, [n], or None
-        Bins of the fine histogram that are not empty, ascending, and their counts.
-    """
-
-    count: int
+    count: int  # how many samples
+    # of each block in order; added up one by one, so that grouping blocks does not change a bit
     sums: tuple[float, ...]
     square_sums: tuple[float, ...]
-    largest: float
-    within: int
-    values: Array | None
+    largest: float  # µm
+    within: int  # samples not above the specification
+    values: Array | None  # [count], or None, µm; the samples themselves
+    # [n], or None; bins of the fine histogram that are not empty, ascending, and their counts
     bins: NDArray[np.uint32] | None
     counts: NDArray[np.int64] | None
 
@@ -85,18 +61,10 @@ class Part:
 def summarise(
     blocks: Iterable[Array], spec_um: float | None = None, *, keep: bool, count: bool
 ) -> Part:
-    """Summarise blocks of samples.
+    """Summarise one block of samples or more, [n] each, µm.
 
-    Parameters
-    ----------
-    blocks : iterable of ndarray, [n], µm
-        At least one.
-    spec_um : float, optional
-        A specification; samples not above it are counted.
-    keep : bool
-        Whether the samples are kept.
-    count : bool
-        Whether they are counted in the bins of the fine histogram.
+    Samples not above a specification are counted. They are kept, or counted in the bins of the fine
+    histogram.
     """
     sums: list[float] = []
     squares: list[float] = []
@@ -128,15 +96,7 @@ def summarise(
 
 
 class Stream:
-    """Collects samples that are not negative.
-
-    Parameters
-    ----------
-    expected : int
-        How many samples will come; decides between exact quantiles and the fine histogram.
-    spec_um : float, optional
-        A specification; samples not above it are counted.
-    """
+    """Collects samples that are not negative."""
 
     def __init__(self, expected: int, spec_um: float | None = None) -> None:
         self.count = 0
@@ -193,12 +153,9 @@ class Stream:
         return min(float(_fine_centres()[index]), self._largest)
 
     def histogram(self, edges_um: Array) -> Histogram:
-        """Count the samples in bins; beyond a million samples as exact as the fine histogram.
+        """Count the samples in bins with ascending edges, [n + 1], µm.
 
-        Parameters
-        ----------
-        edges_um : ndarray, [n + 1], µm
-            Ascending.
+        Beyond a million samples as exact as the fine histogram.
         """
         if self._values is not None:
             counts = np.histogram(self._values[: self.count], edges_um)[0]
@@ -225,6 +182,8 @@ class Stream:
         spread = math.sqrt(max(self.rms_um**2 - self.mean_um**2, 0.0))
         if spread < 1e-9 * max(self._largest, LOWEST_UM):
             return self.mean_um
+        from scipy import ndimage
+
         edges = np.linspace(0.0, self._largest * (1.0 + 1e-12), _SMOOTH_BINS + 1, dtype=np.float64)
         bandwidth = spread * self.count ** (-1.0 / 7.0) / edges[1]
         smooth = ndimage.gaussian_filter1d(
@@ -237,11 +196,25 @@ class Stream:
         """Give the share within the specification; None without one."""
         if self.spec_um is None:
             return None
+        from scipy import stats
+
         interval = stats.binomtest(self._within, self.count).proportion_ci(
             CONFIDENCE, method="wilson"
         )
         share = self._within / self.count
         return Probability(self.spec_um, share, float(interval.low), float(interval.high))
+
+
+def machines_needed(samples: int, probability: float) -> int:
+    """Count how many of the machines have to keep a limit to show that so large a share does.
+
+    The lower end of the 95 % interval (Wilson) is then the probability, or above it.
+    """
+    from scipy import special
+
+    deviation = special.ndtri(0.5 + CONFIDENCE / 2.0)
+    spread = math.sqrt(samples * probability * (1.0 - probability))
+    return math.ceil(samples * probability + deviation * spread)
 
 
 def round_width(least: float) -> float:
@@ -253,7 +226,6 @@ def round_width(least: float) -> float:
 
 
 def _fine_bins(values: Array) -> NDArray[np.int64]:
-    """Find the bin of the fine histogram that each sample lies in."""
     with np.errstate(divide="ignore"):
         position = np.log(values / LOWEST_UM) / math.log1p(RELATIVE_STEP)
     return np.clip(np.floor(position) + 1.0, 0, _BINS + 1).astype(np.int64)
@@ -263,3 +235,119 @@ def _fine_centres() -> Array:
     """Middle of every bin of the fine histogram, the first and last being what lies beyond, µm."""
     inner = LOWEST_UM * np.exp((np.arange(_BINS) + 0.5) * math.log1p(RELATIVE_STEP))
     return np.concatenate([[0.0], inner, [HIGHEST_UM]])
+
+
+# --- Machines drawn from a tolerance set ---------------------------------------------------------
+
+
+SIGMAS = 3.0
+"""Standard deviations of a normal distribution between centre and limit (thesis, section 4.3)."""
+
+
+class Distribution(StrEnum):
+    """How a parameter falls into its tolerance."""
+
+    UNIFORM = "uniform"
+    NORMAL = "normal"
+
+
+@dataclass(frozen=True, slots=True)
+class Draws:
+    """Independent random values of a machine's parameters."""
+
+    keys: tuple[str, ...]  # (K,); parameter keys
+    centre: Array  # [K], µm or µrad
+    half_width: Array
+    # uniform over centre ± half width, or normal with 3σ = half width
+    distribution: Distribution = Distribution.UNIFORM
+    # whether the normal distribution ends at the limits (values outside are drawn again); without
+    # it 0.27 % lie outside. Without effect on the uniform one.
+    clip: bool = False
+
+    @property
+    def variance(self) -> Array:
+        """Variance of each parameter, [K], µm² or µrad²."""
+        if self.distribution is Distribution.UNIFORM:
+            return self.half_width**2 / 3.0
+        sigma = self.half_width / SIGMAS
+        if not self.clip:
+            return sigma**2
+        from scipy import special
+
+        inside = 1.0 - 2.0 * float(special.ndtr(-SIGMAS))
+        density = math.exp(-(SIGMAS**2) / 2.0) / math.sqrt(2.0 * math.pi)
+        return sigma**2 * (1.0 - 2.0 * SIGMAS * density / inside)
+
+    def draw(self, rng: np.random.Generator, count: int) -> Array:
+        """Draw machines, [count, K], µm or µrad."""
+        shape = (count, len(self.keys))
+        if self.distribution is Distribution.UNIFORM:
+            return self.centre + self.half_width * rng.uniform(-1.0, 1.0, shape)
+        unit = rng.standard_normal(shape)
+        while self.clip and (outside := np.abs(unit) > SIGMAS).any():
+            unit[outside] = rng.standard_normal(int(outside.sum()))
+        return self.centre + self.half_width / SIGMAS * unit
+
+    def from_unit(self, unit: Array) -> Array:
+        """Turn numbers between 0 and 1, [..., K], into values through the inverse distribution."""
+        if self.distribution is Distribution.UNIFORM:
+            return self.centre + self.half_width * (2.0 * unit - 1.0)
+        from scipy import special
+
+        tail = float(special.ndtr(-SIGMAS)) if self.clip else 1e-12
+        return self.centre + self.half_width / SIGMAS * special.ndtri(
+            tail + unit * (1.0 - 2.0 * tail)
+        )
+
+
+def loop_keys(model: Model, loop: Loop, keys: Sequence[str]) -> tuple[str, ...]:
+    """Keep the parameters whose axis lies in a loop."""
+    sides = ("tool", "workpiece") if loop is Loop.RELATIVE else (str(loop),)
+    axes = {axis.name for side in sides for axis in model.machine.branch(side)}
+    if not axes:
+        raise OptionError(f"loop {loop}: the machine {model.machine.chain} has no axis in it")
+    return tuple(key for key in keys if parameter(key).axis in axes)
+
+
+def choose_distribution(word: Distribution | str) -> Distribution:
+    """Read the name of a distribution."""
+    if word not in [*Distribution]:
+        raise OptionError(f"distribution {word!r}; expected one of {', '.join(Distribution)}")
+    return Distribution(word)
+
+
+def build_draws(
+    tolerances: ToleranceSet,
+    keys: Sequence[str],
+    distribution: Distribution | str = Distribution.UNIFORM,
+    *,
+    clip: bool = False,
+    source: str = "tolerances",
+) -> Draws:
+    """Collect the distribution of every parameter."""
+    kind = choose_distribution(distribution)
+    if not tolerances:
+        problem = (
+            "has no tolerances to sample machines from; expected a [tolerances] section, for"
+            " instance default = { translation = 10, rotation = 20, squareness = 25 }"
+        )
+        raise SceneError(source, [problem])
+    if missing := tolerances.missing(keys):
+        problem = (
+            f"tolerances: no half width for {', '.join(missing)}; expected one for each parameter"
+            " of the loop, or a default for its class (0 holds it at its centre)"
+        )
+        raise SceneError(source, [problem])
+    found = [tolerance for key in keys if (tolerance := tolerances.get(key)) is not None]
+    for key, tolerance in zip(keys, found, strict=True):
+        if not tolerance.half_width >= 0.0:
+            raise SceneError(
+                source, [f"tolerances.{key}: half width {tolerance.half_width:g}; expected ≥ 0"]
+            )
+    return Draws(
+        tuple(keys),
+        np.array([tolerance.centre for tolerance in found], dtype=float),
+        np.array([tolerance.half_width for tolerance in found], dtype=float),
+        kind,
+        clip,
+    )

@@ -15,56 +15,28 @@ from warpspace.units import Array
 
 @dataclass(frozen=True, slots=True)
 class Contribution:
-    """What one parameter does to one point.
+    """What one parameter does to one point."""
 
-    Attributes
-    ----------
-    key : str
-        Parameter key.
-    value : float, µm or µrad
-        The error at the point's axis position.
-    error_um : ndarray, [3], µm
-        Displacement of the point by this error alone, first order.
-    along_um : float, µm
-        Its part along the total error: these parts add up to the length of the first-order error.
-    direction : ndarray, [3]
-        Unit vector in R along or about which the error acts.
-    origin_mm : ndarray, [3], mm
-        Origin in R of the frame the error sits in.
-    lever_mm : ndarray, [3], mm
-        From that origin to the point.
-    """
-
-    key: str
-    value: float
-    error_um: Array
+    key: str  # parameter key
+    value: float  # µm or µrad; the error at the point's axis position
+    error_um: Array  # [3]; displacement of the point by this error alone, first order
+    # its part along the total error: these parts add up to the length of the first-order error
     along_um: float
-    direction: Array
-    origin_mm: Array
-    lever_mm: Array
+    direction: Array  # [3]; unit vector in R along or about which the error acts
+    origin_mm: Array  # [3]; origin in R of the frame the error sits in
+    lever_mm: Array  # [3]; from that origin to the point
 
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """The error of one point, taken apart.
+    """The error of one point, taken apart."""
 
-    Attributes
-    ----------
-    nominal_mm : ndarray, [3], mm
-    error_um : ndarray, [3], µm
-        From the exact chain.
-    orientation_urad : ndarray, [3], µrad
-        From the exact chain.
-    contributions : tuple of Contribution
-        All parameters of the loop that are not zero there, largest first.
-    remainder_um : ndarray, [3], µm
-        Exact error minus the sum of the contributions: what the first order leaves out.
-    """
-
-    nominal_mm: Array
-    error_um: Array
-    orientation_urad: Array
+    nominal_mm: Array  # [3]
+    error_um: Array  # [3]; from the exact chain
+    orientation_urad: Array  # [3]; from the exact chain
+    # all parameters of the loop that are not zero there, largest first
     contributions: tuple[Contribution, ...]
+    # [3]; exact error minus the sum of the contributions: what the first order leaves out
     remainder_um: Array
 
 
@@ -77,21 +49,8 @@ def explain(
 ) -> Explanation:
     """Take the error of one point apart into its parameters.
 
-    Parameters
-    ----------
-    model : Model
-    errors : ErrorSet
-    coordinates : mapping of str to ndarray, [], mm or degrees
-        One position of every axis.
-    view : View, optional
-        Loop, frame and reference; with a reference each contribution is that of the point minus
-        that of the reference point.
-    point_mm : ndarray, [3], mm, optional
-        Nominal point in R; by default the functional point of the loop.
-
-    Returns
-    -------
-    Explanation
+    At one position of every axis; the nominal point in R is the functional one of the loop unless
+    given. With a reference each contribution is that of the point minus that of the reference.
     """
     view = view or View()
     point = nominal_point(model, view.loop, coordinates) if point_mm is None else point_mm

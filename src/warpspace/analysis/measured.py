@@ -6,13 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpspace.analysis.statistics import Statistics, statistics, volume_statistics
-from warpspace.field.basis import ErrorField
-from warpspace.field.evaluate import View, evaluate_first_order
-from warpspace.field.grid import Workspace, build_grid
-from warpspace.kinematics.model import Model
-from warpspace.machine.errors import ErrorSet
+from warpspace.field.evaluate import ErrorField
+from warpspace.field.grid import build_grid
+from warpspace.kinematics.model import Loop
+from warpspace.machine.errors import ErrorSet, ToleranceSet
 from warpspace.machine.parameters import PARAMETERS, parameter
-from warpspace.machine.tolerances import ToleranceSet
+from warpspace.scene.model import Scene, choose_view, evaluate_grid
 
 DEFAULT_NODES = 11
 SHEARS = {"XY": (0, 1, "EC0Y", -1.0), "XZ": (0, 2, "EB0Z", 1.0), "YZ": (1, 2, "EA0Z", -1.0)}
@@ -20,19 +19,11 @@ SHEARS = {"XY": (0, 1, "EC0Y", -1.0), "XZ": (0, 2, "EB0Z", 1.0), "YZ": (1, 2, "E
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One measured error against its tolerance.
-
-    Attributes
-    ----------
-    key : str
-    value : float, µm or µrad
-    centre, half_width : float or None, µm or µrad
-        The tolerance; None where there is none.
-    """
+    """One measured error against its tolerance."""
 
     key: str
-    value: float
-    centre: float | None
+    value: float  # µm or µrad
+    centre: float | None  # µm or µrad; the tolerance; None where there is none
     half_width: float | None
 
     @property
@@ -55,40 +46,19 @@ class Check:
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """A measured machine.
+    """A measured machine."""
 
-    Attributes
-    ----------
-    checks : tuple of Check
-        One per error of the set.
-    predicted : Statistics
-        |E| of the loop over the working volume.
-    predicted_nodes : Statistics
-        The same over the nodes of the grid, each counted once, as the thesis has it.
-    shear_urad : dict of str to float, µrad
-        Angle by which the volume is out of square per plane, in the sign of the squareness
-        parameter; out of a least-squares affine fit to the whole map.
-    """
-
-    checks: tuple[Check, ...]
-    predicted: Statistics
+    checks: tuple[Check, ...]  # one per error of the set
+    predicted: Statistics  # |E| of the loop over the working volume
+    # the same over the nodes of the grid, each counted once, as the thesis has it
     predicted_nodes: Statistics
+    # angle by which the volume is out of square per plane, in the sign of the squareness parameter;
+    # out of a least-squares affine fit to the whole map
     shear_urad: dict[str, float]
 
 
 def check_errors(errors: ErrorSet, tolerances: ToleranceSet) -> tuple[Check, ...]:
-    """Compare the amplitude of every error that is given with its tolerance.
-
-    Parameters
-    ----------
-    errors : ErrorSet
-    tolerances : ToleranceSet
-
-    Returns
-    -------
-    tuple of Check
-        In the order of the parameter table.
-    """
+    """Compare the amplitude of every error that is given with its tolerance."""
     rows: list[Check] = []
     for key in (key for key in PARAMETERS if key in errors.functions):
         tolerance = tolerances.get(key)
@@ -98,56 +68,39 @@ def check_errors(errors: ErrorSet, tolerances: ToleranceSet) -> tuple[Check, ...
 
 
 def measured(
-    model: Model,
-    errors: ErrorSet,
-    tolerances: ToleranceSet,
-    workspace: Workspace,
-    view: View | None = None,
-    nodes: int | Sequence[int] = DEFAULT_NODES,
+    scene: Scene,
+    *,
+    tolerances: ToleranceSet | None = None,
+    loop: Loop | str = Loop.TOOL,
+    grid: int | Sequence[int] = DEFAULT_NODES,
 ) -> Measured:
-    """Judge a measured machine.
+    """Judge the errors of a scene against tolerances and predict its volumetric error.
 
     Parameters
     ----------
-    model : Model
-    errors : ErrorSet
-        As measured.
-    tolerances : ToleranceSet
-        What it is to keep.
-    workspace : Workspace
-    view : View, optional
-        The tool loop, absolute, by default.
-    nodes : int or sequence of int, (3,), optional
+    scene : Scene
+    tolerances : ToleranceSet, optional
+        The scene's own by default.
+    loop : Loop or str, optional
+    grid : int or sequence of int, (3,), optional
         Nodes per axis of the predicted map.
 
     Returns
     -------
     Measured
     """
-    grid = build_grid(model, workspace, nodes)
-    view = view or View()
-    field = evaluate_first_order(model, errors, grid.coordinates, view, grid.nominal_mm)
+    nodes = build_grid(scene.model, scene.workspace, grid)
+    field = evaluate_grid(scene, nodes, choose_view(scene, loop))
     return Measured(
-        check_errors(errors, tolerances),
-        volume_statistics(field, grid),
-        statistics(field, grid.coordinates),
+        check_errors(scene.errors, scene.tolerances if tolerances is None else tolerances),
+        volume_statistics(field, nodes),
+        statistics(field, nodes.coordinates),
         shear(field),
     )
 
 
 def shear(field: ErrorField) -> dict[str, float]:
-    """Fit an affine map to an error field and give its shear per plane.
-
-    Parameters
-    ----------
-    field : ErrorField
-        Over a volume.
-
-    Returns
-    -------
-    dict of str to float, µrad
-        "XY", "XZ", "YZ": change of the right angle, in the sign of EC0Y, EB0Z and EA0Z.
-    """
+    """Fit an affine map to an error field and give its shear per plane."""
     point = field.nominal_mm.reshape(-1, 3)
     design = np.column_stack([np.ones(len(point)), point - point.mean(axis=0)])
     error = field.error_um.reshape(-1, 3)

@@ -9,93 +9,51 @@ does not grow with the number of samples.
 """
 
 import os
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Executor
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import TypeVar, TypeVarTuple, Unpack
 
-from warpspace.analysis.cases import LEAST_BLOCKS, Case, Job, sample_blocks
-from warpspace.analysis.distribution import Histogram, Part, Probability, Stream
-from warpspace.analysis.draws import Draws
-from warpspace.analysis.engine import run_in_order, threads
-from warpspace.analysis.plan import (
-    BLOCK,
-    DEFAULT_NODES,
-    DEFAULT_SAMPLES,
-    MAX_SAMPLES,
-    MIN_SAMPLES,
-    Plan,
-)
+from warpspace.analysis.cases import LEAST_BLOCKS, Case, Job, Plan, sample_blocks
+from warpspace.analysis.distribution import Draws, Histogram, Part, Probability, Stream
+from warpspace.analysis.statistics import Summary
+from warpspace.exceptions import WorkersLostError
 from warpspace.field.evaluate import View
-from warpspace.field.grid import Workspace
-from warpspace.kinematics.model import Model
 from warpspace.machine.limits import LOCAL_WORKERS
 from warpspace.units import Array
-
-__all__ = [
-    "BLOCK",
-    "DEFAULT_NODES",
-    "DEFAULT_SAMPLES",
-    "MAX_SAMPLES",
-    "MIN_SAMPLES",
-    "Case",
-    "Job",
-    "MonteCarlo",
-    "Plan",
-    "Progress",
-    "Take",
-    "montecarlo",
-    "montecarlo_each",
-    "sample_chunks",
-]
 
 MOST_THREADS = 8
 EXECUTOR_WORKERS = 32
 """Tasks at a time that an executor is taken for, where nobody says how many workers it has."""
 
 Progress = Callable[[int], object]
+"""Called with the number of machines done since the last call."""
 Take = Callable[[int, Array], object]
 """Called with the number of a case and |E| of its next machines, [n], µm."""
+Given = TypeVarTuple("Given")
+Result = TypeVar("Result")
 
 
-@dataclass(frozen=True, slots=True)
-class MonteCarlo:
-    """Distribution of |E| over sampled machines.
-
-    Attributes
-    ----------
-    plan : Plan
-    draws : Draws
-        Which parameters were drawn, and how.
-    view : View
-    mean_um, rms_um, mode_um, median_um, p95_um, p99_um, max_um : float, µm
-    histogram : Histogram
-    probability : Probability or None
-        Of staying within the specification.
-    exact_quantiles : bool
-        False beyond a million samples: quantiles are then good to 0.002 % of their value.
-    """
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MonteCarlo(Summary):
+    """Distribution of |E| over sampled machines."""
 
     plan: Plan
-    draws: Draws
+    draws: Draws  # which parameters were drawn, and how
     view: View
-    mean_um: float
-    rms_um: float
     mode_um: float
     median_um: float
-    p95_um: float
     p99_um: float
-    max_um: float
     histogram: Histogram
-    probability: Probability | None
+    probability: Probability | None  # of staying within the specification
+    # false beyond a million samples: quantiles are then good to 0.002 % of their value
     exact_quantiles: bool
 
 
 def montecarlo(
-    model: Model,
-    draws: Draws,
-    workspace: Workspace,
-    view: View | None = None,
-    plan: Plan | None = None,
+    case: Case,
     progress: Progress | None = None,
     *,
     executor: Executor | None = None,
@@ -103,32 +61,10 @@ def montecarlo(
 ) -> MonteCarlo:
     """Sample machines and collect the distribution of their volumetric error.
 
-    Parameters
-    ----------
-    model : Model
-    draws : Draws
-        The parameters and their distributions, see `build_draws`.
-    workspace : Workspace
-    view : View, optional
-        Loop and reference; the tool loop by default.
-    plan : Plan, optional
-    progress, executor, take : optional
-        See `montecarlo_each`.
-
-    Returns
-    -------
-    MonteCarlo
-
-    Raises
-    ------
-    OptionError
-        If a number of the plan is out of range.
-
     Notes
     -----
     First order in the errors. Thesis, section 4.3, has `sampled`.
     """
-    case = Case(model, draws, workspace, view or View(), plan or Plan())
     (found,) = montecarlo_each(
         [case], workers=case.plan.workers, executor=executor, progress=progress, take=take
     )
@@ -143,34 +79,7 @@ def montecarlo_each(
     progress: Progress | None = None,
     take: Take | None = None,
 ) -> Iterator[MonteCarlo]:
-    """Sample the machines of many cases: a fleet, or the points of a sweep.
-
-    Parameters
-    ----------
-    cases : iterable of Case
-        Taken as they are needed.
-    workers : int, optional
-        Threads, one per core and at most 8 by default; of an executor, its workers.
-    executor : concurrent.futures.Executor, optional
-        Does the work instead of threads: a pool of processes, or of a cluster. A case is cut into
-        tasks of 131,072 machines at least.
-    progress : callable, optional
-        Called with the number of machines done since the last call.
-    take : callable, optional
-        Called with the number of a case and |E| of its next machines, in order.
-
-    Yields
-    ------
-    MonteCarlo
-        Of each case, in order.
-
-    Raises
-    ------
-    OptionError
-        If a number of a plan is out of range.
-    WorkersLostError
-        If the executor gives up.
-    """
+    """Sample the machines of many cases: a fleet, or the points of a sweep."""
     if executor is not None:
         in_flight = 2 * (workers or EXECUTOR_WORKERS)
         yield from _collect(_sent_tasks(cases, take), executor, in_flight, progress, take)
@@ -181,19 +90,7 @@ def montecarlo_each(
 
 
 def sample_chunks(job: Job, plan: Plan) -> Iterator[Array]:
-    """Run a job for every block on several threads and give the results in order.
-
-    Parameters
-    ----------
-    job : callable
-        Takes a random generator and a number of machines, gives their |E|, [n], µm.
-    plan : Plan
-
-    Yields
-    ------
-    ndarray, [n], µm
-        At most a few blocks are held at a time.
-    """
+    """Run a job for every block on several threads and give the results in order, a few at once."""
 
     def block(index: int) -> Array:
         return job(*plan.block(index))
@@ -210,7 +107,6 @@ _Task = tuple[Case, int, int, bool, Job | None]
 
 
 def _own_tasks(cases: Iterable[Case], take: Take | None) -> Iterator[_Task]:
-    """Cut cases into single blocks; what they go through is built once a case."""
     for case in cases:
         case.check()
         job = case.build_job()
@@ -219,7 +115,6 @@ def _own_tasks(cases: Iterable[Case], take: Take | None) -> Iterator[_Task]:
 
 
 def _sent_tasks(cases: Iterable[Case], take: Take | None) -> Iterator[_Task]:
-    """Cut cases into pieces that are worth sending."""
     for case in cases:
         case.check()
         size, blocks = case.task_blocks, case.plan.blocks
@@ -228,7 +123,6 @@ def _sent_tasks(cases: Iterable[Case], take: Take | None) -> Iterator[_Task]:
 
 
 def _run(case: Case, first: int, end: int, keep: bool, job: Job | None) -> Part | MonteCarlo:
-    """Do a task; a case that is one task is evaluated to its end, which is much less to send."""
     part = sample_blocks(case, first, end, keep=keep, job=job)
     if keep or job is not None or case.plan.blocks > LEAST_BLOCKS:
         return part
@@ -244,7 +138,6 @@ def _collect(
     progress: Progress | None,
     take: Take | None,
 ) -> Iterator[MonteCarlo]:
-    """Put the results of tasks together, one case after the other."""
     number, stream = 0, None
     for (case, _, end, _, _), found in run_in_order(_run, tasks, executor, in_flight):
         if isinstance(found, MonteCarlo):
@@ -264,19 +157,89 @@ def _collect(
 
 
 def _finish(case: Case, stream: Stream) -> MonteCarlo:
-    """Read the numbers of a case."""
     return MonteCarlo(
-        case.plan,
-        case.draws,
-        case.view,
-        stream.mean_um,
-        stream.rms_um,
-        stream.mode_um(),
-        stream.quantile(0.5),
-        stream.quantile(0.95),
-        stream.quantile(0.99),
-        stream.max_um,
-        stream.display_histogram(),
-        stream.probability(),
-        stream.exact_quantiles,
+        plan=case.plan,
+        draws=case.draws,
+        view=case.view,
+        mean_um=stream.mean_um,
+        rms_um=stream.rms_um,
+        mode_um=stream.mode_um(),
+        median_um=stream.quantile(0.5),
+        p95_um=stream.quantile(0.95),
+        p99_um=stream.quantile(0.99),
+        max_um=stream.max_um,
+        histogram=stream.display_histogram(),
+        probability=stream.probability(),
+        exact_quantiles=stream.exact_quantiles,
+    )
+
+
+# --- Tasks on any executor of `concurrent.futures`, their results in order ------------------------
+
+
+def run_in_order(
+    function: Callable[[Unpack[Given]], Result],
+    tasks: Iterable[tuple[*Given]],
+    executor: Executor | None,
+    in_flight: int,
+) -> Iterator[tuple[tuple[*Given], Result]]:
+    """Run a function for every task; tasks and results come out in the order of the tasks."""
+    if executor is None:
+        for task in tasks:
+            yield task, function(*task)
+        return
+    pending: deque[tuple[tuple[*Given], Future[Result]]] = deque()
+    try:
+        for task in tasks:
+            if len(pending) >= in_flight:
+                yield _oldest(pending)
+            pending.append((task, _submit(executor, function, task)))
+        while pending:
+            yield _oldest(pending)
+    finally:
+        for _, future in pending:
+            future.cancel()
+
+
+@contextmanager
+def threads(workers: int) -> Generator[Executor | None]:
+    """Start threads; None for one of them. Tasks not begun are dropped at the end."""
+    if workers == 1:
+        yield None
+        return
+    executor = ThreadPoolExecutor(workers)
+    try:
+        yield executor
+    finally:
+        executor.shutdown(wait=False, cancel_futures=True)
+
+
+def _submit(
+    executor: Executor,
+    function: Callable[[Unpack[Given]], Result],
+    task: tuple[*Given],
+) -> "Future[Result]":
+    try:
+        return executor.submit(function, *task)
+    except BrokenExecutor as error:
+        raise _lost(error) from error
+
+
+def _oldest(
+    pending: "deque[tuple[tuple[*Given], Future[Result]]]",
+) -> tuple[tuple[*Given], Result]:
+    """Wait for the oldest task; it stays in the row until it is done, so that it can be stopped."""
+    task, future = pending[0]
+    try:
+        result = future.result()
+    except (BrokenExecutor, CancelledError) as error:
+        raise _lost(error) from error
+    pending.popleft()
+    return task, result
+
+
+def _lost(error: BaseException) -> WorkersLostError:
+    return WorkersLostError(
+        f"the workers are lost ({type(error).__name__}): a process was ended, ran out of memory, or"
+        " the cluster was closed; run again, with fewer --workers where memory is short"
     )

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from warpspace.exceptions import OptionError
-from warpspace.field.basis import ErrorField
+from warpspace.field.evaluate import ErrorField
 from warpspace.field.grid import Grid
 from warpspace.units import Array
 
@@ -18,24 +18,26 @@ CELLS = 40
 
 
 @dataclass(frozen=True, slots=True)
-class Statistics:
-    """Summary of the length of the position error over a field.
+class Summary:
+    """The length of position errors: over a volume, over points, over machines."""
 
-    Attributes
-    ----------
-    mean_um, rms_um, p95_um, max_um : float, µm
-        Mean, root mean square, 95th percentile and largest.
-    max_at_mm : tuple of float, (3,), mm
-        Nominal point in R of the largest.
-    max_at_axes : mapping of str to float, mm or degrees
-        Axis positions there; empty where the field came without any.
-    """
-
-    mean_um: float
+    mean_um: float  # mean, root mean square, 95th percentile and largest
     rms_um: float
     p95_um: float
     max_um: float
-    max_at_mm: tuple[float, float, float]
+
+    @property
+    def three(self) -> tuple[float, float, float]:
+        """Mean, RMS and max."""
+        return self.mean_um, self.rms_um, self.max_um
+
+
+@dataclass(frozen=True, slots=True)
+class Statistics(Summary):
+    """Summary of a field."""
+
+    max_at_mm: tuple[float, float, float]  # nominal point in R of the largest
+    # mm or degrees; axis positions there; empty where the field came without any
     max_at_axes: Mapping[str, float] = attribute(default_factory=dict)
 
 
@@ -44,73 +46,51 @@ def volume_statistics(field: ErrorField, grid: Grid) -> Statistics:
 
     Each node counts for its share of the volume, so that corners and edges weigh less than the
     inside. Between the nodes the length of the error is interpolated.
-
-    Parameters
-    ----------
-    field : ErrorField
-        Errors of all nodes of the grid, of its shape or flat.
-    grid : Grid
-
-    Returns
-    -------
-    Statistics
-        The largest error is that of the worst node.
     """
-    norm = field.norm_um.reshape(grid.shape)
-    weights = grid.weights
+    norm, weights = field.norm_um.reshape(grid.shape), grid.weights
     cells = _cell_values(norm).reshape(-1)
-    worst = np.unravel_index(int(np.argmax(norm)), grid.shape)
-    x, y, z = (float(value) for value in grid.nominal_mm[worst])
-    return Statistics(
+    return _summed_up(
+        norm,
         float(np.sum(weights * norm)),
         float(np.sqrt(np.sum(weights * norm * norm))),
         _percentile(cells, P95 * cells.size - 0.5),
-        float(norm[worst]),
-        (x, y, z),
-        {
-            name: float(np.broadcast_to(value, grid.shape)[worst])
-            for name, value in grid.coordinates.items()
-        },
+        grid.nominal_mm,
+        grid.coordinates,
     )
 
 
 def statistics(field: ErrorField, axes: Mapping[str, Array] | None = None) -> Statistics:
-    """Summarise points, each counted once.
-
-    Parameters
-    ----------
-    field : ErrorField
-    axes : mapping of str to ndarray, mm or degrees, optional
-        Axis positions of the points, shaped to broadcast to them.
-
-    Returns
-    -------
-    Statistics
-
-    Raises
-    ------
-    OptionError
-        If the field has no point.
-    """
-    shape = field.norm_um.shape
-    norm = field.norm_um.reshape(-1)
+    """Summarise points, each counted once."""
+    norm = field.norm_um
     if norm.size == 0:
         raise OptionError("statistics of no points; expected at least one")
-    worst = int(np.argmax(norm))
-    place = np.unravel_index(worst, shape)
-    x, y, z = (float(value) for value in field.nominal_mm[place])
-    return Statistics(
-        float(norm.mean()),
-        float(np.sqrt(norm @ norm / norm.size)),
-        _percentile(norm, P95 * (norm.size - 1)),
-        float(norm[worst]),
-        (x, y, z),
-        {name: float(np.broadcast_to(value, shape)[place]) for name, value in (axes or {}).items()},
-    )
+    flat = norm.reshape(-1)
+    rms = float(np.sqrt(flat @ flat / flat.size))
+    p95 = _percentile(flat, P95 * (flat.size - 1))
+    return _summed_up(norm, float(flat.mean()), rms, p95, field.nominal_mm, axes or {})
+
+
+def _summed_up(
+    norm: Array, mean: float, rms: float, p95: float, nominal: Array, axes: Mapping[str, Array]
+) -> Statistics:
+    worst = np.unravel_index(int(np.argmax(norm)), norm.shape)
+    x, y, z = (float(value) for value in nominal[worst])
+    at = {name: float(np.broadcast_to(q, norm.shape)[worst]) for name, q in axes.items()}
+    return Statistics(mean, rms, p95, float(norm[worst]), (x, y, z), at)
+
+
+def share_within(norm_um: Array, share: float) -> float:
+    """Limit, µm, that a share of the volume keeps; |E| interpolated between nodes, [x, y, z]."""
+    cells = _cell_values(norm_um).reshape(-1)
+    return float(norm_um.max()) if share >= 1.0 else _percentile(cells, share * cells.size - 0.5)
+
+
+def share_below(norm_um: Array, limit_um: float) -> float:
+    """Share of the volume whose |E| is at most a limit; |E| interpolated between nodes."""
+    return 1.0 if norm_um.max() <= limit_um else float(np.mean(_cell_values(norm_um) <= limit_um))
 
 
 def _cell_values(values: Array) -> Array:
-    """Interpolate values at nodes to the middles of cells of equal volume, in any order."""
     for nodes in values.shape:
         values = np.tensordot(values, _to_cells(nodes), axes=(0, 1))
     return values
@@ -118,7 +98,6 @@ def _cell_values(values: Array) -> Array:
 
 @cache
 def _to_cells(nodes: int) -> Array:
-    """Give the weights of nodes along an edge in the middles of its cells, [cells, nodes]."""
     if nodes == 1:
         return np.ones((1, 1))
     parts = max(1, round(CELLS / (nodes - 1)))

@@ -5,107 +5,49 @@ for its whole curve, which the errors of a calibration are: a reading that is to
 position is so at the next one. At one point without a reference this makes no difference.
 """
 
-from collections.abc import Mapping
-from concurrent.futures import Executor
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from warpspace.analysis.cases import Case
-from warpspace.analysis.draws import SIGMAS, Distribution, Draws
-from warpspace.analysis.montecarlo import MonteCarlo, Plan, Progress, Take, montecarlo_each
-from warpspace.analysis.points import Places
-from warpspace.field.evaluate import View, amplitudes_of, build_basis, evaluate_first_order
-from warpspace.field.grid import Workspace
-from warpspace.kinematics.model import Coordinates, Model
+from warpspace.analysis.cases import Case, Places, Plan
+from warpspace.analysis.distribution import SIGMAS, Distribution, Draws, loop_keys
+from warpspace.exceptions import SceneError
+from warpspace.field.evaluate import amplitudes_of, build_basis, evaluate_first_order
+from warpspace.field.grid import DEFAULT_NODES, build_grid
+from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.machine.curves.curve import ErrorFunction
 from warpspace.machine.errors import ErrorSet
 from warpspace.units import Array
 
+if TYPE_CHECKING:
+    from warpspace.scene.model import Scene
+
+SIGMAS_OF = {Distribution.NORMAL: SIGMAS, Distribution.UNIFORM: 3.0**0.5}
+"""Half width in standard uncertainties."""
 Uncertainties = Mapping[str, ErrorFunction]
 """Standard uncertainty (k = 1) along its axis, by key of the error."""
 
 
 @dataclass(frozen=True, slots=True)
 class FieldUncertainty:
-    """Standard uncertainty (k = 1) of a field.
+    """Standard uncertainty (k = 1) of a field."""
 
-    Attributes
-    ----------
-    error_um : ndarray, [..., 3], µm
-        Of each component of the position error.
-    norm_um : ndarray, [...], µm
-        Of its length: along the error, or of the vector as a whole where the error is zero.
-    orientation_urad : ndarray, [..., 3], µrad
-    """
-
-    error_um: Array
+    error_um: Array  # [..., 3]; of each component of the position error
+    # [...]; of its length: along the error, or of the vector as a whole where the error is zero
     norm_um: Array
-    orientation_urad: Array
-
-
-def field_uncertainty(
-    model: Model,
-    errors: ErrorSet,
-    uncertainty: Uncertainties,
-    coordinates: Coordinates,
-    view: View | None = None,
-    point_mm: Array | None = None,
-) -> FieldUncertainty:
-    """Propagate standard uncertainties of errors to a field, to first order.
-
-    Parameters
-    ----------
-    model : Model
-    errors : ErrorSet
-        Gives the direction of the error, along which the uncertainty of its length counts.
-    uncertainty : mapping of str to ErrorFunction
-    coordinates : mapping of str to ndarray, [...], mm or degrees
-    view : View, optional
-        With a reference, the uncertainty of the difference to it.
-    point_mm : ndarray, [..., 3], mm, optional
-        Nominal points in R; by default the functional point of the loop.
-
-    Returns
-    -------
-    FieldUncertainty
-
-    Notes
-    -----
-    Root of the sum of (gain × standard uncertainty)² over the errors (GUM, 5.1.2).
-    """
-    nominal = evaluate_first_order(model, errors, coordinates, view, point_mm)
-    length = nominal.norm_um[..., None]
-    along = np.where(length > 0.0, nominal.error_um / np.where(length > 0.0, length, 1.0), 0.0)
-    own = ErrorSet(uncertainty)
-    position, tilt = np.zeros(nominal.error_um.shape), np.zeros(nominal.error_um.shape)
-    norm = np.zeros(nominal.norm_um.shape)
-    for key in uncertainty:
-        one = build_basis(model, own, (key,), coordinates, view, point_mm)
-        (amplitude,) = amplitudes_of(own, (key,))
-        part = amplitude * one.position[0]
-        position += part**2
-        tilt += (amplitude * one.orientation[0]) ** 2
-        norm += np.sum(part * along, axis=-1) ** 2
-    whole = np.sum(position, axis=-1)
-    norm = np.where(length[..., 0] > 0.0, norm, whole)
-    return FieldUncertainty(np.sqrt(position), np.sqrt(norm), np.sqrt(tilt))
+    orientation_urad: Array  # [..., 3]
 
 
 @dataclass(frozen=True, slots=True)
 class UncertainCase(Case):
-    """A measured machine whose errors are off by their standard uncertainties.
+    """A measured machine whose errors are off by their standard uncertainties."""
 
-    Attributes
-    ----------
-    errors : ErrorSet
-        As measured.
-    uncertainty : ErrorSet
-        Standard uncertainty along the axis of each error.
-    """
-
-    errors: ErrorSet = dataclass_field(default_factory=ErrorSet)
+    errors: ErrorSet = dataclass_field(default_factory=ErrorSet)  # as measured
+    # standard uncertainty along the axis of each error
     uncertainty: ErrorSet = dataclass_field(default_factory=ErrorSet)
 
     def machines(self, rng: np.random.Generator, count: int) -> Array:
@@ -114,8 +56,7 @@ class UncertainCase(Case):
         The one is the factor of the errors as measured.
         """
         draws = self.draws
-        widths = {Distribution.NORMAL: SIGMAS, Distribution.UNIFORM: np.sqrt(3.0)}
-        size = np.full(len(draws.keys), widths[Distribution(draws.distribution)])
+        size = np.full(len(draws.keys), SIGMAS_OF[Distribution(draws.distribution)])
         unit = Draws(draws.keys, np.zeros(len(draws.keys)), size, draws.distribution)
         return np.column_stack([unit.draw(rng, count), np.ones(count)])
 
@@ -131,53 +72,69 @@ class UncertainCase(Case):
         return np.ascontiguousarray(np.moveaxis(both, -1, 0))
 
 
-def uncertain_montecarlo(
-    model: Model,
-    errors: ErrorSet,
-    uncertainty: Uncertainties,
-    workspace: Workspace,
-    view: View | None = None,
-    plan: Plan | None = None,
+def uncertain_case(
+    scene: "Scene",
+    plan: Plan,
+    loop: Loop = Loop.TOOL,
     distribution: Distribution = Distribution.NORMAL,
-    progress: Progress | None = None,
-    *,
-    workers: int | None = None,
-    executor: Executor | None = None,
-    take: Take | None = None,
-) -> MonteCarlo:
-    """Sample what the machine may be: its measured errors, each off by its uncertainty.
-
-    Parameters
-    ----------
-    model : Model
-    errors : ErrorSet
-        As measured.
-    uncertainty : mapping of str to ErrorFunction
-        Those of axes that are not in the loop do nothing.
-    workspace : Workspace
-    view : View, optional
-    plan : Plan, optional
-    distribution : Distribution, optional
-        Normal, or uniform with the same standard uncertainty.
-    progress : callable, optional
-        Called with the number of machines done since the last call.
-    workers, executor, take : optional
-        See `warpspace.analysis.montecarlo.montecarlo_each`.
-
-    Returns
-    -------
-    MonteCarlo
-        Its draws have the amplitudes of the errors as centres and three standard uncertainties,
-        or √3 of them where uniform, as half widths.
-    """
-    view, plan = view or View(), plan or Plan()
-    own = ErrorSet(uncertainty)
+) -> UncertainCase:
+    """Give what a measured machine may be: its errors, each off by its standard uncertainty."""
+    own = ErrorSet(scene_uncertainty(scene, loop))
     keys = tuple(own)
-    widths = {Distribution.NORMAL: SIGMAS, Distribution.UNIFORM: np.sqrt(3.0)}
-    size = np.full(len(keys), widths[distribution]) * np.abs(amplitudes_of(own, keys))
-    drawn = Draws(keys, amplitudes_of(errors, keys), size, distribution)
-    case = UncertainCase(model, drawn, workspace, view, plan, errors, own)
-    (found,) = montecarlo_each(
-        [case], workers=workers or plan.workers, executor=executor, progress=progress, take=take
-    )
-    return found
+    size = SIGMAS_OF[distribution] * np.abs(amplitudes_of(own, keys))
+    drawn = Draws(keys, amplitudes_of(scene.errors, keys), size, distribution)
+    view = scene.view(loop)
+    return UncertainCase(scene.model, drawn, scene.workspace, view, plan, scene.errors, own)
+
+
+def scene_uncertainty(scene: "Scene", loop: Loop) -> Mapping[str, ErrorFunction]:
+    """Collect the standard uncertainties of the errors that act in a loop of a scene."""
+    if not scene.uncertainty:
+        problem = "has no uncertainties; expected an [uncertainty] section, for instance EXX = 0.4"
+        raise SceneError(scene.name, [problem])
+    keys = loop_keys(scene.model, loop, tuple(scene.uncertainty))
+    return {key: scene.uncertainty[key] for key in keys}
+
+
+def evaluate_uncertainty(
+    scene: "Scene",
+    *,
+    at: Mapping[str, ArrayLike] | None = None,
+    grid: int | Sequence[int] | None = None,
+    loop: Loop | str = Loop.TOOL,
+    frame: str = "machine",
+) -> FieldUncertainty:
+    """Propagate the standard uncertainties of a scene to its field, to first order.
+
+    With a reference it is the uncertainty of the difference to it. The errors of the scene give the
+    direction along which the uncertainty of the length counts. See `warpspace.evaluate` for the
+    parameters.
+
+    Notes
+    -----
+    Root of the sum of (gain × standard uncertainty)² over the errors (GUM, 5.1.2).
+    """
+    from warpspace.scene.model import choose_view
+
+    model, view = scene.model, choose_view(scene, loop, frame)
+    own = ErrorSet(scene_uncertainty(scene, view.loop))
+    if at is not None:
+        coordinates = complete_coordinates(scene.machine, at, scene.workspace.positions)
+        where = coordinates, view, None
+    else:
+        nodes = build_grid(model, scene.workspace, DEFAULT_NODES if grid is None else grid)
+        where = nodes.coordinates, view, nodes.point_mm
+    nominal = evaluate_first_order(model, scene.errors, *where)
+    length = nominal.norm_um[..., None]
+    along = np.where(length > 0.0, nominal.error_um / np.where(length > 0.0, length, 1.0), 0.0)
+    position, tilt = np.zeros(nominal.error_um.shape), np.zeros(nominal.error_um.shape)
+    norm = np.zeros(nominal.norm_um.shape)
+    for key in own:
+        one = build_basis(model, own, (key,), *where)
+        (amplitude,) = amplitudes_of(own, (key,))
+        part = amplitude * one.position[0]
+        position += part**2
+        tilt += (amplitude * one.orientation[0]) ** 2
+        norm += np.sum(part * along, axis=-1) ** 2
+    norm = np.where(length[..., 0] > 0.0, norm, np.sum(position, axis=-1))
+    return FieldUncertainty(np.sqrt(position), np.sqrt(norm), np.sqrt(tilt))

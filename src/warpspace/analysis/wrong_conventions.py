@@ -13,10 +13,11 @@ from warpspace.field.evaluate import View
 from warpspace.field.grid import Workspace, build_grid
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_frames, nominal_point
-from warpspace.kinematics.conversion.reference_line import ReferenceLine, fit_line
-from warpspace.kinematics.conversion.squareness import (
+from warpspace.kinematics.conversion import (
+    ReferenceLine,
     SquarenessSign,
     angle_sign,
+    fit_line,
     squareness_keys,
 )
 from warpspace.kinematics.firstorder import jacobian
@@ -34,18 +35,10 @@ Reading = Callable[["_Read", Values, Coordinates], Values]
 
 @dataclass(frozen=True, slots=True)
 class ConventionCost:
-    """What one wrong convention would cost.
+    """What one wrong convention would cost."""
 
-    Attributes
-    ----------
-    name : str
-        For instance "squareness=over_90".
-    mean_um, max_um : float, µm
-        Mean over the volume and largest length of the change of the error vector.
-    """
-
-    name: str
-    mean_um: float
+    name: str  # for instance "squareness=over_90"
+    mean_um: float  # mean over the volume and largest length of the change of the error vector
     max_um: float
 
 
@@ -59,7 +52,6 @@ class _Read:
     keys: tuple[str, ...]
 
     def values(self, coordinates: Coordinates) -> Values:
-        """Give the errors at positions as they are read."""
         way = self.model.direction
         return {
             key: self.errors.evaluate_at(key, coordinates, way)
@@ -75,25 +67,7 @@ def convention_costs(
     view: View | None = None,
     nodes: int = 21,
 ) -> tuple[ConventionCost, ...]:
-    """Find what each wrong convention would cost over the working volume.
-
-    Parameters
-    ----------
-    model : Model
-    errors : ErrorSet
-        As they are read.
-    workspace : Workspace
-    view : View, optional
-    nodes : int, optional
-        Nodes per axis.
-
-    Returns
-    -------
-    tuple of ConventionCost
-        Both signs of squareness by the angle; translations measured along lines through the tool
-        point in the middle of the volume; the three reference lines taken out of straightness and
-        not put into squareness; component errors that are zero in the middle of their axes.
-    """
+    """Find what each wrong convention would cost over the working volume."""
     view = view or View()
     grid = build_grid(model, workspace, nodes)
     keys = tuple(
@@ -127,7 +101,6 @@ def convention_costs(
 
 
 def _change(own: Values, other: Values) -> Values:
-    """Subtract values; what is the same is left out."""
     return {key: value - own.get(key, 0.0) for key, value in other.items()}
 
 
@@ -152,8 +125,6 @@ def _readings() -> dict[str, Reading]:
 
 
 def _squareness(sign: SquarenessSign) -> Reading:
-    """Read squareness errors by the angle between the axes."""
-
     def reading(read: _Read, values: Values, coordinates: Coordinates) -> Values:
         del coordinates
         turned = 1 if sign is SquarenessSign.OVER_90 else -1
@@ -164,7 +135,6 @@ def _squareness(sign: SquarenessSign) -> Reading:
 
 
 def _measuring_line(read: _Read, values: Values, coordinates: Coordinates) -> Values:
-    """Read translations as measured along lines through the tool point in the middle."""
     model, found = read.model, Values()
     middle = {axis: np.asarray(at) for axis, at in read.workspace.positions.items()}
     point = nominal_point(model, Loop.TOOL, middle)
@@ -195,8 +165,6 @@ def _measuring_line(read: _Read, values: Values, coordinates: Coordinates) -> Va
 
 
 def _reference_line(line: ReferenceLine) -> Reading:
-    """Read straightness as deviations from its reference line, the line itself being lost."""
-
     def reading(read: _Read, values: Values, coordinates: Coordinates) -> Values:
         found = Values()
         for key in values:
@@ -214,7 +182,6 @@ def _reference_line(line: ReferenceLine) -> Reading:
 
 
 def _points(read: _Read, key: str) -> Array:
-    """Choose the positions that the line of a curve is laid through."""
     axis = parameter(key).axis
     low, high = read.workspace.ranges[axis]
     if low == high:
@@ -226,7 +193,6 @@ def _points(read: _Read, key: str) -> Array:
 
 
 def _zero_in_the_middle(read: _Read, values: Values, coordinates: Coordinates) -> Values:
-    """Read component errors as set to zero in the middle of their axes."""
     middle = read.workspace.positions
     found = Values()
     for key in values:

@@ -1,36 +1,41 @@
 """What every test is: a frozen set of options with a path, an evaluation and a figure."""
 
-from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from abc import abstractmethod
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from pathlib import Path
+from pkgutil import resolve_name
+from typing import Any, ClassVar
 
-from warpspace.bench.data import DataColumn, Table
-from warpspace.bench.options import option
-from warpspace.bench.outcome import Chart, Outcome
-from warpspace.bench.plan import Plan
-from warpspace.exceptions import OptionError
+import numpy as np
+
+from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table
+from warpspace.analysis.description import Analysis, Result, Watch
+from warpspace.analysis.options import Option, option, options_of
+from warpspace.analysis.typed import File, Place
+from warpspace.bench.data import DataColumn, read_table, unit_notes
+from warpspace.bench.data import Table as DataTable
+from warpspace.bench.plan import Outcome, Plan
+from warpspace.bench.readings import simulate
+from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.kinematics.model import Model, complete_coordinates
+from warpspace.plugins import load_plugins
 from warpspace.scene.model import Scene
 from warpspace.units import Array
+
+LEAST = 5e-4
+"""Numbers below it are printed as zero."""
+SHARED = 3
+"""Options that every test has, the first fields of the base class."""
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """Readings of a test and what they come to.
+    """Readings of a test and what they come to."""
 
-    Attributes
-    ----------
-    who : str
-        "model" or "measured".
-    plan : Plan
-    readings : ndarray, [m], µm or µrad
-    outcome : Outcome
-    """
-
-    who: str
+    who: str  # "model" or "measured"
     plan: Plan
-    readings: Array
+    readings: Array  # [m], µm or µrad
     outcome: Outcome
 
     @property
@@ -42,9 +47,17 @@ class Run:
         """Name a curve; the model has the plain words."""
         return f"{words}, measured" if self.is_measured else words
 
+    def curve(
+        self, words: str, x: Array, y: Array, colour: int = 0, *, once_round: bool = False
+    ) -> Curve:
+        """Give a curve of a chart: dots of what was measured, closed where it goes once round."""
+        if once_round and not self.is_measured:
+            x, y = np.append(x, x[0] + 360.0), np.append(y, y[0])
+        return Curve(self.named(words), x, y, colour, "dots" if self.is_measured else "line")
+
 
 @dataclass(frozen=True, kw_only=True)
-class BenchTest(ABC):
+class BenchTest(Analysis):
     """A test with its options. A subclass is a kind of test, its fields are its options.
 
     Attributes
@@ -61,21 +74,49 @@ class BenchTest(ABC):
         Of a file of readings.
     at : mapping of str to float, mm or degrees
     tool_extension_mm : float, mm
+    data : str, optional
+        File of measured readings.
     """
 
-    name: ClassVar[str]
+    task = "measure"
+    has_chart = True
+    chart_help = "figure of the test"
     title: ClassVar[str]
     standard: ClassVar[str]
     words: ClassVar[str]
     columns: ClassVar[tuple[DataColumn, ...]]
-    at: Mapping[str, float] = option(
-        None,
-        "point",
-        "Where axes stand that the test does not move; what the scene says for others.",
+    at: Place = option(
+        (),
+        "Where axes stand that the test does not move",
+        unset="what the scene says",
+        former=("--center", "--centre"),
     )
     tool_extension_mm: float = option(
-        0.0, "number", "How much longer than the scene's the tool or probe is.", unit="mm"
+        0.0, "How much longer than the scene's the tool or probe is", unit="mm", low=-1e4, high=1e4
     )
+    data: File = option(None, "Measured readings, CSV with the columns above")
+
+    @classmethod
+    def options(cls) -> tuple[Option, ...]:
+        """List them, its own before those that every test has."""
+        found = options_of(cls)
+        return (*found[SHARED:], *found[:SHARED])
+
+    @classmethod
+    def settings(cls) -> tuple[Option, ...]:
+        """List the options that say how it is run."""
+        return tuple(one for one in cls.options() if one.name != "data")
+
+    @classmethod
+    def explained(cls) -> str:
+        """Say what is done, and which columns a file of readings has."""
+        columns = ",".join(column.name for column in cls.columns)
+        title = f"{cls.title} on SCENE ({cls.standard})."
+        return f"{title}\n\n{cls.words}\n\nColumns of --data: {columns}."
+
+    def run(self, scene: Scene, _watch: Watch, /) -> "BenchResult":
+        """Run it on the model, and evaluate readings beside it."""
+        return run_test(scene, self, self.data)
 
     @abstractmethod
     def plan(self, scene: Scene) -> Plan:
@@ -88,20 +129,8 @@ class BenchTest(ABC):
         """
 
     @abstractmethod
-    def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
-        """Lay the path along which readings were taken.
-
-        Parameters
-        ----------
-        scene : Scene
-        table : Table
-            With `columns`.
-
-        Returns
-        -------
-        plan : Plan
-        readings : ndarray, [m], µm or µrad
-            As measured, in the order of the plan.
+    def plan_data(self, scene: Scene, table: DataTable) -> tuple[Plan, Array]:
+        """Lay the path along which readings were taken, and give these in its order, [m].
 
         Raises
         ------
@@ -111,37 +140,27 @@ class BenchTest(ABC):
 
     @abstractmethod
     def evaluate(self, plan: Plan, readings: Array) -> Outcome:
-        """Evaluate readings by the formulas of the standard.
-
-        Parameters
-        ----------
-        plan : Plan
-        readings : ndarray, [m], µm or µrad
-
-        Returns
-        -------
-        Outcome
-        """
+        """Evaluate readings, [m], µm or µrad, by the formulas of the standard."""
 
     @abstractmethod
-    def charts(self, runs: Sequence[Run]) -> tuple[Chart, ...]:
+    def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
         """Lay out the customary figure of runs, the model first."""
 
     def data_columns(self, scene: Scene) -> tuple[DataColumn, ...]:  # noqa: ARG002 - for others
         """Give the columns of a file of readings."""
         return self.columns
 
+    def data_notes(self, table: DataTable) -> tuple[str, ...]:  # noqa: ARG002 - for others
+        """Say where a file of readings is not of the test that is set."""
+        return ()
+
     def stand(self, scene: Scene) -> dict[str, Array]:
         """Give where all axes stand before the test moves any, scalars, mm or degrees."""
         positions = scene.workspace.positions
-        return complete_coordinates(scene.machine, {**positions, **self.at}, positions)
+        return complete_coordinates(scene.machine, {**positions, **dict(self.at)}, positions)
 
     def model(self, scene: Scene) -> Model:
         """Give the model with the tool that the test has."""
-        if not -1e4 < self.tool_extension_mm < 1e4:
-            raise OptionError(
-                f"--tool-extension {self.tool_extension_mm:g} mm; expected within ±10000 mm"
-            )
         if not self.tool_extension_mm:
             return scene.model
         x, y, z = scene.model.tool_point_mm
@@ -153,3 +172,184 @@ class BenchTest(ABC):
         still = [f"{name} {float(stand[name]):g}" for name in stand if name not in moving]
         tool = f"tool {self.tool_extension_mm:+g} mm" if self.tool_extension_mm else ""
         return " · ".join(part for part in (", ".join(still), tool) if part)
+
+
+@dataclass(frozen=True)
+class BenchResult(Result):
+    """A test that was run."""
+
+    drawn_by: ClassVar[str] = "warpspace.outputs.charts.results:bench_chart"
+    test: BenchTest
+    scene: Scene
+    runs: tuple[Run, ...]  # the model; behind it what was measured, if anything
+    notes: tuple[str, ...] = ()  # what a reader should doubt
+
+    @property
+    def model(self) -> Run:
+        """What the model gives."""
+        return self.runs[0]
+
+    @property
+    def measured(self) -> Run | None:
+        """What was measured."""
+        return self.runs[1] if len(self.runs) > 1 else None
+
+    @property
+    def rms_difference(self) -> float | None:
+        """RMS of measured − model, once the unknowns of the set-up are fitted, µm or µrad.
+
+        None where nothing was measured.
+        """
+        if self.measured is None:
+            return None
+        difference = self.measured.readings - self.model.readings
+        if self.model.plan.setup:
+            design = np.stack(list(self.model.plan.setup.values()), -1)
+            difference = difference - design @ np.linalg.lstsq(design, difference, rcond=None)[0]
+        return float(np.sqrt(np.mean(difference**2)))
+
+    @property
+    def charts(self) -> tuple[Lines, ...]:
+        """The customary figure."""
+        return self.test.charts(self.runs)
+
+    def doubts(self) -> tuple[str, ...]:
+        """Say what a reader should doubt."""
+        return self.notes
+
+    def as_json(self) -> dict[str, Any]:
+        """Spell it: the numbers of what was measured at the top, else those of the model."""
+        shown = self.measured or self.model
+        found: dict[str, Any] = {
+            "test": self.test.name,
+            "scene": self.scene.name,
+            "of": shown.who,
+            "place": shown.plan.place,
+            **{quantity.key: quantity.value for quantity in shown.outcome.quantities},
+            **shown.outcome.details,
+        }
+        if self.measured is not None:
+            found["model"] = {q.key: q.value for q in self.model.outcome.quantities}
+            found["rms_difference"] = self.rms_difference
+        return found | {"notes": list(self.notes)}
+
+    def blocks(self) -> Iterator[Block]:
+        """Say the numbers of the standard, and draw its figure."""
+        yield f"{self.test.title} ({self.test.standard}) · {self.scene.title}"
+        yield f"  {self.model.plan.place} · {self.model.plan.readings} readings"
+        rows: dict[str, list[Any]] = {}
+        for index, run in enumerate(self.runs):
+            for one in run.outcome.quantities:
+                row = rows.setdefault(one.key, [one.name, *[None] * len(self.runs), one.unit])
+                row[1 + index] = 0.0 if abs(one.value) < LEAST else one.value
+        numbers = (Column(run.who, ".3f") for run in self.runs)
+        columns = (Column("", leads=True, wraps=True), *numbers, Column("unit"))
+        yield Table(columns, list(rows.values()))
+        yield from self.charts
+
+
+def run_test(
+    scene: Scene, test: BenchTest, data: str | Path | None = None, *, exact: bool = True
+) -> BenchResult:
+    """Run a test on the model of a scene, and evaluate measured readings beside it.
+
+    Parameters
+    ----------
+    scene : Scene
+    test : BenchTest
+    data : str or Path, optional
+        CSV file with the columns of the test. The model is then run through the same poses.
+    exact : bool, optional
+        The exact chain; else the first order.
+
+    Returns
+    -------
+    BenchResult
+
+    Raises
+    ------
+    OptionError, UnknownNameError
+        If the test cannot be run on the machine.
+    SceneError
+        If the file cannot be used.
+
+    Examples
+    --------
+    >>> import warpspace
+    >>> from warpspace.bench.kinds.sphere import Sphere
+    >>> scene = warpspace.load_scene("dvf5000_first")
+    >>> result = warpspace.run_test(scene, Sphere(axis="C", ball=(100.0, 0.0, 60.0)))
+    >>> round(result.model.outcome["z_um"], 1)
+    21.5
+    """
+    table = None if data is None else read_table(data, test.data_columns(scene))
+    plan, measured = (test.plan(scene), None) if table is None else test.plan_data(scene, table)
+    readings = simulate(scene, plan, exact=exact)
+    runs = (Run("model", plan, readings, test.evaluate(plan, readings)),)
+    if table is None or measured is None:
+        return BenchResult(test, scene, runs)
+    angular = any(name.endswith("_urad") for name in table.columns)
+    notes = unit_notes(measured, readings, "µrad" if angular else "µm")
+    return BenchResult(
+        test,
+        scene,
+        (*runs, Run("measured", plan, measured, test.evaluate(plan, measured))),
+        (*table.notes, *test.data_notes(table), *notes),
+    )
+
+
+# --- The tests there are -------------------------------------------------------------------------
+
+
+_HERE = "warpspace.bench.kinds"
+_TESTS: dict[str, type[BenchTest] | str] = {
+    "positioning": f"{_HERE}.positioning:Positioning",
+    "circular": f"{_HERE}.circular:Circular",
+    "diagonals": f"{_HERE}.diagonals:Diagonals",
+    "straightness": f"{_HERE}.straightness:Straightness",
+    "squareness": f"{_HERE}.squareness:Squareness",
+    "rotary-axis": f"{_HERE}.rotary_axis:RotaryAxis",
+    "sphere": f"{_HERE}.sphere:Sphere",
+    "ball-plate": f"{_HERE}.ball_plate:BallPlate",
+    "cone-frustum": f"{_HERE}.cone_frustum:ConeFrustum",
+}
+FORMER = {"ballbar": f"{_HERE}.circular:FormerBallbar"}
+"""Tests under a former name: understood, not listed."""
+
+
+def register_test(test: type[BenchTest]) -> None:
+    """Add a kind of test; it then appears on the command line and in the app.
+
+    Raises
+    ------
+    OptionError
+        If there is one of its name.
+    """
+    if test.name in _TESTS:
+        raise OptionError(f"a test {test.name!r} is there already")
+    _TESTS[test.name] = test
+
+
+def unregister_test(name: str) -> None:
+    """Take a kind of test away again."""
+    del _TESTS[name]
+
+
+def bench_names() -> tuple[str, ...]:
+    """List the names of all tests."""
+    load_plugins()
+    return tuple(_TESTS)
+
+
+def find_test(name: str) -> type[BenchTest]:
+    """Look up a kind of test."""
+    load_plugins()
+    if name not in _TESTS and name not in FORMER:
+        raise UnknownNameError("test", name, _TESTS)
+    found = _TESTS.get(name) or FORMER[name]
+    if isinstance(found, str):
+        loaded: type[BenchTest] = resolve_name(found)
+        if name in _TESTS:
+            _TESTS[name] = loaded
+        return loaded
+    return found

@@ -1,4 +1,4 @@
-"""What a test runs through: poses, the points that count there, and what is sensed."""
+"""What a test runs through, and what it comes to: poses, what is sensed there, its numbers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -22,48 +22,24 @@ class Plan:
     A site is a pose and a point that counts there. The error of a site is that of the tool against
     the workpiece (loop `relative`) at that point; a reading senses it in one direction, as it is or
     against that of another site.
-
-    Attributes
-    ----------
-    coordinates : mapping of str to ndarray, [n], mm or degrees
-        Commanded positions of all axes at each site.
-    point_mm : ndarray, [n, 3], mm
-        Nominal point in R.
-    travel : mapping of str to ndarray, [n]
-        +1 or −1 for the direction in which an axis has come, 0 where it stands.
-    site : ndarray of int, [m]
-        Site of each reading.
-    direction : ndarray, [m, 3]
-        Unit vector in R that is sensed along.
-    against : ndarray of int, [m]
-        Site whose error is subtracted, or `NONE`.
-    gain : ndarray, [m]
-        1 for readings in µm; 1000 / lever in mm for angles in µrad.
-    length_mm : ndarray, [m], mm
-        Length of a bar whose change is read; infinite where a sensor looks in a fixed direction.
-    marks : mapping of str to ndarray, [m]
-        What the test needs to tell its readings apart: targets, angles, runs, directions, channels.
-    setup : mapping of str to ndarray, [m]
-        Readings that one unit (µm, or µrad where the name says so) of an unknown of the set-up
-        gives: the zero of a scale, the place of a ball. They are no errors of the machine.
-    place : str
-        Where it stands, in words.
-    path : tuple of ndarray of int
-        Sites of each stretch of the path, in order, for drawings.
     """
 
-    coordinates: Mapping[str, Array]
-    point_mm: Array
-    travel: Mapping[str, Array]
-    site: Whole
-    direction: Array
-    against: Whole
-    gain: Array
+    coordinates: Mapping[str, Array]  # [n], mm or degrees; of all axes at each site, commanded
+    point_mm: Array  # [n, 3]; nominal points in R
+    travel: Mapping[str, Array]  # [n]; ±1: direction in which an axis has come, 0 where it stands
+    site: Whole  # [m]; of each reading
+    direction: Array  # [m, 3]; unit vectors in R that are sensed along
+    against: Whole  # [m]; site whose error is subtracted, or `NONE`
+    gain: Array  # [m]; 1 for readings in µm, 1000 / lever in mm for angles in µrad
+    # [m]; of a bar whose change is read; infinite where a sensor looks in a fixed direction
     length_mm: Array
+    # [m]; what tells readings apart: targets, angles, runs, directions, channels
     marks: Mapping[str, Array]
+    # [m]; readings that one unit (µm, or µrad where the name says so) of an unknown of the set-up
+    # gives: the zero of a scale, the place of a ball. They are no errors of the machine.
     setup: Mapping[str, Array]
-    place: str
-    path: tuple[Whole, ...] = field(default_factory=tuple)
+    place: str  # where it stands, in words
+    path: tuple[Whole, ...] = ()  # sites of each stretch of the path, in order, for drawings
 
     @property
     def readings(self) -> int:
@@ -86,20 +62,9 @@ def build_plan(
     setup: Mapping[str, Array] | None = None,
     path: tuple[Whole, ...] | None = None,
 ) -> Plan:
-    """Put a plan together; what is left out is the plainest there is.
+    """Put a plan together; by default each site gives one reading of a fixed direction.
 
-    Parameters
-    ----------
-    coordinates : mapping of str to ndarray, [n] or scalar
-    point_mm : ndarray, [n, 3], mm
-    direction : ndarray, [m, 3] or [3]
-    place : str
-    marks, site, against, gain, length_mm, travel, setup, path : optional
-        See `Plan`; by default each site gives one reading of a fixed direction, against none.
-
-    Returns
-    -------
-    Plan
+    Coordinates may be scalars, and all readings may share a direction, gain and length.
     """
     sites = len(point_mm)
     rows = np.arange(sites) if site is None else site
@@ -122,7 +87,6 @@ def build_plan(
 
 
 def _independent(setup: Mapping[str, Array]) -> dict[str, Array]:
-    """Leave out what the unknowns before it give as well, or what gives no reading at all."""
     kept: dict[str, Array] = {}
     basis: list[Array] = []
     for name, column in setup.items():
@@ -134,3 +98,26 @@ def _independent(setup: Mapping[str, Array]) -> dict[str, Array]:
             kept[name] = column
             basis.append(rest / size)
     return kept
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """One number of a standard."""
+
+    key: str  # in JSON; ends in its unit
+    name: str  # in words
+    value: float
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What readings come to."""
+
+    quantities: tuple[Quantity, ...]  # the most important first
+    # what else JSON has: lists of numbers, ready to be spelled
+    details: Mapping[str, object] = field(default_factory=dict[str, object])
+
+    def __getitem__(self, key: str) -> float:
+        """Give a number by its key."""
+        return next(quantity.value for quantity in self.quantities if quantity.key == key)

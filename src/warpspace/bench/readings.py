@@ -8,10 +8,10 @@ import numpy as np
 from warpspace.bench.plan import NONE, Plan, Whole
 from warpspace.field.evaluate import View, build_basis, evaluate_exact
 from warpspace.kinematics.model import Loop, Model
+from warpspace.machine.axes import TravelDirection
 from warpspace.machine.curves.directional import Directional
 from warpspace.machine.errors import ErrorFunction, ErrorSet
 from warpspace.machine.parameters import parameter
-from warpspace.machine.travel import TravelDirection
 from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM, Array
 
@@ -20,20 +20,12 @@ RELATIVE = View(Loop.RELATIVE)
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """Readings as a linear function of the errors: ``readings = matrix @ amplitudes``.
+    """Readings as a linear function of the errors: ``readings = matrix @ amplitudes``."""
 
-    Attributes
-    ----------
-    keys : tuple of str, (K,)
-    amplitudes : ndarray, [K], µm or µrad
-        Those of the scene.
-    matrix : ndarray, [m, K]
-        Reading in µm (angles: µrad) per µm or µrad of amplitude; the curve of each parameter along
-        its axis is folded in, as in an `ErrorBasis`.
-    """
-
-    keys: tuple[str, ...]
-    amplitudes: Array
+    keys: tuple[str, ...]  # (K,)
+    amplitudes: Array  # [K], µm or µrad; those of the scene
+    # [m, K]; reading in µm (angles: µrad) per µm or µrad of amplitude; the curve of each parameter
+    # along its axis is folded in, as in an `ErrorBasis`
     matrix: Array
 
     @property
@@ -43,18 +35,9 @@ class Response:
 
 
 def simulate(scene: Scene, plan: Plan, *, exact: bool = True) -> Array:
-    """Take the readings of a plan on the model of a scene.
+    """Take the readings of a plan on the model of a scene, [m], µm (angles: µrad).
 
-    Parameters
-    ----------
-    scene : Scene
-    plan : Plan
-    exact : bool, optional
-        Full rotations, all products, and the true length of a bar; else the first order.
-
-    Returns
-    -------
-    ndarray, [m], µm (angles: µrad)
+    Exactly: full rotations, all products, and the true length of a bar; else to first order.
     """
     if not exact:
         return respond(scene, plan).readings
@@ -73,17 +56,7 @@ def site_errors(scene: Scene, plan: Plan) -> Array:
 
 
 def sense(plan: Plan, error_um: Array) -> Array:
-    """Give what the sensors of a plan read of the errors of its sites.
-
-    Parameters
-    ----------
-    plan : Plan
-    error_um : ndarray, [n, 3], µm
-
-    Returns
-    -------
-    ndarray, [m], µm (angles: µrad)
-    """
+    """Give what the sensors of a plan read, [m], of the errors of its sites, [n, 3], µm."""
     shift = _differences(plan, error_um)
     along = np.sum(shift * plan.direction, axis=-1)
     bars = np.isfinite(plan.length_mm)
@@ -96,21 +69,7 @@ def sense(plan: Plan, error_um: Array) -> Array:
 
 
 def respond(scene: Scene, plan: Plan, keys: Sequence[str] | None = None) -> Response:
-    """Give the readings of a plan as a linear function of the errors of a scene.
-
-    Parameters
-    ----------
-    scene : Scene
-        Gives the curve of each parameter, and the amplitudes about which nothing is expanded: the
-        first order is that about a machine without errors.
-    plan : Plan
-    keys : sequence of str, optional
-        Parameters; all of the scene by default.
-
-    Returns
-    -------
-    Response
-    """
+    """Give the readings of a plan as a linear function of the errors of a scene."""
     chosen = tuple(scene.parameter_keys if keys is None else keys)
     position = respond_sites(scene, plan, chosen)
     along = np.sum(_differences(plan, position) * plan.direction, axis=-1)
@@ -119,18 +78,7 @@ def respond(scene: Scene, plan: Plan, keys: Sequence[str] | None = None) -> Resp
 
 
 def respond_sites(scene: Scene, plan: Plan, keys: Sequence[str]) -> Array:
-    """Give the errors of all sites of a plan as a linear function of errors.
-
-    Parameters
-    ----------
-    scene : Scene
-    plan : Plan
-    keys : sequence of str, (K,)
-
-    Returns
-    -------
-    ndarray, [K, n, 3], µm per µm or µrad of amplitude
-    """
+    """Give the errors of all sites as a linear function of errors, [K, n, 3], µm per unit."""
     position = np.zeros((len(keys), len(plan.point_mm), 3))
     model = _both_ways(scene)
     for rows, errors in _by_travel(scene.errors, plan):
@@ -150,7 +98,6 @@ def _differences(plan: Plan, values: Array) -> Array:
 
 
 def _by_travel(errors: ErrorSet, plan: Plan) -> Iterator[tuple[Whole, ErrorSet]]:
-    """Split the sites by the directions in which axes have come; the errors that act there."""
     every = np.arange(len(plan.point_mm))
     axes = [axis for axis in plan.travel if _depends_on_travel(errors, axis)]
     if not axes:
@@ -166,12 +113,10 @@ def _by_travel(errors: ErrorSet, plan: Plan) -> Iterator[tuple[Whole, ErrorSet]]
 
 
 def _both_ways(scene: Scene) -> Model:
-    """Give the model without a direction of travel of its own: each site has its own."""
     return replace(scene.model, direction=TravelDirection.MEAN)
 
 
 def _depends_on_travel(errors: ErrorSet, axis: str) -> bool:
-    """Tell whether any error of an axis depends on the direction it has come in."""
     return any(
         parameter(key).axis == axis and isinstance(function, Directional)
         for key, function in errors.functions.items()
@@ -179,8 +124,6 @@ def _depends_on_travel(errors: ErrorSet, axis: str) -> bool:
 
 
 def _travelling(errors: ErrorSet, way: Mapping[str, float]) -> ErrorSet:
-    """Give the errors of axes that have come in a direction; standing ones keep their mean."""
-
     def chosen(key: str, function: ErrorFunction) -> ErrorFunction:
         sign = way.get(parameter(key).axis, 0.0)
         if not sign or not isinstance(function, Directional):

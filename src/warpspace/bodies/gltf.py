@@ -6,6 +6,7 @@ which a viewer can morph the points.
 """
 
 import json
+import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.geometry.srgb import srgb_to_linear
+from warpspace.geometry.colour import srgb_to_linear
 from warpspace.units import Array
 
 Json = dict[str, Any]
@@ -27,66 +28,32 @@ _VERTEX_BUFFER, _INDEX_BUFFER = 34962, 34963
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """How a part is coloured.
-
-    Attributes
-    ----------
-    name : str
-    srgb : tuple of int, (3,)
-        Colours of the points are multiplied with it.
-    opacity : float
-    """
+    """How a part is coloured."""
 
     name: str = "unlit"
-    srgb: tuple[int, int, int] = (255, 255, 255)
+    srgb: tuple[int, int, int] = (255, 255, 255)  # colours of the points are multiplied with it
     opacity: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A surface or a set of lines, with a node of its own.
-
-    Attributes
-    ----------
-    name : str
-    points : ndarray, [V, 3]
-        As they stand in the file: by the standard metres, Y up.
-    indices : ndarray of int, [T, 3] or [S, 2]
-        Numbers of the points of triangles, or of the ends of pieces of line.
-    material : Material
-    colours : ndarray, [V, 3], optional
-        Linear, any value.
-    attributes : mapping of str to ndarray, [V, n]
-        Further values per point; the names begin with an underscore.
-    targets : mapping of str to ndarray, [V, 3]
-        Morph targets: name to displacement of the points at weight 1.
-    group : str
-        Name of the node that holds it; the root by default.
-    """
+    """A surface or a set of lines, with a node of its own."""
 
     name: str
-    points: Array
+    points: Array  # [V, 3]; as they stand in the file: by the standard metres, Y up
+    # [T, 3] or [S, 2]; numbers of the points of triangles, or of the ends of pieces of line
     indices: NDArray[np.integer[Any]]
     material: Material = Material()
-    colours: NDArray[np.floating[Any]] | None = None
+    colours: NDArray[np.floating[Any]] | None = None  # [V, 3]; linear, any value
+    # [V, n]; further values per point; the names begin with an underscore
     attributes: Mapping[str, Array] = field(default_factory=dict[str, Array])
+    # [V, 3]; morph targets: name to displacement of the points at weight 1
     targets: Mapping[str, Array] = field(default_factory=dict[str, Array])
-    group: str = ""
+    group: str = ""  # name of the node that holds it; the root by default
 
 
 def to_gltf(points_mm: Array) -> Array:
-    """Turn points or vectors of R into glTF's frame.
-
-    Parameters
-    ----------
-    points_mm : ndarray, [..., 3], mm
-        Z up.
-
-    Returns
-    -------
-    ndarray, [..., 3], m
-        Y up: (x, z, −y).
-    """
+    """Turn points or vectors of R into glTF's frame."""
     x, y, z = np.moveaxis(np.asarray(points_mm), -1, 0)
     return np.stack([x, z, -y], -1) * _M_PER_MM
 
@@ -98,28 +65,7 @@ def build_gltf(
     generator: str = "warpspace",
     extras: Mapping[str, Any] | None = None,
 ) -> bytes:
-    """Write surfaces and lines to one binary file.
-
-    Parameters
-    ----------
-    parts : sequence of Part
-        Those without indices are left out.
-    root : str, optional
-        Name of the node that holds all others.
-    generator : str, optional
-        Program and version.
-    extras : mapping, optional
-        Goes into the metadata of the asset.
-
-    Returns
-    -------
-    bytes
-
-    Raises
-    ------
-    ValueError
-        If a value of the extras is no JSON, for instance NaN.
-    """
+    """Write surfaces and lines to one binary file."""
     from trimesh import Scene
     from trimesh.exchange.gltf import export_glb
 
@@ -174,7 +120,6 @@ def _geometry(part: Part) -> Any:
 
 
 def _narrow_indices(buffers: dict[Any, bytes], tree: Json) -> None:
-    """Store numbers of points in 16 bits where they fit, which trimesh always gives 32."""
     keys, accessors = list(buffers), list(tree["accessors"].values())
     for at in {p["indices"] for mesh in tree["meshes"] for p in mesh["primitives"]}:
         accessor = accessors[at]
@@ -186,7 +131,6 @@ def _narrow_indices(buffers: dict[Any, bytes], tree: Json) -> None:
 
 
 def _complete(tree: Json, parts: Sequence[Part]) -> None:
-    """Set what trimesh leaves out in the document of a file."""
     materials = list(dict.fromkeys(part.material for part in parts))
     tree["materials"] = [_material(material) for material in materials]
     tree["extensionsUsed"] = [UNLIT]
@@ -213,7 +157,6 @@ def _complete(tree: Json, parts: Sequence[Part]) -> None:
 
 
 def _material(material: Material) -> Json:
-    """Spell a material that no light changes."""
     linear = srgb_to_linear(np.array(material.srgb) / 255.0)
     spelled: Json = {
         "name": material.name,
@@ -228,3 +171,51 @@ def _material(material: Material) -> Json:
     if material.opacity < 1.0:
         spelled["alphaMode"] = "BLEND"
     return spelled
+
+
+# --- A binary glTF file that is written again and again with other points and colours -------------
+# trimesh lays the file out once, which takes it a millisecond or two; a slider move then replaces
+# positions, colours and bounds in it.
+
+_HEAD = 20
+"""Bytes before the document: header of the file, and of the first chunk."""
+
+
+class GltfTemplate:
+    """The file of one coloured part."""
+
+    def __init__(self, name: str, indices: NDArray[np.integer[Any]], count: int) -> None:
+        # trimesh stores equal arrays once: points and colours must differ
+        numbers = np.arange(3.0 * count).reshape(-1, 3)
+        data = build_gltf([Part(name, numbers, indices, colours=-1.0 - numbers)])
+        (length,) = struct.unpack("<I", data[12:16])
+        self._document: dict[str, Any] = json.loads(data[_HEAD : _HEAD + length])
+        self._body = data[_HEAD + length + 8 :]
+        attributes = self._document["meshes"][0]["primitives"][0]["attributes"]
+        self._position, self._colour = attributes["POSITION"], attributes["COLOR_0"]
+
+    def fill(self, points: Array, colours: NDArray[np.floating[Any]]) -> bytes:
+        """Write the file with other points and colours."""
+        body = bytearray(self._body)
+        vertices = np.ascontiguousarray(points, "<f4")
+        for accessor, values in ((self._position, vertices), (self._colour, colours)):
+            view = self._document["bufferViews"][
+                self._document["accessors"][accessor]["bufferView"]
+            ]
+            start, content = view["byteOffset"], np.ascontiguousarray(values, "<f4").tobytes()
+            body[start : start + len(content)] = content
+        bounds = self._document["accessors"][self._position]
+        columns = np.ascontiguousarray(vertices.T)
+        bounds["min"], bounds["max"] = columns.min(axis=1).tolist(), columns.max(axis=1).tolist()
+        text = json.dumps(self._document, separators=(",", ":")).encode()
+        text += b" " * (-len(text) % 4)
+        total = _HEAD + len(text) + 8 + len(body)
+        return b"".join(
+            (
+                struct.pack("<4sII", b"glTF", 2, total),
+                struct.pack("<I4s", len(text), b"JSON"),
+                text,
+                struct.pack("<I4s", len(body), b"BIN\0"),
+                body,
+            )
+        )

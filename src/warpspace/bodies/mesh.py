@@ -1,7 +1,10 @@
 """A body of a machine as a mesh, and the way trimesh opens files of meshes."""
 
 import io
+import json
 import logging
+import re
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,60 +13,189 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.exceptions import OptionError
+from warpspace.machine.limits import (
+    MAX_MESH_DEPTH,
+    MAX_MESH_HEADER,
+    MAX_MESH_LISTS,
+    MAX_MESH_MB,
+    MAX_MESH_PARTS,
+    MAX_MESH_WORDS,
+    MAX_SOLIDS,
+    MAX_TRIANGLES,
+)
 from warpspace.units import Array
+
+# --- Counting what a mesh file holds before trimesh builds it -------------------------------------
+# A small file can ask for much.
+
+_STL_HEAD, _STL_TRIANGLE = 84, 50
+_GROUPS = re.compile(r"^[ \t]*(?:usemtl|mtllib|[ogs])\b[^\n]*", re.MULTILINE)
+_NEXT_SOLID = re.compile(rb"endsolid[^\n]*\n\s*solid[^\n]*", re.IGNORECASE)
+_FACE = re.compile("^f([^\n]*)", re.MULTILINE)
+_PLY_BYTES = {
+    **dict.fromkeys(("char", "uchar", "int8", "uint8"), 1),
+    **dict.fromkeys(("short", "ushort", "int16", "uint16"), 2),
+    **dict.fromkeys(("double", "float64"), 8),
+}
+_DAE_REFERENCES = 20
+"""Nodes of a DAE file by reference: each may hold others, so that they multiply."""
+
+
+def count_mesh(data: bytes, ending: str) -> bytes:
+    """Refuse a mesh file that holds more than can be built in a moment."""
+    if ending == ".obj":
+        text = data.decode("utf-8", "replace").replace("\r\n", "\n").replace("\\\n", "")
+        data = _GROUPS.sub("", text).encode()
+    elif ending == ".stl" and not _is_binary(data):
+        data = _NEXT_SOLID.sub(b"", data)
+    _COUNTERS[ending](data)
+    return data
+
+
+def _limit(count: int, limit: int, what: str) -> None:
+    if count > limit:
+        raise OptionError(f"it holds {count:,} {what}; expected at most {limit:,}")
+
+
+def _count_stl(data: bytes) -> None:
+    if _is_binary(data):
+        _limit((len(data) - _STL_HEAD) // _STL_TRIANGLE, MAX_TRIANGLES, "triangles")
+        return
+    _count_text(data)
+    text = data.lower()
+    _limit(text.count(b"endsolid"), MAX_SOLIDS, "solids")
+    _limit(text.count(b"vertex") // 3, MAX_TRIANGLES, "triangles")
+
+
+def _is_binary(data: bytes) -> bool:
+    stated = int.from_bytes(data[_STL_HEAD - 4 : _STL_HEAD], "little")
+    return len(data) == _STL_HEAD + _STL_TRIANGLE * stated
+
+
+def _count_text(data: bytes) -> int:
+    _limit(data.count(b"\n"), MAX_MESH_LISTS, "lines")
+    blank = np.frombuffer(b" " + data, dtype=np.uint8) <= ord(" ")
+    words = int(np.count_nonzero(blank[:-1] & ~blank[1:]))
+    _limit(words, MAX_MESH_WORDS, "words")
+    return words
+
+
+def _count_obj(data: bytes) -> None:
+    _count_text(data)
+    faces = _FACE.finditer(data.decode())
+    triangles = sum(max(len(face[1].split()) - 2, 0) for face in faces)
+    _limit(triangles, MAX_TRIANGLES, "triangles")
+
+
+def _count_ply(data: bytes) -> None:
+    rows, total, scalars, smallest, at = 0, 0, 0, 4, 0
+    is_text = b"ascii" in data[:100].lower()
+    while at < len(data):
+        end = data.find(b"\n", at) + 1 or len(data)
+        _limit(end, MAX_MESH_HEADER[".ply"], "bytes of header")
+        words = data[at:end].decode("utf-8", "replace").split()
+        at = end
+        if "end_header" in words:
+            break
+        if len(words) == 3 and "element" in words[0]:
+            rows = max(int(words[2]), 0)
+            total += rows
+            _limit(rows, 3 * MAX_TRIANGLES, f"rows of {words[1][:40]!r}")
+        elif len(words) == 3 and "property" in words[0]:
+            scalars += rows * (1 if is_text else _PLY_BYTES.get(words[1], 4))
+        elif len(words) == 5 and "property" in words[0]:
+            smallest = min(smallest, _PLY_BYTES.get(words[3], 4))
+    if is_text:
+        _limit(data.count(b"\n", at), total + 100, "lines")
+    held = _count_text(data[at:]) if is_text else (len(data) - at) // smallest
+    scalars //= 1 if is_text else smallest
+    _limit(held - scalars, MAX_MESH_LISTS, "numbers in lists")
+
+
+def _count_glb(data: bytes) -> None:
+    size = int.from_bytes(data[12:16], "little")
+    if data[:4] != b"glTF" or size > len(data):
+        return  # whoever reads it says what it is not
+    _limit(size, MAX_MESH_HEADER[".glb"], "bytes of description")
+    rest, chunks = 20 + size, 0
+    while rest + 8 <= len(data) and chunks <= MAX_MESH_PARTS:
+        rest += 8 + int.from_bytes(data[rest : rest + 4], "little")
+        chunks += 1
+    _limit(chunks, MAX_MESH_PARTS, "chunks")
+    held = json.loads(data[20 : 20 + size])
+    for name, entries in held.items():
+        if isinstance(entries, list):
+            _limit(len(entries), MAX_MESH_PARTS, name)  # pyright: ignore[reportUnknownArgumentType]
+    primitives = [mesh["primitives"] for mesh in held.get("meshes", [])]
+    _limit(sum(map(len, primitives)), MAX_MESH_PARTS, "primitives")
+    accessors = [max(int(accessor["count"]), 0) for accessor in held.get("accessors", [])]
+    _limit(sum(accessors), MAX_MESH_LISTS, "points and indices")
+    stored = sum(max(int(view["byteLength"]), 0) for view in held.get("bufferViews", []))
+    _limit(stored, MAX_MESH_MB * 1_000_000, "bytes in views of its data")
+    placed = [primitive for mesh in _placed(held) for primitive in primitives[mesh]]
+    _limit(len(placed), MAX_MESH_PARTS, "primitives, each placing counted")
+    corners = sum(
+        accessors[part["indices"] if "indices" in part else part["attributes"]["POSITION"]]
+        for part in placed
+    )
+    _limit(corners // 3, MAX_TRIANGLES, "triangles, each placing counted")
+
+
+def _placed(held: Any) -> Iterator[int]:
+    nodes = held.get("nodes", [])
+    scenes = held.get("scenes", [])
+    waiting = (
+        [(root, 1) for root in scenes[held.get("scene", 0)].get("nodes", [])] if scenes else []
+    )
+    seen: set[int] = set()
+    while waiting:
+        node, depth = waiting.pop()
+        if node in seen:
+            raise OptionError(f"it holds node {node} twice in its scene; expected a tree of nodes")
+        seen.add(node)
+        _limit(depth, MAX_MESH_DEPTH, "nodes below each other")
+        waiting += [(child, depth + 1) for child in nodes[node].get("children", [])]
+        if "mesh" in nodes[node]:
+            yield nodes[node]["mesh"]
+
+
+def _count_dae(data: bytes) -> None:
+    _limit(data.count(b"<"), 2 * MAX_MESH_PARTS, "XML tags")
+    _limit(data.count(b"<instance_node"), _DAE_REFERENCES, "nodes by reference")
+    _count_text(data)
+
+
+_COUNTERS: dict[str, Callable[[bytes], object]] = {
+    ".stl": _count_stl,
+    ".obj": _count_obj,
+    ".ply": _count_ply,
+    ".glb": _count_glb,
+    ".dae": _count_dae,
+}
+
 
 LIGHT, MIDDLE, DARK, METAL = (206, 210, 216), (178, 184, 192), (104, 112, 124), (150, 157, 167)
 """Quiet colours of bodies, since colour means error."""
 CREASE_DEG = 30.0
 """Angle from flat above which an edge is drawn."""
-LIMIT_MB = 50
-"""Size of a file up to which it is read."""
 
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """One body of a machine, in the frame it rides on.
+    """One body of a machine, in the frame it rides on."""
 
-    Attributes
-    ----------
-    name : str
-        What it is, for instance ``X_saddle``.
-    frame : str
-        Frame it rides on: R, an axis, S, t or w.
-    colour : tuple of int, (3,)
-        sRGB; greys, since colour means error.
-    vertices_mm : ndarray, [V, 3], mm
-    triangles : ndarray, [T, 3]
-        Counter-clockwise seen from outside.
-    edges_mm : ndarray, [E, 2, 3], mm
-        Ends of the edges worth drawing.
-    """
-
-    name: str
-    frame: str
-    colour: tuple[int, int, int]
-    vertices_mm: Array
-    triangles: NDArray[np.int32]
-    edges_mm: Array
+    name: str  # what it is, for instance ``X_saddle``
+    frame: str  # frame it rides on: R, an axis, S, t or w
+    colour: tuple[int, int, int]  # sRGB; greys, since colour means error
+    vertices_mm: Array  # [V, 3]
+    triangles: NDArray[np.int32]  # [T, 3]; Counter-clockwise seen from outside
+    edges_mm: Array  # [E, 2, 3]; ends of the edges worth drawing
 
 
 def build_body(
     mesh: Any, name: str, frame: str, colour: tuple[int, int, int], lines_mm: Array | None = None
 ) -> Body:
-    """Turn a mesh of trimesh, vertices in mm, into a body; its edges are where it bends.
-
-    Parameters
-    ----------
-    mesh : trimesh.Trimesh
-    name, frame : str
-    colour : tuple of int, (3,)
-    lines_mm : ndarray, [E, 2, 3], mm, optional
-        Further edges.
-
-    Returns
-    -------
-    Body
-    """
+    """Turn a mesh of trimesh, vertices in mm, into a body; its edges are where it bends."""
     edges = crease_edges(mesh)
     return Body(
         name,
@@ -76,17 +208,7 @@ def build_body(
 
 
 def crease_edges(mesh: Any) -> Array:
-    """Find the edges at which a mesh bends sharply.
-
-    Parameters
-    ----------
-    mesh : trimesh.Trimesh
-
-    Returns
-    -------
-    ndarray, [E, 2, 3]
-        Ends of the edges whose two triangles meet at more than 30° from flat.
-    """
+    """Find the edges at which a mesh bends sharply."""
     sharp = mesh.face_adjacency_angles > np.deg2rad(CREASE_DEG)
     return np.asarray(mesh.vertices[mesh.face_adjacency_edges[sharp]], dtype=float)
 
@@ -99,32 +221,17 @@ def _check_geometry(scene: Any) -> None:
         faces = np.asarray(getattr(mesh, "faces", ()))
         if faces.size and not (int(faces.min()) >= 0 and int(faces.max()) < len(mesh.vertices)):
             raise ValueError("a triangle names a vertex that is not there")
+        if len(faces) > MAX_TRIANGLES:
+            raise ValueError(f"{len(faces):,} triangles; expected at most {MAX_TRIANGLES:,}")
 
 
 def open_meshes(path: Path, what: str) -> Any:
-    """Open a file of meshes with trimesh; nothing in it is changed or merged.
-
-    Parameters
-    ----------
-    path : Path
-        Its ending tells the format. Files that it refers to (textures, materials) are not opened.
-    what : str
-        What it should be, for messages.
-
-    Returns
-    -------
-    trimesh.Scene
-
-    Raises
-    ------
-    OptionError
-        If there is no such file, or it is empty, too large, damaged or of another kind.
-    """
+    """Open a file of meshes with trimesh; nothing in it is changed or merged."""
     try:
         size = path.stat().st_size
-        if size > LIMIT_MB * 1_000_000:
+        if size > MAX_MESH_MB * 1_000_000:
             raise OptionError(
-                f"{path}: {size / 1e6:.0f} MB; a {what} may have up to {LIMIT_MB} MB. "
+                f"{path}: {size / 1e6:.0f} MB; a {what} may have up to {MAX_MESH_MB} MB. "
                 "Reduce its triangles before"
             )
         data = path.read_bytes()
@@ -140,11 +247,13 @@ def open_meshes(path: Path, what: str) -> Any:
     logging.getLogger("trimesh").addHandler(logging.NullHandler())
     try:
         with np.errstate(all="ignore"):
-            found = trimesh.load_scene(
-                io.BytesIO(data), file_type=path.suffix[1:].lower(), process=False
-            )
+            ending = path.suffix.lower()
+            data = count_mesh(data, ending)
+            found = trimesh.load_scene(io.BytesIO(data), file_type=ending[1:], process=False)
             _check_geometry(found)
             return found
+    except OptionError as error:
+        raise OptionError(f"{path}: {error}. Reduce it before") from None
     except Exception as error:  # noqa: BLE001  # trimesh raises whatever a damaged file leads to
         reason = str(error) or type(error).__name__
         raise OptionError(f"{path}: no {what} that can be read ({reason})") from None

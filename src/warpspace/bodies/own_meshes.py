@@ -1,35 +1,122 @@
-"""The meshes that a machine's description names, placed in the frames they ride on."""
+"""Meshes of a user: those a machine names, and what the links of a robot look like."""
 
-from dataclasses import replace
+import io
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from warpspace.bodies.user_mesh import LoadedMesh, load_mesh
+from warpspace.bodies.mesh import MIDDLE, Body, build_body, count_mesh, open_meshes
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.transforms import apply, placed
-from warpspace.machine.body_source import BodySource
-from warpspace.machine.description import Machine
+from warpspace.machine.description import BodySource, Machine
+from warpspace.machine.limits import MAX_MESH_MB, MAX_URDF_TRIANGLES
+from warpspace.units import Array
+
+# --- A user's own mesh as a body of a machine: STL, OBJ, PLY or GLB -------------------------------
+
+UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
+"""Units of length a mesh may be in, in mm."""
+UP_AXES = ("y", "z")
+FORMATS = {".stl": ("mm", "z"), ".obj": ("mm", "z"), ".ply": ("mm", "z"), ".glb": ("m", "y")}
+"""Endings that are read, with the unit and the upward axis taken where none is given."""
+SMALL_MM, LARGE_MM = 10.0, 100_000.0
+"""A body whose longest edge lies beyond is probably in another unit."""
+
+
+@dataclass(frozen=True, slots=True)
+class LoadedMesh:
+    """A body read from a user's file."""
+
+    body: Body
+    warnings: tuple[str, ...] = ()  # what the user should know; the body can be drawn all the same
+
+
+def load_mesh(
+    path: str | Path,
+    frame: str,
+    *,
+    unit: str | None = None,
+    up: str | None = None,
+    colour: tuple[int, int, int] = MIDDLE,
+) -> LoadedMesh:
+    """Read a user's mesh as a body."""
+    path = Path(path)
+    standard = FORMATS.get(path.suffix.lower())
+    if standard is None:
+        raise OptionError(f"{path}: unknown ending; expected one of {', '.join(FORMATS)}")
+    for given, known in ((unit, tuple(UNITS_MM)), (up, UP_AXES)):
+        if given is not None and given not in known:
+            raise OptionError(f"{path}: {given!r}; expected one of {', '.join(known)}")
+    try:
+        changed = path.stat().st_mtime_ns
+    except OSError:
+        changed = 0
+    return _read_mesh(path, changed, frame, unit, up, colour)
+
+
+@lru_cache(maxsize=16)
+def _read_mesh(
+    path: Path,
+    changed: int,  # noqa: ARG001  # a file written anew is read anew
+    frame: str,
+    unit: str | None,
+    up: str | None,
+    colour: tuple[int, int, int],
+) -> LoadedMesh:
+    standard_unit, standard_up = FORMATS[path.suffix.lower()]
+    mesh = open_meshes(path, f"{path.suffix[1:].upper()} file").to_mesh()
+    if not len(mesh.faces):
+        raise OptionError(f"{path}: there are no triangles in it")
+    if not np.isfinite(mesh.vertices[mesh.faces]).all():
+        raise OptionError(f"{path}: a vertex is not finite")
+    mesh.apply_scale(UNITS_MM[unit or standard_unit])
+    if (up or standard_up) == "y":
+        mesh.apply_transform([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
+    if unit is None:
+        _check_size(path, float(np.ptp(mesh.vertices, axis=0).max()), standard_unit)
+    mesh.update_faces(mesh.nondegenerate_faces())
+    if not len(mesh.faces):
+        raise OptionError(f"{path}: all of its triangles are points or lines")
+    with np.errstate(all="ignore"):  # a flat surface has no volume, and no centre of it
+        open_edges = _clean(mesh)
+        body = build_body(mesh, path.stem, frame, colour)
+    if not open_edges:
+        return LoadedMesh(body)
+    warning = f"{path}: the surface is not closed ({open_edges} open edges); it is drawn as it is"
+    return LoadedMesh(body, (warning,))
+
+
+def _check_size(path: Path, longest_mm: float, unit: str) -> None:
+    for far, other in (
+        (longest_mm < SMALL_MM, "m" if unit == "mm" else "another unit"),
+        (longest_mm > LARGE_MM, "mm" if unit == "m" else "another unit"),
+    ):
+        if far:
+            raise OptionError(
+                f"{path}: taken as {unit}, its longest edge is {longest_mm:.4g} mm. It is probably "
+                f"in {other}; give its unit ({', '.join(UNITS_MM)})"
+            )
+
+
+def _clean(mesh: Any) -> int:
+    """Join vertices where triangles do not share any, turn the outside out, count open edges."""
+    from trimesh.grouping import group_rows
+
+    if not mesh.is_watertight:
+        mesh.merge_vertices(merge_tex=True, merge_norm=True)
+    if mesh.is_watertight:
+        if mesh.volume < 0.0:
+            mesh.invert()
+        return 0
+    joined = len(group_rows(mesh.edges_sorted, require_count=2))
+    return len(mesh.edges_unique) - joined
 
 
 def own_meshes(machine: Machine) -> dict[str, LoadedMesh]:
-    """Read the meshes that a machine's description names.
-
-    Parameters
-    ----------
-    machine : Machine
-
-    Returns
-    -------
-    dict of str to LoadedMesh
-        By frame, with what the user should know. A mesh once read is kept: a page that is open
-        does not fail when its file is taken away.
-
-    Raises
-    ------
-    OptionError
-        If a mesh cannot be read; the message names its frame and its file.
-    """
+    """Read the meshes that a machine's description names."""
     return {
         frame: _read(frame, source)
         for frame, source in machine.bodies.items()
@@ -39,7 +126,6 @@ def own_meshes(machine: Machine) -> dict[str, LoadedMesh]:
 
 @lru_cache(maxsize=64)
 def _read(frame: str, source: BodySource) -> LoadedMesh:
-    """Read one mesh and place it in its frame."""
     try:
         loaded = load_mesh(source.path, frame, unit=source.unit or None)
     except OptionError as error:
@@ -57,11 +143,157 @@ def _read(frame: str, source: BodySource) -> LoadedMesh:
 
 
 def check_meshes(machine: Machine) -> tuple[str, ...]:
-    """Read all meshes of a machine and give the warnings about them.
-
-    Raises
-    ------
-    OptionError
-        If a mesh cannot be read.
-    """
+    """Read all meshes of a machine and give the warnings about them."""
     return tuple(text for loaded in own_meshes(machine).values() for text in loaded.warnings)
+
+
+ENDINGS = (".stl", ".obj", ".ply", ".glb", ".dae")
+MM_PER_M = 1000.0
+LARGEST_M = 1e6
+"""Of a shape, its place and its scale; also keeps NaN out."""
+
+
+def frame_meshes(
+    robot: Any, frame_of: dict[str, tuple[str, Array]], folder: Path, root: Path | None = None
+) -> tuple[dict[str, Any], list[str], list[Path]]:
+    """Put the visual shapes of links together."""
+    from trimesh import util
+
+    parts: dict[str, list[Any]] = {}
+    notes: list[str] = []
+    read: dict[Path, Any] = {}
+    triangles = 0
+    for link in robot.links:
+        if link.name not in frame_of:
+            continue
+        frame, pose = frame_of[link.name]
+        for visual in link.visuals:
+            where = f"link {link.name!r}"
+            placed = np.eye(4) if visual.origin is None else np.array(visual.origin, dtype=float)
+            if not (np.abs(placed) < LARGEST_M).all():
+                notes.append(f"{where}: the place of its shape is no finite number; left out")
+                continue
+            mesh = _shape(visual.geometry, where, (folder, root or folder), notes, read)
+            if mesh is None:
+                continue
+            mesh.apply_transform(placed)
+            mesh.apply_scale(MM_PER_M)
+            mesh.apply_transform(pose)
+            if not np.isfinite(mesh.vertices).all():
+                notes.append(f"{where}: its shape holds numbers that are not finite; left out")
+                continue
+            triangles += len(mesh.faces)
+            if triangles > MAX_URDF_TRIANGLES:
+                raise OptionError(
+                    f"{folder}: the shapes of the robot have more than {MAX_URDF_TRIANGLES:,}"
+                    " triangles, the most expected"
+                )
+            parts.setdefault(frame, []).append(mesh)
+    return {frame: util.concatenate(own) for frame, own in parts.items()}, notes, list(read)
+
+
+def _shape(
+    geometry: Any,
+    where: str,
+    folders: tuple[Path, Path],
+    notes: list[str],
+    read: dict[Path, Any],
+) -> Any:
+    """Build one shape, metres; None where it cannot be, which is noted."""
+    from trimesh import creation
+
+    if geometry is None:
+        return None
+    if geometry.box is not None:
+        sizes = _sizes(geometry.box.size, 3, f"{where}: its box", notes)
+        return None if sizes is None else creation.box(extents=sizes)
+    if geometry.cylinder is not None:
+        given = (geometry.cylinder.radius, geometry.cylinder.length)
+        sizes = _sizes(given, 2, f"{where}: its cylinder", notes)
+        if sizes is None:
+            return None
+        return creation.cylinder(radius=sizes[0], height=sizes[1], sections=48)
+    if geometry.sphere is not None:
+        sizes = _sizes([geometry.sphere.radius], 1, f"{where}: its sphere", notes)
+        return None if sizes is None else creation.icosphere(subdivisions=2, radius=sizes[0])
+    if geometry.mesh is None:
+        return None
+    return _mesh(geometry.mesh, where, folders, notes, read)
+
+
+def _sizes(given: Any, count: int, what: str, notes: list[str]) -> Array | None:
+    """Read the sizes of a shape, [count], metres; None where they are none, which is noted."""
+    try:
+        sizes = np.abs(np.asarray(given, dtype=float))
+    except (TypeError, ValueError):
+        sizes = np.empty(0)
+    if sizes.shape == (count,) and (sizes < LARGEST_M).all():
+        return sizes
+    notes.append(f"{what} has no size that can be read; left out")
+    return None
+
+
+def _mesh(
+    given: Any, where: str, folders: tuple[Path, Path], notes: list[str], read: dict[Path, Any]
+) -> Any:
+    import trimesh
+
+    name = str(given.filename or "")
+    path = _find(name, *folders)
+    if path is not None and not path.resolve().is_relative_to(folders[1].resolve()):
+        notes.append(
+            f"{where}: mesh {name!r} leads out of {folders[1]}; left out (--mesh-root FOLDER)"
+        )
+        return None
+    if path is None:
+        notes.append(f"{where}: mesh {name!r} is missing; left out")
+        return None
+    if path not in read:
+        read[path] = _load(path)
+    mesh = read[path]
+    if isinstance(mesh, str):
+        notes.append(f"{where}: mesh {name!r} {mesh}; left out")
+        return None
+    bare = trimesh.Trimesh(np.array(mesh.vertices), np.array(mesh.faces), process=False)
+    if given.scale is not None:
+        scale = np.asarray(given.scale, dtype=float)
+        if scale.shape not in ((), (1,), (3,)) or not (np.abs(scale) < LARGEST_M).all():
+            notes.append(f"{where}: mesh {name!r} has no scale that can be read; left out")
+            return None
+        bare.apply_transform(np.diag([*np.broadcast_to(scale, 3), 1.0]))
+    return bare
+
+
+def _load(path: Path) -> Any:
+    import trimesh
+
+    ending = path.suffix.lower()
+    if ending not in ENDINGS:
+        return f"has no ending of {', '.join(ENDINGS)}"
+    if path.stat().st_size > MAX_MESH_MB * 1_000_000:
+        return f"is larger than {MAX_MESH_MB} MB"
+    try:
+        data = io.BytesIO(count_mesh(path.read_bytes(), ending))
+        mesh = trimesh.load(data, file_type=ending[1:], force="mesh", skip_materials=True)
+    except Exception as error:  # noqa: BLE001 - every format fails in ways of its own
+        reason = str(error).replace("\n", " ")[:100]
+        return f"cannot be read ({reason})"
+    if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
+        return "is empty"
+    return mesh
+
+
+def _find(name: str, folder: Path, root: Path) -> Path | None:
+    places = [folder / name.removeprefix("file://")]
+    if name.startswith("package://"):
+        inside = name.removeprefix("package://")
+        rest = inside.partition("/")[2]
+        above = [part for part in folder.resolve().parents if part.is_relative_to(root.resolve())]
+        places = [place / part for place in (folder, *above, root) for part in (inside, rest)]
+    for place in places:
+        try:
+            if place.is_file():
+                return place
+        except (OSError, ValueError):
+            continue
+    return None

@@ -1,44 +1,31 @@
 """Schematic bodies of a machine: read from its folder, placed and bent like its errors say."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
-from warpspace.bodies.body_file import BODY_FILE, read_bodies
-from warpspace.bodies.generated.generate import generate_bodies
+from warpspace.bodies.generated.frame import generate_bodies
 from warpspace.bodies.mesh import Body
 from warpspace.bodies.own_meshes import own_meshes
-from warpspace.field.evaluate import View
+from warpspace.bodies.schematic import BODY_FILE, read_bodies
+from warpspace.field.evaluate import View, find_placement, placement_effect
 from warpspace.kinematics import transforms
-from warpspace.kinematics.bodies import BASE, BodyMotion, body_motions
+from warpspace.kinematics.chain import branch_pose
+from warpspace.kinematics.firstorder import BASE, BodyMotion, body_motions
 from warpspace.kinematics.model import Coordinates, Loop, Model, complete_coordinates
+from warpspace.machine.axes import TravelDirection
 from warpspace.machine.description import Machine
 from warpspace.machine.errors import ErrorSet
 from warpspace.machine.parameters import parameter
-from warpspace.machine.travel import TravelDirection
-from warpspace.units import Array
+from warpspace.scene.model import Scene
+from warpspace.units import MM_PER_UM, RAD_PER_URAD, Array
 
 
 def load_bodies(machine: Machine) -> tuple[Body, ...]:
-    """Give the bodies of a machine.
-
-    Parameters
-    ----------
-    machine : Machine
-
-    Returns
-    -------
-    tuple of Body
-        Those that the machine's description names, for all other frames those of the file in its
-        folder, and where there is none those generated from the description. Bodies of frames that
-        the machine does not have are left out.
-
-    Raises
-    ------
-    OptionError
-        If a file cannot be read.
-    """
+    """Give the bodies of a machine."""
     frames = {BASE, "S", "t", "w", *machine.axes}
     kept = read_bodies(Path(machine.body_dir) / BODY_FILE) if machine.body_dir else ()
     own = {frame: loaded.body for frame, loaded in own_meshes(machine).items()}
@@ -52,21 +39,7 @@ def error_values_of(
     coordinates: Coordinates,
     direction: str = TravelDirection.MEAN,
 ) -> dict[str, float]:
-    """Evaluate error curves at one position, with amplitudes of their own.
-
-    Parameters
-    ----------
-    errors : ErrorSet
-        Gives the curve of each parameter along its axis.
-    amplitudes : mapping of str to float, µm or µrad
-    coordinates : mapping of str to ndarray, [], mm or degrees
-    direction : str, optional
-        Direction of travel, one of `TravelDirection`.
-
-    Returns
-    -------
-    dict of str to float, µm or µrad
-    """
+    """Evaluate error curves at one position, with amplitudes of their own."""
     found: dict[str, float] = {}
     for key, amplitude in amplitudes.items():
         axis = parameter(key).axis
@@ -83,24 +56,7 @@ def view_motions(
     positions: Mapping[str, float],
     view: View | None = None,
 ) -> dict[str, BodyMotion]:
-    """Find how the bodies move as a view sees it, so that they agree with its deformed grid.
-
-    Parameters
-    ----------
-    model : Model
-    errors : ErrorSet
-    amplitudes : mapping of str to float, µm or µrad
-    positions : mapping of str to float, mm or degrees
-    view : View, optional
-
-    Returns
-    -------
-    dict of str to BodyMotion
-        By frame. In the relative loop everything is seen from the workpiece, which hence stands
-        nominally; where a reference point is held still, all bodies are shifted with it. The tool
-        point of the tool and relative loops, and the point of the workpiece nominally in contact in
-        the workpiece loop, then lie in the deformed grid exactly.
-    """
+    """Find how the bodies move as a view sees it, so that they agree with its deformed grid."""
     view = view or View()
     coordinates = complete_coordinates(model.machine, positions)
     values = error_values_of(errors, amplitudes, coordinates, model.direction)
@@ -108,6 +64,15 @@ def view_motions(
     turn, shift = np.zeros(3), np.zeros(3)
     if view.loop is Loop.RELATIVE:
         turn, shift = motions["w"].rotation_rad, motions["w"].displacement_mm
+    if view.placed_over is not None:
+        for key, amplitude in amplitudes.items():
+            errors = errors.with_amplitude(key, amplitude, (0.0, 1.0))
+        placement = find_placement(model, errors, view)
+        if placement is not None:
+            pose = branch_pose(model, "workpiece", coordinates)
+            at_zero = placement_effect(model, placement, coordinates, np.zeros(3))[0]
+            turn = turn + pose[:3, :3] @ placement[3:] * RAD_PER_URAD
+            shift = shift + at_zero * MM_PER_UM
     if view.reference is not None:
         held = complete_coordinates(model.machine, {**positions, **view.reference})
         values = error_values_of(errors, amplitudes, held, model.direction)
@@ -133,19 +98,71 @@ def _held_displacement(model: Model, motions: Mapping[str, BodyMotion], loop: Lo
 
 
 def place_points(motion: BodyMotion, points_mm: Array, exaggeration: float) -> Array:
-    """Give where points of a body are drawn in R.
-
-    Parameters
-    ----------
-    motion : BodyMotion
-    points_mm : ndarray, [..., 3], mm
-        In the frame of the body.
-    exaggeration : float
-        Display factor of the small motion; 0 for the nominal place.
-
-    Returns
-    -------
-    ndarray, [..., 3], mm
-    """
+    """Give where points of a body are drawn in R."""
     pose = motion.drawn(exaggeration)
     return points_mm @ pose[:3, :3].T + pose[:3, 3]
+
+
+@dataclass(frozen=True)
+class PlacedBody:
+    """One body of a machine."""
+
+    body: Body  # its mesh in the frame it rides on
+    motion: BodyMotion  # nominal place of that frame, and its small motion
+    exaggeration: float  # display factor of the small motion
+
+    @property
+    def label(self) -> str:
+        """Name for people, for instance ``X saddle``."""
+        frame, _, what = self.body.name.partition("_")
+        name = what if frame in ("R", "S", "t") else f"{frame} {what}"
+        return name.replace("_", " ")
+
+    @cached_property
+    def vertices_mm(self) -> Array:
+        """Vertices where they are drawn, [V, 3], mm in R."""
+        return place_points(self.motion, self.body.vertices_mm, self.exaggeration)
+
+    @cached_property
+    def nominal_mm(self) -> Array:
+        """Vertices where they nominally are, [V, 3], mm in R."""
+        return place_points(self.motion, self.body.vertices_mm, 0.0)
+
+    @cached_property
+    def edges_mm(self) -> Array:
+        """Edges where they are drawn, [E, 2, 3], mm in R."""
+        return place_points(self.motion, self.body.edges_mm, self.exaggeration)
+
+    @cached_property
+    def nominal_edges_mm(self) -> Array:
+        """Edges where they nominally are, [E, 2, 3], mm in R."""
+        return place_points(self.motion, self.body.edges_mm, 0.0)
+
+
+def scene_motions(
+    scene: Scene,
+    view: View,
+    *,
+    amplitudes: Mapping[str, float] | None = None,
+    positions: Mapping[str, float] | None = None,
+) -> dict[str, BodyMotion]:
+    """Find place and small motion of every frame of a scene's machine."""
+    if amplitudes is None:
+        amplitudes = {key: scene.errors.amplitude(key) for key in scene.errors}
+    known = {**scene.workspace.positions, **(positions or {})}
+    stands = {name: known.get(name, 0.0) for name in scene.machine.axes}
+    return view_motions(scene.model, scene.errors, amplitudes, stands, view)
+
+
+def place_bodies(
+    scene: Scene,
+    motions: Mapping[str, BodyMotion],
+    exaggeration: float,
+    only: Collection[str] | None = None,
+) -> tuple[PlacedBody, ...]:
+    """Place the bodies of a scene's machine."""
+    return tuple(
+        PlacedBody(body, motions[body.frame], exaggeration)
+        for body in load_bodies(scene.machine)
+        if only is None or body.frame in only
+    )

@@ -1,17 +1,37 @@
 """Calibration: least squares of the errors of a machine to readings, and what is left."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Literal
 
 import numpy as np
-from scipy.stats import t as student
 
-from warpspace.calibration.rank import Rank, find_rank
-from warpspace.calibration.readings import Readings
-from warpspace.calibration.results import Calibration, Found, Request, Residuals
-from warpspace.calibration.solve import MAD, Solved, covariance_of, solve
-from warpspace.calibration.stack import Stack, Watch, named, rms_mm, unwatched
-from warpspace.calibration.terms import Terms, automatic, build_terms
+from warpspace.analysis.description import Analysis
+from warpspace.analysis.description import Watch as Share
+from warpspace.analysis.options import Grammar, option
+from warpspace.analysis.typed import Files, typed_word
+from warpspace.calibration.kinds.points import in_other_frame
+from warpspace.calibration.readings import Readings, read_readings
+from warpspace.calibration.results import Calibration, Combination, Found, Residuals
+from warpspace.calibration.solve import (
+    MAD,
+    Rank,
+    Solved,
+    Stack,
+    Terms,
+    Watch,
+    automatic,
+    build_terms,
+    covariance_of,
+    find_rank,
+    named,
+    read_keys,
+    rms_mm,
+    solve,
+    unwatched,
+)
 from warpspace.exceptions import OptionError
 from warpspace.machine.limits import MAX_ERROR, MAX_TEXT
 from warpspace.scene.model import Scene
@@ -21,12 +41,108 @@ CALIBRATED = ", calibrated"
 """Behind the title of a calibrated scene."""
 OUTLIER = 4.0
 """Robust standard deviations beyond which a reading is named."""
+MOST_NEXT = 10
+
+
+@dataclass(frozen=True, kw_only=True)
+class Calibrate(Analysis):
+    """Find the errors of the machine of SCENE in measured data.
+
+    Least squares with the exact model; it says which parameters the readings determine, which they
+    cannot tell apart, standard uncertainties and 95 % intervals, and what is left. Readings with a
+    column u_um (standard uncertainty) are weighted by it. A column session, or run, tells set-ups
+    apart: each has its own place of the sphere or the station, or its own shift.
+    """
+
+    name = "calibrate"
+    task = "measure"
+    doing = "fitting"
+    makes_scenes = True
+    scene_help = "Write SCENE with the errors found"
+    has_chart = True
+    chart_help = "residuals before and after, and the errors found"
+    has_table = True
+    data: Files = option(
+        (),
+        "CSV file of readings, or the name of a bundled one such as tcp_on.csv",
+        required=True,
+    )
+    kinds: Annotated[tuple[str, ...], Grammar("KIND", typed_word, each=True)] = option(
+        (),
+        "points, tracker, sphere, sphere-tcp, lengths, or a test with its options such as"
+        " circular:plane=XZ:radius=150 (`warpspace test --list`; its test sphere is r-test here)."
+        " Once for all files, or once for each, --data before --predict",
+        flag="--kind",
+        unset="told by the columns of each file",
+    )
+    frame: Literal["machine", "workpiece"] | None = option(
+        None,
+        "Frame of error vectors whose columns do not say it (ex_R_um: machine, ex_w_um: workpiece)",
+        unset="workpiece",
+    )
+    fit: Annotated[tuple[str, ...] | None, Grammar("KEYS|auto", read_keys, many=True)] = option(
+        None,
+        "Parameters to find, with commas between; KEY:ramp and KEY:constant choose the curve of a"
+        " component error",
+        unset="auto: those that the readings can show",
+    )
+    predict: Files = option((), "Readings that are not fitted but predicted")
+    robust: bool = option(False, "Let readings far off count less")
+    priors: bool = option(False, "Count the tolerances of SCENE as knowledge")
+    next_count: int | None = option(
+        None,
+        "Name the N measurements that would lower the uncertainty of the map most",
+        flag="--next",
+        low=1,
+        high=MOST_NEXT,
+    )
+
+    def run(self, scene: Scene, watch: Share, /) -> Calibration:
+        """Read the files and find the errors."""
+        names = (*self.data, *self.predict)
+        each = self.kinds if len(self.kinds) > 1 else (self.kinds or (None,)) * len(names)
+        if len(each) != len(names):
+            raise OptionError(
+                f"{{kinds}} is given {len(each)} times for {len(names)} files; expected 1 or"
+                f" {len(names)}"
+            )
+        read = [
+            read_readings(name, scene, kind, self.frame)
+            for name, kind in zip(names, each, strict=True)
+        ]
+        if self.frame is not None and not any(one.frame for one in read):
+            raise OptionError(
+                f"{{frame}} {self.frame}: no file holds error vectors ({{kinds}} points, tracker)"
+            )
+        count = len(self.data)
+        return self.find(scene, read[:count], read[count:], lambda: watch(0.0))
+
+    def find(
+        self,
+        scene: Scene,
+        sets: Sequence[Readings],
+        held: Sequence[Readings] = (),
+        watch: Watch = unwatched,
+    ) -> Calibration:
+        """Find the errors in readings, and what would tell more."""
+        from warpspace.calibration.next_best import next_best, separating
+
+        found = calibrate(scene, sets, self, held, watch)
+        if self.next_count is None and not found.rank.confounded:
+            return found
+        apart = separating(scene, sets, found, watch=watch)
+        steps = (
+            ()
+            if self.next_count is None
+            else next_best(scene, sets, found, self.next_count, watch=watch)
+        )
+        return replace(found, apart=apart, steps=steps)
 
 
 def calibrate(
     scene: Scene,
     sets: Sequence[Readings],
-    request: Request | None = None,
+    request: Calibrate | None = None,
     predict: Sequence[Readings] = (),
     watch: Watch = unwatched,
 ) -> Calibration:
@@ -37,7 +153,8 @@ def calibrate(
     scene : Scene
         The machine, and the errors to begin with.
     sets : sequence of Readings
-    request : Request, optional
+    request : Calibrate, optional
+        What is looked for, and how: `fit`, `robust`, `priors`.
     predict : sequence of Readings, optional
         Readings that are not fitted but predicted.
     watch : callable, optional
@@ -57,9 +174,10 @@ def calibrate(
     -----
     Weighted least squares (``scipy.optimize.least_squares``) with the exact model; derivatives to
     first order. The parameters are taken in order; one that looks in the readings like those before
-    it keeps the value of the scene. Standard uncertainties: out of the covariance
-    ``s²·(JᵀWJ)⁻¹``, s from the residuals where the readings have no uncertainties of their own,
-    intervals with Student's t (ISO/IEC Guide 98-3, H.3).
+    it keeps the value of the scene, and only a combination of them has an interval. Standard
+    uncertainties: out of the covariance ``s²·(JᵀWJ)⁻¹``, s from the residuals where the readings
+    have no uncertainties of their own, intervals with Student's t (ISO/IEC Guide 98-3, H.3). With
+    readings far off counting less, s² is Huber's robust one (`warpspace.calibration.solve`).
 
     Examples
     --------
@@ -70,27 +188,70 @@ def calibrate(
     >>> round(found.rms_before_mm, 3), round(found.rms_after_mm, 3)
     (0.278, 0.061)
     """
-    request = request or Request()
+    request = request or Calibrate()
     if not sets:
-        raise OptionError("no readings; expected at least one file (--data FILE)")
+        raise OptionError("no readings; expected at least one file ({data} FILE)")
+    found = _fit(scene, sets, request, predict, watch)
+    return replace(found, notes=(*found.notes, *_frame_notes(scene, sets, request, found, watch)))
+
+
+def _frame_notes(
+    scene: Scene, sets: Sequence[Readings], request: Calibrate, found: Calibration, watch: Watch
+) -> tuple[str, ...]:
+    others = [in_other_frame(scene, one) for one in sets]
+    turned = [at for at, one in enumerate(others) if one is not None]
+    best, changed = found, turned[:0]
+    for tried in [turned, *([at] for at in turned if turned[1:])] if turned else []:
+        mixed = [others[at] or one if at in tried else one for at, one in enumerate(sets)]
+        with suppress(OptionError):  # errors that no machine has fit no better
+            fitted = _fit(scene, mixed, request, (), watch)
+            best, changed = min((best, changed), (fitted, tried), key=lambda one: one[0].sigma_mm)
+    from scipy.stats import f
+
+    least = max(best.sigma_mm, 1e-12)
+    freedom = max(found.freedom, 1)
+    if (found.sigma_mm / least) ** 2 < max(4.0, float(f.ppf(0.999, freedom, freedom))):
+        return ()
+    files = ", ".join(Path(sets[at].source).name for at in changed)
+    other = "workpiece" if sets[changed[0]].frame == "machine" else "machine"
+    words = (
+        f"{files}: taken in the {sets[changed[0]].frame} frame these vectors leave"
+        f" {UM_PER_MM * found.rms_after_mm:.3g} µm (RMS), in the {other} frame"
+        f" {UM_PER_MM * best.rms_after_mm:.3g} µm: what is found here is likely wrong; expected"
+        f" --frame {other}, or columns ex_{'w' if other == 'workpiece' else 'R'}_um and so on"
+    )
+    return (words,)
+
+
+def _fit(
+    scene: Scene,
+    sets: Sequence[Readings],
+    request: Calibrate,
+    predict: Sequence[Readings],
+    watch: Watch,
+) -> Calibration:
     sets, assumed = _weighed(scene, sets, request, watch)
     stack = Stack.of(scene, sets, watch)
-    terms = build_terms(scene, automatic(scene, sets) if request.keys is None else request.keys)
+    terms = build_terms(scene, automatic(scene, sets) if request.fit is None else request.fit)
     if not terms.keys:
-        raise OptionError("no axis moves whose errors could be found; expected --fit KEYS")
-    begin = solve(stack, terms.only(()), request)
+        raise OptionError("no axis moves whose errors could be found; expected {fit} KEYS")
+    begin = solve(stack, terms.only(()), robust=request.robust)
     rank = _rank(stack, terms, begin.unknown)
     prior = _prior(scene, terms.keys) if request.priors else None
     free = terms.keys if prior is not None else rank.kept
     _check_count(stack, rank, len(free), prior is not None)
-    solved = solve(stack, terms.only(free), request, prior, begin.unknown)
+    solved = solve(stack, terms.only(free), prior, begin.unknown, robust=request.robust)
     before = stack.residuals(terms, terms.start, begin.unknown)
     part = terms.only(free)
     after = stack.residuals(part, solved.amplitudes, solved.unknown)
     used = stack.size + (len(free) if prior is not None else 0)
     freedom = used - len(free) - len(stack.unknowns)
-    sigma = _sigma(stack, after, freedom)
-    covariance = covariance_of(solved, len(free)) * (1.0 if stack.has_uncertainties else sigma**2)
+    sigma = _sigma(stack, after, freedom) if solved.scale is None else solved.scale
+    is_scaled = stack.has_uncertainties or solved.scale is not None
+    covariance = covariance_of(solved, len(free)) * (1.0 if is_scaled else sigma**2)
+    parameters, combinations = _found(
+        terms, part, rank, solved, covariance, freedom, stack, has_prior=prior is not None
+    )
     errors = part.errors_with(solved.amplitudes)
     _check_size(part, solved.amplitudes)
     title = f"{scene.title.removesuffix(CALIBRATED)}{CALIBRATED}"[:MAX_TEXT]
@@ -98,33 +259,36 @@ def calibrate(
     outliers = _outliers(stack, after)
     held, held_notes = _predict(scene, terms, part, predict, stack, begin, solved, request)
     return Calibration(
-        fitted_scene,
-        _found(terms, part, rank, solved, covariance, freedom, stack),
-        rank,
-        terms.slopes,
-        part.keys,
-        _correlation(covariance),
-        covariance,
-        named(stack.unknowns, solved.unknown),
-        tuple(Residuals(*row) for row in zip(stack.sets, before, after, outliers, strict=True)),
-        held,
-        rms_mm(before),
-        rms_mm(after),
-        rms_mm([one.before_mm for one in held]) if held else None,
-        rms_mm([one.after_mm for one in held]) if held else None,
-        sigma,
-        freedom,
-        (*assumed, *(note for one in (*sets, *predict) for note in one.notes), *held_notes),
+        scene=fitted_scene,
+        title=scene.title,
+        parameters=parameters,
+        combinations=combinations,
+        rank=rank,
+        slopes=terms.slopes,
+        fit=part.keys,
+        correlation=_correlation(covariance),
+        covariance=covariance,
+        unknowns=named(stack.unknowns, solved.unknown),
+        fitted=tuple(
+            Residuals(*row) for row in zip(stack.sets, before, after, outliers, strict=True)
+        ),
+        predicted=held,
+        rms_before_mm=rms_mm(before),
+        rms_after_mm=rms_mm(after),
+        rms_predicted_before_mm=rms_mm([one.before_mm for one in held]) if held else None,
+        rms_predicted_after_mm=rms_mm([one.after_mm for one in held]) if held else None,
+        sigma_mm=sigma,
+        freedom=freedom,
+        notes=(*assumed, *(note for one in (*sets, *predict) for note in one.notes), *held_notes),
     )
 
 
 def _weighed(
-    scene: Scene, sets: Sequence[Readings], request: Request, watch: Watch
+    scene: Scene, sets: Sequence[Readings], request: Calibrate, watch: Watch
 ) -> tuple[Sequence[Readings], tuple[str, ...]]:
-    """Give readings an uncertainty where tolerances are to be weighed against them."""
     if not request.priors or all(one.sigma_mm is not None for one in sets):
         return sets, ()
-    width = calibrate(scene, sets, replace(request, priors=False), (), watch).sigma_mm
+    width = _fit(scene, sets, replace(request, priors=False), (), watch).sigma_mm
     weighed = [
         one if one.sigma_mm is not None else replace(one, sigma_mm=np.full(len(one), width))
         for one in sets
@@ -134,34 +298,31 @@ def _weighed(
 
 
 def _rank(stack: Stack, terms: Terms, unknown: Array) -> Rank:
-    """Find out what the readings can tell apart."""
     by_parameter, by_unknown = stack.derivatives(terms, terms.start, unknown)
     weights = np.concatenate(stack.weights())[:, None]
     return find_rank(terms.keys, weights * np.vstack(by_parameter), weights * np.vstack(by_unknown))
 
 
 def _check_count(stack: Stack, rank: Rank, fitted: int, has_prior: bool) -> None:
-    """Refuse what readings cannot answer."""
     if not rank.kept and not has_prior:
         raise OptionError(
             f"{stack.size} numbers in {sum(map(len, stack.sets))} readings determine none of the"
-            " parameters; expected more poses, other axes, or another --fit"
+            " parameters; expected more poses, other axes, or another {fit}"
         )
     if not has_prior and stack.size <= fitted + len(stack.unknowns):
         need = fitted + len(stack.unknowns) + 1
         raise OptionError(
             f"{stack.size} numbers for {fitted} parameters and {len(stack.unknowns)} unknown"
             f" coordinates of the set-up; expected at least {need}: more readings, or fewer"
-            " parameters (--fit KEYS)"
+            " parameters ({fit} KEYS)"
         )
 
 
 def _prior(scene: Scene, keys: Sequence[str]) -> tuple[Array, Array]:
-    """Give centre and standard uncertainty of each parameter out of its tolerance, [K] twice."""
     missing = scene.tolerances.missing(keys)
     if missing:
         raise OptionError(
-            f"--priors: {', '.join(missing)} have no tolerance; expected one each in [tolerances]"
+            f"{{priors}}: {', '.join(missing)} have no tolerance; expected one each in [tolerances]"
         )
     rows = [tolerance for key in keys if (tolerance := scene.tolerances.get(key)) is not None]
     widths = np.array([max(row.half_width, 1e-6) for row in rows])
@@ -169,13 +330,11 @@ def _prior(scene: Scene, keys: Sequence[str]) -> tuple[Array, Array]:
 
 
 def _sigma(stack: Stack, after: Sequence[Array], freedom: int) -> float:
-    """Give the standard deviation of one weighted component."""
     rows = np.concatenate([row.ravel() for row in after]) * np.concatenate(stack.weights())
     return float(np.sqrt(np.sum(rows**2) / max(freedom, 1)))
 
 
 def _correlation(covariance: Array) -> Array:
-    """Give correlations out of a covariance."""
     width = np.sqrt(np.diag(covariance))
     width = np.where(width > 0.0, width, 1.0)
     return covariance / np.outer(width, width)
@@ -189,24 +348,35 @@ def _found(
     covariance: Array,
     freedom: int,
     stack: Stack,
-) -> tuple[Found, ...]:
-    """Collect every parameter that was asked for."""
-    factor = 1.959964 if stack.has_uncertainties else float(student.ppf(0.975, max(freedom, 1)))
+    *,
+    has_prior: bool,
+) -> tuple[tuple[Found, ...], tuple[Combination, ...]]:
+    from scipy.stats import t
+
+    factor = 1.959964 if stack.has_uncertainties else float(t.ppf(0.975, max(freedom, 1)))
+    held = dict(zip(terms.keys, terms.start.tolist(), strict=True))
     rows: list[Found] = []
+    sums: list[Combination] = []
     for at, key in enumerate(terms.keys):
         before = float(terms.start[at])
         if key not in part.keys:
-            rows.append(Found(key, before, before, None, None, identifiable=False))
+            rows.append(Found(key, before, before, None, None, "no"))
             continue
         own = part.keys.index(key)
         value, width = float(solved.amplitudes[own]), float(np.sqrt(covariance[own, own]))
-        interval = (value - factor * width, value + factor * width)
-        rows.append(Found(key, before, value, width, interval, rank.is_identifiable(key)))
-    return tuple(rows)
+        half = factor * width
+        told = "yes" if rank.is_identifiable(key) else "in part"
+        if told == "yes" or has_prior:
+            rows.append(Found(key, before, value, width, (value - half, value + half), told))
+            continue
+        rows.append(Found(key, before, value, None, None, told))
+        factors = rank.told_with(key)
+        total = value + sum(factors[other] * held[other] for other in factors if other != key)
+        sums.append(Combination(factors, total, width, (total - half, total + half)))
+    return tuple(rows), tuple(sums)
 
 
 def _outliers(stack: Stack, after: Sequence[Array]) -> list[tuple[int, ...]]:
-    """Name the readings that lie further off than the others let expect."""
     weights = stack.weights()
     lengths = [
         np.linalg.norm(row * weight.reshape(row.shape), axis=-1)
@@ -220,7 +390,6 @@ def _outliers(stack: Stack, after: Sequence[Array]) -> list[tuple[int, ...]]:
 
 
 def _check_size(terms: Terms, amplitudes: Array) -> None:
-    """Refuse errors that no rigid-body model holds."""
     for row, value in zip(terms.parameters, amplitudes, strict=True):
         if not abs(value) <= MAX_ERROR:
             raise OptionError(
@@ -237,7 +406,7 @@ def _predict(
     stack: Stack,
     begin: Solved,
     solved: Solved,
-    request: Request,
+    request: Calibrate,
 ) -> tuple[tuple[Residuals, ...], tuple[str, ...]]:
     """Predict readings that were not fitted; set-ups that were not fitted are placed by them."""
     if not predict:
@@ -249,11 +418,11 @@ def _predict(
     notes: tuple[str, ...] = ()
     before, after = dict(known_before), dict(known_after)
     if new:
-        own_before = solve(held, terms.only(()), request).unknown
+        own_before = solve(held, terms.only(()), robust=request.robust).unknown
         fixed = replace(
             part, keys=(), start=np.zeros(0), errors=part.errors_with(solved.amplitudes)
         )
-        own_after = solve(held, fixed, request).unknown
+        own_after = solve(held, fixed, robust=request.robust).unknown
         before |= {k: v for k, v in named(held.unknowns, own_before).items() if k in new}
         after |= {k: v for k, v in named(held.unknowns, own_after).items() if k in new}
         notes = (f"predicted readings place their own set-up: {', '.join(new)}",)

@@ -1,56 +1,166 @@
 """The measurement to make next: the one that lowers the uncertainty of the error map most."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
-from warpspace.calibration.candidates import Candidate, candidates
-from warpspace.calibration.rank import find_rank
-from warpspace.calibration.readings import Readings
-from warpspace.calibration.results import Calibration
-from warpspace.calibration.stack import Stack, Watch, unwatched
-from warpspace.calibration.terms import Terms, build_terms
-from warpspace.exceptions import OptionError
+from warpspace.bench.placing import PLANES
+from warpspace.calibration.kinds.bench import TestReadings
+from warpspace.calibration.kinds.spheres import solve_linear
+from warpspace.calibration.readings import Readings, nominal_tip
+from warpspace.calibration.results import Calibration, Candidate, Step
+from warpspace.calibration.solve import (
+    Stack,
+    Terms,
+    Watch,
+    build_terms,
+    find_rank,
+    orthonormal,
+    unwatched,
+    without,
+)
+from warpspace.exceptions import OptionError, SceneError, UnknownNameError
 from warpspace.field.grid import build_grid
-from warpspace.scene.model import Scene
-from warpspace.scene.pipeline import grid_basis
+from warpspace.scene.model import Scene, grid_basis
 from warpspace.units import Array
+
+# --- Measurements that could be made next ---------------------------------------------------------
+# Poses and small tests on the machine of a scene.
+
+PLACES = (0.0, 0.5, 1.0)
+"""Shares of the working volume, the ends at the ends."""
+TURNS_DEG = (-90.0, -60.0, -30.0, 0.0, 30.0, 60.0, 90.0, 180.0, 270.0)
+ON_CIRCLE = 36
+SESSION = "next"
+"""The set-up of a measurement not made yet: a sphere put somewhere anew."""
+
+
+def candidates(scene: Scene) -> tuple[Candidate, ...]:
+    """List measurements for a machine, each with what its instrument reads and leaves open."""
+    return (*_trackers(scene), *_tests(scene), *_spheres(scene))
+
+
+def _spans(scene: Scene) -> dict[str, tuple[float, float]]:
+    ranges = scene.workspace.ranges
+    return {name: span for name, span in ranges.items() if span[0] < span[1]}
+
+
+def _complete(scene: Scene, positions: Mapping[str, Array]) -> dict[str, Array]:
+    """Give positions of all axes; those that are not given stand where the scene has them."""
+    count = max(len(values) for values in positions.values())
+    still = scene.workspace.positions
+    return {
+        name: np.asarray(positions[name] if name in positions else np.full(count, still[name]))
+        for name in scene.machine.axes
+    }
+
+
+def _nominal(scene: Scene, kind: str, at: Mapping[str, Array], observed_mm: Array) -> Readings:
+    tip, count = nominal_tip(scene, dict(at)), len(observed_mm)
+    lines = tuple(range(1, count + 1))
+    return Readings(kind, at, tip, observed_mm, None, (SESSION,) * count, lines, "")
+
+
+def _trackers(scene: Scene) -> Iterator[Candidate]:
+    spans = _spans(scene)
+    for shares in (PLACES[::2], PLACES):
+        each = [[low + share * (high - low) for share in shares] for low, high in spans.values()]
+        places = np.array(list(product(*each))).T
+        if places.shape[-1] > 1:
+            count = f"{places.shape[-1]} points, {len(shares)} along each of {', '.join(spans)}"
+            title = f"tracker: error vectors at {count}; its place and turn unknown"
+            at = _complete(scene, dict(zip(spans, places, strict=True)))
+            yield Candidate(title, _nominal(scene, "tracker", at, np.zeros(places.T.shape)))
+
+
+def _tests(scene: Scene) -> Iterator[Candidate]:
+    spans = {
+        name: span for name, span in _spans(scene).items() if scene.machine.axes[name].is_linear
+    }
+    for name in spans:
+        yield from _test(scene, f"positioning:axis={name}", f"laser along {name}")
+        for across in "xyz":
+            words = f"probe along {name}, sensing {across} against a straight edge"
+            yield from _test(scene, f"straightness:axis={name}:across={across}:points=11", words)
+    yield from _test(scene, "diagonals", "laser along the four body diagonals")
+    for plane, (first, second, _) in PLANES.items():
+        if not {first, second} <= set(spans):
+            continue
+        yield from _test(scene, f"squareness:plane={plane}:points=11", f"square in {plane}, probed")
+        others = [name for name in spans if name not in (first, second)]
+        radius = 0.4 * min(spans[name][1] - spans[name][0] for name in (first, second))
+        options = f"circular:plane={plane}:radius={radius:g}:points={ON_CIRCLE // 2}"
+        for share in PLACES[:: 2 if others else 3]:
+            at = [f"{n}={spans[n][0] + share * (spans[n][1] - spans[n][0]):g}" for n in others]
+            place = f":at={','.join(at)}" if at else ""
+            words = f"ball bar, circle {plane}, radius {radius:g} mm" + (
+                f" at {', '.join(at).replace('=', ' ')}" if at else ""
+            )
+            yield from _test(scene, options + place, words)
+
+
+def _test(scene: Scene, kind: str, words: str) -> Iterator[Candidate]:
+    with suppress(OptionError, UnknownNameError):
+        readings = TestReadings(kind).planned(scene)
+        setup = readings.plan.setup if readings.plan else ()
+        unknown = ", ".join(name.rpartition("_")[0].replace("_", " ") for name in setup)
+        read = f"{len(readings)} readings of one component"
+        yield Candidate(f"{words}: {read}; unknown: {unknown}", readings)
+
+
+def _spheres(scene: Scene) -> Iterator[Candidate]:
+    still = {name: np.array([value]) for name, value in scene.workspace.positions.items()}
+    centre = nominal_tip(scene, still)
+    rotary = [name for name, axis in scene.machine.axes.items() if not axis.is_linear]
+    turns = {
+        name: np.array([turn for turn in TURNS_DEG if _within(scene, name, turn)])
+        for name in rotary
+    }
+    for name in rotary:
+        others = [other for other in rotary if other != name] or [""]
+        for other in others:
+            for turn in turns.get(other, np.zeros(1)):
+                if len(turns[name]) < 2 or (other and abs(turn) > 90.0):
+                    continue
+                place = {name: turns[name]}
+                held = ""
+                if other:
+                    place[other] = np.full(len(turns[name]), turn)
+                    held = f" at {other} {turn:g}°"
+                at, target = _complete(scene, place), np.repeat(centre, len(turns[name]), axis=0)
+                with suppress(SceneError):
+                    at = _reached(scene, solve_linear(scene, at, target, ""))
+                    if (count := len(at[name])) > 1:
+                        title = f"sphere, TCP on: {name} at {_list(at[name])}°{held}"
+                        yield Candidate(title, _nominal(scene, "sphere-tcp", at, target[:count]))
+
+
+def _reached(scene: Scene, at: Mapping[str, Array]) -> dict[str, Array]:
+    """Leave out poses at which a linear axis would stand beyond its travel."""
+    inside = np.ones(max(map(len, at.values())), dtype=bool)
+    for name, axis in scene.machine.axes.items():
+        if axis.is_linear:
+            inside &= (at[name] >= axis.travel[0]) & (at[name] <= axis.travel[1])
+    return {name: values[inside] for name, values in at.items()}
+
+
+def _within(scene: Scene, name: str, turn: float) -> bool:
+    low, high = scene.machine.axes[name].travel
+    return low <= turn <= high
+
+
+def _list(values: Array) -> str:
+    return ", ".join(f"{value:g}" for value in values)
+
 
 NODES = 5
 """Nodes per axis of the map whose uncertainty counts."""
 WIDE = 1000.0
 """Standard uncertainty in µm or µrad of a parameter of which nothing is known."""
 LEAST_NOISE_MM = 1e-4
-MOST_NEXT = 10
-
-
-@dataclass(frozen=True, slots=True)
-class Step:
-    """One measurement to make.
-
-    Attributes
-    ----------
-    candidate : Candidate
-    map_before_um, map_after_um : float, µm
-        Standard uncertainty of the position error, root mean square over the volume: without and
-        with this measurement, all those before it made.
-    covariance : ndarray, [K, K]
-        Of the parameters once it is made.
-    """
-
-    candidate: Candidate
-    map_before_um: float
-    map_after_um: float
-    covariance: Array
-
-
-@dataclass(frozen=True, slots=True)
-class _Knowledge:
-    """What is known: the information on parameters and unknowns of the set-up."""
-
-    names: tuple[str, ...]
-    matrix: Array
 
 
 def next_best(
@@ -64,61 +174,32 @@ def next_best(
 ) -> tuple[Step, ...]:
     """Choose measurements one after the other, each for the greatest gain.
 
-    Parameters
-    ----------
-    scene : Scene
-        The machine that is calibrated.
-    sets : sequence of Readings
-        What has been measured.
-    found : Calibration
-    count : int, optional
-        1 to 10 measurements.
-    choice : sequence of Candidate, optional
-        Measurements that are possible; by default those of
-        `warpspace.calibration.candidates.candidates`.
-    noise_mm : float, optional
-        Standard uncertainty of one component; by default that of the residuals.
-    watch : callable, optional
-        Called before each evaluation of the model; what it raises ends the work.
-
-    Returns
-    -------
-    tuple of Step
-
-    Raises
-    ------
-    OptionError
-        If the count is out of range.
-
     Notes
     -----
     The information JᵀWJ of what is measured, plus that of the tolerances (1000 µm or µrad where
-    there is none), plus that of the candidate; what the set-up leaves unknown is eliminated. First
-    order, at the errors found.
+    there is none), plus that of the candidate; what a set-up leaves unknown is eliminated, and each
+    candidate has one of its own. First order, at the errors found.
     """
-    if not 1 <= count <= MOST_NEXT:
-        raise OptionError(f"--next {count}; expected 1 to {MOST_NEXT} measurements")
     keys = tuple(one.key for one in found.parameters)
     terms = build_terms(replace(found.scene), keys)
     noise = max(noise_mm or found.sigma_mm, LEAST_NOISE_MM)
     if Stack.of(scene, sets).has_uncertainties and noise_mm is None:
         noise = float(np.median(np.concatenate([_sigma(one, noise) for one in sets])))
-    known = _information(Stack.of(scene, sets, watch), terms, noise)
-    known = _plus(known, _prior(scene, keys))
-    weigh = _map(found.scene, terms)
+    known = _information(Stack.of(scene, sets, watch), terms, noise) + _prior(scene, keys)
+    weigh = map_weights(found.scene, terms)
     rows = [
         (one, _information(Stack.of(scene, [one.readings], watch), terms, noise))
         for one in choice or candidates(scene)
     ]
     steps: list[Step] = []
-    before = _map_um(weigh, _covariance(known, keys))
+    before = _map_um(weigh, _covariance(known))
     for _ in range(count):
         watch()
-        gains = [(one, _covariance(_plus(known, row), keys), row) for one, row in rows]
+        gains = [(one, _covariance(known + row), row) for one, row in rows]
         best, covariance, row = min(gains, key=lambda gain: _map_um(weigh, gain[1]))
         after = _map_um(weigh, covariance)
         steps.append(Step(best, before, after, covariance))
-        known, before = _plus(known, row), after
+        known, before = known + row, after
     return tuple(steps)
 
 
@@ -129,22 +210,7 @@ def separating(
     choice: Sequence[Candidate] | None = None,
     watch: Watch = unwatched,
 ) -> dict[tuple[str, ...], str]:
-    """Name for each group of parameters that look alike a measurement that tells them apart.
-
-    Parameters
-    ----------
-    scene : Scene
-    sets : sequence of Readings
-    found : Calibration
-    choice : sequence of Candidate, optional
-    watch : callable, optional
-        Called before each evaluation of the model; what it raises ends the work.
-
-    Returns
-    -------
-    dict of tuple of str to str
-        Groups that none separates are left out.
-    """
+    """Name for each group of parameters that look alike a measurement that tells them apart."""
     keys = tuple(one.key for one in found.parameters)
     terms = build_terms(scene, keys)
     missing = set(found.rank.confounded)
@@ -169,50 +235,37 @@ def _sigma(readings: Readings, noise_mm: float) -> Array:
     return readings.sigma_mm
 
 
-def _information(stack: Stack, terms: Terms, noise_mm: float) -> _Knowledge:
-    """Give the information of readings on the parameters and their own unknowns."""
-    by_parameter, by_unknown = stack.derivatives(terms, terms.start, stack.start())
-    rows = np.hstack([np.vstack(by_parameter), np.vstack(by_unknown)])
+def _information(stack: Stack, terms: Terms, noise_mm: float) -> Array:
+    """Give the information on the parameters that does not go into the set-ups, [K, K]."""
+    by_parameter, by_unknown = map(np.vstack, stack.derivatives(terms, terms.start, stack.start()))
     weights = np.concatenate(
         [np.repeat(1.0 / _sigma(one, noise_mm), one.observed_mm.shape[1]) for one in stack.sets]
-    )
-    weighted = rows * weights[:, None]
-    return _Knowledge((*terms.keys, *stack.unknowns), weighted.T @ weighted)
+    )[:, None]
+    rows = without(weights * by_parameter, orthonormal(weights * by_unknown))
+    return rows.T @ rows
 
 
-def _prior(scene: Scene, keys: Sequence[str]) -> _Knowledge:
-    """Give what the tolerances say."""
+def _prior(scene: Scene, keys: Sequence[str]) -> Array:
     tolerances = [scene.tolerances.get(key) for key in keys]
     widths = [
         WIDE if one is None else max(one.half_width, 1e-6) / np.sqrt(3.0) for one in tolerances
     ]
-    return _Knowledge(tuple(keys), np.diag(1.0 / np.array(widths) ** 2))
+    return np.diag(1.0 / np.array(widths) ** 2)
 
 
-def _plus(one: _Knowledge, other: _Knowledge) -> _Knowledge:
-    """Add information on quantities that may differ."""
-    names = tuple(dict.fromkeys((*one.names, *other.names)))
-    total = np.zeros((len(names), len(names)))
-    for part in (one, other):
-        index = [names.index(name) for name in part.names]
-        total[np.ix_(index, index)] += part.matrix
-    return _Knowledge(names, total)
+def _covariance(known: Array) -> Array:
+    scale = np.sqrt(np.diag(known))
+    inverse = np.linalg.pinv(known / np.outer(scale, scale), rcond=1e-13, hermitian=True)
+    return inverse / np.outer(scale, scale)
 
 
-def _covariance(known: _Knowledge, keys: Sequence[str]) -> Array:
-    """Give the covariance of the parameters, [K, K]."""
-    scale = np.sqrt(np.diag(known.matrix))
-    scale = np.where(scale > 0.0, scale, 1.0)
-    inverse = np.linalg.pinv(known.matrix / np.outer(scale, scale), rcond=1e-13, hermitian=True)
-    return (inverse / np.outer(scale, scale))[: len(keys), : len(keys)]
-
-
-def _map(scene: Scene, terms: Terms) -> Array:
+def map_weights(scene: Scene, terms: Terms) -> Array:
     """Give how the map weighs covariances, [K, K]: its mean square is the sum of the products."""
     grid = build_grid(scene.model, scene.workspace, NODES)
     basis = grid_basis(replace(scene, errors=terms.errors), grid, keys=terms.keys)
-    flat = basis.position.reshape(len(terms.keys), -1)
-    return flat @ flat.T / (flat.shape[1] / 3)
+    share = np.sqrt(grid.weights)[..., None]
+    flat = (basis.position * share).reshape(len(terms.keys), -1)
+    return flat @ flat.T
 
 
 def _map_um(weigh: Array, covariance: Array) -> float:

@@ -1,62 +1,168 @@
 """Readings of a measurement as a calibration takes them: where, what was read, how well."""
 
+import io
+import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpspace.calibration.table import ReadingTable, parse_table
-from warpspace.exceptions import OptionError, SceneError
+from warpspace.exceptions import OptionError, SceneError, near_miss
+from warpspace.kinematics import transforms
+from warpspace.kinematics.chain import branch_pose, nominal_point
+from warpspace.kinematics.model import Loop
+from warpspace.machine.axes import is_linear
 from warpspace.machine.limits import MAX_CSV_BYTES
 from warpspace.resources import assets_dir
-from warpspace.scene.files import read_text
-from warpspace.scene.model import Scene
+from warpspace.scene.files import CsvRows, plain_heading, radian_notes, read_text, unguard_cell
+from warpspace.scene.model import Scene, coverage_notes
 from warpspace.units import Array
 
-if TYPE_CHECKING:
-    from warpspace.calibration.circles import Circle
+MAX_READINGS = 20_000
+"""Rows that a file of readings may have."""
+LABELS = ("session", "run")
+"""Columns that hold a name; the first that is there tells sessions apart."""
+MAX_NUMBER = 1e9
+FRAMES = {"machine": "r", "workpiece": "w"}
+"""How names of columns spell the frame of vectors, in small letters."""
+MAX_LABEL = 60
+MAX_SESSIONS = 100
+"""Set-ups in one file: each has unknowns of its own."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReadingTable:
+    """The rows of a file of readings."""
+
+    source: str  # name of the file, for messages
+    columns: Mapping[str, Array]  # [n]; numbers by the name of their column, in small letters
+    labels: Mapping[str, tuple[str, ...]]  # (n,); names by column: `session` and `run`
+    lines: tuple[int, ...]  # (n,); line of the file that each row stands on
+    text: str = ""  # all of the file, for kinds that have columns of their own
+    notes: tuple[str, ...] = ()  # what a reader should doubt
+    frame: str | None = None  # of vectors whose columns do not say it, as the user says
+
+    def __len__(self) -> int:
+        """Count the rows."""
+        return len(self.lines)
+
+    def need(self, names: Sequence[str]) -> Array:
+        """Give columns that must be there, [n, len(names)]; refuses a file that lacks one."""
+        missing = [name for name in names if name not in self.columns]
+        if missing:
+            there = ", ".join((*self.labels, *self.columns)) or "none"
+            found = f"has no column {', '.join(missing)}{near_miss(missing[0], self.columns)}"
+            expected = f"expected {', '.join(names)} (the columns there are: {there})"
+            raise SceneError(self.source, [f"{found}; {expected}"])
+        return np.column_stack([self.columns[name] for name in names])
+
+    @property
+    def session(self) -> tuple[str, ...] | None:
+        """Names of the sessions, (n,); None where the file has no such column."""
+        return next((self.labels[name] for name in LABELS if name in self.labels), None)
+
+
+def read_table(path: Path) -> ReadingTable:
+    """Read a CSV file; see `parse_table`."""
+    return parse_table(read_text(path, MAX_CSV_BYTES), str(path))
+
+
+def parse_table(text: str, source: str) -> ReadingTable:
+    """Read the text of a CSV file with a header, or what ``field --json`` printed.
+
+    The source names it, nothing is opened.
+    """
+    if text.lstrip().startswith("{"):
+        return _parse_field(text, source)
+    rows = CsvRows(io.StringIO(text, newline=""), source, MAX_READINGS, once=True)
+    header = [plain_heading(name).lower() for name in rows.header]
+    if not header:
+        raise SceneError(source, ["is empty; expected a header and rows of readings"])
+    repeated = {name for name in header if header.count(name) > 1}
+    if repeated:
+        raise SceneError(source, [f"names column {min(repeated)!r} twice; expected each once"])
+    numbers: dict[str, list[float]] = {name: [] for name in header if name not in LABELS}
+    labels: dict[str, list[str]] = {name: [] for name in header if name in LABELS}
+    lines: list[int] = []
+    for line, row in rows:
+        lines.append(line)
+        for name, field in zip(header, row, strict=True):
+            if name in labels:
+                labels[name].append(unguard_cell(field)[:MAX_LABEL])
+            else:
+                numbers[name].append(rows.number(field, line, name, MAX_NUMBER))
+    rows.check()
+    if not lines:
+        raise SceneError(source, ["has a header but no rows; expected readings below it"])
+    table = ReadingTable(
+        source,
+        {name: np.array(values) for name, values in numbers.items()},
+        {name: tuple(values) for name, values in labels.items()},
+        tuple(lines),
+        text,
+        (*rows.notes, *radian_notes(numbers)),
+    )
+    named = len(set(table.session or ()))
+    if named > MAX_SESSIONS:
+        found = f"names {named:,} sessions; expected at most {MAX_SESSIONS}"
+        raise SceneError(source, [found])
+    return table
+
+
+def _parse_field(text: str, source: str) -> ReadingTable:
+    try:
+        found = json.loads(text)
+        loop, frame, points = found["loop"], FRAMES[found["frame"]], found["points"]
+        loop += "_placed" * ("placement" in found) + "_referenced" * ("reference" in found)
+        axes = {name: "mm" if is_linear(name) else "deg" for name in points[0]["axes"]}
+        columns = {
+            f"axis_{name.lower()}_{unit}": np.array([float(one["axes"][name]) for one in points])
+            for name, unit in axes.items()
+        }
+        errors = np.array([one["error_um"] for one in points], float).reshape(len(points), 3)
+    except (ValueError, TypeError, LookupError, ArithmeticError, RecursionError):
+        expected = "a CSV table of readings, or what `field --loop relative --json` printed"
+        raise SceneError(source, [f"cannot be read; expected {expected}"]) from None
+    if len(points) > MAX_READINGS or not all(
+        map(np.all, map(np.isfinite, (*columns.values(), errors)))
+    ):
+        expected = f"at most {MAX_READINGS:,}, and finite numbers"
+        raise SceneError(source, [f"has {len(points):,} points; expected {expected}"])
+    columns |= {f"error_{loop}_{frame}_{x}_um": errors[:, at] for at, x in enumerate("xyz")}
+    return ReadingTable(source, columns, {}, tuple(range(1, len(points) + 1)), text)
+
+
+@dataclass(frozen=True, slots=True)
+class Circle:
+    """A circle that the linear axes read while one rotary axis turned."""
+
+    axis: str  # the rotary axis
+    sessions: tuple[str, ...]  # the runs it was fitted to; each closes on the same circle
+    plane: str  # for instance "XZ"
+    centre_mm: tuple[float, float]  # in the plane, axis positions
+    radius_mm: float
+    rms_mm: float  # of the distances of the centres from the circle
+    count: int  # readings
+    against: bool  # whether the axis turned against the machine of the scene
 
 
 @dataclass(frozen=True, slots=True)
 class Readings:
-    """The readings of one file.
+    """The readings of one file."""
 
-    Attributes
-    ----------
-    kind : str
-        Name of the kind of measurement.
-    coordinates : mapping of str to ndarray, [n], mm or degrees
-        Commanded positions of all axes.
-    nominal_mm : ndarray, [n, 3], mm
-        Nominal tool point in the workpiece frame.
-    observed_mm : ndarray, [n, d], mm
-        What was read.
-    sigma_mm : ndarray, [n], mm, or None
-        Standard uncertainty of each reading.
-    session : tuple of str, (n,)
-        Readings of one session share what is unknown about the set-up.
-    lines : tuple of int, (n,)
-        Lines of the file.
-    source : str
-        Name of the file.
-    notes : tuple of str
-        What was assumed on reading it.
-    circles : tuple of Circle
-        About rotary axes, where the readings are such.
-    """
-
-    kind: str
-    coordinates: Mapping[str, Array]
-    nominal_mm: Array
-    observed_mm: Array
-    sigma_mm: Array | None
-    session: tuple[str, ...]
-    lines: tuple[int, ...]
-    source: str
-    notes: tuple[str, ...] = ()
-    circles: "tuple[Circle, ...]" = ()
+    kind: str  # name of the kind of measurement
+    coordinates: Mapping[str, Array]  # [n], mm or degrees; commanded positions of all axes
+    nominal_mm: Array  # [n, 3]; nominal tool point in the workpiece frame
+    observed_mm: Array  # [n, d]; what was read
+    sigma_mm: Array | None  # [n], or None; standard uncertainty of each reading
+    session: tuple[str, ...]  # (n,); readings of one session share what is unknown about the set-up
+    lines: tuple[int, ...]  # (n,); lines of the file
+    source: str  # name of the file
+    notes: tuple[str, ...] = ()  # what was assumed on reading it
+    circles: tuple[Circle, ...] = ()  # about rotary axes, where the readings are such
+    # "machine" or "workpiece": what vectors were read in; they are kept in the latter
+    frame: str = ""
 
     def __len__(self) -> int:
         """Count the readings."""
@@ -77,92 +183,46 @@ def bundled_data() -> tuple[str, ...]:
     return tuple(path.name for path in sorted((assets_dir() / "measurements").glob("*/*.csv")))
 
 
-def read_readings(name: str, scene: Scene, kind: str | None = None) -> Readings:
-    """Read a file of readings for a machine.
-
-    Parameters
-    ----------
-    name : str
-        A path, or the name of a bundled file.
-    scene : Scene
-    kind : str, optional
-        Kind of measurement; by default the one whose columns the file has.
-
-    Returns
-    -------
-    Readings
-
-    Raises
-    ------
-    SceneError
-        If the file cannot be read or lacks a column.
-    OptionError
-        If no kind fits.
-    """
+def read_readings(
+    name: str, scene: Scene, kind: str | None = None, frame: str | None = None
+) -> Readings:
+    """Read a file of readings for a machine."""
     path = find_data(name)
-    return parse_readings(read_text(path, MAX_CSV_BYTES), str(path), scene, kind)
+    return parse_readings(read_text(path, MAX_CSV_BYTES), str(path), scene, kind, frame)
 
 
-def parse_readings(text: str, source: str, scene: Scene, kind: str | None = None) -> Readings:
-    """Read the text of a file of readings; see `read_readings`.
-
-    Parameters
-    ----------
-    text : str
-    source : str
-        Name of the file, for messages; nothing is opened.
-    scene : Scene
-    kind : str, optional
-
-    Returns
-    -------
-    Readings
-    """
+def parse_readings(
+    text: str, source: str, scene: Scene, kind: str | None = None, frame: str | None = None
+) -> Readings:
+    """Read the text of a file of readings; see `read_readings`."""
     from warpspace.calibration.kinds.registry import find_kind, recognise
 
     found = None if kind is None else find_kind(kind)
     if found is not None and found.own_columns:
         return found.read(ReadingTable(source, {}, {}, (), text), scene)
-    table = parse_table(text, source)
-    return (found or recognise(table, scene)).read(table, scene)
+    table = replace(parse_table(text, source), frame=frame)
+    readings = (found or recognise(table, scene)).read(table, scene)
+    return replace(readings, notes=(*readings.notes, *table.notes))
 
 
 def axis_columns(
     table: ReadingTable, scene: Scene, names: Sequence[str], needed: Sequence[str] = ()
 ) -> tuple[dict[str, Array], tuple[str, ...]]:
-    """Give positions of axes out of columns such as ``b_deg`` and ``x_mm``.
+    """Give positions of all axes, [n], out of columns such as ``b_deg`` and ``x_mm``, and notes.
 
-    Parameters
-    ----------
-    table : ReadingTable
-    scene : Scene
-    names : sequence of str
-        Axes that may have a column; others stand where the scene has them.
-    needed : sequence of str, optional
-        Axes of which one at least must have a column.
-
-    Returns
-    -------
-    coordinates : dict of str to ndarray, [n], mm or degrees
-        All axes of the machine.
-    notes : tuple of str
-        Axes without a column, and where they are taken to stand.
-
-    Raises
-    ------
-    SceneError
-        If a column names an axis that the machine does not have, or all needed ones are missing.
+    Axes without a column stand where the scene has them, which is noted. One at least of those that
+    are needed must have one.
     """
     axes = scene.machine.axes
     coordinates: dict[str, Array] = {}
     notes: list[str] = []
     for name in names:
         unit = "mm" if axes[name].is_linear else "deg"
-        column = f"{name.lower()}_{unit}"
-        if column in table.columns:
-            coordinates[name] = table.columns[column]
+        for column in (f"{name.lower()}_{unit}", f"axis_{name.lower()}_{unit}"):
+            if column in table.columns:
+                coordinates[name] = table.columns[column]
     for column in table.columns:
-        head, _, unit = column.rpartition("_")
+        head, _, unit = column.removeprefix("axis_").rpartition("_")
         if unit == "deg" and head.upper() not in axes:
             known = ", ".join(name for name, axis in axes.items() if not axis.is_linear)
             found = f"has column {column}, but the machine has no axis {head.upper()}"
@@ -170,6 +230,8 @@ def axis_columns(
     if needed and not any(name in coordinates for name in needed):
         spelled = ", ".join(f"{name.lower()}_deg" for name in needed)
         raise SceneError(table.source, [f"has no axis positions; expected a column of {spelled}"])
+    ranges = {name: (float(at.min()), float(at.max())) for name, at in coordinates.items()}
+    notes += coverage_notes(scene, ranges)
     rest = [name for name in names if name not in coordinates]
     if rest:
         stands = ", ".join(f"{name} {scene.workspace.positions[name]:g}" for name in rest)
@@ -180,14 +242,37 @@ def axis_columns(
     return coordinates, tuple(notes)
 
 
-def uncertainties_mm(table: ReadingTable) -> Array | None:
-    """Give standard uncertainties out of a column ``u_um`` or ``u_mm``, [n], mm; None without one.
+def nominal_tip(scene: Scene, coordinates: Mapping[str, Array]) -> Array:
+    """Give the nominal tool point in the workpiece frame, [n, 3], mm."""
+    model = scene.model
+    tip = nominal_point(model, Loop.TOOL, coordinates)
+    return transforms.apply(transforms.inverse(branch_pose(model, "workpiece", coordinates)), tip)
 
-    Raises
-    ------
-    SceneError
-        If one is not above zero.
-    """
+
+def take_readings(
+    kind: str,
+    scene: Scene,
+    table: ReadingTable,
+    coordinates: Mapping[str, Array],
+    observed_mm: Array,
+    notes: tuple[str, ...],
+) -> Readings:
+    """Put the readings of a file together."""
+    return Readings(
+        kind,
+        coordinates,
+        nominal_tip(scene, coordinates),
+        observed_mm,
+        uncertainties_mm(table),
+        table.session or ("",) * len(table),
+        table.lines,
+        table.source,
+        notes,
+    )
+
+
+def uncertainties_mm(table: ReadingTable) -> Array | None:
+    """Give standard uncertainties, column ``u_um`` or ``u_mm``, [n], mm; None without one."""
     for name, factor in (("u_um", 1e-3), ("u_mm", 1.0)):
         if name in table.columns:
             values = table.columns[name] * factor
@@ -199,32 +284,15 @@ def uncertainties_mm(table: ReadingTable) -> Array | None:
     return None
 
 
-def sessions(table: ReadingTable) -> tuple[str, ...]:
-    """Name the session of each row; one for all where the file does not tell."""
-    return table.session or ("",) * len(table)
-
-
 def check_poses(coordinates: Mapping[str, Array], source: str) -> None:
-    """Refuse readings that were all taken at one pose.
-
-    Raises
-    ------
-    SceneError
-        If no axis moves.
-    """
+    """Refuse readings that were all taken at one pose."""
     if all(np.ptp(values) < 1e-9 for values in coordinates.values()):
         found = "has all readings at one pose: no error can be told from the place of the set-up"
         raise SceneError(source, [f"{found}; expected axes that move between readings"])
 
 
 def check_spread(spread_mm: float, limit_mm: float, source: str, hint: str) -> None:
-    """Refuse readings that lie further from the model than any machine: likely wrong units.
-
-    Raises
-    ------
-    OptionError
-        If they do.
-    """
+    """Refuse readings that lie further from the model than any machine: likely wrong units."""
     if spread_mm > limit_mm:
         raise OptionError(
             f"{source}: the readings lie {spread_mm:.4g} mm from what the nominal machine gives;"

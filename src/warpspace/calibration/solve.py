@@ -1,15 +1,343 @@
-"""Weighted least squares of errors and unknown set-ups to readings."""
+"""Weighted least squares of errors and unknown set-ups to readings, and what data can tell."""
 
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.optimize import OptimizeResult, least_squares
 
-from warpspace.calibration.results import Request
-from warpspace.calibration.stack import Stack
-from warpspace.calibration.terms import Terms
-from warpspace.exceptions import OptionError
+from warpspace.calibration.kinds.kind import Guess
+from warpspace.calibration.kinds.registry import find_kind
+from warpspace.calibration.readings import Readings
+from warpspace.exceptions import OptionError, UnknownNameError
+from warpspace.machine.axes import direction_index, is_linear
+from warpspace.machine.errors import Constant, ErrorSet, Ramp
+from warpspace.machine.parameters import PARAMETERS, Parameter, parameter
+from warpspace.scene.model import Scene
 from warpspace.units import Array
+
+BLIND = 2e-4
+"""Share of its own effect below which what is left of a parameter counts as nothing.
+
+With less, noise of a thousandth makes values that no machine has.
+"""
+SHARE = 1e-3
+"""Of a combination, below which a parameter is not named as part of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rank:
+    """What can be told apart."""
+
+    rank: int  # independent combinations of the parameters that the readings show
+    kept: tuple[str, ...]  # parameters that are determined once those left out are held
+    unseen: tuple[str, ...]  # parameters without any effect on the readings, whatever the set-up
+    # groups: the first of each group looks like a combination of the others (and of what the set-up
+    # leaves unknown). A group of one looks like the set-up alone.
+    confounded: tuple[tuple[str, ...], ...]
+    # by the first of each group: how much of each of the others looks like a unit of it
+    alike: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Mapping[str, float]])
+
+    def is_identifiable(self, key: str) -> bool:
+        """Tell whether the readings alone determine a parameter."""
+        return key in self.kept and not any(key in group for group in self.confounded)
+
+    def told_with(self, key: str) -> dict[str, float]:
+        """Give the sum of parameters that the readings tell where they tell one of them in part."""
+        others = {first: row[key] for first, row in self.alike.items() if key in row}
+        return {key: 1.0, **others}
+
+
+def find_rank(keys: Sequence[str], by_parameter: Array, by_unknown: Array) -> Rank:
+    """Go through the parameters in order and see which adds something new.
+
+    The likelier come first: where two look alike the later one is left out. Readings are weighted;
+    their changes are per unit of each parameter, [N, K], and of each unknown, [N, m].
+    """
+    set_up = orthonormal(by_unknown)
+    norms = np.linalg.norm(by_parameter, axis=0)
+    largest = norms.max(initial=0.0)
+    kept: list[int] = []
+    basis: list[Array] = []
+    unseen: list[str] = []
+    alike: dict[str, Mapping[str, float]] = {}
+    for at, key in enumerate(keys):
+        if norms[at] <= BLIND * largest or not norms[at]:
+            unseen.append(key)
+            continue
+        rest = without(by_parameter[:, at] / norms[at], set_up)
+        for _ in range(2):  # twice: the second pass takes what rounding left
+            for direction in basis:
+                rest = rest - direction * (direction @ rest)
+        if np.linalg.norm(rest) > BLIND:
+            kept.append(at)
+            basis.append(rest / np.linalg.norm(rest))
+            continue
+        alike[key] = _partners(keys, at, kept, by_parameter, norms, set_up)
+    groups = tuple((key, *others) for key, others in alike.items())
+    return Rank(len(kept), tuple(keys[at] for at in kept), tuple(unseen), groups, alike)
+
+
+def _partners(
+    keys: Sequence[str],
+    at: int,
+    kept: Sequence[int],
+    by_parameter: Array,
+    norms: Array,
+    set_up: Array,
+) -> dict[str, float]:
+    if not kept:
+        return {}
+    columns = np.stack([without(by_parameter[:, one] / norms[one], set_up) for one in kept], -1)
+    target = without(by_parameter[:, at] / norms[at], set_up)
+    if np.linalg.norm(target) <= BLIND:
+        return {}
+    shares, *_ = np.linalg.lstsq(columns, target, rcond=None)
+    return {
+        keys[one]: float(share * norms[at] / norms[one])
+        for one, share in zip(kept, shares, strict=True)
+        if abs(share) > SHARE
+    }
+
+
+def orthonormal(columns: Array) -> Array:
+    """Give an orthonormal basis of columns, [N, r]."""
+    if not columns.size:
+        return np.zeros((len(columns), 0))
+    left, values, _ = np.linalg.svd(columns, full_matrices=False)
+    return left[:, values > 1e-12 * values[0]]
+
+
+def without(columns: Array, basis: Array) -> Array:
+    """Take what lies in a basis out of columns; twice, for rounding."""
+    once = columns - basis @ (basis.T @ columns)
+    return once - basis @ (basis.T @ once)
+
+
+def spell_rank(rank: Rank, slopes: Collection[str] = ()) -> tuple[str, ...]:
+    """Say in words what cannot be told apart."""
+
+    def name(key: str) -> str:
+        return f"the slope of {key}" if key in slopes else key
+
+    words: list[str] = []
+    if rank.unseen:
+        words.append(f"{', '.join(rank.unseen)}: no effect on these readings")
+    alone = [name(group[0]) for group in rank.confounded if len(group) == 1]
+    if alone:
+        words.append(
+            f"{', '.join(alone)}: cannot be told apart from the unknown place of the set-up"
+        )
+    for group in (group for group in rank.confounded if len(group) > 1):
+        first, *others = map(name, group)
+        joined = ", ".join(others[:-1]) + " and " + others[-1] if others[1:] else others[0]
+        if others[1:]:
+            words.append(f"{first} looks in these readings like a combination of {joined}")
+        else:
+            words.append(f"{first} and {joined} cannot be told apart by these readings")
+    return tuple(words)
+
+
+# --- Several sets of readings as one problem: predictions and derivatives, weighted ---------------
+
+AUTO = "auto"
+CURVES = ("constant", "ramp")
+
+
+@dataclass(frozen=True, slots=True)
+class Terms:
+    """Parameters to be found, and the errors that their amplitudes give."""
+
+    keys: tuple[str, ...]  # (K,)
+    errors: ErrorSet  # the scene's errors, with a curve for each parameter
+    start: Array  # [K], µm or µrad; amplitudes of the scene
+
+    def errors_with(self, amplitudes: Array) -> ErrorSet:
+        """Give the error set with these amplitudes, [K], µm or µrad."""
+        functions = dict(self.errors.functions)
+        for key, value in zip(self.keys, amplitudes, strict=True):
+            functions[key] = functions[key].with_amplitude(float(value))
+        return ErrorSet(functions)
+
+    def only(self, keys: Sequence[str]) -> "Terms":
+        """Give the same for some of the parameters."""
+        start = np.array([self.start[self.keys.index(key)] for key in keys], dtype=float)
+        return replace(self, keys=tuple(keys), start=start)
+
+    @property
+    def slopes(self) -> frozenset[str]:
+        """Parameters of which a slope is looked for."""
+        ramps = (key for key in self.keys if isinstance(self.errors.functions[key], Ramp))
+        return frozenset(ramps)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The rows of the parameter table."""
+        return tuple(parameter(key) for key in self.keys)
+
+
+def build_terms(scene: Scene, keys: Sequence[str]) -> Terms:
+    """Give each parameter a curve: the scene's own, else what its kind suggests.
+
+    A component error that the scene does not have is a ramp over a linear axis and constant over a
+    rotary one; constants are constant. ``EXY:constant`` and ``EXY:ramp`` choose otherwise.
+    """
+    functions = dict(scene.errors.functions)
+    names: list[str] = []
+    for text in keys:
+        key, _, curve = text.partition(":")
+        row = parameter(key)
+        if row.axis not in scene.machine.axes:
+            raise UnknownNameError("error parameter", key, scene.machine.allowed_keys)
+        if key in names:
+            raise OptionError(f"{{fit}} {key} is given twice; expected each parameter once")
+        if curve and curve not in CURVES:
+            raise OptionError(f"{{fit}} {text!r}; expected {key} with :constant or :ramp behind it")
+        names.append(key)
+        linear = scene.machine.axes[row.axis].is_linear
+        if curve or key not in functions:
+            ramp = curve == "ramp" or (not curve and linear and not row.is_constant)
+            kind = Ramp if ramp and not row.is_constant else Constant
+            functions[key] = kind(scene.axis_span(row.axis))
+    errors = ErrorSet(functions)
+    return Terms(tuple(names), errors, np.array([errors.amplitude(key) for key in names], float))
+
+
+def read_keys(text: str, _scene: Scene) -> tuple[str, ...] | None:
+    """Read keys with commas between, in any case; None for auto."""
+    parts = [part.strip() for part in text.split(",") if part.strip()]
+    if [part.lower() for part in parts] == [AUTO]:
+        return None
+    if not parts or any(part.lower() == AUTO for part in parts):
+        raise ValueError("expected auto, or keys such as EX0B,EZ0B")
+    known = {key.lower(): key for key in PARAMETERS}
+    spelled: list[str] = []
+    for part in parts:
+        key, colon, curve = part.partition(":")
+        spelled.append(known.get(key.strip().lower(), key.strip()) + colon + curve.strip().lower())
+    return tuple(spelled)
+
+
+def automatic(scene: Scene, together: Sequence[Readings]) -> tuple[str, ...]:
+    """List the parameters that ``--fit auto`` looks for in several sets of readings.
+
+    Slopes of straightness come last: a straightness is told from a line of its own, and its slope
+    belongs to the squareness.
+    """
+    from warpspace.calibration.kinds.registry import find_kind
+
+    keys: dict[str, None] = {}
+    for readings in together:
+        for key in find_kind(readings.kind).automatic_keys(readings, scene):
+            row = parameter(key)
+            rotary = not scene.machine.axes[row.axis].is_linear
+            whole = readings.kind in {"points", "tracker", "lengths"}
+            if whole and rotary and not row.is_constant and key not in scene.errors:
+                continue  # a constant there is a location error by another name
+            keys[key] = None
+    return tuple(sorted(keys, key=lambda key: key not in scene.errors and is_straightness(key)))
+
+
+def is_straightness(key: str) -> bool:
+    """Tell whether a parameter is a straightness error; its slope looks like a squareness."""
+    row = parameter(key)
+    return (
+        not row.is_constant
+        and not row.is_rotation
+        and is_linear(row.axis)
+        and row.direction != direction_index(row.axis)
+    )
+
+
+Watch = Callable[[], object]
+
+
+def unwatched() -> None:
+    """Let the work go on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stack:
+    """Readings of one or more files."""
+
+    scene: Scene
+    sets: tuple[Readings, ...]
+    # (m,); what the set-ups leave unknown; files that name the same session share it
+    unknowns: tuple[str, ...]
+    # called before each evaluation of the model; what it raises ends the work
+    watch: Watch = unwatched
+
+    @classmethod
+    def of(cls, scene: Scene, sets: Sequence[Readings], watch: Watch = unwatched) -> "Stack":
+        """Put sets together."""
+        names = (name for one in sets for name in find_kind(one.kind).unknowns(one))
+        return cls(scene, tuple(sets), tuple(dict.fromkeys(names)), watch)
+
+    def start(self) -> Array:
+        """Give values of the unknowns to begin with, [m], mm."""
+        values: dict[str, float] = {}
+        for one in self.sets:
+            kind = find_kind(one.kind)
+            own = kind.unknowns(one)
+            for name, value in zip(own, kind.start(one, own), strict=True):
+                values.setdefault(name, float(value))
+        return np.array([values[name] for name in self.unknowns])
+
+    def residuals(self, terms: Terms, amplitudes: Array, unknown: Array) -> list[Array]:
+        """Give observed − predicted of each set with the exact model, [n, d] each, mm."""
+        self.watch()
+        guess = Guess(terms.errors_with(amplitudes), self.unknowns, unknown)
+        return [
+            one.observed_mm - find_kind(one.kind).observe(self.scene, one, guess)
+            for one in self.sets
+        ]
+
+    def derivatives(
+        self, terms: Terms, amplitudes: Array, unknown: Array
+    ) -> tuple[list[Array], list[Array]]:
+        """Give the change of each prediction, [n·d, K] per µm or µrad and [n·d, m] per mm.
+
+        Errors act to first order here; the residuals are those of the exact model.
+        """
+        self.watch()
+        guess = Guess(terms.errors_with(amplitudes), self.unknowns, unknown)
+        by_parameter: list[Array] = []
+        by_unknown: list[Array] = []
+        for one in self.sets:
+            gains, own = find_kind(one.kind).slopes(self.scene, one, guess, terms.keys)
+            by_parameter.append(gains.reshape(one.observed_mm.size, len(terms.keys)))
+            by_unknown.append(own.reshape(one.observed_mm.size, len(self.unknowns)))
+        return by_parameter, by_unknown
+
+    def weights(self) -> list[Array]:
+        """Give the weight of each component of each reading, [n·d], 1/mm; 1 where none is known."""
+        return [
+            np.ones(one.observed_mm.size)
+            if one.sigma_mm is None
+            else np.repeat(1.0 / one.sigma_mm, one.observed_mm.shape[1])
+            for one in self.sets
+        ]
+
+    @property
+    def has_uncertainties(self) -> bool:
+        """Whether every set says how well it was read."""
+        return all(one.sigma_mm is not None for one in self.sets)
+
+    @property
+    def size(self) -> int:
+        """Number of components of all readings."""
+        return sum(one.observed_mm.size for one in self.sets)
+
+
+def rms_mm(residuals: Sequence[Array]) -> float:
+    """Root mean square of the lengths of residual vectors, mm."""
+    lengths = np.concatenate([np.linalg.norm(one, axis=-1) for one in residuals])
+    return float(np.sqrt(np.mean(lengths**2)))
+
+
+def named(unknowns: Sequence[str], values: Array) -> Mapping[str, float]:
+    """Give the unknowns by name, mm."""
+    return {name: float(value) for name, value in zip(unknowns, values, strict=True)}
+
 
 ROBUST_SCALE = 1.345
 """Standard deviations at which the soft L1 loss begins to trust a reading less."""
@@ -21,27 +349,30 @@ MOST_ROUNDS = 20
 
 @dataclass(frozen=True, slots=True)
 class Solved:
-    """A solution: amplitudes, unknowns, and the weighted derivatives there."""
+    """A solution, the weighted derivatives there, and what a component scatters if robust."""
 
     amplitudes: Array
     unknown: Array
     weighted: Array
-    trust: Array
+    scale: float | None = None
 
 
 def solve(
     stack: Stack,
     terms: Terms,
-    request: Request,
     prior: tuple[Array, Array] | None = None,
     unknown: Array | None = None,
+    *,
+    robust: bool = False,
 ) -> Solved:
     """Minimise the weighted residuals over amplitudes and unknowns."""
+    from scipy.optimize import OptimizeResult, least_squares
+
     weights = np.concatenate(stack.weights())
     count = len(terms.keys)
     start = np.concatenate([terms.start, stack.start() if unknown is None else unknown])
     if not len(start):
-        return Solved(start, start, np.zeros((stack.size, 0)), np.ones(stack.size))
+        return Solved(start, start, np.zeros((stack.size, 0)))
 
     def missed(values: Array) -> Array:
         rows = stack.residuals(terms, values[:count], values[count:])
@@ -51,7 +382,8 @@ def solve(
         by_parameter, by_unknown = stack.derivatives(terms, values[:count], values[count:])
         return -weights[:, None] * np.hstack([np.vstack(by_parameter), np.vstack(by_unknown)])
 
-    trust = np.ones(stack.size)
+    trust, unit = np.ones(stack.size), None
+    freedom = max(stack.size - len(start) + (0 if prior is None else count), 1)
 
     def function(values: Array) -> Array:
         rows = np.sqrt(trust) * missed(values)
@@ -64,7 +396,7 @@ def solve(
         own = np.hstack([np.diag(1.0 / prior[1]), np.zeros((count, len(values) - count))])
         return np.vstack([rows, own])
 
-    for _ in range(MOST_ROUNDS if request.robust else 1):
+    for _ in range(MOST_ROUNDS if robust else 1):
         scale = np.linalg.norm(jacobian(start), axis=0)
         found: OptimizeResult = least_squares(
             function,
@@ -79,22 +411,38 @@ def solve(
         if not found.success:
             raise OptionError(
                 f"the fit does not converge ({found.message}); expected readings near to the model."
-                " Leave out outliers (--robust), or look for fewer parameters (--fit KEYS)"
+                " Leave out outliers ({robust}), or look for fewer parameters ({fit} KEYS)"
             )
         moved = float(np.abs((found.x - start) * scale).max(initial=0.0))
         start = found.x
-        if not request.robust:
+        if not robust:
             break
         rows = missed(start)
-        unit = max(MAD * float(np.median(np.abs(rows))), 1e-12)
+        middle = float(np.median(np.abs(rows)))
+        unit = max(MAD * middle * np.sqrt(stack.size / freedom), 1e-12)
         trust = 1.0 / np.sqrt(1.0 + (rows / (ROBUST_SCALE * unit)) ** 2)
         if moved < 1e-9 * unit:
             break
-    return Solved(start[:count], start[count:], jacobian(start), trust)
+    if unit is not None:
+        variance = unit**2 * _robust_variance(missed(start) / unit, freedom)
+        trust = np.full(stack.size, 1.0 / max(variance, float(stack.has_uncertainties)))
+    return Solved(start[:count], start[count:], jacobian(start), unit)
+
+
+def _robust_variance(rows: Array, freedom: int) -> float:
+    """Give what takes the place of the residual variance where rows count by the soft L1 loss.
+
+    κ²·Σψ²/(n − p)/(mean of ψ′)², Huber and Ronchetti, Robust Statistics (2nd edition), 7.6.
+    """
+    falls = 1.0 + (rows / ROBUST_SCALE) ** 2
+    slope = falls**-1.5
+    mean, share = float(slope.mean()), 1.0 - freedom / len(rows)
+    correction = 1.0 + share * float(slope.var()) / mean**2
+    return correction**2 * float(np.sum(rows**2 / falls)) / freedom / mean**2
 
 
 def covariance_of(solved: Solved, count: int) -> Array:
-    """Give the covariance of the parameters for a weight of one, [K, K]."""
+    """Give the covariance of the parameters, [K, K]: for a weight of one, unless robust."""
     scale = np.linalg.norm(solved.weighted, axis=0)
     scale = np.where(scale > 0.0, scale, 1.0)
     triangle = np.linalg.qr(solved.weighted / scale, mode="r")

@@ -22,13 +22,7 @@ if TYPE_CHECKING:
 
 
 def write_page(picture: "ScenePicture", target: "Path", *, overwrite: bool) -> None:
-    """Write the interactive scene as one page that needs no network.
-
-    Raises
-    ------
-    OptionError
-        If the grid is too fine: the page is built from the response to every parameter.
-    """
+    """Write the interactive scene as one page that needs no network."""
     from warpspace.app.documents.offline_page import build_offline_html, offline_picture
     from warpspace.outputs.files import write_atomically
 
@@ -46,7 +40,6 @@ def write_page(picture: "ScenePicture", target: "Path", *, overwrite: bool) -> N
 
 
 def _check_size(picture: "ScenePicture") -> None:
-    """Refuse a page that takes too much memory to build, before it is built."""
     from warpspace.exceptions import OptionError
     from warpspace.machine.limits import MAX_PAGE_BYTES
 

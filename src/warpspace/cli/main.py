@@ -2,19 +2,28 @@
 
 import io
 import os
+import signal
 import sys
+import threading
+import time
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 from typing import NoReturn
 
 import click
 
-from warpspace import __version__
-from warpspace.cli.registry import COMMANDS
-from warpspace.cli.signals import handle_signals
-from warpspace.cli.terminal import echo, plain
+from warpspace.analysis.catalogue import TASKS, entries
+from warpspace.cli.registry import COMMANDS, task_of
+from warpspace.cli.tables import echo, plain
 from warpspace.exceptions import WarpspaceError
+from warpspace.resources import __version__
 
 BAD_INPUT = 2
+NO_MEMORY = "not enough memory for this; try a smaller grid"
+SIGNS_OF_NO_MEMORY = ("failed to map segment", "cannot allocate memory", "can't start new thread")
+"""How libraries that cannot be loaded, and threads that cannot be started, say so."""
 
 COMPLETION_HELP = """
 \b
@@ -23,7 +32,28 @@ Shell completion (bash; zsh and fish likewise):
 """
 
 
+class TaskGroup(click.Group):
+    """The commands under headings by task; analyses are listed without being imported."""
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the lists."""
+        sentences = {entry.name: entry.sentence for entry in entries()}
+        tasks: dict[str, list[tuple[str, str]]] = {words: [] for words in TASKS.values()}
+        room = formatter.width - 6 - max(map(len, self.commands))
+        for name in self.list_commands(ctx):
+            if name in sentences:
+                words = click.Command(name, help=sentences[name]).get_short_help_str(room)
+            else:
+                words = self.commands[name].get_short_help_str(room)
+            tasks[TASKS[task_of(name)]].append((name, words))
+        for heading, rows in tasks.items():
+            if rows:
+                with formatter.section(heading):
+                    formatter.write_dl(rows)
+
+
 @click.group(
+    cls=TaskGroup,
     commands=COMMANDS,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog=COMPLETION_HELP,
@@ -32,7 +62,7 @@ Shell completion (bash; zsh and fish likewise):
 def cli() -> None:
     """See and steer how a machine tool's geometric errors bend the space it works in.
 
-    SCENE is a bundled name (see `warpspace scenes`) or the path of a TOML file. Lengths are mm,
+    SCENE is a bundled name (see `warpspace list`) or the path of a TOML file. Lengths are mm,
     errors µm, small angles µrad, rotary positions degrees.
     """
 
@@ -52,10 +82,10 @@ def main() -> None:
             click.echo(_shown(error), err=True, nl=False)
             sys.exit(BAD_INPUT)
         except (click.exceptions.Abort, KeyboardInterrupt):
-            _refuse(ending.word, ending.status)
+            _end(ending)
         except WarpspaceError as error:
             if ending.number:  # because its renderer was ended
-                _refuse(ending.word, ending.status)
+                _end(ending)
             _refuse(str(error))
         except BrokenPipeError:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -65,26 +95,132 @@ def main() -> None:
                 _refuse("the working folder does not exist any more; change to another one")
             _refuse(f"{error.filename or 'output'}: {error.strerror or error}")
         except MemoryError:
-            _refuse("not enough memory for this; try a smaller grid")
+            _refuse(NO_MEMORY)
+        except (ImportError, RuntimeError) as error:
+            if not any(sign in str(error) for sign in SIGNS_OF_NO_MEMORY):
+                raise
+            _refuse(NO_MEMORY)
 
 
-def _refuse(message: str, status: int = BAD_INPUT) -> NoReturn:
-    """End with a message."""
+def _refuse(message: str) -> NoReturn:
     echo(f"warpspace: {message}", err=True)
-    sys.exit(status)
+    sys.exit(BAD_INPUT)
+
+
+def _end(ending: "Ending") -> NoReturn:
+    """Say which signal it was; at once, since libraries in C may crash while threads still work."""
+    echo(f"warpspace: {ending.word}", err=True)
+    if ending.number:
+        os._exit(ending.status)
+    sys.exit(ending.status)
 
 
 def _shown(error: click.ClickException) -> str:
-    """Give what click says of an error, with the usage where it belongs to a command."""
     page = io.StringIO()
     error.show(file=page)
     return plain(page.getvalue())
 
 
 def _is_nowhere() -> bool:
-    """Tell whether the working folder was deleted."""
     try:
         Path.cwd()
     except OSError:
         return True
     return False
+
+
+# --- Sudden ends ---------------------------------------------------------------------------------
+
+
+_SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
+_PATIENCE_S = 1.0
+"""A signal that comes again sooner is taken for the same one: some programs send it twice."""
+_LONGEST_IMPORT_S = 5.0
+"""How long a signal waits for the end of an import."""
+
+
+class Ended(KeyboardInterrupt):
+    """A signal that ends the program.
+
+    A class of its own: where a plain KeyboardInterrupt has passed through `exec`, as it does while
+    packages are imported, Python ends itself with SIGINT at last, whatever the exit status said.
+    """
+
+
+class Ending:
+    """What a signal asked for."""
+
+    def __init__(self) -> None:
+        self.number = 0
+        self._first = 0.0
+        self._since = 0.0
+        self._is_lost = False
+
+    @property
+    def status(self) -> int:
+        """Exit status of a process that a signal ended, as shells count."""
+        return 128 + (self.number or signal.SIGINT)
+
+    @property
+    def word(self) -> str:
+        """What the user is told."""
+        return "interrupted" if self.number in (0, signal.SIGINT) else "terminated"
+
+    def handle(self, number: int, frame: FrameType | None) -> None:
+        """Kill the renderers and leave the work begun; the second time end without cleaning up."""
+        now = time.monotonic()
+        if self.number and not self._is_lost:
+            if now - self._since > _PATIENCE_S:
+                os._exit(self.status)
+            return
+        self._first = self._first or now
+        self.number, self._since, self._is_lost = number, now, False
+        if _is_importing(frame) and now - self._first < _LONGEST_IMPORT_S:
+            self._again()
+            return
+        # a command that draws nothing need not load it
+        processes = sys.modules.get("warpspace.outputs.processes")
+        if kill_pools := getattr(processes, "kill_pools", None):
+            kill_pools()
+        raise Ended
+
+    def _again(self) -> None:
+        self._is_lost = True
+        threading.Timer(0.01, os.kill, [os.getpid(), self.number]).start()
+
+    def handle_lost(self, about: "sys.UnraisableHookArgs") -> None:
+        """Raise `Ended` again where Python has dropped it: in finalizers and callbacks."""
+        if isinstance(about.exc_value, Ended):
+            self._again()
+        else:
+            sys.__unraisablehook__(about)
+
+
+def _is_importing(frame: FrameType | None) -> bool:
+    """Tell whether a package is being imported: VTK crashes where that is broken off."""
+    while frame is not None:
+        if frame.f_code.co_filename == "<frozen importlib._bootstrap>":
+            return True
+        frame = frame.f_back
+    return False
+
+
+@contextmanager
+def handle_signals() -> Generator[Ending]:
+    """Let signals that end the program raise `Ended`, so that files are cleaned up."""
+    ending = Ending()
+    before = {}
+    if threading.current_thread() is threading.main_thread():
+        for name in _SIGNALS:
+            number = getattr(signal, name, None)
+            # nohup, and shells in front of a command in the background, have one ignored
+            if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
+                before[number] = signal.signal(number, ending.handle)
+    sys.unraisablehook, hook = ending.handle_lost, sys.unraisablehook
+    try:
+        yield ending
+    finally:
+        sys.unraisablehook = hook
+        if not ending.number:
+            for number, handler in before.items():
+                signal.signal(number, handler)

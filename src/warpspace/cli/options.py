@@ -2,41 +2,85 @@
 
 import json
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import click
-from click.shell_completion import CompletionItem
+from click.core import ParameterSource
 
-from warpspace.cli.terminal import echo, escape_json
+from warpspace.cli.guard import OutputFile, SceneName
+from warpspace.cli.tables import echo, escape_json, progress
 from warpspace.exceptions import OptionError
-from warpspace.machine.axes import is_axis_name
+from warpspace.scene.files import parse_number, parse_whole
 
 if TYPE_CHECKING:
+    from warpspace.field.evaluate import SecondOrder
     from warpspace.machine.description import Machine
+    from warpspace.outputs.drawing.settings import FigureSettings
+    from warpspace.scene.model import Scene
+
+FORMER: dict[str, tuple[str, tuple[str, ...]]] = {
+    "animate": ("draw", ()),
+    "ballbar": ("test", ("ballbar",)),
+    "formats": ("import", ("--formats",)),
+    "import-machine": ("import", ("--format", "urdf")),
+    "measured": ("check", ("--against", "own")),
+    "machines": ("list", ("machines",)),
+    "scenes": ("list", ("scenes",)),
+    "snapshot": ("draw", ()),
+    "sweep": ("montecarlo", ("--rows",)),
+    "template": ("import", ("--template",)),
+}
+"""Former name of a command: its present name, and the arguments it stands for."""
+
+
+class RenamedOption(click.Option):
+    """An option with the flags it had before, which no help text lists."""
+
+    def __init__(self, *declared: Any, former: tuple[str, ...] = (), **traits: Any) -> None:
+        super().__init__(*declared, **traits)
+        self.former = former
+
+    def add_to_parser(self, parser: Any, ctx: click.Context) -> None:
+        """Let the parser know the former flags beside the present ones."""
+        listed = self.opts
+        self.opts = [*listed, *self.former]
+        try:
+            super().add_to_parser(parser, ctx)
+        finally:
+            self.opts = listed
+
+
+class RenamedCommand(click.Command):
+    """A former command: the present one, with the arguments that it stands for put first."""
+
+    def __init__(self, name: str, now: click.Command, prefix: tuple[str, ...]) -> None:
+        super().__init__(name, help=f"Former name of {now.name}.", hidden=True)
+        self.now = now
+        self.prefix = prefix
+
+    def make_context(
+        self,
+        info_name: str | None,  # noqa: ARG002 - signature of click
+        args: list[str],
+        parent: click.Context | None = None,
+        **extra: Any,
+    ) -> click.Context:
+        """Read the arguments as the present command."""
+        return self.now.make_context(self.now.name, [*self.prefix, *args], parent, **extra)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the present command."""
+        return self.now.invoke(ctx)
+
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 LOOPS = ("tool", "workpiece", "relative")
 DIRECTIONS = ("mean", "forward", "backward", "difference")
+SECOND_ORDER = "warpspace.second_order"
+"""Where the context of a command keeps what its JSON object says of the second order."""
 COMPONENTS = ("norm", "x", "y", "z")
-
-
-class SceneName(click.ParamType[str]):
-    """A bundled scene or a path; the shell completes both."""
-
-    name = "scene"
-
-    def shell_complete(
-        self,
-        ctx: click.Context,  # noqa: ARG002 - signature of click
-        param: click.Parameter,  # noqa: ARG002
-        incomplete: str,
-    ) -> list[CompletionItem]:
-        """Offer the bundled names, and files."""
-        from warpspace.scene.library import scene_names
-
-        names = [name for name in scene_names() if name.startswith(incomplete)]
-        return [CompletionItem(name) for name in names] or [CompletionItem(incomplete, type="file")]
 
 
 def scene_argument(name: str = "scene", **kwargs: Any) -> Decorator:
@@ -47,11 +91,27 @@ def scene_argument(name: str = "scene", **kwargs: Any) -> Decorator:
 json_option = click.option(
     "--json", "as_json", is_flag=True, help="Print exactly one JSON object on stdout."
 )
+
+
+def placed_loop(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+    """Look at the relative loop where the placement is fitted out and no loop was given."""
+    given = ctx.get_parameter_source(param.name or "") is not ParameterSource.DEFAULT
+    return "relative" if ctx.params.get("placed") and not given else value
+
+
+placed_option = click.option(
+    "--placed",
+    is_flag=True,
+    is_eager=True,
+    help="Leave out where the workpiece lies: three shifts and three small rotations of it, fitted"
+    " for the least RMS over the working volume. Looks at the relative loop.",
+)
 loop_option = click.option(
     "--loop",
     type=click.Choice(LOOPS),
     default="tool",
     show_default=True,
+    callback=placed_loop,
     help="Structural loop: tool point, workpiece point, or tool relative to workpiece.",
 )
 direction_option = click.option(
@@ -96,95 +156,31 @@ def grid_option(default: int | None = 21, of: str = "of the working volume") -> 
 
 
 def parse_point(text: str, axes: Collection[str], option: str = "--at") -> dict[str, float]:
-    """Read axis positions as a user types them.
+    """Read axis positions as a user types them."""
+    from warpspace.analysis.typed import read_place
 
-    Parameters
-    ----------
-    text : str
-        For instance ``X=0,Y=-225,B=30``.
-    axes : collection of str
-        Letters of the axes there are.
-    option : str, optional
-        What it was given with, for messages.
-
-    Returns
-    -------
-    dict of str to float, mm or degrees
-
-    Raises
-    ------
-    OptionError
-        If it cannot be read.
-    """
-    expected = "expected axis=number pairs with commas between, for instance X=0,Y=-225,B=30"
-    found: dict[str, float] = {}
-    for part in text.replace(";", ",").split(","):
-        name, equals, number = part.partition("=")
-        name = name.strip().upper()
-        try:
-            value = float(number)
-        except ValueError:
-            value = math.nan
-        if not equals or not math.isfinite(value) or not (len(name) == 1 or is_axis_name(name)):
-            raise OptionError(f"{option} {text!r}: {part.strip()!r} cannot be read; {expected}")
-        if name not in axes:
-            known = ", ".join(axes)
-            raise OptionError(f"{option} {text!r}: unknown axis {name}; expected one of {known}")
-        if name in found:
-            raise OptionError(f"{option} {text!r}: axis {name} is given twice")
-        if abs(value) > 1e5:
-            raise OptionError(
-                f"{option} {text!r}: {value:g}; expected at most ±100000 mm or degrees"
-            )
-        found[name] = value
-    return found
+    try:
+        return read_place(text, axes)
+    except ValueError as error:
+        raise OptionError(f"{option} {text!r}: {error}") from None
 
 
 def warn_outside_travel(machine: "Machine", point: Mapping[str, float]) -> None:
-    """Say on stderr where a position lies outside the travel of its axis.
+    """Say on stderr where a position lies outside the travel of its axis."""
+    from warpspace.analysis.typed import outside_travel
 
-    Parameters
-    ----------
-    machine : Machine
-    point : mapping of str to float, mm or degrees
-        As typed.
-    """
-    for name, value in point.items():
-        axis = machine.axes[name]
-        low, high = axis.travel
-        if not low <= value <= high:
-            unit = f" {axis.unit}" if axis.is_linear else axis.unit
-            echo(
-                f"warpspace: warning: --at {name}={value:g} is outside the travel of {name},"
-                f" {low:g} to {high:g}{unit}; its errors are continued beyond it",
-                err=True,
-                fg="yellow",
-            )
+    for words in outside_travel(machine, point):
+        echo(f"warpspace: warning: --at {words}", err=True, fg="yellow")
 
 
 def parse_exaggeration(text: str | None) -> float | Literal["auto"] | None:
-    """Read a display factor as a user types it.
-
-    Parameters
-    ----------
-    text : str or None
-        A number or "auto"; None where the option is absent.
-
-    Returns
-    -------
-    float, "auto" or None
-
-    Raises
-    ------
-    OptionError
-        If it is neither.
-    """
+    """Read a display factor as a user types it."""
     if text is None:
         return None
     if text.strip().lower() == "auto":
         return "auto"
     try:
-        value = float(text)
+        value = parse_number(text)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
@@ -192,11 +188,156 @@ def parse_exaggeration(text: str | None) -> float | Literal["auto"] | None:
     return value
 
 
+def say_first_order(loop: str, *scenes: "Scene") -> None:
+    """Say of scenes whose errors are evaluated to first order what that leaves out."""
+    from warpspace.scene.model import second_order
+
+    say_second_order(*(second_order(scene, loop) for scene in scenes))
+
+
+def say_second_order(*found: "SecondOrder") -> dict[str, float]:
+    """Warn where first-order numbers are not enough; the JSON object carries it in any case."""
+    from warpspace.field.evaluate import second_order_words
+
+    for words in second_order_words(*found):
+        echo(f"warpspace: warning: {words}", err=True, fg="yellow")
+    said = click.get_current_context().meta[SECOND_ORDER] = {
+        "second_order_um": max(one.um for one in found)
+    }
+    return said
+
+
 def print_json(value: Mapping[str, object]) -> None:
     """Print one JSON object; numbers that are not finite are refused rather than misspelt."""
-    click.echo(spell_json(value))
+    context = click.get_current_context(silent=True)
+    click.echo(spell_json({**value, **(context.meta.get(SECOND_ORDER, {}) if context else {})}))
 
 
 def spell_json(value: object) -> str:
     """Spell a value as JSON; numbers that are not finite are refused rather than misspelt."""
     return escape_json(json.dumps(value, ensure_ascii=False, allow_nan=False))
+
+
+# --- Options of the commands that write files ----------------------------------------------------
+
+
+FIGURES = (".png", ".svg", ".pdf")
+ROWS = (".parquet", ".csv")
+SCENES = (".toml",)
+
+force_option = click.option("--force", is_flag=True, help="Replace FILE where it exists.")
+csv_option = click.option(
+    "--csv", "csv_path", type=OutputFile(".csv"), help="Write the numbers to this CSV file."
+)
+
+
+def output_option(
+    help_text: str,
+    *endings: str,
+    added: Callable[[], Iterable[str]] = tuple,
+    required: bool = True,
+) -> Decorator:
+    """Add the option --output, of a file with one of some endings, or any."""
+    kind = OutputFile(*endings, added=added)
+    return click.option(
+        "-o", "--output", metavar="FILE", required=required, type=kind, help=help_text
+    )
+
+
+def plot_option(what: str) -> Decorator:
+    """Add the option --plot: a chart beside the numbers."""
+    help_text = f"Draw the {what} into this file: .png, .svg or .pdf."
+    return click.option("--plot", type=OutputFile(*FIGURES), help=help_text)
+
+
+def size_text(path: str) -> str:
+    """Spell the size of a file."""
+    return f"{Path(path).stat().st_size / 1e6:.2f} MB"
+
+
+SIZE = "1600x1200"
+VIEWS = ("iso", "front", "right", "top")
+
+
+def figure_options(size: str | None = SIZE, sizes: str = "") -> Decorator:
+    """Add the options of a map; where its size in px depends, `sizes` says on what."""
+    options = (
+        component_option,
+        exaggeration_option,
+        click.option(
+            "--view",
+            type=click.Choice(VIEWS),
+            default="iso",
+            show_default=True,
+            help="Where the camera stands.",
+        ),
+        click.option(
+            "--size",
+            default=size,
+            show_default=size is not None,
+            metavar="WxH",
+            help=f"Width and height of the picture in px.{sizes}",
+        ),
+        loop_option,
+        placed_option,
+        direction_option,
+        grid_option(),
+        click.option("--dark", is_flag=True, help="Light ink on a dark ground."),
+        force_option,
+    )
+
+    def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return decorate
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """Read a size as a user types it, for instance ``1600x1200``."""
+    width, _, height = text.lower().replace("×", "x").partition("x")
+    try:
+        return parse_whole(width), parse_whole(height)
+    except ValueError:
+        raise OptionError(
+            f"--size {text!r} cannot be read; expected WIDTHxHEIGHT in px, for instance 1600x1200"
+        ) from None
+
+
+def parse_settings(
+    *,
+    component: str,
+    exaggeration: str | None,
+    view: str,
+    size: str,
+    loop: str,
+    grid: int,
+    dark: bool,
+) -> "FigureSettings":
+    """Check the options of a map."""
+    from warpspace.field.grid import node_counts
+    from warpspace.outputs.drawing.settings import FigureSettings
+
+    node_counts(grid)
+    factor = parse_exaggeration(exaggeration)
+    return FigureSettings(component, factor, view, parse_size(size), dark, loop, grid)
+
+
+def draw_figure_file(
+    name: str,
+    scenes: "Sequence[Scene]",
+    settings: "FigureSettings",
+    target: str,
+    *,
+    force: bool,
+    silent: bool = False,
+) -> None:
+    """Draw a figure and write it; the ending chooses the format."""
+    from warpspace.outputs.save import write_figure
+    from warpspace.outputs.worker import LEAST_MB
+    from warpspace.resources import check_address_space
+
+    check_address_space(LEAST_MB, "drawing")
+    with progress("drawing", silent=silent):
+        write_figure(target, name, scenes, settings, force=force)

@@ -45,23 +45,6 @@ def draw_figure(request: Request, cancelled: threading.Event) -> bytes:
     """Draw the map of a request as a PNG; of a comparison both sides and the difference.
 
     Where tilts are coloured it is the orientation map; a comparison is always of position errors.
-
-    Parameters
-    ----------
-    request : Request
-    cancelled : threading.Event
-        Ends the renderer when set.
-
-    Returns
-    -------
-    bytes
-
-    Raises
-    ------
-    CancelledError
-        If it was cancelled.
-    RenderError
-        If it cannot be drawn here.
     """
     from warpspace.outputs.drawing.settings import FigureSettings
 
@@ -80,7 +63,8 @@ def draw_figure(request: Request, cancelled: threading.Event) -> bytes:
         raise OptionError(f"figure {name!r} is of one machine; show A or B in the tab Compare")
     if not request.figure and request.pair is not None:
         settings = replace(settings, conditions=request.pair_conditions)
-        if request.tilts:
+        # the change has colours of its own, whichever of the three is drawn on the page
+        if request.tilts or not request.range_fixed:
             settings = replace(settings, range_top=None)
         name, scenes = "comparison", list(request.pair)
     elif request.beside is not None:
@@ -109,24 +93,8 @@ def draw_concepts(request: ConceptRequest, cancelled: threading.Event) -> bytes:
 
 
 def draw_compensation(request: CompensationRequest, cancelled: threading.Event) -> bytes:
-    """Draw the maps of a compensation as a PNG.
-
-    Parameters
-    ----------
-    request : CompensationRequest
-    cancelled : threading.Event
-        Ends the process that draws when set.
-
-    Returns
-    -------
-    bytes
-
-    Raises
-    ------
-    CancelledError
-        If it was cancelled.
-    """
-    from warpspace.outputs.charts.compensation_column import draw_maps
+    """Draw the maps of a compensation as a PNG."""
+    from warpspace.outputs.charts.results import draw_maps
     from warpspace.outputs.processes import ProcessPool
 
     _take_turn(cancelled)
@@ -145,7 +113,6 @@ def draw_compensation(request: CompensationRequest, cancelled: threading.Event) 
 
 
 def _take_turn(cancelled: threading.Event) -> None:
-    """Wait until one more figure may be drawn."""
     while not _renderers.acquire(timeout=POLL_S):
         if cancelled.is_set():
             raise CancelledError("cancelled while waiting for a renderer")
@@ -157,7 +124,6 @@ def _render(
     settings: "FigureSettings",
     cancelled: threading.Event,
 ) -> bytes:
-    """Draw a figure in a process of its own, which ends when that is cancelled."""
     from warpspace.outputs.worker import FigureWorker
 
     _take_turn(cancelled)
@@ -175,20 +141,8 @@ def _render(
 
 
 def write_export(request: Request, ending: str) -> bytes:
-    """Write an export of a request.
-
-    Parameters
-    ----------
-    request : Request
-    ending : str
-        ".glb", ".vts" or ".csv".
-
-    Returns
-    -------
-    bytes
-        The file's content.
-    """
-    from warpspace.outputs.leftovers import temporary_folder
+    """Write an export of a request."""
+    from warpspace.outputs.files import temporary_folder
     from warpspace.picture.comparison import scene_change
     from warpspace.picture.scene_picture import evaluate_picture
 

@@ -1,20 +1,26 @@
-"""What the commands print for people: tables and sentences that fit the terminal.
+"""What the commands say to people: tables and sentences that fit the terminal, and progress.
 
 The width is that of the terminal, or what the variable COLUMNS says; 80 where the output goes into
 a file or another program. Only words wrap. A table with more columns than fit goes on below, with
 its first columns repeated, so that no number is cut and nothing is left out. A long table has its
-headings again every forty rows.
+headings again every forty rows. Progress of what takes longer than a second stands on stderr; none
+where that is no terminal, or where a program reads the output (``--json``).
 """
 
 import io
 import re
 import sys
-from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
+from threading import Lock, Timer
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from warpspace.cli.terminal import plain
+if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
+
+    from warpspace.analysis.blocks import Column
 
 WIDTH_ELSEWHERE = 80
 """Characters in a line where the output is no terminal."""
@@ -27,46 +33,6 @@ _TOGETHER = re.compile(r"(?<=\d) (?=[µm°%])|(?<= [A-Z]) (?=[-+\d])")
 """Blanks that no line ends with: between a number and its unit, an axis and its position."""
 
 
-class Column(NamedTuple):
-    """One column of a table.
-
-    Parameters
-    ----------
-    heading : str
-        What it holds; no column of a table without headings has one.
-    unit : str, optional
-        Stands in brackets below the heading.
-    is_number : bool, optional
-        Whether it is aligned at the right.
-    wraps : bool, optional
-        Whether long cells may take several lines, broken between words.
-    leads : bool, optional
-        Whether it is repeated where the table goes on below. Such columns come first.
-    joins : bool, optional
-        Whether it is never parted from the column before it.
-    """
-
-    heading: str = ""
-    unit: str = ""
-    is_number: bool = False
-    wraps: bool = False
-    leads: bool = False
-    joins: bool = False
-
-    @property
-    def head(self) -> str:
-        """Heading and unit, in two lines."""
-        return f"{self.heading}\n[{self.unit}]" if self.unit else self.heading
-
-
-def number_columns(headings: Iterable[str], unit: str = "") -> list[Column]:
-    """Build columns of numbers that have the same unit and stay side by side."""
-    return [
-        Column(heading, unit, is_number=True, joins=index > 0)
-        for index, heading in enumerate(headings)
-    ]
-
-
 def output_width() -> int:
     """Give the width to print in, in characters."""
     import shutil
@@ -75,13 +41,7 @@ def output_width() -> int:
 
 
 def print_text(text: str) -> None:
-    """Print a sentence.
-
-    Parameters
-    ----------
-    text : str
-        The blanks it begins with stand before every line; lines after the first get two more.
-    """
+    """Print a sentence."""
     import textwrap
 
     text = plain(text)
@@ -97,18 +57,8 @@ def print_text(text: str) -> None:
     click.echo("\n".join(lines).replace("\N{NO-BREAK SPACE}", " "))
 
 
-def print_table(columns: Sequence[Column], rows: Sequence[Row], indent: int = 2) -> None:
-    """Print a table.
-
-    Parameters
-    ----------
-    columns : sequence of Column
-        The most important ones first.
-    rows : sequence of sequence of str
-        One text a column. It is printed as it stands: brackets are no mark-up.
-    indent : int, optional
-        Blanks before each line.
-    """
+def print_table(columns: "Sequence[Column]", rows: Sequence[Row], indent: int = 2) -> None:
+    """Print a table."""
     from textwrap import indent as indented
 
     room = output_width() - indent
@@ -136,8 +86,7 @@ class _Size(NamedTuple):
     natural: int
 
 
-def _measure(column: Column, cells: Sequence[str]) -> _Size:
-    """Measure a column."""
+def _measure(column: "Column", cells: Sequence[str]) -> _Size:
     from rich.cells import cell_len
 
     lines = [line for text in (column.head, *cells) for line in text.splitlines()]
@@ -148,8 +97,7 @@ def _measure(column: Column, cells: Sequence[str]) -> _Size:
     return _Size(least, min(natural, max(least, READABLE)), natural)
 
 
-def _split(columns: Sequence[Column], widths: Sequence[int], room: int) -> list[list[int]]:
-    """Share out the columns over as many tables as needed, by index; one blank between columns."""
+def _split(columns: "Sequence[Column]", widths: Sequence[int], room: int) -> list[list[int]]:
     groups: list[list[int]] = []
     for index, column in enumerate(columns):
         if column.joins and groups:
@@ -170,8 +118,7 @@ def _split(columns: Sequence[Column], widths: Sequence[int], room: int) -> list[
     return parts
 
 
-def _draw(columns: Sequence[Column], rows: Sequence[Row], gap: int, width: int) -> str:
-    """Lay out a table in a width that it fits."""
+def _draw(columns: "Sequence[Column]", rows: Sequence[Row], gap: int, width: int) -> str:
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
@@ -201,3 +148,118 @@ def _draw(columns: Sequence[Column], rows: Sequence[Row], gap: int, width: int) 
     )
     console.print(table)
     return "\n".join(line.rstrip() for line in page.getvalue().splitlines())
+
+
+# --- Texts on their way to a terminal ------------------------------------------------------------
+
+
+_STEERING = re.compile(
+    "[\x00-\x1f\x7f-\x9f"  # control characters
+    "\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069"  # direction of writing
+    "\u2028\u2029"  # line and paragraph separators
+    "\ud800-\udfff]"  # bytes of file names that are no text
+)
+_LINE_BREAKS = "\n\t"
+
+
+def plain(text: str, *, breaks: bool = True) -> str:
+    r"""Spell out the characters that would steer a terminal, for instance ``\x1b``."""
+    kept = _LINE_BREAKS if breaks else ""
+    return _STEERING.sub(lambda found: found[0] if found[0] in kept else _spell(found[0]), text)
+
+
+def escape_json(text: str) -> str:
+    r"""Spell out the same characters in JSON text, as ``\u001b``; it means the same as before."""
+    return _STEERING.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+
+
+def echo(text: str = "", *, err: bool = False, breaks: bool = True, **style: Any) -> None:
+    """Print a text without characters that would steer the terminal."""
+    click.secho(plain(text, breaks=breaks), err=err, **style)
+
+
+def _spell(character: str) -> str:
+    code = ord(character)
+    if 0xDC80 <= code <= 0xDCFF:
+        code -= 0xDC00  # a byte of a file name
+    return f"\\x{code:02x}" if code <= 0xFF else f"\\u{code:04x}"
+
+
+DELAY_S = 1.0
+"""What is done sooner shows nothing."""
+
+
+class ProgressBar:
+    """A bar that appears once the work has taken a while."""
+
+    def __init__(self, doing: str, total: float | None, unit: str) -> None:
+        self._doing = doing
+        self._total = total
+        self._unit = unit
+        self._done = 0.0
+        self._lock = Lock()
+        self._closed = False
+        self._shown: tuple[Progress, TaskID] | None = None
+
+    def advance(self, steps: float) -> None:
+        """Count steps that are done."""
+        with self._lock:
+            self._done += steps
+            if self._shown is not None:
+                bar, task = self._shown
+                bar.update(task, completed=self._done)
+
+    def reach(self, share: float) -> None:
+        """Say how much of the work is done, as an analysis counts it: 0 to 1."""
+        self.advance(share - self._done)
+
+    def show(self) -> None:
+        """Draw the bar from now on, unless the work is done."""
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+        counted = "{task.completed:,.0f} of {task.total:,.0f} " + self._unit
+        counts = (
+            [] if self._total is None or not self._unit else [TextColumn(counted, markup=False)]
+        )
+        with self._lock:
+            if self._closed:
+                return
+            bar = Progress(
+                TextColumn("{task.description}", markup=False),
+                BarColumn(bar_width=None),
+                *counts,
+                TimeElapsedColumn(),
+                console=Console(file=sys.stderr),
+                transient=True,
+                expand=True,
+                redirect_stdout=False,
+                redirect_stderr=False,
+            )
+            task = bar.add_task(self._doing, total=self._total, completed=int(self._done))
+            self._shown = bar, task
+            bar.start()
+
+    def close(self) -> None:
+        """Wipe the bar away."""
+        with self._lock:
+            self._closed = True
+            if self._shown is not None:
+                self._shown[0].stop()
+
+
+@contextmanager
+def progress(
+    doing: str, total: float | None = None, unit: str = "", *, silent: bool = False
+) -> Generator[ProgressBar]:
+    """Show how far some work is."""
+    bar = ProgressBar(doing, total, unit)
+    timer = Timer(DELAY_S, bar.show)
+    timer.daemon = True
+    if not silent and sys.stderr.isatty():
+        timer.start()
+    try:
+        yield bar
+    finally:
+        timer.cancel()
+        bar.close()

@@ -8,57 +8,203 @@ an array over these.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
-from warpspace.field.basis import ErrorBasis, ErrorField
-from warpspace.field.pieces import cut, cut_all, is_small, pieces
+from warpspace.field.grid import Grid, Workspace, build_grid, cut, cut_all, is_small, pieces
 from warpspace.kinematics import transforms
-from warpspace.kinematics.chain import branch_pose, nominal_point
+from warpspace.kinematics.chain import branch_pose, nominal_point, tool_axis
 from warpspace.kinematics.components import join, rotate, split, split_rows, subtract
 from warpspace.kinematics.deviation import LoopLinks, build_links, solve_links
 from warpspace.kinematics.firstorder import jacobian
 from warpspace.kinematics.model import Coordinates, Loop, Model, batch_shape
+from warpspace.machine.axes import TravelDirection, is_linear
 from warpspace.machine.errors import ErrorSet
 from warpspace.machine.parameters import parameter
-from warpspace.machine.travel import TravelDirection
-from warpspace.units import Array
+from warpspace.spelling import spell
+from warpspace.units import UM_PER_MM_URAD, Array
 
 
-@dataclass(frozen=True, slots=True)
-class View:
-    """How errors are looked at: the loop, the frame of the result and the point held still.
+@dataclass(frozen=True)
+class ErrorField:
+    """Errors over a batch of points.
 
     Attributes
     ----------
-    loop : Loop
-    frame : str
-        "machine" for results in R, "workpiece" for results in the nominal workpiece frame.
-    reference : mapping of str to float or None
-        Axis coordinates of the point whose position error is subtracted everywhere; None is
-        absolute. Orientation errors stay absolute.
+    nominal_mm : ndarray, [..., 3], mm
+        Nominal points in R.
+    error_um : ndarray, [..., 3], µm
+        Position error, actual − nominal.
+    orientation_urad : ndarray, [..., 3], µrad
+        Orientation error of the tool axis: the small rotation vector that turns it, right-hand
+        rule. It has no part about the tool axis itself; its norm is the tilt. Not a number where it
+        was not asked for.
     """
 
-    loop: Loop = Loop.TOOL
-    frame: str = "machine"
-    reference: Mapping[str, float] | None = None
+    nominal_mm: Array
+    error_um: Array
+    orientation_urad: Array
+
+    @cached_property
+    def norm_um(self) -> Array:
+        """Length of the position error, [...], µm."""
+        x, y, z = (self.error_um[..., axis] for axis in range(3))
+        squared = x * x
+        squared += y * y  # in place: a volume of points is larger than what a processor keeps near
+        squared += z * z
+        return np.sqrt(squared)
 
 
-def error_values(model: Model, errors: ErrorSet, coordinates: Coordinates) -> dict[str, Array]:
-    """Evaluate the error functions of a set at axis positions.
+@dataclass(frozen=True, slots=True)
+class ErrorBasis:
+    """First-order response of a batch of points to every parameter."""
+
+    keys: tuple[str, ...]  # (K,); parameter keys
+    nominal_mm: Array  # [..., 3]; nominal points in R
+    # [K, ..., 3], µm per µm or µrad of amplitude; the curve of each parameter along its axis is
+    # folded in
+    position: Array
+    orientation: Array  # [K, ..., 3], µrad per µm or µrad of amplitude
+
+    def evaluate(self, amplitudes: Array, *, orientation: bool = True) -> ErrorField:
+        """Add up the response to amplitudes, [K]; the orientation error is twice the work."""
+        return ErrorField(
+            self.nominal_mm,
+            self._combine(amplitudes, self.position),
+            self._combine(amplitudes, self.orientation)
+            if orientation
+            else np.broadcast_to(np.nan, self.nominal_mm.shape),
+        )
+
+    def _combine(self, amplitudes: Array, response: Array) -> Array:
+        """One matrix-vector product, [..., 3], without the rows of parameters that are zero.
+
+        The product waits for the memory, and most machines have most parameters at zero.
+        """
+        flat = response.reshape(len(self.keys), self.nominal_mm.size)
+        used = np.flatnonzero(amplitudes)
+        if 2 * len(used) > len(self.keys):
+            return (amplitudes @ flat).reshape(self.nominal_mm.shape)
+        if not len(used):
+            return np.zeros(self.nominal_mm.shape)
+        total = flat[used[0]] * amplitudes[used[0]]
+        part = np.empty_like(total)
+        for index in used[1:]:
+            np.multiply(flat[index], amplitudes[index], out=part)
+            total += part
+        return total.reshape(self.nominal_mm.shape)
+
+    def contributions(self, amplitudes: Array, index: tuple[int, ...] = ()) -> Array:
+        """Split the position error at one node into the parameters, [K, 3], µm."""
+        chosen = self.position[(slice(None), *index)]
+        return amplitudes[:, None] * chosen.reshape(len(self.keys), 3)
+
+
+# --- Where the workpiece lies: six numbers that a relative error contains and nobody sees on a part
+# They are a shift along the axes of the workpiece frame and a small rotation about them, so that
+# they stay the same wherever the axes stand.
+
+LEAST = 1e-12
+"""Combinations of the six with less than this share of the largest effect squared are left out."""
+
+
+def fit_placement(model: Model, grid: Grid, error_um: Array) -> Array:
+    """Fit the placement of the workpiece to relative errors over the nodes of a volume.
 
     Parameters
     ----------
     model : Model
-    errors : ErrorSet
-    coordinates : mapping of str to ndarray, [...], mm or degrees
+    grid : Grid
+    error_um : ndarray, [..., nx, ny, nz, 3], µm
+        In R, absolute; leading axes are fits of their own.
 
     Returns
     -------
-    dict of str to ndarray, [...], µm or µrad
-        In the direction of travel of the model. Parameters whose axis the machine does not have are
-        left out.
+    ndarray, [..., 6], µm and µrad
+        Least squares, each node weighing its share of the volume; the smallest numbers where a
+        volume along a line or a point does not tell them all.
     """
+    columns = _columns(model, grid.coordinates, grid.point_mm)
+    weighted = (grid.weights[..., None, None] * columns).reshape(-1, 6)
+    normal = np.linalg.pinv(columns.reshape(-1, 6).T @ weighted, rcond=LEAST, hermitian=True)
+    found = error_um.reshape(-1, len(weighted)) @ weighted @ normal
+    return found.reshape(*error_um.shape[:-4], 6)
+
+
+def placement_effect(
+    model: Model, placement: Array, coordinates: Coordinates, point_mm: Array
+) -> tuple[Array, Array]:
+    """Give the relative error in R that placements, [6] or [K, 6], take away.
+
+    µm and µrad, [..., 3] or [K, ..., 3]; the orientation is without the part about the tool axis.
+    """
+    columns = _columns(model, coordinates, point_mm)
+    turned = {name: np.zeros(()) if is_linear(name) else at for name, at in coordinates.items()}
+    aim = tool_axis(model, turned)
+    own = branch_pose(model, "workpiece", turned)[..., :3, :3]
+    tilt = own - aim[..., None] * (aim[..., None, :] @ own)
+    return (
+        np.tensordot(placement, columns, (-1, -1)),
+        np.tensordot(placement[..., 3:], np.broadcast_to(tilt, columns[..., 3:].shape), (-1, -1)),
+    )
+
+
+def _columns(model: Model, coordinates: Coordinates, point_mm: Array) -> Array:
+    """Give what each of the six does to points, [..., 3, 6], µm per µm or µrad, in R."""
+    pose = branch_pose(model, "workpiece", coordinates)
+    own = pose[..., :3, :3]
+    about = transforms.skew(pose[..., :3, 3] - point_mm) @ own * UM_PER_MM_URAD
+    return np.concatenate([np.broadcast_to(own, about.shape), about], axis=-1)
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """How errors are looked at: the loop, the frame of the result and the point held still."""
+
+    loop: Loop = Loop.TOOL
+    # "machine" for results in R, "workpiece" for results in the nominal workpiece frame
+    frame: str = "machine"
+    # axis coordinates of the point whose position error is subtracted everywhere; None is absolute.
+    # Orientation errors stay absolute.
+    reference: Mapping[str, float] | None = None
+    # working volume over which the placement of the workpiece is fitted out of a relative error,
+    # before the reference counts; None leaves it in
+    placed_over: Workspace | None = None
+
+
+class SecondOrder(NamedTuple):
+    """What the first order leaves out of position errors."""
+
+    um: float  # largest |E exact − E first order|
+    largest_um: float  # largest |E| of the exact chain
+
+    @property
+    def matters(self) -> bool:
+        """Whether it has to be said: above 0.1 µm or 1 % of the largest |E|, if that is 1 nm."""
+        return self.um > min(0.1, max(0.01 * self.largest_um, 0.001))
+
+
+def compare_orders(first_um: Array, exact_um: Array) -> SecondOrder:
+    """Compare position errors, [..., 3], µm, of the same points."""
+    lengths = (np.linalg.norm(each, axis=-1) for each in (exact_um - first_um, exact_um))
+    return SecondOrder(*(float(length.max(initial=0.0)) for length in lengths))
+
+
+def placed_words(view: View) -> tuple[str, ...]:
+    """Say that errors leave out where the workpiece lies; nothing where they do not."""
+    return () if view.placed_over is None else ("placement of the workpiece fitted out",)
+
+
+def second_order_words(*found: SecondOrder) -> tuple[str, ...]:
+    """Say that the first order is not enough, of one picture or several; nothing where it is."""
+    largest = max((one.um for one in found if one.matters), default=0.0)
+    return (f"first order; the exact chain differs by up to {spell(largest)} µm",) * (largest > 0.0)
+
+
+def error_values(model: Model, errors: ErrorSet, coordinates: Coordinates) -> dict[str, Array]:
+    """Evaluate the errors of axes of the machine, in the direction of travel of the model."""
     axes = model.machine.axes
     return {
         key: errors.evaluate_at(key, coordinates, model.direction)
@@ -75,7 +221,7 @@ def _result_rotation(model: Model, view: View, coordinates: Coordinates) -> Arra
     return np.swapaxes(pose, -1, -2)
 
 
-def _reference_point(
+def reference_point(
     model: Model, view: View, coordinates: Coordinates
 ) -> tuple[dict[str, Array], Array] | None:
     """Coordinates and nominal tool point of the reference; None for an absolute view."""
@@ -96,30 +242,31 @@ def build_basis(
     view: View | None = None,
     point_mm: Array | None = None,
 ) -> ErrorBasis:
-    """Compute the first-order response to every parameter.
+    """Compute the first-order response to every parameter, its curve along its axis folded in.
 
-    Parameters
-    ----------
-    model : Model
-    errors : ErrorSet
-        Gives the curve of each parameter along its axis; its amplitudes are not used.
-    keys : sequence of str, (K,)
-    coordinates : mapping of str to ndarray, [...], mm or degrees
-    view : View, optional
-    point_mm : ndarray, [..., 3], mm, optional
-        Nominal points in R; by default the functional point of the loop.
-
-    Returns
-    -------
-    ErrorBasis
+    Points are nominal ones in R, [..., 3], mm: by default the functional point of the loop. The
+    amplitudes of the set are not used.
     """
     view = view or View()
     point = nominal_point(model, view.loop, coordinates) if point_mm is None else point_mm
-    position, orientation = _shaped_jacobian(model, errors, keys, coordinates, view, point)
-    reference = _reference_point(model, view, coordinates)
+    placement = None
+    if view.placed_over is not None:
+        volume = build_grid(model, view.placed_over)
+        at, nodes = volume.coordinates, volume.point_mm
+        response = _shaped_jacobian(model, errors, keys, at, view, nodes)[0]
+        placement = fit_placement(model, volume, response)
+
+    def respond(at: Coordinates, point: Array) -> tuple[Array, Array]:
+        found = _shaped_jacobian(model, errors, keys, at, view, point)
+        if placement is None:
+            return found
+        less = placement_effect(model, placement, at, point)
+        return found[0] - less[0], found[1] - less[1]
+
+    position, orientation = respond(coordinates, point)
+    reference = reference_point(model, view, coordinates)
     if reference is not None:
-        held, held_point = reference
-        fixed = _shaped_jacobian(model, errors, keys, held, view, held_point)[0]
+        fixed = respond(*reference)[0]
         batch = (1,) * (position.ndim - fixed.ndim) + fixed.shape[1:]
         position = position - fixed.reshape(len(keys), *batch)
     rotation = _result_rotation(model, view, coordinates)
@@ -138,7 +285,6 @@ def _shaped_jacobian(
     view: View,
     point: Array,
 ) -> tuple[Array, Array]:
-    """Jacobian with the unit curve of each parameter folded in, [K, ..., 3] twice."""
     position, orientation = jacobian(model, view.loop, keys, coordinates, point)
     for index, key in enumerate(keys):
         if key in errors.functions or model.direction == TravelDirection.DIFFERENCE:
@@ -160,22 +306,10 @@ def evaluate_exact(
     view: View | None = None,
     point_mm: Array | None = None,
 ) -> ErrorField:
-    """Evaluate the field with the exact chain.
+    """Evaluate the field with the exact chain, at points in R, [..., 3], or that of the loop.
 
-    Parameters
-    ----------
-    model : Model
-    errors : ErrorSet
-    coordinates : mapping of str to ndarray, [...], mm or degrees
-    view : View, optional
-    point_mm : ndarray, [..., 3], mm, optional
-        Nominal points in R; by default the functional point of the loop.
-
-    Returns
-    -------
-    ErrorField
-        Where the model looks at the difference of both directions of travel, the field forward
-        minus that backward.
+    Where the model looks at the difference of both directions of travel, it is the field forward
+    minus that backward.
     """
     view = view or View()
     if model.direction == TravelDirection.DIFFERENCE:
@@ -205,6 +339,18 @@ def evaluate_first_order(
     return _evaluate(model, errors, coordinates, view or View(), point_mm, exact=False)
 
 
+def find_placement(
+    model: Model, errors: ErrorSet, view: View, *, exact: bool = False
+) -> Array | None:
+    """Fit where the workpiece lies, [6], µm and µrad; None where a view leaves it in."""
+    if view.placed_over is None:
+        return None
+    volume = build_grid(model, view.placed_over)
+    absolute = View(view.loop)
+    field = _evaluate(model, errors, volume.coordinates, absolute, volume.point_mm, exact=exact)
+    return fit_placement(model, volume, field.error_um)
+
+
 def _evaluate(
     model: Model,
     errors: ErrorSet,
@@ -214,16 +360,17 @@ def _evaluate(
     *,
     exact: bool,
 ) -> ErrorField:
-    """Evaluate the field piece by piece, straight into the arrays of the result."""
     point = nominal_point(model, view.loop, coordinates) if point_mm is None else point_mm
     shape = (*np.broadcast_shapes(batch_shape(coordinates), point.shape[:-1]), 3)
     error, orientation = np.empty(shape), np.empty(shape)
-    reference = _reference_point(model, view, coordinates)
+    reference = reference_point(model, view, coordinates)
     if reference is None:
         fixed = np.zeros(3)
     else:
         held, held_point = reference
-        fixed = _evaluate(model, errors, held, View(view.loop), held_point, exact=exact).error_um
+        still = replace(view, frame="machine", reference=None)
+        fixed = _evaluate(model, errors, held, still, held_point, exact=exact).error_um
+    placement = find_placement(model, errors, view, exact=exact)
 
     def steps(at: Coordinates) -> LoopLinks:
         return build_links(model, at, error_values(model, errors, at), exact=exact)
@@ -235,6 +382,9 @@ def _evaluate(
         here = steps(at) if links is None else cut_all(links, piece)
         nodes = (*piece, slice(None))
         found, tilt = solve_links(here, view.loop, split(cut(point, nodes)), exact=exact)
+        if placement is not None:
+            less = map(split, placement_effect(model, placement, at, cut(point, nodes)))
+            found, tilt = map(subtract, (found, tilt), less)
         found = subtract(found, split(cut(fixed, nodes)))
         rotation = _result_rotation(model, view, at)
         if rotation is not None:

@@ -1,20 +1,74 @@
 """The working volume and the grid of axis positions laid over it."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from math import prod
 from operator import index as whole_number
+from typing import Any, TypeAlias, TypeVar, cast
 
 import numpy as np
 
-from warpspace.exceptions import OptionError
-from warpspace.field.pieces import cut, pieces
-from warpspace.kinematics.chain import carry_inwards, carry_outwards, nominal_point
+from warpspace.exceptions import OptionError, UnknownNameError
+from warpspace.kinematics import transforms
+from warpspace.kinematics.chain import branch_pose, carry_inwards, carry_outwards, nominal_point
 from warpspace.kinematics.components import join, split
-from warpspace.kinematics.model import Coordinates, Loop, Model
+from warpspace.kinematics.model import Coordinates, Loop, Model, complete_coordinates
 from warpspace.machine.axes import direction_index, is_linear, sort_axes
 from warpspace.machine.limits import GRID_NODES
 from warpspace.units import Array
+
+# --- A large batch in pieces that stay in the processor's cache -----------------------------------
+
+NODES = 32_768
+"""Points that are evaluated at a time: a number of each of them takes 256 kB."""
+
+Piece: TypeAlias = tuple[slice, ...]
+"""One slice for each dimension of a batch."""
+T = TypeVar("T")
+
+
+def pieces(shape: tuple[int, ...]) -> Iterator[Piece]:
+    """Cut a batch along its first dimensions into pieces of at most `NODES` points."""
+    if not shape:
+        yield ()
+        return
+    first, rest = shape[0], shape[1:]
+    if prod(rest) > NODES:
+        for index in range(first):
+            for piece in pieces(rest):
+                yield (slice(index, index + 1), *piece)
+        return
+    step = max(1, NODES // max(prod(rest), 1))
+    for start in range(0, first, step):
+        yield (slice(start, start + step), *(slice(None) for _ in rest))
+
+
+def is_small(arrays: Iterable[Array]) -> bool:
+    """Tell whether each of some arrays fits into a piece."""
+    return all(array.size <= NODES for array in arrays)
+
+
+def cut(array: Array, piece: Piece) -> Array:
+    """Give the part of an array, [...] or broadcastable to it, that a piece needs."""
+    own = piece[len(piece) - array.ndim :]
+    return array[
+        tuple(
+            slice(None) if size == 1 else part for size, part in zip(array.shape, own, strict=True)
+        )
+    ]
+
+
+def cut_all(values: T, piece: Piece) -> T:
+    """Cut all arrays of nested tuples."""
+    if isinstance(values, np.ndarray):
+        return cast("T", cut(values, piece))
+    if isinstance(values, tuple):
+        parts = [cut_all(value, piece) for value in cast("tuple[object, ...]", values)]
+        kind = cast("Any", type(values))
+        return kind(*parts) if hasattr(kind, "_fields") else kind(parts)
+    return values
+
 
 DEFAULT_NODES = 21
 MIN_NODES, MAX_NODES = GRID_NODES
@@ -28,20 +82,6 @@ def find_volume_axes(ranges: Mapping[str, tuple[float, float]]) -> VolumeAxes:
 
     Linear axes take the direction they move along; rotary ones with a range take what is left, in
     the order of their names: the volume of a robot with two rotary axes in series is curved.
-
-    Parameters
-    ----------
-    ranges : mapping of str to tuple of float, (2,), mm or degrees
-
-    Returns
-    -------
-    tuple of str, (3,)
-        Empty where no axis runs along a direction.
-
-    Raises
-    ------
-    OptionError
-        If two linear axes with a range move along one direction, or more than three have one.
     """
     slots = ["", "", ""]
     for axis in sort_axes(axis for axis, (low, high) in ranges.items() if low < high):
@@ -57,14 +97,9 @@ def find_volume_axes(ranges: Mapping[str, tuple[float, float]]) -> VolumeAxes:
 
 @dataclass(frozen=True, slots=True)
 class Workspace:
-    """Axis coordinates of the working volume, and the positions it is drawn at.
+    """Axis coordinates of the working volume, and the positions it is drawn at."""
 
-    Attributes
-    ----------
-    ranges : mapping of str to tuple of float, (2,), mm or degrees
-        Lower and upper end per axis; equal where the axis stands still.
-    """
-
+    # mm or degrees; lower and upper end per axis; equal where the axis stands still
     ranges: Mapping[str, tuple[float, float]]
 
     @property
@@ -85,28 +120,17 @@ class Workspace:
 
 @dataclass(frozen=True)
 class Grid:
-    """Nodes of the working volume.
+    """Nodes of the working volume."""
 
-    Attributes
-    ----------
-    coordinates : dict of str to ndarray, mm or degrees
-        Axis positions, shaped to broadcast to `shape`.
-    shape : tuple of int, (3,)
-        Nodes along x, y and z of the volume.
-    nominal_mm : ndarray, [nx, ny, nz, 3], mm
-        Where each node is drawn: the nominal tool point as the workpiece sees it, in R while the
-        linear axes that carry the workpiece stand in the middle of their ranges.
-    point_mm : ndarray, [nx, ny, nz, 3], mm
-        Nominal tool point in R at each node, where its error is evaluated. The same as
-        `nominal_mm` on a machine whose linear axes all carry the tool.
-    axes : tuple of str, (3,)
-        The axis that runs along each direction of the grid; empty where there is one node.
-    """
-
-    coordinates: dict[str, Array]
-    shape: tuple[int, int, int]
+    coordinates: dict[str, Array]  # mm or degrees; axis positions, shaped to broadcast to `shape`
+    shape: tuple[int, int, int]  # nodes along x, y and z of the volume
+    # [nx, ny, nz, 3]; where each node is drawn: the nominal tool point as the workpiece sees it, in
+    # R while the linear axes that carry the workpiece stand in the middle of their ranges
     nominal_mm: Array
+    # [nx, ny, nz, 3]; nominal tool point in R at each node, where its error is evaluated. The same
+    # as `nominal_mm` on a machine whose linear axes all carry the tool.
     point_mm: Array
+    # the axis that runs along each direction of the grid; empty where there is one node
     axes: VolumeAxes = ("X", "Y", "Z")
 
     @cached_property
@@ -148,60 +172,22 @@ class Grid:
 
 
 def node_counts(nodes: int | Sequence[int]) -> tuple[int, int, int]:
-    """Check the number of nodes per axis.
-
-    Parameters
-    ----------
-    nodes : int or sequence of int, (3,)
-
-    Returns
-    -------
-    tuple of int, (3,)
-
-    Raises
-    ------
-    OptionError
-        If a count is outside 2 … 101.
-    """
+    """Check the number of nodes per axis."""
     try:
-        counts = _counts(nodes)
+        given = nodes if isinstance(nodes, Sequence) else (nodes,) * DIMENSIONS
+        counts = tuple(map(whole_number, given))
     except TypeError:
         raise OptionError(f"grid: {nodes!r}; expected whole numbers of nodes") from None
     if len(counts) != DIMENSIONS or any(not MIN_NODES <= n <= MAX_NODES for n in counts):
-        given = " × ".join(map(str, counts)) if isinstance(nodes, Sequence) else nodes
-        raise OptionError(f"grid: {given} nodes; expected {MIN_NODES} to {MAX_NODES} per axis")
+        said = " × ".join(map(str, counts)) if isinstance(nodes, Sequence) else nodes
+        raise OptionError(f"grid: {said} nodes; expected {MIN_NODES} to {MAX_NODES} per axis")
     return counts[0], counts[1], counts[2]
-
-
-def _counts(nodes: int | Sequence[int]) -> tuple[int, ...]:
-    """Give one whole number per linear axis, whatever kind of integer was given."""
-    if isinstance(nodes, Sequence):
-        return tuple(map(whole_number, nodes))
-    return (whole_number(nodes),) * DIMENSIONS
 
 
 def build_grid(
     model: Model, workspace: Workspace, nodes: int | Sequence[int] = DEFAULT_NODES
 ) -> Grid:
-    """Lay a grid over the working volume.
-
-    Parameters
-    ----------
-    model : Model
-    workspace : Workspace
-        Axes with a range are gridded; every other axis stands at its position.
-    nodes : int or sequence of int, (3,), optional
-        Nodes along x, y and z; a direction that no axis runs along has one.
-
-    Returns
-    -------
-    Grid
-
-    Raises
-    ------
-    OptionError
-        If the number of nodes is out of range, or the axes span no volume.
-    """
+    """Lay a grid over the working volume."""
     counts = node_counts(nodes)
     axes = workspace.volume_axes
     positions = workspace.positions
@@ -224,22 +210,9 @@ def build_grid(
 def seen_from_workpiece(
     model: Model, coordinates: Coordinates, workspace: Workspace, point_mm: Array
 ) -> Array:
-    """Move points with the axes that carry the workpiece back to the middle of their ranges.
+    """Move points of R with the axes that carry the workpiece to the middle of their ranges.
 
-    Parameters
-    ----------
-    model : Model
-    coordinates : mapping of str to ndarray, [...], mm or degrees
-        Where the axes stand.
-    workspace : Workspace
-        Linear axes that carry the workpiece go back, and rotary ones that span this volume.
-    point_mm : ndarray, [..., 3], mm
-        In R.
-
-    Returns
-    -------
-    ndarray, [..., 3], mm
-        Where they are drawn; see `Grid.nominal_mm`.
+    Linear ones go there, and rotary ones that span the volume; see `Grid.nominal_mm`.
     """
     axes, middle = workspace.volume_axes, workspace.positions
     branch = model.machine.branch("workpiece")
@@ -255,3 +228,50 @@ def seen_from_workpiece(
         point = carry_outwards(model, "workpiece", here, split(point_mm[nodes]))
         join(carry_inwards(model, "workpiece", there, point), seen[nodes])
     return seen
+
+
+# --- Planar slices through the working volume -----------------------------------------------------
+# A slice at any position is a grid of n × 1 × m nodes with one axis standing still, so that its
+# errors come from the model and not from interpolation between the nodes of the volume.
+
+PLANES: Mapping[str, str] = {"X": "YZ", "Y": "XZ", "Z": "XY"}
+"""Axis that stands still, and the plane it leaves."""
+
+
+def slice_ranges(model: Model, workspace: Workspace) -> dict[str, tuple[float, float]]:
+    """List where slices can lie."""
+    spanning = [axis for axis in workspace.volume_axes if axis in model.machine.axes]
+    if tuple(spanning) != tuple(PLANES):
+        return {}
+    return {axis: workspace.ranges[axis] for axis in spanning}
+
+
+def build_slice(
+    model: Model,
+    workspace: Workspace,
+    axis: str,
+    position_mm: float,
+    nodes: int = DEFAULT_NODES,
+) -> Grid:
+    """Lay a grid over one plane of the working volume."""
+    ranges = slice_ranges(model, workspace)
+    if axis not in ranges:
+        raise UnknownNameError("axis of a slice", axis, ranges)
+    low, high = ranges[axis]
+    if not low <= position_mm <= high:
+        raise OptionError(f"slice at {axis} = {position_mm:g} mm; expected {low:g} to {high:g} mm")
+    grid = build_grid(model, workspace.moved({axis: position_mm}), nodes)
+    if axis not in {found.name for found in model.machine.branch("workpiece")}:
+        return grid
+    # the slice is drawn where the whole volume is: with the table in the middle of its range
+    here, home = (
+        branch_pose(model, "workpiece", complete_coordinates(model.machine, positions))
+        for positions in (
+            workspace.moved({axis: position_mm}).positions,
+            workspace.positions,
+        )
+    )
+    return replace(
+        grid,
+        nominal_mm=transforms.apply(home @ transforms.inverse(here), grid.nominal_mm),
+    )

@@ -1,13 +1,15 @@
-"""What a format is and can: what it holds, how it is recognised, read, written and evaluated."""
+"""What a format is and can, and what its user says beside its files."""
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from warpspace.exceptions import OptionError
 from warpspace.formats.compensation.wanted import Wanted
-from warpspace.formats.measured import Imported
-from warpspace.formats.source import Source
-from warpspace.formats.terms import Tables
+from warpspace.formats.measured import Imported, merge
+from warpspace.formats.source import Place, Source
+from warpspace.formats.terms import Tables, errors_of
+from warpspace.machine.axes import is_axis_name
 from warpspace.machine.description import Machine
 
 ERROR, CORRECTION = "error", "correction"
@@ -19,132 +21,99 @@ Files = Mapping[str, str]
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """What a user says about a file that the file itself does not.
+    """What a user says about a file that the file itself does not."""
 
-    Attributes
-    ----------
-    machine : Machine or None
-        The machine its errors are for; None where none is named.
-    axis : str
-        Axis of a file that names none.
-    names : mapping of str to str
-        Axis of the machine by its name in the file.
-    sign : str
-        "error" or "correction"; empty for what the documentation of the format says.
-    variant : str
-        Which of the published variants of a format it is; empty for the usual one.
-    """
-
-    machine: Machine | None = None
-    axis: str = ""
+    machine: Machine | None = None  # that its errors are for; None where none is named
+    axis: str = ""  # axis of a file that names none
+    # axis of the machine by its name in the file
     names: Mapping[str, str] = field(default_factory=dict[str, str])
-    sign: str = ""
+    sign: str = ""  # "error" or "correction"; empty for what the documentation of the format says
+    # which of the published variants of a format it is; empty for the usual one
     variant: str = ""
 
     def factor(self, usual: str) -> float:
         """Give the factor from a number of a table to a correction: −1 where it is an error."""
         return -1.0 if (self.sign or usual) == ERROR else 1.0
 
+    def said_sign(self, usual: str) -> str:
+        """Say what the numbers are: what the user says, else the documentation of the format."""
+        return f"sign: {self.sign}" if self.sign else usual
+
+    def axis_named(self, name: str, at: Source | Place) -> str:
+        """Find the axis of the machine behind a name in a file: X1, MX1 and X mean X."""
+        bare = name.strip().strip('"').upper()
+        given = self.names.get(bare, "")
+        candidates = [given] if given else _candidates(bare)
+        known = [axis for axis in candidates if len(axis) == 1 or given]
+        if self.machine is not None:
+            known = [axis for axis in candidates if axis in self.machine.axes]
+        if not known:
+            says = f"--axis {bare or 'NAME'}=AXIS says which one it is"
+            if self.machine is None:
+                at.unsaid(f"axis {bare!r} is not known", f"X Y Z U V W A B C; {says}")
+            chain, axes = self.machine.chain, ", ".join(self.machine.axes)
+            found = f"axis {bare!r} is none of the machine {chain}, which has {axes}"
+            at.unsaid(found if given else f"{found} ({says})")
+        return known[0]
+
 
 @dataclass(frozen=True)
 class Format:
-    """A kind of file.
-
-    Attributes
-    ----------
-    name, title : str
-    source : str
-        Where its structure is published.
-    endings : tuple of str
-        Usual endings of its files.
-    holds, units, grid, limits : str
-        For the list of formats.
-    recognise : callable
-        Tells by the first lines of a file and its name whether it is of this format.
-    read : callable
-        Gives the errors that files hold.
-    tables : callable or None
-        Gives what the controller evaluates after reading them; None where it is no controller's.
-    write : callable or None
-        Gives the files that compensate; None where it cannot be written.
-    points : int
-        Points per axis where none are asked for.
-    most_points : int
-        Points per axis that the controller takes.
-    parametric : bool
-        Whether it holds error parameters, from which the controller works out its corrections.
-    variants : tuple of str
-        Published variants, the usual one first.
-    orientation : bool
-        Whether corrections of rotary axes have a place in it.
-    """
+    """A kind of file: what it holds, how it is recognised, read, written and evaluated."""
 
     name: str
     title: str
-    source: str
-    endings: tuple[str, ...]
-    holds: str
+    source: str  # where its structure is published
+    endings: tuple[str, ...]  # usual endings of its files
+    holds: str  # for the list of formats, as the next three
     units: str
     grid: str
     limits: str
-    recognise: Callable[[str, str], bool]
-    read: Callable[[Sequence[Source], ReadOptions], Imported]
+    recognise: Callable[[str, str], bool]  # by the first lines of a file and its name
+    # the errors that files hold; None for those that `tables` correct
+    read: Callable[[Sequence[Source], ReadOptions], Imported] | None = None
+    # what the controller evaluates after reading them; None where it is no controller's
     tables: Callable[[Sequence[Source], ReadOptions], Tables] | None = None
-    write: Callable[[Wanted], Files] | None = None
-    points: int = 21
-    most_points: int = 10_000
+    write: Callable[[Wanted], Files] | None = None  # the files that compensate
+    apart: bool = False  # whether each of its files is a table by itself
+    points: int = 21  # per axis where none are asked for
+    most_points: int = 10_000  # per axis that the controller takes
+    # whether it holds error parameters, from which the controller works out its corrections
     parametric: bool = False
-    variants: tuple[str, ...] = ()
-    orientation: bool = False
+    variants: tuple[str, ...] = ()  # published ones, the usual one first
+    names_variants: bool = False  # whether its files name variants of their own, such as profiles
+    orientation: bool = False  # whether corrections of rotary axes have a place in it
+    # whether it can move all positions by the same; where not, a part that lies elsewhere cannot be
+    # corrected, and its placement is fitted out of relative errors
+    offsets: bool = True
+    measured: bool = False  # whether its runs are readings, which are kept with the scene
 
     @property
     def can_write(self) -> bool:
         """Whether `warpspace compensate` writes it."""
         return self.write is not None
 
+    def errors(self, sources: Sequence[Source], options: ReadOptions) -> Imported:
+        """Give the errors that files hold."""
+        if self.read is not None:
+            return self.read(sources, options)
+        if self.tables is None:
+            raise OptionError(f"{self.name} is written only; expected another format")
+        parts = [[source] for source in sources] if self.apart else [sources]
+        found = [
+            errors_of(self.tables(part, options), self.name, part[0], options.machine)
+            for part in parts
+        ]
+        return merge(found) if len(found) > 1 else found[0]
 
-def resolve_axis(name: str, source: Source, line: int | None, options: ReadOptions) -> str:
-    """Find the axis of the machine behind a name in a file: X1, MX1 and X mean X.
 
-    Parameters
-    ----------
-    name : str
-    source : Source
-    line : int or None
-    options : ReadOptions
-
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    UnsaidError
-        If it means no axis, or none of the machine.
-    """
-    machine = options.machine
-    bare = name.strip().strip('"').upper()
-    given = options.names.get(bare, "")
-    candidates = [given] if given else _candidates(bare)
-    if machine is not None:
-        for axis in candidates:
-            if axis in machine.axes:
-                return axis
-        known = ", ".join(machine.axes)
-        hint = "" if given else f" (--axis {bare or 'NAME'}=AXIS says which one it is)"
-        found = f"axis {bare!r} is none of the machine {machine.chain}, which has {known}{hint}"
-        raise source.unsaid(found, line)
-    for axis in candidates:
-        if len(axis) == 1 or given:
-            return axis
-    expected = f"expected X Y Z U V W A B C; --axis {bare or 'NAME'}=AXIS says which one it is"
-    raise source.unsaid(f"axis {bare!r} is not known; {expected}", line)
+def has(pattern: str) -> Callable[[str, str], bool]:
+    """Tell files by a pattern in their first lines, whatever their name."""
+    found = re.compile(pattern, re.MULTILINE)
+    return lambda head, _: found.search(head) is not None
 
 
 def _candidates(bare: str) -> list[str]:
-    """List the axes that a name may mean, the most likely first."""
-    from warpspace.machine.axes import is_axis_name
-
     found = [bare] if is_axis_name(bare) else []
     stem = bare.removeprefix("M").rstrip("0123456789")
     if len(stem) == 1 and is_axis_name(stem) and stem not in found:
@@ -153,20 +122,7 @@ def _candidates(bare: str) -> list[str]:
 
 
 def parse_axis_options(texts: Sequence[str]) -> tuple[str, dict[str, str]]:
-    """Read what a user says of axes: one letter, or NAME=AXIS.
-
-    Returns
-    -------
-    axis : str
-        Axis of files that name none.
-    names : dict of str to str
-
-    Raises
-    ------
-    OptionError
-    """
-    from warpspace.machine.axes import is_axis_name
-
+    """Read what a user says of axes: one letter, or NAME=AXIS."""
     axis, names = "", {}
     for text in texts:
         name, equals, target = text.partition("=")

@@ -1,13 +1,21 @@
-"""What a file of measured errors holds, whatever its format: the neutral form of an import."""
+"""What a file of errors holds, whatever its format: the neutral form of imports and of scenes."""
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from warpspace.formats.compensation.wanted import Wanted
+from warpspace.formats.source import Place, Source
+from warpspace.machine.axes import TravelDirection, direction_index, is_linear
+from warpspace.machine.curves.curve import ErrorFunction
+from warpspace.machine.curves.directional import Directional
+from warpspace.machine.curves.table import Table, TwoArguments
 from warpspace.machine.parameters import parameter
+from warpspace.scene.model import Scene
 from warpspace.units import Array
 
 FORWARD, BACKWARD, BOTH = 1, -1, 0
@@ -19,51 +27,35 @@ Matrix = tuple[tuple[float, ...], ...]
 
 @dataclass(frozen=True)
 class Run:
-    """One run over the positions of a series.
-
-    Attributes
-    ----------
-    number : int
-    direction : int
-        1 forward, −1 backward, 0 where not told.
-    values : tuple of float, (n,), µm or µrad
-        Not a number where a position was left out.
-    """
+    """One run over the positions of a series."""
 
     number: int
-    direction: int
-    values: tuple[float, ...]
+    direction: int  # 1 forward, −1 backward, 0 where not told
+    values: tuple[float, ...]  # (n,), µm or µrad; not a number where a position was left out
 
 
 @dataclass(frozen=True)
 class Series:
-    """One error along its axis.
+    """One error along its axis."""
 
-    Attributes
-    ----------
-    key : str
-        Parameter.
-    positions : tuple of float, (n,), mm or degrees
-        Ascending.
-    runs : tuple of Run
-        At least one.
-    uncertainty : tuple of float, (n,), µm or µrad
-        Standard uncertainties (k = 1); empty where none are given.
-    """
-
-    key: str
-    positions: tuple[float, ...]
-    runs: tuple[Run, ...]
+    key: str  # parameter
+    positions: tuple[float, ...]  # (n,), mm or degrees; ascending
+    runs: tuple[Run, ...]  # at least one
+    # (n,), µm or µrad; standard uncertainties (k = 1); empty where none are given
     uncertainty: tuple[float, ...] = ()
 
     def _runs(self, direction: int) -> Array:
-        """Give the values of the runs in a direction, [runs, n]."""
         return np.array([run.values for run in self.runs if run.direction == direction])
 
     def mean(self, direction: int) -> Array | None:
         """Give the mean of the runs in one direction, [n]; None where there are none."""
         found = self._runs(direction)
         return np.nanmean(found, axis=0) if len(found) else None
+
+    def toward(self, direction: int) -> Array:
+        """Give the mean in a direction of travel, [n]; of both where there are no such runs."""
+        mean = self.mean(direction)
+        return self.values if mean is None else mean
 
     @property
     def forward(self) -> Array | None:
@@ -110,26 +102,15 @@ class Series:
 
 @dataclass(frozen=True)
 class Plane:
-    """One error over two axes.
-
-    Attributes
-    ----------
-    key : str
-    axes : tuple of str, (2,)
-    first, second : tuple of float, mm or degrees
-        Ascending positions of the two axes.
-    values : tuple of tuple of float, (first, second), µm or µrad
-        Forward values where `backward` is given.
-    backward : tuple of tuple of float, (first, second), µm or µrad
-        Values for travel of the first axis in the negative direction; empty where they are the
-        same.
-    """
+    """One error over two axes."""
 
     key: str
     axes: tuple[str, str]
-    first: tuple[float, ...]
+    first: tuple[float, ...]  # mm or degrees; ascending positions of the two axes
     second: tuple[float, ...]
-    values: Matrix
+    values: Matrix  # (first, second), µm or µrad; forward values where `backward` is given
+    # (first, second), µm or µrad; values for travel of the first axis in the negative direction;
+    # empty where they are the same
     backward: Matrix = ()
 
     def table(self, direction: int) -> Array:
@@ -145,22 +126,7 @@ def plane_by_direction(
     positions: tuple[ArrayLike, ArrayLike],
     tables: Mapping[int, Array],
 ) -> Plane:
-    """Build an error over two axes of its values in both directions of travel.
-
-    Parameters
-    ----------
-    key : str
-    axes : tuple of str, (2,)
-    positions : tuple of array_like, (n,) and (m,), mm or degrees
-        Ascending, of each axis.
-    tables : mapping of int to ndarray, (first, second), µm or µrad
-        By direction, 1 and −1.
-
-    Returns
-    -------
-    Plane
-        With one table where both are the same.
-    """
+    """Build an error over two axes of its values in both directions of travel."""
     forward, backward = (
         tuple(tuple(row) for row in tables[way].tolist()) for way in (FORWARD, BACKWARD)
     )
@@ -170,38 +136,21 @@ def plane_by_direction(
 
 @dataclass(frozen=True)
 class Imported:
-    """What a file holds.
+    """What a file holds."""
 
-    Attributes
-    ----------
-    format : str
-        Name of its format.
-    series : tuple of Series
-    planes : tuple of Plane
-    constants : mapping of str to float, µm or µrad
-    uncertainty : mapping of str to float, µm or µrad
-        Standard uncertainty of constants.
-    units : tuple of str
-        Units that the file has its numbers in.
-    assumed : tuple of str
-        What the file does not say and was taken for granted, a sentence each.
-    notes : tuple of str
-        What else a user should know.
-    convention : mapping of str to str
-        Where its component errors act, by kind of axis; empty where the file does not tell.
-    curves : mapping of str to object
-        Errors that no table but another spelling of a scene file holds: {"poly": […]}.
-    """
-
-    format: str
+    format: str  # name of its format
     series: tuple[Series, ...] = ()
     planes: tuple[Plane, ...] = ()
-    constants: Mapping[str, float] = field(default_factory=dict[str, float])
+    constants: Mapping[str, float] = field(default_factory=dict[str, float])  # µm or µrad
+    # µm or µrad; standard uncertainty of constants
     uncertainty: Mapping[str, float] = field(default_factory=dict[str, float])
-    units: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()  # units that the file has its numbers in
+    # what the file does not say and was taken for granted, a sentence each
     assumed: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # what else a user should know
+    # where its component errors act, by kind of axis; empty where the file does not tell
     convention: Mapping[str, str] = field(default_factory=dict[str, str])
+    # errors that no table but another spelling of a scene file holds: {"poly": […]}
     curves: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     @property
@@ -227,40 +176,269 @@ class Imported:
 
 
 def merge(parts: Sequence[Imported]) -> Imported:
-    """Put the contents of several files together, all of one format.
+    """Put the contents of several files together, all of one format."""
+    found: dict[str, Any] = {"format": " + ".join(dict.fromkeys(part.format for part in parts))}
+    for name in (entry.name for entry in fields(Imported)[1:]):
+        values = [getattr(part, name) for part in parts]
+        if isinstance(values[0], Mapping):
+            found[name] = {key: value for table in values for key, value in table.items()}
+        else:
+            every = [one for value in values for one in value]
+            # an error that is given twice is refused later
+            found[name] = tuple(every if name in ("series", "planes") else dict.fromkeys(every))
+    return Imported(**found)
 
-    Parameters
-    ----------
-    parts : sequence of Imported
-        At least one; no two give the same parameter.
 
-    Returns
-    -------
-    Imported
-    """
-    constants: dict[str, float] = {}
-    uncertainty: dict[str, float] = {}
-    convention: dict[str, str] = {}
-    curves: dict[str, Any] = {}
-    for part in parts:
-        constants |= part.constants
-        uncertainty |= part.uncertainty
-        convention |= part.convention
-        curves |= part.curves
-    return Imported(
-        " + ".join(dict.fromkeys(part.format for part in parts)),
-        tuple(one for part in parts for one in part.series),
-        tuple(one for part in parts for one in part.planes),
-        constants,
-        uncertainty,
-        _once(part.units for part in parts),
-        _once(part.assumed for part in parts),
-        _once(part.notes for part in parts),
-        convention,
-        curves,
+@dataclass(frozen=True, kw_only=True)
+class Summary:
+    """One error."""
+
+    key: str  # values below are in the unit, µm or µrad
+    # "table", "by direction", "over Z", "over Z, by direction", "constant", or the name of a curve
+    kind: str
+    points: int = 1
+    runs: int = 0
+    directions: str = ""  # "+", "-", "+ -", or empty where not told
+    span: tuple[float, float] | None = None  # first and last position, mm or degrees
+    smallest: float  # of the mean
+    largest: float
+    # mean over the positions of the reversal error (B̄ of ISO 230-2)
+    mean_reversal: float | None = None
+    repeatability: float | None = None  # largest bidirectional repeatability (R of ISO 230-2)
+    uncertainty: float | None = None  # largest standard uncertainty
+
+    @property
+    def unit(self) -> str:
+        """Unit of its values."""
+        return parameter(self.key).unit
+
+
+def summaries(found: Imported) -> list[Summary]:
+    """Summarise all errors of an import."""
+    rows = [_of_series(one) for one in found.series]
+    for plane in found.planes:
+        values = plane.table(BOTH)
+        rows.append(
+            Summary(
+                key=plane.key,
+                kind=f"over {plane.axes[1]}{', by direction' if plane.backward else ''}",
+                points=values.size,
+                directions="+ -" if plane.backward else "",
+                span=(plane.first[0], plane.first[-1]),
+                smallest=float(values.min()),
+                largest=float(values.max()),
+            )
+        )
+    for key, value in found.constants.items():
+        own = found.uncertainty.get(key)
+        row = Summary(key=key, kind="constant", smallest=value, largest=value, uncertainty=own)
+        rows.append(row)
+    for key, curve in found.curves.items():
+        ((kind, numbers),) = curve.items()
+        last = numbers[-1][1] if kind == "harmonics" else numbers[-1]
+        rows.append(Summary(key=key, kind=kind, points=len(numbers), smallest=last, largest=last))
+    return rows
+
+
+def _of_series(one: Series) -> Summary:
+    values, reversal, repeatability = one.values, one.reversal, one.repeatability
+    if repeatability is not None and np.isnan(repeatability).all():
+        repeatability = None
+    ways = {run.direction for run in one.runs}
+    return Summary(
+        key=one.key,
+        kind="table" if reversal is None else "by direction",
+        points=len(one.positions),
+        runs=len(one.runs),
+        directions=" ".join(sign for sign, way in (("+", FORWARD), ("-", BACKWARD)) if way in ways),
+        span=(one.positions[0], one.positions[-1]),
+        smallest=float(values.min()),
+        largest=float(values.max()),
+        mean_reversal=None if reversal is None else float(reversal.mean()),
+        repeatability=None if repeatability is None else float(np.nanmax(repeatability)),
+        uncertainty=max(one.uncertainty) if one.uncertainty else None,
     )
 
 
-def _once(parts: Any) -> tuple[str, ...]:
-    """Give every sentence of several lists once."""
-    return tuple(dict.fromkeys(text for part in parts for text in part))
+WAYS = {TravelDirection.FORWARD: FORWARD, TravelDirection.BACKWARD: BACKWARD}
+SAME = 1e-9
+"""mm or degrees: positions nearer than this are one."""
+Point = tuple[Place, float, float, float]
+"""Line, position of both axes, value."""
+
+
+@dataclass(frozen=True)
+class ErrorTable:
+    """Errors side by side: constants, those of one axis, or one over two axes."""
+
+    axes: tuple[str, ...]  # that they are over; none for constants
+    keys: tuple[str, ...]
+    # positions, direction, and a value for each key
+    rows: list[tuple[tuple[float, ...], int, Sequence[float]]]
+
+    @property
+    def directed(self) -> bool:
+        """Whether they depend on the direction of travel."""
+        return any(way != BOTH for _, way, _ in self.rows)
+
+
+def zero_key(scene: Scene) -> str:
+    """Give an error of the machine for a file of a scene without any: its value is zero."""
+    axis = next(iter(scene.machine.axes))
+    return f"E{'XYZABC'[direction_index(axis) + (0 if is_linear(axis) else 3)]}{axis}"
+
+
+def sampled(wanted: Wanted) -> Imported:
+    """Sample the errors of a scene at the points of a table."""
+    scene = wanted.scene
+    constants: dict[str, float] = {}
+    series: list[Series] = []
+    planes: list[Plane] = []
+    for key, curve in scene.errors.functions.items():
+        row = parameter(key)
+        if row.axis not in scene.machine.axes:
+            continue
+        if row.is_constant:
+            constants[key] = float(curve.amplitude)
+            continue
+        count = wanted.points.get(row.axis) or max(wanted.points.values())
+        at = np.linspace(*scene.axis_span(row.axis), count)
+        ways = _ways(curve)
+        other = _second_axis(curve)
+        tabled = all(isinstance(one, Table | TwoArguments) for one in ways.values() or [curve])
+        if tabled and (other is not None or len(curve.kinks) <= count):
+            at = np.array(curve.kinks)
+        elif other is not None:
+            at = np.union1d(at, curve.kinks)
+        if other is not None:
+            tables = {
+                way: np.asarray(
+                    part.evaluate_at(row.axis, {row.axis: at[:, None], other[0]: other[1]})
+                )
+                + np.zeros((len(at), len(other[1])))
+                for way, part in {FORWARD: curve, BACKWARD: curve, **ways}.items()
+            }
+            planes.append(plane_by_direction(key, (row.axis, other[0]), (at, other[1]), tables))
+        else:
+            runs = tuple(
+                Run(1, way, tuple(np.asarray(part.evaluate(at)).tolist()))
+                for way, part in (ways or {BOTH: curve}).items()
+            )
+            series.append(Series(key, tuple(at.tolist()), runs))
+    return Imported("scene", tuple(series), tuple(planes), constants)
+
+
+def in_one_direction(held: Imported, wanted: Wanted) -> Imported:
+    """Give errors by direction of travel as the scene has them in the direction it looks at."""
+    way = WAYS.get(TravelDirection(wanted.scene.model.direction), BOTH)
+
+    return replace(
+        held,
+        series=tuple(
+            Series(one.key, one.positions, (Run(1, BOTH, tuple(one.toward(way).tolist())),))
+            for one in held.series
+        ),
+        planes=tuple(
+            replace(one, values=tuple(map(tuple, one.table(way).tolist())), backward=())
+            for one in held.planes
+        ),
+    )
+
+
+def _ways(curve: ErrorFunction) -> dict[int, ErrorFunction]:
+    """Give the curves of both directions of travel; none where they are the same."""
+    if not isinstance(curve, Directional):
+        return {}
+    return {FORWARD: curve.forward, BACKWARD: curve.backward}
+
+
+def _second_axis(curve: ErrorFunction) -> tuple[str, Array] | None:
+    """Give the other axis that an error depends on, with its positions; None where there is none.
+
+    Where its two directions depend on two different axes, both are taken in the middle of these.
+    """
+    surfaces = [one for one in (curve, *_ways(curve).values()) if isinstance(one, TwoArguments)]
+    others = {one.axes[1] for one in surfaces}
+    if len(others) != 1:
+        return None
+    at = np.unique(np.concatenate([one.positions[1] for one in surfaces]))
+    return others.pop(), at
+
+
+def tables_of(held: Imported) -> list[ErrorTable]:
+    """Put errors over the same axes side by side, those of one axis at all their positions."""
+    tables: list[ErrorTable] = []
+    if held.constants:
+        row = ((), BOTH, tuple(held.constants.values()))
+        tables.append(ErrorTable((), tuple(held.constants), [row]))
+    for axis in dict.fromkeys(parameter(one.key).axis for one in held.series):
+        series = [one for one in held.series if parameter(one.key).axis == axis]
+        at = np.unique(np.concatenate([one.positions for one in series]))
+        directed = any(one.reversal is not None for one in series)
+        table = ErrorTable((axis,), tuple(one.key for one in series), [])
+        for way in (FORWARD, BACKWARD) if directed else (BOTH,):
+            columns = [np.interp(at, one.positions, one.toward(way)).tolist() for one in series]
+            found = zip(at.tolist(), *columns, strict=True)
+            table.rows.extend(((q,), way, values) for q, *values in found)
+        tables.append(table)
+    for plane in held.planes:
+        table = ErrorTable(plane.axes, (plane.key,), [])
+        for way in (FORWARD, BACKWARD) if plane.backward else (BOTH,):
+            values = plane.backward if way == BACKWARD else plane.values
+            for first, row in zip(plane.first, values, strict=True):
+                points = zip(plane.second, row, strict=True)
+                table.rows.extend(((first, second), way, (value,)) for second, value in points)
+        tables.append(table)
+    return tables
+
+
+# --- errors of two axes from their points --------------------------------------------------------
+
+
+def distinct(at: np.ndarray) -> np.ndarray:
+    """Give the positions, each once, ascending."""
+    ordered = np.sort(at)
+    return ordered[np.concatenate([[True], np.diff(ordered) > SAME])]
+
+
+def plane_of(
+    key: str, axes: tuple[str, str], points: Sequence[Point], source: Source, where: str = ""
+) -> Plane:
+    """Build an error of two axes from its points."""
+    first = distinct(np.array([point[1] for point in points]))
+    second = distinct(np.array([point[2] for point in points]))
+    values = np.full((len(first), len(second)), math.nan)
+    lines: dict[tuple[int, int], Place] = {}
+    for at, one, other, value in points:
+        i = int(np.abs(first - one).argmin())
+        j = int(np.abs(second - other).argmin())
+        if (i, j) in lines:
+            found = f"{axes[0]} {one:g}, {axes[1]} {other:g}{where} stands also in line"
+            at.refuse(f"{found} {lines[i, j].line}", "every point once")
+        lines[i, j] = at
+        values[i, j] = value
+    if np.isnan(values).any():
+        i, j = (int(index) for index in np.argwhere(np.isnan(values))[0])
+        found = f"{key} has no value at {axes[0]} {first[i]:g}, {axes[1]} {second[j]:g}{where}"
+        (lines.get((i, j)) or source).refuse(found, "a value at every point of the grid")
+    rows = tuple(tuple(row) for row in values.tolist())
+    return Plane(key, axes, tuple(first.tolist()), tuple(second.tolist()), rows)
+
+
+def plane_by_ways(
+    key: str, axes: tuple[str, str], points: Mapping[int, Sequence[Point]], source: Source
+) -> Plane:
+    """Build an error of two axes from its points by direction of travel, see `plane_of`."""
+    words = {FORWARD: " forward", BACKWARD: " backward", BOTH: ""}
+    planes = {way: plane_of(key, axes, own, source, words[way]) for way, own in points.items()}
+    if len(planes) == 1:
+        return next(iter(planes.values()))
+    if set(planes) != {FORWARD, BACKWARD}:
+        expected = "+ or - in every row, or in none"
+        points[BOTH][0][0].refuse("has no direction", expected)
+    there, back = planes[FORWARD], planes[BACKWARD]
+    if (there.first, there.second) != (back.first, back.second):
+        found = f"{key} has other points backward than forward"
+        points[BACKWARD][0][0].refuse(found, "the same")
+    tables = {way: plane.table(BOTH) for way, plane in planes.items()}
+    return plane_by_direction(key, axes, (there.first, there.second), tables)

@@ -1,12 +1,62 @@
-"""The text of a file that somebody measured or a controller saved, with the places of its lines."""
+"""The text of a file that somebody measured or a controller saved: its lines, places and units."""
 
+import io
+import math
 import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
 from warpspace.exceptions import SceneError, UnsaidError
-from warpspace.scene.files import check_file
+from warpspace.machine.limits import MAX_ERROR, MAX_LENGTH_MM
+from warpspace.scene.files import CsvRows, check_file, parse_number
+
+UM_PER: Mapping[str, float] = {
+    "um": 1.0,
+    "µm": 1.0,
+    "μm": 1.0,
+    "mm": 1e3,
+    "nm": 1e-3,
+    "m": 1e6,
+    "in": 25_400.0,
+    "inch": 25_400.0,
+}
+"""Micrometres in a unit of length."""
+URAD_PER: Mapping[str, float] = {
+    "urad": 1.0,
+    "µrad": 1.0,
+    "μrad": 1.0,
+    "mrad": 1e3,
+    "rad": 1e6,
+    "arcsec": math.pi / 180.0 / 3600.0 * 1e6,
+    "deg": math.pi / 180.0 * 1e6,
+    "°": math.pi / 180.0 * 1e6,
+    "um/m": 1.0,
+    "µm/m": 1.0,
+    "mm/m": 1e3,
+}
+"""Microradians in a unit of angle."""
+MM_PER: Mapping[str, float] = {unit: size * 1e-3 for unit, size in UM_PER.items()}
+DEG_PER: Mapping[str, float] = {
+    "deg": 1.0,
+    "°": 1.0,
+    "rad": 180.0 / math.pi,
+    "arcsec": 1.0 / 3600.0,
+}
+MM_TO_UM = 1e3
+RAD_TO_URAD = 1e6
+DEG_TO_URAD = URAD_PER["deg"]
+
+
+def spell(value: float, digits: int) -> str:
+    """Spell a number with at most so many digits behind the point, without needless zeros."""
+    text = f"{value:.{digits}f}"
+    if "." in text:
+        whole, _, part = text.partition(".")
+        text = f"{whole}.{part.rstrip('0') or '0'}"
+    return "0.0" if text in {"-0.0", "-0"} else text
+
 
 MAX_BYTES = 64 * 1024 * 1024
 MAX_LINES = 2_000_000
@@ -23,59 +73,130 @@ _LINE_ENDS = re.compile(r"\r\n|\n|\r")
 
 @dataclass(frozen=True)
 class Source:
-    """A text file in lines.
+    """A text file in lines."""
 
-    Attributes
-    ----------
-    name : str
-        As messages call it.
-    lines : tuple of str
-        Without their ends.
-    notes : tuple of str
-        What was assumed about its bytes.
-    """
-
-    name: str
-    lines: tuple[str, ...]
-    notes: tuple[str, ...] = ()
+    name: str  # as messages call it
+    lines: tuple[str, ...]  # without their ends
+    notes: tuple[str, ...] = ()  # what was assumed about its bytes
 
     @property
     def head(self) -> str:
         """The first lines, by which a format is recognised."""
         return "\n".join(self.lines[:HEAD_LINES])
 
-    def refuse(self, problem: str, line: int | None = None) -> NoReturn:
-        """Refuse the file.
+    @property
+    def text(self) -> str:
+        """All its lines."""
+        return "\n".join(self.lines)
 
-        Parameters
-        ----------
-        problem : str
-            What was found and what was expected.
-        line : int, optional
-            Number of the line, from 1.
+    @property
+    def base(self) -> str:
+        """Its name without folders."""
+        return self.name.replace("\\", "/").rsplit("/", 1)[-1]
 
-        Raises
-        ------
-        SceneError
-        """
-        raise self.problem(problem, line)
+    @property
+    def stem(self) -> str:
+        """Its name without folders and ending."""
+        return self.base.rsplit(".", 1)[0]
 
-    def problem(self, problem: str, line: int | None = None) -> SceneError:
-        """Give the exception that refuses the file, see `refuse`."""
-        return SceneError(self.name, [_placed(problem, line)])
+    def refuse(self, found: str, expected: str = "") -> NoReturn:
+        """Refuse the file."""
+        raise SceneError(self.name, [_joined(found, expected)])
 
-    def unsaid(self, problem: str, line: int | None = None) -> UnsaidError:
-        """Give the exception that asks for what the file does not say, see `refuse`."""
-        return UnsaidError(self.name, [_placed(problem, line)])
+    def unsaid(self, found: str, expected: str = "") -> NoReturn:
+        """Ask for what the file does not say."""
+        raise UnsaidError(self.name, [_joined(found, expected)])
 
-    def shown(self, line: int) -> str:
-        """Give a line as a message shows it; its number counts from 1."""
-        return shown(self.lines[line - 1])
+    def rows(self, most: int) -> CsvRows:
+        """Read it as a table with a header and at most so many rows."""
+        return CsvRows(io.StringIO(self.text), self.name, most, once=True)
+
+    def at(self, line: int) -> "Place":
+        """Give one of its lines, counted from 1."""
+        return Place(self, line)
+
+    def scan(self, *comments: str) -> Iterator[tuple["Place", str]]:
+        """Give the lines that hold something, without what follows the mark of a comment."""
+        for number, text in enumerate(self.lines, start=1):
+            bare = text
+            for mark in comments:
+                bare = bare.split(mark)[0]
+            if bare := bare.strip():
+                yield Place(self, number), bare
 
 
-def _placed(problem: str, line: int | None) -> str:
-    """Put the number of a line before a problem."""
-    return problem if line is None else f"line {line}: {problem}"
+@dataclass(frozen=True)
+class Place:
+    """A line of a file: what is read from it, and how it is refused."""
+
+    source: Source
+    line: int
+
+    @property
+    def shown(self) -> str:
+        """The line as a message shows it."""
+        return shown(self.source.lines[self.line - 1])
+
+    def refuse(self, found: str, expected: str = "") -> NoReturn:
+        """Refuse the file for this line."""
+        self.source.refuse(f"line {self.line}: {found}", expected)
+
+    def unsaid(self, found: str, expected: str = "") -> NoReturn:
+        """Ask for what the line does not say."""
+        self.source.unsaid(f"line {self.line}: {found}", expected)
+
+    def number(self, text: str, what: str) -> float:
+        """Read one finite number with a decimal point."""
+        try:
+            return parse_number(text)
+        except ValueError:
+            if "," in text:
+                self.refuse(f"{what} {shown(text)} has a decimal comma", "a point")
+            self.refuse(f"{what} {shown(text)}", "a finite number")
+
+    def whole(self, text: str, what: str, low: int, high: int) -> int:
+        """Read one whole number within limits."""
+        value = self.number(text, what)
+        if value != int(value) or not low <= value <= high:
+            self.refuse(f"{what} {shown(text)}", f"a whole number {low} … {high}")
+        return int(value)
+
+    def position(self, text: str, what: str) -> float:
+        """Read a position that a machine reaches, mm or degrees."""
+        return self.checked_position(self.number(text, what), what)
+
+    def checked_position(self, value: float, what: str) -> float:
+        """Refuse a position that no machine reaches, mm or degrees."""
+        if abs(value) > MAX_LENGTH_MM:
+            self.refuse(f"{what} {value:g}", f"at most ±{MAX_LENGTH_MM:g} mm or degrees")
+        return value
+
+    def error(self, text: str, what: str, scale: float = 1.0) -> float:
+        """Read an error in its own unit, as µm or µrad."""
+        return self.checked_error(self.number(text, what) * scale, what)
+
+    def checked_error(self, value: float, what: str) -> float:
+        """Refuse an error that no rigid-body model holds, µm or µrad."""
+        if abs(value) > MAX_ERROR:
+            expected = f"at most ±{MAX_ERROR:g} (is the unit right?)"
+            self.refuse(f"{what} {value:g} µm or µrad", expected)
+        return value
+
+    def unit(self, unit: str, known: Mapping[str, float], what: str) -> float:
+        """Give the factor of a unit."""
+        if unit not in known:
+            units = ", ".join(name for name in known if name.isascii())
+            self.refuse(f"{what} in {shown(unit)}", f"one of the units {units}")
+        return known[unit]
+
+    def ascending(self, value: float, before: Sequence[float], what: str, of: str = "") -> None:
+        """Refuse a position that does not lie behind the last one."""
+        if before and value <= before[-1]:
+            self.refuse(f"{what} {value:g}{of} after {before[-1]:g}", "ascending positions")
+
+
+def _joined(found: str, expected: str) -> str:
+    return f"{found}; expected {expected}" if expected else found
 
 
 def shown(text: str) -> str:
@@ -85,21 +206,7 @@ def shown(text: str) -> str:
 
 
 def read_source(path: Path) -> Source:
-    """Read a file that a user named.
-
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    Source
-
-    Raises
-    ------
-    SceneError
-        If it is missing, no regular file, too large or no text.
-    """
+    """Read a file that a user named."""
     name = str(path)
     check_file(path, MAX_BYTES, name)
     try:
@@ -110,23 +217,7 @@ def read_source(path: Path) -> Source:
 
 
 def source_of_bytes(content: bytes, name: str) -> Source:
-    """Take the bytes of a file, for instance an upload, as text.
-
-    Parameters
-    ----------
-    content : bytes
-    name : str
-        As messages call it.
-
-    Returns
-    -------
-    Source
-
-    Raises
-    ------
-    SceneError
-        If it is too large, empty or no text.
-    """
+    """Take the bytes of a file, for instance an upload, as text."""
     if len(content) > MAX_BYTES:
         found = f"is {len(content):,} bytes long; expected at most {MAX_BYTES:,} bytes"
         raise SceneError(name, [found])
@@ -136,23 +227,18 @@ def source_of_bytes(content: bytes, name: str) -> Source:
         raise SceneError(name, [f"line {line}: holds bytes that are no text; expected a text file"])
     source = source_of_text(text, name, notes)
     if not any(line.strip() for line in source.lines):
-        source.refuse("is empty; expected measured data or a table of a controller")
+        source.refuse("is empty", "measured data or a table of a controller")
     return source
 
 
 def source_of_text(text: str, name: str, notes: tuple[str, ...] = ()) -> Source:
-    """Split a text into lines, whatever ends them.
-
-    Raises
-    ------
-    SceneError
-        If there are too many lines, or one is too long.
-    """
+    """Split a text into lines, whatever ends them."""
+    count = text.count("\n") + text.count("\r") - text.count("\r\n") + (text[-1:] not in "\r\n")
+    if count > MAX_LINES:  # counted first: splitting four million lines holds up everybody
+        raise SceneError(name, [f"has {count:,} lines; expected at most {MAX_LINES:,}"])
     lines = _LINE_ENDS.split(text)
     if lines and not lines[-1]:
         lines.pop()
-    if len(lines) > MAX_LINES:
-        raise SceneError(name, [f"has {len(lines):,} lines; expected at most {MAX_LINES:,}"])
     for number, line in enumerate(lines, start=1):
         if len(line) > MAX_LINE:
             found = f"is longer than {MAX_LINE:,} characters; expected at most so many"

@@ -1,9 +1,10 @@
-"""How controllers evaluate their compensation tables: what each adds to the commanded position.
+"""How controllers evaluate their compensation tables, and which errors those tables correct.
 
 A term gives, for commanded positions of the axes, the correction of each axis it acts on: the
 interpolation, the behaviour at the ends and the direction of travel are those of the controller.
 """
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -11,7 +12,20 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from warpspace.formats.measured import (
+    BACKWARD,
+    BOTH,
+    FORWARD,
+    Imported,
+    Plane,
+    Run,
+    Series,
+    plane_by_direction,
+)
+from warpspace.formats.source import DEG_TO_URAD, MM_TO_UM, RAD_TO_URAD, Source
 from warpspace.kinematics.model import Coordinates
+from warpspace.machine.axes import direction_index, is_linear
+from warpspace.machine.description import Machine
 from warpspace.units import Array
 
 HELD, MODULO, EXTENDED = "held", "modulo", "extended"
@@ -33,32 +47,18 @@ class Term(Protocol):
 
 @dataclass(frozen=True)
 class Line:
-    """A table of one axis that corrects one axis.
+    """A table of one axis that corrects one axis."""
 
-    Attributes
-    ----------
-    source, target : str
-        The axis whose position is looked up, and the one that is corrected.
-    positions : tuple of float, (n,), mm or degrees
-        Ascending.
-    values : tuple of float, (n,), mm or degrees
-        What is added to the commanded position of the target. Forward values where `backward` is
-        given.
-    ends : str
-        "held", "modulo" (the period is that of the table) or "extended".
-    backward : tuple of float, (n,)
-        Values for travel in the negative direction; empty where they are the same.
-    direction : int
-        1 or −1 where it acts in one direction of travel only, else 0.
-    """
-
-    source: str
+    source: str  # the axis whose position is looked up, and the one that is corrected
     target: str
-    positions: tuple[float, ...]
+    positions: tuple[float, ...]  # (n,), mm or degrees; ascending
+    # (n,), mm or degrees; what is added to the commanded position of the target. Forward values
+    # where `backward` is given.
     values: tuple[float, ...]
-    ends: str = HELD
+    ends: str = HELD  # "held", "modulo" (the period is that of the table) or "extended"
+    # (n,); values for travel in the negative direction; empty where they are the same
     backward: tuple[float, ...] = ()
-    direction: int = 0
+    direction: int = 0  # 1 or −1 where it acts in one direction of travel only, else 0
 
     @property
     def size(self) -> int:
@@ -87,19 +87,11 @@ class Line:
 
 @dataclass(frozen=True)
 class Product:
-    """Two tables whose values are multiplied; the product is added to the target of the first.
+    """Two tables whose values are multiplied; the product is added to the target of the first."""
 
-    Attributes
-    ----------
-    first, second : Line
-        Their own corrections are no part of it.
-    sign : float
-        Of the product: −1 where the controller subtracts what its tables say.
-    """
-
-    first: Line
+    first: Line  # their own corrections are no part of it
     second: Line
-    sign: float = 1.0
+    sign: float = 1.0  # of the product: −1 where the controller subtracts what its tables say
 
     @property
     def size(self) -> int:
@@ -120,19 +112,12 @@ class Product:
 
 @dataclass(frozen=True)
 class Grid3:
-    """Corrections of three axes at the points of a grid, trilinear between them.
-
-    Attributes
-    ----------
-    axes : tuple of str, (3,)
-    positions : tuple of tuple of float, (3, n)
-        Ascending, of each axis.
-    values : ndarray, [n1, n2, n3, 3], mm
-        Added to the commanded positions. Beyond the grid its border is held.
-    """
+    """Corrections of three axes at the points of a grid, trilinear between them."""
 
     axes: tuple[str, str, str]
+    # (3, n); ascending, of each axis
     positions: tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
+    # [n1, n2, n3, 3], mm; added to the commanded positions. Beyond the grid its border is held.
     values: Array
 
     @property
@@ -150,16 +135,10 @@ class Grid3:
 
 @dataclass(frozen=True)
 class Affine:
-    """Corrections that are linear in the commanded positions.
+    """Corrections that are linear in the commanded positions."""
 
-    Attributes
-    ----------
-    axes : tuple of str, (n,)
-    matrix : tuple of tuple of float, (n, n)
-        Correction of the axis of the row per position of the axis of the column.
-    """
-
-    axes: tuple[str, ...]
+    axes: tuple[str, ...]  # (n,)
+    # (n, n); correction of the axis of the row per position of the axis of the column
     matrix: tuple[tuple[float, ...], ...]
 
     @property
@@ -178,20 +157,7 @@ class Affine:
 
 
 def interpolate(position: Array, at: Sequence[float], values: Sequence[float], ends: str) -> Array:
-    """Interpolate linearly in a table.
-
-    Parameters
-    ----------
-    position : ndarray, [...], mm or degrees
-    at, values : sequence of float, (n,)
-        Positions ascend.
-    ends : str
-        "held", "modulo" or "extended".
-
-    Returns
-    -------
-    ndarray, [...]
-    """
+    """Interpolate linearly in a table."""
     places, found = np.asarray(at, dtype=float), np.asarray(values, dtype=float)
     if ends == MODULO and len(places) > 1:
         period = places[-1] - places[0]
@@ -208,19 +174,7 @@ def interpolate(position: Array, at: Sequence[float], values: Sequence[float], e
 def trilinear(
     points: Sequence[Array], positions: Sequence[Sequence[float]], values: Array
 ) -> Array:
-    """Interpolate in a grid of three axes: the documented sum over the eight corners of a cell.
-
-    Parameters
-    ----------
-    points : sequence of ndarray, (3,) of [...], mm
-    positions : sequence of sequence of float, (3, n)
-    values : ndarray, [n1, n2, n3, k]
-
-    Returns
-    -------
-    ndarray, [..., k]
-        Beyond the grid the values of its border.
-    """
+    """Interpolate in a grid of three axes: the documented sum over the eight corners of a cell."""
     cells: list[NDArray[np.intp]] = []
     shares: list[Array] = []
     for point, along in zip(points, positions, strict=True):
@@ -241,17 +195,9 @@ def trilinear(
 
 @dataclass(frozen=True)
 class Tables:
-    """What a controller holds after it has read its file.
+    """What a controller holds after it has read its file."""
 
-    Attributes
-    ----------
-    terms : tuple of Term
-        All corrections add up.
-    assumed, notes : tuple of str
-    units : tuple of str
-    """
-
-    terms: tuple[Term, ...]
+    terms: tuple[Term, ...]  # all corrections add up
     assumed: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     units: tuple[str, ...] = field(default=("mm",))
@@ -268,3 +214,203 @@ class Tables:
             for axis, value in term.corrections(coordinates, direction).items():
                 total[axis] = total[axis] + value if axis in total else np.asarray(value)
         return total
+
+
+# --- Errors behind the tables: what a controller corrects is taken for the error itself -----------
+
+SQUARENESS = {("X", "Y"): ("EC0Y", -1.0), ("X", "Z"): ("EB0Z", 1.0), ("Y", "Z"): ("EA0Z", -1.0)}
+"""Squareness that an error of the first axis in proportion to the second one is, and its sign."""
+WAYS: tuple[int, ...] = (FORWARD, BACKWARD)
+NEGLIGIBLE = 1e-9
+"""µm or µrad."""
+
+
+def errors_of(
+    tables: Tables, name: str, source: Source, machine: Machine | None = None
+) -> Imported:
+    """Give the errors that the tables of a controller correct."""
+    lines = [term for term in tables.terms if isinstance(term, Line)]
+    series = [_series(key, parts, machine) for key, parts in _by_key(lines, source).items()]
+    planes = [_plane(term, machine, source) for term in tables.terms if isinstance(term, Product)]
+    notes = list(tables.notes)
+    for term in tables.terms:
+        if isinstance(term, Grid3):
+            found, left = _grid_planes(term, machine)
+            planes += found
+            if left > NEGLIGIBLE:
+                notes.append(
+                    f"up to {left:.3g} µm depend on all three axes together, which no error of two"
+                    " axes holds: left out"
+                )
+    series, planes = _joined(series, planes, source)
+    constants: dict[str, float] = {}
+    curves: dict[str, object] = {}
+    for term in tables.terms:
+        if isinstance(term, Affine):
+            _affine(term, machine, constants, curves)
+    side = "" if machine is not None else " (all axes taken to carry the tool)"
+    assumed = (*tables.assumed, f"what the table corrects is taken for the whole error{side}")
+    return Imported(
+        name,
+        tuple(
+            one
+            for one in series
+            if any(abs(value) > NEGLIGIBLE for run in one.runs for value in run.values)
+        ),
+        tuple(planes),
+        constants,
+        units=tables.units,
+        assumed=assumed,
+        notes=tuple(notes),
+        curves=curves,
+    )
+
+
+def error_key(source_axis: str, target: str) -> str:
+    """Name the error of one axis that shows as a displacement of another: EXY for X over Y."""
+    letters = "XYZ" if is_linear(target) else "ABC"
+    return f"E{letters[direction_index(target)]}{source_axis}"
+
+
+def sense(machine: Machine | None, axis: str) -> float:
+    """Give +1 where an axis moves the tool in its direction against the workpiece, else −1."""
+    if machine is None or axis not in machine.axes:
+        return 1.0
+    return float(machine.sense(axis))
+
+
+def side(machine: Machine | None, axis: str) -> float:
+    """Give +1 for an axis that carries the tool, −1 for one that carries the workpiece."""
+    return -1.0 if machine is not None and axis in machine.chain.workpiece else 1.0
+
+
+def _factor(machine: Machine | None, source_axis: str, target: str) -> float:
+    """Factor from a correction in mm or degrees of an axis to the error in µm or µrad."""
+    size = MM_TO_UM if is_linear(target) else DEG_TO_URAD
+    return -size * sense(machine, target) * side(machine, source_axis)
+
+
+def _by_key(lines: Sequence[Line], source: Source) -> dict[str, list[Line]]:
+    found: defaultdict[str, list[Line]] = defaultdict(list)
+    for line in lines:
+        if not is_linear(line.target) and line.source != line.target:
+            source.refuse(
+                f"corrects the rotary axis {line.target} over {line.source}: no error parameter"
+                " is such a correction",
+                "tables of linear axes, or of a rotary axis itself",
+            )
+        found[error_key(line.source, line.target)].append(line)
+    return found
+
+
+def _series(key: str, parts: Sequence[Line], machine: Machine | None) -> Series:
+    at = np.unique(np.concatenate([part.positions for part in parts]))
+    factor = _factor(machine, parts[0].source, parts[0].target)
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite the scene refuses
+        ways = {way: factor * np.sum([part.at(at, way) for part in parts], axis=0) for way in WAYS}
+    if np.array_equal(ways[FORWARD], ways[BACKWARD]):
+        runs = (Run(1, BOTH, tuple(ways[FORWARD].tolist())),)
+    else:
+        runs = tuple(Run(1, way, tuple(values.tolist())) for way, values in ways.items())
+    return Series(key, tuple(at.tolist()), runs)
+
+
+def _plane(term: Product, machine: Machine | None, source: Source) -> Plane:
+    one, other = term.first, term.second
+    if one.source == other.source or not is_linear(one.target):
+        source.refuse(
+            f"multiplies tables over {one.source} and {other.source} for {one.target}",
+            "tables over two axes that correct a linear axis",
+        )
+    factor = _factor(machine, one.source, one.target)
+    first, second = np.meshgrid(one.positions, other.positions, indexing="ij")
+    tables = {way: factor * term.at(first, second, way) for way in WAYS}
+    key = error_key(one.source, one.target)
+    return plane_by_direction(
+        key, (one.source, other.source), (one.positions, other.positions), tables
+    )
+
+
+def _grid_planes(term: Grid3, machine: Machine | None) -> tuple[list[Plane], float]:
+    """Split a grid of corrections into errors of two axes each; give what is left over, µm."""
+    planes: list[Plane] = []
+    left = 0.0
+    for index, target in enumerate(term.axes):
+        values = term.values[..., index]
+        over = {
+            axes: values.mean(axis=axes, keepdims=True)
+            for axes in ((0,), (1,), (2,), (0, 1), (0, 2), (1, 2), (0, 1, 2))
+        }
+        parts = {
+            (0, 1): over[2,],
+            (1, 2): over[0,] - over[0, 2],
+            (2, 0): over[1,] - over[1, 2] - over[0, 1] + over[0, 1, 2],
+        }
+        rest = np.abs(values - sum(parts.values())).max()
+        left = max(left, float(rest) * MM_TO_UM)
+        for (first, second), part in parts.items():
+            flat = part.squeeze(axis=3 - first - second)
+            table = flat if first < second else flat.T
+            axes = (term.axes[first], term.axes[second])
+            scaled: Array = _factor(machine, axes[0], target) * table
+            places = (term.positions[first], term.positions[second])
+            tables = dict.fromkeys(WAYS, scaled)
+            planes.append(plane_by_direction(error_key(axes[0], target), axes, places, tables))
+    return [plane for plane in planes if np.abs(plane.values).max() > NEGLIGIBLE], left
+
+
+def _joined(
+    series: list[Series], planes: list[Plane], source: Source
+) -> tuple[list[Series], list[Plane]]:
+    joined: dict[tuple[str, tuple[str, str]], Plane] = {}
+    for plane in planes:
+        place = (plane.key, plane.axes)
+        joined[place] = _added(joined[place], plane) if place in joined else plane
+    keys = [key for key, _ in joined]
+    if twice := next((key for key in keys if keys.count(key) > 1), ""):
+        source.refuse(f"has products of {twice} with two other axes", "one for each error")
+    left: list[Series] = []
+    for one in series:
+        place = next((place for place in joined if place[0] == one.key), None)
+        if place is None:
+            left.append(one)
+            continue
+        ends = (joined[place].second[0], joined[place].second[-1])
+        columns = {way: np.repeat(one.toward(way)[:, None], 2, axis=1) for way in WAYS}
+        own = plane_by_direction(one.key, place[1], (one.positions, ends), columns)
+        joined[place] = _added(joined[place], own)
+    return left, list(joined.values())
+
+
+def _added(one: Plane, other: Plane) -> Plane:
+    first = np.union1d(one.first, other.first)
+    second = np.union1d(one.second, other.second)
+    totals = {
+        way: _resampled(one, way, first, second) + _resampled(other, way, first, second)
+        for way in WAYS
+    }
+    return plane_by_direction(one.key, one.axes, (first.tolist(), second.tolist()), totals)
+
+
+def _resampled(plane: Plane, direction: int, first: Array, second: Array) -> Array:
+    rows = np.array([np.interp(second, plane.second, row) for row in plane.table(direction)])
+    return np.array([np.interp(first, plane.first, column) for column in rows.T]).T
+
+
+def _affine(
+    term: Affine,
+    machine: Machine | None,
+    constants: dict[str, float],
+    curves: dict[str, object],
+) -> None:
+    for target, row in zip(term.axes, term.matrix, strict=True):
+        for axis, value in zip(term.axes, row, strict=True):
+            if not value:
+                continue
+            if (target, axis) in SQUARENESS:
+                key, sign = SQUARENESS[target, axis]
+                turned = sense(machine, target) * sense(machine, axis)
+                constants[key] = -value * sign * turned * RAD_TO_URAD
+            else:
+                slope = value * _factor(machine, axis, target)
+                curves[error_key(axis, target)] = {"poly": [0.0, slope]}

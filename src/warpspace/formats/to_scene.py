@@ -7,77 +7,51 @@ from typing import TypeVar
 import numpy as np
 
 from warpspace.exceptions import OptionError, SceneError
-from warpspace.formats.importing import Reading
 from warpspace.formats.measured import BACKWARD, FORWARD, Imported, Plane, Series
+from warpspace.formats.registry import Reading
 from warpspace.kinematics.model import Model
 from warpspace.machine.axes import is_linear
-from warpspace.machine.curves.constant import Constant
 from warpspace.machine.curves.curve import ErrorFunction
 from warpspace.machine.curves.directional import Directional
-from warpspace.machine.curves.table import Table
-from warpspace.machine.curves.two_arguments import TwoArguments
-from warpspace.machine.errors import ErrorSet
+from warpspace.machine.curves.simple import Constant
+from warpspace.machine.curves.table import Table, TwoArguments
+from warpspace.machine.errors import ErrorSet, Measurement, Run
 from warpspace.machine.limits import MAX_POINTS, MAX_SCENE_BYTES, MAX_TEXT, MIN_SPAN
-from warpspace.machine.measurement import Measurement, Run
 from warpspace.machine.parameters import parameter
-from warpspace.scene.curves import read_curve
+from warpspace.scene.curves import CurveReader
+from warpspace.scene.files import radian_notes
 from warpspace.scene.library import load_scene, parse_scene
 from warpspace.scene.machines import machine_names
-from warpspace.scene.model import Scene
+from warpspace.scene.model import Scene, coverage_notes
 from warpspace.scene.save import scene_to_toml
-from warpspace.scene.sections import Problems
+from warpspace.scene.schema import Problems
 
-MEASURED = ("csv", "rtl")
-"""Formats whose runs are readings, which are kept with the scene."""
 LEEWAY = 1e-6
 """mm or degrees by which a position may lie beyond the travel."""
+LARGE = {False: 1000.0, True: 5000.0}
+"""µm of a translation and µrad of a rotation above which the unit of a file is asked about."""
 T = TypeVar("T")
 SIGNS = {FORWARD: "+", BACKWARD: "-"}
 
 
 @dataclass(frozen=True)
 class ImportedScene:
-    """A scene with imported errors.
-
-    Attributes
-    ----------
-    scene : Scene
-    text : str
-        Its file.
-    notes : tuple of str
-        What was left out, replaced or assumed for it.
-    """
+    """A scene with imported errors."""
 
     scene: Scene
-    text: str
-    notes: tuple[str, ...]
+    text: str  # its file
+    notes: tuple[str, ...]  # what was left out, replaced or assumed for it
 
 
 def base_scene(machine: str) -> Scene:
-    """Give the scene that errors are imported into: of a machine of the library, or a scene.
-
-    Parameters
-    ----------
-    machine : str
-        Name of a bundled machine, or name or path of a scene.
-
-    Raises
-    ------
-    SceneError
-    """
+    """Give the scene that errors are imported into: of a machine of the library, or a scene."""
     if machine in machine_names():
         return parse_scene(f'title = "{machine}"\nmachine = "{machine}"\n', machine)
     return load_scene(machine)
 
 
 def plain_scene(found: Imported) -> Scene:
-    """Give a machine of X, Y and Z for errors that name none.
-
-    Raises
-    ------
-    OptionError
-        If the errors are of other axes.
-    """
+    """Give a machine of X, Y and Z for errors that name none."""
     other = [axis for axis in found.axes if axis not in ("X", "Y", "Z")]
     if other:
         raise OptionError(
@@ -91,30 +65,7 @@ def plain_scene(found: Imported) -> Scene:
 
 
 def into_scene(reading: Reading, base: Scene | None, title: str, name: str) -> ImportedScene:
-    """Put imported errors into a scene.
-
-    Parameters
-    ----------
-    reading : Reading
-    base : Scene or None
-        Errors of the same parameters are replaced, all others stay. None for a machine of X, Y, Z.
-    title : str
-        Of the scene, where there is none.
-    name : str
-        What the files are called in messages.
-
-    Returns
-    -------
-    ImportedScene
-
-    Raises
-    ------
-    SceneError
-        If the machine lacks an axis or a parameter, a position lies outside its travel, or the
-        scene would be too large.
-    OptionError
-        If a machine must be named.
-    """
+    """Put imported errors into a scene."""
     found = reading.found
     notes: list[str] = []
     if base is None:
@@ -123,6 +74,7 @@ def into_scene(reading: Reading, base: Scene | None, title: str, name: str) -> I
         notes.append("no machine named: X, Y and Z carry the tool, travels are those of the data")
     _check_keys(found, base, name)
     _check_travel(found, base, name)
+    notes += _doubts(found, base)
     curves = _curves(found, base, name)
     replaced = [key for key in curves if key in base.errors]
     if replaced:
@@ -130,7 +82,7 @@ def into_scene(reading: Reading, base: Scene | None, title: str, name: str) -> I
     kept = [key for key in base.errors if key not in curves]
     if kept:
         notes.append(f"kept from {base.name}: {', '.join(kept)}")
-    uncertainty, measured = _measured(found, base)
+    uncertainty, measured = _measured(found, base, keep_runs=reading.format.measured)
     model, said = _convention(found, base)
     said_by = [*reading.found.assumed, *notes, *said, *found.notes]
     description = "\n".join([f"Imported from {name} ({reading.format.name}).", *said_by])[:MAX_TEXT]
@@ -160,15 +112,11 @@ def _check_keys(found: Imported, base: Scene, name: str) -> None:
     """Refuse parameters that the machine does not have."""
     machine = base.machine
     expected = f"expected errors of {', '.join(machine.axes)}"
+    needed = [(key, parameter(key).axis) for key in found.keys]
+    needed += [(plane.key, axis) for plane in found.planes for axis in plane.axes]
     problems = [
-        f"{key}: the machine {machine.chain} has no axis {parameter(key).axis}; {expected}"
-        for key in found.keys
-        if parameter(key).axis not in machine.axes
-    ]
-    problems += [
-        f"{plane.key}: the machine {machine.chain} has no axis {axis}; {expected}"
-        for plane in found.planes
-        for axis in plane.axes
+        f"{key}: the machine {machine.chain} has no axis {axis}; {expected}"
+        for key, axis in needed
         if axis not in machine.axes
     ]
     if problems:
@@ -176,7 +124,6 @@ def _check_keys(found: Imported, base: Scene, name: str) -> None:
 
 
 def _ranges(found: Imported) -> dict[str, tuple[float, float]]:
-    """Give the range of positions of each axis."""
     at: dict[str, list[float]] = {}
     for one in found.series:
         at.setdefault(parameter(one.key).axis, []).extend(one.positions)
@@ -204,23 +151,36 @@ def _check_travel(found: Imported, base: Scene, name: str) -> None:
         raise SceneError(name, problems)
 
 
+def _doubts(found: Imported, base: Scene) -> list[str]:
+    notes = list(coverage_notes(base, _ranges(found)))
+    for one in found.series:
+        if not is_linear(axis := parameter(one.key).axis):
+            notes += radian_notes({f"{one.key} over {axis}_deg": one.positions})
+    largest = {one.key: float(np.abs(one.values).max()) for one in (*found.series, *found.planes)}
+    largest |= {key: abs(value) for key, value in found.constants.items()}
+    for key, value in largest.items():
+        if value > LARGE[parameter(key).is_rotation]:
+            units = f", read in {', '.join(found.units)}" if found.units else ""
+            notes.append(
+                f"{key} reaches {value:g} {parameter(key).unit}{units}: is the file in this unit?"
+            )
+    return notes
+
+
 def _curves(found: Imported, base: Scene, name: str) -> dict[str, ErrorFunction]:
-    """Build the curve of each error."""
     curves: dict[str, ErrorFunction] = {}
     for key, value in found.constants.items():
         curves[key] = Constant(base.axis_span(parameter(key).axis), value)
-    for one in found.series:
+    for one in (*found.series, *found.planes):
         if one.key in curves:
             raise SceneError(name, [f"{one.key} is given twice; expected each error once"])
-        curves[one.key] = _curve(one, base)
-    for plane in found.planes:
-        if plane.key in curves:
-            raise SceneError(name, [f"{plane.key} is given twice; expected each error once"])
-        curves[plane.key] = _surface(plane, base, name)
+        curves[one.key] = (
+            _curve(one, base) if isinstance(one, Series) else _surface(one, base, name)
+        )
     problems = Problems()
     for key, value in found.curves.items():
-        span = base.axis_span(parameter(key).axis)
-        curve = read_curve(value, span, key, None, problems, axis=parameter(key).axis)
+        axis = parameter(key).axis
+        curve = CurveReader(problems, base.axis_span(axis), axis).read(value, key)
         if curve is not None:
             curves[key] = curve
     if problems.lines:
@@ -229,7 +189,6 @@ def _curves(found: Imported, base: Scene, name: str) -> dict[str, ErrorFunction]
 
 
 def _curve(one: Series, base: Scene) -> ErrorFunction:
-    """Build the curve of an error along its axis: by direction where both were measured."""
     span = base.axis_span(parameter(one.key).axis)
     forward, backward = one.forward, one.backward
     if forward is not None and backward is not None and np.any(forward != backward):
@@ -241,12 +200,10 @@ def _curve(one: Series, base: Scene) -> ErrorFunction:
 
 
 def _table(span: tuple[float, float], at: Sequence[float], values: Sequence[float]) -> Table:
-    """Build a table."""
     return Table(span, tuple(zip(at, values, strict=True)))
 
 
 def _surface(plane: Plane, base: Scene, name: str) -> ErrorFunction:
-    """Build a table over two axes, by direction where it depends on it."""
     if len(plane.first) * len(plane.second) > MAX_POINTS:
         found = f"{plane.key} has {len(plane.first)} × {len(plane.second)} values"
         raise SceneError(name, [f"{found}; expected at most {MAX_POINTS:,}"])
@@ -259,9 +216,8 @@ def _surface(plane: Plane, base: Scene, name: str) -> ErrorFunction:
 
 
 def _measured(
-    found: Imported, base: Scene
+    found: Imported, base: Scene, *, keep_runs: bool
 ) -> tuple[dict[str, ErrorFunction], dict[str, Measurement]]:
-    """Give uncertainties, and the runs of what was measured."""
     uncertainty: dict[str, ErrorFunction] = {
         key: Constant(base.axis_span(parameter(key).axis), value)
         for key, value in found.uncertainty.items()
@@ -271,25 +227,21 @@ def _measured(
         if one.uncertainty:
             span = base.axis_span(parameter(one.key).axis)
             uncertainty[one.key] = _table(span, one.positions, one.uncertainty)
-        if found.format in MEASURED and len(one.runs) > 1:
+        if keep_runs and len(one.runs) > 1:
+            runs = [
+                (SIGNS.get(run.direction, ""), zip(one.positions, run.values, strict=True))
+                for run in one.runs
+            ]
             measured[one.key] = Measurement(
                 tuple(
-                    Run(
-                        SIGNS.get(run.direction, ""),
-                        tuple(
-                            (q, value)
-                            for q, value in zip(one.positions, run.values, strict=True)
-                            if not np.isnan(value)
-                        ),
-                    )
-                    for run in one.runs
+                    Run(sign, tuple((q, value) for q, value in pairs if not np.isnan(value)))
+                    for sign, pairs in runs
                 )
             )
     return uncertainty, measured
 
 
 def _convention(found: Imported, base: Scene) -> tuple[Model, list[str]]:
-    """Give the axes of imported component errors the convention of their file."""
     model = base.model
     own = dict(model.own_component_errors)
     said: list[str] = []

@@ -24,23 +24,13 @@ Bytes = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True)
 class ColourScale:
-    """A colour map over a range of values.
+    """A colour map over a range of values."""
 
-    Attributes
-    ----------
-    low, high : float
-        Values at the ends, in `unit`.
-    diverging : bool
-        Whether it has a neutral middle (signed values) rather than a dark end (lengths).
-    label : str
-        What the values are.
-    unit : str
-    """
-
-    low: float
+    low: float  # values at the ends, in `unit`
     high: float
+    # whether it has a neutral middle (signed values) rather than a dark end (lengths)
     diverging: bool = False
-    label: str = "|E|"
+    label: str = "|E|"  # what the values are
     unit: str = MICROMETRE
 
     @property
@@ -78,7 +68,6 @@ class ColourScale:
 
 @cache
 def _table(name: str) -> Bytes:
-    """Read the colours of a map, [256, 3]."""
     return (np.asarray(Colormap(name).lut(LEVELS))[:, :3] * 255.0 + 0.5).astype(np.uint8)
 
 
@@ -126,26 +115,9 @@ def build_scale(
     quantity: str = "E",
     unit: str = MICROMETRE,
     end: float | None = None,
+    change: bool = False,
 ) -> ColourScale:
-    """Choose a scale with round ends for values up to a largest magnitude, or with a given end.
-
-    Parameters
-    ----------
-    largest : float
-        Largest magnitude to show; of several maps where they are compared.
-    component : str
-        "norm" gives a sequential scale from zero, a signed component a symmetric diverging one.
-    quantity : str, optional
-        Symbol of what is shown.
-    unit : str, optional
-    end : float, optional
-        Where it ends, whatever the values; a signed component's begins at its negative.
-
-    Returns
-    -------
-    ColourScale
-        From 0 to 1 (or −1 to 1) where everything is zero.
-    """
+    """Choose a scale with round ends for values up to a largest magnitude, or with a given end."""
     top = 1.0
     if math.isfinite(largest) and largest > 0.0:
         step = nice_step(largest if component == "norm" else 2.0 * largest)
@@ -153,5 +125,21 @@ def build_scale(
     if end is not None:
         top = end
     if component == "norm":
-        return ColourScale(0.0, top, diverging=False, label=f"|{quantity}|", unit=unit)
-    return ColourScale(-top, top, diverging=True, label=f"{quantity}_{component}", unit=unit)
+        label = f"|{quantity}_B − {quantity}_A|" if change else f"|{quantity}|"
+        return ColourScale(0.0, top, diverging=False, label=label, unit=unit)
+    label = f"{quantity}_{component}{', B − A' if change else ''}"
+    return ColourScale(-top, top, diverging=True, label=label, unit=unit)
+
+
+# --- The transfer curve between sRGB colours and linear light -------------------------------------
+
+
+def srgb_to_linear(srgb: Array) -> Array:
+    """Undo the sRGB transfer curve, [..., 3] of 0 … 1."""
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+
+
+def linear_to_srgb(linear: Array) -> Array:
+    """Apply the sRGB transfer curve, [..., 3] of 0 … 1."""
+    positive = np.maximum(linear, 0.0)
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * positive ** (1 / 2.4) - 0.055)

@@ -1,13 +1,22 @@
 """Surface, lines and corners of the gridded volume as indices into its nodes.
 
 Indices do not change when the grid is bent, so a picture is updated by moving nodes only.
+A face is a patch, a 2-D array of flat grid indices: surfaces, grid lines, creases and isolines of a
+picture come from one list of patches, so that they lie on each other.
 """
 
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
+
+from warpspace.geometry.colour import ColourScale
+from warpspace.machine.limits import EXAGGERATION
+from warpspace.units import MM_PER_UM, Array
 
 Index = NDArray[np.intp]
 Shape = tuple[int, int, int]
@@ -16,68 +25,40 @@ _CELLS = 12
 
 @dataclass(frozen=True, slots=True)
 class Surface:
-    """Triangles on the outside of a grid.
+    """Triangles on the outside of a grid."""
 
-    Attributes
-    ----------
-    nodes : ndarray, [M]
-        Flat grid index of each vertex.
-    triangles : ndarray, [T, 3]
-        Vertex numbers, counter-clockwise seen from outside.
+    nodes: Index  # [M]; flat grid index of each vertex
+    triangles: Index  # [T, 3]; vertex numbers, counter-clockwise seen from outside
+
+
+def outer_faces(shape: Shape) -> list[Index]:
+    """List the outer faces of a grid as flat node indices [a, b], (row, column) turning outwards.
+
+    One face for a flat grid (a count of 1), none for a line.
     """
-
-    nodes: Index
-    triangles: Index
-
-
-def _face_nodes(shape: Shape, axis: int, end: int) -> Index:
-    """Flat grid indices of one face as a 2-D array, ordered to face outwards."""
     numbers = np.arange(np.prod(shape)).reshape(shape)
-    face = np.take(numbers, end, axis=axis)
-    # the remaining two axes in ascending order turn right-handed about +axis, except about y
-    outwards = (end != 0) != (axis == 1)
-    return face if outwards else face.T
-
-
-def _faces(shape: Shape) -> list[Index]:
-    """All faces of the grid that span an area; a flat grid has one."""
     found: list[Index] = []
     for axis in range(3):
-        rest = [shape[other] for other in range(3) if other != axis]
-        if min(rest) > 1:
-            ends = (0, -1) if shape[axis] > 1 else (-1,)
-            found += [_face_nodes(shape, axis, end) for end in ends]
+        if min(shape[other] for other in range(3) if other != axis) == 1:
+            continue
+        ends = (0, 1) if shape[axis] > 1 else (1,)
+        found += [oriented(np.take(numbers, -end, axis=axis), axis, upper=end) for end in ends]
     return found
 
 
+def oriented(face: Index, axis: int, *, upper: int) -> Index:
+    """Order a face so that it looks along +axis (upper) or −axis."""
+    # the other two axes in ascending order turn right-handed about +axis, except about y
+    return face if bool(upper) != (axis == 1) else face.T
+
+
 def outer_surface(shape: Shape) -> Surface:
-    """Triangulate the outside of a grid.
-
-    Parameters
-    ----------
-    shape : tuple of int, (3,)
-        Nodes along the three axes; 1 where the volume is flat.
-
-    Returns
-    -------
-    Surface
-        Vertices shared between neighbouring faces.
-    """
-    return triangulate(_faces(shape))
+    """Triangulate the outside of a grid."""
+    return triangulate(outer_faces(shape))
 
 
 def triangulate(faces: list[Index]) -> Surface:
-    """Triangulate rectangular patches of nodes into one surface with shared vertices.
-
-    Parameters
-    ----------
-    faces : list of ndarray, [a, b]
-        Flat grid indices of each patch, ordered so that (row, column) turns outwards.
-
-    Returns
-    -------
-    Surface
-    """
+    """Triangulate patches [a, b] of nodes that turn outwards into one surface."""
     if not faces:
         return Surface(np.zeros(0, dtype=np.intp), np.zeros((0, 3), dtype=np.intp))
     triangles: list[Index] = []
@@ -91,95 +72,16 @@ def triangulate(faces: list[Index]) -> Surface:
     return Surface(nodes, numbered.reshape(-1, 3))
 
 
-def cut_octant(shape: Shape, corner: tuple[int, int, int]) -> Surface:
-    """Triangulate the outside of a grid without the octant at one corner.
-
-    Parameters
-    ----------
-    shape : tuple of int, (3,)
-        At least three nodes along each axis.
-    corner : tuple of int, (3,)
-        0 for the lower, 1 for the upper end along each axis.
-
-    Returns
-    -------
-    Surface
-        Outer faces with a quarter missing where the octant was, and the three faces of the cut.
-    """
-    numbers = np.arange(np.prod(shape)).reshape(shape)
-    middle = [count // 2 for count in shape]
-    faces: list[Index] = []
-    for axis in range(3):
-        for end in (0, 1):
-            face = np.take(numbers, -end, axis=axis)
-            if end != corner[axis]:
-                faces.append(_oriented(face, axis, upper=bool(end)))
-            else:
-                faces += [
-                    _oriented(patch, axis, upper=bool(end))
-                    for patch in _without_quarter(face, axis, corner, middle)
-                ]
-        inner = np.take(numbers, middle[axis], axis=axis)
-        quarter = inner[_quarter(axis, corner, middle)]
-        faces.append(_oriented(quarter, axis, upper=bool(corner[axis])))
-    return triangulate(faces)
-
-
-def _quarter(axis: int, corner: tuple[int, int, int], middle: list[int]) -> tuple[slice, ...]:
-    """Slices of the quarter of a face that belongs to the cut octant."""
-    rest = [other for other in range(3) if other != axis]
-    return tuple(_half(corner[other], middle[other]) for other in rest)
-
-
-def _half(upper: int, middle: int) -> slice:
-    """Slice of the half at one end, the middle node included."""
-    return slice(middle, None) if upper else slice(None, middle + 1)
-
-
-def _without_quarter(
-    face: Index, axis: int, corner: tuple[int, int, int], middle: list[int]
-) -> list[Index]:
-    """Split a face into the two patches that remain without the quarter of the octant."""
-    first, second = (other for other in range(3) if other != axis)
-    kept = _half(1 - corner[first], middle[first])
-    cut = _half(corner[first], middle[first])
-    return [face[kept, :], face[cut, _half(1 - corner[second], middle[second])]]
-
-
-def _oriented(face: Index, axis: int, *, upper: bool) -> Index:
-    """Order a face so that it looks along +axis (upper) or −axis."""
-    return face if upper != (axis == 1) else face.T
-
-
 def box_edges(shape: Shape) -> list[Index]:
-    """List the edges of the grid as polylines.
-
-    Parameters
-    ----------
-    shape : tuple of int, (3,)
-
-    Returns
-    -------
-    list of ndarray, [n]
-        Flat grid indices along each edge; twelve for a full volume.
-    """
+    """List the edges of the grid as polylines of flat node indices; twelve for a full volume."""
     whole = max(shape)
     return grid_lines(shape, (whole, whole, whole))
 
 
 def grid_lines(shape: Shape, every: tuple[int, int, int]) -> list[Index]:
-    """List the lines on the faces of the grid as polylines.
+    """List every n-th line of each axis on the faces of the grid, first and last included.
 
-    Parameters
-    ----------
-    shape : tuple of int, (3,)
-    every : tuple of int, (3,)
-        Draw every n-th line along each axis; first and last are always drawn.
-
-    Returns
-    -------
-    list of ndarray, [n]
-        Flat grid indices; each line once.
+    Polylines of flat node indices; each line once.
     """
     numbers = np.arange(np.prod(shape)).reshape(shape)
     lines: list[Index] = []
@@ -195,7 +97,6 @@ def grid_lines(shape: Shape, every: tuple[int, int, int]) -> list[Index]:
 
 
 def _kept(count: int, every: int) -> list[int]:
-    """Numbers of the lines that are drawn along an axis."""
     return sorted({*range(0, count, every), count - 1})
 
 
@@ -215,3 +116,375 @@ def corners(shape: Shape) -> Index:
     numbers = np.arange(np.prod(shape)).reshape(shape)
     ends = [sorted({0, count - 1}) for count in shape]
     return np.array([numbers[at] for at in product(*ends)])
+
+
+# --- A volume without area as a body that can be seen ---------------------------------------------
+# A line becomes a bar, a point a cube.
+#
+# The axes that stand still get two nodes instead of one, half a thickness to either side; a bar
+# then has surface, grid lines and edges like any other volume.
+
+THICKNESS = 0.016
+"""Of a bar or a cube, as a part of the length that the picture is sized by."""
+
+
+def is_thin(shape: Shape) -> bool:
+    """Tell whether a grid is a line or a point, so that it has no area."""
+    return shape.count(1) >= 2
+
+
+def thicken(points_mm: Array, thickness_mm: float) -> Array:
+    """Give a line or a point of nodes a thickness.
+
+    Parameters
+    ----------
+    points_mm : ndarray, [nx, ny, nz, 3], mm
+        At most one of the counts is above 1.
+    thickness_mm : float, mm
+
+    Returns
+    -------
+    ndarray, [mx, my, mz, 3], mm
+        Two nodes wherever there was one.
+    """
+    shape = points_mm.shape[:3]
+    still = [axis for axis in range(3) if shape[axis] == 1]
+    run = np.abs(points_mm[-1, -1, -1] - points_mm[0, 0, 0])
+    ways = list(np.eye(3))
+    if len(still) < len(shape):
+        # a turned machine may have its line along another direction than its axis is named for
+        along = ways.pop(int(np.argmax(run)))
+        ways.insert(next(axis for axis in range(3) if shape[axis] > 1), along)
+    thick = points_mm
+    for axis in still:
+        shift = 0.5 * thickness_mm * ways[axis]
+        thick = np.concatenate([thick - shift, thick + shift], axis=axis)
+    return thick
+
+
+def spread(values: Array) -> Array:
+    """Repeat what is known at the nodes of a line or a point, [nx, ny, nz, ...], as `thicken`."""
+    for axis in range(3):
+        if values.shape[axis] == 1:
+            values = np.repeat(values, 2, axis=axis)
+    return values
+
+
+def spread_nodes(shape: Shape) -> NDArray[np.intp]:
+    """Give the flat index of the grid node that each node of a thickened grid belongs to, [M]."""
+    numbers = np.arange(np.prod(shape), dtype=np.intp).reshape(shape)
+    for axis in range(3):
+        if shape[axis] == 1:
+            numbers = np.repeat(numbers, 2, axis=axis)
+    return numbers.reshape(-1)
+
+
+# --- Exaggerated displacement: the one place where errors become something to look at -------------
+
+TARGET_FRACTION = 0.1
+"""Largest displacement on screen, as a fraction of the volume's longest edge, that auto aims at."""
+NEUTRAL_EXAGGERATION = 1000.0
+"""What auto chooses where nothing is displaced."""
+_ROUND = (1.0, 2.0, 5.0, 10.0)
+
+
+def deform(nominal_mm: Array, error_um: Array, exaggeration: float) -> Array:
+    """Displace points by their exaggerated error.
+
+    Parameters
+    ----------
+    nominal_mm : ndarray, [..., 3], mm
+    error_um : ndarray, [..., 3], µm
+    exaggeration : float
+        Display factor; 1 is true scale.
+
+    Returns
+    -------
+    ndarray, [..., 3], mm
+        Where the points are drawn.
+    """
+    return nominal_mm + (exaggeration * MM_PER_UM) * error_um
+
+
+def auto_exaggeration(largest_um: float, longest_edge_mm: float) -> float:
+    """Choose a round display factor."""
+    largest_mm = largest_um * MM_PER_UM  # zero also where an error is too small to be divided by
+    if not largest_mm > 0.0 or not longest_edge_mm > 0.0:
+        return NEUTRAL_EXAGGERATION
+    wanted = TARGET_FRACTION * longest_edge_mm / largest_mm
+    wanted = min(max(wanted, 1.0), EXAGGERATION[1])
+    decade = 10.0 ** math.floor(math.log10(wanted))
+    return min((step * decade for step in _ROUND), key=lambda value: abs(math.log(value / wanted)))
+
+
+def round_down(value: float) -> float:
+    """Give the largest 1, 2 or 5 × 10ⁿ that is not above a positive value (scale bars)."""
+    decade = 10.0 ** math.floor(math.log10(value))
+    return max(step * decade for step in _ROUND if step * decade <= value * (1.0 + 1e-9))
+
+
+# --- Picking: where a ray from the eye meets a surface or passes a line ---------------------------
+
+_PARALLEL = 1e-12
+
+
+@dataclass(frozen=True, slots=True)
+class Hit:
+    """Where a ray meets a surface."""
+
+    vertices: NDArray[np.intp]  # [3]; vertex numbers of the triangle
+    # [3]; barycentric weights of the point in it; they interpolate anything given per vertex
+    weights: Array
+    distance: float  # along the ray, in lengths of its direction
+
+
+def pick_surface(
+    origin: Array, direction: Array, vertices: Array, triangles: NDArray[np.intp]
+) -> Hit | None:
+    """Find the first triangle that a ray meets (Möller and Trumbore, all triangles at once).
+
+    Parameters
+    ----------
+    origin, direction : ndarray, [3]
+        The ray, in the units of the vertices.
+    vertices : ndarray, [M, 3]
+    triangles : ndarray, [T, 3]
+        Vertex numbers.
+
+    Returns
+    -------
+    Hit or None
+        None where the ray misses.
+    """
+    a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
+    first, second = b - a, c - a
+    across = np.cross(direction, second)
+    determinant = np.sum(first * across, axis=-1)
+    safe = np.where(np.abs(determinant) < _PARALLEL, np.inf, determinant)
+    from_a = origin - a
+    u = np.sum(from_a * across, axis=-1) / safe
+    turned = np.cross(from_a, first)
+    v = np.sum(direction * turned, axis=-1) / safe
+    distance = np.sum(second * turned, axis=-1) / safe
+    inside = (u >= 0) & (v >= 0) & (u + v <= 1) & (distance > 0) & np.isfinite(safe)
+    if not inside.any():
+        return None
+    at = int(np.argmin(np.where(inside, distance, np.inf)))
+    weights = np.array([1.0 - u[at] - v[at], u[at], v[at]])
+    return Hit(triangles[at], weights, float(distance[at]))
+
+
+def pick_point(
+    origin: Array, direction: Array, points: Array, tolerance: float
+) -> tuple[int, float] | None:
+    """Find the point that a ray passes most closely, seen from its origin.
+
+    Parameters
+    ----------
+    origin, direction : ndarray, [3]
+        The ray.
+    points : ndarray, [M, 3]
+    tolerance : float
+        Largest angle between the ray and the line of sight to the point, rad.
+
+    Returns
+    -------
+    tuple of (int, float) or None
+        Number of the point and its distance along the ray; None where none is near.
+    """
+    if len(points) == 0:
+        return None
+    unit = direction / np.linalg.norm(direction)
+    sight = points - origin
+    along = sight @ unit
+    aside = np.linalg.norm(sight - along[:, None] * unit, axis=-1)
+    angle = np.where(along > 0.0, np.arctan2(aside, np.maximum(along, _PARALLEL)), np.inf)
+    nearest = int(np.argmin(angle))
+    return (nearest, float(along[nearest])) if angle[nearest] <= tolerance else None
+
+
+MIN_CUT_NODES = 3
+"""Nodes an axis needs for an octant to be cut away."""
+
+
+def cut_faces(shape: Shape, corner: tuple[int, int, int]) -> list[Index]:
+    """List the faces of a grid without the octant at one corner: 0 lower, 1 upper end of each axis.
+
+    The outer faces, a quarter missing where the octant was, and the three faces of the cut; the
+    uncut faces where an axis has fewer than three nodes.
+    """
+    if min(shape) < MIN_CUT_NODES:
+        return outer_faces(shape)
+    numbers = np.arange(np.prod(shape)).reshape(shape)
+    middle = [count // 2 for count in shape]
+    faces: list[Index] = []
+    for axis in range(3):
+        first, second = (other for other in range(3) if other != axis)
+        gone = [_half(corner[other], middle[other]) for other in (first, second)]
+        kept = [_half(1 - corner[other], middle[other]) for other in (first, second)]
+        for end in (0, 1):
+            face = np.take(numbers, -end, axis=axis)
+            whole = end != corner[axis]
+            patches = [face] if whole else [face[kept[0], :], face[gone[0], kept[1]]]
+            faces += [oriented(patch, axis, upper=end) for patch in patches]
+        inner = np.take(numbers, middle[axis], axis=axis)[gone[0], gone[1]]
+        faces.append(oriented(inner, axis, upper=corner[axis]))
+    return faces
+
+
+def _half(upper: int, middle: int) -> slice:
+    return slice(middle, None) if upper else slice(None, middle + 1)
+
+
+def face_axis(face: Index, shape: Shape) -> int:
+    """Tell which grid direction does not vary over a patch."""
+    ends = np.stack(np.unravel_index(face[[0, -1], [0, -1]], shape), -1)
+    other = np.stack(np.unravel_index(face[[0, -1], [-1, 0]], shape), -1)
+    still = (ends[0] == ends[1]) & (other[0] == other[1])
+    return int(np.argmax(still))
+
+
+def crease_lines(faces: Sequence[Index], shape: Shape) -> list[Index]:
+    """Find the edges where patches meet at an angle, and open borders: node indices, each once."""
+    met: defaultdict[tuple[int, int], list[int]] = defaultdict(list)
+    borders = [(face_axis(face, shape), _borders(face)) for face in faces]
+    for axis, lines in borders:
+        for line in lines:
+            for pair in _pairs(line):
+                met[pair].append(axis)
+    wanted = {pair for pair, axes in met.items() if len(axes) == 1 or len(set(axes)) > 1}
+    return _collect((line for _, lines in borders for line in lines), wanted)
+
+
+def face_lines(faces: Sequence[Index], shape: Shape, every: Shape) -> list[Index]:
+    """Find every n-th grid line of each axis on patches, those on creases left out.
+
+    Polylines of flat grid indices; each line once.
+    """
+    creases = {pair for line in crease_lines(faces, shape) for pair in _pairs(line)}
+    lines: list[Index] = []
+    for face in faces:
+        for patch in (face, face.T):
+            for row in patch:
+                at = np.stack(np.unravel_index(row, shape), -1)
+                across = _held_axis(patch, shape)
+                if len(row) > 1 and at[0, across] % every[across] == 0:
+                    lines.append(row)
+    wanted = {pair for line in lines for pair in _pairs(line)} - creases
+    return _collect(iter(lines), wanted)
+
+
+def _held_axis(patch: Index, shape: Shape) -> int:
+    first, last = (np.stack(np.unravel_index(patch[row, 0], shape)) for row in (0, -1))
+    return int(np.argmax(first != last))
+
+
+def _borders(face: Index) -> list[Index]:
+    return [face[0, :], face[-1, :], face[:, 0], face[:, -1]]
+
+
+def _pairs(line: Index) -> list[tuple[int, int]]:
+    low, high = np.minimum(line[:-1], line[1:]), np.maximum(line[:-1], line[1:])
+    return list(zip(low.tolist(), high.tolist(), strict=True))
+
+
+def _collect(lines: Iterator[Index], wanted: set[tuple[int, int]]) -> list[Index]:
+    left = set(wanted)
+    found: list[Index] = []
+    for line in lines:
+        start = None
+        for at, pair in enumerate([*_pairs(line), (-1, -1)]):
+            if pair in left:
+                left.discard(pair)
+                start = at if start is None else start
+            elif start is not None:
+                found.append(line[start : at + 1])
+                start = None
+    return found
+
+
+def isoline_levels(scale: ColourScale) -> tuple[float, ...]:
+    """Give the values that lines are drawn at: the ticks of the scale, its ends left out."""
+    return tuple(tick for tick in scale.ticks if scale.low < tick < scale.high)
+
+
+def isolines(
+    face: Index, nodes_mm: Array, values: Array, levels: Sequence[float]
+) -> list[tuple[float, Array]]:
+    """Find the lines of equal value on a patch of the surface.
+
+    Parameters
+    ----------
+    face : ndarray of int, [a, b]
+        Flat grid indices.
+    nodes_mm : ndarray, [N, 3], mm
+        All nodes where they are drawn.
+    values : ndarray, [N]
+    levels : sequence of float
+        In the unit of the values.
+
+    Returns
+    -------
+    list of (float, ndarray), [n, 3], mm
+        Level and polyline.
+
+    Notes
+    -----
+    Marching squares on the values at the nodes, straight within a cell.
+    """
+    at_nodes = values[face]
+    low, high = float(at_nodes.min()), float(at_nodes.max())
+    inside = [level for level in levels if low <= level <= high]
+    if not inside or low == high:
+        return []
+    import contourpy
+
+    generator = contourpy.contour_generator(z=at_nodes, name="serial")
+    corners = nodes_mm[face]
+    found: list[tuple[float, Array]] = []
+    for level in inside:
+        for line in generator.lines(level):
+            at = np.asarray(line, dtype=float)
+            if len(at) > 1:
+                found.append((level, _bilinear(corners, at[:, 1], at[:, 0])))
+    return found
+
+
+def isoline_segments(
+    faces: Sequence[Index],
+    nodes_mm: Array,
+    values: Array,
+    levels: Sequence[float],
+    lift_mm: Array | None = None,
+) -> Array:
+    """Find the lines of equal value on all faces, as pieces of line.
+
+    Parameters
+    ----------
+    faces : sequence of ndarray of int, [a, b]
+    nodes_mm : ndarray, [N, 3], mm
+    values : ndarray, [N]
+    levels : sequence of float
+    lift_mm : ndarray, [F, 3], mm, optional
+        Per face, how far its lines are moved off it.
+
+    Returns
+    -------
+    ndarray, [S, 2, 3], mm
+    """
+    pieces: list[Array] = []
+    for number, face in enumerate(faces):
+        off = np.zeros(3) if lift_mm is None else lift_mm[number]
+        for _, line in isolines(face, nodes_mm, values, levels):
+            pieces.append(np.stack([line[:-1], line[1:]], axis=1) + off)
+    return np.concatenate(pieces) if pieces else np.zeros((0, 2, 3))
+
+
+def _bilinear(corners: Array, row: Array, column: Array) -> Array:
+    """Interpolate a patch of points at fractional rows and columns, [n, 3]."""
+    i = np.clip(np.floor(row).astype(int), 0, corners.shape[0] - 2)
+    j = np.clip(np.floor(column).astype(int), 0, corners.shape[1] - 2)
+    u, v = (row - i)[:, None], (column - j)[:, None]
+    near = (1.0 - v) * corners[i, j] + v * corners[i, j + 1]
+    far = (1.0 - v) * corners[i + 1, j] + v * corners[i + 1, j + 1]
+    return (1.0 - u) * near + u * far

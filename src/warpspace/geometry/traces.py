@@ -22,24 +22,12 @@ FULL_TURN_DEG = 360.0
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """What one trace is: which point is turned by which axis, and where the other axes stand.
+    """What one trace is: which point is turned by which axis, and where the other axes stand."""
 
-    Attributes
-    ----------
-    axis : str
-        The axis that turns.
-    point_mm : tuple of float, (3,), mm
-        The point in the workpiece (or tool) frame.
-    at : dict of str to float, degrees
-        Positions of the other rotary axes of the branch.
-    closed : bool
-        Whether it is a full circle.
-    """
-
-    axis: str
-    point_mm: Vector
-    at: dict[str, float]
-    closed: bool
+    axis: str  # the axis that turns
+    point_mm: Vector  # the point in the workpiece (or tool) frame
+    at: dict[str, float]  # degrees; positions of the other rotary axes of the branch
+    closed: bool  # whether it is a full circle
 
     @property
     def label(self) -> str:
@@ -50,23 +38,13 @@ class Trace:
 
 @dataclass(frozen=True, slots=True)
 class TraceGroup:
-    """All traces of one branch, ready to be evaluated in one go.
+    """All traces of one branch, ready to be evaluated in one go."""
 
-    Attributes
-    ----------
-    loop : Loop
-        Loop whose error displaces the traces.
-    traces : tuple of Trace, (T,)
-    coordinates : dict of str to ndarray, mm or degrees
-        Axis positions, [T, n] for the rotary axes of the branch, scalar for the others.
-    nominal_mm : ndarray, [T, n, 3], mm
-        Nominal points in R.
-    """
-
-    loop: Loop
-    traces: tuple[Trace, ...]
+    loop: Loop  # loop whose error displaces the traces
+    traces: tuple[Trace, ...]  # (T,)
+    # mm or degrees; axis positions, [T, n] for the rotary axes of the branch, scalar for the others
     coordinates: dict[str, Array]
-    nominal_mm: Array
+    nominal_mm: Array  # [T, n, 3]; nominal points in R
 
 
 def build_traces(
@@ -76,27 +54,7 @@ def build_traces(
     samples: int = SAMPLES,
     held: Mapping[str, Sequence[float]] | None = None,
 ) -> tuple[TraceGroup, ...]:
-    """Lay the traces of points over every rotary axis of a machine.
-
-    Parameters
-    ----------
-    model : Model
-    points_mm : sequence of tuple of float, (3,), mm
-        Points in the workpiece frame (tool frame where the rotary axes carry the tool).
-    positions : mapping of str to float, mm or degrees
-        Where the axes stand. The axis next to the point runs its travel at several positions of
-        the one before it: here, and 30° to either side within the travel.
-    samples : int, optional
-        Points along each trace.
-    held : mapping of str to sequence of float, degrees, optional
-        Positions at which a rotary axis is held while its neighbour turns, instead of those above;
-        so also the first axis can be turned at several positions of the one after it.
-
-    Returns
-    -------
-    tuple of TraceGroup
-        One per branch with rotary axes; empty for a machine without any or without points.
-    """
+    """Lay the traces of points over every rotary axis of a machine."""
     groups: list[TraceGroup] = []
     for side, loop in (("workpiece", Loop.WORKPIECE), ("tool", Loop.TOOL)):
         rotary = [axis.name for axis in model.machine.branch(side) if not axis.is_linear]
@@ -120,7 +78,6 @@ def _traces_of(
     positions: Mapping[str, float],
     chosen: Mapping[str, Sequence[float]],
 ) -> list[Trace]:
-    """Traces of one point over one axis: several where an axis before it tilts it."""
     low, high = model.machine.axes[axis].travel
     closed = high - low >= FULL_TURN_DEG
     held = {name: positions.get(name, 0.0) for name in rotary if name != axis}
@@ -147,7 +104,6 @@ def _group(
     positions: Mapping[str, float],
     samples: int,
 ) -> TraceGroup:
-    """Sample the traces of one branch."""
     axes = model.machine.axes
     coordinates = {name: np.asarray(positions.get(name, 0.0), dtype=float) for name in axes}
     sweep = np.linspace(0.0, 1.0, samples)

@@ -11,9 +11,9 @@ import numpy as np
 
 from warpspace.kinematics import components, transforms
 from warpspace.kinematics.components import Triple
-from warpspace.kinematics.conventions.convention import AxisFrames
 from warpspace.kinematics.model import (
     TOOL_AXIS,
+    AxisFrames,
     Coordinates,
     Loop,
     Model,
@@ -27,17 +27,7 @@ ErrorValues = Mapping[str, Array]
 
 
 def motion(axis: Axis, position: Array) -> Array:
-    """Build the nominal motion of an axis.
-
-    Parameters
-    ----------
-    axis : Axis
-    position : ndarray, [...], mm or degrees
-
-    Returns
-    -------
-    ndarray, [..., 4, 4]
-    """
+    """Build the nominal motion of an axis at positions, mm or degrees, [..., 4, 4]."""
     signed = axis.direction * np.asarray(position, dtype=float)
     if axis.is_linear:
         return transforms.translation(signed[..., None] * np.eye(3)[axis.index])
@@ -45,20 +35,7 @@ def motion(axis: Axis, position: Array) -> Array:
 
 
 def error_transform(axis: str, values: ErrorValues, *, constant: bool) -> Array | None:
-    """Build ``Trans(δ)·Rot(ε)`` of an axis; None where no parameter of it is given.
-
-    Parameters
-    ----------
-    axis : str
-        Name of the axis.
-    values : mapping of str to ndarray, [...], µm or µrad
-    constant : bool
-        Whether to take the constant or the component errors.
-
-    Returns
-    -------
-    ndarray, [..., 4, 4] or None
-    """
+    """Build ``Trans(δ)·Rot(ε)`` of an axis, [..., 4, 4]; None where no parameter is given."""
     middle = "0" if constant else ""
     keys = [f"E{letter}{middle}{axis}" for letter in DIRECTIONS]
     if not any(key in values for key in keys):
@@ -70,19 +47,7 @@ def error_transform(axis: str, values: ErrorValues, *, constant: bool) -> Array 
 
 
 def branch_frames(model: Model, side: str, coordinates: Coordinates) -> Iterator[AxisFrames]:
-    """Walk the nominal frames of a branch from the frame of the machine outwards.
-
-    Parameters
-    ----------
-    model : Model
-    side : str
-        "tool" or "workpiece".
-    coordinates : mapping of str to ndarray, [...], mm or degrees
-
-    Yields
-    ------
-    AxisFrames
-    """
+    """Walk the nominal frames of a branch, tool or workpiece, from the frame outwards."""
     pose = np.eye(4)
     for axis in model.machine.branch(side):
         before = pose @ transforms.placed(axis.offset_mm, axis.rotation_deg)
@@ -93,20 +58,9 @@ def branch_frames(model: Model, side: str, coordinates: Coordinates) -> Iterator
 def branch_pose(
     model: Model, side: str, coordinates: Coordinates, values: ErrorValues | None = None
 ) -> Array:
-    """Multiply out the pose of the tool or workpiece frame in R.
+    """Multiply out the pose of the tool or workpiece frame in R, [..., 4, 4].
 
-    Parameters
-    ----------
-    model : Model
-    side : str
-        "tool" or "workpiece".
-    coordinates : mapping of str to ndarray, [...], mm or degrees
-    values : mapping of str to ndarray, [...], µm or µrad, optional
-        Errors at the coordinates; without them the pose is nominal.
-
-    Returns
-    -------
-    ndarray, [..., 4, 4]
+    Without errors at the coordinates it is the nominal one.
     """
     pose = np.eye(4)
     errors = values or {}
@@ -123,19 +77,7 @@ def branch_pose(
 
 
 def nominal_point(model: Model, loop: Loop, coordinates: Coordinates) -> Array:
-    """Give the nominal position of the functional point of a loop in R.
-
-    Parameters
-    ----------
-    model : Model
-    loop : Loop
-        The workpiece loop has the workpiece point, the others the tool point.
-    coordinates : mapping of str to ndarray, [...], mm or degrees
-
-    Returns
-    -------
-    ndarray, [..., 3], mm
-    """
+    """Give where the tool point or, of its loop, the workpiece point nominally is, [..., 3], mm."""
     if loop is Loop.WORKPIECE:
         return point_in_branch(model, "workpiece", coordinates, model.workpiece_point_mm)
     return point_in_branch(model, "tool", coordinates, model.tool_point_mm)

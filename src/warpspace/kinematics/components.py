@@ -130,7 +130,6 @@ def transpose(rows: Rows) -> Rows:
 
 
 def _plain(values: Array) -> Number:
-    """Give a float for values that are all the same."""
     if not values.size:
         return values
     first = values.flat[0]

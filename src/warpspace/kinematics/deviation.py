@@ -18,51 +18,28 @@ import numpy as np
 from warpspace.kinematics import components, transforms
 from warpspace.kinematics.chain import ErrorValues, error_transform, motion
 from warpspace.kinematics.components import Rows, Triple
-from warpspace.kinematics.conventions.convention import AxisFrames
-from warpspace.kinematics.model import TOOL_AXIS, Coordinates, Loop, Model
+from warpspace.kinematics.model import TOOL_AXIS, AxisFrames, Coordinates, Loop, Model
 from warpspace.machine.description import Axis
 from warpspace.machine.parameters import parameter
 from warpspace.units import RAD_PER_URAD, UM_PER_MM, UM_PER_MM_URAD, URAD_PER_RAD, Array
 
 
 class Link(NamedTuple):
-    """One step of a branch: the offset and the motion of an axis, and its errors.
+    """One step of a branch: the offset and the motion of an axis, and its errors."""
 
-    Attributes
-    ----------
-    nominal : rows of a matrix
-        Rotation of N.
-    position_mm : components
-        Position of N.
-    actual : rows of a matrix
-        Rotation of A.
-    shift_um : components
-        What A · N⁻¹ − I does to the origin of the frame before the axis.
-    turn_urad : rows of a matrix
-        Its rotation part.
-    """
-
-    nominal: Rows
-    position_mm: Triple
-    actual: Rows
-    shift_um: Triple
-    turn_urad: Rows
+    nominal: Rows  # rotation of N
+    position_mm: Triple  # position of N
+    actual: Rows  # rotation of A
+    shift_um: Triple  # what A · N⁻¹ − I does to the origin of the frame before the axis
+    turn_urad: Rows  # its rotation part
 
 
 class LoopLinks(NamedTuple):
-    """The steps of both branches of a machine.
+    """The steps of both branches of a machine."""
 
-    Attributes
-    ----------
-    tool, workpiece : tuple of Link
-        From the frame of the machine outwards.
-    tool_axis : components
-        Direction of the tool axis behind the last step of the tool branch.
-    """
-
-    tool: tuple[Link, ...]
+    tool: tuple[Link, ...]  # from the frame of the machine outwards
     workpiece: tuple[Link, ...]
-    tool_axis: Triple
+    tool_axis: Triple  # direction of the tool axis behind the last step of the tool branch
 
 
 class Deviation(NamedTuple):
@@ -83,21 +60,7 @@ NO_DEVIATION = Deviation(components.ZERO, components.ZERO_ROWS)
 def build_links(
     model: Model, coordinates: Coordinates, values: ErrorValues, *, exact: bool
 ) -> LoopLinks:
-    """Work out the steps of both branches.
-
-    Parameters
-    ----------
-    model : Model
-    coordinates : mapping of str to ndarray, [...], mm or degrees
-    values : mapping of str to ndarray, [...], µm or µrad
-        Errors at the coordinates; arrays over one axis stay so.
-    exact : bool
-        Full rotations and products, not the first order.
-
-    Returns
-    -------
-    LoopLinks
-    """
+    """Work out the steps of both branches; errors at coordinates of one axis stay over that."""
     make = _exact_link if exact else _first_order_link
     tool, workpiece = (
         tuple(make(model, axis, coordinates, values) for axis in model.machine.branch(side))
@@ -110,7 +73,6 @@ def build_links(
 
 
 def _link(nominal: Array, actual: Array, shift_um: Array, turn_urad: Array) -> Link:
-    """Split a step into components."""
     return Link(
         components.split_rows(nominal[..., :3, :3]),
         components.split(nominal[..., :3, 3]),
@@ -121,7 +83,6 @@ def _link(nominal: Array, actual: Array, shift_um: Array, turn_urad: Array) -> L
 
 
 def _exact_link(model: Model, axis: Axis, coordinates: Coordinates, values: ErrorValues) -> Link:
-    """Multiply out the step of an axis."""
     place = transforms.placed(axis.offset_mm, axis.rotation_deg)
     move = motion(axis, coordinates[axis.name])
     constant = error_transform(axis.name, values, constant=True)
@@ -139,7 +100,6 @@ def _exact_link(model: Model, axis: Axis, coordinates: Coordinates, values: Erro
 def _first_order_link(
     model: Model, axis: Axis, coordinates: Coordinates, values: ErrorValues
 ) -> Link:
-    """Add up the errors of an axis in the frame before it."""
     place = transforms.placed(axis.offset_mm, axis.rotation_deg)
     nominal = place @ motion(axis, coordinates[axis.name])
     frames, convention = AxisFrames(axis, place, nominal), model.convention(axis.name)
@@ -160,24 +120,7 @@ def _first_order_link(
 def solve_links(
     links: LoopLinks, loop: Loop, point_mm: Triple, *, exact: bool
 ) -> tuple[Triple, Triple]:
-    """Evaluate the error of a loop.
-
-    Parameters
-    ----------
-    links : LoopLinks
-    loop : Loop
-    point_mm : components, mm
-        Nominal point in R, which the tool and the workpiece point share.
-    exact : bool
-        As the links were built.
-
-    Returns
-    -------
-    error_um : components, µm
-        Position error in R, actual − nominal; for the relative loop tool minus workpiece.
-    orientation_urad : components, µrad
-        Rotation vector that takes the nominal tool axis to the actual one.
-    """
+    """Evaluate the error of a loop."""
     axis = links.tool_axis
     for link in reversed(links.tool):
         axis = components.rotate(link.nominal, axis)
@@ -199,10 +142,16 @@ def solve_links(
     return error, components.subtract((x, y, z), components.scale(along, axis))
 
 
-def exact_error(
-    model: Model, loop: Loop, coordinates: Coordinates, values: ErrorValues, point_mm: Array
+def loop_error(
+    model: Model,
+    loop: Loop,
+    coordinates: Coordinates,
+    values: ErrorValues,
+    point_mm: Array,
+    *,
+    exact: bool = True,
 ) -> tuple[Array, Array]:
-    """Evaluate the error of a loop with full rotations and all products.
+    """Evaluate the error of a loop: with full rotations and all products, or to first order.
 
     Parameters
     ----------
@@ -213,6 +162,7 @@ def exact_error(
         Errors at the coordinates.
     point_mm : ndarray, [..., 3], mm
         Nominal point in R, which the tool and the workpiece point share.
+    exact : bool, optional
 
     Returns
     -------
@@ -222,8 +172,8 @@ def exact_error(
         Rotation vector that takes the nominal tool axis to the actual one; it has no part about
         the tool axis itself.
     """
-    links = build_links(model, coordinates, values, exact=True)
-    found = solve_links(links, loop, components.split(point_mm), exact=True)
+    links = build_links(model, coordinates, values, exact=exact)
+    found = solve_links(links, loop, components.split(point_mm), exact=exact)
     arrays = [point_mm[..., 0], *coordinates.values(), *values.values()]
     shape = np.broadcast_shapes(*(np.shape(array) for array in arrays))
     error, orientation = np.empty((*shape, 3)), np.empty((*shape, 3))
@@ -233,7 +183,6 @@ def exact_error(
 
 
 def _walk(links: tuple[Link, ...]) -> Deviation:
-    """Collect the deviation of a branch from its outer end inwards; the formula of the module."""
     shift, turn = NO_DEVIATION
     for link in reversed(links):
         inside = components.multiply(link.actual, turn)

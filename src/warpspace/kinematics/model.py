@@ -1,18 +1,168 @@
 """What the kinematic functions work on: a machine, its functional points and its conventions."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from warpspace.exceptions import OptionError, UnknownNameError
-from warpspace.kinematics.conventions.convention import Convention
-from warpspace.kinematics.conventions.registry import find_convention
-from warpspace.machine.description import ORIGIN, Machine, Vector
-from warpspace.machine.travel import TravelDirection
+from warpspace.machine.axes import TravelDirection
+from warpspace.machine.description import ORIGIN, Axis, Machine, Vector
+from warpspace.machine.parameters import Parameter
+from warpspace.plugins import load_plugins
 from warpspace.units import Array
+
+
+@dataclass(frozen=True, slots=True)
+class AxisFrames:
+    """Nominal frames of one axis in R: where its constant and its component errors act."""
+
+    axis: Axis
+    before: Array  # [..., 4, 4]; after the offset, before the motion
+    after: Array  # [..., 4, 4]; after the motion
+
+
+class Convention(ABC):
+    """The order of the constant errors, the motion and the component errors of an axis.
+
+    Attributes
+    ----------
+    name : str
+        As scene files have it, for instance "after_motion".
+    title : str
+        In lists of choices.
+    place : str
+        Where component errors stand in the product, for instance "after the motion".
+    meaning : str
+        What component errors do, after the words "component errors".
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    place: ClassVar[str]
+    meaning: ClassVar[str]
+
+    @abstractmethod
+    def factors(
+        self, constant: Array | None, motion: Array, component: Array | None
+    ) -> tuple[Array | None, ...]:
+        """Give the factors of the exact chain behind the offset, from the frame outwards.
+
+        Parameters
+        ----------
+        constant, component : ndarray, [..., 4, 4], or None
+            ``Trans(δ) · Rot(ε)`` of the constant and of the component errors; None where there are
+            none.
+        motion : ndarray, [..., 4, 4]
+            Nominal motion of the axis.
+
+        Returns
+        -------
+        tuple of ndarray, [..., 4, 4], or None
+            Multiplied from left to right; None is left out.
+        """
+
+    @abstractmethod
+    def frame(self, frames: AxisFrames, row: Parameter) -> Array:
+        """Give the nominal frame that a parameter acts in, to first order.
+
+        Parameters
+        ----------
+        frames : AxisFrames
+        row : Parameter
+            A constant or a component error of the axis.
+
+        Returns
+        -------
+        ndarray, [..., 4, 4]
+            Pose in R. Its columns are the directions of errors, its origin is what rotations turn
+            about. It must be the derivative of `factors`.
+        """
+
+    @property
+    def short_words(self) -> str:
+        """Words for the foot of a figure or page."""
+        return f"component errors {self.place}"
+
+    @property
+    def sentence(self) -> str:
+        """Sentence that says what the convention means, for reports."""
+        return f"Component errors {self.meaning} ({self.place})."
+
+
+class AfterMotion(Convention):
+    """``T = Trans(offset) · E0 · Motion · E``: the errors turn with a rotary table."""
+
+    name = "after_motion"
+    title = "after motion (moving body)"
+    place = "after the motion"
+    meaning = "ride on the moving body"
+
+    def factors(
+        self, constant: Array | None, motion: Array, component: Array | None
+    ) -> tuple[Array | None, ...]:
+        """Put component errors behind the motion."""
+        return constant, motion, component
+
+    def frame(self, frames: AxisFrames, row: Parameter) -> Array:
+        """Give constants the frame before the motion, component errors the one after it."""
+        return frames.before if row.is_constant else frames.after
+
+
+class BeforeMotion(Convention):
+    """``T = Trans(offset) · E0 · E · Motion``: the errors keep the directions before the motion."""
+
+    name = "before_motion"
+    title = "before motion (fixed directions)"
+    place = "before the motion"
+    meaning = "act in fixed directions"
+
+    def factors(
+        self, constant: Array | None, motion: Array, component: Array | None
+    ) -> tuple[Array | None, ...]:
+        """Put component errors in front of the motion."""
+        return constant, component, motion
+
+    def frame(self, frames: AxisFrames, row: Parameter) -> Array:
+        """Give all errors the frame before the motion."""
+        del row
+        return frames.before
+
+
+_CONVENTIONS: dict[str, Convention] = {
+    convention.name: convention for convention in (AfterMotion(), BeforeMotion())
+}
+
+
+def convention_names() -> tuple[str, ...]:
+    """List the names of all conventions."""
+    load_plugins()
+    return tuple(_CONVENTIONS)
+
+
+def find_convention(name: str) -> Convention:
+    """Find a convention by its name."""
+    # Asked for each parameter of a Jacobian: plug-ins are looked for only where they may matter.
+    if name not in _CONVENTIONS and name not in convention_names():
+        raise UnknownNameError("convention", name, _CONVENTIONS)
+    return _CONVENTIONS[name]
+
+
+def register_convention(convention: Convention) -> None:
+    """Add a convention; it appears in scene files, the app, reports and figures."""
+    if convention.name in _CONVENTIONS:
+        raise OptionError(f"convention {convention.name!r} is there already")
+    _CONVENTIONS[convention.name] = convention
+
+
+def unregister_convention(name: str) -> None:
+    """Take a convention away again."""
+    del _CONVENTIONS[name]
+
 
 Coordinates = Mapping[str, Array]
 """Axis to positions, [...], broadcastable: mm for linear axes, degrees for rotary ones."""
@@ -39,37 +189,20 @@ TOOL_AXIS: Vector = (0.0, 0.0, 1.0)
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """A machine with the points and conventions its errors are evaluated with.
-
-    Attributes
-    ----------
-    machine : Machine
-    component_errors : str
-        Name of the convention for component errors: one of `ComponentErrors`, or one that was
-        registered.
-    own_component_errors : tuple of (str, str)
-        Axes that have another one: name of the axis and of its convention.
-    tool_point_mm : tuple of float, (3,), mm
-        Functional point in the tool frame.
-    workpiece_point_mm : tuple of float, (3,), mm
-        Functional point in the workpiece frame.
-    """
+    """A machine with the points and conventions its errors are evaluated with."""
 
     machine: Machine
+    # name of the convention for component errors: one of `ComponentErrors`, or one that was
+    # registered
     component_errors: str = ComponentErrors.AFTER_MOTION
-    tool_point_mm: Vector = ORIGIN
-    workpiece_point_mm: Vector = ORIGIN
+    tool_point_mm: Vector = ORIGIN  # functional point in the tool frame
+    workpiece_point_mm: Vector = ORIGIN  # functional point in the workpiece frame
+    # axes that have another one: name of the axis and of its convention
     own_component_errors: tuple[tuple[str, str], ...] = ()
     direction: str = TravelDirection.MEAN
 
     def convention(self, axis: str) -> Convention:
-        """Give the convention for the component errors of an axis.
-
-        Raises
-        ------
-        UnknownNameError
-            If no convention has the name.
-        """
+        """Give the convention for the component errors of an axis."""
         return find_convention(dict(self.own_component_errors).get(axis, self.component_errors))
 
     @property
@@ -94,27 +227,7 @@ def batch_shape(coordinates: Coordinates) -> tuple[int, ...]:
 def complete_coordinates(
     machine: Machine, given: Mapping[str, ArrayLike], default: Mapping[str, float] | None = None
 ) -> dict[str, Array]:
-    """Give every axis of the machine a position.
-
-    Parameters
-    ----------
-    machine : Machine
-    given : mapping of str to array_like, [...], mm or degrees
-        Positions by axis.
-    default : mapping of str to float, optional
-        Positions of the axes not given; zero where absent.
-
-    Returns
-    -------
-    dict of str to ndarray, [...], mm or degrees
-
-    Raises
-    ------
-    UnknownNameError
-        If an axis is given that the machine does not have.
-    OptionError
-        If a position is no finite number, or the batches do not fit together.
-    """
+    """Give every axis of the machine a position: the given, else the default one, else zero."""
     for name in given:
         if name not in machine.axes:
             raise UnknownNameError("axis", name, machine.axes)
@@ -129,7 +242,6 @@ def complete_coordinates(
 
 
 def _finite(name: str, value: ArrayLike) -> Array:
-    """Give the positions of one axis as an array of finite numbers."""
     try:
         positions = np.asarray(value, dtype=float)
     except (TypeError, ValueError):

@@ -6,6 +6,7 @@ axis that turns about z.
 
 import re
 from collections.abc import Iterable
+from enum import StrEnum
 
 from warpspace.exceptions import UnknownNameError
 
@@ -40,24 +41,12 @@ def is_rotary(name: str) -> bool:
 
 
 def direction_index(name: str) -> int:
-    """Give the index 0, 1 or 2 of the direction along or about which an axis moves.
-
-    Parameters
-    ----------
-    name : str
-        Of an axis, or one of the six letters of an error.
-    """
+    """Give the index 0, 1 or 2 of the direction along or about which an axis moves."""
     return _WITHIN[name[0]]
 
 
 def sort_axes(names: Iterable[str]) -> tuple[str, ...]:
-    """Sort axes: X Y Z U V W A B C, then by their digit.
-
-    Raises
-    ------
-    UnknownNameError
-        If one is no name of an axis.
-    """
+    """Sort axes: X Y Z U V W A B C, then by their digit."""
     found = list(names)
     for name in found:
         if name not in _ORDER:
@@ -68,3 +57,28 @@ def sort_axes(names: Iterable[str]) -> tuple[str, ...]:
 def axis_order(name: str) -> int:
     """Give the place of an axis in the order of `sort_axes`."""
     return _ORDER[name]
+
+
+# --- Direction of travel --------------------------------------------------------------------------
+
+
+class TravelDirection(StrEnum):
+    """What counts of errors that depend on the direction of travel.
+
+    Forward is towards growing positions of the axis, as commanded. Errors that do not depend on the
+    direction are the same in the first three and zero in the difference.
+    """
+
+    MEAN = "mean"
+    FORWARD = "forward"
+    BACKWARD = "backward"
+    DIFFERENCE = "difference"
+
+
+DIRECTION_WORDS = {
+    TravelDirection.MEAN: "mean of both directions of travel",
+    TravelDirection.FORWARD: "travelling forward",
+    TravelDirection.BACKWARD: "travelling backward",
+    TravelDirection.DIFFERENCE: "reversal: forward − backward",
+}
+"""How each is called on figures and pages."""

@@ -1,20 +1,144 @@
-"""Description of a machine: its kinematic chain, frame offsets, travels and directions."""
+"""Description of a machine: its kinematic chain, frame offsets, travels, gantries and bodies."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from warpspace.exceptions import UnknownNameError
+from warpspace.exceptions import ChainError, UnknownNameError
 from warpspace.machine.axes import (
     LINEAR_LETTERS,
+    MAX_AXES,
     direction_index,
+    is_axis_name,
     is_linear,
+    sort_axes,
 )
-from warpspace.machine.body_source import BodySource
-from warpspace.machine.chain import Chain, parse_chain
-from warpspace.machine.gantry import Gantry, default_across
 from warpspace.machine.parameters import axis_parameters, default_keys
 
+# --- The kinematic chain --------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Chain:
+    """Order of the axes from the workpiece through the frame to the tool."""
+
+    workpiece: tuple[str, ...]  # axes that carry the workpiece, from the frame outwards
+    tool: tuple[str, ...]  # axes that carry the tool, from the frame outwards
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """All axes of the machine in the order X Y Z U V W A B C."""
+        return sort_axes({*self.workpiece, *self.tool})
+
+    def __str__(self) -> str:
+        """Write the chain in its canonical spelling, for instance ``wCBFXYZt``."""
+        return f"w{''.join(reversed(self.workpiece))}F{''.join(self.tool)}t"
+
+
+def parse_chain(text: str) -> Chain:
+    """Read a kinematic chain written from the workpiece over the frame to the tool."""
+    bare = re.sub(r"[\s()\[\]{}'’′\-–_]", "", text)
+    expected = (
+        "expected w, axes (a letter of X Y Z U V W A B C and an optional digit), F (or b), axes, t;"
+        " for instance wCBFXYZt or wC2XFZC1t"
+    )
+    matched = re.fullmatch(r"[wW]((?:[A-Z][0-9]*)*?)(b|F)((?:[A-EG-Z][0-9]*)*)[tT]", bare)
+    if matched is None:
+        raise ChainError(f"chain {text!r} cannot be read; {expected}")
+    workpiece, tool = (tuple(re.findall(r"[A-Z][0-9]*", matched[side])) for side in (1, 3))
+    axes = workpiece + tool
+    unknown = sorted({name for name in axes if not is_axis_name(name)})
+    if unknown:
+        raise ChainError(f"chain {text!r} has unknown axis {', '.join(unknown)}; {expected}")
+    twice = sorted({name for name in axes if axes.count(name) > 1})
+    if twice:
+        raise ChainError(
+            f"chain {text!r} has axis {', '.join(twice)} twice; expected each name once"
+            f" (a digit tells them apart: {twice[0][0]}1, {twice[0][0]}2)"
+        )
+    if not 1 <= len(axes) <= MAX_AXES:
+        found = f"{len(axes)} axes" if axes else "no axis"
+        raise ChainError(f"chain {text!r} has {found}; expected one to eight")
+    return Chain(tuple(reversed(workpiece)), tool)
+
+
+# --- A gantry: one linear axis on two parallel guides, each with a positioning error of its own ---
+
+ACROSS = "xyz"
+"""Directions in which the guides of a gantry may lie apart."""
+_DEFAULT_ACROSS = {"x": "y", "y": "x", "z": "x"}
+URAD_PER_UM_OVER_MM = 1000.0
+"""A micrometre over a millimetre is a milliradian."""
+
+
+@dataclass(frozen=True, slots=True)
+class Gantry:
+    """Two guides of one axis."""
+
+    axis: str  # name of a linear axis
+    # distance between the guides: the first one lies at −span/2 of the origin of the axis's frame,
+    # the second at +span/2
+    span_mm: float
+    # direction from the first guide to the second: "x", "y" or "z", not that of the axis
+    across: str
+
+    @property
+    def positioning_key(self) -> str:
+        """Key of the positioning error of the axis, which is the mean of the guides'."""
+        return f"E{'XYZ'[direction_index(self.axis)]}{self.axis}"
+
+    @property
+    def rotation_key(self) -> str:
+        """Key of the rotation that the difference between the guides gives."""
+        third = 3 - direction_index(self.axis) - ACROSS.index(self.across)
+        return f"E{'ABC'[third]}{self.axis}"
+
+    @property
+    def rotation_weight(self) -> float:
+        """Rotation for each micrometre that the second guide is ahead of the first, µrad/µm.
+
+        Notes
+        -----
+        A rotation c about the third direction moves a point at p of the direction across by
+        c·p·(third × across) along the axis. That is −c·p for X across y, and where the axis, the
+        direction across and the third one follow each other like x, y, z; +c·p otherwise.
+        """
+        cyclic = (ACROSS.index(self.across) - direction_index(self.axis)) % 3 == 1
+        return (-1.0 if cyclic else 1.0) * URAD_PER_UM_OVER_MM / self.span_mm
+
+
+def default_across(axis: str) -> str:
+    """Give the direction across that none is given for: the other horizontal one; x for Z."""
+    return _DEFAULT_ACROSS["xyz"[direction_index(axis)]]
+
+
+# --- What a frame of a machine looks like where a description says so -----------------------------
+
 Vector = tuple[float, float, float]
+BODY_FRAMES = ("R", "S", "t", "w")
+"""Frames beside the axes that a body can ride on."""
+MESH_ENDINGS = (".stl", ".obj", ".ply", ".glb")
+MESH_UNITS = ("mm", "cm", "m", "in")
+TOOL_SHAPES = ("cutter", "probe", "nozzle", "wheel", "gripper")
+"""What a tool can be drawn as."""
+
+
+@dataclass(frozen=True, slots=True)
+class BodySource:
+    """Where the body of a frame comes from."""
+
+    # mesh, as its name stands in the file of the scene or machine; empty for a shape
+    file: str = ""
+    path: str = ""  # where that file is; empty where the description has no folder (an upload)
+    unit: str = ""  # unit of its numbers; empty for the one of its format
+    offset_mm: Vector = (0.0, 0.0, 0.0)  # origin of the mesh in its frame
+    # its rotation there, about the fixed x, y and z axes in that order
+    rotation_deg: Vector = (0.0, 0.0, 0.0)
+    shape: str = ""  # of the tool, one of `TOOL_SHAPES`; empty for a mesh
+
+
+# --- Description of a machine: its kinematic chain, frame offsets, travels and directions ---------
+
 Range = tuple[float, float]
 
 ORIGIN: Vector = (0.0, 0.0, 0.0)
@@ -35,28 +159,17 @@ def default_travel(axis: str) -> Range:
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """One axis of motion.
+    """One axis of motion."""
 
-    Attributes
-    ----------
-    name : str
-        X Y Z U V W (linear) or A B C (rotary, about x y z), and an optional digit.
-    offset_mm : tuple of float, (3,)
-        Origin of its frame in the frame before it, mm.
-    travel : tuple of float, (2,)
-        Lower and upper end, mm or degrees.
-    direction : int
-        +1, or −1 for an axis that moves against its name.
-    rotation_deg : tuple of float, (3,)
-        Fixed rotation of its frame against the frame before it, degrees, about the fixed x, y and z
-        axes in that order (roll, pitch, yaw of URDF).
-    """
-
-    name: str
-    offset_mm: Vector
-    travel: Range
-    direction: int = 1
+    name: str  # X Y Z U V W (linear) or A B C (rotary, about x y z), and an optional digit
+    offset_mm: Vector  # origin of its frame in the frame before it, mm
+    travel: Range  # lower and upper end, mm or degrees
+    direction: int = 1  # +1, or −1 for an axis that moves against its name
+    # fixed rotation of its frame against the frame before it, degrees, about the fixed x, y and z
+    # axes in that order (roll, pitch, yaw of URDF)
     rotation_deg: Vector = ORIGIN
+    # whether the description says the direction, or leaves it at +1
+    direction_given: bool = field(default=False, compare=False)
 
     @property
     def is_linear(self) -> bool:
@@ -76,74 +189,46 @@ class Axis:
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """A machine tool as a rigid-body kinematic chain.
+    """A machine tool as a rigid-body kinematic chain."""
 
-    Attributes
-    ----------
-    chain : Chain
-        Order and side of the axes.
-    axes : mapping of str to Axis
-        The axes by name, in the order X Y Z U V W A B C.
-    fixed_mm : mapping of str to tuple of float, (3,)
-        Origins of S (spindle) and t (tool) at the end of the tool branch, and w (workpiece) at the
-        end of the workpiece branch, each in the frame before it, mm.
-    fixed_deg : mapping of str to tuple of float, (3,)
-        Their fixed rotations, degrees, as those of axes.
-    bodies : mapping of str to BodySource
-        Bodies of frames that the description gives; all others are generated.
-    source : str
-        Where its structure is published.
-    name, title : str
-        Short name and full name.
-    body_dir : str
-        Folder with the schematic bodies, empty where there are none.
-    gantries : mapping of str to Gantry
-        Linear axes that stand on two guides.
-    """
-
-    chain: Chain
-    axes: Mapping[str, Axis]
+    chain: Chain  # order and side of the axes
+    axes: Mapping[str, Axis]  # the axes by name, in the order X Y Z U V W A B C
+    # origins of S (spindle) and t (tool) at the end of the tool branch, and w (workpiece) at the
+    # end of the workpiece branch, each in the frame before it, mm
     fixed_mm: Mapping[str, Vector] = field(default_factory=dict[str, Vector])
-    name: str = "machine"
+    name: str = "machine"  # short name and full name
     title: str = ""
-    body_dir: str = ""
+    body_dir: str = ""  # folder with the schematic bodies, empty where there are none
+    # their fixed rotations, degrees, as those of axes
     fixed_deg: Mapping[str, Vector] = field(default_factory=dict[str, Vector])
+    # linear axes that stand on two guides
     gantries: Mapping[str, Gantry] = field(default_factory=dict[str, Gantry])
+    # bodies of frames that the description gives; all others are generated
     bodies: Mapping[str, BodySource] = field(default_factory=dict[str, BodySource])
-    source: str = ""
+    source: str = ""  # where its structure is published
 
     def axis(self, name: str) -> Axis:
-        """Look up an axis by its name.
-
-        Raises
-        ------
-        UnknownNameError
-            If the machine has no such axis.
-        """
+        """Look up an axis by its name."""
         try:
             return self.axes[name]
         except KeyError:
             raise UnknownNameError("axis", name, self.axes) from None
 
     def branch(self, side: str) -> tuple[Axis, ...]:
-        """List the axes of a branch, from the frame outwards.
-
-        Parameters
-        ----------
-        side : str
-            "tool" or "workpiece".
-        """
+        """List the axes of a branch, from the frame outwards."""
         names = self.chain.tool if side == "tool" else self.chain.workpiece
         return tuple(self.axes[name] for name in names)
 
-    def end_frames(self, side: str) -> tuple[tuple[str, Vector, Vector], ...]:
-        """List the fixed frames behind the last axis of a branch: name, offset [mm], turn [°].
+    def sense(self, axis: str) -> int:
+        """Give +1 where a positive command moves the tool with the axis over the workpiece.
 
-        Parameters
-        ----------
-        side : str
-            "tool" or "workpiece".
+        That is the rule of ISO 841; −1 is against it.
         """
+        side = 1 if axis in self.chain.tool else -1
+        return side * self.axes[axis].direction
+
+    def end_frames(self, side: str) -> tuple[tuple[str, Vector, Vector], ...]:
+        """List the fixed frames behind the last axis of a branch: name, offset [mm], turn [°]."""
         names = ("S", "t") if side == "tool" else ("w",)
         return tuple(
             (name, self.fixed_mm.get(name, ORIGIN), self.fixed_deg.get(name, ORIGIN))
@@ -183,36 +268,7 @@ def build_machine(
     body_dir: str = "",
     source: str = "",
 ) -> Machine:
-    """Put a machine together from its chain and the tables that go with it.
-
-    Parameters
-    ----------
-    chain : str or Chain
-        Order of the axes, for instance ``wCBFXYZt``.
-    offset_mm : mapping of str to tuple of float, (3,), optional
-        Origin of each frame (axes, S, t, w) in the frame before it, mm. Absent is zero.
-    rotation_deg : mapping of str to tuple of float, (3,), optional
-        Fixed rotation of each frame after its offset, degrees, about the fixed x, y and z axes in
-        that order. Absent is zero.
-    travel : mapping of str to tuple of float, (2,), optional
-        Lower and upper end of each axis, mm or degrees.
-    direction : mapping of str to int, optional
-        +1 or −1; absent is +1.
-    gantry : mapping of str to (float, str or None), optional
-        Linear axes on two guides: distance of the guides in mm, and the direction "x", "y" or "z"
-        in which they lie apart (None for the other horizontal one).
-    name, title, body_dir, source : str, optional
-        Short name, full name, folder of the schematic bodies, where its structure is published.
-
-    Returns
-    -------
-    Machine
-
-    Raises
-    ------
-    ChainError
-        If the chain cannot be read.
-    """
+    """Put a machine together from its chain and the tables that go with it."""
     parsed = parse_chain(chain) if isinstance(chain, str) else chain
     offsets, rotations = offset_mm or {}, rotation_deg or {}
     travels, directions = travel or {}, direction or {}
@@ -223,6 +279,7 @@ def build_machine(
             travels.get(axis, default_travel(axis)),
             directions.get(axis, 1),
             rotations.get(axis, ORIGIN),
+            axis in directions,
         )
         for axis in parsed.axes
     }

@@ -1,24 +1,21 @@
-"""The errors of a machine: the curve of every parameter, and the set of all of them.
+"""The errors of a machine: the curve of every parameter, tolerances, and what was measured.
 
 The kinds of curve are in `warpspace.machine.curves`; those that come with warpspace can be imported
 from here as well.
 """
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
-from warpspace.machine.curves.constant import Constant
+from warpspace.machine.axes import TravelDirection
 from warpspace.machine.curves.curve import OWN, ErrorFunction
 from warpspace.machine.curves.directional import Directional
-from warpspace.machine.curves.harmonics import Harmonics
-from warpspace.machine.curves.poly import Poly
-from warpspace.machine.curves.ramp import Ramp
-from warpspace.machine.curves.table import Table
-from warpspace.machine.curves.two_arguments import TwoArguments
+from warpspace.machine.curves.simple import Constant, Harmonics, Poly, Ramp
+from warpspace.machine.curves.table import Table, TwoArguments
 from warpspace.machine.parameters import parameter
-from warpspace.machine.travel import TravelDirection
 from warpspace.units import Array
 
 __all__ = [
@@ -36,14 +33,9 @@ __all__ = [
 
 @dataclass(frozen=True)
 class ErrorSet:
-    """The error functions of a machine; a parameter that is absent is zero.
+    """The error functions of a machine; a parameter that is absent is zero."""
 
-    Attributes
-    ----------
-    functions : mapping of str to ErrorFunction
-        Parameter key to function.
-    """
-
+    # parameter key to function
     functions: Mapping[str, ErrorFunction] = field(default_factory=dict[str, ErrorFunction])
 
     def __post_init__(self) -> None:
@@ -68,19 +60,9 @@ class ErrorSet:
         return tuple(dict.fromkeys(own if axis == OWN else axis for axis in named))
 
     def evaluate(self, key: str, position: Array) -> Array:
-        """Give one error along its axis: the mean of both directions of travel.
+        """Give one error along its axis, the mean of both directions of travel, [...].
 
-        Parameters
-        ----------
-        key : str
-            Parameter key.
-        position : ndarray, [...], mm or degrees
-
-        Returns
-        -------
-        ndarray, [...], µm or µrad
-            Of an error that depends on a second axis, the section in the middle of its positions;
-            see `evaluate_at`.
+        Of an error that depends on a second axis it is the section in the middle of its positions.
         """
         function = self.functions.get(key)
         return np.zeros(np.shape(position)) if function is None else function.evaluate(position)
@@ -91,22 +73,7 @@ class ErrorSet:
         coordinates: Mapping[str, Array],
         direction: str = TravelDirection.MEAN,
     ) -> Array:
-        """Give one error where all axes stand somewhere, reached in a direction of travel.
-
-        Parameters
-        ----------
-        key : str
-            Parameter key.
-        coordinates : mapping of str to ndarray, [...], mm or degrees
-            Broadcastable positions of the axes that it depends on, its own one among them.
-        direction : str, optional
-            One of `TravelDirection`.
-
-        Returns
-        -------
-        ndarray, [...], µm or µrad
-            Of the shape that the positions of its arguments broadcast to.
-        """
+        """Give one error where the axes it depends on stand, reached in a direction, [...]."""
         axis = parameter(key).axis
         function = self.functions.get(key)
         if function is None:
@@ -138,3 +105,82 @@ class ErrorSet:
         """Give the set with one amplitude changed; an absent one becomes a constant."""
         function = self.functions.get(key, Constant(span))
         return ErrorSet({**self.functions, key: function.with_amplitude(amplitude)})
+
+
+TOLERANCE_CLASSES = ("translation", "rotation", "squareness")
+
+
+@dataclass(frozen=True, slots=True)
+class Tolerance:
+    """Range of one parameter."""
+
+    centre: float  # µm or µrad
+    half_width: float  # µm or µrad, not negative
+
+
+@dataclass(frozen=True, slots=True)
+class ToleranceSet:
+    """Tolerances of a machine's parameters."""
+
+    # half width about zero per class: translation [µm], rotation and squareness [µrad]
+    default: Mapping[str, float] = field(default_factory=dict[str, float])
+    # parameters with a tolerance of their own
+    own: Mapping[str, Tolerance] = field(default_factory=dict[str, Tolerance])
+
+    def __bool__(self) -> bool:
+        """Whether any tolerance is given."""
+        return bool(self.default or self.own)
+
+    def get(self, key: str) -> Tolerance | None:
+        """Give the tolerance of a parameter; None where neither it nor its class has one."""
+        if key in self.own:
+            return self.own[key]
+        half_width = self.default.get(parameter(key).tolerance_class)
+        return None if half_width is None else Tolerance(0.0, half_width)
+
+    def missing(self, keys: Sequence[str]) -> tuple[str, ...]:
+        """List the parameters that have no tolerance."""
+        return tuple(key for key in keys if self.get(key) is None)
+
+    def with_half_widths(self, half_widths: Mapping[str, float]) -> "ToleranceSet":
+        """Give parameters other half widths, µm or µrad; centres stay where they are."""
+        own = dict(self.own)
+        for key, half_width in half_widths.items():
+            present = self.get(key)
+            own[key] = Tolerance(0.0 if present is None else present.centre, half_width)
+        return replace(self, own=own)
+
+
+FORWARD, BACKWARD, UNKNOWN = "+", "-", ""
+RUN_DIRECTIONS = (FORWARD, BACKWARD, UNKNOWN)
+"""Towards growing positions, towards falling ones, not known."""
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """Readings of one travel along an axis."""
+
+    # "+" towards growing positions, "-" towards falling ones, empty where it is not known
+    direction: str
+    # (n, 2); position in mm or degrees and reading in µm or µrad, in the order they were taken
+    points: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """All runs of one error."""
+
+    runs: tuple[Run, ...]
+
+    @cached_property
+    def scatter(self) -> dict[str, Array]:
+        """Readings by direction, [n, 2]: position in mm or degrees, value in µm or µrad."""
+        found: dict[str, list[tuple[float, float]]] = {}
+        for run in self.runs:
+            found.setdefault(run.direction, []).extend(run.points)
+        return {way: np.array(points) for way, points in found.items()}
+
+    @property
+    def count(self) -> int:
+        """Number of readings."""
+        return sum(len(run.points) for run in self.runs)

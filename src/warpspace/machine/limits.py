@@ -73,6 +73,32 @@ MAX_TEXT = 4000
 """Characters of a title or description."""
 MAX_TRACES = 64
 
+# --- meshes and robots: what is counted before anything is built ----------------------------------
+
+MAX_MESH_MB = 50
+MAX_TRIANGLES = 250_000
+"""Of one mesh file, each placing of a mesh counted: 2 s to read and to find the edges of."""
+MAX_MESH_PARTS = 5_000
+"""Entries of any one list of a GLB file, and primitives, as often as placed."""
+MAX_SOLIDS = 1_000
+"""Of an STL file, those between which there is text."""
+MAX_MESH_DEPTH = 50
+"""Nodes of a GLB file below each other."""
+MAX_MESH_HEADER = {".glb": 12_000_000, ".ply": 65_536}
+"""Bytes before the numbers."""
+MAX_MESH_LISTS = 12 * MAX_TRIANGLES
+"""Numbers in the lists of a PLY file, points and indices of a GLB file, lines of a text: of three
+corners with normals and texture."""
+MAX_MESH_WORDS = 40 * MAX_TRIANGLES
+"""Of a mesh file that is text: a triangle of an STL has 21."""
+MAX_LINKS = 2_000
+"""Links of a URDF file."""
+MAX_SHAPES = 500
+"""Shapes of its links."""
+MAX_URDF_ELEMENTS = 50_000
+MAX_URDF_TRIANGLES = 1_000_000
+"""Of all shapes together."""
+
 # --- how a scene is looked at ---------------------------------------------------------------------
 
 EXAGGERATION = (1e-3, 1e6)

@@ -68,30 +68,14 @@ class ErrorKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One error parameter.
+    """One error parameter."""
 
-    Attributes
-    ----------
-    key : str
-        ISO 230-1 name in ASCII.
-    symbol : str
-        The thesis's symbol, or one formed like it for axes the thesis does not have.
-    name : str
-        Plain name, for instance "roll of X".
-    axis : str
-        Name of the axis it belongs to.
-    kind : ErrorKind
-        What it describes.
-    source : str
-        Where it is defined.
-    """
-
-    key: str
-    symbol: str
-    name: str
-    axis: str
-    kind: ErrorKind
-    source: str
+    key: str  # ISO 230-1 name in ASCII
+    symbol: str  # the thesis's symbol, or one formed like it for axes the thesis does not have
+    name: str  # plain name, for instance "roll of X"
+    axis: str  # name of the axis it belongs to
+    kind: ErrorKind  # what it describes
+    source: str  # where it is defined
 
     @property
     def letter(self) -> str:
@@ -136,7 +120,6 @@ class Parameter:
 
 
 def _component(letter: str, axis: str) -> Parameter:
-    """Build the row of one component error."""
     rotation = letter in ROTARY_LETTERS
     about, own = direction_index(letter), direction_index(axis)
     low = "xyz"[about]
@@ -156,7 +139,6 @@ def _component(letter: str, axis: str) -> Parameter:
 
 
 def _constant(letter: str, axis: str) -> Parameter:
-    """Build the row of one constant error of an axis."""
     key = f"E{letter}0{axis}"
     about, own = direction_index(letter), direction_index(axis)
     low = "xyz"[about]
@@ -222,32 +204,12 @@ PARAMETERS = ParameterTable()
 
 
 def parameter(key: str) -> Parameter:
-    """Look up one parameter.
-
-    Parameters
-    ----------
-    key : str
-        ISO 230-1 name in ASCII.
-
-    Returns
-    -------
-    Parameter
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such parameter; the message names the near misses.
-    """
+    """Look up one parameter."""
     row = _row(key)
     if row is None:
-        classic = [name for axis in "XYZABC" for name in _keys(axis)]
+        classic = [row.key for axis in "XYZABC" for row in axis_parameters(axis)]
         raise UnknownNameError("error parameter", key, classic)
     return row
-
-
-def _keys(axis: str) -> tuple[str, ...]:
-    """List the keys of all parameters that an axis can have."""
-    return tuple(row.key for row in axis_parameters(axis))
 
 
 def default_keys(axes: Sequence[str]) -> tuple[str, ...]:
@@ -255,16 +217,6 @@ def default_keys(axes: Sequence[str]) -> tuple[str, ...]:
 
     Six component errors per axis; per rotary axis two orientation and two location errors; per
     linear axis the squareness not absorbed by the reference axis and the reference plane.
-
-    Parameters
-    ----------
-    axes : sequence of str
-        Names of axes, in any order.
-
-    Returns
-    -------
-    tuple of str
-        Keys: per axis its component errors, then its constants; linear axes first.
 
     Notes
     -----
@@ -287,6 +239,5 @@ def default_keys(axes: Sequence[str]) -> tuple[str, ...]:
 
 
 def _turns_away(letter: str, own: int, earlier: Sequence[int]) -> bool:
-    """Tell whether turning direction `own` about `letter` changes its angle to an earlier axis."""
     about = direction_index(letter)
     return about != own and (own in earlier or 3 - about - own in earlier)

@@ -1,13 +1,24 @@
-"""Writing files: nothing half-written is ever left behind, and nothing is replaced unasked."""
+"""Writing files: nothing half-written is ever left behind, and nothing is replaced unasked.
+
+The name of a temporary file says which machine and which process it belongs to:
+``.warpspace-<machine>-<process>-<random><ending>``.
+"""
 
 import os
+import re
+import shutil
+import socket
+import stat
+import sys
 import tempfile
-from collections.abc import Generator, Iterable, Sequence
+import time
+import zlib
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from warpspace.exceptions import OutputError
-from warpspace.outputs.leftovers import clear_leftovers, temporary_prefix
 
 
 def check_target(
@@ -17,31 +28,7 @@ def check_target(
     overwrite: bool = True,
     inputs: Iterable[Path] = (),
 ) -> Path:
-    """Refuse a target that cannot or must not be written, before any work is done for it.
-
-    Parameters
-    ----------
-    path : str or Path
-        The target.
-    endings : sequence of str, optional
-        Endings that are known, for instance ".glb"; any where none is given.
-    overwrite : bool, optional
-        Whether an existing file may be replaced.
-    inputs : iterable of Path, optional
-        Files that are read for what is written: never replaced, under whatever name. Asked for
-        only where the target exists.
-
-    Returns
-    -------
-    Path
-        The file to write; a symbolic link is followed.
-
-    Raises
-    ------
-    OutputError
-        If the ending is unknown, the folder does not exist, or the target is a folder, a device or
-        a file that must not be replaced.
-    """
+    """Refuse a target that cannot or must not be written, before any work is done for it."""
     target = Path(path)
     try:
         exists = _exists(target)
@@ -74,23 +61,6 @@ def check_target(
 def write_atomically(path: str | Path, *, overwrite: bool = True) -> Generator[Path]:
     """Give a temporary file beside the target; rename it onto the target when all went well.
 
-    Parameters
-    ----------
-    path : str or Path
-        The target. An existing file is replaced only by a complete new one, which gets its mode.
-    overwrite : bool, optional
-        Whether an existing file may be replaced.
-
-    Yields
-    ------
-    Path
-        The temporary file; same ending as the target, same folder.
-
-    Raises
-    ------
-    OutputError
-        If the target cannot be written; the message names it and the reason.
-
     Notes
     -----
     What a process that was killed has left in the folder is removed first.
@@ -119,7 +89,6 @@ def write_atomically(path: str | Path, *, overwrite: bool = True) -> Generator[P
 
 
 def _exists(path: Path) -> bool:
-    """Tell whether there is something behind a name; say why a name is impossible."""
     try:
         path.stat()
     except (FileNotFoundError, NotADirectoryError):
@@ -128,7 +97,6 @@ def _exists(path: Path) -> bool:
 
 
 def _is_same(target: Path, source: Path) -> bool:
-    """Tell whether two names mean one file: by links, or by another way of writing the path."""
     try:
         return target.samefile(source)
     except (OSError, ValueError):
@@ -136,12 +104,10 @@ def _is_same(target: Path, source: Path) -> bool:
 
 
 def _reason(error: Exception) -> str:
-    """Say what the system complained about."""
     return getattr(error, "strerror", None) or str(error)
 
 
 def _mode(target: Path) -> int:
-    """Give the mode of the file that is replaced, or that of a new file."""
     with suppress(FileNotFoundError):
         return target.stat().st_mode & 0o777
     mask = os.umask(0)
@@ -156,3 +122,90 @@ def _flush(path: Path) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
+
+
+_NAME = re.compile(r"\.warpspace-([0-9a-f]{8})-(\d{1,10})-")
+_OLD_S = 24 * 3600.0
+"""Nothing is written for so long: older files are left over, whichever machine wrote them."""
+
+
+def temporary_prefix() -> str:
+    """Give what the names of this process's temporary files begin with."""
+    return f".warpspace-{_machine()}-{os.getpid()}-"
+
+
+def clear_leftovers(folder: Path) -> None:
+    """Remove the temporary files in a folder whose process has ended.
+
+    Notes
+    -----
+    Processes are known on this machine only. Files that another machine wrote into a shared
+    folder are removed when they are a day old. What cannot be removed stays.
+    """
+    with suppress(OSError), os.scandir(folder) as entries:
+        found = [Path(entry.path) for entry in entries if _NAME.match(entry.name)]
+        for path in found:
+            with suppress(OSError):
+                if _is_left_over(path):
+                    _remove(path)
+
+
+@contextmanager
+def temporary_folder() -> Generator[Path]:
+    """Give a folder of the system's for temporary files, gone afterwards.
+
+    What a killed process has left there is removed by the next that asks for one.
+    """
+    clear_leftovers(Path(tempfile.gettempdir()))
+    with tempfile.TemporaryDirectory(prefix=temporary_prefix()) as name:
+        yield Path(name)
+
+
+def _is_left_over(path: Path) -> bool:
+    name, about = _NAME.match(path.name), path.lstat()
+    if name is None or (hasattr(os, "geteuid") and about.st_uid != os.geteuid()):
+        return False
+    if time.time() - about.st_mtime > _OLD_S:
+        return True
+    return name[1] == _machine() and not _runs(int(name[2]))
+
+
+def _runs(process: int) -> bool:
+    if sys.platform == "win32":  # asking would end it
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True
+
+
+def _remove(path: Path) -> None:
+    if stat.S_ISDIR(path.lstat().st_mode):
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def _machine() -> str:
+    return f"{zlib.crc32(socket.gethostname().encode()):08x}"
+
+
+def mesh_files(
+    target: Path, frames: Iterable[str], *, overwrite: bool, inputs: Iterable[Path]
+) -> dict[str, Path]:
+    """Name the meshes beside a file."""
+    files = {frame: target.with_name(f"{target.stem}_{frame}.stl") for frame in frames}
+    read = tuple(inputs)
+    for file in files.values():
+        check_target(file, overwrite=overwrite, inputs=read)
+    return files
+
+
+def write_meshes(files: Mapping[str, Path], meshes: Mapping[str, Any], *, overwrite: bool) -> None:
+    """Write the meshes of frames."""
+    for frame, file in files.items():
+        with write_atomically(file, overwrite=overwrite) as temporary:
+            meshes[frame].export(temporary, file_type="stl")

@@ -29,23 +29,7 @@ _Task = tuple[Callable[..., Any], tuple[Any, ...], Mapping[str, Any]]
 
 
 class ProcessPool(Executor):
-    """Does tasks in processes, each of which does one task after the other.
-
-    Parameters
-    ----------
-    processes : int
-        How many there are at the most; each is started when there is a task for it.
-    tasks_per_process : int, optional
-        A process is replaced after so many tasks.
-    losses : int, optional
-        How many processes may die altogether. Each is replaced, and its task done again; one more,
-        and all tasks fail with `WorkersLostError`.
-
-    Raises
-    ------
-    RenderError
-        If this program has been told to end.
-    """
+    """Does tasks in processes, each of which does one task after the other."""
 
     def __init__(
         self, processes: int, *, tasks_per_process: int | None = None, losses: int = 0
@@ -64,13 +48,7 @@ class ProcessPool(Executor):
         _pools.add(self)
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> "Future[Any]":
-        """Give a task to the pool: a function of a module's own level, and what it is called with.
-
-        Returns
-        -------
-        Future
-            Raises what the function raises, or `WorkersLostError`.
-        """
+        """Give a task to the pool: a function of a module's own level and its arguments."""
         return self._threads.submit(self._do, (fn, args, kwargs))
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
@@ -95,7 +73,6 @@ class ProcessPool(Executor):
             worker.process.kill()
 
     def _do(self, task: _Task) -> Any:
-        """Have a process do a task, as often as it takes."""
         while True:
             worker = self._find()
             try:
@@ -130,21 +107,13 @@ class ProcessPool(Executor):
         raise WorkersLostError(f"worker processes died {times} (out of memory?)")
 
     def _retire(self, worker: "_Worker") -> None:
-        """End a process that has no task."""
         with self._lock:
             worker.end()
             self._workers.discard(worker)
 
 
 class _Worker:
-    """A process, and this end of its pipe.
-
-    Attributes
-    ----------
-    process : multiprocessing.Process
-    done : int
-        How many tasks it has done.
-    """
+    """A process, and this end of its pipe."""
 
     def __init__(self) -> None:
         self._pipe, theirs = _spawn.Pipe()
@@ -155,7 +124,6 @@ class _Worker:
         theirs.close()  # so that the pipe ends when the process does
 
     def do(self, task: _Task) -> tuple[Any, BaseException | None]:
-        """Send a task and wait for what comes of it; an OSError or EOFError is its end."""
         try:
             self._pipe.send(task)
             self.done += 1
@@ -166,7 +134,6 @@ class _Worker:
             return None, error
 
     def end(self) -> None:
-        """Let the process end, and wait for it."""
         self._pipe.close()
         self.process.join(END_S)
         self.process.kill()
@@ -199,7 +166,6 @@ def _interrupts_held_back() -> Generator[None]:
 
 
 def _work(pipe: "Connection[Any, Any]") -> None:
-    """Do the tasks that come through the pipe; runs in a process of its own."""
     _follow_parent()
     while True:
         try:
@@ -222,7 +188,6 @@ def _work(pipe: "Connection[Any, Any]") -> None:
 def _outcome(
     fn: Callable[..., Any], args: tuple[Any, ...], kwargs: Mapping[str, Any]
 ) -> tuple[Any, BaseException | None]:
-    """Call a function; give what it returns, or what it raises."""
     try:
         return fn(*args, **kwargs), None
     except Exception as error:  # noqa: BLE001 - raised again by whoever waits for it
@@ -243,7 +208,6 @@ def _follow_parent() -> None:
 
 
 def _end_with_parent() -> None:
-    """Wait for the end of the parent, then end this process at once."""
     parent = parent_process()
     if parent is not None:
         parent.join()

@@ -5,29 +5,17 @@ from pathlib import Path
 
 import matplotlib as mpl
 
-from warpspace.outputs.drawing.content import Drawing
+from warpspace.outputs.charts.paper import encode_figure
 from warpspace.outputs.drawing.settings import FigureSettings
+from warpspace.outputs.drawing.sheet import Drawing
 from warpspace.outputs.drawing.style import FIGURE_ENDINGS, SAVE_RC
-from warpspace.outputs.encoding import encode_figure
 from warpspace.outputs.figures.catalogue import draw_figure
 from warpspace.outputs.files import check_target, write_atomically
 from warpspace.scene.model import Scene
 
 
 def figure_bytes(drawing: Drawing, form: str) -> bytes:
-    """Write a drawn figure into memory.
-
-    Parameters
-    ----------
-    drawing : Drawing
-    form : str
-        One of `FORMATS`.
-
-    Returns
-    -------
-    bytes
-        The same for the same figure: no dates, no random names.
-    """
+    """Write a drawn figure into memory."""
     facts = drawing.facts
     about = f"{facts['settings']}; scene={facts['scene']}"
     said = {"Title": drawing.title}
@@ -63,24 +51,7 @@ def write_figure(
     *,
     force: bool = True,
 ) -> Path:
-    """Draw a figure into a file, in this process.
-
-    Parameters
-    ----------
-    path : str or Path
-        Ends in .png, .svg or .pdf.
-    name : str
-        Name of the figure, see `warpspace.outputs.figures.catalogue`.
-    scenes : sequence of Scene
-    settings : FigureSettings, optional
-    force : bool, optional
-        Whether an existing file is replaced.
-
-    Returns
-    -------
-    Path
-        The file.
-    """
+    """Draw a figure into a file, in this process."""
     form = check_target(path, FIGURE_ENDINGS, overwrite=force).suffix.lower().lstrip(".")
     content = render_figure(name, scenes, settings or FigureSettings(), form)
     with write_atomically(path, overwrite=force) as temporary:

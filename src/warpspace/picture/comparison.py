@@ -3,35 +3,38 @@
 The change is always B − A: of the error vectors node by node, and of each statistic.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any, cast
 
+from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.statistics import Statistics
 from warpspace.exceptions import OptionError
 from warpspace.machine.errors import ErrorSet
-from warpspace.picture.exaggeration import Exaggeration, choose_exaggeration
-from warpspace.picture.model import P, Picture, same_nodes, subtract_fields
+from warpspace.picture.model import (
+    DIFFERENCE_LENGTH,
+    Exaggeration,
+    P,
+    Picture,
+    choose_exaggeration,
+    same_nodes,
+    subtract_fields,
+)
 from warpspace.picture.scene_picture import ScenePicture
 from warpspace.picture.traces import TraceLines, subtract_traces
+from warpspace.picture.words import own_axes, spell_at, spell_point
+from warpspace.scene.model import Scene
 
 CHANGE = "B − A"
 """How a change is called, and its sign."""
-DIFFERENCE_LENGTH = "|E_B − E_A|"
-"""What the statistics of the difference are of: the length of the change of the error vector."""
 STATISTICS = {"mean": "mean_um", "RMS": "rms_um", "P95": "p95_um", "max": "max_um"}
 """Name of a statistic, and its attribute of `Statistics`."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class DifferencePicture(ScenePicture):
-    """The change from scene A to scene B, B − A; the bodies of its machine stand nominally.
-
-    Attributes
-    ----------
-    a, b : ScenePicture
-    """
+    """The change from scene A to scene B, B − A; the bodies of its machine stand nominally."""
 
     a: ScenePicture
     b: ScenePicture
@@ -75,13 +78,7 @@ class DifferencePicture(ScenePicture):
 
 
 def check_same_nodes(first: ScenePicture, second: ScenePicture) -> None:
-    """Refuse two pictures whose nodes do not coincide.
-
-    Raises
-    ------
-    OptionError
-        With the names of the scenes.
-    """
+    """Refuse two pictures whose nodes do not coincide."""
     if not same_nodes(first.field.nominal_mm, second.field.nominal_mm):
         raise OptionError(
             f"{first.scene.name} and {second.scene.name} cannot be compared: their working volumes"
@@ -94,6 +91,36 @@ def statistics_change(a: Statistics, b: Statistics) -> dict[str, float]:
     return {name: getattr(b, name) - getattr(a, name) for name in STATISTICS.values()}
 
 
+def statistics_blocks(
+    scene: Scene, names: Sequence[str], found: Sequence[Statistics]
+) -> Iterator[Block]:
+    """Say the statistics of fields over one volume, and where each is largest.
+
+    Of three the last is that of the change; the change of each statistic then stands beside it.
+    """
+    columns = [Column("|E|" if len(names) > 1 else "", leads=True)]
+    columns += number_columns(names, unit="µm")
+    change = statistics_change(*found[:2]) if len(names) == 2 else {}
+    if change:
+        columns.append(Column(CHANGE, "+.2f", "µm", joins=True))
+    if len(found) > len(names):
+        columns.append(Column(DIFFERENCE_LENGTH, ".2f", "µm", joins=True))
+    rows = [
+        (
+            name, *(getattr(one, key) for one in found[: len(names)]),
+            *([change[key]] if change else []),
+            *(getattr(one, key) for one in found[len(names) :]),
+        )
+        for name, key in STATISTICS.items()
+    ]  # fmt: skip
+    yield Table(tuple(columns), rows)
+    for name, part in zip((*names, DIFFERENCE_LENGTH), found, strict=False):
+        if part.max_um > 0.0:
+            worst = own_axes(scene, part.max_at_axes)
+            yield f"  max of {name} at {spell_point(worst, part.max_at_mm)} mm"
+            yield f"  --at {spell_at(worst)}"
+
+
 def conditions_of_both(a: Sequence[str], b: Sequence[str]) -> tuple[str, ...]:
     """Say the conditions of two pictures: those of one with its letter, common ones once."""
     own = [
@@ -104,22 +131,7 @@ def conditions_of_both(a: Sequence[str], b: Sequence[str]) -> tuple[str, ...]:
 
 
 def scene_change(a: ScenePicture, b: ScenePicture) -> DifferencePicture:
-    """Subtract the errors of evaluated scene A from those of B, B − A.
-
-    Parameters
-    ----------
-    a, b : ScenePicture
-
-    Returns
-    -------
-    DifferencePicture
-        Drawn with the factor, the component and the colours of A.
-
-    Raises
-    ------
-    OptionError
-        If the working volumes are not the same.
-    """
+    """Subtract the errors of evaluated scene A from those of B, B − A."""
     check_same_nodes(a, b)
     scene = replace(
         a.scene,
@@ -134,7 +146,7 @@ def scene_change(a: ScenePicture, b: ScenePicture) -> DifferencePicture:
         exaggeration=a.exaggeration,
         component=a.component,
         quantity=a.quantity,
-        colours=a.colours,
+        is_difference=True,
         conditions=conditions_of_both(a.conditions, b.conditions),
         scene=scene,
         a=a,
@@ -145,19 +157,7 @@ def scene_change(a: ScenePicture, b: ScenePicture) -> DifferencePicture:
 def share_exaggeration(
     pictures: Sequence[P], wanted: Exaggeration, own: float | None
 ) -> tuple[P, ...]:
-    """Give pictures one display factor: what is asked for, or a round one that suits all.
-
-    Parameters
-    ----------
-    pictures : sequence of Picture
-    wanted : float, "auto" or None
-    own : float or None
-        What the first scene says.
-
-    Returns
-    -------
-    tuple of Picture
-    """
+    """Give pictures one display factor: what is asked for, or a round one that suits all."""
     factor = choose_exaggeration(
         wanted,
         own,

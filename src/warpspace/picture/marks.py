@@ -1,11 +1,13 @@
 """What is written on a picture of the bent volume: corner arrows, the worst point, scale bars."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from warpspace.geometry.deform import deform, round_down
-from warpspace.geometry.surfaces import Shape, corners
+from warpspace.geometry.colour import nice_step
+from warpspace.geometry.surfaces import Shape, corners, deform, round_down
 from warpspace.units import MM_PER_UM, Array
 
 LABEL_GAP = 0.035
@@ -16,22 +18,12 @@ BAR_FRACTION = 0.25
 
 @dataclass(frozen=True, slots=True)
 class CornerArrows:
-    """Displacement of the corners of the volume.
+    """Displacement of the corners of the volume."""
 
-    Attributes
-    ----------
-    start_mm, end_mm : ndarray, [n, 3], mm
-        Nominal corner, and where it is drawn.
-    label_mm : ndarray, [n, 3], mm
-        Where its number stands, outside the volume.
-    norm_um : ndarray, [n], µm
-        Length of the error there.
-    """
-
-    start_mm: Array
+    start_mm: Array  # [n, 3]; nominal corner, and where it is drawn
     end_mm: Array
-    label_mm: Array
-    norm_um: Array
+    label_mm: Array  # [n, 3]; where its number stands, outside the volume
+    norm_um: Array  # [n]; length of the error there
 
     @property
     def texts(self) -> tuple[str, ...]:
@@ -41,40 +33,21 @@ class CornerArrows:
 
 @dataclass(frozen=True, slots=True)
 class WorstPoint:
-    """The node where a value is largest in magnitude.
+    """The node where a value is largest in magnitude."""
 
-    Attributes
-    ----------
-    index : int
-        Flat grid index.
-    nominal_mm, drawn_mm : ndarray, [3], mm
-    value : float
-        In the unit of the values.
-    """
-
-    index: int
-    nominal_mm: Array
+    index: int  # flat grid index
+    nominal_mm: Array  # [3]
     drawn_mm: Array
-    value: float
+    value: float  # in the unit of the values
 
 
 @dataclass(frozen=True, slots=True)
 class ScaleBar:
-    """A bar of round length.
+    """A bar of round length."""
 
-    Attributes
-    ----------
-    length : float
-        In mm of geometry, or in µm of error.
-    drawn_mm : float, mm
-        How long it is in the picture.
-    text : str
-        Length and unit.
-    """
-
-    length: float
-    drawn_mm: float
-    text: str
+    length: float  # in mm of geometry, or in µm of error
+    drawn_mm: float  # how long it is in the picture
+    text: str  # length and unit
 
 
 def spell_micrometres(value_um: float) -> str:
@@ -91,22 +64,10 @@ def corner_arrows(
     exaggeration: float,
     size_mm: float | None = None,
 ) -> CornerArrows:
-    """Find the arrows from the nominal to the displaced corners.
+    """Find the arrows from the nominal to the displaced corners, eight for a full volume.
 
-    Parameters
-    ----------
-    shape : tuple of int, (3,)
-        Nodes along the three axes.
-    nominal_mm : ndarray, [nx, ny, nz, 3], mm
-    error_um : ndarray, [nx, ny, nz, 3], µm
-    exaggeration : float
-    size_mm : float, mm, optional
-        Length that the gap before a number is a part of; by default the longest edge.
-
-    Returns
-    -------
-    CornerArrows
-        Eight for a full volume.
+    Points and errors are [nx, ny, nz, 3], mm and µm; the gap before a number is a part of
+    `size_mm`, by default of the longest edge.
     """
     chosen = corners(shape)
     nominal = nominal_mm.reshape(-1, 3)
@@ -122,26 +83,12 @@ def corner_arrows(
         start,
     )
     outwards = np.sign(start - middle)
-    return CornerArrows(start, end, tip + LABEL_GAP * size * outwards, _norm(error))
-
-
-def _norm(vectors: Array) -> Array:
-    """Length of vectors, [...]."""
-    return np.linalg.norm(vectors, axis=-1)
+    length = np.linalg.norm(error, axis=-1)
+    return CornerArrows(start, end, tip + LABEL_GAP * size * outwards, length)
 
 
 def worst_point(values: Array, nominal_mm: Array, drawn_mm: Array) -> WorstPoint:
-    """Find the node with the largest magnitude.
-
-    Parameters
-    ----------
-    values : ndarray, [...]
-    nominal_mm, drawn_mm : ndarray, [..., 3], mm
-
-    Returns
-    -------
-    WorstPoint
-    """
+    """Find the node with the largest magnitude of values [...], points being [..., 3], mm."""
     flat = values.reshape(-1)
     index = int(np.argmax(np.abs(flat)))
     return WorstPoint(
@@ -150,20 +97,7 @@ def worst_point(values: Array, nominal_mm: Array, drawn_mm: Array) -> WorstPoint
 
 
 def scale_bars(longest_mm: float, exaggeration: float) -> tuple[ScaleBar, ScaleBar]:
-    """Choose the two scale bars of a picture: geometry in mm, displacement in µm.
-
-    Parameters
-    ----------
-    longest_mm : float, mm
-        Longest edge of the volume.
-    exaggeration : float
-        Display factor of displacements.
-
-    Returns
-    -------
-    tuple of ScaleBar, (2,)
-        Of round length (1, 2 or 5 × 10ⁿ), at most a quarter of the longest edge as drawn.
-    """
+    """Choose the two scale bars of a picture: geometry in mm, displacement in µm."""
     room = max(BAR_FRACTION * longest_mm, 1e-9)
     geometry = round_down(room)
     error_um = round_down(room / (exaggeration * MM_PER_UM))
@@ -172,3 +106,89 @@ def scale_bars(longest_mm: float, exaggeration: float) -> tuple[ScaleBar, ScaleB
         ScaleBar(geometry, geometry, f"{geometry:g} mm"),
         ScaleBar(error_um, error_um * MM_PER_UM * exaggeration, spelt),
     )
+
+
+# --- Round values along an axis -------------------------------------------------------------------
+
+NO_SPAN = 1e-12
+"""A range below this part of its ends is rounding, mm a part of 1 mm."""
+
+
+def tick_values(low: float, high: float, most: float) -> list[float]:
+    """Choose round values within a range."""
+    span = high - low
+    if not span > NO_SPAN * max(1.0, abs(low), abs(high)):
+        return [low]
+    step = nice_step(span)
+    while span / step > max(most, 2.0):
+        step = nice_step(10.0 * step * 1.01)
+    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    return [round(step * number, 10) for number in range(first, last + 1)]
+
+
+SIDES = 10
+_HEAD_PART = 0.7
+"""Longest head, as a part of the arrow."""
+
+
+def _across(direction: Array) -> tuple[Array, Array]:
+    """Two unit vectors at right angles to each other and to unit vectors, [n, 3] each."""
+    helper = np.eye(3)[np.argmin(np.abs(direction), axis=-1)]
+    sideways: Array = np.cross(direction, helper)
+    first: Array = sideways / np.linalg.norm(sideways, axis=-1, keepdims=True)
+    second: Array = np.cross(direction, first)
+    return first, second
+
+
+def build_arrows(
+    start_mm: Array, end_mm: Array, radius_mm: float, head_mm: float
+) -> tuple[Array, NDArray[np.intp]]:
+    """Build arrows with a round shaft and a conical head.
+
+    Parameters
+    ----------
+    start_mm, end_mm : ndarray, [n, 3], mm
+    radius_mm : float, mm
+        Of the shaft; the head is three times as wide.
+    head_mm : float, mm
+        Length of the head; short arrows get a smaller one of the same shape.
+
+    Returns
+    -------
+    vertices_mm : ndarray, [n·(3·10 + 2), 3], mm
+        An arrow without length shrinks to a point.
+    triangles : ndarray, [T, 3]
+        Counter-clockwise seen from outside; the same for every place of the arrows.
+    """
+    vector = end_mm - start_mm
+    length = np.linalg.norm(vector, axis=-1, keepdims=True)
+    direction = np.where(
+        length > 0.0, vector / np.where(length > 0.0, length, 1.0), (0.0, 0.0, 1.0)
+    )
+    first, second = _across(direction)
+    head = np.minimum(head_mm, _HEAD_PART * length)
+    size = head / head_mm
+    turn = 2.0 * np.pi * np.arange(SIDES) / SIDES
+    ring = (
+        np.cos(turn)[:, None] * first[:, None, :] + np.sin(turn)[:, None] * second[:, None, :]
+    ) * (radius_mm * size)[:, None, :]
+    neck = (end_mm - head * direction)[:, None, :]
+    rings = [start_mm[:, None, :] + ring, neck + ring, neck + 3.0 * ring]
+    vertices = np.concatenate([*rings, start_mm[:, None, :], end_mm[:, None, :]], axis=1)
+    one = _triangles()
+    count = 3 * SIDES + 2
+    offsets = count * np.arange(len(start_mm))[:, None, None]
+    return vertices.reshape(-1, 3), (one + offsets).reshape(-1, 3)
+
+
+def _triangles() -> NDArray[np.intp]:
+    here = np.arange(SIDES)
+    there = (here + 1) % SIDES
+    foot, tip = 3 * SIDES, 3 * SIDES + 1
+    parts = [np.stack([np.full(SIDES, foot), there, here], -1)]
+    for low in (0, SIDES):
+        high = low + SIDES
+        parts.append(np.stack([low + here, low + there, high + there], -1))
+        parts.append(np.stack([low + here, high + there, high + here], -1))
+    parts.append(np.stack([2 * SIDES + here, 2 * SIDES + there, np.full(SIDES, tip)], -1))
+    return np.concatenate(parts)

@@ -5,11 +5,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.geometry.isolines import isoline_levels, isoline_segments
-from warpspace.geometry.surfaces import Index
-from warpspace.geometry.thicken import THICKNESS, is_thin, spread, spread_nodes, thicken
-from warpspace.picture.model import Picture
-from warpspace.picture.topology import Topology, topology
+from warpspace.geometry.surfaces import (
+    THICKNESS,
+    Index,
+    is_thin,
+    isoline_levels,
+    isoline_segments,
+    isolines,
+    spread,
+    spread_nodes,
+    thicken,
+)
+from warpspace.picture.model import Picture, Topology, topology
 from warpspace.units import Array
 
 LIFT = 0.0012
@@ -21,19 +28,11 @@ Pieces = NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True)
 class MapMesh:
-    """What is drawn of a map, mm in R.
+    """What is drawn of a map, mm in R."""
 
-    Attributes
-    ----------
-    vertices_mm : ndarray, [M, 3], mm
-    triangles : ndarray, [T, 3] or [S, 2]
-    values : ndarray, [M]
-        What is coloured, in the unit of the picture's scale.
-    """
-
-    vertices_mm: Array
-    triangles: NDArray[np.intp]
-    values: Array
+    vertices_mm: Array  # [M, 3]
+    triangles: NDArray[np.intp]  # [T, 3] or [S, 2]
+    values: Array  # [M]; what is coloured, in the unit of the picture's scale
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +63,6 @@ def map_parts(picture: Picture) -> list[Part]:
 
 
 def _part(picture: Picture, lifts: tuple[float, ...]) -> Part:
-    """Take what is drawn of one grid; a line or a point is given a thickness."""
     if is_thin(picture.shape):
         drawn_mm = thick_nodes(picture, picture.drawn_mm)
         values = spread(picture.values)
@@ -81,12 +79,7 @@ def thick_nodes(picture: Picture, nodes_mm: Array) -> Array:
 def thick_map(picture: Picture) -> tuple[Array, Index, Index]:
     """Give what a ray can meet of a line or a point that is drawn thick.
 
-    Returns
-    -------
-    vertices_mm : ndarray, [M, 3], mm
-    triangles : ndarray, [T, 3]
-    nodes : ndarray, [M]
-        Flat index of the grid node that each vertex belongs to.
+    Vertices [M, 3], mm, triangles [T, 3], and the flat index of each vertex's grid node, [M].
     """
     thick = thick_nodes(picture, picture.drawn_mm)
     surface = topology(thick.shape[:3]).surface
@@ -102,16 +95,7 @@ def outline_pieces(picture: Picture, nodes_mm: Array) -> Pieces:
 
 
 def map_mesh(picture: Picture) -> MapMesh:
-    """Collect the triangles of a map.
-
-    Parameters
-    ----------
-    picture : Picture
-
-    Returns
-    -------
-    MapMesh
-    """
+    """Collect the triangles of a map."""
     vertices: list[Array] = []
     triangles: list[NDArray[np.intp]] = []
     values: list[Array] = []
@@ -194,3 +178,49 @@ def _joined(parts: list[Pieces]) -> Pieces:
     if not kept:
         return np.zeros((1, 2, 3), np.float32)
     return kept[0] if len(kept) == 1 else np.concatenate(kept)
+
+
+# --- Values written on isolines -------------------------------------------------------------------
+# Where they stand, so that few of them say what each line means.
+
+LEAST_LENGTH = 0.2
+"""Shortest line that carries its value, as a part of the longest edge."""
+ALONG_SLICE = 0.3
+"""Where along its line the value stands on a slice: in the middle another slice crosses it."""
+MOST_LABELS = 60
+
+
+@dataclass(frozen=True, slots=True)
+class IsolineLabel:
+    """The value of one line."""
+
+    value: float  # in the unit of the picture's scale
+    at_mm: Array  # [3]; on the line, where it is drawn
+    outward: Array  # [3]; direction that the face with the line looks to; of a slice one of the two
+    length_mm: float  # of the line
+
+
+def isoline_labels(picture: Picture) -> list[IsolineLabel]:
+    """Choose where the lines of equal value carry their value: one on each face or slice."""
+    levels = isoline_levels(picture.scale)
+    found: list[IsolineLabel] = []
+    for part in map_parts(picture):
+        nodes, values = part.drawn_mm.reshape(-1, 3), part.values.reshape(-1)
+        normals = part.drawn_of.normals * part.ways
+        for face, normal in zip(part.drawn_of.faces, normals, strict=True):
+            longest: dict[float, IsolineLabel] = {}
+            for value, line in isolines(face, nodes, values, levels):
+                at, length = _part_way(line, ALONG_SLICE if picture.slices else 0.5)
+                if length > (longest[value].length_mm if value in longest else 0.0):
+                    longest[value] = IsolineLabel(value, at, normal, length)
+            found += longest.values()
+    least = LEAST_LENGTH * picture.size_mm
+    kept = [label for label in found if label.length_mm >= least]
+    return sorted(kept, key=lambda label: -label.length_mm)[:MOST_LABELS]
+
+
+def _part_way(line: Array, share: float) -> tuple[Array, float]:
+    """Find the point at a share of the length of a polyline, [n, 3], and that length."""
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    at = share * along[-1]
+    return np.array([np.interp(at, along, line[:, k]) for k in range(3)]), float(along[-1])

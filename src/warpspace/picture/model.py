@@ -1,65 +1,132 @@
 """One picture in numbers: an evaluated volume with its display factor and its colours."""
 
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import TypeVar
+from functools import cached_property, lru_cache
+from typing import Literal, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpspace.analysis.statistics import Statistics, volume_statistics
 from warpspace.exceptions import OptionError
-from warpspace.field.basis import ErrorField
-from warpspace.field.evaluate import View
+from warpspace.field.evaluate import ErrorField, View
 from warpspace.field.grid import Grid
+from warpspace.geometry import surfaces
 from warpspace.geometry.colour import SYMBOLS, ColourScale, build_scale, component_values
-from warpspace.geometry.deform import deform
-from warpspace.geometry.surfaces import Shape
-from warpspace.picture.topology import Topology, topology
+from warpspace.geometry.surfaces import (
+    MIN_CUT_NODES,
+    Shape,
+    auto_exaggeration,
+    crease_lines,
+    cut_faces,
+    deform,
+    face_axis,
+    face_lines,
+    outer_faces,
+)
+from warpspace.machine.limits import EXAGGERATION
+from warpspace.scene.model import Scene
 from warpspace.units import Array
 
+# --- What is drawn of a grid, as indices into its nodes -------------------------------------------
+# Whole surface, or without an octant.
+
+Floats = NDArray[np.float32]
+
+CUT_CORNER = (1, 0, 1)
+"""The octant that is cut away: the one nearest to the operator, right in front and above."""
+
+
+def map_faces(shape: surfaces.Shape, *, cut: bool = False) -> list[surfaces.Index]:
+    """List the patches of the surface that is drawn, whole or without the octant cut away."""
+    return cut_faces(shape, CUT_CORNER) if cut else outer_faces(shape)
+
+
+@dataclass(frozen=True, slots=True)
+class Topology:
+    """Indices of what is drawn of a grid; they do not change when it is bent."""
+
+    surface: surfaces.Surface
+    grid_segments: surfaces.Index  # [S, 2]; flat node indices of the ends of each piece of line
+    edge_segments: surfaces.Index
+    # [S, 2, 3]; at the ends of the pieces of line, the sum of the outward directions of the faces
+    # that the node lies on
+    grid_outwards: Floats
+    edge_outwards: Floats
+    # [a, b]; rectangular patches of nodes that the surface consists of
+    faces: tuple[surfaces.Index, ...]
+    normals: Array  # [F, 3]; outward direction of each patch
+
+
+@lru_cache(maxsize=32)
+def topology(shape: surfaces.Shape, *, cut: bool = False) -> Topology:
+    """Work out what is drawn of a grid of a shape."""
+    faces = map_faces(shape, cut=cut)
+    normals = np.array([_normal(face, shape) for face in faces]).reshape(-1, 3)
+    outwards = np.zeros((int(np.prod(shape)), 3))
+    for axis in range(3):
+        for sign in (-1.0, 1.0):
+            on = [f for f, n in zip(faces, normals, strict=True) if n[axis] == sign]
+            if on:
+                outwards[np.unique(np.concatenate([f.ravel() for f in on])), axis] += sign
+    every = tuple(map(surfaces.line_spacing, shape))
+    lines = face_lines(faces, shape, (every[0], every[1], every[2]))
+    grid, edges = surfaces.segments(lines), surfaces.segments(crease_lines(faces, shape))
+    return Topology(
+        surfaces.triangulate(faces),
+        grid,
+        edges,
+        outwards[grid].astype(np.float32),
+        outwards[edges].astype(np.float32),
+        tuple(faces),
+        normals,
+    )
+
+
+def _normal(face: surfaces.Index, shape: surfaces.Shape) -> Array:
+    corner, down, right = (
+        np.array(np.unravel_index(index, shape), dtype=float)
+        for index in (face[0, 0], face[-1, 0], face[0, -1])
+    )
+    normal = np.zeros(3)
+    normal[face_axis(face, shape)] = 1.0
+    return normal * np.sign(np.cross(down - corner, right - corner) @ normal)
+
+
+DIFFERENCE_LENGTH = "|E_B − E_A|"
+"""What the statistics of a change are of: the length of the change of the error vector."""
 SAME_PLACE_MM = 1e-6
 """Nodes nearer to each other than this are the same."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Picture:
-    """What every renderer, export and page draws of a gridded volume, a slice included.
+    """What every renderer, export and page draws of a gridded volume, a slice included."""
 
-    Attributes
-    ----------
-    view : View
-        Loop, frame and reference the errors are seen in.
-    grid : Grid
-    field : ErrorField
-        Errors of all nodes of the grid.
-    exaggeration : float
-        Display factor of displacements; 1 is true scale.
-    component : str
-        What is coloured: "norm", "x", "y" or "z" ...
-    quantity : str
-        ... of the "position" error, µm, or of the "orientation" error of the tool axis, µrad.
-    colours : ColourScale or None
-        The colours where they are given, for instance shared with other pictures; None for round
-        ends that hold all values.
-    cut : bool
-        Whether the octant towards the operator is cut away.
-    slices : tuple of Picture
-        Slices that are drawn in place of the surface, where there are any.
-    conditions : tuple of str
-        What a reader must know who takes the picture for all of its scene: which errors are
-        excluded, and colours that end where somebody chose. Every output says them.
-    """
-
-    view: View
+    view: View  # loop, frame and reference the errors are seen in
     grid: Grid
-    field: ErrorField
-    exaggeration: float
-    component: str = "norm"
+    field: ErrorField  # errors of all nodes of the grid
+    exaggeration: float  # display factor of displacements; 1 is true scale
+    component: str = "norm"  # what is coloured: "norm", "x", "y" or "z" ..
+    # ... of the "position" error, µm, or of the "orientation" error of the tool axis, µrad.
     quantity: str = "position"
+    # the colours where they are given, for instance shared with other pictures; None for round ends
+    # that hold all values
     colours: ColourScale | None = None
-    cut: bool = False
+    cut: bool = False  # whether the octant towards the operator is cut away
+    # slices that are drawn in place of the surface, where there are any
     slices: "tuple[Picture, ...]" = ()
+    # what a reader must know who takes the picture for all of its scene: which errors are excluded,
+    # and colours that end where somebody chose. Every output says them.
     conditions: tuple[str, ...] = ()
+    is_difference: bool = False  # whether it is the change from one picture to another, B − A
+
+    @property
+    def length_words(self) -> str:
+        """What the statistics are of."""
+        return DIFFERENCE_LENGTH if self.is_difference else "|E|"
 
     @property
     def tilts(self) -> bool:
@@ -96,7 +163,8 @@ class Picture:
         """Colours of the values."""
         if self.colours is not None:
             return self.colours
-        return choose_scale([self.values], self.component, self.quantity)
+        values, change = [self.values], self.is_difference
+        return choose_scale(values, self.component, self.quantity, change=change)
 
     @cached_property
     def drawn_mm(self) -> Array:
@@ -120,26 +188,17 @@ def coloured_values(field: ErrorField, component: str, quantity: str = "position
 
 
 def choose_scale(
-    values: "list[Array]", component: str, quantity: str = "position", end: float | None = None
+    values: "list[Array]",
+    component: str,
+    quantity: str = "position",
+    end: float | None = None,
+    *,
+    change: bool = False,
 ) -> ColourScale:
-    """Choose the colours of pictures that share one bar.
-
-    Parameters
-    ----------
-    values : list of ndarray, µm or µrad
-        What each picture colours.
-    component, quantity : str
-    end : float, optional
-        Where the scale ends, whatever the values.
-
-    Returns
-    -------
-    ColourScale
-        With round ends unless one is given.
-    """
+    """Choose the colours of pictures that share one bar."""
     symbol, unit = SYMBOLS[quantity]
     largest = max((float(np.abs(part).max(initial=0.0)) for part in values), default=0.0)
-    return build_scale(largest, component, quantity=symbol, unit=unit, end=end)
+    return build_scale(largest, component, quantity=symbol, unit=unit, end=end, change=change)
 
 
 def same_nodes(one_mm: Array, other_mm: Array) -> bool:
@@ -159,22 +218,101 @@ def subtract_fields(one: ErrorField, other: ErrorField) -> ErrorField:
 
 
 def subtract_pictures(one: P, other: Picture) -> P:
-    """Subtract the errors of a picture from those of another, one − other, node by node.
-
-    Parameters
-    ----------
-    one, other : Picture
-
-    Returns
-    -------
-    Picture
-        As `one` is drawn: its factor, component and given colours.
-
-    Raises
-    ------
-    OptionError
-        If their nodes do not coincide.
-    """
+    """Subtract the errors of a picture from those of another, one − other, node by node."""
     if not same_nodes(one.grid.nominal_mm, other.grid.nominal_mm):
         raise OptionError("the working volumes are not the same: there is no difference")
-    return replace(one, field=subtract_fields(one.field, other.field))
+    field = subtract_fields(one.field, other.field)
+    return replace(one, field=field, colours=None, is_difference=True)
+
+
+# --- Slices through the working volume: pictures of one plane each --------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class Slice(Picture):
+    """A picture of one plane of the working volume."""
+
+    axis: str  # the axis that stands still: the grid has one node along it
+    position_mm: float  # where it stands
+
+
+def subtract_slices(one: Sequence[P], other: Sequence[P]) -> tuple[P, ...]:
+    """Subtract the errors of slices, one − other, where both lie in one place."""
+    return tuple(
+        subtract_pictures(first, second)
+        for first, second in zip(one, other, strict=False)
+        if same_nodes(first.grid.nominal_mm, second.grid.nominal_mm)
+    )
+
+
+# --- Named views: from where a picture is looked at -----------------------------------------------
+
+Direction = tuple[float, float, float]
+
+VIEWS: Mapping[str, Direction] = {
+    "iso": (0.53, -0.85, 0.55),
+    "front": (0.0, -1.0, 0.0),
+    "right": (1.0, 0.0, 0.0),
+    "top": (0.0, 0.0, 1.0),
+}
+"""Direction from what is looked at towards the viewer, in R; the operator stands on the −Y side."""
+UPWARDS: Mapping[str, Direction] = {"top": (0.0, 1.0, 0.0)}
+"""What points upwards in a view, in R, where it is not z."""
+VIEW_WORDS = {
+    "front": "front view, from the operator",
+    "right": "view from the right",
+    "top": "view from above",
+}
+
+
+def view_words(view: str, shape: Shape) -> str:
+    """Say where the volume is looked at from, and what of it is cut away."""
+    if view == "iso":
+        return "octant towards the viewer cut away" if min(shape) >= MIN_CUT_NODES else "iso view"
+    return VIEW_WORDS[view]
+
+
+# --- Which display factor a picture is drawn with -------------------------------------------------
+# What is asked for, the scene's, or a round one.
+
+Exaggeration = float | Literal["auto"] | None
+"""A display factor, "auto" for a round one that suits the errors, None for what the scene says."""
+
+
+def given_exaggeration(wanted: Exaggeration, own: float | None) -> float | None:
+    """Give the factor that is asked for, else the scene's own; None where one is to be chosen."""
+    factor = own if wanted is None else wanted
+    if factor is None or factor == "auto":
+        return None
+    low, high = EXAGGERATION
+    if not low <= factor <= high:  # nor is NaN
+        found = f"exaggeration {factor:g}; expected auto or a number above 0"
+        raise OptionError(f"{found}, from {low:g} to {high:,.0f}")
+    return float(factor)
+
+
+def choose_exaggeration(
+    wanted: Exaggeration, own: float | None, largest_um: float, size_mm: float
+) -> float:
+    """Choose the display factor of a picture, or of several that share one."""
+    given = given_exaggeration(wanted, own)
+    return auto_exaggeration(largest_um, size_mm) if given is None else given
+
+
+# --- The length that a picture is sized by: labels, markers, axes, the display factor -------------
+
+LEAST_SIZE_MM = 100.0
+"""Of a single point without traces, on a machine without linear axes."""
+
+
+def picture_size_mm(scene: Scene, grid: Grid) -> float:
+    """Choose the length that a picture of a scene is sized by."""
+    if grid.longest_edge_mm > 0.0:
+        return grid.longest_edge_mm
+    axes = scene.machine.axes.values()
+    if any(not axis.is_linear for axis in axes):
+        circle = 2.0 * max((math.hypot(*point) for point in scene.trace_points_mm), default=0.0)
+        if circle > 0.0:
+            return circle
+    travels = (axis.travel[1] - axis.travel[0] for axis in axes if axis.is_linear)
+    return max(travels, default=0.0) or LEAST_SIZE_MM

@@ -1,34 +1,37 @@
 """The picture of a scene as figures, exports and reports draw it, with what it says of itself."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any
 
-from warpspace import __version__
-from warpspace.field.evaluate import View
+import numpy as np
+
+from warpspace.analysis.concepts import Concept, expected_um, zero_field
+from warpspace.analysis.statistics import Statistics, volume_statistics
+from warpspace.field.evaluate import View, placed_words, second_order_words
 from warpspace.field.grid import DEFAULT_NODES, build_grid
 from warpspace.geometry.colour import ColourScale
 from warpspace.kinematics.model import Loop
 from warpspace.machine.parameters import parameter
-from warpspace.picture.exaggeration import Exaggeration, choose_exaggeration
-from warpspace.picture.model import Picture, coloured_values
-from warpspace.picture.size import picture_size_mm
+from warpspace.picture.model import (
+    Exaggeration,
+    Picture,
+    choose_exaggeration,
+    coloured_values,
+    picture_size_mm,
+)
 from warpspace.picture.traces import TraceLines, evaluate_traces
 from warpspace.picture.words import direction_words
-from warpspace.scene.model import Scene
-from warpspace.scene.pipeline import choose_view, evaluate
+from warpspace.resources import __version__
+from warpspace.scene.model import Scene, choose_view, evaluate, second_order
 from warpspace.scene.save import scene_to_toml
+from warpspace.units import Array
 
 
 @dataclass(frozen=True, kw_only=True)
 class ScenePicture(Picture):
-    """A scene evaluated over its grid.
-
-    Attributes
-    ----------
-    scene : Scene
-    """
+    """A scene evaluated over its grid."""
 
     scene: Scene
 
@@ -92,9 +95,11 @@ class ScenePicture(Picture):
 def field_remarks(scene: Scene, view: View, *, exact: bool = False) -> dict[str, str]:
     """Say what a field belongs to, in words: scene, loop, reference, convention, program."""
     held = view.reference
+    placement = {} if view.placed_over is None else {"placement": "fitted out"}
     return {
         "scene": scene.name,
         "loop": str(view.loop),
+        **placement,
         "reference": "absolute"
         if held is None
         else " ".join(f"{axis}={at:g}" for axis, at in held.items()),
@@ -105,7 +110,6 @@ def field_remarks(scene: Scene, view: View, *, exact: bool = False) -> dict[str,
 
 
 def _one_text(value: str | dict[str, str]) -> str:
-    """Spell a value that may differ between axes in one text."""
     if isinstance(value, str):
         return value
     return " ".join(f"{axis}={name}" for axis, name in value.items())
@@ -122,34 +126,7 @@ def evaluate_picture(
     colours: ColourScale | None = None,
     conditions: Sequence[str] = (),
 ) -> ScenePicture:
-    """Evaluate all that a picture of a scene is drawn from.
-
-    Parameters
-    ----------
-    scene : Scene
-    grid : int, optional
-        Nodes per axis.
-    loop : Loop or str, optional
-    exaggeration : float, "auto" or None, optional
-        Display factor; by default what the scene says.
-    component : str, optional
-        What the colours show: "norm", "x", "y" or "z" ...
-    quantity : str, optional
-        ... of the "position" or the "orientation" error.
-    colours : ColourScale, optional
-        The colours where they are given.
-    conditions : sequence of str, optional
-        What every output must say of the picture beside its scene.
-
-    Returns
-    -------
-    ScenePicture
-
-    Raises
-    ------
-    OptionError
-        If one of the choices does not exist or is out of range.
-    """
+    """Evaluate all that a picture of a scene is drawn from."""
     view = choose_view(scene, loop)
     nodes = build_grid(scene.model, scene.workspace, grid)
     field = evaluate(scene, grid=grid, loop=loop)
@@ -165,6 +142,45 @@ def evaluate_picture(
         component=component,
         quantity=quantity,
         colours=colours,
-        conditions=(*direction_words(scene), *conditions),
+        conditions=(
+            *direction_words(scene),
+            *placed_words(view),
+            *second_order_words(second_order(scene, loop)),
+            *conditions,
+        ),
         scene=scene,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConceptPicture(ScenePicture):
+    """A nominal volume with the RMS of |E| of machines within tolerance."""
+
+    concept: Concept
+    expected_um: Array  # [nx, ny, nz]
+
+    @cached_property
+    def values(self) -> Array:
+        """What is coloured at each node, [nx, ny, nz], µm."""
+        return self.expected_um
+
+    @cached_property
+    def statistics(self) -> Statistics:
+        """Statistics of the RMS of |E| of machines within tolerance over the volume."""
+        along = np.stack([self.expected_um, *[np.zeros_like(self.expected_um)] * 2], axis=-1)
+        return volume_statistics(replace(self.field, error_um=along), self.grid)
+
+
+def picture_concept(concept: Concept, nodes: int) -> ConceptPicture:
+    """Evaluate the expected error of a concept over its working volume."""
+    scene = concept.scene
+    grid = build_grid(scene.model, scene.workspace, nodes)
+    return ConceptPicture(
+        view=concept.sampled.view,
+        grid=grid,
+        field=zero_field(grid),
+        exaggeration=1.0,
+        scene=scene,
+        concept=concept,
+        expected_um=expected_um(concept, grid),
     )

@@ -1,41 +1,32 @@
-"""The traces of the rotary axes as they are drawn: nominal, and displaced by their errors."""
+"""The traces of the rotary axes as they are drawn, and the error motion along one of them."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from warpspace.field.evaluate import evaluate_first_order
-from warpspace.geometry.deform import deform
+from warpspace.analysis.axis_motion import AxisMotion, Motion, axis_motion, points_on_axis
+from warpspace.analysis.blocks import Curve, Lines
+from warpspace.field.evaluate import ErrorField, evaluate_first_order
+from warpspace.geometry.surfaces import deform
 from warpspace.geometry.traces import SAMPLES, Trace, TraceGroup, build_traces
 from warpspace.kinematics.model import Loop
 from warpspace.picture.model import same_nodes
 from warpspace.scene.model import Scene
+from warpspace.spelling import spell_short
 from warpspace.units import Array
 
 
 @dataclass(frozen=True)
 class TraceLine:
-    """One trace.
+    """One trace."""
 
-    Attributes
-    ----------
-    trace : Trace
-        Which point is turned by which axis.
-    loop : Loop
-        Loop whose error displaces it.
-    nominal_mm : ndarray, [n, 3], mm
-    error_um : ndarray, [n, 3], µm
-    actual_mm : ndarray, [n, 3], mm
-        Where it is drawn.
-    """
-
-    trace: Trace
-    loop: Loop
-    nominal_mm: Array
-    error_um: Array
-    actual_mm: Array
+    trace: Trace  # which point is turned by which axis
+    loop: Loop  # loop whose error displaces it
+    nominal_mm: Array  # [n, 3]
+    error_um: Array  # [n, 3]
+    actual_mm: Array  # [n, 3]; where it is drawn
 
     @property
     def largest_um(self) -> float:
@@ -45,21 +36,12 @@ class TraceLine:
 
 @dataclass(frozen=True)
 class TraceLines:
-    """All traces of one branch.
-
-    Attributes
-    ----------
-    group : TraceGroup
-    nominal_mm : ndarray, [T, n, 3], mm
-    error_um : ndarray, [T, n, 3], µm
-    exaggeration : float
-        Display factor they are drawn with.
-    """
+    """All traces of one branch."""
 
     group: TraceGroup
-    nominal_mm: Array
-    error_um: Array
-    exaggeration: float
+    nominal_mm: Array  # [T, n, 3]
+    error_um: Array  # [T, n, 3]
+    exaggeration: float  # display factor they are drawn with
 
     @cached_property
     def actual_mm(self) -> Array:
@@ -81,21 +63,7 @@ class TraceLines:
 def evaluate_traces(
     scene: Scene, exaggeration: float, samples: int = SAMPLES
 ) -> tuple[TraceLines, ...]:
-    """Evaluate the traces of a scene's points over its rotary axes, seen as the scene says.
-
-    Parameters
-    ----------
-    scene : Scene
-        Its reference point is held still here too.
-    exaggeration : float
-    samples : int, optional
-        Points along each trace.
-
-    Returns
-    -------
-    tuple of TraceLines
-        One a branch with rotary axes.
-    """
+    """Evaluate the traces of a scene's points over its rotary axes, seen as the scene says."""
     groups = build_traces(scene.model, scene.trace_points_mm, scene.workspace.positions, samples)
     return tuple(
         TraceLines(
@@ -128,3 +96,101 @@ def subtract_traces(
         for first, second in zip(one, other, strict=False)
         if same_nodes(first.nominal_mm, second.nominal_mm)
     )
+
+
+Evaluate = Callable[..., ErrorField]
+LEAST_RADIUS_MM = 1e-3
+"""A point nearer to the axis is on it and has no direction from it."""
+LEAST_UM = 1e-6
+"""Traces with smaller errors are moved by none."""
+MOTION_SAMPLES = 181
+"""Places of a turn: every two degrees."""
+
+
+def is_moved(line: TraceLine) -> bool:
+    """Tell whether any error moves a trace."""
+    return line.largest_um > LEAST_UM
+
+
+def name_trace(trace: Trace) -> str:
+    """Name a trace: ``C at B −30°, point (275, 0, 0) mm``."""
+    held = ", ".join(f"{axis} {spell_short(value)}°" for axis, value in trace.at.items())
+    point = ", ".join(map(spell_short, trace.point_mm))
+    return f"{trace.axis}{f' at {held}' if held else ''}, point ({point}) mm"
+
+
+def evaluate_axis_motion(
+    scene: Scene, line: TraceLine, evaluate: Evaluate = evaluate_first_order
+) -> AxisMotion | None:
+    """Evaluate the error motion of the axis that a trace is over."""
+    trace = line.trace
+    found = build_traces(
+        scene.model,
+        (trace.point_mm,),
+        {**scene.workspace.positions, **trace.at},
+        MOTION_SAMPLES,
+        {name: (at,) for name, at in trace.at.items()},
+    )
+    for group in found:
+        number = _number(group, line)
+        if number is not None:
+            return _of_group(scene, group, number, evaluate)
+    return None
+
+
+def _number(group: TraceGroup, line: TraceLine) -> int | None:
+    if group.loop is not line.loop or line.trace not in group.traces:
+        return None
+    return group.traces.index(line.trace)
+
+
+def _of_group(
+    scene: Scene, group: TraceGroup, number: int, evaluate: Evaluate
+) -> AxisMotion | None:
+    nominal, trace = group.nominal_mm[number], group.traces[number]
+    if np.ptp(nominal, axis=0).max() < LEAST_RADIUS_MM:
+        return None
+    coordinates = {
+        name: values[number] if values.ndim == 2 else values
+        for name, values in group.coordinates.items()
+    }
+    on_axis, above = (
+        evaluate(scene.model, scene.errors, coordinates, scene.view(group.loop), point).error_um
+        for point in points_on_axis(nominal)
+    )
+    return axis_motion(nominal, coordinates[trace.axis], on_axis, above, closed=trace.closed)
+
+
+WORDS = {1: "once a turn", 2: "twice a turn"}
+POSITIVE = {
+    "radial": "towards the point",
+    "axial": "along the axis",
+    "tilt": "leans towards the point",
+}
+"""Which deviation is positive."""
+
+
+def motion_lines(name: str, motion: AxisMotion, part: Motion) -> Lines:
+    """Give one deviation as a polar chart around the position of its axis."""
+    turns = turn_words(part.times_a_turn) if motion.closed else "an arc"
+    values = (
+        f"peak to valley {part.peak_to_valley:.2f} {part.unit}, {turns};"
+        f" {part.motion_value:.2f} {part.unit} about the average line"
+    )
+    towards = f"actual − nominal, + {POSITIVE[part.name]}"
+    return Lines(
+        "polar",
+        f"{name}: {part.iso}",
+        "",
+        part.unit,
+        (
+            Curve(towards, motion.angle_deg, part.values),
+            Curve("about the average line", motion.angle_deg, part.about_line, 1, "dashed"),
+        ),
+        note=values,
+    )
+
+
+def turn_words(times: int | None) -> str:
+    """Say how often a deviation comes back: ``twice a turn``; a dash where it does not vary."""
+    return "–" if times is None else WORDS.get(times, f"{times} times a turn")

@@ -1,18 +1,81 @@
 """Numbers, places, factors and conventions as pictures, pages and files spell them."""
 
-import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import SupportsFloat
 
-from warpspace.kinematics.conventions.convention import Convention
-from warpspace.kinematics.model import Loop, Model
-from warpspace.machine.tolerances import ToleranceSet
-from warpspace.machine.travel import DIRECTION_WORDS, TravelDirection
-from warpspace.picture.coordinates import MINUS, list_axes
+from warpspace.kinematics.model import Convention, Loop, Model
+from warpspace.machine.axes import DIRECTION_WORDS, TravelDirection, is_linear, is_rotary
+from warpspace.machine.errors import ToleranceSet
 from warpspace.scene.model import Scene
+from warpspace.spelling import MINUS, THIN_SPACE, spell_short
 from warpspace.units import Array
 
+# --- A point in both of its coordinates -----------------------------------------------------------
+# Positions of the axes, and the point of R they lead to.
+
+IN_R = "in R"
+"""What a point of the machine frame is introduced by."""
+SEPARATOR = " · "
+_DIGITS = 6
+"""Decimals of a position in a command: a nanometre."""
+
+
+def spell_coordinate(value: SupportsFloat) -> str:
+    """Spell a coordinate to a tenth, with a true minus; zero has no sign."""
+    return f"{round(float(value), 1) + 0.0:g}".replace("-", MINUS)
+
+
+def list_axes(at: Mapping[str, SupportsFloat]) -> str:
+    """Spell positions of all axes that are given: ``X 275 Y −225 Z −480 B 0°``, mm and degrees."""
+    units = {name: "" if is_linear(name) else "°" for name in at}
+    return " ".join(f"{name} {spell_coordinate(q)}{units[name]}" for name, q in at.items())
+
+
+def own_axes(scene: Scene, at: Mapping[str, float]) -> dict[str, float]:
+    """Choose the axes that name a point: the linear ones, and those not at their scene's place."""
+    placed = scene.workspace.positions
+    return {
+        name: value
+        for name, value in at.items()
+        if is_linear(name) or abs(value - placed.get(name, 0.0)) > 1e-9
+    }
+
+
+def spell_axes(axes: Mapping[str, SupportsFloat]) -> str:
+    """Spell positions of axes: ``axes X 275 Y −225 Z −480 B −30°``."""
+    linear = {name: at for name, at in axes.items() if is_linear(name)}
+    rotary = {name: float(at) for name, at in axes.items() if not is_linear(name)}
+    turned = {name: at for name, at in rotary.items() if round(at, 1) != 0.0 or not linear}
+    return f"axes {list_axes({**linear, **turned})}"
+
+
+def spell_in_r(point_mm: Array | Sequence[float]) -> str:
+    """Spell a point of the machine frame, mm: ``in R x 275 y −225 z −51``."""
+    pairs = zip("xyz", point_mm, strict=True)
+    return " ".join((IN_R, *(f"{name} {spell_coordinate(value)}" for name, value in pairs)))
+
+
+def spell_point(axes: Mapping[str, SupportsFloat], point_mm: Array | Sequence[float]) -> str:
+    """Spell a point in both coordinates, to a tenth of a millimetre or degree.
+
+    ``axes X 275 Y −225 Z −480 · in R x 275 y −225 z −51``: where the axes stand (none where nobody
+    knows), and the point in R, as it is drawn.
+    """
+    return SEPARATOR.join((*([spell_axes(axes)] if axes else ()), spell_in_r(point_mm)))
+
+
+def spell_at(axes: Mapping[str, SupportsFloat]) -> str:
+    """Spell positions of axes as the option ``--at`` of a command takes them."""
+    names = sorted(axes, key=is_rotary)
+    return ",".join(f"{name}={_plain(float(axes[name]))}" for name in names)
+
+
+def _plain(value: float) -> str:
+    """Spell a number with as many digits as it has, no more than six decimals, never as −0."""
+    return f"{round(value, _DIGITS) + 0.0:.{_DIGITS}f}".rstrip("0").rstrip(".")
+
+
 TIMES = "\N{MULTIPLICATION SIGN}"
-THIN_SPACE = "\N{NARROW NO-BREAK SPACE}"
 LOOP_WORDS = {
     Loop.TOOL: "tool loop",
     Loop.WORKPIECE: "workpiece loop",
@@ -22,51 +85,12 @@ LOOP_WORDS = {
 TOLERANCE_UNITS = {"translation": "µm", "rotation": "µrad", "squareness": "µrad"}
 
 
-def spell(value: float, digits: int = 3) -> str:
-    """Spell a number with a few significant digits, never in powers of ten where that is avoidable.
-
-    Parameters
-    ----------
-    value : float
-    digits : int, optional
-        Significant digits of a fraction; whole digits are all kept.
-
-    Returns
-    -------
-    str
-        With a true minus sign, for instance ``−43.7``, ``1230`` or ``0.00412``.
-    """
-    if value == 0.0 or not math.isfinite(value):
-        return "0" if value == 0.0 else str(value)
-    size = int(f"{value:.{digits - 1}e}".rpartition("e")[2])  # of the rounded number
-    if size >= 7 or size < -5:
-        text = f"{value:.{digits - 1}e}"
-    else:
-        text = f"{value:.{max(0, digits - 1 - size)}f}"
-    return text.replace("-", MINUS)
-
-
-def spell_signed(value: float, digits: int = 3) -> str:
-    """Spell a change with its sign: ``+3.24``, ``−17.1``, ``0``."""
-    return ("+" if value > 0.0 else "") + spell(value, digits)
-
-
 def tolerance_words(tolerances: ToleranceSet) -> str:
     """Spell the half widths of the classes of parameters."""
     return ", ".join(
         f"{name} ±{spell_short(value)} {TOLERANCE_UNITS[name]}"
         for name, value in tolerances.default.items()
     )
-
-
-def spell_short(value: float) -> str:
-    """Spell a number without trailing zeros, with a true minus sign."""
-    return f"{value:.6g}".replace("-", MINUS)
-
-
-def spell_count(number: int) -> str:
-    """Spell a whole number, its digits in groups of three from 10 000 up."""
-    return f"{number:,}".replace(",", THIN_SPACE) if abs(number) >= 10_000 else str(number)
 
 
 def spell_factor(value: float) -> str:
@@ -93,13 +117,7 @@ def reference_words(scene: Scene) -> str:
 
 
 def exclusion_words(excluded: Sequence[str], only: Sequence[str] = ()) -> tuple[str, ...]:
-    """Say which errors a picture leaves out: ``excluded: EA0Z``, ``only: EAX``.
-
-    Parameters
-    ----------
-    excluded, only : sequence of str
-        Keys that do not take part; keys that alone do, where there are any.
-    """
+    """Say which errors a picture leaves out: ``excluded: EA0Z``, ``only: EAX``."""
     found = [f"only: {', '.join(only)}"] if only else []
     return (*found, *([f"excluded: {', '.join(excluded)}"] if excluded else []))
 

@@ -1,32 +1,95 @@
-"""Reading the files of a scene, with limits and messages that say what is wrong."""
+"""The text files of scenes and of people: TOML and tables, with limits and plain messages."""
 
+import csv
+import math
+import re
 import tomllib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from datetime import date, time
+from itertools import chain
 from pathlib import Path
+from typing import TextIO
 
 from warpspace.exceptions import SceneError
-from warpspace.scene.outline import check_outline
+from warpspace.machine.limits import (
+    MAX_CSV_COLUMNS,
+    MAX_CSV_LINE,
+    MAX_CSV_LINES,
+    MAX_KEY_PARTS,
+    MAX_KEYS,
+    MAX_MARKS,
+    MAX_NESTING,
+)
+
+# --- The outline of TOML text (keys, brackets, strings), bounded before the text is parsed --------
+# A TOML reader's memory grows with the square of the parts of one key, and each table costs far
+# more memory than its two brackets. One pass over the text counts what would be expensive; it takes
+# time in proportion to the length of the text and no memory.
+
+_TOKENS = re.compile(
+    r'"""(?:[^"\\]++|\\.|"(?!""))*+(?:"{3,5})?'  # a text may end with two quotes of its own
+    r"|'''(?:[^']++|'(?!''))*+(?:'{3,5})?"
+    r'|"(?:[^"\\\n]++|\\[^\n])*+"?'
+    r"|'[^'\n]*+'?"
+    r"|#[^\n]*+"
+    r"|[.,=\n\[\]{}]",
+    re.DOTALL,
+)
+"""What matters in TOML: punctuation, and whole texts and remarks, which are passed over."""
+
+
+def check_outline(text: str, source: str) -> None:
+    """Refuse text whose keys, nesting or number of keys no scene needs.
+
+    Valid text is understood as a TOML reader does, so that nothing in a text or remark counts. Of
+    text that is not valid only the part before the first mistake matters.
+    """
+    dots = depth = keys = 0
+    for count, found in enumerate(_TOKENS.finditer(text)):
+        mark = found[0]
+        if count >= MAX_MARKS:
+            _refuse(
+                text,
+                found,
+                source,
+                f"more than {MAX_MARKS:,} brackets, commas, dots and lines; expected long tables in"
+                " CSV files of their own",
+            )
+        if mark == ".":  # between the parts of a key; a number has one at most
+            dots += 1
+            if dots >= MAX_KEY_PARTS:
+                _refuse(
+                    text,
+                    found,
+                    source,
+                    f"a key of over {MAX_KEY_PARTS} parts; expected at most {MAX_KEY_PARTS}",
+                )
+            continue
+        if mark[0] in "\"'#":
+            continue
+        if mark == "=" or (mark == "]" and depth == 1):
+            keys += dots + 1
+        elif mark == "{":
+            keys += 1
+        if keys > MAX_KEYS:
+            _refuse(text, found, source, f"more than {MAX_KEYS:,} parts of keys")
+        dots = 0
+        if mark in "]}":
+            depth = max(depth - 1, 0)
+        elif mark in "[{":
+            depth += 1
+            if depth > MAX_NESTING:
+                expected = f"is not valid TOML: nested too deeply, more than {MAX_NESTING} levels"
+                _refuse(text, found, source, expected)
+
+
+def _refuse(text: str, found: re.Match[str], source: str, problem: str) -> None:
+    line = text.count("\n", 0, found.start()) + 1
+    raise SceneError(source, [f"line {line}: {problem}"])
 
 
 def read_text(path: Path, limit_bytes: int, source: str | None = None) -> str:
-    """Read a text file that a user named.
-
-    Parameters
-    ----------
-    path : Path
-    limit_bytes : int
-        Largest size accepted.
-    source : str, optional
-        How the file is called in messages; its path by default.
-
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    SceneError
-        If it is missing, no regular file, too large, unreadable or not UTF-8.
-    """
+    """Read a text file that a user named."""
     source = source or str(path)
     check_file(path, limit_bytes, source)
     try:
@@ -43,13 +106,7 @@ def read_text(path: Path, limit_bytes: int, source: str | None = None) -> str:
 
 
 def check_file(path: Path, limit_bytes: int, source: str) -> None:
-    """Refuse what is no file of limited size; a device or a pipe may never end.
-
-    Raises
-    ------
-    SceneError
-        If it is missing, no regular file or too large.
-    """
+    """Refuse what is no file of limited size; a device or a pipe may never end."""
     try:
         if path.is_dir():
             raise SceneError(source, ["is a folder; expected a file"])
@@ -68,14 +125,7 @@ def check_file(path: Path, limit_bytes: int, source: str) -> None:
 
 
 def parse_toml(text: str, source: str) -> dict[str, object]:
-    """Parse TOML text.
-
-    Raises
-    ------
-    SceneError
-        If it is not TOML; the message has line and column. Also if its keys or its nesting go
-        beyond what a scene needs.
-    """
+    """Parse TOML text."""
     check_outline(text, source)
     try:
         return tomllib.loads(text)
@@ -84,3 +134,286 @@ def parse_toml(text: str, source: str) -> dict[str, object]:
     except ValueError as error:  # a syntax error, or a whole number Python refuses to read
         reason = str(error).partition(";")[0]
         raise SceneError(source, [f"is not valid TOML: {reason}"]) from None
+
+
+# --- Spelling what stands in a scene file ---------------------------------------------------------
+
+SHOWN = 60
+"""Characters of a value or a key that a message shows."""
+_DEPTH = 6
+_ENTRIES = 8
+_HUGE_BITS = 512
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+", re.ASCII)
+_ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
+
+
+def spell_value(value: object) -> str:
+    """Spell a value as TOML does, in at most a line."""
+    return _cut(_spell(value, _DEPTH))
+
+
+def spell_key(name: str) -> str:
+    """Spell a key as TOML does: bare where it may be, else between quotes."""
+    return _cut(name if _BARE_KEY.fullmatch(name) else _quoted(name))
+
+
+def location(key: str, parts: Iterable[int | str]) -> str:
+    """Spell the place of a finding as it stands in the file."""
+    text = key
+    for part in parts:
+        if isinstance(part, int):
+            text += f"[{part}]"
+        else:
+            text += f".{spell_key(part)}" if text else spell_key(part)
+    return text
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= SHOWN else text[: SHOWN - 1] + "…"
+
+
+def _quoted(text: str) -> str:
+    """Put a text between quotes, with nothing in it that a terminal would obey."""
+    shown = text[: SHOWN + 1]
+    return (
+        '"'
+        + "".join(_ESCAPES.get(c, c if c.isprintable() else f"\\u{ord(c):04x}") for c in shown)
+        + '"'
+    )
+
+
+def _spell(value: object, depth: int) -> str:
+    if isinstance(value, str):
+        return _quoted(value)
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int) and value.bit_length() > _HUGE_BITS:
+        return f"a whole number of {value.bit_length()} bits"
+    if isinstance(value, date | time):
+        return value.isoformat()
+    if not isinstance(value, list | tuple | dict):
+        return repr(value)
+    left, right = "{}" if isinstance(value, dict) else "[]"
+    if not value:
+        return left + right
+    if depth == 0:
+        return f"{left}…{right}"
+    if isinstance(value, dict):
+        pairs = list(value.items())[:_ENTRIES]
+        shown = [f"{spell_key(str(name))} = {_spell(entry, depth - 1)}" for name, entry in pairs]
+    else:
+        shown = [_spell(entry, depth - 1) for entry in value[:_ENTRIES]]
+    inside = ", ".join([*shown, "…"] if len(value) > _ENTRIES else shown)
+    return f"{{ {inside} }}" if isinstance(value, dict) else f"[{inside}]"
+
+
+# --- The one reader of tables that people measured: scenes, imports, tests and calibrations -------
+# A line ``sep=;`` names what parts the columns; without it the first of semicolon, tab and comma
+# that the header has. Lines that begin with # are remarks, rows without any text and separators
+# behind the last column count for nothing. A file has one decimal sign: the point, or where
+# semicolons or tabs part the columns the comma.
+
+MARKS = (";", "\t", ",")
+"""What may part columns, the most telling first."""
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""What a text must not begin with, or a spreadsheet would take it for a formula."""
+_MOST_PROBLEMS = 10_000
+_TURN_RAD = 1.001 * math.tau
+_WHOLE_DEG = 0.02
+_MAX_LINES_OF_ROW = 20
+"""Lines that one row may take, where its texts hold line breaks."""
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_SEP = re.compile(r'"?sep=(.)"?\s*', re.IGNORECASE)
+_HEADING = re.compile(r"(.*?\S)\s*(?:\[\s*([^\[\]()]+?)\s*\]|\(\s*([^\[\]()]+?)\s*\))")
+_UNIT = str.maketrans({"µ": "u", "μ": "u", "°": "deg"})
+Row = tuple[int, list[str]]
+"""Number of the line that a row ends on, and its cells without the blanks around them."""
+
+
+def parse_number(text: str) -> float:
+    """Read a finite decimal number: no underscore, word or digit of other scripts."""
+    bare = text.strip()
+    value = float(bare) if _NUMBER.fullmatch(bare) else math.nan
+    if not math.isfinite(value):
+        raise ValueError(f"{text!r} is no number")
+    return value
+
+
+def parse_whole(text: str) -> int:
+    """Read a whole number; unlike `int` no underscore or digit of other scripts."""
+    value = parse_number(text)
+    if not value.is_integer():
+        raise ValueError(f"{text!r} is no whole number")
+    return int(value)
+
+
+def plain_heading(text: str) -> str:
+    """Spell a heading with its unit behind an underscore: ``angle (°)`` is ``angle_deg``."""
+    found = _HEADING.fullmatch(text.strip())
+    return f"{found[1]}_{(found[2] or found[3]).translate(_UNIT)}" if found else text.strip()
+
+
+def radian_notes(columns: Mapping[str, Sequence[float]]) -> tuple[str, ...]:
+    """Say which columns ``…_deg`` look like radians: a whole turn of them, or whole degrees."""
+    notes: list[str] = []
+    for name, values in columns.items():
+        low, high = min(values), max(values)
+        if not name.endswith("_deg") or not 0.0 < max(-low, high) < _TURN_RAD:
+            continue
+        whole = all(abs(value - round(value)) < _WHOLE_DEG for value in map(math.degrees, values))
+        if whole or high - low > 0.9 * _TURN_RAD:
+            turned = f"{math.degrees(low):.4g} … {math.degrees(high):.4g}°"
+            notes.append(
+                f"{name} runs {low:.4g} … {high:.4g}: in radians that would be {turned}; taken as"
+                " degrees"
+            )
+    return tuple(notes)
+
+
+def guard_cell(text: str) -> str:
+    """Put ' before a text that a spreadsheet would take for a formula; `unguard_cell` undoes it."""
+    return f"'{text}" if text.lstrip("'").startswith(FORMULA) else text
+
+
+def unguard_cell(text: str) -> str:
+    """Give the text that `guard_cell` was given."""
+    return text[1:] if text[:1] == "'" and guard_cell(text[1:]) == text else text
+
+
+def spell_row(cells: Iterable[object]) -> str:
+    """Spell a row of a table that is written: texts guarded, None empty, a line feed behind."""
+    return ",".join(map(_spell_cell, cells)) + "\n"
+
+
+def _spell_cell(value: object) -> str:
+    if not isinstance(value, str):
+        return "" if value is None else str(value)
+    text = guard_cell(value)
+    # the csv module quotes no carriage return where rows end with a line feed
+    quoted = any(mark in text for mark in ',;"\r\n')
+    return '"' + text.replace('"', '""') + '"' if quoted else text
+
+
+class CsvRows:
+    """The rows of a table: memory does not grow with what is refused.
+
+    What is wrong with single cells and rows is noted; `check` raises it, all at once.
+    """
+
+    def __init__(self, file: TextIO, source: str, most: int, *, once: bool = False) -> None:
+        self.source, self.problems = source, list[str]()
+        self._file, self._most, self._once = file, most, once
+        self._number = self._since_row = 0
+        self._signs: dict[str, str] = {}
+        self._repeated: list[str] = []
+        lines = self._lines()
+        first = self._first(lines)
+        named = _SEP.fullmatch(first)
+        if named:
+            self._since_row = 0
+            first = self._first(lines)
+        bare = re.sub(r'"[^"]*("|$)', "", first)
+        self.mark = named[1] if named else next((mark for mark in MARKS if mark in bare), ",")
+        self._rows = self._split(chain([first] if first else [], lines))
+        self.line, self.header = next(self._rows, (0, list[str]()))
+        width = len(self.header)
+        while self.header and not self.header[-1]:
+            self.header.pop()
+        self._trails = width > len(self.header) or self.mark != ","
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was made of rows that stand there twice."""
+        if not self._repeated:
+            return ()
+        count, rows = len(self._repeated), "rows" if len(self._repeated) > 1 else "row"
+        return (f"{count} {rows} identical to an earlier one, counted once: {self._repeated[0]}",)
+
+    def __iter__(self) -> Iterator[Row]:
+        """Give the rows below the header that have as many cells."""
+        width = len(self.header)
+        seen: dict[tuple[str, ...], int] = {}
+        for count, (line, cells) in enumerate(self._rows):
+            if count >= self._most:
+                found = f"line {line}: more than {self._most:,} rows below the header"
+                raise SceneError(self.source, [f"{found}; expected at most so many"])
+            while self._trails and len(cells) > width and not cells[-1]:
+                cells.pop()
+            if len(cells) != width:
+                commas = self.mark == "," and len(cells) > width
+                hint = " (decimal commas? then semicolons or tabs must part the columns)"
+                found = f"{len(cells)} fields; expected {width} as in the header"
+                self.note(f"line {line}: {found}{hint if commas else ''}")
+            elif self._once and seen.setdefault(tuple(cells), line) != line:
+                self._repeated.append(f"line {line} is line {seen[tuple(cells)]} again")
+            else:
+                yield line, cells
+
+    def number(
+        self, text: str, line: int, what: str = "", limit: float = math.inf, hint: str = ""
+    ) -> float:
+        """Read a cell; one that is no finite number within ± the limit is noted."""
+        place = f"line {line}, {what}" if what else f"line {line}"
+        sign = next((mark for mark in ",." if mark in text), "")
+        try:
+            value = parse_number(text.replace(",", "."))
+        except ValueError:
+            self.note(f"{place}: {spell_value(text)}; expected a finite number")
+            return math.nan
+        if sign == "," == self.mark:
+            expected = "expected a decimal point (a comma only where semicolons or tabs part)"
+            self.note(f"{place}: {spell_value(text)} has a decimal comma; {expected}")
+        elif sign and sign not in self._signs:
+            self._signs[sign] = f"line {line} has {spell_value(text)}"
+            if len(self._signs) > 1:
+                self.note(f"{', '.join(self._signs.values())}; expected one decimal sign in a file")
+        if abs(value) > limit:
+            self.note(f"{place}: {value:g}; expected at most ±{limit:g}{hint}")
+        return value
+
+    def note(self, problem: str) -> None:
+        """Note what is wrong with the file."""
+        if len(self.problems) < _MOST_PROBLEMS:
+            self.problems.append(problem)
+
+    def check(self) -> None:
+        """Refuse the file if anything is wrong with it."""
+        if self.problems:
+            raise SceneError(self.source, self.problems)
+
+    def _lines(self) -> Iterator[str]:
+        while line := self._file.readline(MAX_CSV_LINE + 1):
+            self._number += 1
+            if len(line) > MAX_CSV_LINE:
+                found = f"is longer than {MAX_CSV_LINE:,} characters; expected at most so many"
+                raise SceneError(self.source, [f"line {self._number} {found}"])
+            if self._number > MAX_CSV_LINES:
+                found = f"has more than {MAX_CSV_LINES:,} lines; expected at most so many"
+                raise SceneError(self.source, [found])
+            if not self._since_row and line.lstrip().startswith("#"):
+                continue
+            self._since_row += 1
+            if self._since_row > _MAX_LINES_OF_ROW:
+                raise csv.Error("a quoted text does not end")
+            yield line
+
+    def _first(self, lines: Iterator[str]) -> str:
+        for line in lines:
+            if line.strip(" \t\r\n,;"):
+                return line
+            self._since_row = 0
+        return ""
+
+    def _split(self, lines: Iterator[str]) -> Iterator[Row]:
+        try:
+            for row in csv.reader(lines, delimiter=self.mark, strict=True):
+                self._since_row = 0
+                cells = [cell.strip() for cell in row]
+                if len(cells) > MAX_CSV_COLUMNS:
+                    found = f"has {len(cells)} fields; expected at most {MAX_CSV_COLUMNS}"
+                    raise SceneError(self.source, [f"line {self._number} {found}"])
+                if any(cells):
+                    yield self._number, cells
+        except csv.Error as error:
+            found = f"line {self._number}: is not valid CSV: {error}"
+            raise SceneError(self.source, [found]) from None

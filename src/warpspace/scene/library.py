@@ -1,44 +1,53 @@
-"""Finding scenes and machines: bundled by name, or any file by path."""
+"""Finding scenes and reading them: bundled by name, or any file by path, each in one pass."""
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any, cast
 
-from warpspace.exceptions import SceneError, near_miss
-from warpspace.machine.limits import MAX_SCENE_BYTES
+from warpspace.exceptions import OptionError, SceneError, near_miss
+from warpspace.field.grid import Workspace, find_volume_axes
+from warpspace.kinematics.model import ComponentErrors, Model
+from warpspace.machine import limits
+from warpspace.machine.axes import direction_index, is_linear, sort_axes
+from warpspace.machine.curves.curve import MISSING, ErrorFunction, ValueReader
+from warpspace.machine.curves.simple import Constant
+from warpspace.machine.curves.table import MAX_COLUMN_NAME, MAX_FILE_NAME, Table
+from warpspace.machine.description import Machine, Range, build_machine
+from warpspace.machine.errors import (
+    RUN_DIRECTIONS,
+    UNKNOWN,
+    ErrorSet,
+    Measurement,
+    Run,
+    Tolerance,
+    ToleranceSet,
+)
+from warpspace.machine.parameters import PARAMETERS
 from warpspace.resources import scenes_dir
-from warpspace.scene.build import build_scene
+from warpspace.scene import schema
+from warpspace.scene.curves import GUIDES, CurveReader, read_csv_runs
 from warpspace.scene.files import parse_toml, read_text
-from warpspace.scene.machines import load_machine, machine_names, machine_of
-from warpspace.scene.model import Scene
-from warpspace.scene.sections import Problems
+from warpspace.scene.machines import (
+    body_notes,
+    load_machine,
+    machine_names,
+    machine_of,
+    read_bodies,
+)
+from warpspace.scene.model import Scene, scene_notes
+from warpspace.scene.save import Notation, read_errors
+from warpspace.scene.schema import Problems
 
 
 def scene_names() -> tuple[str, ...]:
     """List the bundled scenes, the reference machine's first."""
-    return tuple(sorted((path.stem for path in scenes_dir().glob("*.toml")), key=_order))
-
-
-def _order(name: str) -> tuple[bool, str]:
-    """Sort the teaching scenes behind the machine's."""
-    return (not name.startswith("dvf"), name)
+    names = (path.stem for path in scenes_dir().glob("*.toml"))
+    return tuple(sorted(names, key=lambda name: (not name.startswith("dvf"), name)))
 
 
 def scene_path(name_or_path: str | Path) -> Path:
-    """Find the file of a scene.
-
-    Parameters
-    ----------
-    name_or_path : str or Path
-        A bundled name, or the path of a file.
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    SceneError
-        If it is neither; the message names the near misses.
-    """
+    """Find the file of a scene."""
     text = str(name_or_path)
     if text in scene_names():
         return scenes_dir() / f"{text}.toml"
@@ -80,42 +89,352 @@ def load_scene(name_or_path: str | Path) -> Scene:
     """
     path = scene_path(name_or_path)
     name = path.stem.encode(errors="replace").decode()  # bytes that are no text become "?"
-    return parse_scene(read_text(path, MAX_SCENE_BYTES), name, str(path), path.parent)
+    return parse_scene(read_text(path, limits.MAX_SCENE_BYTES), name, str(path), path.parent)
+
+
+SECTIONS = (
+    "title",
+    "description",
+    "machine",
+    "bodies",
+    "convention",
+    "workspace",
+    "points_mm",
+    "errors",
+    "tolerances",
+    "uncertainty",
+    "measured",
+    "view",
+)
+STAND_IN = build_machine("wFXYZABCt")
+"""Has every axis there is: with it the rest of a document is checked whose machine is unusable."""
 
 
 def parse_scene(
     text: str, name: str, source: str | None = None, folder: Path | None = None
 ) -> Scene:
-    """Build a scene from TOML text, for instance an upload.
-
-    Parameters
-    ----------
-    text : str
-    name : str
-        Name of the scene.
-    source : str, optional
-        What the text is called in messages.
-    folder : Path, optional
-        Folder that CSV names are relative to; without it CSV files are refused.
-
-    Returns
-    -------
-    Scene
-
-    Raises
-    ------
-    SceneError
-        With every problem of the text.
-    """
+    """Build a scene from TOML text, for instance an upload."""
     source = source or name
-    raw = parse_toml(text, source)
-    problems = Problems()
-    given = raw.get("machine")
+    raw, problems = parse_toml(text, source), Problems()
+    machine = _machine(raw, name, folder, problems)
+    texts = [
+        problems.read(schema.TEXT, key, raw[key]) if key in raw else ""
+        for key in ("title", "description")
+    ]
+    convention, points, view = (
+        problems.read(kind, key, raw.get(key, {}))
+        for key, kind in (
+            ("convention", schema.CONVENTION),
+            ("points_mm", schema.POINTS),
+            ("view", schema.VIEW),
+        )
+    )
+    workspace = _workspace(problems.table("workspace", raw.get("workspace")), machine, problems)
+    fixed = (convention or {}).get("reference_axis") == "fixed"
+    document = _Document(raw, machine, workspace, machine.reference_keys * fixed, folder, problems)
+    errors, tolerances = document.errors(), document.tolerances()
+    uncertainty, measured = document.uncertainties(), document.measurements()
+    reference = _reference(view, workspace, problems)
+    orders, lines = _conventions(convention or {}, machine, problems)
+    if problems.lines:
+        raise SceneError(source, problems.lines)
+    model = Model(
+        machine, orders[0], points["tool"], points["workpiece"], orders[1], convention["direction"]
+    )
+    errors = read_errors(
+        model, errors, workspace, Notation(convention["squareness"], lines), source
+    )
+    return Scene(
+        name=name,
+        title=texts[0] or name,
+        model=model,
+        workspace=workspace,
+        errors=errors,
+        tolerances=tolerances,
+        trace_points_mm=points["traces"],
+        exaggeration=view["exaggeration"],
+        reference=reference,
+        placed=view["placed"],
+        description=texts[1],
+        notes=(*scene_notes(machine, workspace, errors), *body_notes(machine)),
+        uncertainty=uncertainty,
+        measured=measured,
+    )
+
+
+def _machine(
+    raw: Mapping[str, object], name: str, folder: Path | None, problems: Problems
+) -> Machine:
+    """Read the machine of a document, with the bodies it has there."""
+    given, machine = raw.get("machine"), None
     if not isinstance(given, str):
         machine = machine_of(given, "machine", name, problems, folder=folder)
     elif given in machine_names():
         machine = load_machine(given)
     else:
-        machine = None
-        problems.unknown_value("machine", given, machine_names(), "machine")
-    return build_scene(raw, name, source, machine, folder, problems)
+        problems.add("machine", f"unknown machine{near_miss(given, machine_names())}", given)
+    for key in raw:
+        if key not in SECTIONS:
+            problems.unknown("", key, SECTIONS, "key")
+    if machine is not None and "bodies" in raw:
+        own = read_bodies(raw["bodies"], machine, folder, problems)
+        machine = replace(machine, bodies={**machine.bodies, **own})
+    return machine or STAND_IN
+
+
+def _conventions(
+    convention: Mapping[str, Any], machine: Machine, problems: Problems
+) -> tuple[tuple[str, tuple[tuple[str, str], ...]], dict[str, Any]]:
+    """Give the order of component errors, with the axes that have another, and measuring lines."""
+    kinds, default = ("linear", "rotary"), str(ComponentErrors.AFTER_MOTION)
+    asked = convention.get("component_errors", default)
+    table: Mapping[str, str] = {} if isinstance(asked, str) else asked
+    for key in table:
+        if key not in (*kinds, *machine.axes):
+            known = (*kinds, *machine.axes)
+            problems.unknown("convention.component_errors", key, known, "kind or axis")
+    lines = dict(convention.get("measuring_line_mm", {}))
+    for axis in lines:
+        if axis not in machine.axes:
+            where = "convention.measuring_line_mm"
+            problems.unknown(where, axis, machine.axes, "axis of this machine")
+    if isinstance(asked, str):
+        return (asked, ()), lines
+    found = {
+        name: table.get(name, table.get(kinds[not axis.is_linear], default))
+        for name, axis in machine.axes.items()
+    }
+    names = list(found.values())
+    main = max(dict.fromkeys(names), key=names.count)
+    return (main, tuple(pair for pair in found.items() if pair[1] != main)), lines
+
+
+def _reference(view: Any, workspace: Workspace, problems: Problems) -> dict[str, float] | None:
+    """Read the point held still: a linear axis that is not given stands in its middle."""
+    given = None if view is None else view["reference"]
+    if given is None:
+        return None
+    for axis in given:
+        if axis not in workspace.ranges:
+            problems.unknown("view.reference", axis, workspace.ranges, "axis of this machine")
+    spanning = workspace.volume_axes
+    middle = {
+        name: q for name, q in workspace.positions.items() if is_linear(name) or name in spanning
+    }
+    return {**middle, **given}
+
+
+# --- Which axes span the working volume, and where the others stand -------------------------------
+
+
+def _workspace(raw: Mapping[str, object], machine: Machine, problems: Problems) -> Workspace:
+    given: dict[str, Range] = {}
+    for name, value in raw.items():
+        if name not in machine.axes:
+            problems.unknown("workspace", name, machine.axes, "axis of this machine")
+        elif valid := problems.read(schema.workspace_range, f"workspace.{name}", value):
+            given[name] = valid
+    ranges = _complete(given, machine)
+    moving = [name for name in reversed(sort_axes(given)) if given[name][0] < given[name][1]]
+    said = ""
+    for name in (*moving, ""):
+        try:
+            find_volume_axes(ranges)
+            break
+        except OptionError as error:
+            said = said or str(error)
+        if name:
+            middle = sum(ranges[name]) / 2.0
+            ranges[name] = (middle, middle)
+            still = (
+                "expected one position in degrees for a rotary axis of a machine whose linear axes"
+                " span the volume"
+            )
+            problems.add(f"workspace.{name}", said if is_linear(name) else still, raw[name])
+    return Workspace(ranges)
+
+
+def _complete(given: Mapping[str, Range], machine: Machine) -> dict[str, Range]:
+    spanned = {
+        direction_index(name)
+        for name, (low, high) in given.items()
+        if is_linear(name) and low < high
+    }
+    found: dict[str, Range] = {}
+    for name, axis in machine.axes.items():
+        if name in given:
+            found[name] = given[name]
+        elif axis.is_linear and axis.index not in spanned:
+            found[name] = axis.travel
+            spanned.add(axis.index)
+        else:
+            low, high = axis.travel
+            at = min(max(0.0, low), high) if axis.is_linear else 0.0
+            found[name] = (at, at)
+    return found
+
+
+# --- What stands under the keys of error parameters -----------------------------------------------
+
+LIMITS = ((-limits.MAX_LENGTH_MM, limits.MAX_LENGTH_MM), (-limits.MAX_ERROR, limits.MAX_ERROR))
+"""Of position and reading."""
+
+
+@dataclass(frozen=True)
+class _Document:
+    """A document whose machine and working volume are known."""
+
+    raw: Mapping[str, object]
+    machine: Machine
+    workspace: Workspace
+    refused: Sequence[str]  # parameters that are zero by definition
+    folder: Path | None
+    problems: Problems
+
+    def known(self, section: str) -> dict[str, object]:
+        """Give the entries of a table whose keys are parameters of the machine.
+
+        Refused are the rotations of the reference axis, nearly always a slip, unless the file
+        frees it.
+        """
+        known: dict[str, object] = {}
+        machine, problems = self.machine, self.problems
+        for key, value in problems.table(section, self.raw.get(section)).items():
+            if section == "tolerances" and key == "default":
+                continue
+            if key not in PARAMETERS:
+                problems.unknown(section, key, machine.allowed_keys, "error parameter")
+            elif key not in machine.allowed_keys:
+                axis = PARAMETERS[key].axis
+                problems.add(f"{section}.{key}", f"the machine {machine.chain} has no axis {axis}")
+            else:
+                known[key] = value
+            if key in self.refused:
+                reference = PARAMETERS[key].axis
+                usual = [name for name in machine.parameter_keys if PARAMETERS[name].is_constant]
+                problems.add(
+                    f"{section}.{key}",
+                    f"is zero by definition of the frame, {reference} being the reference axis"
+                    f'{near_miss(key, usual)} ([convention] reference_axis = "free" allows it)',
+                    value,
+                )
+        return known
+
+    def curves(self, key: str) -> CurveReader:
+        """Give the reader of an error's curves, which run over `Scene.axis_span`."""
+        axis = PARAMETERS[key].axis
+        low, high = self.workspace.ranges[axis]
+        span = (low, high) if low < high else self.machine.axes[axis].travel
+        return CurveReader(self.problems, span, axis, self.machine.axes, self.folder)
+
+    def errors(self) -> ErrorSet:
+        """Read the curves of the errors."""
+        found: dict[str, ErrorFunction] = {}
+        problems, known = self.problems, self.known("errors")
+        known_names = cast("dict[str, object]", self.raw.get("errors") or {})
+        for key, value in known.items():
+            where, row, reader = f"errors.{key}", PARAMETERS[key], self.curves(key)
+            if isinstance(value, dict) and GUIDES in value:
+                given = {name for name in known_names if name != key}
+                gantry, raw = self.machine.gantries.get(row.axis), cast("dict[str, object]", value)
+                curves = reader.guides(key, raw, where, gantry, given)
+            else:
+                curve = reader.read(value, where, constant=row.is_constant)
+                curves = {} if curve is None else {key: curve}
+            for name, function in curves.items():
+                peak, (low, high) = function.amplitude, reader.span
+                if self.machine is not STAND_IN and not abs(peak) <= limits.MAX_ERROR:
+                    which = "" if name == key else f"gives {name}, which "
+                    problems.add(
+                        where,
+                        f"{which}reaches {peak:g} {PARAMETERS[name].unit} within {low:g} …"
+                        f" {high:g}; expected at most ±{limits.MAX_ERROR:g}",
+                    )
+            found |= curves
+        return ErrorSet(found)
+
+    def tolerances(self) -> ToleranceSet:
+        """Read the tolerances of classes and of single errors."""
+        problems, table, default = self.problems, self.raw.get("tolerances"), None
+        if isinstance(table, dict) and "default" in table:
+            default = problems.read(schema.DEFAULTS, "tolerances.default", table["default"])
+        given = {name: value for name, value in (default or {}).items() if value is not None}
+        own: dict[str, Tolerance] = {}
+        for key, value in self.known("tolerances").items():
+            if valid := problems.read(schema.tolerance, f"tolerances.{key}", value):
+                own[key] = valid
+        return ToleranceSet(given, own)
+
+    def uncertainties(self) -> dict[str, ErrorFunction]:
+        """Read the standard uncertainties of errors."""
+        found: dict[str, ErrorFunction] = {}
+        for key, raw in self.known("uncertainty").items():
+            where, constant = f"uncertainty.{key}", PARAMETERS[key].is_constant
+            curve = self.curves(key).read(raw, where, constant=constant)
+            if curve is None:
+                continue
+            if not isinstance(curve, Constant | Table):
+                expected = "expected a number or { table = [[position, uncertainty], …] }"
+                self.problems.add(where, expected, raw)
+                continue
+            values = [curve.value] if isinstance(curve, Constant) else [v for _, v in curve.points]
+            if min(values) < 0.0:
+                self.problems.add(where, "a standard uncertainty is not negative", min(values))
+            found[key] = curve
+        return found
+
+    def measurements(self) -> dict[str, Measurement]:
+        """Read the readings of errors."""
+        found: dict[str, Measurement] = {}
+        for key, raw in self.known("measured").items():
+            reader = ValueReader()
+            if isinstance(raw, dict) and "csv" in raw:
+                runs = _csv_runs(cast("dict[str, object]", raw), self.folder, reader)
+            else:
+                entries = reader.table(raw, (), ("runs",))
+                runs = _runs(entries["runs"], reader) if entries else ()
+            if self.problems.take(f"measured.{key}", reader):
+                found[key] = Measurement(runs)
+        return found
+
+
+def _runs(raw: object, reader: ValueReader) -> tuple[Run, ...]:
+    found: list[Run] = []
+    count = 0
+    for index, entry in enumerate(reader.entries(raw, ("runs",), limits.MAX_RUNS)):
+        place = ("runs", index)
+        table = reader.table(entry, place, ("direction", "points"))
+        if not table:
+            continue
+        way = UNKNOWN if table["direction"] is MISSING else table["direction"]
+        if way not in RUN_DIRECTIONS:
+            reader.note((*place, "direction"), 'expected "+", "-" or "" (not known)', way)
+        points: list[tuple[float, float]] = []
+        for at, point in enumerate(
+            reader.entries(table["points"], (*place, "points"), limits.MAX_POINTS)
+        ):
+            where = (*place, "points", at)
+            position, value = reader.row(point, where, "[position, value]", LIMITS)
+            points.append((position, value))
+        found.append(Run(str(way), tuple(points)))
+        count += len(points)
+    if count > limits.MAX_POINTS:
+        reader.note(("runs",), f"have {count:,} readings; expected at most {limits.MAX_POINTS:,}")
+    return tuple(found)
+
+
+def _csv_runs(raw: dict[str, object], folder: Path | None, reader: ValueReader) -> tuple[Run, ...]:
+    entries = reader.table(raw, (), ("csv", "column"))
+    file = reader.text(entries["csv"], ("csv",), MAX_FILE_NAME)
+    column = reader.text(entries["column"], ("column",), MAX_COLUMN_NAME)
+    if reader.findings:
+        return ()
+    if folder is None:
+        reader.note((), "CSV files are not read here; expected the readings as runs = [ … ]")
+        return ()
+    try:
+        return read_csv_runs(folder / file, column)
+    except SceneError as error:
+        for problem in error.problems:
+            reader.note((), f"{error.source}: {problem}")
+        return ()

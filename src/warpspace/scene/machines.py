@@ -4,16 +4,84 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 from warpspace.exceptions import ChainError, SceneError, UnknownNameError
 from warpspace.machine.axes import direction_index, is_linear
-from warpspace.machine.description import FIXED_FRAMES, Machine, build_machine, parse_chain
+from warpspace.machine.description import (
+    BODY_FRAMES,
+    FIXED_FRAMES,
+    MESH_ENDINGS,
+    BodySource,
+    Machine,
+    build_machine,
+    parse_chain,
+)
 from warpspace.machine.limits import MAX_SCENE_BYTES
 from warpspace.resources import assets_dir
-from warpspace.scene.bodies import read_bodies
+from warpspace.scene import schema
 from warpspace.scene.files import parse_toml, read_text
-from warpspace.scene.schema import GantrySection
-from warpspace.scene.sections import Problems
+from warpspace.scene.schema import Problems
+
+
+def read_bodies(
+    raw: object, machine: Machine, folder: Path | None, problems: Problems
+) -> dict[str, BodySource]:
+    """Read where the bodies of a machine come from."""
+    found: dict[str, BodySource] = {}
+    frames = (*machine.axes, *BODY_FRAMES)
+    for frame, value in problems.table("bodies", raw).items():
+        if frame not in frames:
+            problems.unknown("bodies", frame, frames, "frame of this machine")
+            continue
+        where = f"bodies.{frame}"
+        body: BodySource | None = problems.read(
+            schema.BODY, where, {"file": value} if isinstance(value, str) else value
+        )
+        if body is None:
+            continue
+        if bool(body.file) == bool(body.shape):
+            problems.add(where, "expected a file, or the shape of a tool", value)
+        elif body.shape and frame != "t":
+            problems.add(f"{where}.shape", "only the tool t has one; expected a file", body.shape)
+        elif body.shape:
+            found[frame] = BodySource(shape=body.shape)
+        else:
+            found[frame] = replace(body, path=_path(body.file, where, folder, problems))
+    return found
+
+
+def _path(file: str, where: str, folder: Path | None, problems: Problems) -> str:
+    ending = Path(file).suffix.lower()
+    if ending not in MESH_ENDINGS:
+        known = ", ".join(MESH_ENDINGS)
+        problems.add(where, f"unknown ending; expected a mesh that ends in {known}", file)
+        return ""
+    if folder is None:
+        return ""
+    try:
+        home = folder.resolve()
+        path = (home / file).resolve()
+        inside, there = path.is_relative_to(home), path.is_file()
+    except (OSError, ValueError):
+        path, inside, there = folder, True, False
+    if not inside:
+        problems.add(where, "leads out of the folder of this file; expected a mesh in it", file)
+    elif not there:
+        problems.add(where, "there is no such file beside this one", file)
+    else:
+        return str(path)
+    return ""
+
+
+def body_notes(machine: Machine) -> tuple[str, ...]:
+    """Remark on meshes that are named and cannot be drawn, since an upload has no folder."""
+    return tuple(
+        f"bodies.{frame}: {source.file} cannot be read from here (the text came without its"
+        " folder); a schematic body is drawn instead"
+        for frame, source in machine.bodies.items()
+        if source.file and not source.path
+    )
 
 
 def machine_names() -> tuple[str, ...]:
@@ -29,24 +97,7 @@ def machine_picture(name: str) -> Path | None:
 
 @lru_cache(maxsize=64)
 def load_machine(name: str) -> Machine:
-    """Load a bundled machine; its file is read once.
-
-    Parameters
-    ----------
-    name : str
-        Name of a folder below ``assets/machines``.
-
-    Returns
-    -------
-    Machine
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such machine.
-    SceneError
-        If its file has problems.
-    """
+    """Load a bundled machine; its file is read once."""
     if name not in machine_names():
         raise UnknownNameError("machine", name, machine_names())
     folder = assets_dir() / "machines" / name
@@ -67,22 +118,7 @@ def machine_of(
     body_dir: str = "",
     folder: Path | None = None,
 ) -> Machine | None:
-    """Build a machine from its table; note problems and give None where it cannot be.
-
-    Parameters
-    ----------
-    raw : object
-        The table.
-    key : str
-        Where it stands; empty for a file of its own.
-    name : str
-        Name of the machine.
-    problems : Problems
-    body_dir : str, optional
-        Folder of the machine's schematic bodies.
-    folder : Path, optional
-        Folder that the names of its meshes are relative to.
-    """
+    """Build a machine from its table; note problems and give None where it cannot be."""
     expected = 'expected a machine name or a [machine] table with "chain"'
     if raw is None:
         problems.add(key, f"is missing; {expected}")
@@ -90,47 +126,38 @@ def machine_of(
     if not isinstance(raw, dict):
         problems.add(key, expected, raw)
         return None
-    section = problems.validate("machine", key, raw)
+    section = problems.read(schema.MACHINE, key, raw)
     if section is None:
         return None
     prefix = f"{key}." if key else ""
     try:
-        chain = parse_chain(section.chain)
+        chain = parse_chain(section["chain"])
     except ChainError as error:
         problems.add(f"{prefix}chain", str(error))
         return None
-    for part, known in (
-        ("offset_mm", (*chain.axes, *FIXED_FRAMES)),
-        ("rotation_deg", (*chain.axes, *FIXED_FRAMES)),
-        ("travel", chain.axes),
-        ("direction", chain.axes),
-        ("gantry", chain.axes),
-    ):
-        for axis in getattr(section, part):
+    tables = {part: section[part] for part in ("offset_mm", "rotation_deg", "travel", "direction")}
+    for part, entries in {**tables, "gantry": section["gantry"]}.items():
+        known = (*chain.axes, *(FIXED_FRAMES if part in ("offset_mm", "rotation_deg") else ()))
+        for axis in entries:
             if axis not in known:
                 problems.unknown(f"{prefix}{part}", axis, known, "frame of this machine")
-    gantry = _gantries(section.gantry, chain.axes, f"{prefix}gantry", problems)
     machine = build_machine(
         chain,
-        offset_mm=section.offset_mm,
-        rotation_deg=section.rotation_deg,
-        travel=section.travel,
-        direction=section.direction,
-        gantry=gantry,
+        **tables,
+        gantry=_gantries(section["gantry"], chain.axes, f"{prefix}gantry", problems),
         name=name,
-        title=section.title or name,
+        title=section["title"] or name,
         body_dir=body_dir,
-        source=section.source,
+        source=section["source"],
     )
-    if not section.bodies:
+    if not section["bodies"]:
         return machine
-    return replace(machine, bodies=read_bodies(section.bodies, machine, folder, problems))
+    return replace(machine, bodies=read_bodies(section["bodies"], machine, folder, problems))
 
 
 def _gantries(
-    section: Mapping[str, GantrySection], axes: Sequence[str], key: str, problems: Problems
+    section: Mapping[str, Mapping[str, Any]], axes: Sequence[str], key: str, problems: Problems
 ) -> dict[str, tuple[float, str | None]]:
-    """Read which axes stand on two guides; those that cannot are noted and left out."""
     found: dict[str, tuple[float, str | None]] = {}
     for axis, given in section.items():
         if axis not in axes:  # noted already
@@ -138,10 +165,10 @@ def _gantries(
         own = "xyz"[direction_index(axis)]
         if not is_linear(axis):
             problems.add(f"{key}.{axis}", "expected a linear axis: a rotary one has no guides")
-        elif given.across == own:
+        elif given["across"] == own:
             others = " or ".join(f'"{name}"' for name in "xyz" if name != own)
             expected = f"is the direction of the axis itself; expected {others}"
-            problems.add(f"{key}.{axis}.across", expected, given.across)
+            problems.add(f"{key}.{axis}.across", expected, given["across"])
         else:
-            found[axis] = (given.span_mm, given.across)
+            found[axis] = (given["span_mm"], given["across"])
     return found

@@ -1,16 +1,30 @@
-"""A scene as the program holds it: validated, frozen, without a trace of the file format."""
+"""A scene as the program holds it: validated, frozen, without a trace of its file; evaluated."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
-from warpspace.field.evaluate import View
-from warpspace.field.grid import Workspace
-from warpspace.kinematics.model import Loop, Model
+import numpy as np
+from numpy.typing import ArrayLike
+
+from warpspace.exceptions import OptionError
+from warpspace.field.evaluate import (
+    ErrorBasis,
+    ErrorField,
+    SecondOrder,
+    View,
+    build_basis,
+    compare_orders,
+    error_values,
+    evaluate_exact,
+    evaluate_first_order,
+)
+from warpspace.field.grid import DEFAULT_NODES, Grid, Workspace, build_grid
+from warpspace.kinematics.model import Coordinates, Loop, Model, complete_coordinates
+from warpspace.machine.axes import TravelDirection, direction_index, is_linear
 from warpspace.machine.description import Machine, Vector
-from warpspace.machine.errors import ErrorFunction, ErrorSet
-from warpspace.machine.measurement import Measurement
-from warpspace.machine.parameters import default_keys
-from warpspace.machine.tolerances import ToleranceSet
+from warpspace.machine.errors import ErrorFunction, ErrorSet, Harmonics, Measurement, ToleranceSet
+from warpspace.machine.limits import MAX_ERROR
+from warpspace.machine.parameters import PARAMETERS, ErrorKind, default_keys, parameter
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +49,8 @@ class Scene:
         Display factor of displacements; None chooses a round one.
     reference : mapping of str to float or None
         Axis coordinates of the point held still; None is absolute.
+    placed : bool
+        Whether the placement of the workpiece is fitted out of relative errors over the workspace.
     notes : tuple of str
         Remarks on the scene that are no errors.
     uncertainty : mapping of str to ErrorFunction
@@ -52,6 +68,7 @@ class Scene:
     trace_points_mm: tuple[Vector, ...] = ()
     exaggeration: float | None = None
     reference: Mapping[str, float] | None = None
+    placed: bool = False
     description: str = ""
     notes: tuple[str, ...] = ()
     uncertainty: Mapping[str, ErrorFunction] = field(default_factory=dict[str, ErrorFunction])
@@ -77,4 +94,240 @@ class Scene:
 
     def view(self, loop: Loop = Loop.TOOL, frame: str = "machine") -> View:
         """Give the view of the scene through a loop, with the scene's reference."""
-        return View(loop, frame, self.reference)
+        over = self.workspace if self.placed and loop is Loop.RELATIVE else None
+        return View(loop, frame, self.reference, over)
+
+
+FRAMES = ("machine", "workpiece")
+CHECK_NODES = 5
+"""Nodes per axis at which the first order is compared with the exact chain."""
+
+
+def evaluate(
+    scene: Scene,
+    *,
+    at: Mapping[str, ArrayLike] | None = None,
+    grid: int | Sequence[int] | None = None,
+    loop: Loop | str = Loop.TOOL,
+    exact: bool = False,
+    frame: str = "machine",
+    placed: bool = False,
+) -> ErrorField:
+    """Evaluate the error field of a scene at points or over the grid of its working volume.
+
+    Parameters
+    ----------
+    scene : Scene
+    at : mapping of str to array_like, [...], mm or degrees, optional
+        Axis positions; an axis that is not given stands at its position in the scene's workspace,
+        the middle of a range. Without it the grid is evaluated.
+    grid : int or sequence of int, (3,), optional
+        Nodes per axis of the working volume; 21 by default.
+    loop : Loop or str, optional
+        "tool", "workpiece" or "relative". At points the workpiece loop takes the scene's functional
+        workpiece point; over the grid the workpiece points that nominally coincide with the nodes.
+    exact : bool, optional
+        Full rotations and all products instead of the first order.
+    frame : str, optional
+        "machine" for results in R, "workpiece" for the nominal workpiece frame.
+    placed : bool, optional
+        Whether the placement of the workpiece is fitted out of the relative loop: the three shifts
+        and three small rotations of its frame that leave the smallest RMS over the working volume.
+
+    Returns
+    -------
+    ErrorField
+        Arrays of shape [..., 3], the batch being that of `at` or of the grid.
+
+    Raises
+    ------
+    OptionError, UnknownNameError
+        If an argument names something that does not exist.
+
+    Examples
+    --------
+    >>> from warpspace import load_scene
+    >>> scene = load_scene("dvf5000_first")
+    >>> corner = evaluate(scene, at={"X": 275, "Y": -225, "Z": -480})
+    >>> [round(float(part), 2) for part in corner.error_um]
+    [3.94, 49.81, -13.39]
+    >>> evaluate(scene, grid=11).error_um.shape
+    (11, 11, 11, 3)
+    """
+    if at is not None and grid is not None:
+        raise OptionError("give either points (at) or a grid, not both")
+    scene = placed_in(scene, loop, placed=placed)
+    view = choose_view(scene, loop, frame)
+    if at is not None:
+        solve = evaluate_exact if exact else evaluate_first_order
+        given = complete_coordinates(scene.machine, at, scene.workspace.positions)
+        _check_magnitude(scene, given)
+        return solve(scene.model, scene.errors, given, view)
+    nodes = build_grid(scene.model, scene.workspace, DEFAULT_NODES if grid is None else grid)
+    return evaluate_grid(scene, nodes, view, exact=exact)
+
+
+def evaluate_grid(scene: Scene, grid: Grid, view: View, *, exact: bool = False) -> ErrorField:
+    """Evaluate the error field of a scene over a grid that is there already."""
+    solve = evaluate_exact if exact else evaluate_first_order
+    field = solve(scene.model, scene.errors, grid.coordinates, view, grid.point_mm)
+    return replace(field, nominal_mm=grid.nominal_mm)
+
+
+def _check_magnitude(scene: Scene, coordinates: Coordinates) -> None:
+    for key, values in error_values(scene.model, scene.errors, coordinates).items():
+        peak = np.abs(values).max(initial=0.0)
+        if not peak <= MAX_ERROR:
+            row = parameter(key)
+            raise OptionError(
+                f"{key} reaches {peak:.3g} {row.unit} at the positions given for {row.axis};"
+                f" expected at most ±{MAX_ERROR:g}"
+            )
+
+
+def in_direction(scene: Scene, direction: str | None) -> Scene:
+    """Give a scene whose errors are looked at for a direction of travel."""
+    if direction is None:
+        return scene
+    if direction not in [*TravelDirection]:
+        known = ", ".join(TravelDirection)
+        raise OptionError(f"direction {direction!r}; expected one of {known}")
+    return replace(scene, model=replace(scene.model, direction=TravelDirection(direction)))
+
+
+def placed_in(scene: Scene, loop: Loop | str, *, placed: bool = True) -> Scene:
+    """Give a scene whose relative errors leave out where the workpiece lies, if that is wanted."""
+    if placed and loop != Loop.RELATIVE:
+        raise OptionError(
+            f"placed: where the workpiece lies is not told by the {loop} loop; expected loop"
+            f" {Loop.RELATIVE}"
+        )
+    return replace(scene, placed=True) if placed else scene
+
+
+def choose_view(scene: Scene, loop: Loop | str, frame: str = "machine") -> View:
+    """Build a view of a scene from a user's words."""
+    if loop not in [*Loop]:
+        raise OptionError(f"loop {loop!r}; expected one of {', '.join(Loop)}")
+    if frame not in FRAMES:
+        raise OptionError(f"frame {frame!r}; expected one of {', '.join(FRAMES)}")
+    return scene.view(Loop(loop), frame)
+
+
+def grid_basis(
+    scene: Scene, grid: Grid, view: View | None = None, keys: Sequence[str] | None = None
+) -> ErrorBasis:
+    """Compute the response of every node of a grid to parameters of a scene."""
+    basis = build_basis(
+        scene.model,
+        scene.errors,
+        scene.parameter_keys if keys is None else keys,
+        grid.coordinates,
+        view or scene.view(),
+        grid.point_mm,
+    )
+    return replace(basis, nominal_mm=grid.nominal_mm)
+
+
+def second_order(
+    scene: Scene,
+    loop: Loop | str = Loop.TOOL,
+    *,
+    at: Mapping[str, ArrayLike] | None = None,
+    grid: int = CHECK_NODES,
+) -> SecondOrder:
+    """Compare the first order with the exact chain, over the grid unless at points."""
+    nodes = grid if at is None else None
+    first, exact = (
+        evaluate(scene, at=at, grid=nodes, loop=loop, exact=way).error_um for way in (False, True)
+    )
+    return compare_orders(first, exact)
+
+
+LEAST_SHARE = 0.5
+"""Of its range that data of an axis cover, unsaid."""
+MANY_COSINES = 10_000_000
+"""Cosines that the curves of a scene take before it is said: about a second of computing."""
+
+
+def scene_notes(machine: Machine, workspace: Workspace, errors: ErrorSet) -> tuple[str, ...]:
+    """Remark on directions, volumes beyond the travel, carried squareness and costly curves."""
+    return (
+        *_direction_notes(machine),
+        *_travel_notes(machine, workspace),
+        *_carried_notes(machine, errors),
+        *_costly_notes(errors),
+    )
+
+
+def _direction_notes(machine: Machine) -> tuple[str, ...]:
+    notes: list[str] = []
+    for name, axis in machine.axes.items():
+        if not axis.is_linear or machine.sense(name) > 0:
+            continue
+        said = f"machine.direction.{name} = {axis.direction}"
+        if axis.direction_given:
+            notes.append(f"{said} is against ISO 841")
+        else:
+            notes.append(
+                f"{said} since none is given: positive {name} moves the tool towards −{name} over"
+                " the workpiece, against ISO 841; expected −1, or 1 given if the machine does so"
+            )
+    return tuple(notes)
+
+
+def coverage_notes(scene: Scene, measured: Mapping[str, tuple[float, float]]) -> tuple[str, ...]:
+    """Remark on axes whose measured range is less than half of the one that the scene covers."""
+    notes: list[str] = []
+    for axis, (low, high) in measured.items():
+        first, last = scene.axis_span(axis)
+        share, unit = (high - low) / (last - first), scene.machine.axes[axis].unit
+        if 0.0 < share < LEAST_SHARE:
+            notes.append(
+                f"data over {axis} {low:g} … {high:g} {unit}, {100.0 * share:.0f} % of its range"
+                f" {first:g} … {last:g} {unit}: the rest is not measured"
+            )
+    return tuple(notes)
+
+
+def _travel_notes(machine: Machine, workspace: Workspace) -> tuple[str, ...]:
+    notes: list[str] = []
+    for name in machine.axes:
+        (low, high), (first, last) = workspace.ranges[name], machine.axes[name].travel
+        if low < first or high > last:
+            unit = machine.axes[name].unit
+            notes.append(
+                f"workspace.{name} {low:g} … {high:g} {unit} reaches beyond the travel"
+                f" {first:g} … {last:g} {unit}"
+            )
+    return tuple(notes)
+
+
+def _costly_notes(errors: ErrorSet) -> tuple[str, ...]:
+    curves = [part for curve in errors.functions.values() for part in curve.parts]
+    waves = [curve for curve in curves if isinstance(curve, Harmonics)]
+    if sum(curve.cosines for curve in waves) <= MANY_COSINES:
+        return ()
+    terms = sum(len(curve.terms) for curve in waves)
+    found = f"errors: {len(waves)} curves with {terms} harmonics, many of short wavelength"
+    return (f"{found}: opening the scene takes seconds; fewer terms are faster",)
+
+
+def _carried_notes(machine: Machine, errors: ErrorSet) -> tuple[str, ...]:
+    notes: list[str] = []
+    for key in errors:
+        row = PARAMETERS[key]
+        if row.kind is not ErrorKind.SQUARENESS or errors.amplitude(key) == 0.0:
+            continue
+        own = direction_index(row.axis)
+        if row.direction == own:
+            continue
+        branches = (machine.chain.tool, machine.chain.workpiece)
+        branch = next(branch for branch in branches if row.axis in branch)
+        notes += [
+            f"errors.{key} turns {other} as well, which rides on {row.axis}: the angle"
+            f" between them stays, the pair turns as a whole"
+            for other in branch[branch.index(row.axis) + 1 :]
+            if is_linear(other) and direction_index(other) == 3 - row.direction - own
+        ]
+    return tuple(notes)

@@ -1,21 +1,92 @@
-"""Scenes back into the file format: the text reloads to the identical scene."""
+"""Scenes back into the file format: the text reloads to the identical scene, in any notation."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import cast
 
 import tomli_w
 
-from warpspace.exceptions import SceneError
-from warpspace.machine.body_source import BodySource
-from warpspace.machine.description import ORIGIN, Machine, default_travel
+from warpspace.exceptions import OptionError, SceneError
+from warpspace.field.grid import Workspace
+from warpspace.kinematics.conversion import SquarenessSign, convert_squareness, move_measuring_line
+from warpspace.kinematics.model import Model
+from warpspace.machine.axes import TravelDirection
+from warpspace.machine.curves.curve import Span
+from warpspace.machine.description import ORIGIN, BodySource, Machine, Vector, default_travel
+from warpspace.machine.errors import ErrorSet
 from warpspace.machine.limits import MIN_NUMBER
-from warpspace.machine.parameters import PARAMETERS, Parameter
-from warpspace.machine.tolerances import Tolerance
-from warpspace.machine.travel import TravelDirection
+from warpspace.machine.parameters import PARAMETERS, Parameter, parameter
 from warpspace.scene.machines import load_machine, machine_names
 from warpspace.scene.model import Scene
-from warpspace.scene.notation import Notation, write_errors
+
+
+@dataclass(frozen=True, slots=True)
+class Notation:
+    """How numbers are written that mean the same errors."""
+
+    # what a positive squareness means, one of `SquarenessSign`
+    squareness: str = SquarenessSign.RIGHT_HAND
+    # per axis the point of its moving body, in the frame of the axis, whose displacement its
+    # translations are; axes left out have the origin of their frame
+    measuring_line_mm: Mapping[str, Vector] = field(default_factory=dict[str, Vector])
+
+    def to_toml(self) -> dict[str, object]:
+        """Give the keys of `[convention]` that are not the program's own."""
+        found: dict[str, object] = {}
+        if self.squareness != SquarenessSign.RIGHT_HAND:
+            found["squareness"] = str(self.squareness)
+        if self.measuring_line_mm:
+            lines = {axis: list(place) for axis, place in self.measuring_line_mm.items()}
+            found["measuring_line_mm"] = lines
+        return found
+
+
+def covered_spans(model: Model, workspace: Workspace) -> dict[str, Span]:
+    """Give the range of each axis, mm or degrees, that numbers must hold in: travel and volume."""
+    found: dict[str, Span] = {}
+    for name, axis in model.machine.axes.items():
+        low, high = workspace.ranges.get(name, axis.travel)
+        found[name] = (min(low, axis.travel[0]), max(high, axis.travel[1]))
+    return found
+
+
+def over_ranges(errors: ErrorSet, model: Model, workspace: Workspace) -> ErrorSet:
+    """Give every curve the range that it has in a scene; its values stay."""
+    chosen = dict(errors.functions)
+    for key, function in errors.functions.items():
+        axis = parameter(key).axis
+        low, high = workspace.ranges[axis]
+        span = (low, high) if low < high else model.machine.axes[axis].travel
+        if function.span != span:
+            chosen[key] = replace(function.for_span(span), span=span)
+    return ErrorSet(chosen)
+
+
+def read_errors(
+    model: Model, errors: ErrorSet, workspace: Workspace, notation: Notation, source: str
+) -> ErrorSet:
+    """Read errors that are written in a notation."""
+    errors = convert_squareness(model.machine, errors, notation.squareness)
+    lines = notation.measuring_line_mm
+    if not lines:
+        return errors
+    spans = covered_spans(model, workspace)
+    try:
+        moved = move_measuring_line(model, errors, spans, lines, to_origin=True)
+        return over_ranges(moved, model, workspace)
+    except OptionError as error:
+        raise SceneError(source, [f"convention.measuring_line_mm: {error}"]) from None
+
+
+def write_errors(scene: Scene, notation: Notation) -> ErrorSet:
+    """Write the errors of a scene in a notation."""
+    spans = covered_spans(scene.model, scene.workspace)
+    lines, errors = notation.measuring_line_mm, scene.errors
+    if lines:
+        moved = move_measuring_line(scene.model, errors, spans, lines, to_origin=False)
+        errors = over_ranges(moved, scene.model, scene.workspace)
+    return convert_squareness(scene.machine, errors, notation.squareness)
+
 
 _WRAP = 8
 """Entries of a list that stand on one line."""
@@ -23,19 +94,6 @@ _WRAP = 8
 
 def scene_to_toml(scene: Scene, notation: Notation | None = None) -> str:
     """Spell a scene as the text of a scene file.
-
-    Parameters
-    ----------
-    scene : Scene
-    notation : Notation, optional
-        Convention that the numbers of the errors are written in, and that the text then says; that
-        of the program by default.
-
-    Returns
-    -------
-    str
-        TOML. A bundled machine is named, any other is written inline; errors that came from CSV
-        files are written as tables, so that the text needs no other file.
 
     Notes
     -----
@@ -73,7 +131,11 @@ def scene_to_toml(scene: Scene, notation: Notation | None = None) -> str:
         "traces": scene.trace_points_mm,
     }
     parts.append(_section("points_mm", points))
-    parts += [_errors_section(scene), _tolerances_section(scene)]
+    functions = {
+        key: function.for_span(scene.axis_span(PARAMETERS[key].axis)).to_toml()
+        for key, function in scene.errors.functions.items()
+    }
+    parts += [_section("errors", functions, PARAMETERS), _tolerances_section(scene)]
     uncertain = {key: function.to_toml() for key, function in scene.uncertainty.items()}
     parts.append(_section("uncertainty", uncertain, PARAMETERS))
     for key, measurement in scene.measured.items():
@@ -82,6 +144,7 @@ def scene_to_toml(scene: Scene, notation: Notation | None = None) -> str:
     view = {
         "exaggeration": "auto" if scene.exaggeration is None else scene.exaggeration,
         "reference": "absolute" if scene.reference is None else scene.reference,
+        **({"placed": True} if scene.placed else {}),
     }
     parts.append(_section("view", view))
     return "\n".join(part for part in parts if part)
@@ -112,7 +175,6 @@ def _bodies_section(machine: Machine, known: Machine | None) -> str:
 
 
 def _machine_sections(machine: Machine) -> list[str]:
-    """Spell a machine inline."""
     offsets = {name: axis.offset_mm for name, axis in machine.axes.items()} | dict(machine.fixed_mm)
     turned = {name: axis.rotation_deg for name, axis in machine.axes.items()}
     turned |= dict(machine.fixed_deg)
@@ -121,7 +183,11 @@ def _machine_sections(machine: Machine) -> list[str]:
         for name, axis in machine.axes.items()
         if axis.travel != default_travel(name)
     }
-    direction = {name: axis.direction for name, axis in machine.axes.items() if axis.direction != 1}
+    direction = {
+        name: axis.direction
+        for name, axis in machine.axes.items()
+        if axis.direction != 1 or axis.direction_given
+    }
     gantry = {
         name: {"span_mm": one.span_mm, "across": one.across}
         for name, one in machine.gantries.items()
@@ -137,32 +203,12 @@ def _machine_sections(machine: Machine) -> list[str]:
     ]
 
 
-def _errors_section(scene: Scene) -> str:
-    """Spell the error functions, each with its thesis symbol and unit behind it."""
-    values = {key: _function(scene, key) for key in scene.errors}
-    return _section("errors", values, PARAMETERS)
-
-
-def _function(scene: Scene, key: str) -> object:
-    """Spell one error function."""
-    span = scene.axis_span(PARAMETERS[key].axis)
-    return scene.errors.functions[key].for_span(span).to_toml()
-
-
 def _tolerances_section(scene: Scene) -> str:
-    """Spell the tolerance set."""
     values: dict[str, object] = {}
     if scene.tolerances.default:
         values["default"] = scene.tolerances.default
     for key, own in scene.tolerances.own.items():
-        values[key] = (
-            own.half_width
-            if own == Tolerance(0.0, own.half_width)
-            else {
-                "centre": own.centre,
-                "half_width": own.half_width,
-            }
-        )
+        values[key] = asdict(own) if own.centre else own.half_width
     return _section("tolerances", values, PARAMETERS)
 
 
@@ -181,7 +227,6 @@ def _section(
 
 
 def _inline(value: object) -> str:
-    """Spell a value on one line (a long list on several)."""
     if isinstance(value, Mapping):
         table = cast("Mapping[str, object]", value)
         return "{ " + ", ".join(f"{key} = {_inline(entry)}" for key, entry in table.items()) + " }"
@@ -193,7 +238,7 @@ def _inline(value: object) -> str:
     if isinstance(value, str):
         return tomli_w.dumps({"value": value}).split("=", 1)[1].strip()
     if isinstance(value, int):
-        return repr(value)
+        return repr(value).lower()
     number = float(cast("float", value))
     # a scaled curve may hold numbers so small that no reader takes them
     return repr(0.0 if 0.0 < abs(number) < MIN_NUMBER else number)

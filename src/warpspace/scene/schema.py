@@ -1,231 +1,253 @@
-"""The scene format as pydantic models: what each section may hold.
+"""What each section of a scene or machine file may hold, and the list that its problems go to."""
 
-Each section is validated on its own, so that every problem of a file is found in one reading.
-"""
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, cast
 
-from typing import Annotated, Literal
-
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Discriminator,
-    Field,
-    Tag,
-)
-from pydantic_core import PydanticCustomError
-
-from warpspace.kinematics.conventions.registry import convention_names
-from warpspace.kinematics.conversion.squareness import SquarenessSign
-from warpspace.machine.body_source import MESH_UNITS, TOOL_SHAPES
+from warpspace.exceptions import SHOWN_PROBLEMS, near_miss
+from warpspace.kinematics.conversion import SquarenessSign
+from warpspace.kinematics.model import ComponentErrors, convention_names
+from warpspace.machine import limits
+from warpspace.machine.axes import TravelDirection
+from warpspace.machine.curves.curve import MISSING, Path, ValueReader
 from warpspace.machine.curves.table import MAX_FILE_NAME
-from warpspace.machine.limits import (
-    EXAGGERATION,
-    FULL_TURN_DEG,
-    GANTRY_SPAN_MM,
-    MAX_ERROR,
-    MAX_LENGTH_MM,
-    MAX_TEXT,
-    MAX_TRACES,
-    MIN_HALF_WIDTH,
-    MIN_NUMBER,
-    MIN_SPAN,
+from warpspace.machine.description import MESH_UNITS, ORIGIN, TOOL_SHAPES, BodySource
+from warpspace.machine.errors import TOLERANCE_CLASSES, Tolerance
+from warpspace.scene.files import location, spell_value
+
+Kind = Callable[[ValueReader, Any, Path], Any]
+"""Checks one raw value at its place: notes what is wrong with it, or gives what it means."""
+
+
+class Problems:
+    """What is wrong with a file, a line each."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def add(self, key: str, text: str, value: object = ...) -> None:
+        """Note one problem: key, value and what was expected."""
+        shown = "" if value is ... else f" = {spell_value(value)}"
+        self.lines.append(f"{key}{shown}: {text}" if key else text)
+
+    def unknown(self, section: str, name: str, known: Iterable[str], what: str) -> None:
+        """Note a name that is not among the known ones."""
+        hint = near_miss(name, known) if len(self.lines) < SHOWN_PROBLEMS else ""
+        self.lines.append(f"{location(section, [name])}: unknown {what}{hint}")
+
+    def take(self, key: str, reader: ValueReader) -> bool:
+        """Note what a reader has found below a key; tell whether that is nothing."""
+        for finding in reader.findings:
+            self.add(location(key, finding.path), finding.text, finding.value)
+        return not reader.findings
+
+    def read(self, kind: Kind, key: str, value: object) -> Any:
+        """Read one value; None where anything is wrong with it."""
+        reader = ValueReader()
+        found = kind(reader, value, ())
+        return found if self.take(key, reader) else None
+
+    def table(self, key: str, value: object) -> dict[str, object]:
+        """Give a table as a dictionary; note a problem and give an empty one for anything else."""
+        if value is not None and not isinstance(value, dict):
+            self.add(key, "expected a table", value)
+        return dict(cast("dict[str, object]", value)) if isinstance(value, dict) else {}
+
+
+# --- kinds of values ------------------------------------------------------------------------------
+
+
+def _number(
+    low: float, high: float, least: float = limits.MIN_NUMBER, expected: str = "a number"
+) -> Kind:
+    return lambda reader, value, path: reader.number(value, path, low, high, least, expected)
+
+
+def _numbers(spelling: str, limit: float) -> Kind:
+    limits = ((-limit, limit),) * (spelling.count(",") + 1)
+    return lambda reader, value, path: reader.row(value, path, spelling, limits)
+
+
+def _span(reader: ValueReader, value: Any, path: Path) -> tuple[float, float]:
+    before = len(reader.findings)
+    low, high = reader.row(value, path, "[lower, upper]", (LIMIT, LIMIT))
+    if len(reader.findings) == before and high - low < limits.MIN_SPAN:
+        reader.note(path, "expected [lower, upper] with lower < upper", value)
+    return low, high
+
+
+def _by_name(kind: Kind) -> Kind:
+    def read(reader: ValueReader, value: Any, path: Path) -> dict[str, Any]:
+        table = reader.dictionary(value, path)
+        return {name: kind(reader, entry, (*path, name)) for name, entry in table.items()}
+
+    return read
+
+
+def _text(longest: int) -> Kind:
+    return lambda reader, value, path: reader.text(value, path, longest, least=0)
+
+
+def _choice(names: Callable[[], Iterable[object]], words: str = "{} or {}") -> Kind:
+    """Take one of some values: spelled "a", "b" or "c", or with words for all of them."""
+
+    def read(reader: ValueReader, value: Any, path: Path) -> Any:
+        known = list(names())
+        if value in known and type(value) is not bool and type(value) is not float:
+            return value
+        *others, last = [spell_value(name) for name in known]
+        if "{}" in words:
+            reader.note(path, f"expected {words.format(', '.join(others), last)}", value)
+        else:
+            reader.note(path, f"expected {words} {', '.join([*others, last])}", value)
+        return known[0]
+
+    return read
+
+
+def _one_of(names: Iterable[str]) -> Kind:
+    return _choice(lambda: names, "one of")
+
+
+def _exaggeration(reader: ValueReader, value: Any, path: Path) -> float | None:
+    if value == "auto":
+        return None
+    (low, high), above = limits.EXAGGERATION, "a number above 0"
+    factor = reader.number(value, path, least=0.0, expected=f'"auto" or {above}')
+    if factor <= 0.0:
+        reader.note(path, f"expected {above}", value)
+    elif not low <= factor <= high and not reader.findings:
+        limit = f"at most {high:,.0f}" if factor > high else f"at least {low:g}"
+        reader.note(path, f"expected {limit}", value)
+    return factor
+
+
+def _reference(reader: ValueReader, value: Any, path: Path) -> dict[str, float] | None:
+    if isinstance(value, dict):
+        return _by_name(LENGTH)(reader, value, path)
+    if value != "absolute":
+        axes = "axis coordinates, for instance { X = 0, Y = 0, Z = -280 }"
+        reader.note(path, f'expected "absolute" or {axes}', value)
+    return None
+
+
+def _traces(reader: ValueReader, value: Any, path: Path) -> tuple[Any, ...]:
+    entries = reader.entries(value, path, limits.MAX_TRACES, least=0)
+    return tuple(POINT(reader, entry, (*path, index)) for index, entry in enumerate(entries))
+
+
+def _component_errors(reader: ValueReader, value: Any, path: Path) -> str | dict[str, str]:
+    name = _choice(convention_names)
+    return (_by_name(name) if isinstance(value, dict) else name)(reader, value, path)
+
+
+def _placed(reader: ValueReader, value: Any, path: Path) -> bool:
+    if not isinstance(value, bool):
+        reader.note(path, "expected true or false", value)
+    return value is True
+
+
+@dataclass(frozen=True)
+class Section:
+    """A table whose keys are known: by key the kind of its value, and what stands for none."""
+
+    fields: Mapping[str, tuple[Kind, Any]]
+    build: Callable[..., Any] = dict
+
+    def __call__(self, reader: ValueReader, value: Any, path: Path) -> Any:
+        """Read it."""
+        before = len(reader.findings)
+        table = reader.dictionary(value, path)
+        if len(reader.findings) > before:
+            return None
+        found: dict[str, Any] = {}
+        for name, (kind, default) in self.fields.items():
+            if (entry := table.get(name, default)) is MISSING:
+                reader.note((*path, name), "", MISSING)
+            found[name] = kind(reader, entry, (*path, name)) if name in table else entry
+        reader.only(table, path, self.fields)
+        return self.build(**found)
+
+
+# --- what sections hold ---------------------------------------------------------------------------
+
+LIMIT = (-limits.MAX_LENGTH_MM, limits.MAX_LENGTH_MM)
+LENGTH = _number(*LIMIT)
+POINT, TURN = (
+    _numbers("[x, y, z]", limits.MAX_LENGTH_MM),
+    _numbers("[x, y, z]", limits.FULL_TURN_DEG),
 )
-from warpspace.machine.travel import TravelDirection
+TEXT = _text(limits.MAX_TEXT)
+_HALF_WIDTH = 0.0, limits.MAX_ERROR, limits.MIN_HALF_WIDTH
+GANTRY = Section(
+    {
+        "span_mm": (_number(*limits.GANTRY_SPAN_MM), MISSING),
+        "across": (_choice(lambda: "xyz"), None),
+    }
+)
+MACHINE = Section(
+    {
+        "title": (TEXT, ""),
+        "description": (TEXT, ""),
+        "source": (TEXT, ""),
+        "chain": (_text(100), MISSING),
+        "offset_mm": (_by_name(POINT), {}),
+        "rotation_deg": (_by_name(TURN), {}),
+        "travel": (_by_name(_span), {}),
+        "direction": (_by_name(_choice(lambda: (1, -1))), {}),
+        "gantry": (_by_name(GANTRY), {}),
+        "bodies": (_by_name(lambda _reader, value, _path: value), {}),
+    }
+)
+BODY = Section(
+    {
+        "file": (_text(MAX_FILE_NAME), ""),
+        "unit": (_one_of(MESH_UNITS), ""),
+        "offset_mm": (POINT, ORIGIN),
+        "rotation_deg": (TURN, ORIGIN),
+        "shape": (_one_of(TOOL_SHAPES), ""),
+    },
+    BodySource,
+)
+CONVENTION = Section(
+    {
+        "component_errors": (_component_errors, ComponentErrors.AFTER_MOTION.value),
+        "reference_axis": (_choice(lambda: ("fixed", "free")), "fixed"),
+        "direction": (_one_of(tuple(TravelDirection)), TravelDirection.MEAN.value),
+        "squareness": (_one_of(tuple(SquarenessSign)), SquarenessSign.RIGHT_HAND.value),
+        "measuring_line_mm": (_by_name(POINT), {}),
+    }
+)
+POINTS = Section({"tool": (POINT, ORIGIN), "workpiece": (POINT, ORIGIN), "traces": (_traces, ())})
+VIEW = Section(
+    {
+        "exaggeration": (_exaggeration, None),
+        "reference": (_reference, None),
+        "placed": (_placed, False),
+    }
+)
+DEFAULTS = Section({name: (_number(*_HALF_WIDTH), None) for name in TOLERANCE_CLASSES})
+_RANGE = Section(
+    {
+        "centre": (_number(-limits.MAX_ERROR, limits.MAX_ERROR), 0.0),
+        "half_width": (_number(*_HALF_WIDTH), MISSING),
+    },
+    Tolerance,
+)
+_WIDTH = _number(*_HALF_WIDTH, "a half width or { centre = , half_width = }")
+_PLACE = _number(*LIMIT, expected="a number or [lower, upper]")
 
 
-def _entries(spelling: str) -> BeforeValidator:
-    """Refuse a list that has not as many entries as its spelling, for instance "[x, y, z]"."""
-    count = spelling.count(",") + 1
-
-    def check(value: object) -> object:
-        if not isinstance(value, list | tuple) or len(value) != count:
-            raise PydanticCustomError("entries", "expected {spelling}", {"spelling": spelling})
-        return value
-
-    return BeforeValidator(check)
+def tolerance(reader: ValueReader, value: Any, path: Path) -> Tolerance:
+    """Read a half width about zero, or a range."""
+    if isinstance(value, dict):
+        return _RANGE(reader, value, path)
+    return Tolerance(0.0, _WIDTH(reader, value, path))
 
 
-def _registered_convention(value: object) -> object:
-    """Refuse what is no name of a convention."""
-    if value not in convention_names():
-        names = [f'"{name}"' for name in convention_names()]
-        expected = " or ".join([", ".join(names[:-1]), names[-1]])
-        raise PydanticCustomError("convention", "expected {names}", {"names": expected})
-    return value
-
-
-def _whole_number(value: object) -> object:
-    """Refuse what only equals 1 or -1."""
-    if type(value) is not int:
-        raise PydanticCustomError("direction", "expected 1 or -1")
-    return value
-
-
-def _at_least(smallest: float) -> AfterValidator:
-    """Refuse magnitudes so small that they are neither 0 nor of any use."""
-
-    def check(value: float) -> float:
-        if 0.0 < abs(value) < smallest:
-            raise PydanticCustomError(
-                "too_small", "expected 0, or at least {least}", {"least": f"{smallest:.3g}"}
-            )
-        return value
-
-    return AfterValidator(check)
-
-
-def _drawable(value: float) -> float:
-    """Refuse display factors that nothing can be drawn with."""
-    low, high = EXAGGERATION
-    if value > high:
-        raise PydanticCustomError("large", "expected at most {high}", {"high": f"{high:,.0f}"})
-    if value < low:
-        raise PydanticCustomError("small", "expected at least {low}", {"low": f"{low:g}"})
-    return value
-
-
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Finite = Annotated[Number, _at_least(MIN_NUMBER)]
-Length = Annotated[Finite, Field(ge=-MAX_LENGTH_MM, le=MAX_LENGTH_MM)]
-Angle = Annotated[Finite, Field(ge=-FULL_TURN_DEG, le=FULL_TURN_DEG)]
-ErrorValue = Annotated[Finite, Field(ge=-MAX_ERROR, le=MAX_ERROR)]
-HalfWidth = Annotated[Finite, Field(ge=0, le=MAX_ERROR), _at_least(MIN_HALF_WIDTH)]
-Point = Annotated[tuple[Length, Length, Length], _entries("[x, y, z]")]
-Turn = Annotated[tuple[Angle, Angle, Angle], _entries("[x, y, z]")]
-Text = Annotated[str, Field(strict=True, max_length=MAX_TEXT)]
-
-
-def _ascending_range(value: tuple[float, float]) -> tuple[float, float]:
-    """Refuse a range that is empty or upside down."""
-    if value[1] - value[0] < MIN_SPAN:
-        raise PydanticCustomError("empty_range", "expected [lower, upper] with lower < upper")
-    return value
-
-
-Span = Annotated[
-    tuple[Length, Length], _entries("[lower, upper]"), AfterValidator(_ascending_range)
-]
-
-
-ConventionName = Annotated[str, BeforeValidator(_registered_convention)]
-
-
-class Section(BaseModel):
-    """Base of all sections: unknown keys are errors."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class GantrySection(Section):
-    """An axis on two guides."""
-
-    span_mm: Annotated[Finite, Field(ge=GANTRY_SPAN_MM[0], le=GANTRY_SPAN_MM[1])]
-    across: Literal["x", "y", "z"] | None = None
-
-
-class MachineSection(Section):
-    """A machine, inline in a scene or in a file of its own."""
-
-    title: Text = ""
-    description: Text = ""
-    source: Text = ""
-    chain: Annotated[str, Field(strict=True, max_length=100)]
-    offset_mm: dict[str, Point] = {}
-    rotation_deg: dict[str, Turn] = {}
-    travel: dict[str, Span] = {}
-    direction: dict[str, Annotated[Literal[1, -1], BeforeValidator(_whole_number)]] = {}
-    gantry: dict[str, GantrySection] = {}
-    bodies: dict[str, object] = {}
-
-
-def _one_of(names: tuple[str, ...]) -> BeforeValidator:
-    """Refuse what is none of some names."""
-
-    def check(value: object) -> object:
-        if value not in names:
-            expected = ", ".join(f'"{name}"' for name in names)
-            raise PydanticCustomError("one_of", "expected one of {names}", {"names": expected})
-        return value
-
-    return BeforeValidator(check)
-
-
-class BodySection(Section):
-    """The body of one frame: a mesh with its unit and its place, or the shape of a tool."""
-
-    file: Annotated[str, Field(strict=True, max_length=MAX_FILE_NAME)] = ""
-    unit: Annotated[str, _one_of(MESH_UNITS)] | None = None
-    offset_mm: Point = (0.0, 0.0, 0.0)
-    rotation_deg: Turn = (0.0, 0.0, 0.0)
-    shape: Annotated[str, _one_of(TOOL_SHAPES)] = ""
-
-
-class ConventionSection(Section):
-    """Where component errors sit, and whether the reference axis itself may be out of direction."""
-
-    component_errors: Annotated[
-        Annotated[ConventionName, Tag("word")] | Annotated[dict[str, ConventionName], Tag("table")],
-        Discriminator(lambda value: "table" if isinstance(value, dict) else "word"),
-    ] = "after_motion"
-    reference_axis: Literal["fixed", "free"] = "fixed"
-    direction: Annotated[str, _one_of(tuple(TravelDirection))] = TravelDirection.MEAN.value
-    squareness: Annotated[str, _one_of(tuple(SquarenessSign))] = SquarenessSign.RIGHT_HAND.value
-    measuring_line_mm: dict[str, Point] = {}
-
-
-class PointsSection(Section):
-    """Functional points in the tool and workpiece frame, and the points that are traced."""
-
-    tool: Point = (0.0, 0.0, 0.0)
-    workpiece: Point = (0.0, 0.0, 0.0)
-    traces: Annotated[list[Point], Field(max_length=MAX_TRACES)] = []
-
-
-class DefaultTolerances(Section):
-    """Half widths per class, µm or µrad."""
-
-    translation: HalfWidth | None = None
-    rotation: HalfWidth | None = None
-    squareness: HalfWidth | None = None
-
-
-class ToleranceSpec(Section):
-    """Range of one parameter."""
-
-    centre: ErrorValue = 0.0
-    half_width: HalfWidth
-
-
-class ViewSection(Section):
-    """How the scene is first shown."""
-
-    exaggeration: Annotated[
-        Annotated[Literal["auto"], Tag("word")]
-        | Annotated[Number, Field(gt=0), AfterValidator(_drawable), Tag("number")],
-        Discriminator(lambda value: "word" if isinstance(value, str) else "number"),
-    ] = "auto"
-    reference: Annotated[
-        Annotated[Literal["absolute"], Tag("word")] | Annotated[dict[str, Length], Tag("axes")],
-        Discriminator(lambda value: "axes" if isinstance(value, dict) else "word"),
-    ] = "absolute"
-
-
-RangeSpec = Annotated[
-    Annotated[Length, Tag("number")] | Annotated[Span, Tag("range")],
-    Discriminator(lambda value: "range" if isinstance(value, (list, tuple)) else "number"),
-]
-ToleranceValue = Annotated[
-    Annotated[HalfWidth, Tag("number")] | Annotated[ToleranceSpec, Tag("range")],
-    Discriminator(lambda value: "range" if isinstance(value, dict) else "number"),
-]
-TAG_AT = {"range": 0, "tolerance": 0, "view": 1, "convention": 1}
-"""Which part of a pydantic location is the tag of a union and no key, per kind of value."""
-ALTERNATIVES = {
-    "range": "a number or [lower, upper]",
-    "tolerance": "a half width or { centre = , half_width = }",
-    "exaggeration": '"auto" or a number above 0',
-    "reference": '"absolute" or axis coordinates, for instance { X = 0, Y = 0, Z = -280 }',
-}
-"""All that a union takes, per kind of value or field of a section."""
+def workspace_range(reader: ValueReader, value: Any, path: Path) -> tuple[float, float]:
+    """Read the range of an axis in the working volume; equal ends where it stands still."""
+    if isinstance(value, list | tuple):
+        return _span(reader, value, path)
+    at = _PLACE(reader, value, path)
+    return at, at

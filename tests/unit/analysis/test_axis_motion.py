@@ -1,9 +1,15 @@
-"""Error motions against bodies that were moved by hand, and against the exact model."""
+"""Error motions and circle deviations against bodies and circles that were moved by hand."""
 
 import numpy as np
 import pytest
 
-from warpspace.analysis.axis_motion import LEVER_MM, axis_motion, points_on_axis, times_a_turn
+from warpspace.analysis.axis_motion import (
+    LEVER_MM,
+    axis_motion,
+    circle_deviation,
+    fit_circle,
+    times_a_turn,
+)
 
 ANGLE = np.linspace(0.0, 360.0, 73)
 THETA = np.deg2rad(ANGLE)
@@ -11,7 +17,7 @@ CIRCLE = np.stack([200.0 * np.cos(THETA), 200.0 * np.sin(THETA), np.full_like(TH
 OUT = CIRCLE * [1.0, 1.0, 0.0] / 200.0
 
 
-def taken_apart(shift_um: np.ndarray, rotation_urad: np.ndarray):
+def taken_apart(shift_um, rotation_urad):
     """Error motion of a body that is shifted and rotated about the centre of the circle."""
     above = shift_um + np.cross(rotation_urad, [0.0, 0.0, LEVER_MM]) * 1e-3
     return axis_motion(CIRCLE, ANGLE, shift_um, above, closed=True)
@@ -42,6 +48,7 @@ def test_axial_motion_keeps_its_part_once_a_turn():
     assert found.axial.motion_value == pytest.approx(6.0)
     assert found.axial.about_line == pytest.approx(3.0 * np.sin(THETA))
     assert found.axial.times_a_turn == 1
+    assert times_a_turn(np.cos(5.0 * THETA) + 0.4 * np.cos(THETA)) == 5
 
 
 def test_tilt_is_positive_where_the_axis_leans_towards_the_point():
@@ -55,17 +62,6 @@ def test_tilt_is_positive_where_the_axis_leans_towards_the_point():
     assert found.axial.values - 0.2 * found.tilt.values == pytest.approx(face)
 
 
-def test_points_on_the_axis_lie_in_the_plane_of_the_circle_and_above_it():
-    on_axis, above = points_on_axis(CIRCLE)
-    np.testing.assert_allclose(on_axis, np.tile([0.0, 0.0, 50.0], (73, 1)), atol=1e-9)
-    np.testing.assert_allclose(above, np.tile([0.0, 0.0, 50.0 + LEVER_MM], (73, 1)), atol=1e-9)
-
-
-def test_harmonics_are_counted():
-    assert times_a_turn(np.cos(5.0 * THETA) + 0.4 * np.cos(THETA)) == 5
-    assert times_a_turn(np.full(73, 7.0)) is None
-
-
 def test_arc_has_no_times_a_turn():
     part = slice(0, 30)
     above = np.zeros((30, 3))
@@ -74,3 +70,30 @@ def test_arc_has_no_times_a_turn():
     )
     assert found.radial.times_a_turn is None
     assert found.radial.values == pytest.approx(np.cos(THETA[part]))
+
+
+def test_displaced_and_tilted_circle_is_taken_apart():
+    error = np.tile([3.0, -4.0, 7.0], (73, 1))
+    error[:, 2] += 25e-6 * CIRCLE[:, 1] * 1e3  # 25 µrad about x
+    found = circle_deviation(CIRCLE, error)
+    assert found.radius_mm == pytest.approx(200.0)
+    assert found.centre_um == pytest.approx(5.0)
+    assert found.axial_offset_um == pytest.approx(7.0)
+    assert found.tilt_urad == pytest.approx(25.0)
+    assert found.radial_um == pytest.approx(0.0, abs=1e-9)
+    assert found.axial_um == pytest.approx(0.0, abs=1e-9)
+
+
+def test_runout_twice_a_turn_is_its_peak_to_valley():
+    error = 2.0 * np.cos(2 * THETA)[:, None] * CIRCLE * [1, 1, 0] / 200.0
+    found = circle_deviation(CIRCLE, error)
+    assert found.radial_um == pytest.approx(4.0, rel=2e-2)
+    assert found.centre_um == pytest.approx(0.0, abs=0.1)
+
+
+def test_arc_in_a_tilted_plane_is_fitted():
+    arc = np.stack([np.cos(THETA[:30]), np.zeros(30), -np.sin(THETA[:30])], -1) * 300.0
+    centre, radius, normal = fit_circle(arc + np.array([1.0, 2.0, 3.0]))
+    np.testing.assert_allclose(centre, [1.0, 2.0, 3.0], atol=1e-9)
+    assert radius == pytest.approx(300.0)
+    np.testing.assert_allclose(normal, [0.0, 1.0, 0.0], atol=1e-12)

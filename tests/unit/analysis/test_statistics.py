@@ -1,17 +1,25 @@
-"""Statistics of a field."""
+"""Statistics of a field, verdicts on measured errors, and what their uncertainties do."""
+
+import math
 
 import numpy as np
 import pytest
 
+import warpspace
+from warpspace.analysis.cases import Plan
+from warpspace.analysis.distribution import Distribution
+from warpspace.analysis.measured import Check, check_errors, shear
+from warpspace.analysis.montecarlo import montecarlo
 from warpspace.analysis.statistics import statistics, volume_statistics
-from warpspace.exceptions import OptionError
-from warpspace.field.basis import ErrorField
+from warpspace.analysis.uncertain import evaluate_uncertainty, uncertain_case
+from warpspace.exceptions import OptionError, SceneError
+from warpspace.field.evaluate import ErrorField
 from warpspace.field.grid import build_grid
-from warpspace.scene.library import load_scene
-from warpspace.scene.pipeline import evaluate
+from warpspace.machine.errors import Constant, ErrorSet, ToleranceSet
+from warpspace.scene.library import load_scene, parse_scene
 
 
-def field_of(norms: np.ndarray) -> ErrorField:
+def field_of(norms):
     """A field along x whose errors point along y."""
     nominal = np.stack([np.arange(norms.size), *np.zeros((2, norms.size))], -1)
     error = norms.reshape(-1, 1) * np.array([0.0, -1.0, 0.0])
@@ -19,7 +27,7 @@ def field_of(norms: np.ndarray) -> ErrorField:
     return ErrorField(nominal.reshape(shape), error.reshape(shape), np.zeros(shape))
 
 
-def test_numbers_are_those_of_the_lengths() -> None:
+def test_numbers_are_those_of_the_lengths():
     found = statistics(field_of(np.array([[3.0, 4.0], [0.0, 5.0]])))
     assert found.mean_um == 3.0
     assert found.rms_um == pytest.approx(np.sqrt(12.5))
@@ -27,36 +35,19 @@ def test_numbers_are_those_of_the_lengths() -> None:
     assert found.max_at_mm == (3.0, 0.0, 0.0)
 
 
-def test_95th_percentile_leaves_a_twentieth_above() -> None:
-    assert statistics(field_of(np.arange(101.0))).p95_um == pytest.approx(95.0)
-
-
 @pytest.mark.parametrize("count", [1, 2, 3, 19, 20, 21, 9261])
-def test_95th_percentile_is_that_of_numpy(count: int) -> None:
+def test_95th_percentile_is_that_of_numpy(count):
     norms = np.random.default_rng(count).gamma(2.0, 10.0, count)
     assert statistics(field_of(norms)).p95_um == pytest.approx(np.quantile(norms, 0.95), rel=1e-14)
 
 
-def test_one_point_is_enough_and_none_is_not() -> None:
+def test_one_point_is_enough_and_none_is_not():
     assert statistics(field_of(np.array(7.0))).max_um == 7.0
     with pytest.raises(OptionError, match="expected at least one"):
         statistics(field_of(np.zeros(0)))
 
 
-@pytest.mark.parametrize("name", ["dvf5000_first", "dvf5000_second"])
-def test_statistics_of_the_volume_hardly_depend_on_the_number_of_nodes(name: str) -> None:
-    scene = load_scene(name)
-    found = {}
-    for nodes in (11, 31, 61):
-        grid = build_grid(scene.model, scene.workspace, nodes)
-        found[nodes] = volume_statistics(evaluate(scene, grid=nodes), grid)
-    for nodes in (11, 31):
-        assert found[nodes].mean_um == pytest.approx(found[61].mean_um, rel=0.005)
-        assert found[nodes].rms_um == pytest.approx(found[61].rms_um, rel=0.005)
-        assert found[nodes].p95_um == pytest.approx(found[61].p95_um, rel=0.005)
-
-
-def test_statistics_of_the_volume_of_a_linear_error_are_those_of_its_integral() -> None:
+def test_statistics_of_the_volume_of_a_linear_error_are_those_of_its_integral():
     """|E| = 100·u over a bar 0 ≤ u ≤ 1: mean 50, RMS 100/√3 (at many nodes), P95 95."""
     scene = load_scene("dvf5000_nominal")
     grid = build_grid(scene.model, scene.workspace, (101, 2, 2))
@@ -69,12 +60,95 @@ def test_statistics_of_the_volume_of_a_linear_error_are_those_of_its_integral() 
     assert found.max_at_axes["X"] == 275.0
 
 
-def test_the_worst_node_is_named_in_both_coordinate_systems() -> None:
-    """The corner of the first machine: axes X 275 Y −225 Z −480, in R z −51."""
-    scene = load_scene("dvf5000_first")
-    grid = build_grid(scene.model, scene.workspace, 5)
-    field = evaluate(scene, grid=5)
-    found = volume_statistics(field, grid)
-    assert {axis: found.max_at_axes[axis] for axis in "XYZ"} == {"X": 275, "Y": -225, "Z": -480}
-    assert found.max_at_mm[2] == pytest.approx(-51.0, abs=0.5)
-    assert statistics(field, grid.coordinates).max_at_axes == found.max_at_axes
+@pytest.mark.parametrize(
+    ("value", "mark"), [(-14.0, "O"), (-2.0, "O"), (-14.01, "X"), (-1.99, "X"), (-8.0, "O")]
+)
+def test_limits_belong_to_the_tolerance(value, mark):
+    assert Check("EAX", value, -8.0, 6.0).mark == mark
+
+
+def test_without_a_tolerance_there_is_no_verdict():
+    (check,) = check_errors(ErrorSet({"EAX": Constant((0, 1), 3.0)}), ToleranceSet())
+    assert (check.passes, check.mark) == (None, "–")
+
+
+def test_shear_of_pure_squareness_is_the_squareness():
+    field = warpspace.evaluate(warpspace.load_scene("teach_squareness"), grid=3)
+    found = shear(field)
+    assert found["XY"] == pytest.approx(30.0)
+    assert found["XZ"] == pytest.approx(0.0, abs=1e-9)
+    assert found["YZ"] == pytest.approx(0.0, abs=1e-9)
+
+
+HEAD = """[machine]
+chain = "wFXYZt"
+[machine.offset_mm]
+t = [0, 0, -300]
+[workspace]
+X = [-100, 100]
+Y = [-100, 100]
+Z = 0
+"""
+SCENE = (
+    HEAD
+    + """[errors]
+EXX = 5
+[uncertainty]
+EXX = 0.4
+EYX = { table = [[-100, 0.1], [100, 0.3]] }
+EBX = 1
+"""
+)
+
+
+def test_gains_times_uncertainties_add_up_in_squares():
+    found = evaluate_uncertainty(parse_scene(SCENE, "s"), at={"X": [-100.0, 0.0, 100.0]})
+    # along x: 0.4 µm, and 1 µrad on an arm of 300 mm; along y the table; along z nothing at X 0 …
+    x = math.hypot(0.4, 0.3)
+    np.testing.assert_allclose(found.error_um[:, 0], x)
+    np.testing.assert_allclose(found.error_um[:, 1], [0.1, 0.2, 0.3])
+    np.testing.assert_allclose(found.error_um[:, 2], 0.0, atol=1e-12)
+    # … and |E| is along x
+    np.testing.assert_allclose(found.norm_um, x)
+    np.testing.assert_allclose(found.orientation_urad[:, 1], 1.0)
+
+
+def test_where_there_is_no_error_the_vector_counts_as_a_whole():
+    found = evaluate_uncertainty(parse_scene(SCENE.replace("EXX = 5\n", ""), "s"), at={"X": 0.0})
+    assert float(found.norm_um) == pytest.approx(math.sqrt(0.4**2 + 0.3**2 + 0.2**2))
+
+
+def test_with_a_reference_one_error_goes_the_same_way_at_both_points():
+    held = SCENE + "[view]\nreference = { X = -100, Y = 0, Z = 0 }\n"
+    found = evaluate_uncertainty(parse_scene(held, "s"), at={"X": [-100.0, 100.0]})
+    np.testing.assert_allclose(found.error_um, [[0, 0, 0], [0, 0.2, 0]], atol=1e-12)
+
+
+def test_sampled_machines_scatter_by_it_around_the_errors():
+    scene = parse_scene(HEAD + "[errors]\nEXX = 50\n[uncertainty]\nEXX = 3\n", "s")
+    result = montecarlo(uncertain_case(scene, Plan(samples=40_000, seed=2)))
+    assert result.mean_um == pytest.approx(50.0, abs=0.1)
+    spread = math.sqrt(result.rms_um**2 - result.mean_um**2)
+    assert spread == pytest.approx(3.0, abs=0.05)
+    assert result.p95_um == pytest.approx(50.0 + 1.645 * 3.0, abs=0.15)
+    flat = montecarlo(
+        uncertain_case(scene, Plan(samples=40_000), distribution=Distribution.UNIFORM)
+    )
+    assert flat.max_um == pytest.approx(50.0 + math.sqrt(3.0) * 3.0, abs=0.01)
+
+
+@pytest.mark.parametrize("over", ["max", "mean"])
+def test_over_all_points_each_machine_keeps_its_own_errors(over):
+    text = (
+        HEAD
+        + "[errors]\nEXX = { ramp = 50 }\n[uncertainty]\nEXX = { table = [[-100, 0], [100, 3]] }\n"
+    )
+    result = montecarlo(
+        uncertain_case(parse_scene(text, "s"), Plan(samples=5000, over=over, nodes=5))
+    )
+    assert result.median_um == pytest.approx(50.0 if over == "max" else 25.0, abs=0.3)
+
+
+def test_the_scene_must_have_some():
+    with pytest.raises(SceneError, match="has no uncertainties; expected an"):
+        evaluate_uncertainty(load_scene("dvf5000_first"))

@@ -6,7 +6,7 @@ import pytest
 from warpspace.analysis.wrong_conventions import convention_costs
 from warpspace.field.evaluate import View, evaluate_first_order
 from warpspace.field.grid import Workspace, build_grid
-from warpspace.kinematics.conversion.measuring_line import move_measuring_line
+from warpspace.kinematics.conversion import move_measuring_line
 from warpspace.kinematics.model import Model
 from warpspace.machine.description import build_machine
 from warpspace.machine.errors import Constant, ErrorSet, Ramp, Table
@@ -16,19 +16,19 @@ SPAN = (-100.0, 100.0)
 VOLUME = Workspace({"X": SPAN, "Y": (0.0, 0.0), "Z": (0.0, 0.0)})
 
 
-def costs(errors: ErrorSet, offset: float = 0.0) -> dict[str, tuple[float, float]]:
+def costs(errors, offset=0.0):
     machine = build_machine("wFXYZt", offset_mm={"t": (0.0, 0.0, offset)})
     found = convention_costs(Model(machine), errors, VOLUME)
     return {cost.name: (cost.mean_um, cost.max_um) for cost in found}
 
 
-def test_a_pitch_on_an_arm() -> None:
+def test_a_pitch_on_an_arm():
     found = costs(ErrorSet({"EBX": Constant(SPAN, 10.0)}), offset=-300.0)
     assert found["measuring_line"] == pytest.approx((3.0, 3.0))
     assert found["squareness=over_90"] == (0.0, 0.0)
 
 
-def test_the_sign_of_a_squareness_counts_twice() -> None:
+def test_the_sign_of_a_squareness_counts_twice():
     found = costs(ErrorSet({"EB0Z": Constant(SPAN, 10.0)}), offset=-300.0)
     assert found["squareness=over_90"] == pytest.approx((6.0, 6.0))
     assert found["squareness=under_90"] == (0.0, 0.0)
@@ -36,7 +36,7 @@ def test_the_sign_of_a_squareness_counts_twice() -> None:
     assert found["squareness=under_90"] == pytest.approx((6.0, 6.0))
 
 
-def test_a_tilt_that_is_lost_with_the_reference_line() -> None:
+def test_a_tilt_that_is_lost_with_the_reference_line():
     tilted = Table(SPAN, ((-100.0, 0.0), (100.0, 8.0)))
     found = costs(ErrorSet({"EYX": tilted}))
     for line in ("end_point", "least_squares", "minimum_zone"):
@@ -45,12 +45,12 @@ def test_a_tilt_that_is_lost_with_the_reference_line() -> None:
         assert largest == pytest.approx(8.0)
 
 
-def test_a_curve_set_to_zero_in_the_middle() -> None:
+def test_a_curve_set_to_zero_in_the_middle():
     found = costs(ErrorSet({"EXX": Ramp(SPAN, 6.0)}))
     assert found["zero_at"] == pytest.approx((3.0, 3.0))
 
 
-def test_it_is_the_difference_to_what_the_translation_gives() -> None:
+def test_it_is_the_difference_to_what_the_translation_gives():
     scene = load_scene("dvf5000_first")
     model, held = scene.model, {"X": 0.0, "Y": 0.0, "Z": -280.0}
     grid = build_grid(model, scene.workspace, 5)

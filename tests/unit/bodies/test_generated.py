@@ -1,24 +1,79 @@
-"""Bodies of any machine, generated from its description alone."""
+"""Bodies of machines: generated from a description, stored, and placed in the bent machine."""
 
-import time
+from runpy import run_path
 
 import numpy as np
 import pytest
+from trimesh import Trimesh
 
-from body_checks import assert_closed, components, nodes_inside, of_head
-from warpspace.bodies.generated.generate import generate_bodies
+import warpspace
+from warpspace.bodies.generated.frame import generate_bodies
 from warpspace.bodies.generated.layout import build_layout
+from warpspace.bodies.mesh import DARK, METAL, Body
+from warpspace.bodies.placed import (
+    load_bodies,
+    place_bodies,
+    place_points,
+    scene_motions,
+    view_motions,
+)
+from warpspace.bodies.schematic import BODY_FILE, box, cylinder, read_bodies
+from warpspace.exceptions import OptionError
+from warpspace.field.evaluate import View, build_basis
 from warpspace.field.grid import build_grid
+from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.machine.description import build_machine
-from warpspace.picture.bodies import place_bodies, scene_motions
+from warpspace.resources import assets_dir
 from warpspace.scene.library import load_scene
 from warpspace.scene.machines import load_machine, machine_names
+from warpspace.scene.starter import starter_scene
+
+HEAD = ("S", "t")
+"""Frames whose bodies reach into the volume, since the tool does."""
+
+
+def components(body: Body, vertices_mm: np.ndarray) -> list[Trimesh]:
+    """Give the closed shapes that a body is joined from."""
+    mesh = Trimesh(vertices_mm, body.triangles, process=False)
+    return list(mesh.split(only_watertight=False))
+
+
+def assert_closed(body: Body) -> None:
+    """Every shape of a body is closed and right side out, and no triangle is lost."""
+    found = components(body, body.vertices_mm)
+    assert sum(len(shape.faces) for shape in found) == len(body.triangles), body.name
+    for shape in found:
+        assert shape.is_watertight, body.name
+        assert shape.volume > 0.0, body.name
+
+
+def nodes_inside(body: Body, vertices_mm: np.ndarray, nodes_mm: np.ndarray) -> int:
+    """Count the points that lie in the convex hull of a shape of a body."""
+    inside = np.zeros(len(nodes_mm), dtype=bool)
+    for shape in components(body, vertices_mm):
+        low, high = shape.bounds
+        near = np.flatnonzero(((nodes_mm > low) & (nodes_mm < high)).all(axis=1))
+        if len(near):
+            normals = shape.face_normals
+            behind = np.einsum("fi,fi->f", normals, shape.triangles[:, 0])
+            inside[near[((nodes_mm[near] @ normals.T) < behind - 1e-6).all(axis=1)]] = True
+    return int(inside.sum())
+
+
+def of_head(machine, body: Body) -> bool:
+    """Whether a body belongs to what carries the tool beyond the last linear axis, or is a neck."""
+    names = machine.chain.tool
+    linear = [place for place, name in enumerate(names) if machine.axes[name].is_linear]
+    behind = names[linear[-1] + 1 :] if linear else names
+    what = body.name.partition("_")[2]
+    return body.frame in (*HEAD, *behind) or what in ("fork", "wedge", "neck")
+
 
 LIBRARY = tuple(name for name in machine_names() if name != "dvf5000")
 MAX_TRIANGLES = 20_000
 
 
-def random_machine(seed: int):
+def random_machine(seed):
     """One to eight axes of any letters on either side, with offsets and rotations now and then."""
     rng = np.random.default_rng(seed)
     names: list[str] = []
@@ -73,56 +128,19 @@ def test_tool_ends_in_the_tool_point(name):
     assert bodies["t"].vertices_mm[:, 2].min() == pytest.approx(0.0, abs=1e-9)
 
 
-def test_table_of_a_c_axis_is_round_about_it_and_carries_the_workpiece_frame():
-    machine = load_machine("trunnion_ac")
-    table = next(body for body in generate_bodies(machine) if body.name == "C_table")
-    radius = np.hypot(table.vertices_mm[:, 0], table.vertices_mm[:, 1])
-    rim = radius[np.isclose(table.vertices_mm[:, 2], table.vertices_mm[:, 2].max())]
-    assert rim.max() == pytest.approx(0.92 * 200.0, rel=1e-6)
-    assert table.vertices_mm[:, 2].max() == pytest.approx(machine.fixed_mm["w"][2], abs=1e-9)
+@pytest.mark.parametrize("chain", ["wXYZFt", "wZFXYt", "wBYFXZt", "wXYFZt", "wCAZYXFt"])
+def test_nothing_reaches_below_the_bed(chain):
+    machine = starter_scene(chain).machine
+    layout = build_layout(machine)
+    lowest = {
+        body.name: (body.vertices_mm @ pose[:3, :3].T + pose[:3, 3])[:, 2].min()
+        for body in generate_bodies(machine)
+        for pose in [layout.poses[body.frame]]
+    }
+    assert min(lowest.values()) == pytest.approx(lowest["R_bed"])
 
 
-def test_trunnion_tilts_about_its_axis_between_two_towers():
-    bodies = {body.name: body for body in generate_bodies(load_machine("trunnion_ac"))}
-    towers = bodies["R_towers"].vertices_mm
-    assert (towers[:, 0] < -250.0).any()
-    assert (towers[:, 0] > 250.0).any()
-    assert not (np.abs(towers[:, 0]) < 250.0).any()
-
-
-def test_bodies_grow_with_travel():
-    small = build_machine("wXYFZt", travel=dict.fromkeys("XYZ", (-50.0, 50.0)))
-    large = build_machine("wXYFZt", travel=dict.fromkeys("XYZ", (-500.0, 500.0)))
-    sizes = [
-        {body.name: np.ptp(body.vertices_mm, axis=0) for body in generate_bodies(machine)}
-        for machine in (small, large)
-    ]
-    for name in ("R_bed", "R_column", "X_table", "Y_saddle", "Z_headstock"):
-        assert (sizes[1][name] > 3.0 * sizes[0][name]).all(), name
-
-
-def test_a_place_in_the_library_is_what_its_structure_says():
-    kinds = {
-        "gantry_mill": "X_bridge", "bridge_cmm": "Y_bridge", "c_frame_mill": "Z_headstock",
-        "trunnion_bc": "R_portal", "head_head_cb": "C_fork", "nutating_head": "C_wedge",
-        "lathe_mill": "C1_chuck", "rotary_grinder": "t_wheel", "printer_3d": "Z_beam",
-        "scara": "C2_arm", "fixed_spindle": "Z_lift", "horizontal_b_table": "B_table",
-        "bridge_cmm ": "t_probe",
-    }  # fmt: skip
-    for name, body in kinds.items():
-        assert body in {found.name for found in generate_bodies(load_machine(name.strip()))}
-
-
-def test_bodies_are_generated_fast_and_kept():
-    machine = build_machine("wCAFXYZt", travel={"X": (-251.0, 251.0)})
-    generate_bodies(build_machine("wCAFXYZt"))  # imports trimesh
-    start = time.process_time()
-    bodies = generate_bodies(machine)
-    assert time.process_time() - start < 0.1
-    assert generate_bodies(build_machine("wCAFXYZt", travel={"X": (-251.0, 251.0)})) is bodies
-
-
-def slant_lathe(degrees: float):
+def slant_lathe(degrees):
     """A lathe whose carriage Z and slide X lie on a bed that slopes up to the rear."""
     tilt = {45.0: (90.0, -45.0, 90.0), 90.0: (90.0, 0.0, 90.0)}[degrees]
     return build_machine(
@@ -165,3 +183,118 @@ def test_only_slides_that_are_square_and_leave_tables_level_make_a_slant():
     cosine, sine = np.cos(np.radians(30.0)), 0.5
     expected = [[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]]
     np.testing.assert_allclose(slant, expected, atol=1e-12)
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return warpspace.load_scene("dvf5000_general")
+
+
+@pytest.fixture(scope="module")
+def bodies(scene):
+    return {body.name: body for body in load_bodies(scene.machine)}
+
+
+def amplitudes(scene):
+    """One value for every parameter, so that each of them has to be right."""
+    rng = np.random.default_rng(4)
+    return {key: float(value) for key, value in zip(
+        scene.parameter_keys, rng.normal(0, 20, len(scene.parameter_keys)), strict=True
+    )}  # fmt: skip
+
+
+def nominal(scene, body, **positions):
+    motion = view_motions(scene.model, scene.errors, {}, {**scene.workspace.positions, **positions})
+    return place_points(motion[body.frame], body.vertices_mm, 0.0)
+
+
+def test_every_part_of_the_machine_is_there_and_right_side_out(bodies):
+    assert set(bodies) == {
+        "R_bed", "R_column", "R_towers", "X_saddle", "Y_saddle", "Z_ram", "S_spindle", "t_tool",
+        "B_cradle", "C_table",
+    }  # fmt: skip
+    for body in bodies.values():
+        assert_closed(body)
+        assert len(body.edges_mm) > 0
+        assert np.ptp(body.colour) <= 24, "bodies are grey: colour means error"
+
+
+def test_the_stored_tool_ends_in_the_tool_point(scene, bodies):
+    tip = bodies["t_tool"].vertices_mm
+    assert tip[:, 2].min() == pytest.approx(0.0, abs=1e-4)
+    assert tip[np.argmin(tip[:, 2])][:2] == pytest.approx((0, 0), abs=8.01)
+
+
+def test_table_is_500_across_with_its_top_in_the_workpiece_frame(scene, bodies):
+    table = nominal(scene, bodies["C_table"], B=0.0, C=0.0)
+    assert table[:, 2].max() == pytest.approx(0.0, abs=1e-4)
+    assert np.ptp(table[:, 0]) == pytest.approx(500.0, abs=1e-3)
+
+
+def test_nothing_but_the_table_reaches_into_the_working_volume(scene, bodies):
+    low, high = np.array([-275, -225, 0.5]), np.array([275, 225, 429])
+    for name in ("R_bed", "R_column", "R_towers", "B_cradle", "C_table"):
+        points = nominal(scene, bodies[name])
+        triangles = points[bodies[name].triangles]
+        # no triangle's box meets the volume (boxes and cylinders: coarse, but on the safe side)
+        apart = (triangles.max(axis=1) < low) | (triangles.min(axis=1) > high)
+        assert apart.any(axis=1).all(), name
+
+
+def test_bent_tool_point_lies_in_the_deformed_grid(scene, bodies):
+    values = amplitudes(scene)
+    at = {**scene.workspace.positions, "X": 120.0, "Y": -80.0, "Z": -333.0, "B": -25.0, "C": 40.0}
+    for loop in Loop:
+        for reference in (None, {"X": 0.0, "Y": 0.0, "Z": -280.0}):
+            view = View(loop, "machine", reference)
+            coordinates = complete_coordinates(scene.machine, at)
+            tip = view_motions(scene.model, scene.errors, {}, at)["t"].nominal[:3, 3]
+            basis = build_basis(
+                scene.model, scene.errors, scene.parameter_keys, coordinates, view, tip
+            )
+            field = basis.evaluate(np.array(list(values.values())))
+            motions = view_motions(scene.model, scene.errors, values, at, view)
+            frame = "w" if loop is Loop.WORKPIECE else "t"
+            inside = np.linalg.inv(motions[frame].nominal) @ [*tip, 1.0]
+            for factor in (1.0, 2000.0):
+                drawn = place_points(motions[frame], inside[:3], factor)
+                assert drawn == pytest.approx(tip + factor * 1e-3 * field.error_um, abs=1e-9)
+
+
+def test_machine_without_a_file_of_bodies_has_generated_ones_and_a_broken_file_is_refused(tmp_path):
+    generated = generate_bodies(build_machine("wFXYZt"))
+    assert load_bodies(build_machine("wFXYZt")) == generated
+    assert load_bodies(build_machine("wFXYZt", body_dir=str(tmp_path))) == generated
+    (tmp_path / "bad").mkdir()
+    (tmp_path / "bad" / BODY_FILE).write_bytes(b"not a file of arrays")
+    with pytest.raises(OptionError, match="no file of machine bodies"):
+        load_bodies(build_machine("wFXYZt", body_dir=str(tmp_path / "bad")))
+
+
+def test_bodies_of_absent_axes_are_left_out(scene):
+    lean = build_machine("wCFXYZt", body_dir=scene.machine.body_dir)
+    assert "B_cradle" not in {body.name for body in load_bodies(lean)}
+
+
+SCRIPT = run_path(str(assets_dir() / "machines" / "dvf5000" / "build_bodies.py"))
+join_shapes, write_bodies = SCRIPT["join_shapes"], SCRIPT["write_bodies"]
+HERE = np.array([10.0, 20.0, 30.0])
+
+
+def test_written_bodies_are_read_back_with_their_edges_lines_and_colours(tmp_path):
+    bodies = [
+        join_shapes("X_saddle", DARK, [box((0, 1000), (0, 20), (0, 30))], HERE),
+        join_shapes("C_table", METAL, [cylinder(50.0, (0.0, 20.0), inner=10.0)], HERE),
+    ]
+    line = np.array([[[0.0, 0.0, 20.5], [50.0, 0.0, 20.5]], [[0.0, 0.0, 20.5], [0.0, 50.0, 20.5]]])
+    write_bodies(tmp_path / "bodies.glb", bodies, {"C_table": line})
+    found = read_bodies(tmp_path / "bodies.glb")
+    assert [body.name for body in found] == ["X_saddle", "C_table"]
+    for read, body in zip(found, bodies, strict=True):
+        assert (read.frame, read.colour) == (body.frame, body.colour)
+        np.testing.assert_allclose(read.vertices_mm, body.vertices_mm, atol=1e-4)
+        np.testing.assert_array_equal(read.triangles, body.triangles)
+        edges = body.edges_mm
+        if body.name == "C_table":
+            edges = np.concatenate([edges, line])
+        np.testing.assert_allclose(read.edges_mm, edges, atol=1e-4)

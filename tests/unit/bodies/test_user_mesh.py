@@ -1,16 +1,21 @@
-"""Meshes made by trimesh, written in all four formats, and read as bodies."""
+"""Meshes of users: read as bodies from all formats, and counted before they are built."""
 
+import copy
+import json
 import os
 import re
 import struct
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import trimesh
 
-from warpspace.bodies import mesh as opening
-from warpspace.bodies.user_mesh import FORMATS, load_mesh
-from warpspace.exceptions import OptionError
+from warpspace.bodies.mesh import open_meshes
+from warpspace.bodies.own_meshes import FORMATS, frame_meshes, load_mesh
+from warpspace.exceptions import OptionError, SceneError, WarpspaceError
+from warpspace.scene.urdf import place_robot, read_robot
 
 SIZE = np.array([300.0, 200.0, 100.0])
 
@@ -83,39 +88,45 @@ def test_missing_empty_and_damaged_files_are_named(ending, tmp_path):
         load_mesh(tmp_path / f"folder{ending}", "R")
 
 
-@pytest.mark.parametrize("name", ["points.ply", "points.glb", "points.obj"])
-def test_file_without_triangles(name, tmp_path):
-    if name.endswith("obj"):
-        (tmp_path / name).write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n")
-    else:
-        written(tmp_path / name, trimesh.PointCloud([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]]).scene()
-                if name.endswith("glb")
-                else trimesh.PointCloud([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]]))  # fmt: skip
-    with pytest.raises(OptionError, match=rf"{name}: there are no triangles"):
-        load_mesh(tmp_path / name, "R")
+def corrupted(folder):
+    """Give the names of files with something wrong in them."""
+    points = trimesh.PointCloud([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]])
+    written(folder / "points.ply", points)
+    written(folder / "points.glb", points.scene())
+    (folder / "points.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n")
+    (folder / "point.obj").write_text("v -10.0\n", "utf-8")
+    (folder / "flat.obj").write_text("v 0 0 0\nv 100 0 0\nv 200 0 0\nf 1 2 3\n")
+    for value in (np.nan, np.inf):
+        data = bytearray(written(folder / "a.stl", box()).read_bytes())
+        struct.pack_into("<f", data, 84 + 12, value)
+        (folder / f"{value}.stl").write_bytes(data)
+    content = trimesh.creation.box((20.0, 30.0, 40.0)).export(file_type="ply", encoding="ascii")
+    head, faces = content.split(b"end_header\n")
+    far = re.sub(rb"(?m)^3 7 ", b"3 70 ", faces)
+    assert far != faces
+    (folder / "box.ply").write_bytes(head + b"end_header\n" + far)
 
 
-def test_triangles_without_area_are_no_surface(tmp_path):
-    flat = tmp_path / "flat.obj"
-    flat.write_text("v 0 0 0\nv 100 0 0\nv 200 0 0\nf 1 2 3\n")
-    with pytest.raises(OptionError, match=r"flat\.obj: all of its triangles"):
-        load_mesh(flat, "R")
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_vertex_that_is_not_finite(value, tmp_path):
-    data = bytearray(written(tmp_path / "a.stl", box()).read_bytes())
-    struct.pack_into("<f", data, 84 + 12, value)
-    (tmp_path / "bad.stl").write_bytes(data)
-    with pytest.raises(OptionError, match=r"bad\.stl: a vertex is not finite"):
-        load_mesh(tmp_path / "bad.stl", "R")
-
-
-def test_too_large_a_file_is_not_opened(tmp_path, monkeypatch):
-    monkeypatch.setattr(opening, "LIMIT_MB", 0.0001)
-    path = written(tmp_path / "large.stl", box())
-    with pytest.raises(OptionError, match=r"large\.stl: .* may have up to"):
-        load_mesh(path, "R")
+@pytest.mark.parametrize(
+    ("name", "said", "options"),
+    [
+        ("points.ply", "there are no triangles", {}),
+        ("points.glb", "there are no triangles", {}),
+        ("points.obj", "there are no triangles", {}),
+        ("point.obj", ".*without three coordinates", {}),
+        ("flat.obj", "all of its triangles", {}),
+        ("nan.stl", "a vertex is not finite", {}),
+        ("inf.stl", "a vertex is not finite", {}),
+        ("box.ply", "no PLY file .* vertex that is not there", {}),
+        ("a.step", r"unknown ending; expected one of \.stl", {}),
+        ("a.stl", "'feet'; expected one of mm, cm, m, in", {"unit": "feet"}),
+        ("a.stl", "'x'; expected one of y, z", {"up": "x"}),
+    ],
+)
+def test_what_is_no_mesh_is_refused(name, said, options, tmp_path):
+    corrupted(tmp_path)
+    with pytest.raises(OptionError, match=f"{name}: {said}"):
+        load_mesh(tmp_path / name, "R", **options)
 
 
 def test_a_size_that_suggests_another_unit(tmp_path):
@@ -156,15 +167,6 @@ def test_meshes_of_a_file_are_joined_where_their_nodes_place_them(tmp_path):
     assert len(body.edges_mm) == 24
 
 
-def test_unknown_endings_units_and_axes(tmp_path):
-    with pytest.raises(OptionError, match=r"a\.step: unknown ending; expected one of \.stl"):
-        load_mesh(tmp_path / "a.step", "R")
-    with pytest.raises(OptionError, match=r"a\.stl: 'feet'; expected one of mm, cm, m, in"):
-        load_mesh(tmp_path / "a.stl", "R", unit="feet")
-    with pytest.raises(OptionError, match=r"a\.stl: 'x'; expected one of y, z"):
-        load_mesh(tmp_path / "a.stl", "R", up="x")
-
-
 def test_a_file_is_read_once_until_it_changes(tmp_path):
     path = written(tmp_path / "a.stl", box())
     first = load_mesh(path, "R")
@@ -181,23 +183,6 @@ def test_obj_does_not_open_the_files_it_names(tmp_path):
     assert len(load_mesh(path, "R").body.triangles) == 12
 
 
-def test_a_triangle_of_a_vertex_that_is_not_there(tmp_path):
-    content = trimesh.creation.box((20.0, 30.0, 40.0)).export(file_type="ply", encoding="ascii")
-    head, faces = content.split(b"end_header\n")
-    path = tmp_path / "box.ply"
-    path.write_bytes(head + b"end_header\n" + re.sub(rb"(?m)^3 7 ", b"3 70 ", faces))
-    assert b"\n3 70 " in path.read_bytes()
-    with pytest.raises(OptionError, match=r"box\.ply: no PLY file .* vertex that is not there"):
-        load_mesh(path, "X")
-
-
-def test_points_with_one_coordinate(tmp_path):
-    path = tmp_path / "point.obj"
-    path.write_text("v -10.0\n", "utf-8")
-    with pytest.raises(OptionError, match="without three coordinates"):
-        load_mesh(path, "X")
-
-
 def test_a_closed_surface_without_volume_warns_of_nothing(tmp_path):
     path = tmp_path / "x.obj"
     corners = "-10 -15 -20|-10 -15 20|-10 15 -20|-10 15 20|-10 15 20"
@@ -207,3 +192,241 @@ def test_a_closed_surface_without_volume_warns_of_nothing(tmp_path):
     lines += [f"f {face}" for face in faces.split("|")]
     path.write_text("\n".join(lines), "utf-8")
     assert len(load_mesh(path, "X").body.triangles) > 0
+
+
+POINTS = np.array([[0, 0, 0], [50, 0, 0], [0, 50, 0]], np.float32).tobytes()
+TRIANGLE = POINTS + np.array([0, 1, 2, 0], np.uint16).tobytes()
+ONE: dict[str, Any] = {
+    "asset": {"version": "2.0"},
+    "scene": 0,
+    "scenes": [{"nodes": [0]}],
+    "nodes": [{"mesh": 0}],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+    "accessors": [
+        {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
+        {"bufferView": 1, "componentType": 5123, "count": 3, "type": "SCALAR"},
+    ],
+    "bufferViews": [
+        {"buffer": 0, "byteOffset": 0, "byteLength": 36},
+        {"buffer": 0, "byteOffset": 36, "byteLength": 6},
+    ],
+    "buffers": [{"byteLength": 44}],
+}
+CORNERS = "".join(f"v {i % 7} {i // 7} {i % 3}\n" for i in range(300))
+
+
+def glb(**changes):
+    held = json.dumps({**copy.deepcopy(ONE), **changes}).encode()
+    held += b" " * (-len(held) % 4)
+    chunks = struct.pack("<II", len(held), 0x4E4F534A) + held
+    chunks += struct.pack("<II", len(TRIANGLE), 0x004E4942) + TRIANGLE
+    return struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks
+
+
+def diamond(levels):
+    pairs = [{"children": [2 * level + 2, 2 * level + 3]} for level in range(levels) for _ in "ab"]
+    return {"nodes": [*pairs, {"mesh": 0}, {"mesh": 0}], "scenes": [{"nodes": [0, 1]}]}
+
+
+def chain(length):
+    return [*({"children": [i + 1]} for i in range(length - 1)), {"mesh": 0}]
+
+
+primitive = ONE["meshes"][0]["primitives"][0]
+view, points = ONE["bufferViews"][0], ONE["accessors"][0]
+GLB = {
+    "nodes": (
+        {"nodes": [{"mesh": 0}] * 6000, "scenes": [{"nodes": list(range(6000))}]}, "6,000 nodes"
+    ),
+    "primitives": ({"meshes": [{"primitives": [primitive] * 6000}]}, "6,000 primitives"),
+    "placed": (
+        {
+            "meshes": [{"primitives": [primitive] * 100}],
+            "nodes": [{"mesh": 0}] * 100,
+            "scenes": [{"nodes": list(range(100))}],
+        },
+        "10,000 primitives, each placing counted",
+    ),
+    "each other's children": (
+        {"nodes": [{"children": [1]}, {"children": [0], "mesh": 0}]}, "node 0 twice"
+    ),
+    "its own child": ({"nodes": [{"children": [0], "mesh": 0}]}, "node 0 twice"),
+    "two parents, thirty levels": (diamond(30), "twice in its scene; expected a tree"),
+    "named twice": ({"scenes": [{"nodes": [0, 0]}]}, "node 0 twice"),
+    "deep": ({"nodes": chain(200)}, "51 nodes below each other; expected at most 50"),
+    "materials": ({"materials": [{}] * 6000}, "6,000 materials"),
+    "overlapping views": (
+        {"bufferViews": [{**view, "byteLength": 44_000_000}] * 2}, "88,000,000 bytes in views"
+    ),
+    "accessors": ({"accessors": [{**points, "count": 2_000_000}] * 2}, "4,000,000 points and ind"),
+    "negative": (
+        {"accessors": [{**points, "count": 4_000_000}, {**points, "count": -9_000_000}]},
+        "4,000,000 points and indices",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", GLB)
+def test_a_glb_file_is_counted_before_it_is_built(tmp_path, name):
+    changes, expected = GLB[name]
+    path = tmp_path / "a.glb"
+    path.write_bytes(glb(**changes))
+    with pytest.raises(OptionError, match=r"a\.glb: it holds .*; expected .*") as caught:
+        open_meshes(path, "GLB file")
+    assert expected in str(caught.value)
+
+
+def test_a_glb_file_within_the_limits_is_built(tmp_path):
+    path = tmp_path / "a.glb"
+    path.write_bytes(glb(nodes=chain(50)))
+    assert len(load_mesh(path, "X", unit="mm").body.triangles) == 1
+    path.write_bytes(glb() + struct.pack("<II", 0, 0x12345678) * 6000)
+    with pytest.raises(OptionError, match="5,001 chunks; expected at most 5,000"):
+        open_meshes(path, "GLB file")
+
+
+@pytest.mark.parametrize("word", ["usemtl m{}", "g g{}", "o o{}", "  usemtl m {}", "s {}"])
+def test_groups_and_materials_of_an_obj_file_are_one_body(tmp_path, word):
+    # 30,000 materials took more than 25 s: trimesh goes through all vertices for each
+    path = tmp_path / "a.obj"
+    faces = (
+        f"{word.format(i)}\nf {i % 290 + 1} {i % 290 + 2} {i % 290 + 8}\n" for i in range(30_000)
+    )
+    path.write_text(CORNERS + "mtllib a.mtl\n" + "".join(faces))
+    scene = open_meshes(path, "OBJ file")
+    assert [len(mesh.faces) for mesh in scene.geometry.values()] == [30_000]
+
+
+def test_solids_of_an_stl_file_are_one_body(tmp_path):
+    facet = "facet normal 0 0 1\nouter loop\nvertex {0} 0 0\nvertex {0} 9 0\nvertex {0} 0 9\n"
+    solid = "solid s{0}\n" + facet + "endloop\nendfacet\nendsolid s{0}\n"
+    path = tmp_path / "a.stl"
+    path.write_text("".join(solid.format(i) for i in range(3000)))
+    scene = open_meshes(path, "STL file")
+    assert [len(mesh.faces) for mesh in scene.geometry.values()] == [3000]
+    path.write_text("".join(solid.format(i) + "between\n" for i in range(3000)))
+    with pytest.raises(OptionError, match="3,000 solids; expected at most 1,000"):
+        open_meshes(path, "STL file")
+
+
+XYZ = "property float x\nproperty float y\nproperty float z\n"
+FACES = "element face {}\nproperty list uchar {} vertex_indices\nend_header\n"
+TEXTS = {
+    "polygon.obj": (CORNERS + "f" + " 1 2 3" * 90_000 + "\n", "269,998 triangles"),
+    "polygons.obj": (CORNERS + ("f" + " 1 2 3" * 50 + "\nf 1 2 3\n") * 2000, "298,000 triangles"),
+    "odd_blanks.obj": (CORNERS + "f 1" + "\x1c2" * 260_000 + "\n", "259,999 triangles"),
+    "lines.obj": (CORNERS + "\n" * 3_000_000, "3,000,300 lines; expected at most 3,000,000"),
+    "triangles.stl": ("solid a\n" + "vertex 0 0 1\n" * 750_003 + "endsolid\n", "250,001 triangles"),
+    "numbers.stl": ("solid a\nvertex" + " 1" * 10_000_000 + "\nendsolid\n", "10,000,004 words"),
+    "header.ply": ("ply\nformat ascii 1.0\n" + "comment a\n" * 7000 + "end_header\n", "of header"),
+    "elements.ply": (
+        "ply\nformat ascii 1.0\n" + "".join(f"element e{i} 1\n" for i in range(6000)), "of header"
+    ),
+    "rows.ply": (
+        "ply\nformat ascii 1.0\nelement vertex 3000000000\n" + XYZ + FACES.format(1, "int"),
+        "3,000,000,000 rows of 'vertex'; expected at most 750,000",
+    ),
+    "polygon.ply": (
+        "ply\nformat ascii 1.0\nelement vertex 3\n" + XYZ + FACES.format(1, "int")
+        + "0 0 0\n5 0 0\n0 5 0\n" + "9" + " 1" * 3_000_000,
+        "3,000,001 numbers in lists",
+    ),
+    "binary.ply": (
+        "ply\nformat binary_little_endian 1.0\nelement vertex 0\n" + XYZ + FACES.format(1, "uchar")
+        + "1" * 3_000_001,
+        "3,000,001 numbers in lists",
+    ),
+    "lines.ply": (
+        "ply\nformat ascii 1.0\nelement vertex 0\n" + XYZ + FACES.format(0, "int") + "\n" * 101,
+        "lines; expected at most 100",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_numbers_of_a_file_are_counted_before_it_is_built(tmp_path, name):
+    text, expected = TEXTS[name]
+    path = tmp_path / name
+    path.write_bytes(text.encode())
+    with pytest.raises(OptionError, match=f"{name}: it holds ") as caught:
+        open_meshes(path, "mesh")
+    assert expected in str(caught.value)
+
+
+def test_triangles_of_a_binary_stl_are_counted(tmp_path):
+    path = tmp_path / "a.stl"
+    path.write_bytes(bytes(80) + struct.pack("<I", 250_001) + bytes(50 * 250_001))
+    with pytest.raises(OptionError, match="250,001 triangles; expected at most 250,000"):
+        open_meshes(path, "STL file")
+
+
+# --- URDF -----------------------------------------------------------------------------------------
+
+
+def urdf(path, links, visual="", further=""):
+    """A chain of links of which the first joint moves."""
+    text = "".join(f'<link name="l{i}">{visual if i == 1 else ""}</link>' for i in range(links))
+    ends = '<parent link="l{0}"/><child link="l{1}"/>'
+    moving = '<axis xyz="1 0 0"/><origin xyz="0 0 1"/><limit lower="0" upper="1"/>'
+    fixed = '<origin xyz="0.001 0 0" rpy="0 0 0"/>'
+    for i in range(1, links):
+        kind, rest = ("prismatic", moving) if i == 1 else ("fixed", fixed)
+        text += f'<joint name="j{i}" type="{kind}">{ends.format(i - 1, i)}{rest}</joint>'
+    path.write_text(f'<robot name="r">{text}{further}</robot>')
+    return path
+
+
+URDF = {
+    "links": ({"links": 2001}, "has 2,001 links; expected at most 2,000"),
+    "shapes": ({"links": 2, "visual": "<visual/>" * 501}, "has 501 shapes"),
+    "elements": (
+        {"links": 2, "further": "<gazebo/>" * 50_001},
+        "elements; expected at most 50,000",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", URDF)
+def test_a_urdf_file_is_counted_before_it_is_read(tmp_path, name):
+    values, expected = URDF[name]
+    with pytest.raises(SceneError) as caught:
+        read_robot(urdf(tmp_path / "a.urdf", **values))
+    assert expected in str(caught.value)
+
+
+def test_a_chain_of_links_is_gone_through_once(tmp_path, monkeypatch):
+    from warpspace.scene import urdf as placing
+
+    steps = [0]
+    pose = placing._pose_mm
+
+    def counted(joints):
+        steps[0] += len(joints)
+        return pose(joints)
+
+    monkeypatch.setattr(placing, "_pose_mm", counted)
+    robot, _ = read_robot(urdf(tmp_path / "a.urdf", 2000))
+    found = placing.place_robot(robot, "a.urdf")
+    assert steps[0] < 10 * 2000  # 2,000,000 joints were gone through, 40 s
+    frame, last = found.frame_of["l1999"]
+    assert frame == "X"
+    np.testing.assert_allclose(last[:3, 3], (1998.0, 0.0, 0.0), atol=1e-9)
+
+
+def test_a_mesh_of_many_shapes_is_read_once_and_their_triangles_are_limited(tmp_path, monkeypatch):
+    import warpspace.bodies.own_meshes as module
+
+    loads: list[Path] = []
+    load = module._load
+    monkeypatch.setattr(module, "_load", lambda path: loads.append(path) or load(path))
+    (tmp_path / "one.obj").write_text(CORNERS + "f 1 2 8\n" * 40_000)
+    (tmp_path / "bad.obj").write_text(CORNERS + "f" + " 1" * 260_000)
+    shape = '<visual><geometry><mesh filename="{}.obj"/></geometry></visual>'
+    robot, _ = read_robot(urdf(tmp_path / "a.urdf", 2, shape.format("bad") * 20))
+    _, notes, _ = frame_meshes(robot, place_robot(robot, "a.urdf").frame_of, tmp_path)
+    assert len(notes) == 20
+    assert "259,998 triangles; expected at most 250,000" in notes[0]
+    robot, _ = read_robot(urdf(tmp_path / "a.urdf", 2, shape.format("one") * 26))
+    with pytest.raises(WarpspaceError, match="more than 1,000,000 triangles"):
+        frame_meshes(robot, place_robot(robot, "a.urdf").frame_of, tmp_path)
+    assert [path.name for path in loads] == ["bad.obj", "one.obj"]

@@ -1,20 +1,56 @@
-"""The exact chain on machines small enough to work out by hand."""
+"""Transforms, chains, bodies and the first order, against numbers by hand."""
 
 import numpy as np
 import pytest
 
+from warpspace import load_scene
+from warpspace.exceptions import OptionError, UnknownNameError
+from warpspace.field.evaluate import error_values
+from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import (
-    branch_frames,
-    branch_pose,
     error_transform,
-    motion,
     nominal_point,
     point_in_branch,
     tool_axis,
 )
-from warpspace.kinematics.deviation import exact_error
-from warpspace.kinematics.model import ComponentErrors, Loop, Model
+from warpspace.kinematics.deviation import loop_error
+from warpspace.kinematics.firstorder import body_motions, columns
+from warpspace.kinematics.model import (
+    ComponentErrors,
+    Loop,
+    Model,
+    batch_shape,
+    complete_coordinates,
+)
 from warpspace.machine.description import build_machine
+
+
+def test_tiny_rotations_are_not_rounded_away():
+    turned = transforms.vector_rotation([0.0, 0.0, 1e-12])
+    assert turned[1, 0] == pytest.approx(1e-12, rel=1e-12)
+    assert turned[0, 1] == pytest.approx(-1e-12, rel=1e-12)
+
+
+MACHINE = build_machine("wCFXYt")
+
+
+def test_axes_not_given_take_their_default_or_zero():
+    found = complete_coordinates(MACHINE, {"X": [1.0, 2.0]}, {"Y": 5.0, "X": 9.0})
+    assert {axis: at.tolist() for axis, at in found.items()} == {"X": [1, 2], "Y": 5, "C": 0}
+    assert batch_shape(found) == (2,)
+    fitting = complete_coordinates(MACHINE, {"X": np.zeros((2, 1)), "Y": np.zeros(3)})
+    assert batch_shape(fitting) == (2, 3)
+    with pytest.raises(OptionError, match=r"X \(2,\), Y \(3,\).*one batch shape"):
+        complete_coordinates(MACHINE, {"X": np.zeros(2), "Y": np.zeros(3)})
+    with pytest.raises(UnknownNameError, match="'Z'; expected one of X, Y, C"):
+        complete_coordinates(MACHINE, {"Z": 1.0})
+
+
+@pytest.mark.parametrize("value", [np.nan, [0.0, np.inf], "far", None, [[1.0], [1.0, 2.0]]])
+def test_positions_that_are_no_finite_numbers_are_refused(value):
+    with pytest.raises(OptionError, match=r"axis Y at .*; expected finite numbers"):
+        complete_coordinates(MACHINE, {"Y": value})
+
 
 OFFSETS = {
     "X": (1.0, 2.0, 3.0),
@@ -22,26 +58,12 @@ OFFSETS = {
     "t": (0.0, 0.0, -100.0),
     "w": (0.0, 0.0, 10.0),
 }
-MACHINE = build_machine("wCFXt", offset_mm=OFFSETS)
+CHAIN_MACHINE = build_machine("wCFXt", offset_mm=OFFSETS)
 AT = {"X": np.asarray(20.0), "C": np.asarray(90.0)}
 
 
-def test_frames_stand_before_and_after_the_motion() -> None:
-    (frames,) = branch_frames(Model(MACHINE), "tool", AT)
-    assert frames.axis.name == "X"
-    assert frames.before[:3, 3].tolist() == [1.0, 2.0, 3.0]
-    assert frames.after[:3, 3].tolist() == [21.0, 2.0, 3.0]
-
-
-def test_poses_end_at_the_tool_and_the_workpiece() -> None:
-    assert branch_pose(Model(MACHINE), "tool", AT)[:3, 3].tolist() == [21.0, 2.0, -97.0]
-    workpiece = branch_pose(Model(MACHINE), "workpiece", AT)
-    assert workpiece[:3, 3].tolist() == [0.0, 0.0, 60.0]
-    np.testing.assert_allclose(workpiece[:3, 0], [0.0, 1.0, 0.0], atol=1e-15)
-
-
-def test_functional_points_belong_to_their_loops() -> None:
-    model = Model(MACHINE, tool_point_mm=(0.0, 0.0, -7.0), workpiece_point_mm=(5.0, 0.0, 0.0))
+def test_functional_points_belong_to_their_loops():
+    model = Model(CHAIN_MACHINE, tool_point_mm=(0.0, 0.0, -7.0), workpiece_point_mm=(5.0, 0.0, 0.0))
     assert nominal_point(model, Loop.TOOL, AT).tolist() == [21.0, 2.0, -104.0]
     assert nominal_point(model, Loop.RELATIVE, AT).tolist() == [21.0, 2.0, -104.0]
     found = nominal_point(model, Loop.WORKPIECE, AT)
@@ -49,69 +71,92 @@ def test_functional_points_belong_to_their_loops() -> None:
     np.testing.assert_array_equal(found, point_in_branch(model, "workpiece", AT, (5.0, 0.0, 0.0)))
 
 
-@pytest.mark.parametrize("direction", [1, -1])
-def test_direction_decides_which_way_an_axis_moves(direction: int) -> None:
-    machine = build_machine("wCFXt", direction={"X": direction, "C": direction})
-    assert motion(machine.axis("X"), np.asarray(20.0))[0, 3] == 20.0 * direction
-    assert motion(machine.axis("C"), np.asarray(90.0))[1, 0] == pytest.approx(direction)
-
-
-def test_tool_axis_turns_with_a_swivelling_head() -> None:
+def test_tool_axis_turns_with_a_swivelling_head():
     model = Model(build_machine("wFXBt"))
     turned = tool_axis(model, {"X": np.asarray(0.0), "B": np.array([0.0, 90.0])})
     np.testing.assert_allclose(turned, [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]], atol=1e-15)
 
 
-def test_error_transform_is_a_shift_and_then_a_full_turn() -> None:
+def test_error_transform_is_a_shift_and_then_a_full_turn():
     pose = error_transform("X", {"EYX": np.asarray(7.0), "ECX": np.asarray(1e5)}, constant=False)
-    assert pose is not None
     assert pose[:3, 3] == pytest.approx([0.0, 0.007, 0.0])
     assert pose[1, 0] == pytest.approx(np.sin(0.1), abs=1e-15)
     assert error_transform("X", {"EC0X": np.asarray(1.0)}, constant=False) is None
     assert error_transform("X", {"EC0X": np.asarray(1.0)}, constant=True) is not None
 
 
-def shift_of(model: Model, loop: Loop, values: dict[str, float]) -> np.ndarray:
-    """Position error of the functional point, µm."""
-    arrays = {key: np.asarray(value) for key, value in values.items()}
-    return exact_error(model, loop, AT, arrays, nominal_point(model, loop, AT))[0]
+TILTED = 20e3 * np.array([np.cos(1e-3) - 1.0, np.sin(1e-3), 0.0])
+"""20 mm along X, turned by 1000 µrad about z, µm."""
 
 
-def test_error_is_actual_minus_nominal_in_the_loop_of_its_axis() -> None:
-    model = Model(MACHINE)
-    for loop, expected in (("tool", 5.0), ("relative", 5.0), ("workpiece", 0.0)):
-        np.testing.assert_allclose(
-            shift_of(model, Loop(loop), {"EXX": 5.0}), [expected, 0.0, 0.0], atol=1e-9
-        )
-    for loop, expected in (("tool", 0.0), ("relative", -4.0), ("workpiece", 4.0)):
-        np.testing.assert_allclose(
-            shift_of(model, Loop(loop), {"EZC": 4.0}), [0.0, 0.0, expected], atol=1e-9
-        )
+@pytest.mark.parametrize(
+    ("loop", "errors", "after", "before"),
+    [
+        # actual minus nominal in the loop of its axis
+        ("tool", {"EXX": 5.0}, (5, 0, 0), (5, 0, 0)),
+        ("relative", {"EXX": 5.0}, (5, 0, 0), (5, 0, 0)),
+        ("workpiece", {"EXX": 5.0}, (0, 0, 0), (0, 0, 0)),
+        ("tool", {"EZC": 4.0}, (0, 0, 0), (0, 0, 0)),
+        ("relative", {"EZC": 4.0}, (0, 0, -4), (0, 0, -4)),
+        ("workpiece", {"EZC": 4.0}, (0, 0, 4), (0, 0, 4)),
+        # component errors ride on the body or keep their direction, constants always keep it
+        ("workpiece", {"EXC": 4.0}, (0, 4, 0), (4, 0, 0)),
+        ("workpiece", {"EX0C": 4.0}, (4, 0, 0), (4, 0, 0)),
+        # squareness does not ride on the linear motion it tilts
+        ("tool", {"EC0X": 1000.0}, TILTED, TILTED),
+        ("tool", {"ECX": 1000.0}, (0, 0, 0), TILTED),
+    ],
+)
+def test_errors_of_the_exact_chain_by_hand(loop, errors, after, before):
+    values = {key: np.asarray(value) for key, value in errors.items()}
+    for order, expected in zip(ComponentErrors, (after, before), strict=True):
+        model = Model(CHAIN_MACHINE, order)
+        point = nominal_point(model, Loop(loop), AT)
+        found, _ = loop_error(model, Loop(loop), AT, values, point)
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
 
 
-def test_component_errors_ride_on_the_body_or_keep_their_direction() -> None:
-    after = Model(MACHINE, ComponentErrors.AFTER_MOTION)
-    before = Model(MACHINE, ComponentErrors.BEFORE_MOTION)
-    found = shift_of(after, Loop.WORKPIECE, {"EXC": 4.0})
-    np.testing.assert_allclose(found, [0.0, 4.0, 0.0], atol=1e-9)
-    found = shift_of(before, Loop.WORKPIECE, {"EXC": 4.0})
-    np.testing.assert_allclose(found, [4.0, 0.0, 0.0], atol=1e-9)
-    for model in (after, before):
-        found = shift_of(model, Loop.WORKPIECE, {"EX0C": 4.0})
-        np.testing.assert_allclose(found, [4.0, 0.0, 0.0], atol=1e-9)
-
-
-def test_squareness_does_not_ride_on_the_linear_motion_it_tilts() -> None:
-    values = {"EC0X": 1000.0}
-    moved = shift_of(Model(MACHINE), Loop.TOOL, values)
-    assert moved[1] == pytest.approx(20.0 * np.sin(1e-3) * 1e3, rel=1e-9)
-    assert shift_of(Model(MACHINE), Loop.TOOL, {"ECX": 1000.0})[1] == pytest.approx(0.0, abs=1e-9)
-
-
-def test_tilt_of_the_tool_axis_has_no_part_about_the_axis() -> None:
-    model = Model(MACHINE)
+def test_tilt_of_the_tool_axis_has_no_part_about_the_axis():
+    model = Model(CHAIN_MACHINE)
     values = {"EAX": np.asarray(30.0), "ECX": np.asarray(50.0)}
-    tilt = exact_error(model, Loop.TOOL, AT, values, np.zeros(3))[1]
+    tilt = loop_error(model, Loop.TOOL, AT, values, np.zeros(3))[1]
     np.testing.assert_allclose(tilt, [30.0, 0.0, 0.0], atol=2e-3)
-    tilt = exact_error(model, Loop.RELATIVE, AT, {"EA0C": np.asarray(30.0)}, np.zeros(3))[1]
+    tilt = loop_error(model, Loop.RELATIVE, AT, {"EA0C": np.asarray(30.0)}, np.zeros(3))[1]
     np.testing.assert_allclose(tilt, [-30.0, 0.0, 0.0], atol=1e-6)
+
+
+def test_only_bodies_behind_an_error_move():
+    scene = load_scene("teach_squareness")
+    at = complete_coordinates(scene.machine, {"X": 10.0})
+    bodies = body_motions(scene.model, error_values(scene.model, scene.errors, at), at)
+    moved = {name for name, body in bodies.items() if np.any(body.rotation_rad != 0.0)}
+    assert moved == {"Y", "Z", "S", "t"}
+
+
+def test_errors_before_the_motion_stand_in_fixed_directions():
+    machine = build_machine("wCFt")
+    at = {"C": np.array(90.0)}
+    after = body_motions(Model(machine), {"EAC": 10.0}, at)["C"]
+    before = body_motions(Model(machine, ComponentErrors.BEFORE_MOTION), {"EAC": 10.0}, at)["C"]
+    np.testing.assert_allclose(after.rotation_rad, [0.0, 1e-5, 0.0], atol=1e-18)
+    np.testing.assert_allclose(before.rotation_rad, [1e-5, 0.0, 0.0], atol=1e-18)
+
+
+MODEL = Model(build_machine("wCFXt", offset_mm={"X": (1.0, 2.0, 3.0), "t": (0.0, 0.0, -100.0)}))
+POINT = np.array([21.0, 2.0, -97.0])
+
+
+def test_columns_hold_direction_lever_sign_and_gain():
+    found = columns(MODEL, Loop.TOOL, ["EBX", "EYX", "EAC", "EC0X"], AT, POINT)
+    assert set(found) == {"EBX", "EYX", "EC0X"}
+    assert found["EBX"].lever_mm.tolist() == [0.0, 0.0, -100.0]
+    assert found["EBX"].position == pytest.approx([-0.1, 0.0, 0.0])
+    assert found["EYX"].position.tolist() == [0.0, 1.0, 0.0]
+    assert found["EC0X"].lever_mm.tolist() == [20.0, 0.0, -100.0]  # before the motion
+    relative = columns(MODEL, Loop.RELATIVE, ["EZC", "EZX"], AT, POINT)
+    assert (relative["EZC"].sign, relative["EZX"].sign) == (-1.0, 1.0)
+    assert relative["EZC"].position.tolist() == [0.0, 0.0, -1.0]
+    for convention, direction in zip(ComponentErrors, ((0, 1, 0), (1, 0, 0)), strict=True):
+        model = Model(MODEL.machine, convention)
+        column = columns(model, Loop.WORKPIECE, ["EXC"], AT, POINT)["EXC"]
+        np.testing.assert_allclose(column.direction, direction, atol=1e-15)

@@ -1,15 +1,18 @@
 """Files are written whole or not at all."""
 
 import stat
+import subprocess
+import sys
+import tempfile
 from pathlib import Path
 
 import pytest
 
 from warpspace.exceptions import OutputError
-from warpspace.outputs.files import write_atomically
+from warpspace.outputs.files import temporary_folder, temporary_prefix, write_atomically
 
 
-def test_new_file_appears_only_when_all_went_well(tmp_path: Path) -> None:
+def test_new_file_appears_only_when_all_went_well(tmp_path):
     target = tmp_path / "out.csv"
     with write_atomically(target) as temporary:
         temporary.write_text("whole", encoding="utf-8")
@@ -21,9 +24,7 @@ def test_new_file_appears_only_when_all_went_well(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", [ValueError, KeyboardInterrupt])
-def test_failure_leaves_the_old_file_and_nothing_beside_it(
-    tmp_path: Path, kind: type[BaseException]
-) -> None:
+def test_failure_leaves_the_old_file_and_nothing_beside_it(tmp_path, kind):
     target = tmp_path / "out.csv"
     target.write_text("old", encoding="utf-8")
     with pytest.raises(kind):
@@ -32,43 +33,46 @@ def test_failure_leaves_the_old_file_and_nothing_beside_it(
     assert list(tmp_path.iterdir()) == [target]
 
 
-def test_error_of_the_system_names_the_target(tmp_path: Path) -> None:
+def test_error_of_the_system_names_the_target(tmp_path):
     target = tmp_path / "out.csv"
     with pytest.raises(OutputError, match=r"out\.csv: cannot be written: No space"):
         write_full(target)
     assert list(tmp_path.iterdir()) == []
 
 
-def write_half(target: Path, failure: BaseException) -> None:
+def write_half(target, failure):
     """Fail in the middle of writing."""
     with write_atomically(target) as temporary:
         temporary.write_text("half", encoding="utf-8")
         raise failure
 
 
-def write_full(target: Path) -> None:
+def write_full(target):
     """Run out of space while writing."""
     with write_atomically(target):
         raise OSError(28, "No space left on device")
 
 
 @pytest.mark.parametrize(
-    ("name", "reason"), [("", "is a folder"), ("nowhere/out.csv", "does not exist")]
+    ("name", "reason"),
+    [
+        ("", "is a folder"),
+        ("nowhere/out.csv", "does not exist"),
+        ("nul\0.csv", "cannot be written"),
+    ],
 )
-def test_impossible_target_is_refused_before_any_work(
-    tmp_path: Path, name: str, reason: str
-) -> None:
+def test_impossible_target_is_refused_before_any_work(tmp_path, name, reason):
     with pytest.raises(OutputError, match=reason), write_atomically(tmp_path / name):
         pytest.fail("the work was begun")
 
 
-def test_device_is_refused_and_stays_a_device() -> None:
+def test_device_is_refused_and_stays_a_device():
     with pytest.raises(OutputError, match="no regular file"), write_atomically("/dev/null"):
         pytest.fail("the work was begun")
     assert Path("/dev/null").is_char_device()
 
 
-def test_link_stays_a_link_to_the_new_file(tmp_path: Path) -> None:
+def test_link_stays_a_link_to_the_new_file(tmp_path):
     folder = tmp_path / "elsewhere"
     folder.mkdir()
     link = tmp_path / "out.csv"
@@ -77,3 +81,21 @@ def test_link_stays_a_link_to_the_new_file(tmp_path: Path) -> None:
         temporary.write_text("new", encoding="utf-8")
     assert link.is_symlink()
     assert (folder / "file.csv").read_text(encoding="utf-8") == "new"
+
+
+def test_a_temporary_folder_clears_those_of_processes_that_have_ended(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    ended = subprocess.run(
+        [sys.executable, "-c", "import os; print(os.getpid())"],
+        check=True, capture_output=True, text=True,
+    ).stdout.strip()  # fmt: skip
+    machine = temporary_prefix().split("-")[1]
+    left = tmp_path / f".warpspace-{machine}-{ended}-abc"
+    (left / "inside").mkdir(parents=True)
+    alive = tmp_path / f"{temporary_prefix()}abc"
+    alive.mkdir()
+    with temporary_folder() as folder:
+        assert folder.is_dir()
+        assert not left.exists()
+        assert alive.is_dir()
+    assert not folder.exists()

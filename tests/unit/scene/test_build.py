@@ -1,23 +1,32 @@
-"""From text to a scene: defaults, spans, references, and machines of one's own."""
+"""From text to a scene and to other conventions: defaults, spans, readings, machines, evaluate."""
 
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from warpspace.exceptions import SceneError
+from warpspace.exceptions import SceneError, WarpspaceError
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import ComponentErrors
-from warpspace.machine.errors import Constant, Harmonics, Poly, Ramp, Table
-from warpspace.machine.tolerances import Tolerance
-from warpspace.scene.library import parse_scene
-from warpspace.scene.pipeline import evaluate
-from warpspace.scene.save import scene_to_toml
+from warpspace.machine.errors import (
+    Constant,
+    Harmonics,
+    Measurement,
+    Poly,
+    Ramp,
+    Run,
+    Table,
+    Tolerance,
+)
+from warpspace.scene.conversion import Target, convert_scene, field_difference
+from warpspace.scene.library import load_scene, parse_scene
+from warpspace.scene.model import evaluate
+from warpspace.scene.save import Notation, scene_to_toml
 
 DVF = 'machine = "dvf5000"\n'
 
 
-def test_everything_but_the_machine_has_a_default() -> None:
+def test_everything_but_the_machine_has_a_default():
     scene = parse_scene(DVF, "bare")
     assert (scene.name, scene.title, scene.description) == ("bare", "bare", "")
     assert scene.workspace.ranges["X"] == (-275.0, 275.0)
@@ -29,7 +38,7 @@ def test_everything_but_the_machine_has_a_default() -> None:
     assert not scene.tolerances
 
 
-def test_every_kind_of_error_function_is_built(tmp_path: Path) -> None:
+def test_every_kind_of_error_function_is_built(tmp_path):
     (tmp_path / "m.csv").write_text("q,yaw,pitch\n-275,1,-4\n275,2,6\n", encoding="utf-8")
     text = DVF + (
         "[workspace]\nZ = [-480, -80]\n[errors]\nEXX = 3\nEAZ = { ramp = -22.5 }\n"
@@ -47,37 +56,18 @@ def test_every_kind_of_error_function_is_built(tmp_path: Path) -> None:
     assert functions["EBX"] == Table(travel, ((-275.0, -4.0), (275.0, 6.0)))
 
 
-def test_ramp_runs_over_the_travel_where_the_axis_stands_still() -> None:
+def test_ramp_runs_over_the_travel_where_the_axis_stands_still():
     scene = parse_scene(DVF + "[workspace]\nZ = -100\n[errors]\nEAZ = { ramp = 8 }\n", "x")
     assert scene.errors.evaluate("EAZ", np.array([-480.0, 0.0])).tolist() == [0.0, 8.0]
 
 
-def test_csv_is_refused_where_there_is_no_folder() -> None:
+def test_csv_is_refused_where_there_is_no_folder():
     text = DVF + '[errors]\nEBX = { csv = "/etc/hostname", column = "pitch" }\n'
     with pytest.raises(SceneError, match="CSV files are not read here"):
         parse_scene(text, "upload")
 
 
-@pytest.mark.parametrize("chain", ["wXYZABCFt", "wFXYZABCt", "wBFt", "(w)C'Y-b X Z (t)"])
-def test_machine_of_any_chain_can_stand_in_the_scene(chain: str) -> None:
-    scene = parse_scene(f'[machine]\nchain = "{chain}"\ntitle = "Mine"\n', "mine")
-    assert scene.machine.title == "Mine"
-    assert set(scene.workspace.ranges) == set(scene.machine.axes)
-
-
-def test_own_machine_takes_offsets_travels_and_directions() -> None:
-    text = (
-        '[machine]\nchain = "wCFXt"\noffset_mm.X = [1, 2, 3]\noffset_mm.t = [0, 0, -9]\n'
-        "travel.X = [0, 800]\ndirection.C = -1\n"
-    )
-    machine = parse_scene(text, "mine").machine
-    assert machine.axis("X").offset_mm == (1, 2, 3)
-    assert machine.axis("X").travel == (0, 800)
-    assert machine.axis("C").direction == -1
-    assert machine.end_frames("tool")[1][1] == (0, 0, -9)
-
-
-def test_constant_beyond_the_default_ones_becomes_a_parameter_of_the_scene() -> None:
+def test_constant_beyond_the_default_ones_becomes_a_parameter_of_the_scene():
     free = '[convention]\nreference_axis = "free"\n[errors]\nEC0X = 5\n[tolerances]\nEY0X = 3\n'
     scene = parse_scene(DVF + free, "x")
     assert len(scene.parameter_keys) == 43
@@ -85,48 +75,24 @@ def test_constant_beyond_the_default_ones_becomes_a_parameter_of_the_scene() -> 
     assert parse_scene(scene_to_toml(scene), "x") == scene
 
 
-def test_rotation_of_the_reference_axis_is_taken_for_a_slip() -> None:
-    with pytest.raises(SceneError, match=r"EC0X = 5: .* did you mean 'EC0Y'.*reference_axis"):
-        parse_scene(DVF + "[errors]\nEC0X = 5\nEX0X = 1\n", "x")
-
-
-def test_tolerances_are_a_half_width_or_a_range() -> None:
+def test_tolerances_are_a_half_width_or_a_range():
     text = DVF + "[tolerances]\ndefault = { rotation = 20 }\nEXB = 5\nEAX = { centre = -8, "
     tolerances = parse_scene(text + "half_width = 6 }\n", "x").tolerances
     assert tolerances.own == {"EXB": Tolerance(0.0, 5.0), "EAX": Tolerance(-8.0, 6.0)}
     assert tolerances.default == {"rotation": 20.0}
 
 
-def test_reference_is_a_point_even_where_the_scene_names_one_axis() -> None:
+def test_the_placement_of_the_workpiece_is_left_out_where_the_scene_says_so():
+    scene = parse_scene(DVF + "[view]\nplaced = true\n", "x")
+    assert scene.placed
+    assert parse_scene(scene_to_toml(scene), "x").placed
+    assert not parse_scene(DVF, "x").placed
+
+
+def test_reference_is_a_point_even_where_the_scene_names_one_axis():
     scene = parse_scene(DVF + "[view]\nreference = { Y = 100 }\nexaggeration = 2000\n", "x")
     assert scene.reference == {"X": 0.0, "Y": 100.0, "Z": -240.0}
     assert scene.exaggeration == 2000.0
-
-
-def test_unusable_machine_does_not_hide_the_other_problems_nor_invent_any() -> None:
-    text = (
-        'machine = "dvf"\n[workspace]\nA = 5\nX = [0, 2000]\n'
-        "[errors]\nEXX = { poly = [0, 0, 10] }\nEBA = 5\nEZZZ = 1\n"
-    )
-    with pytest.raises(SceneError) as caught:
-        parse_scene(text, "x")
-    assert [line.split(":")[0] for line in caught.value.problems] == [
-        'machine = "dvf"',
-        "errors.EZZZ",
-    ]
-
-
-def test_upload_is_called_by_its_name_in_messages() -> None:
-    with pytest.raises(SceneError, match=r"^upload: machine: is missing"):
-        parse_scene("", "upload")
-
-
-def test_squareness_of_an_axis_that_carries_the_other_is_remarked_on() -> None:
-    text = '[machine]\nchain = "{}"\n[errors]\nEC0Y = 5\n'
-    (note,) = parse_scene(text.format("wFYXZt"), "x").notes
-    assert "EC0Y turns X as well" in note
-    for chain in ("wFXYZt", "wYFXZt", "wXFYZt"):
-        assert parse_scene(text.format(chain), "x").notes == ()
 
 
 NUTATING = """
@@ -149,7 +115,7 @@ EBB1 = { table = [[-90, 0.0], [90, 12.0]] }
 """
 
 
-def test_repeated_letters_rotations_and_mixed_conventions_are_read_and_written() -> None:
+def test_repeated_letters_rotations_and_mixed_conventions_are_read_and_written():
     scene = parse_scene(NUTATING, "nutating")
     machine, model = scene.machine, scene.model
     assert machine.axis("B1").rotation_deg == (45.0, 0.0, 0.0)
@@ -163,27 +129,7 @@ def test_repeated_letters_rotations_and_mixed_conventions_are_read_and_written()
     assert again == scene
 
 
-def test_a_rotated_head_points_where_its_rotation_says() -> None:
-    """B at 45° about x: its axis is (0, 1, 1)/√2; half a turn about it turns the tool round."""
-    scene = parse_scene(NUTATING.replace("t = [0, 10, -20]\n", ""), "nutating")
-    at = {"X": 0.0, "Y": 0.0, "Z": 0.0, "C1": 0.0, "C2": 0.0, "B1": 0.0}
-    tool = [
-        evaluate(scene, at={**at, "B1": angle}, loop="tool").nominal_mm.reshape(3)
-        for angle in (0.0, 180.0)
-    ]
-    assert tool[0] == pytest.approx(tool[1])  # the tool point lies in the pivot
-    scene = parse_scene(NUTATING.replace("t = [0, 10, -20]", "").replace(
-        "B1 = [0, 0, -100]", "B1 = [0, 0, -100]\nt = [0, 0, -100]"), "nutating")  # fmt: skip
-    tool = [
-        evaluate(scene, at={**at, "B1": angle}, loop="tool").nominal_mm.reshape(3)
-        for angle in (0.0, 180.0)
-    ]
-    s = 100.0 / 2.0**0.5
-    assert tool[0] == pytest.approx([0.0, s, -100.0 - s])
-    assert tool[1] == pytest.approx([0.0, -s, -100.0 + s])
-
-
-def test_rotary_axes_span_the_volume_of_a_robot() -> None:
+def test_rotary_axes_span_the_volume_of_a_robot():
     scene = parse_scene(
         'title = "r"\n[machine]\nchain = "wFZC1C2t"\n'
         "offset_mm = { C2 = [300, 0, 0], t = [250, 0, 0] }\n"
@@ -199,57 +145,158 @@ def test_rotary_axes_span_the_volume_of_a_robot() -> None:
     assert evaluate(scene, grid=5).norm_um.max() == pytest.approx(0.05 * reach.max())
 
 
-@pytest.mark.parametrize(
-    ("change", "problem"),
-    [
-        ("C1 = 30", None),
-        ("C1 = [0, 30]", "expected one position in degrees for a rotary axis"),
-        ("C9 = 30", "unknown axis of this machine"),
-    ],
-)
-def test_ranges_that_are_too_many_are_named(change: str, problem: str | None) -> None:
-    text = NUTATING.replace("C1 = 30", change)
-    if problem is None:
-        parse_scene(text, "n")
-        return
-    with pytest.raises(SceneError, match=problem):
-        parse_scene(text, "n")
+def test_a_direction_against_iso_841_is_remarked_on_again_when_it_was_saved():
+    scene = parse_scene('[machine]\nchain = "wCYFXZt"\ndirection.Y = 1\n', "x")
+    assert scene.notes == ("machine.direction.Y = 1 is against ISO 841",)
+    assert parse_scene(scene_to_toml(scene), "x").notes == scene.notes
 
 
-def test_two_ranges_along_one_direction_are_refused() -> None:
-    text = 'title = "z"\n[machine]\nchain = "wFXYZWt"\n[workspace]\nZ = [0, 9]\nW = [0, 5]\n'
-    with pytest.raises(SceneError, match=r"workspace\.W.*W has a range beside Z; expected one pos"):
-        parse_scene(text, "z")
-    scene = parse_scene(text.replace("W = [0, 5]\n", ""), "z")
-    assert scene.workspace.ranges["W"] == (0.0, 0.0)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "problem"),
-    [
-        ("B1 = [45, 0, 0]", 'B1 = "x"', r"machine.rotation_deg.B1 = \"x\": expected \[x, y, z\]"),
-        ("B1 = [45, 0, 0]", "B1 = [45, 0, 999]", "rotation_deg.B1.*expected at most 360"),
-        ("B1 = [45, 0, 0]", "B7 = [45, 0, 0]", "rotation_deg.B7: unknown frame of this machine"),
-        ('C1 = "after_motion"', 'C9 = "after_motion"', "component_errors.C9: unknown kind or axis"),
-        ('C1 = "after_motion"', 'C1 = "during"', "component_errors.C1.*expected \"after_motion\""),
-    ],
-)  # fmt: skip
-def test_bad_rotations_and_conventions_are_named(old: str, new: str, problem: str) -> None:
-    with pytest.raises(SceneError, match=problem):
-        parse_scene(NUTATING.replace(old, new), "n")
-
-
-def test_messages_name_axes_with_a_digit() -> None:
-    text = 'title = "d"\n[machine]\nchain = "wFX1Yt"\n[errors]\nEA0X1 = 5.0\n'
-    with pytest.raises(SceneError, match="X1 being the reference axis"):
-        parse_scene(text, "d")
-    text = 'title = "d"\n[machine]\nchain = "wFY1X1t"\n[errors]\nEC0Y1 = 5.0\n'
-    (note,) = parse_scene(text, "d").notes
-    assert note.startswith("errors.EC0Y1 turns X1 as well, which rides on Y1")
-
-
-def test_a_rotation_of_zero_is_none() -> None:
+def test_a_rotation_of_zero_is_none():
     text = 'title = "z"\n[machine]\nchain = "wFXt"\nrotation_deg = { t = [0, 0, 0] }\n'
     scene = parse_scene(text, "z")
     assert scene.machine.fixed_deg == {}
     assert parse_scene(scene_to_toml(scene), "z") == scene
+
+
+MEASURED = (
+    DVF
+    + """[errors]
+EXX = 3
+[uncertainty]
+EXX = 0.4
+EYX = { table = [[-275, 0.1], [275, 0.2]] }
+EC0Y = 1
+[measured.EXX]
+runs = [
+  { direction = "+", points = [[-275, 1], [275, 2]] },
+  { direction = "-", points = [[275, 1.5], [-275, 2.5]] },
+  { points = [[0, 0.5]] },
+]
+"""
+)
+
+
+def test_they_are_read_and_reload_equal():
+    scene = parse_scene(MEASURED, "s")
+    assert scene.uncertainty["EXX"] == Constant((-275.0, 275.0), 0.4)
+    assert scene.uncertainty["EYX"] == Table((-275.0, 275.0), ((-275.0, 0.1), (275.0, 0.2)))
+    runs = scene.measured["EXX"].runs
+    assert [run.direction for run in runs] == ["+", "-", ""]
+    assert runs[1].points == ((275.0, 1.5), (-275.0, 2.5))
+    assert parse_scene(scene_to_toml(scene), "s") == scene
+
+
+def test_readings_come_by_direction():
+    runs = (Run("+", ((0.0, 1.0),)), Run("-", ((0.0, 2.0),)), Run("+", ((5.0, 3.0),)))
+    measurement = Measurement(runs)
+    assert measurement.count == 3
+    np.testing.assert_array_equal(measurement.scatter["+"], [[0.0, 1.0], [5.0, 3.0]])
+    np.testing.assert_array_equal(measurement.scatter["-"], [[0.0, 2.0]])
+
+
+def test_readings_may_stand_in_a_file_beside_the_scene(tmp_path):
+    (tmp_path / "runs.csv").write_text(
+        "X,EYX,EXX,run,direction\n-275,9,1,1,+\n275,9,2,1,+\n275,9,1.5,1,-\n-275,9,2.5,2,-\n"
+    )
+    text = DVF + '[measured.EXX]\ncsv = "runs.csv"\ncolumn = "EXX"\n'
+    (tmp_path / "s.toml").write_text(text)
+    scene = load_scene(tmp_path / "s.toml")
+    assert scene.measured["EXX"].runs == (
+        Run("+", ((-275.0, 1.0), (275.0, 2.0))),
+        Run("-", ((275.0, 1.5),)),
+        Run("-", ((-275.0, 2.5),)),
+    )
+    assert parse_scene(scene_to_toml(scene), "s") == scene  # needs no other file
+
+
+def test_a_number_too_large_for_any_scene_is_spelled_by_its_size():
+    with pytest.raises(SceneError, match="a whole number of 1329 bits: is too large"):
+        parse_scene(DVF + f"[errors]\nEAX = {{ ramp = {10**400} }}\n", "x")
+
+
+FIRST = load_scene("dvf5000_first")
+
+
+def test_workpiece_loop_takes_its_functional_point_at_points_and_the_node_over_the_grid():
+    point = evaluate(FIRST, at={"B": 0.0}, loop="workpiece").nominal_mm
+    np.testing.assert_allclose(point, [0.0, 275.0, 450.0], atol=1e-12)
+    grids = [evaluate(FIRST, grid=2, loop=loop).nominal_mm for loop in ("tool", "workpiece")]
+    np.testing.assert_array_equal(*grids)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        ({"at": {"X": 0.0}, "grid": 5}, "not both"),
+        ({"frame": "tool"}, "frame 'tool'; expected one of machine, workpiece"),
+        ({"grid": 2.5}, "expected whole numbers"),
+        ({"at": {"X": [1.0, 2.0], "Y": [1.0, 2.0, 3.0]}}, "one batch shape"),
+        ({"at": {"X": 1e9}}, "EAX reaches 1e.07 µrad"),
+    ],
+)
+def test_impossible_argument_is_refused_with_what_was_expected(arguments, reason):
+    with pytest.raises(WarpspaceError, match=reason):
+        evaluate(FIRST, **arguments)
+
+
+SAME = 3e-9
+HELD = {"X": 0.0, "Y": 0.0, "Z": -280.0}
+TARGETS = {
+    "order": Target(component_errors=dict.fromkeys("XYZBC", "before_motion")),
+    "one kind": Target(component_errors={"B": "before_motion", "C": "before_motion"}),
+    "line": Target(straightness=dict.fromkeys("XYZ", "minimum_zone")),
+    "zero": Target(zero_at={"X": 0.0, "Y": 0.0}),
+    "over": Target(notation=Notation("over_90")),
+    "under": Target(notation=Notation("under_90")),
+    "abbe": Target(notation=Notation(measuring_line_mm={"X": (0.0, 150.0, -80.0)})),
+    "all": Target(
+        straightness={"X": "least_squares"},
+        zero_at={"Y": 10.0},
+        notation=Notation("over_90", {"Y": (20.0, 0.0, 300.0)}),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_the_file_reads_back_to_the_same_field(name):
+    found = convert_scene(FIRST, TARGETS[name])
+    read = parse_scene(found.text, FIRST.name)
+    assert read == found.scene
+    assert max(*field_difference(FIRST, read), found.largest_um, found.largest_urad) < SAME
+    # the program's own notation again: the same errors
+    assert parse_scene(scene_to_toml(read), FIRST.name).errors == read.errors
+
+
+def test_the_check_sees_a_difference():
+    other = replace(FIRST, errors=FIRST.errors.with_amplitude("EC0Y", 23.2, (-225.0, 225.0)))
+    largest_um, _ = field_difference(FIRST, other)
+    assert largest_um > 1e-3
+
+
+def test_numbers_are_written_with_the_sign_that_the_file_says():
+    found = convert_scene(FIRST, TARGETS["over"])
+    assert 'squareness = "over_90"' in found.text
+    assert "EB0Z = -18.1" in found.text
+    assert found.changed == {"EB0Z": (18.1, -18.1)}
+    assert found.scene.errors.amplitude("EB0Z") == 18.1
+
+
+def test_a_held_point_becomes_constants_and_a_held_point_again():
+    held = replace(FIRST, reference=HELD)
+    found = convert_scene(held, Target(reference="constants"))
+    assert found.scene.reference is None
+    assert found.largest_um < SAME
+    assert {"EX0X", "EY0X"} <= {*found.changed}
+    back = convert_scene(found.scene, Target(reference=HELD))
+    assert back.scene.reference == HELD
+    assert back.largest_um < 1e-6  # the point is held to a picometre
+    assert field_difference(held, back.scene)[0] < SAME
+
+
+def test_readings_of_other_curves_are_left_out_and_named():
+    text = scene_to_toml(FIRST) + "\n[measured.EAX]\nruns = [{ points = [[0, 1]] }]\n"
+    text += "[measured.EZY]\nruns = [{ points = [[0, 1]] }]\n"
+    scene = parse_scene(text, "s")
+    found = convert_scene(scene, Target(component_errors={"Y": "before_motion"}))
+    assert [*found.scene.measured] == ["EAX"]
+    assert found.notes == ("readings of EZY are left out: they are of other curves",)

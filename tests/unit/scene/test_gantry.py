@@ -1,21 +1,18 @@
 """A gantry: what two guides give, derived by hand, and what a file may say of them."""
 
-import re
-
 import numpy as np
 import pytest
 
 from warpspace import evaluate
-from warpspace.exceptions import SceneError
-from warpspace.machine.curves.combination import combine_curves
 from warpspace.machine.errors import Constant, Harmonics, Poly, Ramp, Table
+from warpspace.scene.curves import combine_curves
 from warpspace.scene.library import parse_scene
 from warpspace.scene.save import scene_to_toml
 
 SPAN = (-500.0, 500.0)
 
 
-def scene_text(errors: str, gantry: str = "X = { span_mm = 1800 }", chain: str = "wFXYZt") -> str:
+def scene_text(errors, gantry="X = { span_mm = 1800 }", chain="wFXYZt"):
     return f"""
 title = "gantry"
 [machine]
@@ -101,14 +98,6 @@ def test_sums_of_equal_kinds_are_exact(first, second, kind):
     assert found.evaluate(at) == pytest.approx(exact, abs=1e-12)
 
 
-def test_sums_of_unlike_kinds_are_close():
-    wave, kinked = Harmonics(SPAN, ((7, 3, 10),)), Table(SPAN, ((-100, 3), (0.3, 1), (100, 5)))
-    found = combine_curves(wave, kinked, (1.0, 2.0))
-    at = np.linspace(-500.0, 500.0, 7001)
-    exact = wave.evaluate(at) + 2.0 * kinked.evaluate(at)
-    assert np.abs(found.evaluate(at) - exact).max() < 2e-5 * np.abs(exact).max()
-
-
 @pytest.mark.parametrize(
     "pair",
     ["[1, 2]", "[{ ramp = 3 }, { ramp = 5 }]", "[{ poly = [0, 0.01] }, 4]",
@@ -121,34 +110,3 @@ def test_a_saved_gantry_reloads_to_the_same_scene(pair):
     text = scene_to_toml(scene)
     assert "[machine.gantry]" in text
     assert parse_scene(text, "g") == scene
-
-
-@pytest.mark.parametrize(
-    ("errors", "gantry", "said"),
-    [
-        ("EXX = { guides = [1, 2] }\nECX = 3", None, "errors.ECX: follows from the guides of EXX"),
-        ("EXX = { guides = [1] }", None, "expected [first guide, second guide]"),
-        ("EXX = { guides = 4 }", None, "expected [first guide, second guide]"),
-        ("EXX = { guides = [1, { rmp = 2 }] }", None, "errors.EXX.guides[1]"),
-        ("EXX = { guides = [1, 2], span = 3 }", None, "errors.EXX.span: unknown key"),
-        ("EYX = { guides = [1, 2] }", None, "expected guides in EXX, the positioning of X"),
-        ("EYY = { guides = [1, 2] }", None, "[machine.gantry] Y = { span_mm = 1800 }"),
-        ("EXX = { guides = [-9.5e4, 9.5e4] }", None, "gives ECX, which reaches -105556"),
-        ("", "A = { span_mm = 900 }", "machine.gantry.A: unknown frame"),
-        ("", "X = { span_mm = 0 }", "machine.gantry.X.span_mm = 0: expected at least 1"),
-        ("", 'X = { span_mm = 900, across = "x" }', 'expected "y" or "z"'),
-        ("", 'X = { span_mm = 900, across = "u" }', "machine.gantry.X.across"),
-        ("", "X = 5", "machine.gantry.X = 5: expected a table"),
-        ("", "X = {}", "machine.gantry.X.span_mm: is missing"),
-    ],
-)
-def test_what_cannot_be_a_gantry_is_said(errors, gantry, said):
-    with pytest.raises(SceneError) as caught:
-        parse_scene(scene_text(errors, gantry or "X = { span_mm = 1800 }"), "g")
-    assert said in str(caught.value)
-    assert len(re.findall("Traceback", str(caught.value))) == 0
-
-
-def test_a_rotary_axis_has_no_guides():
-    with pytest.raises(SceneError, match=r"machine\.gantry\.C: expected a linear axis"):
-        parse_scene(scene_text("", "C = { span_mm = 900 }", "wCFXYZt"), "g")

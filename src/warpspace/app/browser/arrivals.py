@@ -24,14 +24,7 @@ MOST_KNOWN = 256
 
 
 class Arrival:
-    """Token and width of one page, once they are known.
-
-    Attributes
-    ----------
-    token : str
-    width : float or None
-        CSS pixels, whatever stands beside the drawing by now; None where the page does not say.
-    """
+    """Token and width of one page, once they are known."""
 
     def __init__(self) -> None:
         self._there = threading.Event()
@@ -54,30 +47,13 @@ class Arrival:
         return self._there.is_set()
 
     def wait(self, seconds: float, called: Callable[[], None]) -> bool:
-        """Wait for the token.
-
-        Parameters
-        ----------
-        seconds : float
-        called : callable
-            Called when it comes later.
-
-        Returns
-        -------
-        bool
-            Whether it is known by then.
-        """
+        """Wait for the token."""
         self._called = called
         return self._there.wait(seconds)
 
 
 class Arrivals:
-    """What pages say of themselves on arrival.
-
-    Parameters
-    ----------
-    server : viser.ViserServer
-    """
+    """What pages say of themselves on arrival."""
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._known: OrderedDict[int, Arrival] = OrderedDict()
@@ -99,7 +75,6 @@ class Arrivals:
             self._known.pop(client_id, None)
 
     def _take(self, client_id: int, widget: str, said: Any) -> None:
-        """Take the token out of a message, if it is one of these; a browser may send anything."""
         if widget != CARRIER or not isinstance(said, dict):
             return
         token, width = said.get("value"), said.get("width")
@@ -110,19 +85,7 @@ class Arrivals:
 
 
 def ask_script(carrier: str) -> str:
-    """Write the script that makes a page hand over its token, and its width in CSS pixels.
-
-    Parameters
-    ----------
-    carrier : str
-        What stands for a widget in the message.
-
-    Returns
-    -------
-    str
-        JavaScript. A page without a token makes one; where the browser forbids `sessionStorage` it
-        has it until it is reloaded.
-    """
+    """Write the script that makes a page hand over its token, and its width in CSS pixels."""
     return f"""(() => {{
   const key = {json.dumps(STORAGE_KEY)};
   let token = window.__warpspaceTab;

@@ -51,16 +51,7 @@ It shows the old text until the answer comes, which is none where what was typed
 
 
 class Clicks:
-    """Makes pieces of HTML into buttons.
-
-    Parameters
-    ----------
-    gui : viser.GuiApi
-    clicked : callable
-        Gets the word of what was clicked, once per click and in their order. The word comes from a
-        browser and may be anything, so it is to be looked up, never trusted; the callable must only
-        take note.
-    """
+    """Makes pieces of HTML into buttons."""
 
     def __init__(self, gui: GuiApi, clicked: Callable[[str], None]) -> None:
         self._carrier = gui.add_text("", "", visible=False)
@@ -81,15 +72,7 @@ class Clicks:
                 self._clicked(word)
 
     def attributes(self, word: str, role: str = "button") -> Markup:
-        """Spell the attributes of an element that is clicked, or reached with Tab and Enter.
-
-        Parameters
-        ----------
-        word : str
-            What `clicked` gets.
-        role : str, optional
-            ARIA role.
-        """
+        """Spell the attributes of an element that is clicked, or reached with Tab and Enter."""
         return Markup(KEYS % escape(role)) + self._sends(word)  # noqa: S704 - escaped here
 
     def button(self, word: str) -> Markup:
@@ -104,23 +87,11 @@ class Clicks:
         return Markup(TYPED % (escape(word), dom_id(self._carrier)))  # noqa: S704 - escaped here
 
     def _sends(self, word: str) -> Markup:
-        """Spell the attributes of what sends a word when it is clicked."""
         return Markup(SENDS % (escape(word), dom_id(self._carrier)))  # noqa: S704 - escaped here
 
 
 def read_clicks(text: str) -> tuple[tuple[int, str], ...]:
-    """Read what a page has sent: its latest clicks, numbered.
-
-    Parameters
-    ----------
-    text : str
-        Lines ``number:word``; anything else in it is left out.
-
-    Returns
-    -------
-    tuple of (int, str)
-        In the order of the lines.
-    """
+    """Read what a page has sent: its latest clicks, numbered."""
     found: list[tuple[int, str]] = []
     for line in text[: MOST_CLICKS * (LONGEST_WORD + 20)].split("\n")[:MOST_CLICKS]:
         number, colon, word = line.partition(":")

@@ -15,12 +15,6 @@ class Input(Generic[T]):
 
     What the browser sets meanwhile is never overwritten: `show` writes only where the wanted value
     differs from the one read last.
-
-    Parameters
-    ----------
-    handle : viser.GuiInputHandle
-    changed : callable
-        Called when a browser has changed it; it must only take note.
     """
 
     def __init__(self, handle: Any, changed: Changed) -> None:
@@ -59,10 +53,6 @@ class Handle:
     Every assignment to a handle costs viser's checks even where nothing is sent; a picture consists
     of some sixty values of which a slider move changes ten. Arrays count as the same only where
     they are the same object, so one that was handed over must not be changed afterwards.
-
-    Parameters
-    ----------
-    handle : viser.SceneNodeHandle or viser.GuiHandle
     """
 
     __slots__ = ("_assigned", "handle")

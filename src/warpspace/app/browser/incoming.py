@@ -141,13 +141,7 @@ def guard_widgets(owner: ViserServer | ClientHandle) -> None:
 
 
 def may_pass(raw: bytes) -> bool:
-    """Tell whether a message of a page may reach viser.
-
-    Parameters
-    ----------
-    raw : bytes
-        As it has come over the socket.
-    """
+    """Tell whether a message of a page may reach viser."""
     try:
         message = _READER.decode(raw)
     except ValueError:  # not msgpack, another kind, other fields, other types, not finite
@@ -159,20 +153,25 @@ def may_pass(raw: bytes) -> bool:
     return fine
 
 
+def moved(raw: object) -> str | None:
+    """Name what a message moves where the last move says all: a widget with numbers, the camera.
+
+    None for any other message: two clicks on a button are two clicks.
+    """
+    try:
+        message = _READER.decode(raw) if isinstance(raw, bytes) else None
+    except ValueError:
+        return None
+    if isinstance(message, WidgetChanged):
+        value = message.updates.value
+        return None if isinstance(value, bool | str) else f"widget {message.uuid}"
+    return "camera" if isinstance(message, CameraMoved) else None
+
+
 def may_set(
     present: object, updates: dict[str, Any], options: tuple[str, ...] | None = None
 ) -> bool:
-    """Tell whether a page may update a widget.
-
-    Parameters
-    ----------
-    present : object
-        The value that the widget has.
-    updates : dict
-        What the page wants to set, by name.
-    options : tuple of str, optional
-        What there is to choose from.
-    """
+    """Tell whether a page may update a widget."""
     fine = updates.keys() == {"value"} and _is_alike(present, updates["value"])
     if fine and options is not None:
         fine = updates["value"] in options
@@ -182,7 +181,6 @@ def may_set(
 
 
 def _is_alike(present: object, value: object) -> bool:
-    """Tell whether a value is of the kind of another: flag, text, number or numbers."""
     if isinstance(present, tuple):
         return (
             isinstance(value, list | tuple)
@@ -199,7 +197,6 @@ def _is_alike(present: object, value: object) -> bool:
 
 
 def _is_picture(payload: bytes) -> bool:
-    """Tell whether a payload is a PNG that can be unpacked without taking all memory."""
     if not payload.startswith(PNG_START) or len(payload) < len(PNG_START) + 8:
         return False
     return max(struct.unpack_from(">II", payload, len(PNG_START))) <= LARGEST_SIDE_PX

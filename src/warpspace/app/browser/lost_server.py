@@ -7,8 +7,8 @@ itself keeps the panels dimmed and connects anew every second while the page is 
 import json
 from collections.abc import Sequence
 
-from warpspace.app.browser.address import PARAMETER as LINK_PARAMETER
-from warpspace.app.browser.address import STORAGE_KEY as LINK_KEY
+from warpspace.app.browser.page import PARAMETER as LINK_PARAMETER
+from warpspace.app.browser.page import STORAGE_KEY as LINK_KEY
 
 STORAGE_KEY = "warpspace-kept"
 STYLE = (
@@ -45,7 +45,6 @@ BEGUN_ANEW = (
 
 
 def _show(title: str, lines: Sequence[str], role: str) -> str:
-    """Write the script that puts a message into the page, in place of one that is there."""
     return f"""(({{ title, lines, role, style }}) => {{
   document.getElementById("warpspace-server")?.remove();
   const box = document.createElement("section");
@@ -76,11 +75,6 @@ def watch_script() -> str:
     """Write the script that says when the connection of a page is lost.
 
     It is to run anew with every connection: what it knows is what viser sends with now.
-
-    Returns
-    -------
-    str
-        JavaScript.
     """
     return f"""(() => {{
   clearInterval(window.__warpspaceWatch);
@@ -115,12 +109,7 @@ def watch_script() -> str:
 
 
 def keep_script(text: str) -> str:
-    """Write the script that keeps a text in the tab; an empty one takes away what was kept.
-
-    Parameters
-    ----------
-    text : str
-    """
+    """Write the script that keeps a text in the tab; an empty one takes away what was kept."""
     key = json.dumps(STORAGE_KEY)
     if not text:
         return f"try {{ sessionStorage.removeItem({key}); }} catch {{}}"
@@ -132,21 +121,7 @@ def keep_script(text: str) -> str:
 
 
 def back_script(widget: str, *, known: bool) -> str:
-    """Write the script of a page that is connected, for the first time or again.
-
-    Parameters
-    ----------
-    widget : str
-        Identifier of the (invisible) text widget that takes what the page has kept.
-    known : bool
-        Whether the server still has the state of the tab.
-
-    Returns
-    -------
-    str
-        JavaScript. It hands over what is kept where the server knows nothing, and says what has
-        happened to a page that was cut off.
-    """
+    """Write the script of a page that is connected, for the first time or again."""
     return f"""(() => {{
   const was = window.__warpspaceLost;
   window.__warpspaceLost = false;
@@ -169,17 +144,9 @@ def back_script(widget: str, *, known: bool) -> str:
 
 
 def say_script(title: str, lines: Sequence[str]) -> str:
-    """Write the script that shows a message that stays until it is closed.
-
-    Parameters
-    ----------
-    title : str
-    lines : sequence of str
-        Anything: they become text, not HTML.
-    """
+    """Write the script that shows a message that stays until it is closed."""
     return f"{_show(title, lines, 'status')};".replace("<", "\\u003c")
 
 
 def _spelt(text: str) -> str:
-    """Spell a text in JavaScript, without what could end a script."""
     return json.dumps(text).replace("<", "\\u003c")

@@ -36,18 +36,11 @@ def column_widths(page_width: float) -> tuple[int, int]:
 
 @dataclass(frozen=True, slots=True)
 class Room:
-    """How large the drawing is, CSS pixels.
+    """How large the drawing is, CSS pixels."""
 
-    Attributes
-    ----------
-    width, height : float
-        Of the picture.
-    top, bottom : float
-        Of it, what heading and scale bars (on a phone the sheet of panels) cover.
-    """
-
-    width: float
+    width: float  # of the picture
     height: float
+    # of it, what heading and scale bars (on a phone the sheet of panels) cover
     top: float = HEADING_PX
     bottom: float = FOOT_PX
 
@@ -68,13 +61,7 @@ class Room:
 
 
 def read_room(text: str) -> Room | None:
-    """Read what a page says of its room; None where it says nothing that can be.
-
-    Parameters
-    ----------
-    text : str
-        A running number, width, height, top and bottom, with commas between them.
-    """
+    """Read what a page says of its room; None where it says nothing that can be."""
     words = text[:LONGEST_WORD].split(",")
     if len(words) != 5 or not all(word.isascii() and word.isdigit() for word in words):
         return None
@@ -86,30 +73,16 @@ def read_room(text: str) -> Room | None:
 
 @cache
 def _source() -> str:
-    """Read the script that the room consists of."""
     return files("warpspace.app.browser").joinpath("room.js").read_text("utf-8")
 
 
 def open_script(widget: str) -> str:
-    """Write the script that lays the room over the drawing.
-
-    Parameters
-    ----------
-    widget : str
-        Identifier of the (invisible) text widget that is told how large it is.
-    """
+    """Write the script that lays the room over the drawing."""
     return f"{_source()}\nwarpspaceRoom.open({json.dumps(widget)});"
 
 
 def show_script(changes: Mapping[str, Any]) -> str:
-    """Write the script that shows what has changed.
-
-    Parameters
-    ----------
-    changes : mapping
-        ``html`` (by piece: head, buttons, strip; escaped by its template), ``bars``, ``factor``,
-        ``spelt``, ``centre``, ``perMm``, ``labels``, ``slices``, ``dark``.
-    """
+    """Write the script that shows what has changed."""
     return f"warpspaceRoom.show({json.dumps(changes)});"
 
 

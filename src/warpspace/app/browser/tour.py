@@ -12,41 +12,17 @@ STORAGE_KEY = "warpspace-visited"
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """One step of the tour.
+    """One step of the tour."""
 
-    Attributes
-    ----------
-    title, text : str
-        Plain text.
-    at : str
-        CSS selector of what it tells of; empty where the step stands by itself.
-    tab : str
-        The word on the tab it tells of, in place of a selector.
-    more : str
-        Further text in small print.
-    """
-
-    title: str
+    title: str  # plain text
     text: str
-    at: str = ""
-    tab: str = ""
-    more: str = ""
+    at: str = ""  # CSS selector of what it tells of; empty where the step stands by itself
+    tab: str = ""  # the word on the tab it tells of, in place of a selector
+    more: str = ""  # further text in small print
 
 
 def tour_stops(scene: str, description: str, exaggeration: str) -> tuple[Stop, ...]:
-    """List the steps for what is shown.
-
-    Parameters
-    ----------
-    scene, description : str
-        Title and description of the scene; whatever a user has written.
-    exaggeration : str
-        As it is spelt, for instance "×1000".
-
-    Returns
-    -------
-    tuple of Stop, (5,)
-    """
+    """List the steps for what is shown."""
     about = " ".join(description.split())
     return (
         Stop(
@@ -87,25 +63,10 @@ def tour_stops(scene: str, description: str, exaggeration: str) -> tuple[Stop, .
 
 @cache
 def _source() -> str:
-    """Read the script: a function of the steps."""
     return (files("warpspace.app.browser") / "tour.js").read_text("utf-8").rstrip()
 
 
 def tour_script(stops: Sequence[Stop], *, asked: bool) -> str:
-    """Write the script of the tour.
-
-    Parameters
-    ----------
-    stops : sequence of Stop
-    asked : bool
-        Whether a user has asked for it; else it is shown at a browser's first visit only.
-        `tour=off` in the page's address leaves it out, `tour=on` shows it anyway, and a page that
-        a program has opened with `fixedDpr` goes without.
-
-    Returns
-    -------
-    str
-        JavaScript, in which the words of the steps are data.
-    """
+    """Write the script of the tour."""
     told = {"stops": [asdict(stop) for stop in stops], "asked": asked, "key": STORAGE_KEY}
     return f"{_source()}({json.dumps(told)});"

@@ -32,11 +32,6 @@ class Uploads:
     kept (when a page announces it) and while it arrives (when a page has announced less). Only so
     many files are under way at once, whatever their buttons, and a file goes to the button that
     it was announced for.
-
-    Parameters
-    ----------
-    client : viser.ClientHandle
-        One that nothing else watches over.
     """
 
     def __init__(self, client: ClientHandle) -> None:
@@ -53,21 +48,7 @@ class Uploads:
         refused: Refused,
         what: str = "scene file",
     ) -> None:
-        """Take files from a button.
-
-        Parameters
-        ----------
-        button : viser.GuiUploadButtonHandle
-        most_bytes : int
-            Size of the largest file.
-        received : callable
-            Gets name and content of a file within the limit, in the order they are complete. It is
-            called in the server's event loop and must only take note.
-        refused : callable
-            Gets the message about one that is not.
-        what : str, optional
-            What the button takes, for messages.
-        """
+        """Take files from a button."""
         self._watched[dom_id(button)] = _Watched(dom_id(button), most_bytes, refused, what)
 
         @button.on_upload
@@ -117,7 +98,6 @@ class Uploads:
 
 
 def _is_count(value: object) -> bool:
-    """Tell whether a number from a browser can count something."""
     return isinstance(value, int) and not isinstance(value, bool) and value >= 0
 
 
@@ -128,15 +108,7 @@ def size_message(source: str, size: float, most_bytes: int, what: str = "scene f
 
 
 def size_script(button: Any, carrier: Any, most_bytes: int) -> str:
-    """Write the script that refuses a file that is too large before it is sent.
-
-    Parameters
-    ----------
-    button : viser upload button
-    carrier : viser text widget
-        Gets name and size of a refused file.
-    most_bytes : int
-    """
+    """Write the script that refuses a file that is too large before it is sent."""
     return f"""(() => {{
   addEventListener("change", event => {{
     const input = event.target, file = input && input.files && input.files[0];
@@ -151,17 +123,32 @@ def size_script(button: Any, carrier: Any, most_bytes: int) -> str:
 
 
 def read_refusal(told: str) -> tuple[str, float]:
-    """Read name and size of a refused file from what the script of `size_script` tells.
-
-    Parameters
-    ----------
-    told : str
-        From a browser: anything.
-
-    Returns
-    -------
-    tuple of (str, float)
-        The name as it came, and bytes; 0 for what is no size.
-    """
+    """Read name and size of a refused file from what the script of `size_script` tells."""
     _, size, name = (*told.split(":", 2), "", "")[:3]
     return name, float(size) if size.isdecimal() and len(size) < 16 else 0.0
+
+
+# --------------------------------------------------------------------------------------------------
+# Files that are dropped anywhere on the page go the way of those chosen with the upload button.
+
+
+def drop_script(button: Any) -> str:
+    """Write the script that gives dropped files, one after the other, to an upload button."""
+    return f"""(() => {{
+  const hasFiles = event => [...(event.dataTransfer?.types ?? [])].includes("Files");
+  addEventListener("dragover", event => {{
+    if (hasFiles(event)) event.preventDefault();
+  }});
+  addEventListener("drop", event => {{
+    if (!hasFiles(event)) return;
+    event.preventDefault();
+    const input = document.getElementById("file_upload_{dom_id(button)}");
+    if (!input) return;
+    [...event.dataTransfer.files].slice(0, 16).forEach((file, index) => setTimeout(() => {{
+      const one = new DataTransfer();
+      one.items.add(file);
+      input.files = one.files;
+      input.dispatchEvent(new Event("change", {{ bubbles: true }}));
+    }}, 150 * index));
+  }});
+}})();"""

@@ -82,17 +82,6 @@ def serve_with(change: Callable[[dict[str, Any]], dict[str, Any]]) -> Generator[
     viser starts a server of the package `websockets` with options of its own: it checks no request,
     and takes messages of any rate. A parameter of `ViserServer` for these options would replace
     this.
-
-    Parameters
-    ----------
-    change : callable
-        Gets viser's keyword arguments of `websockets.asyncio.server.serve`, and gives those to use.
-
-    Yields
-    ------
-    list of bool
-        Empty as long as no server was started with them. A server that goes another way has to be
-        stopped by who created it.
     """
     library: Any = websockets.asyncio.server
     with _STARTING:
@@ -145,10 +134,6 @@ class UploadMessages:
 
     `on_upload` is called when all of a file is in memory. A limit of size for uploads, checked
     while they arrive, would replace this.
-
-    Parameters
-    ----------
-    client : viser.ClientHandle
     """
 
     def __init__(self, client: ClientHandle) -> None:
@@ -218,13 +203,6 @@ def check_updates(
 
     viser sets any attribute that a message names, its own bookkeeping included, and fails later
     where it relies on it. A viser that sets nothing but `value` would replace this.
-
-    Parameters
-    ----------
-    owner : viser.ViserServer or viser.ClientHandle
-        Before it has widgets.
-    may_set : callable
-        Takes the present value, the updates and the options, where there are some.
     """
     gui: Any = owner.gui
     connection: Any = gui._websock_interface  # noqa: SLF001

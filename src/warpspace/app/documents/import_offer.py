@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 from warpspace.exceptions import UnsaidError, WarpspaceError
-from warpspace.formats.importing import Reading, read_errors
 from warpspace.formats.kind import SIGNS, Format, ReadOptions, parse_axis_options
-from warpspace.formats.registry import find_format, recognise
+from warpspace.formats.registry import Reading, find_format, read_errors, recognise
 from warpspace.formats.source import Source
 from warpspace.formats.to_scene import ImportedScene, into_scene
 from warpspace.scene.model import Scene
@@ -21,24 +20,12 @@ LONGEST_PROBLEM = 1500
 
 @dataclass(frozen=True)
 class Said:
-    """What a user says of files that they do not say themselves, as the command's options.
+    """What a user says of files that they do not say themselves, as the command's options."""
 
-    Attributes
-    ----------
-    format : str
-        Name of a format; empty for the one recognised.
-    axes : str
-        ``X`` or ``AX1=X``, several with blanks or commas between.
-    sign : str
-        "error", "correction", or empty for what the manual says.
-    variant : str
-        Published variant of the format; empty for the usual one.
-    """
-
-    format: str = ""
-    axes: str = ""
-    sign: str = ""
-    variant: str = ""
+    format: str = ""  # name of a format; empty for the one recognised
+    axes: str = ""  # ``X`` or ``AX1=X``, several with blanks or commas between
+    sign: str = ""  # "error", "correction", or empty for what the manual says
+    variant: str = ""  # published variant of the format; empty for the usual one
 
     def fitting(self, kind: Format | None) -> Self:
         """Leave out what a format has no choice of, and what is too long."""
@@ -54,28 +41,14 @@ class Said:
 
 @dataclass(frozen=True)
 class Offer:
-    """Files, what is said of them, and what they would bring.
-
-    Attributes
-    ----------
-    sources : tuple of Source
-    said : Said
-    recognised : Format or None
-        What the files are by themselves.
-    reading : Reading or None
-        The last one that was possible; None before the first.
-    made : ImportedScene or None
-        The scene with it.
-    problem : str
-        Why the files cannot be read with what is said now; empty where they can.
-    """
+    """Files, what is said of them, and what they would bring."""
 
     sources: tuple[Source, ...]
     said: Said = Said()
-    recognised: Format | None = None
-    reading: Reading | None = None
-    made: ImportedScene | None = None
-    problem: str = ""
+    recognised: Format | None = None  # what the files are by themselves
+    reading: Reading | None = None  # the last one that was possible; None before the first
+    made: ImportedScene | None = None  # the scene with it
+    problem: str = ""  # why the files cannot be read with what is said now; empty where they can
 
     @property
     def kind(self) -> Format | None:
@@ -94,23 +67,7 @@ class Offer:
 
 
 def offered(sources: Sequence[Source], base: Scene, said: Said = Said()) -> Offer:
-    """Read files into a scene.
-
-    Parameters
-    ----------
-    sources : sequence of Source
-    base : Scene
-    said : Said, optional
-
-    Returns
-    -------
-    Offer
-
-    Raises
-    ------
-    WarpspaceError
-        If they cannot be read; an `UnsaidError` where the user may say more of them.
-    """
+    """Read files into a scene."""
     return _read(Offer(tuple(sources), said, _recognised(sources)), base)
 
 
@@ -120,19 +77,7 @@ def asking(sources: Sequence[Source], error: UnsaidError) -> Offer:
 
 
 def said_again(offer: Offer, said: Said, base: Scene) -> Offer:
-    """Read files again as a user says now; the last reading stays where that is not possible.
-
-    Parameters
-    ----------
-    offer : Offer
-    said : Said
-        As a browser sends it.
-    base : Scene
-
-    Returns
-    -------
-    Offer
-    """
+    """Read files again as a user says now; the last reading stays where that is not possible."""
     try:
         chosen = replace(offer, said=said)
         return _read(replace(chosen, said=said.fitting(chosen.kind)), base)
@@ -141,7 +86,6 @@ def said_again(offer: Offer, said: Said, base: Scene) -> Offer:
 
 
 def _read(offer: Offer, base: Scene) -> Offer:
-    """Read the files of an offer as it says."""
     said = offer.said
     axis, names = parse_axis_options([text for text in re.split(r"[\s,;]+", said.axes) if text])
     options = ReadOptions(base.machine, axis, names, said.sign, said.variant)
@@ -159,6 +103,5 @@ def _recognised(sources: Sequence[Source]) -> Format | None:
 
 
 def _clamped(error: WarpspaceError) -> str:
-    """Spell a message that a window can show."""
     text = str(error)
     return text if len(text) <= LONGEST_PROBLEM else text[: LONGEST_PROBLEM - 1] + "…"

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
-from warpspace.app.documents.received_files import safe_name
+from warpspace.app.documents.files import safe_name
 from warpspace.app.documents.scene_file import (
     MAX_LINK,
     named_link,
@@ -36,36 +36,15 @@ UNREADABLE = "what this tab has kept cannot be read"
 
 @dataclass(frozen=True, slots=True)
 class Restored:
-    """What has come back.
-
-    Attributes
-    ----------
-    state : AppState
-    camera : CameraMemory or None
-    missing : tuple of str
-        What has not, in words.
-    """
+    """What has come back."""
 
     state: AppState
     camera: CameraMemory | None
-    missing: tuple[str, ...]
+    missing: tuple[str, ...]  # what has not, in words
 
 
 def kept_text(state: AppState, camera: CameraMemory | None, known: Sequence[Scene]) -> str:
-    """Spell a state for its page to keep.
-
-    Parameters
-    ----------
-    state : AppState
-    camera : CameraMemory or None
-    known : sequence of Scene
-        Scenes that the server has after a restart as well.
-
-    Returns
-    -------
-    str
-        Empty where it is too large.
-    """
+    """Spell a state for its page to keep."""
     bare = without_table(state)
     table, state = bare is not state, bare
     alone = replace(state, comparison=Comparison())
@@ -86,25 +65,7 @@ def kept_text(state: AppState, camera: CameraMemory | None, known: Sequence[Scen
 
 
 def read_kept(text: str, known: Sequence[Scene]) -> Restored:
-    """Build what a page has kept.
-
-    Parameters
-    ----------
-    text : str
-        Anything, since it comes from a browser.
-    known : sequence of Scene
-        Scenes of the server.
-
-    Returns
-    -------
-    Restored
-        By the link where that leads to the very same file, else of the file.
-
-    Raises
-    ------
-    OptionError, SceneError
-        If it cannot be read.
-    """
+    """Build what a page has kept."""
     kept = _parse(text)
     file, link = kept.get(FILE, ""), kept.get(LINK, "")
     lost = {ALONE: COMPARISON, TABLE: NO_TABLE}
@@ -118,7 +79,6 @@ def read_kept(text: str, known: Sequence[Scene]) -> Restored:
 
 
 def _parse(text: str) -> dict[str, str]:
-    """Take the text apart."""
     if len(text) > MAX_KEPT_TEXT:
         raise OptionError(UNREADABLE)
     try:

@@ -16,7 +16,6 @@ import viser
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from warpspace import __version__
 from warpspace.app.documents.conditions import picture_conditions
 from warpspace.app.evaluation.budget import active_errors, answer
 from warpspace.app.evaluation.evaluate import LiveModel
@@ -26,20 +25,19 @@ from warpspace.app.readouts.html import style_sheet
 from warpspace.app.state.app_state import start_state
 from warpspace.app.viewport.camera import CameraMemory, fit_camera
 from warpspace.app.viewport.layers import SCENE_PER_MM
+from warpspace.app.viewport.layers.adding import light_scene
 from warpspace.app.viewport.layers.asked_point import AskedPointLayer
 from warpspace.app.viewport.layers.axes import AxesLayer, axes_room_mm
-from warpspace.app.viewport.layers.box import BoxLayer
-from warpspace.app.viewport.layers.lights import light_scene
-from warpspace.app.viewport.layers.other_side import OtherSideLayer
+from warpspace.app.viewport.layers.box import BoxLayer, OtherSideLayer
 from warpspace.app.viewport.layers.traces import TracesLayer
 from warpspace.field.grid import MIN_NODES
-from warpspace.geometry.thicken import is_thin
+from warpspace.geometry.surfaces import is_thin
 from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import ErrorFunction
 from warpspace.machine.parameters import parameter
-from warpspace.picture.coordinates import own_axes, spell_point
 from warpspace.picture.model import choose_scale
-from warpspace.picture.words import convention_words, reference_words
+from warpspace.picture.words import convention_words, own_axes, reference_words, spell_point
+from warpspace.resources import __version__
 from warpspace.scene.model import Scene
 
 POLICY = (
@@ -62,25 +60,7 @@ def offline_picture(
     component: str = "norm",
     largest: float | None = None,
 ) -> LivePicture:
-    """Evaluate a scene for a page.
-
-    Parameters
-    ----------
-    scene : Scene
-    exaggeration : float
-        Display factor.
-    nodes : int
-        Grid nodes per axis.
-    loop : Loop, optional
-    component : str, optional
-        What is coloured: norm, x, y or z.
-    largest : float, optional
-        Largest magnitude of the colour scale, µm, where it is shared with other pages.
-
-    Returns
-    -------
-    LivePicture
-    """
+    """Evaluate a scene for a page."""
     state = replace(
         start_state(scene),
         exaggeration=exaggeration,
@@ -99,21 +79,7 @@ def offline_picture(
 def build_scene_html(
     picture: LivePicture, aspect: float = ASPECT, camera: CameraMemory | None = None
 ) -> str:
-    """Export the 3-D scene of a picture as a page of its own, without a word around it.
-
-    Parameters
-    ----------
-    picture : LivePicture
-    aspect : float, optional
-        Width over height of the room it will fill.
-    camera : CameraMemory, optional
-        Where it is first seen from; by default from the operator's side.
-
-    Returns
-    -------
-    str
-        HTML that requests nothing.
-    """
+    """Export the 3-D scene of a picture as a page of its own, without a word around it."""
     with contextlib.redirect_stdout(io.StringIO()):  # the server says hello and goodbye
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         try:
@@ -130,7 +96,6 @@ def build_scene_html(
 
 
 def _place_camera(server: viser.ViserServer, picture: LivePicture, aspect: float) -> None:
-    """Let the page open with the whole box in view, from the operator's side."""
     drawn = np.concatenate([picture.grid.nominal_mm, picture.drawn_mm]).reshape(-1, 3)
     if is_thin(picture.shape):
         drawn = np.concatenate([drawn, axes_room_mm(picture)])
@@ -143,7 +108,6 @@ def _place_camera(server: viser.ViserServer, picture: LivePicture, aspect: float
 
 
 def _keep_camera(server: viser.ViserServer, kept: CameraMemory) -> None:
-    """Let the page open as it was seen."""
     camera = server.initial_camera
     camera.up = kept.up
     camera.fov = kept.fov_rad
@@ -156,21 +120,7 @@ def build_offline_html(
     provenance: Mapping[str, Any] | None = None,
     camera: CameraMemory | None = None,
 ) -> str:
-    """Build the page: the interactive scene with its colour bar, numbers and factor.
-
-    Parameters
-    ----------
-    picture : LivePicture
-    provenance : mapping, optional
-        Program, scene and settings, stored in the page as JSON.
-    camera : CameraMemory, optional
-        Where it is first seen from; by default from the operator's side.
-
-    Returns
-    -------
-    str
-        HTML that requests nothing and carries everything.
-    """
+    """Build the page: the interactive scene with its colour bar, numbers and factor."""
     # a page in an attribute: only these two characters would end or change it
     inner = build_scene_html(picture, camera=camera).replace("&", "&amp;").replace('"', "&quot;")
     conditions = list(picture_conditions(picture))
@@ -224,13 +174,11 @@ def point_words(picture: LivePicture) -> str:
 
 
 def _row(key: str, value: str) -> dict[str, str]:
-    """Spell one error."""
     row = parameter(key)
     return {"key": key, "name": row.name, "value": f"{value} {row.unit}".replace("-", "−")}
 
 
 def _amplitude(function: ErrorFunction | None) -> str:
-    """Spell the amplitude of an error."""
     return "0" if function is None else f"{function.amplitude:+g}"
 
 

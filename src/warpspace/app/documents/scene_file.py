@@ -9,26 +9,28 @@ import base64
 import binascii
 import re
 import zlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from urllib.parse import parse_qsl, urlencode
 
-from warpspace import __version__
-from warpspace.app.documents.received_files import LONGEST_NAME, safe_name
-from warpspace.app.documents.stored_comparison import PREFIX as COMPARISON
-from warpspace.app.documents.stored_comparison import comparison_line, with_comparison
+from warpspace.app.documents.files import LONGEST_NAME, safe_name
 from warpspace.app.documents.view_settings import (
     MAX_FIELDS,
     camera_of,
+    comparison_line,
     settings_line,
+    with_comparison,
     with_settings,
 )
+from warpspace.app.documents.view_settings import PREFIX as COMPARISON
 from warpspace.app.evaluation.resulting_scene import scene_of
 from warpspace.app.state.app_state import AppState, start_state
+from warpspace.app.state.comparison import NOBODY, PRESENT
 from warpspace.app.viewport.camera import CameraMemory
 from warpspace.exceptions import OptionError
 from warpspace.machine.limits import MAX_PACKED_TEXT
-from warpspace.scene.editing.edited import same_shape
+from warpspace.resources import __version__
+from warpspace.scene.editing import same_shape
 from warpspace.scene.library import load_scene, parse_scene, scene_names
 from warpspace.scene.machines import load_machine, machine_names
 from warpspace.scene.model import Scene
@@ -50,23 +52,7 @@ Find = Callable[[str], Scene | None]
 
 
 def state_to_toml(state: AppState, camera: CameraMemory | None = None) -> str:
-    """Spell a state as a scene file.
-
-    Parameters
-    ----------
-    state : AppState
-    camera : CameraMemory, optional
-
-    Returns
-    -------
-    str
-        TOML that every reader of scenes takes; `open_text` gives the identical state back.
-
-    Raises
-    ------
-    OptionError
-        If what the state is compared with is too large to be stored beside it.
-    """
+    """Spell a state as a scene file."""
     line = comparison_line(state.comparison, lambda side: _write(side, None, _bundled))
     if len(line) > MAX_COMPARED:
         raise OptionError("what is compared is too large to be stored with the scene")
@@ -83,25 +69,7 @@ def _with_view(state: AppState, camera: CameraMemory | None, remarks: str = "") 
 
 
 def open_text(text: str, name: str, source: str) -> tuple[AppState, CameraMemory | None]:
-    """Build the state of a scene file that somebody has uploaded.
-
-    Parameters
-    ----------
-    text : str
-    name : str
-        Name of the scene.
-    source : str
-        What the file is called in messages.
-
-    Returns
-    -------
-    tuple of (AppState, CameraMemory or None)
-
-    Raises
-    ------
-    SceneError, OptionError
-        With every problem of the text, or what is wrong with the comparison in it.
-    """
+    """Build the state of a scene file that somebody has uploaded."""
     state, camera = _read_text(text, name, source)
     found = _COMPARISON.search(_head(text))
     if found is not None:
@@ -125,13 +93,11 @@ def is_looked_at(text: str) -> bool:
 
 
 def _head(text: str) -> str:
-    """Give the comments that a file begins with."""
     found = _HEAD.match(text)
     return found[0] if found else ""
 
 
 def _bundled(name: str) -> Scene | None:
-    """Give a scene that everybody has."""
     return load_scene(name) if name in scene_names() else None
 
 
@@ -152,25 +118,7 @@ def _recognised(scene: Scene) -> Scene:
 
 
 def state_to_link(state: AppState, camera: CameraMemory | None, known: Iterable[Scene]) -> str:
-    """Spell a state as a link.
-
-    Parameters
-    ----------
-    state : AppState
-    camera : CameraMemory or None
-    known : iterable of Scene
-        Scenes that whoever opens the link has as well.
-
-    Returns
-    -------
-    str
-        A query string.
-
-    Raises
-    ------
-    OptionError
-        If the scene, or what it is compared with, is too large for a link.
-    """
+    """Spell a state as a link."""
     link = named_link(state, camera, known) or _packed(
         state.scene.name, state_to_toml(state, camera)
     )
@@ -205,7 +153,6 @@ def _write_named(state: AppState, camera: CameraMemory | None, find: Find) -> st
 
 
 def _among(known: Iterable[Scene]) -> Find:
-    """Find scenes among those a server offers; of two with one name the first."""
     named: dict[str, Scene] = {}
     for scene in known:
         named.setdefault(scene.name, scene)
@@ -213,29 +160,11 @@ def _among(known: Iterable[Scene]) -> Find:
 
 
 def _behind(line: str) -> str:
-    """Put settings behind the name of a scene."""
     return f"&{line}" if line else ""
 
 
 def open_link(link: str, known: Iterable[Scene]) -> tuple[AppState, CameraMemory | None]:
-    """Build the state that a link describes.
-
-    Parameters
-    ----------
-    link : str
-        A query string; anything, since anybody can write one.
-    known : iterable of Scene
-        Scenes it may name.
-
-    Returns
-    -------
-    tuple of (AppState, CameraMemory or None)
-
-    Raises
-    ------
-    OptionError, SceneError
-        If it names no scene, or holds none that can be read, or a comparison that cannot.
-    """
+    """Build the state that a link describes."""
     pairs = _pairs(link, MAX_LINK, "the link")
     find = _among(known)
     if PACKED in pairs:
@@ -245,7 +174,6 @@ def open_link(link: str, known: Iterable[Scene]) -> tuple[AppState, CameraMemory
 
 
 def _pairs(line: str, longest: int, what: str) -> dict[str, str]:
-    """Take a query string apart that may be anything."""
     if len(line) > longest:
         raise OptionError(f"{what} is {len(line):,} characters long; expected at most {longest:,}")
     try:
@@ -270,18 +198,15 @@ def _read_link(link: str, find: Find) -> tuple[AppState, CameraMemory | None]:
 
 
 def _packed(name: str, text: str) -> str:
-    """Pack a file into a link."""
     word = base64.urlsafe_b64encode(zlib.compress(text.encode(), 9)).decode().rstrip("=")
     return urlencode({NAME: name, PACKED: word})
 
 
 def _named(pairs: Mapping[str, str]) -> tuple[str, str]:
-    """Name the file in a link, for itself and for messages."""
     return safe_name(pairs.get(NAME, ""), "link"), "the scene in the link"
 
 
 def _unpack(packed: str) -> str:
-    """Unpack the file in a link, up to a size."""
     try:
         data = base64.urlsafe_b64decode(packed + "=" * (-len(packed) % 4))
         reader = zlib.decompressobj()
@@ -291,3 +216,59 @@ def _unpack(packed: str) -> str:
         return text.decode("utf-8")
     except (binascii.Error, zlib.error, ValueError):
         raise OptionError("the scene in the link cannot be read; was the link cut?") from None
+
+
+# --- The scenes a tab can choose from -------------------------------------------------------------
+# The server's own, and the newest that were opened in it.
+
+MOST_OPENED = 20
+
+
+class SceneList(Mapping[str, Scene]):
+    """Scenes by the title shown, each title once."""
+
+    def __init__(self, scenes: Mapping[str, Scene]) -> None:
+        self._fixed = dict(scenes)
+        self._opened: dict[str, Scene] = {}
+
+    def __getitem__(self, title: str) -> Scene:
+        return self._fixed[title] if title in self._fixed else self._opened[title]
+
+    def __iter__(self) -> Iterator[str]:
+        yield from self._fixed
+        yield from self._opened
+
+    def __len__(self) -> int:
+        return len(self._fixed) + len(self._opened)
+
+    @property
+    def fixed(self) -> tuple[Scene, ...]:
+        """Scenes that whoever opens a link on this server has as well."""
+        return tuple(self._fixed.values())
+
+    def add(self, scene: Scene) -> tuple[str, str]:
+        """Take in a scene that was opened from a file or a link."""
+        for title, known in self.items():
+            if known is scene or known == scene:
+                return title, ""
+        title = self._free_title(scene)
+        self._opened[title] = scene
+        dropped = ""
+        if len(self._opened) > MOST_OPENED:
+            dropped = next(iter(self._opened))
+            del self._opened[dropped]
+        return title, dropped
+
+    def _free_title(self, scene: Scene) -> str:
+        """Give a scene a title that nothing else in a list of scenes has."""
+        own = scene.title or scene.name
+        title, number = own, 2
+        while title in self or title in (PRESENT, NOBODY):
+            title = f"{own} ({number})"
+            number += 1
+        return title
+
+
+def dropped_words(title: str) -> str:
+    """Say that a scene has left the list."""
+    return f"The newest {MOST_OPENED} opened scenes are kept; {title} left the list."

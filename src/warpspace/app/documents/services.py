@@ -1,6 +1,8 @@
 """What the app has others do: drawing figures and writing exports. The command line hands it in."""
 
+import math
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -10,8 +12,8 @@ from warpspace.geometry.colour import ColourScale
 from warpspace.scene.model import Scene
 
 if TYPE_CHECKING:
+    from warpspace.analysis.concepts import Concepts
     from warpspace.formats.compensation.compensate import Compensation
-    from warpspace.scene.concepts import ConceptPlan
 
 
 class CancelledError(WarpspaceError):
@@ -20,137 +22,153 @@ class CancelledError(WarpspaceError):
 
 @dataclass(frozen=True, slots=True)
 class Beside:
-    """The other side of a comparison.
-
-    Attributes
-    ----------
-    scene : Scene
-    loop : str
-    conditions : tuple of str
-        Errors that are excluded there, in words.
-    """
+    """The other side of a comparison."""
 
     scene: Scene
     loop: str
-    conditions: tuple[str, ...] = ()
+    conditions: tuple[str, ...] = ()  # errors that are excluded there, in words
 
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What is to be drawn or written.
+    """What is to be drawn or written."""
 
-    Attributes
-    ----------
-    scene : Scene
-        With all changes made in the app.
-    loop, component : str
-    nodes : int
-        Grid nodes per axis.
-    exaggeration : float
-        Display factor in force.
-    dark : bool
-        Light ink on a dark ground.
-    tilts : bool
-        Whether the tool-orientation error is coloured, not the position error.
-    colours : ColourScale or None
-        The colours that are shown, where they are not those of the request's own map: fixed by the
-        user, or shared with other maps.
-    beside : Beside or None
-        B, where the change from the scene (A) to B is wanted: B − A.
-    pair : tuple of Scene, (2,), or None
-        Both sides of a comparison where they can be drawn on one sheet, with their difference.
-    figure : str
-        Name of the figure; empty for the one that suits what is coloured.
-    conditions : tuple of str
-        Errors that are excluded, in words.
-    pair_conditions : tuple of str
-        The same of both sides of a pair, with the letter of the side.
-    range_fixed : bool
-        Whether the user has fixed the range of the colours.
-    """
-
-    scene: Scene
+    scene: Scene  # with all changes made in the app
     loop: str
     component: str
-    nodes: int
-    exaggeration: float
-    dark: bool
-    tilts: bool = False
+    nodes: int  # grid nodes per axis
+    exaggeration: float  # display factor in force
+    dark: bool  # light ink on a dark ground
+    tilts: bool = False  # whether the tool-orientation error is coloured, not the position error
+    # the colours that are shown, where they are not those of the request's own map: fixed by the
+    # user, or shared with other maps
     colours: ColourScale | None = None
-    beside: Beside | None = None
+    beside: Beside | None = None  # B, where the change from the scene (A) to B is wanted: B − A
+    # or None; both sides of a comparison where they can be drawn on one sheet, with their
+    # difference
     pair: tuple[Scene, Scene] | None = None
-    figure: str = ""
-    conditions: tuple[str, ...] = ()
+    figure: str = ""  # name of the figure; empty for the one that suits what is coloured
+    conditions: tuple[str, ...] = ()  # errors that are excluded, in words
+    # the same of both sides of a pair, with the letter of the side
     pair_conditions: tuple[str, ...] = ()
-    range_fixed: bool = False
+    range_fixed: bool = False  # whether the user has fixed the range of the colours
 
 
 @dataclass(frozen=True, slots=True)
 class ConceptRequest:
-    """Machines that are to be drawn side by side.
-
-    Attributes
-    ----------
-    scenes : tuple of Scene
-    plan : ConceptPlan
-        How they are sampled.
-    loop : str
-    dark : bool
-        Light ink on a dark ground.
-    strip_px : tuple of int, (2,), or None
-        Width and height of each picture where they are wanted alone, one below the other; None for
-        a sheet with words and numbers.
-    """
+    """Machines that are to be drawn side by side."""
 
     scenes: tuple[Scene, ...]
-    plan: "ConceptPlan"
+    plan: "Concepts"  # how they are sampled
     loop: str
-    dark: bool
+    dark: bool  # light ink on a dark ground
+    # or None; width and height of each picture where they are wanted alone, one below the other;
+    # None for a sheet with words and numbers
     strip_px: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class CompensationRequest:
-    """Maps of a compensation that are to be drawn: before, after, and what is left.
-
-    Attributes
-    ----------
-    found : Compensation
-    dark : bool
-        Light ink on a dark ground.
-    narrow : bool
-        Whether they are for a column of the page, without title and numbers; else a sheet.
-    """
+    """Maps of a compensation that are to be drawn: before, after, and what is left."""
 
     found: "Compensation"
-    dark: bool
+    dark: bool  # light ink on a dark ground
+    # whether they are for a column of the page, without title and numbers; else a sheet
     narrow: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Services:
-    """Work the app cannot do itself; None where nobody does it.
+    """Work the app cannot do itself; None where nobody does it."""
 
-    Attributes
-    ----------
-    draw_figure : callable or None
-        Takes a request and an event that cancels; gives a PNG. Raises `CancelledError` when
-        cancelled, another `WarpspaceError` where it cannot be drawn.
-    write_export : callable or None
-        Takes a request and an ending (".glb", ".csv"); gives the file's content.
-    draw_concepts : callable or None
-        As `draw_figure`, of machines side by side.
-    draw_compensation : callable or None
-        As `draw_figure`, of the maps of a compensation.
-    figures : tuple of (str, str)
-        Names of the figures of one scene, and what each shows.
-    exports : tuple of (str, str)
-        Endings of the formats, and what each is for.
-    """
-
+    # takes a request and an event that cancels; gives a PNG. Raises `CancelledError` when
+    # cancelled, another `WarpspaceError` where it cannot be drawn.
     draw_figure: Callable[[Request, threading.Event], bytes] | None = None
+    # takes a request and an ending (".glb", ".csv"); gives the file's content
     write_export: Callable[[Request, str], bytes] | None = None
+    # as `draw_figure`, of machines side by side
     draw_concepts: Callable[[ConceptRequest, threading.Event], bytes] | None = None
+    # as `draw_figure`, of the maps of a compensation
     draw_compensation: Callable[[CompensationRequest, threading.Event], bytes] | None = None
+    # names of the figures of one scene, and what each shows
     figures: tuple[tuple[str, str], ...] = ()
-    exports: tuple[tuple[str, str], ...] = ()
+    exports: tuple[tuple[str, str], ...] = ()  # endings of the formats, and what each is for
+    token: str | None = None  # what the app asks for; it goes into a link where that is asked for
+
+
+# --- Long work beside a session: one at a time, with progress, and cancellable --------------------
+
+TICK_S = 0.25
+Work = Callable[[threading.Event], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a job is."""
+
+    name: str  # what is being done
+    percent: float  # estimated from the time it usually takes; 100 only when done
+
+
+class Jobs:
+    """Runs one job at a time in threads of its own."""
+
+    def __init__(
+        self, report: Callable[[Progress | None], None], failed: Callable[[str, Exception], None]
+    ) -> None:
+        self._report, self._failed = report, failed
+        self._lock = threading.Lock()
+        self._cancelled: threading.Event | None = None
+
+    @property
+    def busy(self) -> bool:
+        """Whether something runs."""
+        with self._lock:
+            return self._cancelled is not None
+
+    def start(self, name: str, work: Work, usual_s: float) -> bool:
+        """Start a job."""
+        with self._lock:
+            if self._cancelled is not None:
+                return False
+            cancelled = self._cancelled = threading.Event()
+        threading.Thread(
+            target=self._watch,
+            args=(name, work, cancelled, usual_s),
+            name="warpspace-job",
+            daemon=True,
+        ).start()
+        return True
+
+    def cancel(self) -> None:
+        """Cancel what runs; its result is not delivered any more."""
+        with self._lock:
+            cancelled = self._cancelled
+        if cancelled is not None:
+            cancelled.set()
+
+    def _watch(self, name: str, work: Work, cancelled: threading.Event, usual_s: float) -> None:
+        done = threading.Event()
+        raised: list[Exception] = []
+
+        def run() -> None:
+            try:
+                work(cancelled)
+            except Exception as error:  # noqa: BLE001 - handed to the session, which shows it
+                raised.append(error)
+            done.set()
+
+        started = time.monotonic()
+        threading.Thread(target=run, name="warpspace-work", daemon=True).start()
+        finished = False
+        while not finished and not cancelled.is_set():
+            part = 1.0 - math.exp(-1.5 * (time.monotonic() - started) / usual_s)
+            self._report(Progress(name, 100.0 * part))
+            finished = done.wait(TICK_S)
+        with self._lock:
+            self._cancelled = None
+        self._report(None)
+        if cancelled.is_set():
+            self._failed(name, CancelledError(f"{name}: cancelled"))
+        elif raised:
+            self._failed(name, raised[0])

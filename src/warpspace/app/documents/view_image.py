@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont, PngImagePlugin
 
-from warpspace import __version__
 from warpspace.app.documents.conditions import picture_conditions
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.picture.marks import scale_bars
 from warpspace.picture.words import reference_words, spell_factor
+from warpspace.resources import __version__
 
 LIGHT, DARK = ((255, 255, 255), (27, 38, 59)), ((26, 27, 30), (222, 226, 232))
 """Ground and ink."""
@@ -26,22 +26,7 @@ BAR_PX, BAR_LEFT_PX, BAR_STEP_PX = 150, 16, 24
 def view_png(
     pixels: NDArray[np.uint8], picture: LivePicture, px_per_mm: float | None = None
 ) -> bytes:
-    """Put a rendered view under a heading and beside its colour bar.
-
-    Parameters
-    ----------
-    pixels : ndarray of uint8, [h, w, 3 or 4]
-        With a transparent ground where there are four channels.
-    picture : LivePicture
-        What it shows.
-    px_per_mm : float, optional
-        At the middle of the volume, for scale bars; none by default.
-
-    Returns
-    -------
-    bytes
-        PNG.
-    """
+    """Put a rendered view under a heading and beside its colour bar."""
     ground, ink = DARK if picture.state.shown.dark else LIGHT
     view = Image.fromarray(pixels).convert("RGBA")
     page = Image.new("RGBA", (view.width + BAND_PX, view.height + HEAD_PX), (*ground, 255))
@@ -75,14 +60,14 @@ def _font(size: int) -> "ImageFont.ImageFont | ImageFont.FreeTypeFont":
 
 
 def _heading(draw: ImageDraw.ImageDraw, picture: LivePicture, ink: tuple[int, int, int]) -> None:
-    """Write title, factor and numbers."""
     found = picture.statistics
     title = picture.title
     factor = spell_factor(picture.exaggeration).replace("\u202f", " ")
     draw.text((16, 10), title[:110], ink, _font(22))
     draw.text(
         (16, 38),
-        f"exaggeration {factor} · |E| mean {found.mean_um:.2f} µm, max {found.max_um:.2f} µm"
+        f"exaggeration {factor} · {picture.length_words} mean {found.mean_um:.2f} µm,"
+        f" max {found.max_um:.2f} µm"
         f" · {' · '.join(_said(picture))}",
         ink,
         _font(15),
@@ -90,7 +75,6 @@ def _heading(draw: ImageDraw.ImageDraw, picture: LivePicture, ink: tuple[int, in
 
 
 def _said(picture: LivePicture) -> list[str]:
-    """Say how the picture came about: loop, reference, excluded errors, fixed range."""
     reference = picture.both_words(lambda state: reference_words(state.scene))
     held = any(
         side.scene.reference is not None
@@ -106,7 +90,6 @@ def _said(picture: LivePicture) -> list[str]:
 def _colour_bar(
     page: Image.Image, draw: ImageDraw.ImageDraw, picture: LivePicture, ink: tuple[int, int, int]
 ) -> None:
-    """Draw the colour bar with ticks and unit on the right."""
     scale = picture.scale
     left, top = page.width - BAND_PX + 20, HEAD_PX + 60
     height = max(page.height - top - 40, 40)
@@ -124,7 +107,6 @@ def _colour_bar(
 def _scale_bars(
     draw: ImageDraw.ImageDraw, picture: LivePicture, px_per_mm: float, ink: tuple[int, int, int]
 ) -> None:
-    """Draw the two lengths at the bottom on the left."""
     # the longest bar is a quarter of the length that is handed over
     bars = scale_bars(4.0 * BAR_PX / px_per_mm, picture.exaggeration)
     factor = spell_factor(picture.exaggeration).replace("\u202f", " ")

@@ -6,16 +6,18 @@ cannot be read is left out and named.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, replace
 from urllib.parse import parse_qsl, urlencode
 
+from warpspace.app.evaluation.compare import plain_state, scene_side
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, Shown, start_state
 from warpspace.app.state.bench import option_names
-from warpspace.app.state.exclusions import Exclusions
+from warpspace.app.state.comparison import BEFORE, NOBODY, PRESENT, SHOWN, Comparison, Side
 from warpspace.app.state.look import linear_spans, slice_spans
 from warpspace.app.state.picked import Picked, read_trace, spell_trace
+from warpspace.app.state.ranges import Exclusions
 from warpspace.app.state.spelling import (
     Unreadable,
     read_number,
@@ -27,6 +29,7 @@ from warpspace.app.state.spelling import (
     spell_numbers,
 )
 from warpspace.app.viewport.camera import CameraMemory
+from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop
 
 MAX_LENGTH = 16_000
@@ -44,18 +47,7 @@ Handler = Callable[[AppState, str], AppState]
 
 
 def settings_line(state: AppState, camera: CameraMemory | None = None) -> str:
-    """Spell how a state is looked at, and its amplitudes, as a query string.
-
-    Parameters
-    ----------
-    state : AppState
-    camera : CameraMemory, optional
-
-    Returns
-    -------
-    str
-        ASCII without blanks or line breaks; only what differs from the scene as opened.
-    """
+    """Spell how a state is looked at, and its amplitudes, as a query string."""
     pairs = [*_differences(state)]
     if camera is not None:
         numbers = (*camera.position, *camera.look_at, *camera.up, camera.fov_rad)
@@ -64,7 +56,6 @@ def settings_line(state: AppState, camera: CameraMemory | None = None) -> str:
 
 
 def _differences(state: AppState) -> Iterator[tuple[str, str]]:
-    """List what differs from the scene as opened."""
     opened = start_state(state.scene)
     for key, value in state.amplitudes.items():
         if value != opened.amplitudes.get(key):
@@ -74,9 +65,9 @@ def _differences(state: AppState) -> Iterator[tuple[str, str]]:
             yield axis, repr(value)
     if state.exaggeration != opened.exaggeration:
         yield "exaggeration", "auto" if state.exaggeration is None else repr(state.exaggeration)
-    for name in ("component", "loop", "nodes"):
+    for name in ("component", "loop", "placed", "nodes"):
         if getattr(state, name) != getattr(opened, name):
-            yield name, str(getattr(state, name))
+            yield name, spell(getattr(state, name))
     for group in ("shown", "look", "machine", "specification"):
         now, before = getattr(state, group), getattr(opened, group)
         for field in fields(now):
@@ -115,19 +106,7 @@ def _differences(state: AppState) -> Iterator[tuple[str, str]]:
 
 
 def with_settings(state: AppState, line: str) -> AppState:
-    """Apply a line of settings to a state.
-
-    Parameters
-    ----------
-    state : AppState
-    line : str
-        Anything: it comes from a link or an uploaded file.
-
-    Returns
-    -------
-    AppState
-        What is out of range is clamped and what means nothing left out; `notes` says so.
-    """
+    """Apply a line of settings to a state."""
     handlers = _handlers(state)
     unread: list[str] = []
     for name, value in _pairs(line):
@@ -162,7 +141,6 @@ def camera_of(line: str) -> CameraMemory | None:
 
 
 def _pairs(line: str) -> list[tuple[str, str]]:
-    """Split a line; nothing where it is no query string of reasonable size."""
     if len(line) > MAX_LENGTH:
         return []
     try:
@@ -172,11 +150,11 @@ def _pairs(line: str) -> list[tuple[str, str]]:
 
 
 def _handlers(state: AppState) -> dict[str, Handler]:
-    """List what can be set in a state, and how."""
     found: dict[str, Handler] = {
         "exaggeration": lambda s, v: s.with_exaggeration(None if v == "auto" else read_number(v)),
         "component": lambda s, v: s.with_component(v),
         "loop": lambda s, v: s.with_loop(v) if v in [*Loop] else refuse(),
+        "placed": lambda s, v: replace(s, placed=read_switch(v)),
         "nodes": lambda s, v: s.with_nodes(read_number(v)),
         "look.range_top": lambda s, v: _with_top(s, read_number(v)),
         "specification.limit_um": lambda s, v: replace(
@@ -200,8 +178,8 @@ def _handlers(state: AppState) -> dict[str, Handler]:
         ),
         "rotary.own": lambda s, v: replace(s, rotary=s.rotary.with_own(read_point(v))),
         "rotary.chosen": lambda s, v: replace(s, rotary=s.rotary.with_chosen(v)),
-        **dict.fromkeys(("excluded", "muted"), lambda s, v: _with_exclusions(s, excluded=v)),
-        **dict.fromkeys(("only", "soloed"), lambda s, v: _with_exclusions(s, only=v)),
+        "excluded": lambda s, v: _with_exclusions(s, excluded=v),
+        "only": lambda s, v: _with_exclusions(s, only=v),
         "test": lambda s, v: replace(s, bench=s.bench.with_test(v)),
         "test.path": lambda s, v: replace(s, bench=replace(s.bench, path=read_switch(v))),
         TRACE: lambda s, v: replace(s, picked=read_trace(v)),
@@ -248,16 +226,12 @@ def _handlers(state: AppState) -> dict[str, Handler]:
 
 
 def _with_top(state: AppState, value: float) -> AppState:
-    """Set the end of a fixed range; which range is in force stays."""
     mode = state.look.range_mode
     return replace(state, look=state.look.with_top(value).with_choice(range_mode=mode))
 
 
 def _with_exclusions(state: AppState, *, excluded: str = "", only: str = "") -> AppState:
-    """Set what is excluded, or what alone takes part, from a list of keys.
-
-    Older links and files call the two muted and soloed.
-    """
+    """Set what is excluded, or what alone takes part, from a list of keys."""
     exclusions = Exclusions(
         frozenset(excluded.split(",")) if excluded else state.exclusions.excluded,
         frozenset(only.split(",")) if only else state.exclusions.only,
@@ -266,12 +240,10 @@ def _with_exclusions(state: AppState, *, excluded: str = "", only: str = "") -> 
 
 
 def _known_keys(state: AppState, text: str) -> frozenset[str]:
-    """Read keys of the machine with commas between; others are left out."""
     return frozenset(text.split(",")) & state.amplitudes.keys()
 
 
 def _with_held(state: AppState, axis: str, text: str) -> AppState:
-    """Hold an axis at listed positions within its travel."""
     span = state.position_spans[axis]
     at = tuple(span.clamp(value, span.low) for value in read_numbers(text)[:8])
     return replace(state, rotary=state.rotary.with_held(axis, at))
@@ -284,14 +256,98 @@ def _with_asked(state: AppState, axis: str, at: float) -> AppState:
 
 
 def _with_turned(state: AppState, axis: str, at: float) -> AppState:
-    """Ask about a point of a trace, one rotary axis at a time, degrees."""
     if state.picked is None or state.picked.point_mm is None:
         refuse()
     return _with_asked(state, axis, state.position_spans[axis].clamp(at, 0.0))
 
 
 def _indices(state: AppState, text: str) -> Iterator[int]:
-    """Read numbers of the scene's trace points."""
     for value in read_numbers(text):
         if 0 <= value < len(state.scene.trace_points_mm):
             yield int(value)
+
+
+# --- A comparison as one line of text -------------------------------------------------------------
+# What is compared, what is drawn, and what was pinned.
+#
+# A side that is a scene, and what was pinned, are spelt as links of their own, so that they come
+# back as they are seen: by the name of a scene that is known, or with all that is in them.
+
+PREFIX = "compare."
+PINNED = "pinned"
+NOW = "now"
+"""What is steered, in files and links."""
+TITLE, OLD_TITLE = f"{BEFORE}: ", "snapshot: "
+"""What the title of a pinned state begins with, now and in older files and links."""
+LONGEST_TITLE = 200
+NAMES = frozenset({"a", "b", "shown", "ghost", PINNED, "a.title", "b.title", "pinned.title"})
+Write = Callable[[AppState], str]
+Read = Callable[[str], AppState]
+
+
+def comparison_line(comparison: Comparison[AppState], write: Write) -> str:
+    """Spell a comparison as a query string."""
+    pairs: list[tuple[str, str]] = []
+    for name, side in (("a", comparison.a), ("b", comparison.b)):
+        if side is None or (name == "a" and side.state is None):
+            continue
+        pairs.append((name, _side_text(side, write)))
+        if side.is_scene and side.state and side.title != scene_side(side.state.scene).title:
+            pairs.append((f"{name}.title", side.title))
+    if comparison.shown != Comparison().shown:
+        pairs.append(("shown", comparison.shown))
+    if not comparison.ghost:
+        pairs.append(("ghost", "0"))
+    pinned = comparison.pinned
+    if pinned is not None and pinned.state is not None:
+        pairs += [(PINNED, write(pinned.state)), ("pinned.title", pinned.title)]
+    return urlencode([(PREFIX + name, value) for name, value in pairs])
+
+
+def _side_text(side: Side[AppState], write: Write) -> str:
+    if side.state is None:
+        return NOW
+    return write(side.state) if side.is_scene else PINNED
+
+
+def with_comparison(state: AppState, pairs: Mapping[str, str], read: Read) -> AppState:
+    """Give a state the comparison that somebody has written down."""
+    given = {k.removeprefix(PREFIX): v for k, v in pairs.items() if k.startswith(PREFIX)}
+    if not given:
+        return state
+    for name in given:
+        if name not in NAMES:
+            raise OptionError(f"the comparison says {name[:30]!r}, which means nothing")
+    pinned = None
+    notes = state.notes
+    if PINNED in given:
+        before = read(given[PINNED])
+        notes = (*notes, *(f"{BEFORE}: {note}" for note in before.notes))
+        plain = replace(plain_state(before), notes=())
+        given_title = given.get("pinned.title", "")
+        title = TITLE + given_title.removeprefix(OLD_TITLE).removeprefix(TITLE)
+        pinned = Side(title[:LONGEST_TITLE], plain)
+    a, b = (_side(given, name, pinned, read) for name in "ab")
+    shown, ghost = given.get("shown", Comparison().shown), given.get("ghost", "1")
+    if shown not in SHOWN or ghost not in ("0", "1"):
+        raise OptionError("the comparison does not say what is drawn: expected a, b or difference")
+    if given.get("pinned.title", "").startswith(OLD_TITLE) and a is None and b is pinned:
+        a, b, shown = pinned, Side(), {"a": "b", "b": "a"}.get(shown, shown)
+    found = Comparison(a or Side(), b, shown, ghost == "1", pinned)
+    return replace(state, comparison=found, notes=notes)
+
+
+def _side(
+    given: Mapping[str, str], name: str, pinned: Side[AppState] | None, read: Read
+) -> Side[AppState] | None:
+    """Read one side; None where there is none."""
+    text = given.get(name)
+    if text is None or text == NOW:
+        return None if text is None else Side()
+    if text == PINNED:
+        if pinned is None:
+            raise OptionError("the comparison is with a pinned state, but holds none")
+        return pinned
+    side = scene_side(read(text).scene)
+    title = given.get(f"{name}.title", side.title)[:LONGEST_TITLE]
+    return side if title in (NOW, PRESENT, NOBODY, "") else replace(side, title=title)

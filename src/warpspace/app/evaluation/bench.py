@@ -4,14 +4,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from warpspace.analysis.blocks import Lines
 from warpspace.app.evaluation.cache import Cache, Identity
 from warpspace.app.state.app_state import AppState
-from warpspace.bench.base import BenchTest, Run
-from warpspace.bench.options import read_options
-from warpspace.bench.outcome import Chart
+from warpspace.bench.base import BenchTest, Run, find_test
 from warpspace.bench.plan import Plan
 from warpspace.bench.readings import respond_sites, sense
-from warpspace.bench.registry import find_test
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.field.grid import Workspace, seen_from_workpiece
 from warpspace.units import MM_PER_UM, Array
@@ -23,21 +21,12 @@ MOST_SITES = 20_000
 
 @dataclass(frozen=True, slots=True)
 class Prepared:
-    """A test laid on a machine.
-
-    Attributes
-    ----------
-    test : BenchTest
-    plan : Plan
-    nominal_mm : ndarray, [n, 3], mm
-        Sites as they are drawn: as the workpiece sees them.
-    response : ndarray, [K, n, 3]
-        Error of the tool against the workpiece at each site, per unit of each amplitude.
-    """
+    """A test laid on a machine."""
 
     test: BenchTest
     plan: Plan
-    nominal_mm: Array
+    nominal_mm: Array  # [n, 3]; sites as they are drawn: as the workpiece sees them
+    # [K, n, 3]; error of the tool against the workpiece at each site, per unit of each amplitude
     response: Array
 
     @property
@@ -48,19 +37,11 @@ class Prepared:
 
 @dataclass(frozen=True, slots=True)
 class BenchPicture:
-    """A test that was run on a state.
-
-    Attributes
-    ----------
-    prepared : Prepared
-    error_um : ndarray, [n, 3], µm
-        At its sites.
-    readings : ndarray, [m], µm or µrad
-    """
+    """A test that was run on a state."""
 
     prepared: Prepared
-    error_um: Array
-    readings: Array
+    error_um: Array  # [n, 3]; at its sites
+    readings: Array  # [m], µm or µrad
 
     @property
     def run(self) -> Run:
@@ -70,18 +51,12 @@ class BenchPicture:
         return Run("model", prepared.plan, self.readings, outcome)
 
     @property
-    def charts(self) -> tuple[Chart, ...]:
+    def charts(self) -> tuple[Lines, ...]:
         """The customary figure."""
         return self.prepared.test.charts([self.run])
 
     def lines_mm(self, exaggeration: float) -> list[tuple[Array, Array]]:
-        """Give each stretch of the path, nominal and actual, [n, 3], mm.
-
-        Parameters
-        ----------
-        exaggeration : float
-            Display factor of the box.
-        """
+        """Give each stretch of the path, nominal and actual, [n, 3], mm."""
         nominal = self.prepared.nominal_mm
         actual = nominal + exaggeration * MM_PER_UM * self.error_um
         return [(nominal[rows], actual[rows]) for rows in self.prepared.plan.path]
@@ -100,19 +75,7 @@ class BenchSource:
         self._kept: Cache[Prepared] = Cache(CACHE_BYTES)
 
     def picture(self, state: AppState, amplitudes: Array) -> BenchPicture | str | None:
-        """Run the test that a state has chosen.
-
-        Parameters
-        ----------
-        state : AppState
-        amplitudes : ndarray, [K], µm or µrad
-            Those that count.
-
-        Returns
-        -------
-        BenchPicture, str or None
-            Why it cannot be run on this machine; None where no test is chosen.
-        """
+        """Run the test that a state has chosen."""
         look = state.bench
         if not look.name:
             return None
@@ -124,6 +87,9 @@ class BenchSource:
         )
         try:
             prepared = self._kept.get(key, lambda: prepare(state), lambda found: found.size)
+        except OptionError as error:
+            labels = {one.name: one.label for one in find_test(look.name).settings()}
+            return error.said(lambda name: labels.get(name, name))
         except WarpspaceError as error:
             return str(error)
         error_um = np.tensordot(amplitudes, prepared.response, axes=1)
@@ -131,16 +97,12 @@ class BenchSource:
 
 
 def prepare(state: AppState) -> Prepared:
-    """Lay the test of a state on its machine.
-
-    Raises
-    ------
-    WarpspaceError
-        If it cannot be run there.
-    """
+    """Lay the test of a state on its machine."""
     scene = replace(state.scene, workspace=_standing(state))
     kind = find_test(state.bench.name)
-    test = kind(**read_options(kind, state.bench.options, scene.machine.axes))
+    typed = state.bench.options
+    named = (one for one in kind.settings() if typed.get(one.name, "").strip())
+    test = kind(**{one.name: one.read(typed[one.name], scene) for one in named})
     plan = test.plan(scene)
     if len(plan.point_mm) > MOST_SITES:
         raise OptionError(
@@ -152,7 +114,6 @@ def prepare(state: AppState) -> Prepared:
 
 
 def _standing(state: AppState) -> Workspace:
-    """Give the working volume with the rotary axes where they stand, ranges of others kept."""
     workspace = state.scene.workspace
     moved = {
         axis: value

@@ -12,17 +12,21 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.edits import curve_of
 from warpspace.app.state.picked import Picked
 from warpspace.field.grid import Grid, seen_from_workpiece
-from warpspace.geometry.deform import deform
-from warpspace.geometry.pick import pick_point, pick_surface
-from warpspace.geometry.surfaces import Index, outer_surface
-from warpspace.geometry.thicken import is_thin
+from warpspace.geometry.surfaces import (
+    Index,
+    deform,
+    is_thin,
+    outer_surface,
+    pick_point,
+    pick_surface,
+)
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, nominal_point
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
 from warpspace.machine.errors import ErrorSet
-from warpspace.picture.axis_motion import is_moved
 from warpspace.picture.mesh import thick_map
+from warpspace.picture.traces import is_moved
 from warpspace.units import Array
 
 TOLERANCE_RAD = 0.0032
@@ -35,49 +39,25 @@ REACH_MM = 1e7
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """A picked point explained, as it is drawn.
+    """A picked point explained, as it is drawn."""
 
-    Attributes
-    ----------
-    at : mapping of str to float, mm or degrees
-        Positions of all axes.
-    loop : Loop
-    explanation : Explanation
-    shift_mm : ndarray, [3], mm
-        From R to where things are drawn, on machines whose linear axes carry the workpiece.
-    drawn_mm : ndarray, [3], mm
-        Where the displaced point is drawn.
-    drawn_um : ndarray, [3], µm
-        The error that it is drawn with: the one explained, or what a table leaves of it.
-    """
-
-    at: Mapping[str, float]
+    at: Mapping[str, float]  # mm or degrees; positions of all axes
     loop: Loop
     explanation: Explanation
+    # [3]; from R to where things are drawn, on machines whose linear axes carry the workpiece
     shift_mm: Array
-    drawn_mm: Array
+    drawn_mm: Array  # [3]; where the displaced point is drawn
+    # [3]; the error that it is drawn with: the one explained, or what a table leaves of it
     drawn_um: Array
 
     @property
     def is_corrected(self) -> bool:
         """Whether a table corrects the point that is drawn."""
-        return self.drawn_um is not self.explanation.error_um
+        return not np.array_equal(self.drawn_um, self.explanation.error_um)
 
 
 def pick(picture: LivePicture, origin_mm: Array, direction: Array) -> Picked | None:
-    """Find the point of a drawn trace or surface that a click means.
-
-    Parameters
-    ----------
-    picture : LivePicture
-    origin_mm, direction : ndarray, [3]
-        The ray from the eye; anything, since it comes from a browser.
-
-    Returns
-    -------
-    Picked or None
-        None where it meets nothing. A trace in front of the surface comes before it.
-    """
+    """Find the point of a drawn trace or surface that a click means."""
     ray = np.concatenate([np.ravel(origin_mm), np.ravel(direction)]).astype(float)
     if ray.shape != (6,) or not np.isfinite(ray).all() or np.abs(ray).max() > REACH_MM:
         return None
@@ -121,7 +101,6 @@ def _on_surface(picture: LivePicture, origin: Array, unit: Array) -> tuple[Picke
 
 
 def _between_nodes(grid: Grid, nodes: Index, weights: Array) -> Picked:
-    """Interpolate the axis positions of flat grid nodes."""
     return Picked(
         {
             name: float(np.broadcast_to(values, grid.shape).reshape(-1)[nodes] @ weights)
@@ -155,7 +134,6 @@ def _on_trace(picture: LivePicture, origin: Array, unit: Array) -> tuple[Picked,
 
 
 def _denser(samples: Array) -> Array:
-    """Put `BETWEEN` steps between two samples, [T, n, d] → [T, (n−1)·BETWEEN + 1, d]."""
     count = samples.shape[1]
     place = np.linspace(0.0, count - 1.0, (count - 1) * BETWEEN + 1)
     first = np.minimum(place.astype(int), count - 2)
@@ -169,19 +147,7 @@ def active_errors(state: AppState) -> ErrorSet:
 
 
 def answer(state: AppState, picked: Picked, exaggeration: float) -> Answer:
-    """Explain the error of a picked point.
-
-    Parameters
-    ----------
-    state : AppState
-    picked : Picked
-    exaggeration : float
-        Display factor in force.
-
-    Returns
-    -------
-    Answer
-    """
+    """Explain the error of a picked point."""
     model = state.scene.model
     stands = {**state.scene.workspace.positions, **state.positions, **picked.at}
     at = {name: stands.get(name, 0.0) for name in model.machine.axes}
@@ -193,7 +159,7 @@ def answer(state: AppState, picked: Picked, exaggeration: float) -> Answer:
         side = "workpiece" if loop is Loop.WORKPIECE else "tool"
         pose = branch_pose(model, side, coordinates)
         point = transforms.apply(pose, np.asarray(picked.point_mm))
-    found = explain(model, active_errors(state), coordinates, state.scene.view(loop), point)
+    found = explain(model, active_errors(state), coordinates, state.view(loop), point)
     shift = np.zeros(3)
     if picked.point_mm is None:
         volume = state.scene.workspace.moved(state.positions)

@@ -2,7 +2,8 @@
 
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Generator, Hashable
+from contextlib import contextmanager
 from typing import Any, Generic, TypeVar
 
 T = TypeVar("T")
@@ -42,3 +43,21 @@ class Identity:
 
     def __hash__(self) -> int:
         return id(self.thing)
+
+
+# --- Slow work of all tabs together, whatever its kind --------------------------------------------
+# One at a time, so that sliders stay quick.
+
+POLL_S = 0.1
+_TURN = threading.Lock()
+
+
+@contextmanager
+def taken_turn(watch: Callable[[], object]) -> Generator[None]:
+    """Wait until nothing else is worked on; `watch` raises where nobody waits any more."""
+    while not _TURN.acquire(timeout=POLL_S):
+        watch()
+    try:
+        yield
+    finally:
+        _TURN.release()

@@ -1,22 +1,19 @@
 """Calibrations of what a state shows: readings that were taken in, the question, the answer."""
 
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
-from warpspace.app.evaluation.cache import Identity
+from warpspace.analysis.options import options_of
+from warpspace.app.evaluation.cache import Identity, taken_turn
 from warpspace.app.evaluation.compare import plain_state, scene_side, with_before
 from warpspace.app.evaluation.resulting_scene import scene_of
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.comparison import Side
-from warpspace.calibration.calibrate import calibrate
-from warpspace.calibration.circles import Circle
+from warpspace.calibration.calibrate import Calibrate
 from warpspace.calibration.kinds.registry import KINDS
-from warpspace.calibration.next_best import Step, next_best, separating
-from warpspace.calibration.readings import bundled_data, find_data, parse_readings
-from warpspace.calibration.results import Calibration, Request
-from warpspace.calibration.table import parse_table
-from warpspace.calibration.terms import read_keys
+from warpspace.calibration.readings import bundled_data, find_data, parse_readings, parse_table
+from warpspace.calibration.results import Calibration
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.machine.limits import MAX_CSV_BYTES
 from warpspace.scene.files import read_text
@@ -27,9 +24,6 @@ MOST_FILES, MOST_READINGS = 6, 5_000
 """Files of a page, and readings in all of them: what a fit needs of memory goes with it."""
 MOST_NEXT = 3
 LONGEST_KEYS = 500
-POLL_S = 0.1
-_TURN = threading.Lock()
-"""One fit at a time for all tabs together, so that sliders stay quick."""
 Tell = Callable[[str], None]
 """Takes what is being done, in words."""
 
@@ -40,88 +34,41 @@ class StoppedError(WarpspaceError):
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """A file of readings.
+    """A file of readings."""
 
-    Attributes
-    ----------
-    name : str
-        Unlike those of the other files of the page; never a path.
-    text : str
-    kind : str or None
-        As chosen; None for what its columns tell.
-    told : str
-        The kind it was read as.
-    count : int
-        Readings.
-    """
-
-    name: str
+    name: str  # unlike those of the other files of the page; never a path
     text: str = field(repr=False)
-    kind: str | None
-    told: str
-    count: int
+    kind: str | None  # as chosen; None for what its columns tell
+    told: str  # the kind it was read as
+    count: int  # readings
 
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """All that an answer depends on; equal questions have equal answers.
+    """All that an answer depends on; equal questions have equal answers."""
 
-    Attributes
-    ----------
-    scene : Identity
-        Scene with machine and curves.
-    amplitudes : tuple of (str, float), µm or µrad
-        All errors, excluded or not: what a saved scene has.
-    positions : tuple of (str, float), degrees
-    files : tuple of Measured
-    keys : str
-        Parameters to find, as typed.
-    robust : bool
-    start : Scene
-        What all this amounts to.
-    """
-
-    scene: Identity
+    scene: Identity  # scene with machine and curves
+    # µm or µrad; all errors, excluded or not: what a saved scene has
     amplitudes: tuple[tuple[str, float], ...]
-    positions: tuple[tuple[str, float], ...]
+    positions: tuple[tuple[str, float], ...]  # degrees
     files: tuple[Measured, ...]
-    keys: str
+    keys: str  # parameters to find, as typed
     robust: bool
-    start: Scene = field(compare=False, repr=False)
+    start: Scene = field(compare=False, repr=False)  # what all this amounts to
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """A calibration with all that a reader is told of it.
-
-    Attributes
-    ----------
-    question : Question
-    found : Calibration
-    circles : tuple of Circle
-    apart : mapping of tuple of str to str
-        Groups that cannot be told apart, and the measurement that would.
-    steps : tuple of Step
-        Next measurements.
-    """
+    """A calibration with all that a reader is told of it."""
 
     question: Question
     found: Calibration
-    circles: tuple[Circle, ...]
-    apart: Mapping[tuple[str, ...], str]
-    steps: tuple[Step, ...]
 
 
 def take(
     scene: Scene, text: str, name: str, kind: str | None, others: Sequence[Measured]
 ) -> Measured:
-    """Take in the text of a file beside those that are there.
-
-    Raises
-    ------
-    WarpspaceError
-        If it cannot be read as readings of this machine, or is too much.
-    """
+    """Take in the text of a file beside those that are there."""
     if len(others) >= MOST_FILES:
         raise OptionError(f"{name}: expected at most {MOST_FILES} files; remove one first")
     unlike = name
@@ -161,25 +108,7 @@ def ask(state: AppState, files: Sequence[Measured], keys: str, *, robust: bool) 
 
 
 def answer(question: Question, cancelled: threading.Event, tell: Tell) -> Answer:
-    """Calibrate.
-
-    Parameters
-    ----------
-    question : Question
-    cancelled : threading.Event
-        Ends the work when set.
-    tell : callable
-        Gets what is being done.
-
-    Returns
-    -------
-    Answer
-
-    Raises
-    ------
-    WarpspaceError
-        If nothing can be found; `StoppedError` where it was cancelled.
-    """
+    """Calibrate."""
 
     def watch() -> None:
         if cancelled.is_set():
@@ -188,21 +117,14 @@ def answer(question: Question, cancelled: threading.Event, tell: Tell) -> Answer
     if len(question.keys) > LONGEST_KEYS:
         raise OptionError(f"parameters to find: expected at most {LONGEST_KEYS} characters")
     scene, typed = question.start, question.keys
-    request = Request(read_keys((typed,)) if typed else None, robust=question.robust)
+    (fit,) = (one for one in options_of(Calibrate) if one.name == "fit")
+    keys = fit.read(typed, scene) if typed else None
+    request = Calibrate(fit=keys, robust=question.robust, next_count=MOST_NEXT)
     tell("Waiting for another fit …")
-    while not _TURN.acquire(timeout=POLL_S):
-        watch()
-    try:
+    with taken_turn(watch):
         tell("Fitting …")
         sets = [parse_readings(one.text, one.name, scene, one.kind) for one in question.files]
-        found = calibrate(scene, sets, request, (), watch)
-        circles = tuple(circle for one in sets for circle in one.circles)
-        tell("Looking for further measurements …")
-        apart = separating(scene, sets, found, watch=watch) if found.rank.confounded else {}
-        steps = next_best(scene, sets, found, MOST_NEXT, watch=watch)
-    finally:
-        _TURN.release()
-    return Answer(question, found, circles, apart, steps)
+        return Answer(question, request.find(scene, sets, (), watch))
 
 
 def is_applied(state: AppState, given: Answer) -> bool:
@@ -219,5 +141,5 @@ def with_calibrated_beside(state: AppState, given: Answer) -> AppState:
 
 def calibrated_state(state: AppState, given: Answer) -> AppState:
     """Show the calibrated scene as what is steered; the state before it is the other side."""
-    opened = replace(state.with_scene(given.found.scene), loop=state.loop)
+    opened = replace(state.with_scene(given.found.scene), loop=state.loop, placed=state.placed)
     return with_before(opened, Side(BEFORE, plain_state(state)))

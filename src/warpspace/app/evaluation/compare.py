@@ -1,4 +1,4 @@
-"""Two states side by side: shared grid, shared colours, shared display factor, and the difference.
+"""Two states side by side: one grid, colours and display factor, and the change in its own colours.
 
 A difference is taken node by node, so the nominal volumes must coincide. Where they do not, the two
 sides are still shown and the reason stands in `Compared.refused`.
@@ -13,8 +13,7 @@ from warpspace.app.state.comparison import AFTER, BEFORE, PRESENT, Comparison, S
 from warpspace.app.state.look import RotaryLook
 from warpspace.app.state.table import table_words
 from warpspace.geometry.colour import ColourScale
-from warpspace.picture.model import choose_scale, same_nodes, subtract_pictures
-from warpspace.picture.slices import subtract_slices
+from warpspace.picture.model import choose_scale, same_nodes, subtract_pictures, subtract_slices
 from warpspace.picture.traces import subtract_traces
 from warpspace.scene.model import Scene
 
@@ -22,22 +21,10 @@ REFUSED = "The working volumes are not the same, so there is no difference node 
 
 
 def side_state(now: AppState, side: Side[AppState]) -> AppState:
-    """Give the state of one side, looked at as the present one.
-
-    Parameters
-    ----------
-    now : AppState
-    side : Side[AppState]
-
-    Returns
-    -------
-    AppState
-        Component, density, factor and look are those of now. A scene also stands at the rotary
-        positions of now, in its loop; what was pinned keeps its own.
-    """
+    """Give the state of one side, looked at as the present one."""
     base = side.state or now
     if side.is_scene:
-        base = replace(base, loop=now.loop)
+        base = replace(base, loop=now.loop, placed=now.placed)
         for axis, position in now.positions.items():
             if axis in base.positions:
                 base = base.with_position(axis, position).without_notes()
@@ -58,7 +45,6 @@ def side_state(now: AppState, side: Side[AppState]) -> AppState:
 
 
 def _turns_alike(one: AppState, other: AppState) -> bool:
-    """Tell whether the same points are traced over the same axes."""
     points = one.scene.trace_points_mm == other.scene.trace_points_mm
     return points and one.positions.keys() == other.positions.keys()
 
@@ -85,20 +71,7 @@ def plain_state(state: AppState) -> AppState:
 
 
 def compare_pictures(single: Callable[[AppState], LivePicture], state: AppState) -> LivePicture:
-    """Evaluate a state that compares two.
-
-    Parameters
-    ----------
-    single : callable
-        Evaluates one plain state.
-    state : AppState
-        With `state.comparison.b`.
-
-    Returns
-    -------
-    LivePicture
-        Of what is drawn; `LivePicture.subject` is the side it shows.
-    """
+    """Evaluate a state that compares two."""
     chosen = state.comparison
     other_side = chosen.b or Side()
     a, b = _with_one_factor(
@@ -106,8 +79,7 @@ def compare_pictures(single: Callable[[AppState], LivePicture], state: AppState)
     )
     refused = "" if same_nodes(a.grid.nominal_mm, b.grid.nominal_mm) else REFUSED
     difference = None if refused else _difference(a, b)
-    maps = [a, b] if difference is None else [a, b, difference]
-    scale = _shared_scale(state, maps)
+    scale = _shared_scale(state, [a, b])
     shown = "b" if refused and chosen.shown == "difference" else chosen.shown
     drawn, other = {"a": (a, b), "b": (b, a), "difference": (difference or b, None)}[shown]
     alike = other is not None and other.drawn_mm.shape == drawn.drawn_mm.shape
@@ -121,13 +93,13 @@ def compare_pictures(single: Callable[[AppState], LivePicture], state: AppState)
         other.drawn_mm if other is not None and alike else None,
         refused,
     )
-    return replace(drawn, state=state, subject=drawn.state, colours=scale, compared=compared)
+    colours = drawn.scale if drawn.is_difference else scale
+    return replace(drawn, state=state, subject=drawn.state, colours=colours, compared=compared)
 
 
 def _with_one_factor(
     state: AppState, pictures: Sequence[LivePicture]
 ) -> tuple[LivePicture, LivePicture]:
-    """Draw both sides with one display factor: the one chosen, or the smaller of theirs."""
     factor = state.exaggeration or min(picture.exaggeration for picture in pictures)
     a, b = (
         replace(
@@ -142,7 +114,6 @@ def _with_one_factor(
 
 
 def _title(state: AppState, side: Side[AppState], beside: Side[AppState]) -> str:
-    """Name a side on the page."""
     if side.state:
         return side.title
     pinned = beside.state is not None and not beside.is_scene
@@ -152,10 +123,11 @@ def _title(state: AppState, side: Side[AppState], beside: Side[AppState]) -> str
 
 
 def _difference(a: LivePicture, b: LivePicture) -> LivePicture:
-    """Take the change from a to b, b − a: node by node, slice by slice and trace by trace."""
+    change = subtract_pictures(b, a)
+    if b.state.look.range_mode == "fixed":
+        change = replace(change, colours=replace(change.scale, low=b.scale.low, high=b.scale.high))
     return replace(
-        subtract_pictures(b, a),
-        colours=None,
+        change,
         bench=None,
         traces=subtract_traces(b.traces, a.traces),
         slices=subtract_slices(b.slices, a.slices),
@@ -163,7 +135,6 @@ def _difference(a: LivePicture, b: LivePicture) -> LivePicture:
 
 
 def _shared_scale(state: AppState, maps: Sequence[LivePicture]) -> ColourScale:
-    """Give one colour scale that holds all maps."""
     if state.look.range_mode == "fixed":
         return maps[0].scale
     widest = max((picture.scale for picture in maps), key=lambda scale: scale.high)

@@ -4,7 +4,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from warpspace.app.evaluation.cache import Identity
+from warpspace.app.evaluation.cache import Identity, taken_turn
 from warpspace.app.evaluation.compare import pinned_side, with_before
 from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.state.app_state import AppState
@@ -15,12 +15,9 @@ from warpspace.formats.compensation.compensate import Compensation, compensate
 from warpspace.formats.compensation.controller import Controller
 from warpspace.scene.model import Scene
 
-POLL_S = 0.1
 MACHINE, BOTH, LEFT = "the machine", "before and after", "what is left"
 BOXES = (MACHINE, BOTH, LEFT)
 """What the box can show."""
-_TURN = threading.Lock()
-"""One compensation at a time for all tabs together, so that sliders stay quick."""
 
 
 class StoppedError(WarpspaceError):
@@ -29,25 +26,14 @@ class StoppedError(WarpspaceError):
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """All that an answer depends on; equal questions have equal answers.
+    """All that an answer depends on; equal questions have equal answers."""
 
-    Attributes
-    ----------
-    scene : Identity
-        Scene with machine and curves.
-    amplitudes : tuple of (str, float), µm or µrad
-        Errors that take part.
-    positions : tuple of (str, float), degrees
-    choice : CompensationChoice
-    start : Scene
-        What all this amounts to.
-    """
-
-    scene: Identity
-    amplitudes: tuple[tuple[str, float], ...]
-    positions: tuple[tuple[str, float], ...]
+    scene: Identity  # scene with machine and curves
+    amplitudes: tuple[tuple[str, float], ...]  # µm or µrad; errors that take part
+    positions: tuple[tuple[str, float], ...]  # degrees
     choice: CompensationChoice
-    start: Scene = field(compare=False, repr=False)
+    placed: bool
+    start: Scene = field(compare=False, repr=False)  # what all this amounts to
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,30 +51,13 @@ def ask(state: AppState, choice: CompensationChoice) -> Question:
         tuple(state.active.items()),
         tuple(state.positions.items()),
         choice,
+        state.placed,
         active_scene(state),
     )
 
 
 def answer(question: Question, cancelled: threading.Event, tell: Callable[[str], None]) -> Answer:
-    """Compensate.
-
-    Parameters
-    ----------
-    question : Question
-    cancelled : threading.Event
-        Ends the work when set.
-    tell : callable
-        Gets what is being done, in words.
-
-    Returns
-    -------
-    Answer
-
-    Raises
-    ------
-    WarpspaceError
-        If it cannot be done; `StoppedError` where it was cancelled.
-    """
+    """Compensate."""
 
     def watch() -> None:
         if cancelled.is_set():
@@ -96,33 +65,21 @@ def answer(question: Question, cancelled: threading.Event, tell: Callable[[str],
 
     plan = question.choice.plan()
     tell("Waiting for another compensation …")
-    while not _TURN.acquire(timeout=POLL_S):
-        watch()
-    try:
+    with taken_turn(watch):
         tell("Writing the table and reading it back …")
         return Answer(question, compensate(question.start, plan, watch=watch))
-    finally:
-        _TURN.release()
 
 
 def with_box(state: AppState, box: str, controller: Controller) -> AppState:
-    """Choose what the box shows: a word of `BOXES`; nonsense changes nothing.
-
-    Parameters
-    ----------
-    state : AppState
-    box : str
-    controller : Controller
-        Of the latest compensation. Its table corrects the machine as it is now, in the loop that
-        it corrects.
-    """
+    """Choose what the box shows: a word of `BOXES`; nonsense changes nothing."""
     same = box == box_of(state) and state.controller in (None, controller)
     if box not in BOXES or same:
         return state
     bare = without_table(state)
     if box == MACHINE:
         return bare
-    bare = replace(bare, loop=controller.loop)
+    placed = bare.placed or controller.scene.placed
+    bare = replace(bare, loop=controller.loop, placed=placed)
     corrected = replace(bare, controller=controller)
     if box == BOTH:
         return with_before(corrected, pinned_side(bare))

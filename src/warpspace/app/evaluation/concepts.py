@@ -5,33 +5,24 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from warpspace.app.evaluation.cache import taken_turn
 from warpspace.app.evaluation.resulting_scene import scene_of
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.concept_choice import ConceptChoice
 from warpspace.geometry.colour import ColourScale
+from warpspace.kinematics.model import Loop
 from warpspace.scene.model import Scene
 
 if TYPE_CHECKING:
-    from warpspace.scene.concepts import Concept, ConceptPlan
+    from warpspace.analysis.concepts import Concept, Concepts
 
-POLL_S = 0.1
 NODES = 21
 """Nodes per axis that colours are chosen from; the pictures have the same."""
-_TURN = threading.Lock()
-"""One comparison at a time for all tabs together, so that sliders stay quick."""
 
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """All that a comparison depends on.
-
-    Attributes
-    ----------
-    scenes : tuple of Scene
-    limit_um : float, µm
-    own_tolerances : bool
-    over, loop : str
-    """
+    """All that a comparison depends on."""
 
     scenes: tuple[Scene, ...]
     limit_um: float
@@ -46,15 +37,18 @@ class Question:
             return False
         return all(any(_alike([one], [two]) for two in self.scenes) for one in other.scenes)
 
-    def plan(self) -> "ConceptPlan":
-        """Say how machines are sampled: as the command does it, on one thread."""
-        from warpspace.scene.concepts import ConceptPlan
+    def plan(self) -> "Concepts":
+        """Say how machines are sampled: as the tolerances of one are, on one thread."""
+        from warpspace.analysis.allocating import SAMPLES
+        from warpspace.analysis.concepts import Concepts
 
-        return ConceptPlan(self.limit_um, self.own_tolerances, over=self.over, workers=1)
+        return Concepts(
+            limit_um=self.limit_um, own_tolerances=self.own_tolerances, samples=SAMPLES,
+            over="max" if self.over == "max" else "sampled", loop=Loop(self.loop), workers=1,
+        )  # fmt: skip
 
 
 def _alike(ones: Sequence[Scene], others: Sequence[Scene]) -> bool:
-    """Tell whether scenes are compared alike."""
     return len(ones) == len(others) and all(
         one is other or _matters(one) == _matters(other)
         for one, other in zip(ones, others, strict=True)
@@ -69,19 +63,11 @@ def _matters(scene: Scene) -> tuple[object, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """Machines side by side.
-
-    Attributes
-    ----------
-    question : Question
-    concepts : tuple of Concept
-    scale : ColourScale
-        The colours that their pictures share.
-    """
+    """Machines side by side."""
 
     question: Question
     concepts: "tuple[Concept, ...]"
-    scale: ColourScale
+    scale: ColourScale  # the colours that their pictures share
 
 
 def ask(state: AppState, choice: ConceptChoice) -> Question:
@@ -95,30 +81,11 @@ def ask(state: AppState, choice: ConceptChoice) -> Question:
 def answer(
     question: Question, cancelled: threading.Event, progress: Callable[[float], object]
 ) -> Answer | None:
-    """Compare machines.
-
-    Parameters
-    ----------
-    question : Question
-    cancelled : threading.Event
-        Ends the work when set.
-    progress : callable
-        Called with the share that is done, 0 … 1.
-
-    Returns
-    -------
-    Answer or None
-        None where it was cancelled.
-
-    Raises
-    ------
-    SceneError, OptionError
-        If tolerances are missing, or machines cannot be sampled.
-    """
+    """Compare machines."""
     # scipy's distributions take half a second to import: not before the first picture
-    from warpspace.picture.concepts import picture_concept
+    from warpspace.analysis.concepts import compare_concepts
     from warpspace.picture.model import choose_scale
-    from warpspace.scene.concepts import compare_concepts
+    from warpspace.picture.scene_picture import picture_concept
 
     plan, done = question.plan(), 0
     total = plan.samples * len(question.scenes)
@@ -130,16 +97,12 @@ def answer(
         done += machines
         progress(done / total)
 
-    while not _TURN.acquire(timeout=POLL_S):
-        if cancelled.is_set():
-            return None
     try:
-        found = compare_concepts(question.scenes, plan, loop=question.loop, progress=report)
-        values = [picture_concept(concept, NODES).values for concept in found]
+        with taken_turn(lambda: report(0)):
+            found = compare_concepts(question.scenes, plan, progress=report)
+            values = [picture_concept(concept, NODES).values for concept in found]
     except _CancelledError:
         return None
-    finally:
-        _TURN.release()
     return Answer(question, found, choose_scale(values, "norm"))
 
 

@@ -14,12 +14,10 @@ from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.state.app_state import AppState, start_loop
 from warpspace.app.state.ranges import Span
 from warpspace.field.grid import Grid, build_grid
-from warpspace.kinematics.conventions.registry import convention_names
-from warpspace.kinematics.model import Loop
-from warpspace.machine.axes import is_linear
-from warpspace.machine.travel import TravelDirection
-from warpspace.scene.model import Scene
-from warpspace.scene.pipeline import grid_basis
+from warpspace.kinematics.model import Loop, convention_names
+from warpspace.machine.axes import TravelDirection, is_linear
+from warpspace.machine.description import Axis
+from warpspace.scene.model import Scene, grid_basis
 from warpspace.units import Array
 
 OWN = "own"
@@ -29,18 +27,10 @@ Reference = Mapping[str, float] | None
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """What one choice does to the map, against the scene's own conventions.
+    """What one choice does to the map, against the scene's own conventions."""
 
-    Attributes
-    ----------
-    choice : str
-        For instance "component_errors=before_motion".
-    mean_um, max_um : float, µm
-        Mean and largest length of the change over the grid.
-    """
-
-    choice: str
-    mean_um: float
+    choice: str  # for instance "component_errors=before_motion"
+    mean_um: float  # mean and largest length of the change over the grid
     max_um: float
 
 
@@ -75,7 +65,8 @@ def with_direction(state: AppState, axis: str, direction: int) -> AppState:
     machine = state.scene.machine
     if axis not in machine.axes or direction not in (1, -1):
         return state
-    axes = {**machine.axes, axis: replace(machine.axes[axis], direction=direction)}
+    turned = replace(machine.axes[axis], direction=direction, direction_given=True)
+    axes = {**machine.axes, axis: turned}
     model = replace(state.scene.model, machine=replace(machine, axes=axes))
     return _with_scene(state, replace(state.scene, model=model))
 
@@ -123,10 +114,10 @@ def with_choice(state: AppState, choice: str) -> AppState:
 def with_own_conventions(state: AppState) -> AppState:
     """Go back to the conventions of the scene."""
     own = state.origin
-    axes = {
-        name: replace(axis, direction=own.machine.axes.get(name, axis).direction)
-        for name, axis in state.scene.machine.axes.items()
-    }
+    axes: dict[str, Axis] = {}
+    for name, axis in state.scene.machine.axes.items():
+        said = own.machine.axes.get(name, axis)
+        axes[name] = replace(axis, direction=said.direction, direction_given=said.direction_given)
     # an edited machine may not have all axes of the scene's
     held = {name: at for name, at in (own.reference or {}).items() if name in axes}
     model = replace(
@@ -140,7 +131,6 @@ def with_own_conventions(state: AppState) -> AppState:
 
 
 def _with_scene(state: AppState, scene: Scene) -> AppState:
-    """Show a scene with changed conventions and remember the one it came from."""
     if scene == state.scene:
         return state
     own = state.origin
@@ -190,20 +180,9 @@ class Effects:
         self._responses: dict[str, Array] = {}
 
     def of(self, state: AppState) -> dict[str, Effect]:
-        """Compare each choice, taken alone, with the scene's own conventions.
-
-        Parameters
-        ----------
-        state : AppState
-
-        Returns
-        -------
-        dict of str to Effect
-            By choice; "all" is the present combination. Over the nodes of the result, first order,
-            at the same axis positions. What the scene itself chooses changes nothing.
-        """
+        """Compare each choice, taken alone, with the scene's own conventions."""
         turned = tuple(state.positions.items())
-        needed = (state.origin, state.scene, turned, state.loop, state.nodes)
+        needed = (state.origin, state.scene, turned, state.seen, state.nodes)
         amplitudes = np.fromiter(state.active.values(), float, len(state.amplitudes))
         if not self._looks or not amplitudes.any() or not _same(needed, self._for):
             self._for = needed
@@ -217,7 +196,6 @@ class Effects:
         return found
 
     def _begin(self, state: AppState) -> None:
-        """List the states that are compared; as long as all errors are zero they are the same."""
         own, held = own_state(state), state.scene.reference
         own_choices = chosen(own)
         looks = {c: with_choice(own, c) for c in choices(state) if c not in own_choices}
@@ -265,17 +243,14 @@ def own_state(state: AppState) -> AppState:
 
 
 def _same(new: tuple[object, ...], old: tuple[object, ...]) -> bool:
-    """Compare what responses were worked out for, scenes by identity."""
     return len(new) == len(old) and all(
         a is b if isinstance(a, Scene) else a == b for a, b in zip(new, old, strict=True)
     )
 
 
 def _grid(state: AppState) -> Grid:
-    """Lay the grid of the result."""
     return build_grid(state.scene.model, state.scene.workspace.moved(state.positions), state.nodes)
 
 
 def _response(state: AppState, keys: tuple[str, ...]) -> Array:
-    """Respond to some amplitudes over the grid of the result, [K, nx, ny, nz, 3]."""
-    return grid_basis(state.scene, _grid(state), state.scene.view(state.loop), keys).position
+    return grid_basis(state.scene, _grid(state), state.view(), keys).position

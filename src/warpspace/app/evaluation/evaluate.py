@@ -11,21 +11,23 @@ import numpy as np
 from warpspace.app.evaluation.bench import BenchSource
 from warpspace.app.evaluation.cache import Cache, Identity
 from warpspace.app.evaluation.compare import compare_pictures
-from warpspace.app.evaluation.compensated import CompensatedSource
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.slices import SliceSource
+from warpspace.app.evaluation.slices import CompensatedSource, SliceSource
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import default_held
-from warpspace.field.basis import ErrorBasis, ErrorField
-from warpspace.field.evaluate import build_basis
+from warpspace.field.evaluate import ErrorBasis, ErrorField, build_basis
 from warpspace.field.grid import Grid, build_grid
 from warpspace.geometry.colour import ColourScale
 from warpspace.geometry.traces import TraceGroup, build_traces
-from warpspace.picture.exaggeration import choose_exaggeration
-from warpspace.picture.model import choose_scale, coloured_error, coloured_values
-from warpspace.picture.size import picture_size_mm
+from warpspace.picture.model import (
+    choose_exaggeration,
+    choose_scale,
+    coloured_error,
+    coloured_values,
+    picture_size_mm,
+)
 from warpspace.picture.traces import TraceLines
-from warpspace.scene.pipeline import grid_basis
+from warpspace.scene.model import grid_basis
 from warpspace.units import Array
 
 CACHE_BYTES = 400_000_000
@@ -64,29 +66,18 @@ class LiveModel:
             Identity(state.scene),
             state.nodes,
             tuple(state.positions.items()),
-            state.loop,
+            state.seen,
             replace(state.rotary, chosen=""),
         )
         return self._responses.get(key, lambda: _build(state), lambda response: response.size)
 
     def evaluate(self, state: AppState) -> LivePicture:
-        """Evaluate a state.
-
-        Parameters
-        ----------
-        state : AppState
-
-        Returns
-        -------
-        LivePicture
-            Where two states are compared, of the one that is drawn.
-        """
+        """Evaluate a state."""
         if state.comparison.b is not None:
             return compare_pictures(self._single, state)
         return self._single(state)
 
     def _single(self, state: AppState) -> LivePicture:
-        """Evaluate a state without what it is compared with."""
         response = self.response(state)
         amplitudes = np.fromiter(state.active.values(), float, len(state.amplitudes))
         field = self._compensated.field(state, response.grid)
@@ -108,7 +99,7 @@ class LiveModel:
         )
         colours = _chosen_colours(state, field, response.basis)
         return LivePicture(
-            view=state.scene.view(state.loop),
+            view=state.view(),
             grid=response.grid,
             field=field,
             exaggeration=factor,
@@ -142,7 +133,6 @@ def _length(vectors: Array) -> Array:
 
 
 def _build(state: AppState) -> Response:
-    """Lay grid and traces and compute their responses."""
     scene = state.scene
     grid = build_grid(scene.model, scene.workspace.moved(state.positions), state.nodes)
     positions = {**scene.workspace.positions, **state.positions}
@@ -160,9 +150,9 @@ def _build(state: AppState) -> Response:
             scene.errors,
             keys,
             group.coordinates,
-            scene.view(group.loop),
+            state.view(group.loop),
             group.nominal_mm,
         )
         for group in groups
     )
-    return Response(grid, grid_basis(scene, grid, scene.view(state.loop)), groups, trace_bases)
+    return Response(grid, grid_basis(scene, grid, state.view()), groups, trace_bases)

@@ -9,67 +9,37 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import linear_positions
-from warpspace.field.evaluate import build_basis
-from warpspace.geometry.deform import deform
+from warpspace.bodies.placed import PlacedBody, place_bodies, scene_motions
+from warpspace.field.evaluate import evaluate_first_order
+from warpspace.geometry.surfaces import deform
 from warpspace.kinematics import transforms
-from warpspace.kinematics.bodies import BodyMotion
 from warpspace.kinematics.chain import nominal_point
+from warpspace.kinematics.firstorder import BodyMotion
 from warpspace.kinematics.model import Loop, complete_coordinates
-from warpspace.picture.bodies import PlacedBody, place_bodies, scene_motions
 from warpspace.picture.model import coloured_values
 from warpspace.units import Array
 
 
 @dataclass(frozen=True, slots=True)
 class ToolPoint:
-    """The tool point at the machine's positions.
+    """The tool point at the machine's positions."""
 
-    Attributes
-    ----------
-    nominal_mm, drawn_mm : ndarray, [3], mm
-        Where it should be and where the deformed grid has it.
-    value : float
-        What the map colours there, in the unit of the scale.
-    error_um : ndarray, [3], µm
-    """
-
-    nominal_mm: Array
+    nominal_mm: Array  # [3]; where it should be and where the deformed grid has it
     drawn_mm: Array
-    value: float
-    error_um: Array
+    value: float  # what the map colours there, in the unit of the scale
+    error_um: Array  # [3]
 
 
 def machine_positions(
     state: AppState, turned: Mapping[str, float] | None = None
 ) -> dict[str, float]:
-    """Give where all axes stand, mm and degrees.
-
-    Parameters
-    ----------
-    state : AppState
-    turned : mapping of str to float, degrees, optional
-        Axes that are being turned at the moment.
-    """
+    """Give where all axes stand, mm and degrees."""
     linear = linear_positions(state.scene, state.machine)
     return {**state.scene.workspace.positions, **linear, **state.positions, **(turned or {})}
 
 
 def standing(state: AppState, at: Mapping[str, float]) -> tuple[dict[str, float], Array]:
-    """Tell where the tool point is while some axes stand somewhere, nominally.
-
-    Parameters
-    ----------
-    state : AppState
-    at : mapping of str to float, mm or degrees
-        Axes left out stand where the state has them, linear ones in the middle.
-
-    Returns
-    -------
-    dict of str to float, mm or degrees
-        Positions of all axes.
-    ndarray, [3], mm
-        The point in R.
-    """
+    """Tell where the tool point is while some axes stand somewhere, nominally."""
     scene = state.scene
     stands = {**scene.workspace.positions, **state.positions, **at}
     axes = {name: float(stands.get(name, 0.0)) for name in scene.machine.axes}
@@ -83,7 +53,7 @@ def machine_motions(
     """Find place and small motion of every frame, as the state's loop and reference see it."""
     return scene_motions(
         state.scene,
-        state.scene.view(state.loop),
+        state.view(),
         amplitudes=state.active,
         positions=machine_positions(state, turned),
     )
@@ -92,20 +62,7 @@ def machine_motions(
 def drawn_bodies(
     picture: LivePicture, turned: Mapping[str, float] | None = None
 ) -> tuple[PlacedBody, ...]:
-    """Place the bodies of a picture's machine, bent where that is chosen.
-
-    Parameters
-    ----------
-    picture : LivePicture
-    turned : mapping of str to float, degrees, optional
-        Axes that are being turned at the moment.
-
-    Returns
-    -------
-    tuple of PlacedBody
-        Empty for a machine without bodies. Of a machine that is not shown the rotary axes on the
-        side of those that are turned, and the workpiece there.
-    """
+    """Place the bodies of a picture's machine, bent where that is chosen."""
     state = picture.state
     factor = picture.exaggeration if state.machine.bent else 0.0
     only = None if state.machine.shown else _turning_frames(state, turned or {})
@@ -113,7 +70,6 @@ def drawn_bodies(
 
 
 def _turning_frames(state: AppState, turned: Mapping[str, float]) -> tuple[str, ...]:
-    """Name the frames of the rotary axes on the side of those that are turned."""
     for side, end in (("workpiece", "w"), ("tool", "t")):
         rotary = [axis.name for axis in state.scene.machine.branch(side) if not axis.is_linear]
         if not turned.keys().isdisjoint(rotary):
@@ -127,33 +83,16 @@ def nominal_bodies(picture: LivePicture) -> tuple[PlacedBody, ...]:
 
 
 def tool_point(picture: LivePicture) -> ToolPoint:
-    """Find the tool point in the deformed grid of a picture.
-
-    Parameters
-    ----------
-    picture : LivePicture
-
-    Returns
-    -------
-    ToolPoint
-        Evaluated where the axes stand, so that it lies in the grid between its nodes too.
-    """
+    """Find the tool point in the deformed grid of a picture."""
     state, scene = picture.state, picture.state.scene
     coordinates = complete_coordinates(scene.machine, machine_positions(state))
     motion = machine_motions(state)["t"]
     nominal = transforms.apply(motion.nominal, scene.model.tool_point_mm)
-    basis = build_basis(
-        scene.model,
-        scene.errors,
-        scene.parameter_keys,
-        coordinates,
-        scene.view(state.loop),
-        nominal,
-    )
-    field = basis.evaluate(np.array([state.active[key] for key in basis.keys]))
+    now = active_scene(state)
     if state.controller is not None:
-        now = active_scene(state)
         field = state.controller.field(coordinates, nominal, now, state.loop)
+    else:
+        field = evaluate_first_order(scene.model, now.errors, coordinates, state.view(), nominal)
     return ToolPoint(
         nominal,
         deform(nominal, field.error_um, picture.exaggeration),

@@ -5,30 +5,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpspace.analysis.allocation import Ensemble
-from warpspace.analysis.allocation import build_ensemble as draw_ensemble
-from warpspace.analysis.allocation.ensemble import SAMPLES, SEED
-from warpspace.analysis.distribution import Histogram, Probability, Stream
-from warpspace.analysis.draws import Distribution, loop_keys
-from warpspace.analysis.nodes import Over
+from warpspace.analysis.allocating import SAMPLES, Ensemble
+from warpspace.analysis.allocating import build_ensemble as draw_ensemble
+from warpspace.analysis.cases import LIMIT_OVER, Case, Over, Plan
+from warpspace.analysis.distribution import (
+    Distribution,
+    Draws,
+    Histogram,
+    Probability,
+    Stream,
+    loop_keys,
+)
 from warpspace.kinematics.model import Loop
-from warpspace.machine.tolerances import Tolerance, ToleranceSet
+from warpspace.machine.errors import Tolerance, ToleranceSet
 from warpspace.scene.model import Scene
 
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """What a tolerance set is likely to give.
-
-    Attributes
-    ----------
-    over : Over
-    samples : int
-    mean_um, p95_um, max_um : float, µm
-    histogram : Histogram
-    probability : Probability
-        Of staying within the specification, with its 95 % confidence interval.
-    """
+    """What a tolerance set is likely to give."""
 
     over: Over
     samples: int
@@ -36,6 +31,7 @@ class Estimate:
     p95_um: float
     max_um: float
     histogram: Histogram
+    # of staying within the specification, with its 95 % confidence interval
     probability: Probability
 
 
@@ -43,62 +39,23 @@ def build_ensemble(
     scene: Scene,
     loop: Loop = Loop.TOOL,
     *,
-    over: Over = Over.SAMPLED,
+    over: Over = LIMIT_OVER,
     distribution: Distribution = Distribution.UNIFORM,
     positions: Mapping[str, float] | None = None,
     samples: int = SAMPLES,
-    seed: int = SEED,
+    seed: int = 0,
 ) -> Ensemble:
-    """Draw the machines of a scene.
-
-    Parameters
-    ----------
-    scene : Scene
-    loop : Loop, optional
-    over : Over, optional
-        `sampled` or `max`.
-    distribution : Distribution, optional
-        The normal one has 3σ at the limits.
-    positions : mapping of str to float, degrees, optional
-        Where the rotary axes stand, if elsewhere than in the scene.
-    samples, seed : int, optional
-
-    Returns
-    -------
-    Ensemble
-
-    Raises
-    ------
-    OptionError
-        If the loop has no axis, or its worst point lies among too many to be found live.
-    """
-    return draw_ensemble(
-        scene.model,
-        loop_keys(scene.model, loop, scene.parameter_keys),
-        scene.workspace.moved(positions or {}),
-        scene.view(loop),
-        over,
-        distribution,
-        samples=samples,
-        seed=seed,
-    )
+    """Draw the machines of a scene."""
+    keys = loop_keys(scene.model, loop, scene.parameter_keys)
+    none = np.zeros(len(keys))
+    draws = Draws(keys, none, none, distribution)
+    workspace = scene.workspace.moved(positions or {})
+    plan = Plan(samples, seed, over)
+    return draw_ensemble(Case(scene.model, draws, workspace, scene.view(loop), plan))
 
 
 def estimate(ensemble: Ensemble, tolerances: ToleranceSet, spec_um: float) -> Estimate:
-    """Work out what a tolerance set gives.
-
-    Parameters
-    ----------
-    ensemble : Ensemble
-    tolerances : ToleranceSet
-        A parameter without a tolerance is held at zero.
-    spec_um : float, µm
-        The largest |E| allowed.
-
-    Returns
-    -------
-    Estimate
-    """
+    """Work out what a tolerance set gives."""
     none = Tolerance(0.0, 0.0)
     found = [tolerances.get(key) or none for key in ensemble.keys]
     norm = ensemble.norm_um(
@@ -123,21 +80,7 @@ def estimate(ensemble: Ensemble, tolerances: ToleranceSet, spec_um: float) -> Es
 def tolerance_shares(
     ensemble: Ensemble, tolerances: ToleranceSet, keys: Sequence[str]
 ) -> dict[str, float]:
-    """Say how much each tolerance adds to the scatter of the error.
-
-    Parameters
-    ----------
-    ensemble : Ensemble
-    tolerances : ToleranceSet
-    keys : sequence of str
-        Parameters asked for.
-
-    Returns
-    -------
-    dict of str to float
-        Share of the variance of E (its three components added) over all machines and points,
-        between 0 and 1; they add up to 1 over all parameters of the loop.
-    """
+    """Say how much each tolerance adds to the scatter of the error."""
     half = np.array(
         [found.half_width if (found := tolerances.get(key)) else 0.0 for key in ensemble.keys]
     )

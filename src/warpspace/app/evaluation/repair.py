@@ -5,59 +5,51 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpspace.analysis.repair import Objective, RepairPlan, Repairs, find_repairs
+from warpspace.analysis.adjusting import Objective
+from warpspace.analysis.repair import Repair, RepairResult, find_repairs
+from warpspace.analysis.typed import ALL
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.compare import plain_state, with_before
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.comparison import Side
+from warpspace.field.evaluate import View
 from warpspace.field.grid import build_grid
-from warpspace.kinematics.model import Loop
 from warpspace.machine.parameters import parameter
-from warpspace.picture.words import spell
-from warpspace.scene.model import Scene
-from warpspace.scene.pipeline import grid_basis
+from warpspace.scene.model import Scene, grid_basis
+from warpspace.spelling import spell
 
 BEFORE = "before repair"
 
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """All that an answer depends on; equal questions have equal answers.
+    """All that an answer depends on; equal questions have equal answers."""
 
-    Attributes
-    ----------
-    scene : Identity
-        Scene with machine and curves; its amplitudes are not used.
-    amplitudes : tuple of (str, float), µm or µrad
-        Errors that are not excluded.
-    positions : tuple of (str, float), degrees
-        Where the rotary axes stand.
-    loop : Loop
-    nodes : int
-    objective : Objective
-    any_error : bool
-        Whether errors other than squareness and alignment are adjusted, too.
-    limit : float, µm or µrad
-    """
-
-    scene: Identity
-    amplitudes: tuple[tuple[str, float], ...]
-    positions: tuple[tuple[str, float], ...]
-    loop: Loop
+    scene: Identity  # scene with machine and curves; its amplitudes are not used
+    amplitudes: tuple[tuple[str, float], ...]  # µm or µrad; errors that are not excluded
+    positions: tuple[tuple[str, float], ...]  # degrees; where the rotary axes stand
+    view: View
     nodes: int
     objective: Objective
-    any_error: bool
-    limit: float
+    any_error: bool  # whether errors other than squareness and alignment are adjusted, too
+    limit: float  # µm or µrad
 
-    def answer(self) -> Repairs:
+    def answer(self) -> RepairResult:
         """Find the repairs; takes from a tenth of a second to some seconds."""
         scene: Scene = self.scene.thing
         grid = build_grid(scene.model, scene.workspace.moved(dict(self.positions)), self.nodes)
         keys = tuple(key for key, _ in self.amplitudes)
-        basis = grid_basis(scene, grid, scene.view(self.loop), keys)
-        plan = RepairPlan(self.objective, any_error=self.any_error, limit=self.limit)
-        return find_repairs(basis, grid, np.array([value for _, value in self.amplitudes]), plan)
+        basis = grid_basis(scene, grid, self.view, keys)
+        asked = Repair(
+            loop=self.view.loop,
+            objective=self.objective,
+            adjustable=(ALL,) if self.any_error else (),
+            limit=((ALL, self.limit),),
+            grid=self.nodes,
+        )
+        values = np.array([value for _, value in self.amplitudes])
+        return find_repairs(basis, grid, values, asked, scene)
 
 
 def ask(state: AppState, objective: Objective, *, any_error: bool, limit: float) -> Question:
@@ -67,7 +59,7 @@ def ask(state: AppState, objective: Objective, *, any_error: bool, limit: float)
         Identity(state.scene),
         tuple(active.items()),
         tuple(state.positions.items()),
-        state.loop,
+        state.view(),
         state.nodes,
         objective,
         any_error,
@@ -96,6 +88,5 @@ def with_repair(state: AppState, adjust: Mapping[str, float]) -> AppState:
 
 
 def _after_words(adjust: Mapping[str, float]) -> str:
-    """Name a repair that is looked at."""
     parts = ", ".join(f"{key} {spell(v)} {parameter(key).unit}" for key, v in adjust.items())
     return f"after repair: {parts}"

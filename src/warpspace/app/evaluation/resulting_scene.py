@@ -9,17 +9,7 @@ from warpspace.scene.model import Scene
 
 
 def scene_of(state: AppState) -> Scene:
-    """Give the scene that a state amounts to: amplitudes, curves, positions, tolerances, factor.
-
-    Parameters
-    ----------
-    state : AppState
-
-    Returns
-    -------
-    Scene
-        All parameters take part, excluded or not.
-    """
+    """Give the scene that a state amounts to: amplitudes, curves, positions, tolerances, factor."""
     scene = state.scene
     keys = [
         key for key in state.amplitudes if state.amplitudes[key] or key in scene.errors.functions
@@ -35,6 +25,7 @@ def scene_of(state: AppState) -> Scene:
         workspace=scene.workspace.moved(moved) if moved else scene.workspace,
         tolerances=state.tolerances,
         exaggeration=state.exaggeration,
+        placed=state.placed,
     )
 
 

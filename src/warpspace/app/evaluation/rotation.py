@@ -1,9 +1,20 @@
 """Which axis is played, and where the traced points are while it turns."""
 
+from dataclasses import replace
+
 import numpy as np
 
+from warpspace.analysis.axis_motion import AxisMotion, subtract_motions
 from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.state.app_state import AppState
+from warpspace.picture.traces import (
+    TraceLine,
+    evaluate_axis_motion,
+    is_moved,
+    name_trace,
+    trace_lines,
+)
 from warpspace.units import Array
 
 
@@ -33,19 +44,7 @@ def played_position(state: AppState, angle_deg: float) -> dict[str, float]:
 
 
 def points_on_traces(picture: LivePicture, position: dict[str, float]) -> tuple[Array, Array]:
-    """Find where the traced points are at a position of the played axis.
-
-    Parameters
-    ----------
-    picture : LivePicture
-    position : dict of str to float, degrees
-        As `played_position` gives it.
-
-    Returns
-    -------
-    tuple of ndarray, [n, 3], mm
-        Nominal, and as drawn: on the circles of the picture, one a trace over that axis.
-    """
+    """Find where the traced points are at a position of the played axis."""
     nominal: list[Array] = []
     actual: list[Array] = []
     for lines in picture.traces:
@@ -60,5 +59,43 @@ def points_on_traces(picture: LivePicture, position: dict[str, float]) -> tuple[
 
 
 def _at(line_mm: Array, sweep: Array, position: float) -> Array:
-    """Interpolate a trace at a position of its axis, [3]."""
     return np.array([np.interp(position, sweep, line_mm[:, i]) for i in range(3)])
+
+
+# --- Which of the traces is looked at: the one chosen, as long as an error moves it ---------------
+
+
+def moved_traces(picture: LivePicture) -> dict[str, TraceLine]:
+    """Give the traces that an error moves, by name."""
+    if not picture.state.shown.traces:
+        return {}
+    return {name_trace(line.trace): line for line in trace_lines(picture.traces) if is_moved(line)}
+
+
+def chosen_trace(picture: LivePicture, moved: dict[str, TraceLine] | None = None) -> str:
+    """Name the trace that is looked at; empty where no error moves one."""
+    moved = moved_traces(picture) if moved is None else moved
+    state = picture.state
+    if state.rotary.chosen in moved:
+        return state.rotary.chosen
+    played = played_axis(state)
+
+    def rank(line: TraceLine) -> tuple[bool, bool]:
+        at = line.trace.at.items()
+        stands = all(state.positions.get(axis) == value for axis, value in at)
+        return line.trace.axis != played, not stands
+
+    return min(moved, key=lambda name: rank(moved[name]), default="")
+
+
+def motion_of(picture: LivePicture, line: TraceLine) -> AxisMotion | None:
+    """Evaluate how the axis of a trace runs, with the errors that take part."""
+    if picture.compared is None or not picture.is_difference:
+        return _of_state(picture.drawn_state, line)
+    one, other = (_of_state(side, line) for side in picture.compared.sides)
+    return None if one is None or other is None else subtract_motions(other, one)
+
+
+def _of_state(state: AppState, line: TraceLine) -> AxisMotion | None:
+    scene = active_scene(state)
+    return evaluate_axis_motion(replace(scene, trace_points_mm=(line.trace.point_mm,)), line)

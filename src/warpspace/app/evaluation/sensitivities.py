@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.field.basis import ErrorBasis
-from warpspace.field.evaluate import build_basis
+from warpspace.field.evaluate import ErrorBasis, build_basis
 from warpspace.kinematics.chain import nominal_point
 from warpspace.kinematics.firstorder import columns
 from warpspace.kinematics.model import Coordinates, Loop, Model
@@ -19,28 +18,14 @@ SHOWN_BARS = 10
 
 @dataclass(frozen=True, slots=True)
 class Bar:
-    """One parameter at one point.
-
-    Attributes
-    ----------
-    key : str
-    gain : float, µm/µm or µm/µrad
-        Length of the displacement per unit.
-    lever_mm : float
-        Distance from the frame the error sits in.
-    amplitude : float, µm or µrad
-        What the parameter has at present.
-    moved_um : float, µm
-        Displacement of the point by this parameter alone.
-    along_um : float, µm
-        Its part along the total error at the point; these add up to the total's length.
-    """
+    """One parameter at one point."""
 
     key: str
-    gain: float
-    lever_mm: float
-    amplitude: float
-    moved_um: float
+    gain: float  # µm/µm or µm/µrad; length of the displacement per unit
+    lever_mm: float  # distance from the frame the error sits in
+    amplitude: float  # µm or µrad; what the parameter has at present
+    moved_um: float  # displacement of the point by this parameter alone
+    # its part along the total error at the point; these add up to the total's length
     along_um: float
 
     @property
@@ -51,44 +36,17 @@ class Bar:
 
 @dataclass(frozen=True, slots=True)
 class Ranking:
-    """The errors of a machine ranked for one point.
+    """The errors of a machine ranked for one point."""
 
-    Attributes
-    ----------
-    bars : tuple of Bar
-        Largest first.
-    by_effect : bool
-        Ranked by what the present errors do, not by gain.
-    point_mm : ndarray, [3], mm
-        Where the point is drawn.
-    at : mapping of str to ndarray, [], mm or degrees
-        Where the axes stand.
-    error_um : float, µm
-        |E| there.
-    """
-
-    bars: tuple[Bar, ...]
-    by_effect: bool
-    point_mm: Array
-    at: Mapping[str, Array]
-    error_um: float
+    bars: tuple[Bar, ...]  # largest first
+    by_effect: bool  # ranked by what the present errors do, not by gain
+    point_mm: Array  # [3]; where the point is drawn
+    at: Mapping[str, Array]  # [], mm or degrees; where the axes stand
+    error_um: float  # |E| there
 
 
 def rank_picture(picture: LivePicture, *, middle: bool = False, by_effect: bool = False) -> Ranking:
-    """Rank the errors for a point of a picture.
-
-    Parameters
-    ----------
-    picture : LivePicture
-    middle : bool, optional
-        The middle of the volume instead of its worst point.
-    by_effect : bool, optional
-        Rank by what the present errors do.
-
-    Returns
-    -------
-    Ranking
-    """
+    """Rank the errors for a point of a picture."""
     state, grid = picture.state, picture.grid
     norm = np.broadcast_to(picture.field.norm_um, grid.shape)
     worst = np.unravel_index(int(np.argmax(norm)), grid.shape)
@@ -101,7 +59,7 @@ def rank_picture(picture: LivePicture, *, middle: bool = False, by_effect: bool 
         scene.errors,
         tuple(state.amplitudes),
         at,
-        scene.view(state.loop),
+        state.view(),
         grid.nominal_mm[node],
     )
     bars = rank_gains(scene.model, state.loop, basis, state.active, (), at)
@@ -118,25 +76,7 @@ def rank_gains(
     node: tuple[int, ...],
     coordinates: Coordinates,
 ) -> tuple[Bar, ...]:
-    """Rank the parameters of a machine by their gain at one node of a grid.
-
-    Parameters
-    ----------
-    model : Model
-    loop : Loop
-    basis : ErrorBasis
-        First-order response of the grid.
-    amplitudes : mapping of str to float, µm or µrad
-    node : tuple of int
-        Index of the node.
-    coordinates : mapping of str to ndarray, [], mm or degrees
-        Axis positions of the node.
-
-    Returns
-    -------
-    tuple of Bar
-        Largest gain first; parameters outside the loop are left out.
-    """
+    """Rank the parameters of a machine by their gain at one node of a grid."""
     values = np.array([amplitudes.get(key, 0.0) for key in basis.keys])
     moved = basis.contributions(values, node)
     total = moved.sum(axis=0)
@@ -172,5 +112,4 @@ def node_coordinates(
 
 
 def _length(vector: Array) -> float:
-    """Length of one vector, [3]."""
     return float(np.linalg.norm(vector))

@@ -12,8 +12,8 @@ from warpspace.app.readouts.places import slices_html
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import RANGES, SURFACES, slice_positions, slice_spans
 from warpspace.app.viewport.named_views import VIEWS
-from warpspace.geometry.slices import PLANES
-from warpspace.picture.slices import Slice
+from warpspace.field.grid import PLANES
+from warpspace.picture.model import Slice
 from warpspace.scene.model import Scene
 
 QUANTITY_NAMES = {
@@ -30,12 +30,7 @@ SWITCHES = {
 
 
 class CameraPanel:
-    """Named views and the lens.
-
-    Parameters
-    ----------
-    context : PanelContext
-    """
+    """Named views and the lens."""
 
     def __init__(self, context: PanelContext, _state: AppState) -> None:
         keys = {name: key for key, name in VIEW_NAMES.items()}
@@ -73,13 +68,7 @@ class CameraPanel:
 
 
 class AppearancePanel:
-    """What is drawn of the field.
-
-    Parameters
-    ----------
-    context : PanelContext
-    state : AppState
-    """
+    """What is drawn of the field."""
 
     def __init__(self, context: PanelContext, state: AppState) -> None:
         self._context = context
@@ -122,14 +111,12 @@ class AppearancePanel:
     def _names(
         self, label: str, names: Mapping[str, str], value: str, hint: str
     ) -> tuple[Input[str], Mapping[str, str]]:
-        """Add a dropdown of names."""
         handle = self._context.gui.add_dropdown(
             label, tuple(names.values()), initial_value=names[value], hint=hint
         )
         return Input(handle, self._context.changed), names
 
     def _build(self, state: AppState) -> None:
-        """Add the sliders of the slices of a scene."""
         if self._folder is not None:
             self._folder.remove()
         self._scene = state.scene

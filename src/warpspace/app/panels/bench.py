@@ -3,6 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
+from warpspace.analysis.options import Option
 from warpspace.app.browser.handles import Input
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -10,21 +11,14 @@ from warpspace.app.panels import PanelContext
 from warpspace.app.readouts.bench import bench_html
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
-from warpspace.bench.options import TestOption, options_of
-from warpspace.bench.registry import bench_names, find_test
+from warpspace.bench.base import bench_names, find_test
 
 NONE = "none"
 OWN = "as the test chooses"
 
 
 class TestsPanel:
-    """Test, its options, and its figure.
-
-    Parameters
-    ----------
-    context : PanelContext
-    state : AppState
-    """
+    """Test, its options, and its figure."""
 
     __test__ = False
 
@@ -88,7 +82,6 @@ class TestsPanel:
             bound.show(look.options.get(option, empty))
 
     def _build(self, name: str, axes: tuple[str, ...]) -> None:
-        """Add the options of a test."""
         for part in self._parts:
             part.remove()
         self._built = (name, axes)
@@ -97,24 +90,22 @@ class TestsPanel:
         if not name:
             return
         with self._home:
-            for option in options_of(find_test(name)):
+            for option in find_test(name).settings():
                 handle = self._add(option, axes)
                 self._parts.append(handle)
                 self._options[option.name] = Input(handle, self._context.changed)
 
-    def _add(self, option: TestOption, axes: tuple[str, ...]) -> Any:
-        """Add the widget of one option."""
+    def _add(self, option: Option, axes: tuple[str, ...]) -> Any:
         gui = self._context.gui
-        label = option.flag.removeprefix("--").replace("-", " ").capitalize()
-        if option.unit:
-            label += f" [{option.unit}]"
-        known = {"choice": option.choices, "axis": axes}.get(option.kind)
-        if known is not None:
-            return gui.add_dropdown(label, (OWN, *known), hint=option.about)
-        example = {"point": "X=0,B=30", "vector": "100,0,50"}.get(option.kind, "a number")
-        own = "" if option.default is None else f" {option.default:g} where empty."
+        label = f"{option.label} [{option.unit}]" if option.unit else option.label
+        typed = option.grammar.metavar if option.grammar else "a number"
+        known = axes if typed == "AXIS" else option.choices
+        if known:
+            return gui.add_dropdown(label, (OWN, *known), hint=f"{option.about}.")
+        example = {"X=..,Y=..": "X=0,B=30", "X,Y,Z": "100,0,50"}.get(typed, typed)
+        own = f" {option.default_words} where empty." if option.default_words else ""
         return gui.add_text(
-            label, initial_value="", hint=f"{option.about} Typed as {example}.{own}"
+            label, initial_value="", hint=f"{option.about}. Typed as {example}.{own}"
         )
 
     def settle(self, picture: LivePicture) -> None:

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from warpspace.app.browser.arrangement import front_script
 from warpspace.app.browser.clicks import Clicks
 from warpspace.app.browser.handles import Handle
+from warpspace.app.browser.page import front_script
 from warpspace.app.evaluation.budget import answer, pick_worst, with_lever, with_picked
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
@@ -21,7 +21,7 @@ from warpspace.app.readouts.budget import (
 )
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.edits import with_excluded
-from warpspace.app.state.typed_point import with_typed_point
+from warpspace.app.state.typed_numbers import with_typed_point
 from warpspace.app.viewport.camera import CameraMemory, fit_camera
 from warpspace.app.viewport.layers import SCENE_PER_MM
 
@@ -46,12 +46,7 @@ def ask_worst(context: PanelContext) -> None:
 
 
 class BudgetPanel:
-    """Numbers of the picked point, one row per contribution, and a button that ends it.
-
-    Parameters
-    ----------
-    context : PanelContext
-    """
+    """Numbers of the picked point, one row per contribution, and a button that ends it."""
 
     def __init__(self, context: PanelContext, _state: AppState) -> None:
         gui = context.gui
@@ -81,7 +76,6 @@ class BudgetPanel:
         worst.on_trigger(lambda _: context.act(lambda: ask_worst(context)))
 
     def _clicked(self, word: str) -> None:
-        """Take note of a click on a row, or of a point that was typed."""
         what, _, rest = word.partition(" ")
         context = self._context
         if what == AT:
@@ -94,7 +88,6 @@ class BudgetPanel:
             context.act(lambda: self._edit(rest))
 
     def _edit(self, key: str) -> None:
-        """Bring the slider of an error into view, and its curve below."""
         if key in self._context.store.state.amplitudes and self._context.reveal_error is not None:
             self._context.post(lambda state: state.with_chosen_error(key))
             self._context.reveal_error(key)
@@ -125,7 +118,6 @@ class BudgetPanel:
         self._field.put(content=field_html(at, self._clicks.text_box(AT)))
 
     def _stand_back(self) -> None:
-        """Move the camera back until the frame of the chosen contribution is in view."""
         picture, camera = self._context.shown, self._context.camera.remember()
         if picture is None or picture.state.picked is None:
             return

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from warpspace.app.browser.accessible import find_script, tab_script
+from warpspace.app.browser.page import find_script, tab_script
 from warpspace.app.browser.tour import tour_script, tour_stops
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext, Update
@@ -21,6 +21,7 @@ WORDS = {
     "positions": "rotary position",
     "exaggeration": "exaggeration",
     "loop": "loop",
+    "placed": "placement of the workpiece",
     "nodes": "grid density",
     "exclusions": "which errors are included",
     "rotary": "rotary traces",
@@ -29,6 +30,7 @@ WORDS = {
     "specification": "specification",
     "scene": "scene",
     "loaded": "scene",
+    "left_behind": "scene",
     "controller": "table of compensation",
     "comparison": "comparison",
     "dark": "dark mode",
@@ -39,24 +41,13 @@ WORDS = {
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """One entry of the palette.
-
-    Attributes
-    ----------
-    label, description : str
-    key : str or None
-        Hotkey.
-    modifier : str or None
-        What is held with it, in viser's words.
-    run : callable
-        Called by the session's worker.
-    """
+    """One entry of the palette."""
 
     label: str
     description: str
-    key: str | None
-    modifier: str | None
-    run: Callable[[], None]
+    key: str | None  # hotkey
+    modifier: str | None  # what is held with it, in viser's words
+    run: Callable[[], None]  # called by the session's worker
 
     @property
     def keys(self) -> str:
@@ -69,14 +60,7 @@ class Command:
 
 
 class CommandsPanel:
-    """Undo and redo buttons, the palette with its keys, help and tour.
-
-    Parameters
-    ----------
-    context : PanelContext
-    tabs : sequence of str, optional
-        The words on the tabs, each of which can be opened by its name.
-    """
+    """Undo and redo buttons, the palette with its keys, help and tour."""
 
     def __init__(self, context: PanelContext, tabs: Sequence[str] = ()) -> None:
         self._context, self._tabs = context, tabs
@@ -100,8 +84,6 @@ class CommandsPanel:
             handle.on_trigger(lambda _, run=command.run: context.act(run))
 
     def _commands(self) -> tuple[Command, ...]:
-        """List what there is."""
-
         def does(update: Update) -> Callable[[], None]:
             return lambda: self._context.post(update)
 
@@ -143,8 +125,6 @@ class CommandsPanel:
         )
 
     def _component_commands(self) -> tuple[Command, ...]:
-        """List the components that colours can show."""
-
         def coloured(component: str) -> Callable[[], None]:
             return lambda: self._context.post(lambda state: state.with_component(component))
 
@@ -163,30 +143,24 @@ class CommandsPanel:
         )
 
     def _find(self) -> None:
-        """Put the cursor into the search box."""
         self._context.page.run_script(find_script())
 
     def _open(self, tab: str) -> None:
-        """Bring a tab to the front."""
         self._context.page.run_script(tab_script(tab))
 
     def _undo(self) -> None:
-        """Take the latest change back and say what it was."""
         self._say("Undone", self._context.store.undo())
 
     def _redo(self) -> None:
-        """Do again what was undone and say what it is."""
         self._say("Done again", self._context.store.redo())
 
     def _say(self, done: str, what: str) -> None:
-        """Tell the user what was changed, or that there is nothing."""
         if what:
             self._context.notify(f"{done}: {spell_change(what)}", "", "gray")
         else:
             self._context.notify(f"Nothing to be {done.lower()}", "", "gray")
 
     def _toggle_help(self) -> None:
-        """Open the list of keys, or close it."""
         opened, self._help = self._help, None
         if opened is not None:
             opened.close()
@@ -203,13 +177,7 @@ class CommandsPanel:
             close.on_click(lambda _: self._context.act(self._toggle_help))
 
     def show_tour(self, *, asked: bool = True) -> None:
-        """Show the tour of what is drawn.
-
-        Parameters
-        ----------
-        asked : bool, optional
-            Whether a user wants it; else only a browser that was never here shows it.
-        """
+        """Show the tour of what is drawn."""
         if self._help is not None:
             self._toggle_help()
         shown, scene = self._context.shown, self._context.store.state.scene
@@ -226,18 +194,11 @@ class CommandsPanel:
 
 
 def _toggled(name: str) -> Update:
-    """Give the update that turns a switch of what is drawn."""
     return lambda state: state.with_shown(**{name: not getattr(state.shown, name)})
 
 
 def spell_change(what: str) -> str:
-    """Say in words what `describe_change` has found.
-
-    Parameters
-    ----------
-    what : str
-        For instance "amplitudes.EAX".
-    """
+    """Say in words what `describe_change` has found."""
     words: list[str] = []
     paths = what.split(", ")
     parts_of_machine = ("scene.model.machine", "scene.workspace")
@@ -265,19 +226,6 @@ def spell_change(what: str) -> str:
 
 
 def help_text(commands: Sequence[Command], title: str = "", description: str = "") -> str:
-    """Write the help: what is drawn, what the mouse does, and all keys.
-
-    Parameters
-    ----------
-    commands : sequence of Command
-        Those with a key are listed.
-    title, description : str, optional
-        Of the scene.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Write the help: what is drawn, what the mouse does, and all keys."""
     keys = [(command.keys, command.label, command.description) for command in commands]
     return spell_help([key for key in keys if key[0]], title, description)

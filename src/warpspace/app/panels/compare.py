@@ -9,19 +9,14 @@ from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext, Update
-from warpspace.app.readouts.comparison import MARK, NOTHING, comparison_html, marked
+from warpspace.app.readouts.summary import MARK, NOTHING, comparison_html, marked
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.comparison import NOBODY, PRESENT, SHOWN, Side
 from warpspace.scene.model import Scene
 
 
 class ComparePanel:
-    """Who is compared with whom, what is drawn, and the numbers of both.
-
-    Parameters
-    ----------
-    context : PanelContext
-    """
+    """Who is compared with whom, what is drawn, and the numbers of both."""
 
     def __init__(self, context: PanelContext, _state: AppState) -> None:
         gui, scenes = context.gui, context.scenes
@@ -117,7 +112,6 @@ class ComparePanel:
 
 
 def _drawn(text: str) -> Update:
-    """Give the update that draws what a button says; nonsense changes nothing."""
     wanted = text.removeprefix(MARK)
     word = next((word for word, shown in SHOWN.items() if shown == wanted), "")
     return lambda s: replace(s, comparison=s.comparison.with_shown(word))

@@ -14,7 +14,7 @@ from viser import ClientHandle, GuiApi, ViserServer
 
 from warpspace.app.browser.page import Page
 from warpspace.app.browser.uploads import Uploads
-from warpspace.app.documents.scene_list import SceneList
+from warpspace.app.documents.scene_file import SceneList
 from warpspace.app.documents.services import Services
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
@@ -26,40 +26,7 @@ from warpspace.app.viewport.tab_camera import TabCamera
 
 
 class PanelContext:
-    """What a panel may use of its tab.
-
-    Parameters
-    ----------
-    server : viser.ViserServer
-    client : viser.ClientHandle
-    store : StateStore
-    scenes : SceneList
-    services : Services
-
-    Attributes
-    ----------
-    client : viser.ClientHandle
-    page : Page
-    uploads : Uploads
-        Of all upload buttons of the tab.
-    camera : TabCamera
-    store : StateStore
-        State and history: the tab's own, or those of a shared review.
-    scenes : SceneList
-        Scenes this tab can choose from.
-    services : Services
-        Draw figures and write exports.
-    shown : LivePicture or None
-        The picture that is drawn; None before the first.
-    stage : MovingLayer or None
-        What moves by itself around the map; None before it is drawn.
-    next_click : callable or None
-        Takes the point of the next click on the map in place of asking about it.
-    reveal_error : callable or None
-        Brings the slider of an error into view; None before it is built. For the session.
-    changed_at : float
-        When a browser has last changed something, on the monotonic clock, s.
-    """
+    """What a panel may use of its tab."""
 
     def __init__(
         self,
@@ -135,20 +102,7 @@ class PanelContext:
     def show_opened(
         self, opened: AppState, camera: CameraMemory | None, *, whole: bool = True
     ) -> str:
-        """Show an opened state from its camera.
-
-        Parameters
-        ----------
-        opened : AppState
-        camera : CameraMemory or None
-        whole : bool, optional
-            Whether its comparison is taken over, too; else the present one stays.
-
-        Returns
-        -------
-        str
-            Title of the scene that left the list for it; empty where none did.
-        """
+        """Show an opened state from its camera."""
         # here, since not every opened scene is drawn where many follow each other
         _, dropped = self.scenes.add(opened.origin)
 

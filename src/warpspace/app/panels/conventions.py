@@ -27,13 +27,7 @@ PICKING = "Click a point of the box …"
 
 
 class ConventionsPanel:
-    """Rows to choose from, the reference point in numbers or picked in 3-D, and the way back.
-
-    Parameters
-    ----------
-    context : PanelContext
-    state : AppState
-    """
+    """Rows to choose from, the reference point in numbers or picked in 3-D, and the way back."""
 
     def __init__(self, context: PanelContext, state: AppState) -> None:
         gui = context.gui
@@ -59,7 +53,6 @@ class ConventionsPanel:
         back.on_click(lambda _: context.post(_back))
 
     def _build(self, state: AppState) -> None:
-        """Add a number box per axis that moves within the volume."""
         for bound in self._at.values():
             bound.handle.remove()
         self._at, self._built_for = {}, _axes_of(state)
@@ -81,12 +74,10 @@ class ConventionsPanel:
         self._wait(self._choose if self._context.next_click is None else None)
 
     def _choose(self, picked: Picked) -> None:
-        """Hold a point still that was clicked."""
         self._wait(None)
         self._context.post(lambda state: with_reference(state, picked.at))
 
     def _wait(self, choose: Callable[[Picked], None] | None) -> None:
-        """Say on the button whether a click is waited for."""
         self._context.next_click = choose
         self._pick.label = "Pick the reference in 3-D" if choose is None else PICKING
 
@@ -103,7 +94,7 @@ class ConventionsPanel:
             Identity(state.scene.model),
             Identity(state.scene.workspace),
             state.scene.reference,
-            state.loop,
+            state.seen,
             state.nodes,
         )
 
@@ -126,7 +117,6 @@ class ConventionsPanel:
             self._context.act(self._work_out)
 
     def _work_out(self) -> None:
-        """Work out what every choice changes in the state that was shown last."""
         state, self._asked = self._asked, None
         if state is None:
             return
@@ -136,17 +126,14 @@ class ConventionsPanel:
             self._write(state)
 
     def _write(self, state: AppState) -> None:
-        """Write the table."""
         content = conventions_html(state, self._known, self._clicks.attributes, self._costs)
         if content != self._text.content:
             self._text.content = content
 
 
 def _axes_of(state: AppState) -> tuple[object, ...]:
-    """Tell which number boxes there are: scene and ranges of its axes."""
     return Identity(state.origin), reference_spans(state.scene)
 
 
 def _back(state: AppState) -> AppState:
-    """Go back to all conventions of the scene, its loop included."""
     return replace(with_own_conventions(state), loop=start_loop(state.origin))

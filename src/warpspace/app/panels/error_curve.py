@@ -6,9 +6,17 @@ from warpspace.app.browser.handles import Input
 from warpspace.app.browser.viser_private import dom_id
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
-from warpspace.app.readouts.chart_text import chart_text, describe_curve, measured_words
-from warpspace.app.readouts.charts import add_chart, chart_axis, chart_scales
-from warpspace.app.readouts.curve_chart import SERIES, curve_data, value_span
+from warpspace.app.readouts.curve_chart import (
+    SERIES,
+    add_chart,
+    chart_axis,
+    chart_scales,
+    chart_text,
+    curve_data,
+    describe_curve,
+    measured_words,
+    value_span,
+)
 from warpspace.app.readouts.html import message
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
@@ -21,8 +29,7 @@ from warpspace.app.state.curve_text import (
 )
 from warpspace.exceptions import OptionError
 from warpspace.machine.curves.registry import curve_kind
-from warpspace.machine.errors import Constant, ErrorFunction
-from warpspace.machine.measurement import Measurement
+from warpspace.machine.errors import Constant, ErrorFunction, Measurement
 from warpspace.machine.parameters import Parameter, parameter
 
 CHART_HEIGHT = 128
@@ -35,13 +42,7 @@ Drawn = tuple[ErrorFunction, ErrorFunction | None, Measurement | None]
 
 
 class ErrorCurvePanel:
-    """The curve of the error that was moved last, or chosen.
-
-    Parameters
-    ----------
-    context : PanelContext
-    state : AppState
-    """
+    """The curve of the error that was moved last, or chosen."""
 
     def __init__(self, context: PanelContext, state: AppState) -> None:
         self._context, gui = context, context.gui
@@ -92,7 +93,6 @@ class ErrorCurvePanel:
         return self._edited(state, self._chosen(state), kind, rows)
 
     def _edited(self, state: AppState, key: str, kind: str | None, rows: str | None) -> AppState:
-        """Apply an edited curve; what cannot be read is said and changes nothing."""
         if kind is None and rows is None:
             return state
         span, present = edits.axis_span(state, key), edits.curve_of(state, key)
@@ -132,7 +132,6 @@ class ErrorCurvePanel:
         return next((key for key in keys if key in state.amplitudes), "") or _first(state)
 
     def _show(self, state: AppState) -> None:
-        """Show the chosen error of a state."""
         if tuple(state.amplitudes) != self._keys:
             self._keys = tuple(state.amplitudes)
             self._which.handle.options = _options(self._keys)
@@ -154,7 +153,6 @@ class ErrorCurvePanel:
             self._draw(drawn, row, state)
 
     def _write(self, function: ErrorFunction, row: Parameter) -> None:
-        """Write kind and numbers of a curve."""
         self._written = function
         kind = shape_kind(function)
         kinds = (Constant.title,) if row.is_constant else kind_titles()
@@ -168,12 +166,12 @@ class ErrorCurvePanel:
         self._problem.content = ""
 
     def _draw(self, drawn: Drawn, row: Parameter, state: AppState) -> None:
-        """Draw the curve along the travel, with what is known of its measurement."""
         unit = state.scene.machine.axes[row.axis].unit
         function, uncertainty, measured = drawn
         span = edits.axis_span(state, row.key)
         data = at, value, *_ = curve_data(function, span, uncertainty, measured)
-        self._chart.data, self._chart.scales = data, chart_scales(value_span(data))
+        scales = chart_scales(value_span(data), (float(at[0]), float(at[-1])))
+        self._chart.data, self._chart.scales = data, scales
         self._words.content = chart_text(
             describe_curve(f"{row.key}, {row.name}", row.unit, unit, at, value)
             + measured_words(uncertainty, measured)
@@ -194,7 +192,6 @@ def _style(*handles: Any) -> str:
 
 
 def _first(state: AppState) -> str:
-    """Choose what is shown first: the largest error that varies along its axis."""
     varying = {
         key: abs(value) for key, value in state.amplitudes.items() if not parameter(key).is_constant
     }
@@ -202,12 +199,10 @@ def _first(state: AppState) -> str:
 
 
 def _options(keys: tuple[str, ...]) -> tuple[str, ...]:
-    """List what can be chosen."""
     return tuple(parameter(key).label for key in keys)
 
 
 def _rows_hint(kind: str) -> str:
-    """Say how the numbers of a kind of curve are written."""
     text = curve_kind(kind).row_words
     return (
         f"{text[0].upper()}{text[1:]}. Blanks, tabs or semicolons between numbers, decimal point or"

@@ -12,12 +12,13 @@ from functools import partial
 from itertools import groupby
 from typing import Any
 
+import numpy as np
+
 from warpspace.app.browser.clicks import Clicks
-from warpspace.app.browser.copying import reveal_script
 from warpspace.app.browser.handles import Input
+from warpspace.app.browser.page import reveal_script
 from warpspace.app.browser.viser_private import show_marks
 from warpspace.app.evaluation.cache import Identity
-from warpspace.app.evaluation.effects import effects_alone
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
 from warpspace.app.readouts.error_controls import (
@@ -35,6 +36,23 @@ from warpspace.app.state.ranges import Span
 from warpspace.app.state.typed_numbers import read_typed
 from warpspace.machine.axes import axis_order
 from warpspace.machine.parameters import PARAMETERS, Parameter, parameter
+from warpspace.scene.model import grid_basis
+
+# --- How much each error does in the whole volume, taken alone ------------------------------------
+
+
+def effects_alone(picture: LivePicture, state: AppState) -> dict[str, float]:
+    """Give the effect of every error: RMS of the volume, with this error alone.
+
+    It is the RMS that the page shows when the error's "only" is pressed. It does not depend on the
+    other errors, with which the error may add up or cancel.
+    """
+    basis = grid_basis(state.scene, picture.grid, picture.view)
+    amplitudes = np.array([state.amplitudes[key] for key in basis.keys])
+    squares = np.sum(basis.position**2, axis=-1).reshape(len(basis.keys), -1)
+    rms = np.sqrt(squares @ picture.grid.weights.reshape(-1)) * np.abs(amplitudes)
+    return dict(zip(basis.keys, rms.tolist(), strict=True))
+
 
 BY_EFFECT = "by effect"
 
@@ -43,13 +61,6 @@ class ErrorsPanel:
     """Sliders of all parameters; rebuilt when another scene is shown.
 
     At first only those of the first axis are there; `add_axes` adds the others.
-
-    Parameters
-    ----------
-    context : PanelContext
-    state : AppState
-    show_curve : callable
-        Shows the panel of the chosen error, should it be minimized; called by the session.
     """
 
     def __init__(
@@ -113,14 +124,7 @@ class ErrorsPanel:
         context.reveal_error = self._reveal
 
     def _build(self, state: AppState, picture: LivePicture | None = None) -> None:
-        """Lay out the folders with the parameters that were asked for.
-
-        Parameters
-        ----------
-        state : AppState
-        picture : LivePicture, optional
-            Of its scene; what is shown by default.
-        """
+        """Lay out the folders with the parameters that were asked for."""
         picture, self._effects = picture or self._context.shown, None
         if self._listing.by_effect and picture is not None:
             self._effects = effects_alone(picture, state)
@@ -128,7 +132,6 @@ class ErrorsPanel:
         self.add_axes(state)
 
     def _begin(self, state: AppState) -> None:
-        """Clear all folders and note which are to be laid out."""
         keys = listed_keys(state, self._listing, self._effects)
         for part in self._parts:
             part.remove()
@@ -152,7 +155,6 @@ class ErrorsPanel:
             self._add_axis(state)
 
     def _add_axis(self, state: AppState) -> None:
-        """Lay out the folder of the next axis."""
         gui, own = self._context.gui, self._missing.popleft()
         axis = own[0].axis if self._effects is None else ""
         narrowed = len(self._found) < len(state.amplitudes)
@@ -178,7 +180,6 @@ class ErrorsPanel:
                 button.on_click(lambda _, axis=axis: self._context.post(lambda s: s.reset(axis)))
 
     def _slider(self, state: AppState, row: Parameter) -> Any:
-        """Add the slider of one parameter."""
         span = state.spans[row.key]
         return self._context.gui.add_slider(
             row.label,
@@ -224,7 +225,6 @@ class ErrorsPanel:
         self._context.act(partial(self._answer, key, None if value is not None else text))
 
     def _answer(self, key: str, refused: str | None) -> None:
-        """Have the box of an error show its value again, and say what was no number."""
         state = self._context.store.state
         if key not in self._buttons:
             return
@@ -235,7 +235,6 @@ class ErrorsPanel:
             self._context.notify("Not a number", text, "yellow")
 
     def _spell(self, state: AppState, key: str) -> None:
-        """Bring buttons and number box of an error up to date; what is right already is left."""
         value, attempt = state.amplitudes[key], self._attempts[key]
         spelt = (value, attempt, Identity(state.exclusions))
         if self._spelt.get(key) == spelt:

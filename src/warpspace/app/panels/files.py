@@ -6,20 +6,19 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from warpspace.app.browser.address import listen_script, show_script
-from warpspace.app.browser.dropping import drop_script
+from warpspace.app.browser.page import listen_script, show_script
+from warpspace.app.browser.uploads import drop_script
 from warpspace.app.browser.viser_private import dom_id
-from warpspace.app.documents import links
-from warpspace.app.documents import received_files as incoming
+from warpspace.app.documents import files
+from warpspace.app.documents import files as incoming
 from warpspace.app.documents import scene_file as document
-from warpspace.app.documents.export_request import build_request, exported_words, file_stem
-from warpspace.app.documents.scene_list import dropped_words
+from warpspace.app.documents.files import build_request, exported_words, file_stem
+from warpspace.app.documents.scene_file import dropped_words
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
 from warpspace.app.panels.importing import ImportWindow, accepted_endings
-from warpspace.app.panels.job_part import JobPart
-from warpspace.app.panels.uploading import add_upload
+from warpspace.app.panels.job_part import JobPart, add_upload
 from warpspace.app.readouts.html import message
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.comparison import Comparison
@@ -33,16 +32,13 @@ RENDER_TIMEOUT_S = 30.0
 LARGEST_VIEW_PX = 4096
 AS_COLOURED = "what is coloured"
 """The figure that suits the picture on the screen."""
-Make = Callable[[threading.Event], bytes]
+Make = Callable[[threading.Event], tuple[str, bytes]]
+WITHOUT_TABLES = LiveModel()
+"""Evaluates what files show, for all tabs and beside their sessions."""
 
 
 class FilesPanel:
-    """Buttons for files, a progress bar and a way to cancel.
-
-    Parameters
-    ----------
-    context : PanelContext
-    """
+    """Buttons for files, a progress bar and a way to cancel."""
 
     def __init__(self, context: PanelContext, _state: AppState) -> None:
         self._context = context
@@ -60,7 +56,6 @@ class FilesPanel:
         )
 
     def _add_scene_files(self) -> None:
-        """Add opening, saving and the link."""
         context, gui = self._context, self._context.gui
         upload = add_upload(
             context,
@@ -74,18 +69,19 @@ class FilesPanel:
             most_bytes=MAX_SCENE_BYTES,
         )
         context.page.run_script(drop_script(upload))
+        token = context.services.token
+        with_token = {"Link with token": partial(self._link, token)} if token else {}
         self._group(
             "Keep scene, settings and camera",
-            {"Save scene": self._save, "Link": self._link},
+            {"Save scene": self._save, "Link": self._link, **with_token},
             "Save: a scene file that opens to this very state. Link: into the page's address, and"
-            " into the clipboard where the browser allows it.",
+            " into the clipboard where the browser allows it; without the token, unless with it.",
         )
         link = gui.add_text("", "", visible=False)
         link.on_update(lambda _: self._context.act(lambda: self._follow(str(link.value))))
         context.page.run_script(listen_script(dom_id(link)))
 
     def _add_outputs(self) -> None:
-        """Add pictures and exports."""
         services = self._context.services
         pictures = {} if services.draw_figure is None else {"Figure": self._figure}
         self._figures = {AS_COLOURED: ""} | {name: name for name, _ in services.figures}
@@ -110,7 +106,6 @@ class FilesPanel:
         )
 
     def _group(self, label: str, actions: Mapping[str, Callable[[], None]], hint: str) -> None:
-        """Add buttons whose actions the worker does."""
         group = self._context.gui.add_button_group(label, tuple(actions), hint=hint)
 
         @group.on_click
@@ -142,9 +137,8 @@ class FilesPanel:
         self._try("Not opened", read)
 
     def _follow(self, message: str) -> None:
-        """Show what a link describes."""
         word, scenes = message.partition(":")[2], self._context.scenes.fixed
-        self._try("Link", lambda: self._show(*document.open_link(links.unpack(word), scenes)))
+        self._try("Link", lambda: self._show(*document.open_link(files.unpack(word), scenes)))
 
     def _show(self, opened: AppState, camera: CameraMemory | None, *, whole: bool = True) -> None:
         """Show an opened state from its camera; beside a plain scene the comparison stays."""
@@ -154,23 +148,21 @@ class FilesPanel:
             self._context.notify("Scenes", dropped_words(dropped), "gray")
 
     def _save(self) -> None:
-        """Send the state as a scene file."""
         state, camera = self._context.store.state, self._context.camera.remember()
         text = self._alone_if_large(lambda s: document.state_to_toml(s, camera))
         self._send(incoming.safe_name(state.scene.name), ".toml", text.encode())
 
-    def _link(self) -> None:
-        """Put a link into the address bar."""
+    def _link(self, token: str | None = None) -> None:
         scenes, camera = self._context.scenes.fixed, self._context.camera.remember()
         link = self._alone_if_large(lambda s: document.state_to_link(s, camera, scenes))
-        self._context.page.run_script(show_script(links.pack(link)))
+        self._context.page.run_script(show_script(files.pack(link), token))
         self._context.client.flush()
-        self._context.notify(
-            "Link", "It stands in the address bar, and in the clipboard where allowed.", "green"
-        )
+        text = "It stands in the address bar, and in the clipboard where allowed."
+        if token:
+            text += " The copy carries the token: whoever has it can use this app."
+        self._context.notify("Link", text, "green")
 
     def _alone_if_large(self, write: Callable[[AppState], str]) -> str:
-        """Write the state; without what it is compared with where both are too large."""
         state = without_table(self._context.store.state)
         try:
             return write(state)
@@ -182,23 +174,23 @@ class FilesPanel:
             return text
 
     def _figure(self) -> None:
-        """Draw the figure in a process of its own."""
-        draw, picture = self._context.services.draw_figure, self._bare()
+        draw, picture = self._context.services.draw_figure, self._picture
         if draw is not None and picture is not None:
             kind = self._figures.get(self._kind.value, "")
-            request = replace(build_request(picture), figure=kind)
-            stem = f"{file_stem(picture)}_{kind or 'figure'}"
-            self._make("Figure", stem, ".png", FIGURE_S, lambda stop: draw(request, stop))
 
-    def _bare(self) -> LivePicture | None:
-        """Give what figures and exports show: what is drawn, without a table of compensation."""
-        picture = self._picture
-        if picture is None or not drawn_tables(picture.state):
+            def make(cancelled: threading.Event) -> tuple[str, bytes]:
+                bare = self._bare(picture)
+                request = replace(build_request(bare), figure=kind)
+                return f"{file_stem(bare)}_{kind or 'figure'}", draw(request, cancelled)
+
+            self._make("Figure", ".png", FIGURE_S, make)
+
+    def _bare(self, picture: LivePicture) -> LivePicture:
+        if not drawn_tables(picture.state):
             return picture
-        return LiveModel().evaluate(without_table(picture.state))
+        return WITHOUT_TABLES.evaluate(without_table(picture.state))
 
     def _view(self) -> None:
-        """Have the browser render the view, and put title, factor and colour bar around it."""
         from warpspace.app.documents.view_image import view_png
 
         client, picture = self._context.client, self._picture
@@ -208,38 +200,37 @@ class FilesPanel:
         height = min(max(client.camera.image_height, 64), LARGEST_VIEW_PX)
         bars = self._context.camera.px_per_mm(picture, height)
 
-        def make(_: threading.Event) -> bytes:
+        def make(_: threading.Event) -> tuple[str, bytes]:
             pixels = client.get_render(
                 height, width, transport_format="png", timeout=RENDER_TIMEOUT_S
             )
-            return view_png(pixels, picture, bars)
+            return f"{file_stem(picture)}_view", view_png(pixels, picture, bars)
 
-        self._make("View", f"{file_stem(picture)}_view", ".png", VIEW_S, make)
+        self._make("View", ".png", VIEW_S, make)
 
     def _page(self) -> None:
-        """Write the offline page of what is drawn."""
         from warpspace.app.documents.offline_page import build_offline_html
 
         picture = self._picture
         if picture is not None:
             toml = {"scene_toml": self._alone_if_large(document.state_to_toml)}
             camera = self._context.camera.remember()
-            make: Make = lambda _: build_offline_html(picture, toml, camera).encode()  # noqa: E731
-            self._make("Page", file_stem(picture), ".html", PAGE_S, make)
+            page = partial(build_offline_html, picture, toml, camera)
+            self._make("Page", ".html", PAGE_S, lambda _: (file_stem(picture), page().encode()))
 
     def _export(self, name: str, ending: str) -> None:
-        """Write an export."""
-        write, picture = self._context.services.write_export, self._bare()
+        write, picture = self._context.services.write_export, self._picture
         if write is not None and picture is not None:
-            request = build_request(picture)
-            stem = file_stem(picture)
-            self._make(name, stem, ending, EXPORT_S, lambda _: write(request, ending))
 
-    def _make(self, name: str, stem: str, ending: str, usual_s: float, make: Make) -> None:
-        """Make a file beside the session and send it."""
+            def make(_: threading.Event) -> tuple[str, bytes]:
+                bare = self._bare(picture)
+                return file_stem(bare), write(build_request(bare), ending)
 
+            self._make(name, ending, EXPORT_S, make)
+
+    def _make(self, name: str, ending: str, usual_s: float, make: Make) -> None:
         def work(cancelled: threading.Event) -> None:
-            content = make(cancelled)
+            stem, content = make(cancelled)
             if not cancelled.is_set():
                 self._send(stem, ending, content)
 
@@ -249,13 +240,11 @@ class FilesPanel:
             )
 
     def _send(self, stem: str, ending: str, content: bytes) -> None:
-        """Have the browser save a file."""
         client = self._context.client
         client.send_file_download(f"{stem}{ending}", content, save_immediately=True)
         client.flush()
 
     def _failed(self, name: str, words: str) -> None:
-        """Show what went wrong."""
         title = name if name == "Not opened" else f"{name}: failed"
         self._context.notify(title, words, "red")
 
@@ -269,7 +258,6 @@ class FilesPanel:
         self._say_what_is_exported(exported_words(picture))
 
     def _say_what_is_exported(self, words: str) -> None:
-        """Say what pictures and exports show."""
         content = message(words, "exported", small=True) if words else ""
         if content != self._shows.content:
             self._shows.content = content

@@ -2,11 +2,12 @@
 
 import logging
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from warpspace.app.browser.page import error_words
-from warpspace.app.documents.jobs import Jobs, Progress, Work
-from warpspace.app.documents.services import CancelledError
+from warpspace.app.browser.uploads import read_refusal, size_message, size_script
+from warpspace.app.documents.services import CancelledError, Jobs, Progress, Work
 from warpspace.app.panels.context import PanelContext
 from warpspace.exceptions import WarpspaceError
 
@@ -17,20 +18,6 @@ class JobPart:
     """One job at a time, with a progress bar and a button that cancels while it runs.
 
     A page that has gone cancels its job: nobody waits for it, and its widgets are gone.
-
-    Parameters
-    ----------
-    context : PanelContext
-    failed : callable
-        Gets the name of a job and in words what went wrong; from other threads.
-    hint : str
-        Of the button that cancels.
-    words : callable or None
-        Says what is being done, above the bar; None for no such line.
-    percent : callable, optional
-        Tells how far it is; by default the estimate from the time it usually takes.
-    kept : str, optional
-        What is said of a job that was cancelled; its name by default.
     """
 
     def __init__(
@@ -67,10 +54,16 @@ class JobPart:
             self._failed(name, error_words(error))
 
     def _report(self, progress: Progress | None) -> None:
-        """Show how far the work is; from another thread."""
-        if not self._context.page.is_open:
-            self._jobs.cancel()
-            return
+        try:
+            if self._context.page.is_open:
+                self._show(progress)
+                return
+        except RuntimeError:  # viser refuses handles of a page that has just been closed
+            if self._context.page.is_open:
+                raise
+        self._jobs.cancel()
+
+    def _show(self, progress: Progress | None) -> None:
         if progress is not None:
             if self._words is not None:
                 self._status.content = self._words(progress)
@@ -80,3 +73,39 @@ class JobPart:
             if handle is not None and handle.visible != busy:
                 handle.visible = busy
         self._context.client.flush()
+
+
+# --- A button that takes files up to a size: larger ones are refused before they are sent ---------
+
+
+def add_upload(
+    context: PanelContext,
+    label: str,
+    received: Callable[[str, bytes], None],
+    refused: Callable[[str], None],
+    spell: Callable[[str], str],
+    *,
+    endings: str,
+    hint: str,
+    most_bytes: int,
+    what: str = "scene file",
+) -> Any:
+    """Add a button for uploads."""
+    gui = context.gui
+    button = gui.add_upload_button(label, mime_type=endings, hint=hint)
+    context.uploads.watch(
+        button,
+        most_bytes,
+        lambda name, content: context.act(partial(received, name, content)),
+        lambda text: context.act(partial(refused, text)),
+        what,
+    )
+    carrier = gui.add_text("", "", visible=False)
+
+    def refuse() -> None:
+        name, size = read_refusal(str(carrier.value))
+        refused(size_message(spell(name), size, most_bytes, what))
+
+    carrier.on_update(lambda _: context.act(refuse))
+    context.page.run_script(size_script(button, carrier, most_bytes))
+    return button

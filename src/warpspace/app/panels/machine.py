@@ -33,13 +33,7 @@ OPEN_MESH = "The surface of a mesh of this machine is not closed; it is drawn as
 
 
 class MachinePanel:
-    """Switches and a slider per axis.
-
-    Parameters
-    ----------
-    context : PanelContext
-    state : AppState
-    """
+    """Switches and a slider per axis."""
 
     def __init__(self, context: PanelContext, state: AppState) -> None:
         self._context = context
@@ -65,14 +59,12 @@ class MachinePanel:
             context.stage.listen(self._follow)
 
     def _follow(self, turned: Mapping[str, float]) -> None:
-        """Show where the axis is that is played, or where it stands once that is over."""
         for axis, bound in self._rotary.items():
             at = turned.get(axis, self._state.positions.get(axis))
             if at is not None:
                 bound.show(float(round(at)) if axis in turned else at)
 
     def _build(self, state: AppState) -> None:
-        """Add the sliders of a scene's axes."""
         for slider in self._sliders.values():
             slider.remove()
         self._built_for = state.scene

@@ -5,10 +5,11 @@ import time
 from collections.abc import Mapping
 from functools import partial
 
-from warpspace.analysis.repair import DEFAULT_LIMIT, Objective, Repairs
+from warpspace.analysis.adjusting import Objective
+from warpspace.analysis.repair import DEFAULT_LIMIT, RepairResult
 from warpspace.app.browser.clicks import Clicks
 from warpspace.app.browser.handles import Handle, Input
-from warpspace.app.evaluation.cache import Cache
+from warpspace.app.evaluation.cache import Cache, taken_turn
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.repair import Question, ask, with_preview, with_repair
 from warpspace.app.panels import PanelContext
@@ -26,13 +27,11 @@ ALIGNMENT, ANY = "squareness and alignment", "any error (compensation)"
 LIMITS = Span(1.0, 500.0, 1.0)
 PAUSE_S = 0.5
 """Pause in the changes after which repairs are looked for: nothing is done during a drag."""
-ONE_AT_A_TIME = threading.Lock()
-"""Repairs of all tabs are looked for one after the other."""
 KEPT_BYTES, ANSWER_BYTES = 10_000_000, 100_000
 """All answers that are kept, and about what one takes with its scene."""
 
 
-ANSWERS: Cache[Repairs] = Cache(KEPT_BYTES)
+ANSWERS: Cache[RepairResult] = Cache(KEPT_BYTES)
 """Answers for all sessions together: pages that show the same ask the same."""
 
 
@@ -41,10 +40,6 @@ class RepairPanel:
 
     A thread of its own looks for repairs while somebody sees the panel and once changes have
     paused, so that nobody waits for it and no page that does not show it costs anything.
-
-    Parameters
-    ----------
-    context : PanelContext
     """
 
     def __init__(self, context: PanelContext, _state: AppState) -> None:
@@ -82,7 +77,7 @@ class RepairPanel:
         self._lock = threading.Lock()
         self._wanted: Question | None = None
         self._looking = self._seen = False
-        self._answered: tuple[Question, Repairs] | None = None
+        self._answered: tuple[Question, RepairResult] | None = None
         self._picture: LivePicture | None = None
 
     def read(self, state: AppState) -> AppState:
@@ -102,7 +97,6 @@ class RepairPanel:
         self._context.act(self._ask)
 
     def _ask(self) -> None:
-        """Have the thread answer what is asked now."""
         if self._picture is None:
             return
         objective = OBJECTIVES.get(str(self._objective.handle.value), Objective.RMS)
@@ -119,7 +113,6 @@ class RepairPanel:
         self._begin()
 
     def _begin(self) -> None:
-        """Have the thread work, if there is a question and somebody who sees the panel."""
         with self._lock:
             question = self._wanted
             if question is None or not self._seen or self._looking:
@@ -130,7 +123,6 @@ class RepairPanel:
         ).start()
 
     def _look(self, question: Question) -> None:
-        """Answer a question and those that have come meanwhile."""
         latest: Question | None = question
         while latest is not None:
             question = latest
@@ -146,14 +138,12 @@ class RepairPanel:
                 self._looking = latest is not None
 
     def _other_than(self, question: Question) -> Question | None:
-        """Give the question that is asked now, where that is another one."""
         with self._lock:
             return self._wanted if self._wanted is not question else None
 
     def _answer(self, question: Question) -> partial[None]:
-        """Answer a question; give what the session is to do about it."""
         try:
-            with ONE_AT_A_TIME:
+            with taken_turn(lambda: None):
                 found = ANSWERS.get(question, question.answer, lambda _: ANSWER_BYTES)
             return partial(self._draw, question, found)
         except WarpspaceError as error:
@@ -161,7 +151,7 @@ class RepairPanel:
         except Exception as error:  # noqa: BLE001 - handed to the session, which shows it
             return partial(_raise, error)
 
-    def _draw(self, question: Question, found: Repairs) -> None:
+    def _draw(self, question: Question, found: RepairResult) -> None:
         """Show an answer, unless something else is asked by now."""
         if self._other_than(question) is not None:
             return
@@ -169,12 +159,10 @@ class RepairPanel:
         self._text.put(content=repair_html(found, self._clicks.button))
 
     def _refuse(self, text: str) -> None:
-        """Say why there is no answer."""
         self._answered, self._seen = None, False
         self._text.put(content=message(text, "repair problem", small=True))
 
     def _clicked(self, word: str) -> None:
-        """Take note of a button; the word comes from a browser and may be anything."""
         self._context.act(partial(self._do, word))
 
     def _do(self, word: str) -> None:
@@ -194,7 +182,6 @@ class RepairPanel:
                 self._change(verb, dict(repair.adjust))
 
     def _change(self, verb: str, adjust: Mapping[str, float]) -> None:
-        """Compare with what a set gives, or apply it; another word changes nothing."""
         if verb == "show":
             self._context.post(lambda state: with_preview(state, adjust))
         elif verb == "apply":
@@ -202,5 +189,4 @@ class RepairPanel:
 
 
 def _raise(error: Exception) -> None:
-    """Hand an exception to the session."""
     raise error

@@ -10,14 +10,15 @@ from warpspace.app.browser.clicks import Clicks
 from warpspace.app.browser.handles import Input
 from warpspace.app.browser.room import Room, open_script, read_room, show_script
 from warpspace.app.browser.viser_private import dom_id
+from warpspace.app.documents.conditions import order_conditions
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
-from warpspace.app.readouts.room import buttons, strip
-from warpspace.app.readouts.summary import heading
+from warpspace.app.readouts.summary import buttons, heading, strip
 from warpspace.app.state.app_state import AppState
 from warpspace.app.viewport.layers import SCENE_PER_MM
-from warpspace.picture.isoline_labels import isoline_labels
-from warpspace.picture.words import spell_factor, spell_short
+from warpspace.picture.mesh import isoline_labels
+from warpspace.picture.words import spell_factor
+from warpspace.spelling import spell_short
 from warpspace.units import Array
 
 MACHINE = "machine"
@@ -25,24 +26,19 @@ MACHINE = "machine"
 
 
 class RoomPanel:
-    """The room between the panels.
-
-    Parameters
-    ----------
-    context : PanelContext
-    """
+    """The room between the panels."""
 
     def __init__(self, context: PanelContext) -> None:
         self._context = context
         said = context.gui.add_text("", "", visible=False)
         self._said: Input[str] = Input(said, context.changed)
         self._clicks = Clicks(context.gui, self._clicked)
+        self._order = ""
         self._sent: dict[str, Any] = {}
         self._sent_html: dict[str, str] = {}
         context.page.run_script(open_script(dom_id(said)))
 
     def _clicked(self, word: str) -> None:
-        """Take note of a click on a button."""
         if word == MACHINE:
             self._context.post(_switched)
 
@@ -54,7 +50,6 @@ class RoomPanel:
         return state
 
     def _fill(self, room: Room) -> None:
-        """Tell the camera of its room; by the session's worker."""
         picture = self._context.shown
         if picture is not None and self._context.camera.take_room(room, picture):
             self._context.client.flush()
@@ -62,7 +57,7 @@ class RoomPanel:
     def show(self, picture: LivePicture) -> None:
         """Send what has changed."""
         html = {
-            "head": heading(picture),
+            "head": heading(picture, self._order, picture.state.left_behind),
             "strip": strip(picture),
             "buttons": buttons(
                 ghost=picture.state.machine.ghost,
@@ -77,24 +72,18 @@ class RoomPanel:
             self._context.page.run_script(show_script({**changes, "html": pieces}))
         self._sent, self._sent_html = facts, html
 
+    def settle(self, picture: LivePicture) -> None:
+        """Say what the first order leaves out; evaluating that is too slow for every move."""
+        self._order = " ".join(order_conditions(picture))
+        self.show(picture)
+
 
 def _switched(state: AppState) -> AppState:
-    """Show the ghost of the machine, or hide it."""
     return replace(state, machine=state.machine.switched(ghost=not state.machine.ghost))
 
 
 def room_facts(picture: LivePicture) -> dict[str, Any]:
-    """Give what the page places by itself as the camera moves.
-
-    Parameters
-    ----------
-    picture : LivePicture
-
-    Returns
-    -------
-    dict
-        As `show_script` takes it; lengths in units of the drawing.
-    """
+    """Give what the page places by itself as the camera moves."""
     state = picture.state
     bounds = picture.grid.bounds_mm
     return {
@@ -110,7 +99,6 @@ def room_facts(picture: LivePicture) -> dict[str, Any]:
 
 
 def _scene(point_mm: Array) -> list[float]:
-    """Give a point in units of the drawing, to a micrometre of it."""
     return [round(float(value) * SCENE_PER_MM, 5) for value in point_mm]
 
 
@@ -130,7 +118,6 @@ def _labels(picture: LivePicture) -> list[dict[str, Any]]:
 
 
 def _slices(picture: LivePicture) -> list[dict[str, Any]]:
-    """Tell where slices lie, which may hide what is behind them."""
     found: list[dict[str, Any]] = []
     for one in picture.slices:
         low, high = one.grid.bounds_mm

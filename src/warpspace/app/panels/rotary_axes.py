@@ -6,13 +6,11 @@ from typing import Any
 
 from warpspace.app.browser.handles import Input
 from warpspace.app.evaluation.cache import Identity
-from warpspace.app.evaluation.chosen_trace import chosen_trace, motion_of, moved_traces
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.rotation import played_axis
+from warpspace.app.evaluation.rotation import chosen_trace, motion_of, moved_traces, played_axis
 from warpspace.app.panels import PanelContext
-from warpspace.app.readouts.circles import circle_rows, circle_table
 from warpspace.app.readouts.html import message
-from warpspace.app.readouts.polar import no_motion, polar_html
+from warpspace.app.readouts.rotary_axes import circle_rows, circle_table, no_motion, polar_html
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import parse_positions, quarters
 from warpspace.machine.description import Vector
@@ -24,13 +22,7 @@ STAND_HINT = "Have the axis stand where the rotation is paused; undo takes it ba
 
 
 class RotaryAxesPanel:
-    """Play, the chosen trace and its polar plots, points, positions and the table of deviations.
-
-    Parameters
-    ----------
-    context : PanelContext
-    state : AppState
-    """
+    """Play, the chosen trace and its polar plots, points, positions and the table of deviations."""
 
     def __init__(self, context: PanelContext, state: AppState) -> None:
         self._context, self._stage = context, context.stage
@@ -67,30 +59,25 @@ class RotaryAxesPanel:
             self._stage.listen(self._write_position)
 
     def _toggle(self) -> None:
-        """Play or pause."""
         self._playing = not self._playing
         self._play(on=self._playing)
         self._name_button()
 
     def _stop(self) -> None:
-        """Take the rotation back."""
         self._playing = False
         self._play(on=None)
         self._name_button()
 
     def _play(self, *, on: bool | None) -> None:
-        """Play, pause or take back the rotation."""
         if self._stage is not None:
             self._stage.play(on)
 
     def _stand_here(self) -> None:
-        """Have the axis stand where the rotation is paused: the volume is then that of there."""
         for axis, value in self._position.items():
             at = float(round(value))
             self._context.post(lambda state, axis=axis, at=at: state.with_position(axis, at))
 
     def _write_position(self, position: Mapping[str, float]) -> None:
-        """Write where the played axis is; without a position the play is over."""
         self._position = dict(position)
         text = ", ".join(f"{axis} = {value:.0f}°" for axis, value in position.items())
         self._angle.content = message(text, "turning") if text else ""
@@ -108,7 +95,6 @@ class RotaryAxesPanel:
             self._stand.visible = paused
 
     def _build(self, state: AppState) -> None:
-        """Add what depends on the scene: points and axes."""
         for part in self._parts:
             part.remove()
         self._scene = state.scene
@@ -222,7 +208,6 @@ class RotaryAxesPanel:
             self._table.content = written
 
     def _offer(self, names: tuple[str, ...], chosen: str) -> None:
-        """Offer traces to choose from."""
         handle = self._chosen.handle
         if names != self._names:
             self._names = names
@@ -234,7 +219,6 @@ class RotaryAxesPanel:
 
 
 def _at_quarters(state: AppState) -> AppState:
-    """Hold the axis next to the point at every quarter turn."""
     axis = played_axis(state)
     if axis is None:
         return state
@@ -242,5 +226,4 @@ def _at_quarters(state: AppState) -> AppState:
 
 
 def _spell(state: AppState, axis: str) -> str:
-    """Spell the positions that a user holds an axis at; empty for those by default."""
     return ", ".join(f"{value:g}" for value in dict(state.rotary.held).get(axis, ()))

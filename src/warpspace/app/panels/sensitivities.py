@@ -2,22 +2,35 @@
 
 from warpspace.app.browser.handles import Input
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.sensitivities import rank_picture
+from warpspace.app.evaluation.sensitivities import SHOWN_BARS, Ranking, rank_picture
 from warpspace.app.panels import PanelContext
-from warpspace.app.readouts.gains import spell_ranking
+from warpspace.app.readouts.html import render
 from warpspace.app.state.app_state import AppState
+
+# --- The ranked gains of one point as bars with numbers, in HTML ----------------------------------
+
+
+def spell_ranking(ranking: Ranking) -> str:
+    """Spell a ranking."""
+    bars = ranking.bars[:SHOWN_BARS]
+    lengths = [bar.moved_um if ranking.by_effect else bar.gain for bar in bars]
+    longest = max(lengths, default=0.0) or 1.0
+    return render(
+        "gains",
+        at=ranking.at,
+        point_mm=ranking.point_mm,
+        error_um=ranking.error_um,
+        by_effect=ranking.by_effect,
+        bars=[(bar, length / longest) for bar, length in zip(bars, lengths, strict=True)],
+    )
+
 
 WORST, MIDDLE = "worst point", "middle of the volume"
 BY_GAIN, BY_EFFECT = "gain", "effect of the present errors"
 
 
 class SensitivitiesPanel:
-    """Ranked bars for one point of the volume.
-
-    Parameters
-    ----------
-    context : PanelContext
-    """
+    """Ranked bars for one point of the volume."""
 
     def __init__(self, context: PanelContext, _state: AppState) -> None:
         gui = context.gui
@@ -58,7 +71,6 @@ class SensitivitiesPanel:
         self._draw()
 
     def _draw(self) -> None:
-        """Write the chart."""
         if self._picture is not None:
             middle = self._where.handle.value == MIDDLE
             effect = self._by.handle.value == BY_EFFECT

@@ -1,39 +1,85 @@
 """The view panel: scene, exaggeration, component, loop, density, rotary positions, switches."""
 
 import math
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from warpspace.app.browser.handles import Handle, Input
 from warpspace.app.browser.viser_private import dom_id
-from warpspace.app.documents.scene_list import dropped_words
+from warpspace.app.documents.scene_file import dropped_words
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.conventions import with_travel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
-from warpspace.app.panels.view_words import (
-    COMPONENT_NAMES,
-    LOOP_NAMES,
-    SWITCHES,
-    Names,
-    component_of,
-)
 from warpspace.app.readouts.help import about_scene
 from warpspace.app.state.app_state import EXAGGERATION, NODES, TRUE_SCALE, AppState
-from warpspace.machine.travel import DIRECTION_WORDS, TravelDirection
+from warpspace.kinematics.model import Loop
+from warpspace.machine.axes import DIRECTION_WORDS, TravelDirection
 from warpspace.scene.model import Scene
+
+# --- What the view panel calls things, and which value each name stands for -----------------------
+
+COMPONENT_NAMES = {
+    "position": {"norm": "|E| length", "x": "E_x", "y": "E_y", "z": "E_z"},
+    "orientation": {
+        "norm": "|φ| tilt of the tool axis",
+        "x": "φ_x tilt about x",
+        "y": "φ_y tilt about y",
+        "z": "φ_z tilt about z",
+    },
+}
+"""What the components are called, for each quantity that can be coloured."""
+LOOP_NAMES = {
+    Loop.TOOL.value: "tool point",
+    Loop.WORKPIECE.value: "workpiece point",
+    Loop.RELATIVE.value: "tool relative to workpiece",
+}
+SWITCHES = {
+    "traces": ("Rotary traces", "Circles and arcs of the table: nominal light, actual dark."),
+    "ghost": ("Nominal box", "The working volume without errors, dashed."),
+    "grid_lines": ("Grid lines", "Lines of the grid on the deformed box."),
+    "axes": ("Axes", "Coordinates of the machine in mm."),
+    "dark": ("Dark mode", "Light lines on a dark ground; the colours of the map stay."),
+}
+
+
+class Names:
+    """Words shown for the values of a dropdown, both ways."""
+
+    def __init__(self, shown: Mapping[str, str]) -> None:
+        self._shown = dict(shown)
+        self._value = {text: value for value, text in shown.items()}
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        """All words."""
+        return tuple(self._value)
+
+    def text(self, value: str) -> str:
+        """Give the words for a value."""
+        return self._shown.get(value, value)
+
+    def value(self, text: str) -> str:
+        """Give the value that words stand for."""
+        return self._value.get(text, text)
+
+
+def component_of(text: str) -> str:
+    """Give the component that a name stands for, whatever is coloured meanwhile; else the text."""
+    for names in COMPONENT_NAMES.values():
+        for component, name in names.items():
+            if name == text:
+                return component
+    return text
+
 
 UNSEEN = "position:absolute!important;width:1px!important;overflow:hidden;clip-path:inset(50%)"
 """Style of what only screen readers are to find."""
 
 
 class ViewPanel:
-    """How the field is looked at.
-
-    Parameters
-    ----------
-    context : PanelContext
-    state : AppState
-    """
+    """How the field is looked at."""
 
     def __init__(self, context: PanelContext, state: AppState) -> None:
         self._context, self._scenes = context, context.scenes
@@ -71,6 +117,16 @@ class ViewPanel:
             ),
             changed,
         )
+        self._placed: Input[bool] = Input(
+            gui.add_checkbox(
+                "Placement fitted out",
+                initial_value=state.placed,
+                visible=state.loop is Loop.RELATIVE,
+                hint="Leave out where the workpiece lies, which nobody sees on a part: three shifts"
+                " and three small rotations, fitted over the working volume.",
+            ),
+            changed,
+        )
         self._ways = Names({str(way): words for way, words in DIRECTION_WORDS.items()})
         self._way: Input[str] = Input(
             gui.add_dropdown(
@@ -104,7 +160,6 @@ class ViewPanel:
         }
 
     def _add_exaggeration(self, state: AppState) -> None:
-        """Add the exaggeration: as a number, on a logarithmic slider, and two buttons."""
         gui, context = self._context.gui, self._context
         start = state.exaggeration or TRUE_SCALE  # the slider begins at true scale
         self._exaggeration: Input[float] = Input(
@@ -156,7 +211,6 @@ class ViewPanel:
         buttons.on_click(lambda event: choose(event.target.value))
 
     def _add_positions(self, state: AppState) -> None:
-        """Add a folder with a slider per rotary axis of the scene's machine."""
         gui = self._context.gui
         self._built_for = (Identity(state.origin), state.position_spans)
         with self._home:
@@ -186,11 +240,13 @@ class ViewPanel:
         elif log is not None:
             state = state.with_exaggeration(_from_log(log))
         component, loop, nodes = self._component.poll(), self._loop.poll(), self._nodes.poll()
-        way = self._way.poll()
+        way, placed = self._way.poll(), self._placed.poll()
         if component is not None:
             state = state.with_component(component_of(component))
         if loop is not None:
             state = state.with_loop(self._loops.value(loop))
+        if placed is not None:
+            state = replace(state, placed=placed)
         if way is not None:
             state = with_travel(state, self._ways.value(way))
         if nodes is not None:
@@ -206,7 +262,6 @@ class ViewPanel:
         return state
 
     def _know(self, scene: Scene) -> None:
-        """Offer a scene that has been opened from a file or a link."""
         if scene is self._known:
             return
         self._known, (self._title, dropped) = scene, self._scenes.add(scene)
@@ -223,6 +278,7 @@ class ViewPanel:
             Identity(state.origin),
             picture.exaggeration,
             (state.component, state.look.quantity, state.loop, state.nodes, state.shown),
+            state.placed,
             (state.scene.model.direction, _has_directions(state)),
             Identity(state.positions),
             Identity(state.position_spans),
@@ -241,6 +297,9 @@ class ViewPanel:
         self._log.show(max(round(math.log10(picture.exaggeration), 2), 0.0))
         self._show_component(state)
         self._loop.show(self._loops.text(state.loop))
+        self._placed.show(state.placed)
+        if self._placed.handle.visible != (state.loop is Loop.RELATIVE):
+            self._placed.handle.visible = state.loop is Loop.RELATIVE
         self._way.show(self._ways.text(state.scene.model.direction))
         if self._way.handle.visible != _has_directions(state):
             self._way.handle.visible = _has_directions(state)
@@ -251,7 +310,6 @@ class ViewPanel:
             bound.show(getattr(state.shown, name))
 
     def _show_component(self, state: AppState) -> None:
-        """Call the components by the names of what is coloured."""
         names = COMPONENT_NAMES[state.look.quantity]
         options, dropdown = tuple(names.values()), self._component.handle
         if dropdown.options != options:
@@ -260,7 +318,6 @@ class ViewPanel:
 
 
 def _has_directions(state: AppState) -> bool:
-    """Tell whether there is a direction of travel to choose."""
     scene = state.scene
     return scene.errors.has_directions or scene.model.direction != TravelDirection.MEAN
 

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from warpspace.analysis.blocks import Curve, Lines
 from warpspace.app.evaluation.bench import BenchPicture
 from warpspace.app.readouts.html import message, render
-from warpspace.bench.evaluation.layout import LEAST, lay_polar
-from warpspace.bench.outcome import Chart, Curve
-from warpspace.picture.ticks import tick_values
+from warpspace.bench.evaluation import LEAST, lay_polar
+from warpspace.picture.marks import tick_values
 from warpspace.units import Array
 
 NONE_CHOSEN = (
@@ -30,40 +30,18 @@ class Tick:
 
 @dataclass(frozen=True, slots=True)
 class Plot:
-    """A chart ready for SVG.
+    """A chart ready for SVG."""
 
-    Attributes
-    ----------
-    chart : Chart
-    curves : tuple of (Curve, str or sequence of (float, float))
-        Each with its path, or with its dots.
-    x, y : tuple of Tick
-    rings : tuple of (float, float)
-        Of a polar chart.
-    ring_words : str
-    """
-
-    chart: Chart
-    curves: tuple[tuple[Curve, str], ...]
+    chart: Lines
+    curves: tuple[tuple[Curve, str], ...]  # each with its path, or with its dots
     x: tuple[Tick, ...] = ()
     y: tuple[Tick, ...] = ()
-    rings: tuple[tuple[float, float], ...] = ()
+    rings: tuple[tuple[float, float], ...] = ()  # of a polar chart
     ring_words: str = ""
 
 
 def bench_html(found: BenchPicture | str | None) -> str:
-    """Draw and spell a test.
-
-    Parameters
-    ----------
-    found : BenchPicture, str or None
-        Why it cannot be run; None where none is chosen.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Draw and spell a test."""
     if found is None:
         return message(NONE_CHOSEN, "test none", small=True)
     if isinstance(found, str):
@@ -79,7 +57,7 @@ def bench_html(found: BenchPicture | str | None) -> str:
     )
 
 
-def lay_plot(chart: Chart) -> Plot:
+def lay_plot(chart: Lines) -> Plot:
     """Lay out a chart for SVG."""
     if chart.kind == "polar":
         layout = lay_polar(chart)
@@ -115,7 +93,6 @@ def lay_plot(chart: Chart) -> Plot:
 
 
 def _ends(values: Array) -> tuple[float, float]:
-    """Give the ends of an axis: those of the values with a little room."""
     low, high = float(values.min()), float(values.max())
     if high - low < LEAST:
         middle = round((low + high) / 2.0, 6)
@@ -140,5 +117,4 @@ def _to_scale(
 
 
 def _path(points: Array, digits: int) -> str:
-    """Spell a line for SVG."""
     return "M" + "L".join(f"{x:.{digits}f} {y:.{digits}f}" for x, y in points)

@@ -7,10 +7,9 @@ from markupsafe import Markup
 
 from warpspace.analysis.explain import Contribution
 from warpspace.app.evaluation.budget import Answer
-from warpspace.app.readouts.html import message, render
-from warpspace.app.readouts.numbers import signed, small
+from warpspace.app.readouts.html import message, render, signed, small
 from warpspace.machine.parameters import parameter
-from warpspace.picture.coordinates import spell_axes
+from warpspace.picture.words import spell_axes
 from warpspace.units import Array
 
 ASK = message(
@@ -29,20 +28,7 @@ Attributes = Callable[[str], Markup]
 
 
 def field_html(at: Mapping[str, float] | None, attributes: Markup) -> str:
-    """Spell the field in which a point is typed.
-
-    Parameters
-    ----------
-    at : mapping of str to float, mm or degrees, or None
-        Positions of all axes at the point asked about; None where there is none.
-    attributes : Markup
-        Make the field send what is entered.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Spell the field in which a point is typed."""
     text = "" if at is None else spell_axes(at).removeprefix("axes ")
     return render("point_field", text=text, attributes=attributes)
 
@@ -54,25 +40,7 @@ def answer_html(
     button: Attributes | None = None,
     excluded: Collection[str] = (),
 ) -> str:
-    """Spell an answer.
-
-    Parameters
-    ----------
-    answer : Answer
-    lever : str
-        Key of the chosen contribution, empty for none.
-    attributes : callable
-        Gives the attributes that make a row clickable, by the word it sends.
-    button : callable or None, optional
-        Likewise for buttons; None where the errors cannot be changed.
-    excluded : collection of str, optional
-        Keys that take no part, offered to be included again.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Spell an answer."""
     found = answer.explanation
     total_um = _sum(found.contributions)
     length = float(np.linalg.norm(total_um))
@@ -118,7 +86,6 @@ def answer_html(
 
 
 def _mechanism(part: Contribution) -> str:
-    """Say how a contribution comes about: a rotation times its arm, or a plain shift."""
     row = parameter(part.key)
     value = f"{signed(part.value, 1)} {row.unit}"
     if not row.is_rotation:
@@ -128,7 +95,6 @@ def _mechanism(part: Contribution) -> str:
 
 
 def _split(ranked: list[Contribution], lever: str) -> tuple[list[Contribution], list[Contribution]]:
-    """Separate the parts listed from those summed up; the chosen one is always listed."""
     if len(ranked) <= SHOWN + 1:
         return ranked, []
     smaller = ranked[SHOWN:]

@@ -8,8 +8,8 @@ from markupsafe import Markup
 
 from warpspace.app.evaluation.calibration import Answer, Measured
 from warpspace.app.readouts.html import render
-from warpspace.calibration.rank import spell_rank
 from warpspace.calibration.results import Found, Residuals
+from warpspace.calibration.solve import spell_rank
 from warpspace.units import UM_PER_MM, Array
 
 Button = Callable[[str], Markup]
@@ -34,41 +34,14 @@ class Bar:
 
 
 def files_html(files: Sequence[Measured], note: str, problem: str, button: Button) -> str:
-    """List files of readings, each with a button that removes it.
-
-    Parameters
-    ----------
-    files : sequence of Measured
-    note : str
-        What is to be done next.
-    problem : str
-        What went wrong last; empty for nothing.
-    button : callable
-        Gives the attributes of a button by its word, "remove 0" for the first file.
-    """
+    """List files of readings, each with a button that removes it."""
     return render(
         "calibration_files", files=files, note=note, problem=problem, button=button, remove="remove"
     )
 
 
 def calibration_html(given: Answer, standing: str, button: Button, arrows: str = "") -> str:
-    """Spell a calibration.
-
-    Parameters
-    ----------
-    given : Answer
-    standing : str
-        "current", "applied" or "stale": whether it is that of what is shown.
-    button : callable
-        Gives the attributes of a button by its word, "compare" or "apply".
-    arrows : str, optional
-        What is said of the arrows in the box.
-
-    Returns
-    -------
-    str
-        HTML; every value is escaped.
-    """
+    """Spell a calibration."""
     found = given.found
     shown = [one for one in found.parameters if one.before or one.key not in found.rank.unseen]
     bars, top_um = _bars(found.fitted)
@@ -80,12 +53,20 @@ def calibration_html(given: Answer, standing: str, button: Button, arrows: str =
         sigma_um=UM_PER_MM * found.sigma_mm,
         freedom=found.freedom,
         count=sum(len(one.readings) for one in found.fitted),
-        circles=given.circles,
-        rows=[(one, _told(one), _value(one), _interval(one)) for one in shown],
-        in_part=any(_told(one) == "in part" for one in shown),
+        circles=found.circles,
+        rows=[(one, _value(one), _interval(one.interval_95)) for one in shown],
+        in_part=any(one.told == "in part" for one in shown),
+        combinations=[
+            (
+                one.words,
+                _plus_minus(one.value, one.standard_uncertainty),
+                _interval(one.interval_95),
+            )
+            for one in found.combinations
+        ],
         confounded=spell_rank(found.rank, found.slopes),
-        apart=[(group[0], words) for group, words in given.apart.items()],
-        steps=given.steps,
+        apart=[(group[0], words) for group, words in found.apart.items()],
+        steps=found.steps,
         notes=found.notes[:MOST_WORDS],
         far=_far(found.fitted)[:MOST_WORDS],
         bars=bars,
@@ -95,30 +76,24 @@ def calibration_html(given: Answer, standing: str, button: Button, arrows: str =
     )
 
 
-def _told(one: Found) -> str:
-    """Say whether the readings tell a parameter."""
-    if one.standard_uncertainty is None or one.interval is None:
-        return "no"
-    return "yes" if one.identifiable else "in part"
-
-
 def _value(one: Found) -> str:
-    """Spell a value with its standard uncertainty, or that it is held."""
-    if one.standard_uncertainty is None:
+    if one.told == "no":
         return f"{one.before:.1f} held".replace("-", "−")
-    return f"{one.value:.1f} ± {one.standard_uncertainty:.1f}".replace("-", "−")
+    return _plus_minus(one.value, one.standard_uncertainty)
 
 
-def _interval(one: Found) -> str:
-    """Spell a 95 % interval; wide ones without decimals."""
-    if one.interval is None:
+def _plus_minus(value: float, width: float | None) -> str:
+    return (f"{value:.1f}" + ("" if width is None else f" ± {width:.1f}")).replace("-", "−")
+
+
+def _interval(ends: tuple[float, float] | None) -> str:
+    if ends is None:
         return ""
-    digits = 0 if max(map(abs, one.interval)) >= WIDE else 1
-    return " … ".join(f"{end:.{digits}f}" for end in one.interval).replace("-", "−")
+    digits = 0 if max(map(abs, ends)) >= WIDE else 1
+    return " … ".join(f"{end:.{digits}f}" for end in ends).replace("-", "−")
 
 
 def _far(groups: Sequence[Residuals]) -> list[str]:
-    """Name the readings that lie further off than the others let expect."""
     return [
         f"{group.readings.source} line {group.readings.lines[at]}"
         for group in groups
@@ -154,7 +129,6 @@ def _bars(groups: Sequence[Residuals]) -> tuple[list[Bar], float]:
 
 
 def _pose(group: Residuals, at: int) -> str:
-    """Say where a reading was taken: its line, and the axes that move."""
     coordinates = group.readings.coordinates
     moving = [name for name, values in coordinates.items() if np.ptp(values) > 1e-9]
     rotary = [name for name in moving if name[0] in "ABC"] or moving

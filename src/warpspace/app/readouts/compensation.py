@@ -24,14 +24,7 @@ def note_html(problem: str, *, known: bool) -> str:
 
 
 def box_words(state: AppState, found: Compensation) -> str:
-    """Say how the box is drawn: with which table, and in which loop.
-
-    Parameters
-    ----------
-    state : AppState
-    found : Compensation
-        Whose numbers are shown.
-    """
+    """Say how the box is drawn: with which table, and in which loop."""
     controller = state.controller
     if controller is None:
         return "The box shows the machine without a table."
@@ -44,23 +37,7 @@ def box_words(state: AppState, found: Compensation) -> str:
 
 
 def compensation_html(found: Compensation, picture: str, box: str, *, current: bool) -> str:
-    """Spell a compensation.
-
-    Parameters
-    ----------
-    found : Compensation
-    picture : str
-        Data address of the maps; empty before they are drawn.
-    box : str
-        What the box shows, in words.
-    current : bool
-        Whether it is that of what is shown.
-
-    Returns
-    -------
-    str
-        HTML; every value is escaped.
-    """
+    """Spell a compensation."""
     return render(
         "compensation",
         found=found,

@@ -11,18 +11,18 @@ import numpy as np
 from markupsafe import Markup
 from PIL import Image, ImageChops
 
-from warpspace.app.readouts.html import render
-from warpspace.app.readouts.machine_editor.types import small_picture
-from warpspace.app.readouts.numbers import thousands
+from warpspace.app.readouts.html import render, thousands
+from warpspace.app.readouts.machine_editor import small_picture
 from warpspace.app.readouts.summary import colour_stops
 from warpspace.app.state.concept_choice import Chosen, ConceptChoice
 from warpspace.geometry.colour import ColourScale
 from warpspace.machine.limits import MOST_CONCEPTS
-from warpspace.picture.words import LOOP_WORDS, spell_short, tolerance_words
+from warpspace.picture.words import LOOP_WORDS, tolerance_words
+from warpspace.spelling import spell_short
 
 if TYPE_CHECKING:
+    from warpspace.analysis.concepts import Concept
     from warpspace.app.evaluation.concepts import Answer
-    from warpspace.scene.concepts import Concept
 
 Button = Callable[[str], Markup]
 NUMBERS = {"mean": "mean_um", "P95": "p95_um", "max": "max_um"}
@@ -33,36 +33,15 @@ MARGIN_PX = 6
 
 @dataclass(frozen=True, slots=True)
 class Offer:
-    """A machine that can be chosen.
+    """A machine that can be chosen."""
 
-    Attributes
-    ----------
-    word : str
-        What its button sends.
-    chosen : Chosen
-    chain : str
-    """
-
-    word: str
+    word: str  # what its button sends
     chosen: Chosen
     chain: str
 
 
 def offers_html(offers: Sequence[Offer], choice: ConceptChoice, button: Button) -> str:
-    """Spell what can be chosen: machines of the library with their pictures, then other scenes.
-
-    Parameters
-    ----------
-    offers : sequence of Offer
-    choice : ConceptChoice
-    button : callable
-        Gives the attributes of a button that sends a word.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Spell what can be chosen: machines of the library with their pictures, then other scenes."""
     return render(
         "concept_offers",
         offers=[
@@ -78,45 +57,18 @@ def offers_html(offers: Sequence[Offer], choice: ConceptChoice, button: Button) 
 
 @dataclass(frozen=True, slots=True)
 class ConceptRow:
-    """A chosen machine.
-
-    Attributes
-    ----------
-    title : str
-    opens : bool
-        Whether it can be opened: what is steered is open already.
-    concept : Concept or None
-        Its numbers; None before it is compared.
-    picture : str
-        A data address; empty before it is drawn.
-    """
+    """A chosen machine."""
 
     title: str
-    opens: bool
-    concept: "Concept | None" = None
-    picture: str = ""
+    opens: bool  # whether it can be opened: what is steered is open already
+    concept: "Concept | None" = None  # its numbers; None before it is compared
+    picture: str = ""  # A data address; empty before it is drawn
 
 
 def concepts_html(
     rows: Sequence[ConceptRow], found: "Answer | None", note: str, button: Button
 ) -> str:
-    """Spell the chosen machines side by side, as far as they are compared.
-
-    Parameters
-    ----------
-    rows : sequence of ConceptRow
-    found : Answer or None
-        The last comparison.
-    note : str
-        What is to be done next, or what went wrong.
-    button : callable
-        Gives the attributes of a button: "open 0" or "remove 0" for the first machine.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Spell the chosen machines side by side, as far as they are compared."""
     lettered = list(zip(ascii_uppercase, rows, strict=False))
     known = [row.concept for row in rows if row.concept is not None]
     best: dict[str, float] = {}
@@ -139,7 +91,6 @@ def concepts_html(
 
 
 def _about(found: "Answer") -> list[str]:
-    """Say how machines were compared."""
     question, first = found.question, found.concepts[0]
     return [
         f"{thousands(first.sampled.plan.samples)} machines of each",
@@ -152,26 +103,12 @@ def _about(found: "Answer") -> list[str]:
 
 
 def _ticks(scale: ColourScale) -> list[tuple[float, str]]:
-    """Place the ticks of a colour bar, per cent of its length."""
     span = scale.high - scale.low
     return [(100.0 * (tick - scale.low) / span, spell_short(tick)) for tick in scale.ticks]
 
 
 def cut_strip(png: bytes, count: int) -> list[str]:
-    """Cut pictures that stand one below the other apart.
-
-    Parameters
-    ----------
-    png : bytes
-    count : int
-        How many there are, all equally high.
-
-    Returns
-    -------
-    list of str
-        A data address each, as wide as the strip; empty paper above and below is cut away, so that
-        all stay in one scale.
-    """
+    """Cut pictures that stand one below the other apart."""
     with Image.open(io.BytesIO(png)) as opened:
         strip = opened.convert("RGB")
     height = strip.height // count

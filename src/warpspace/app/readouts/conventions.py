@@ -11,7 +11,7 @@ from warpspace.app.evaluation.machine import standing
 from warpspace.app.readouts.html import render
 from warpspace.app.state.app_state import AppState
 from warpspace.field.grid import find_volume_axes
-from warpspace.kinematics.conventions.registry import find_convention
+from warpspace.kinematics.model import find_convention
 from warpspace.machine.axes import is_linear
 
 GROUPS = {
@@ -60,12 +60,10 @@ COST_WORDS = {
 
 
 def _cost_group(cost: ConventionCost) -> str:
-    """Give the key of `COST_GROUPS` that a cost belongs to."""
     return cost.name.partition("=")[0]
 
 
 def _group(choice: str) -> str:
-    """Give the key of `GROUPS` that a choice belongs to."""
     what, _, axis = choice.split("=", maxsplit=1)[0].partition(" ")
     return what if not axis else "linear" if is_linear(axis) else "rotary"
 
@@ -76,23 +74,7 @@ def conventions_html(
     attributes: Attributes,
     costs: Sequence[ConventionCost] = (),
 ) -> str:
-    """Spell the table of all choices.
-
-    Parameters
-    ----------
-    state : AppState
-    effects : mapping of str to Effect
-        By choice; what is missing is not known yet.
-    attributes : callable
-        Gives the attributes that make a row clickable, by choice and ARIA role.
-    costs : sequence of ConventionCost, optional
-        What data in a wrong convention would cost; none where it is not known yet.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Spell the table of all choices."""
     ranges = state.scene.workspace.ranges
     nodes = "×".join(str(state.nodes if axis else 1) for axis in find_volume_axes(ranges))
     return render(

@@ -1,11 +1,17 @@
 """The chart of one error along its axis: curves, standard uncertainty, and the readings behind."""
 
-import numpy as np
-from viser import uplot
+from collections.abc import Sequence
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+from viser import GuiApi, GuiUplotHandle, uplot
+
+from warpspace.app.readouts.html import render
 from warpspace.app.state.curve_text import sample_curve
 from warpspace.machine.curves.curve import ErrorFunction
-from warpspace.machine.measurement import BACKWARD, Measurement
+from warpspace.machine.errors import BACKWARD, Measurement
+from warpspace.spelling import spell
 from warpspace.units import Array
 
 CURVE_COLOUR = "#4a7ab5"
@@ -17,7 +23,6 @@ FEW_READINGS = 2000
 
 
 def _readings(label: str, fill: str) -> uplot.Series:
-    """Describe dots without a line."""
     dots = uplot.Series_Points(show=True, size=5, width=1, stroke=CURVE_COLOUR, fill=fill)
     return uplot.Series(label=label, stroke=CURVE_COLOUR, width=0, points=dots)
 
@@ -41,21 +46,7 @@ def curve_data(
     uncertainty: ErrorFunction | None = None,
     measurement: Measurement | None = None,
 ) -> tuple[Array, ...]:
-    """Give the numbers of the chart of one error.
-
-    Parameters
-    ----------
-    function : ErrorFunction or None
-    span : tuple of float, (2,), mm or degrees
-        Range of the axis.
-    uncertainty : ErrorFunction, optional
-    measurement : Measurement, optional
-
-    Returns
-    -------
-    tuple of ndarray, [n]
-        Positions, ascending, then one array for each of `SERIES`; what there is none of is NaN.
-    """
+    """Give the numbers of the chart of one error."""
     along, _ = sample_curve(function, span)
     readings = {} if measurement is None else _thinned(measurement)
     at = np.sort(np.concatenate([along, *(points[:, 0] for points in readings.values())]))
@@ -96,7 +87,6 @@ def _thinned(measurement: Measurement) -> dict[str, Array]:
 
 
 def _placed(points: Array | None, at: Array) -> Array:
-    """Put readings at their positions among all; several at one position stand side by side."""
     found = np.full(at.shape, np.nan)
     if points is None:
         return found
@@ -106,3 +96,93 @@ def _placed(points: Array | None, at: Array) -> Array:
     first = np.maximum.accumulate(np.where(same, np.arange(len(ordered)), 0))
     found[place + np.arange(len(ordered)) - first] = ordered[:, 1]
     return found
+
+
+# --- What a chart shows in words, for those who do not see it -------------------------------------
+
+
+def chart_text(words: str) -> str:
+    """Write the text that stands, unseen, just before a chart."""
+    return render("chart_text", words=words)
+
+
+def describe_curve(name: str, unit: str, along: str, at: Array, value: Array) -> str:
+    """Say what the curve of an error shows."""
+    places = [0, len(at) - 1, int(np.argmin(value)), int(np.argmax(value))]
+    words = ("starts with", "ends with", "least", "greatest")
+    if np.ptp(value) == 0.0:
+        return f"Chart of {name}: {spell(float(value[0]))} {unit} everywhere"
+    said = [
+        f"{word} {spell(float(value[place]))} {unit} at {spell(float(at[place]))} {along}"
+        for word, place in zip(words, places, strict=True)
+        if word.endswith("with") or place not in places[:2]
+    ]
+    return f"Chart of {name}: " + ", ".join(said)
+
+
+def measured_words(uncertainty: ErrorFunction | None, measurement: Measurement | None) -> str:
+    """Say what is known of the measurement of an error, behind the words of its curve."""
+    parts: list[str] = []
+    if uncertainty is not None:
+        parts.append(f"standard uncertainty up to {spell(abs(uncertainty.amplitude))}")
+    if measurement is not None:
+        parts.append(f"{measurement.count} readings in {len(measurement.runs)} runs")
+    return "".join(f", {part}" for part in parts)
+
+
+def describe_histogram(
+    edges_um: Array, counts: NDArray[np.integer[Any]], limit_um: float, words: str
+) -> str:
+    """Say what the histogram of the error shows."""
+    top = int(np.argmax(counts))
+    return (
+        f"Histogram of |E|: {words} from {spell(float(edges_um[0]))} to"
+        f" {spell(float(edges_um[-1]))} µm, most of them between {spell(float(edges_um[top]))} and"
+        f" {spell(float(edges_um[top + 1]))} µm; the limit is {spell(limit_um)} µm"
+    )
+
+
+# --- Small charts beside the numbers, drawn by viser's uPlot --------------------------------------
+
+FONT = "11px sans-serif"
+WHOLE = "whole"
+"""Scale of lines that are given in heights of the chart, 0 to 1, beside the one of the values."""
+
+
+def add_chart(
+    gui: GuiApi,
+    data: tuple[Array, ...],
+    lines: Sequence[uplot.Series],
+    height: int,
+    *,
+    axes: tuple[uplot.Axis, ...] | None = None,
+    visible: bool = True,
+) -> GuiUplotHandle:
+    """Add a chart without a legend, whose `data` may be assigned anew."""
+    return gui.add_uplot(
+        data,
+        (uplot.Series(label="along"), *lines),
+        scales=chart_scales(None),
+        axes=axes,
+        legend=uplot.Legend(show=False),
+        height=height,
+        padding=(8, 14, 0, 0),
+        visible=visible,
+    )
+
+
+def chart_scales(
+    span: tuple[float, float] | None, along: tuple[float, float] | None = None
+) -> dict[str, uplot.Scale]:
+    """Describe the scales of a chart."""
+    scales = {"x": uplot.Scale(time=False), WHOLE: uplot.Scale(range=(0.0, 1.0))}
+    if along is not None and along[0] < along[1]:
+        scales["x"]["range"] = along
+    return scales if span is None else {**scales, "y": uplot.Scale(range=span)}
+
+
+def chart_axis(label: str, size: int) -> uplot.Axis:
+    """Describe an axis of a chart; its colours are the page's, light or dark."""
+    return uplot.Axis(
+        label=label, size=size, labelSize=16, font=FONT, space=18 if size > 40 else 40
+    )

@@ -7,7 +7,7 @@ from markupsafe import Markup
 from warpspace.app.readouts.html import render
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.exclusions import Exclusions
+from warpspace.app.state.ranges import Exclusions
 from warpspace.app.state.typed_numbers import spell_typed
 from warpspace.machine.errors import Constant
 from warpspace.machine.limits import MAX_TYPED_NUMBER
@@ -30,26 +30,7 @@ def error_controls(
     text_box: Attributes,
     attempt: int = 0,
 ) -> str:
-    """Draw the number box and the buttons of one error in their present state.
-
-    Parameters
-    ----------
-    row : Parameter
-    exclusions : Exclusions
-    value : float, µm or µrad
-        Present amplitude.
-    button, text_box : callable
-        Give the attributes of a button, and of a box, that sends a word.
-    attempt : int, optional
-        Counts what was typed, so that the page draws a refused box anew.
-
-    Returns
-    -------
-    str
-        HTML to stand directly before the error's slider: the style sheet puts the buttons
-        at the end of the line with the slider's label, and the box in the place of viser's own,
-        which takes neither commas nor exponents, nor numbers beyond the slider's range.
-    """
+    """Draw the number box and the buttons of one error in their present state."""
     excluded = {ONLY: exclusions.only, EXCLUDE: exclusions.excluded}
     return render(
         "error_controls",
@@ -88,14 +69,7 @@ def slider_hint(state: AppState, row: Parameter, effect_um: float | None = None)
 
 
 def with_switched(state: AppState, word: str) -> AppState:
-    """Do what a click of only or exclude asks for.
-
-    Parameters
-    ----------
-    state : AppState
-    word : str
-        For instance "only EAX"; it comes from a browser, and what means nothing changes nothing.
-    """
+    """Do what a click of only or exclude asks for."""
     what, _, key = word.partition(" ")
     if what == ONLY:
         return edits.with_only(state, key, key not in state.exclusions.only)

@@ -44,20 +44,7 @@ FIXED_KEYS = (
 
 
 def spell_help(keys: Sequence[tuple[str, str, str]], title: str, description: str) -> str:
-    """Write the help.
-
-    Parameters
-    ----------
-    keys : sequence of (str, str, str)
-        Key, what it does, remark.
-    title, description : str
-        Of the scene; either may be empty.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Write the help."""
     return render(
         "help",
         title=title,
@@ -68,16 +55,5 @@ def spell_help(keys: Sequence[tuple[str, str, str]], title: str, description: st
 
 
 def about_scene(description: str) -> str:
-    """Write what a scene says of itself, to be unfolded.
-
-    Parameters
-    ----------
-    description : str
-        May be empty.
-
-    Returns
-    -------
-    str
-        HTML; empty where there is no description.
-    """
+    """Write what a scene says of itself, to be unfolded."""
     return render("about", description=description.strip()) if description.strip() else ""

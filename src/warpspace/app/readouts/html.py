@@ -3,26 +3,48 @@
 The templates escape every value by themselves; only what is `Markup` already goes in as it is.
 """
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from typing import Any, SupportsFloat
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
-from warpspace.app.readouts import numbers
 from warpspace.machine.parameters import parameter
-from warpspace.picture.coordinates import spell_at, spell_coordinate, spell_point
-from warpspace.picture.words import spell_short
+from warpspace.picture.words import spell_at, spell_coordinate, spell_point
+from warpspace.spelling import MINUS, THIN_SPACE, spell_short
 from warpspace.units import Array
+
+# --- Spelling of numbers with their sign, and of large counts -------------------------------------
+
+
+def signed(value: float, digits: int = 2) -> str:
+    """Spell a number with its sign; zero has none."""
+    text = f"{value:+.{digits}f}"
+    if float(text) == 0.0:
+        text = f"{0.0:.{digits}f}"
+    return text.replace("-", MINUS)
+
+
+def small(value: float) -> str:
+    """Spell a signed number that may be tiny: to four decimals, below them in powers of ten."""
+    if value == 0.0:
+        return "0"
+    return (f"{value:+.4f}" if abs(value) >= 5e-5 else f"{value:+.0e}").replace("-", MINUS)
+
+
+def thousands(count: int) -> str:
+    """Spell a large count with thin spaces: ``20 000``."""
+    return f"{count:,}".replace(",", THIN_SPACE)
+
 
 PACKAGE = "warpspace.app.readouts"
 
 
 @cache
 def _templates() -> Environment:
-    """Load the templates of this folder."""
     environment = Environment(
         loader=PackageLoader(PACKAGE),
         autoescape=True,
@@ -34,9 +56,10 @@ def _templates() -> Environment:
     spell: dict[str, Callable[..., object]] = {
         "short": spell_short,
         "coordinate": spell_coordinate,
-        "signed": numbers.signed,
-        "small": numbers.small,
+        "signed": signed,
+        "small": small,
         "parameter": parameter,
+        "lowered": lowered,
     }
     environment.filters.update(spell)
     functions: dict[str, Any] = {"point": point}
@@ -44,54 +67,24 @@ def _templates() -> Environment:
     return environment
 
 
+def lowered(text: str) -> Markup:
+    """Set the letter behind an underscore lower: |E_B − E_A|."""
+    return Markup(re.sub("_(.)", r"<sub>\1</sub>", str(escape(text))))  # noqa: S704 - escaped before
+
+
 def point(axes: Mapping[str, SupportsFloat], point_mm: Array | Sequence[float]) -> Markup:
-    """Spell a point in both of its coordinates, with a button that copies it.
-
-    Parameters
-    ----------
-    axes : mapping of str to float, mm or degrees
-        Positions of all axes.
-    point_mm : ndarray or sequence of float, [3], mm
-        The point in R, as it is drawn.
-
-    Returns
-    -------
-    Markup
-        The button copies what the option ``--at`` of a command takes.
-    """
+    """Spell a point in both of its coordinates, with a button that copies it."""
     text = render("point", text=spell_point(axes, point_mm), at=spell_at(axes))
     return Markup(text)  # noqa: S704 - escaped by its template
 
 
 def render(name: str, /, **values: object) -> str:
-    """Fill in the template of a readout.
-
-    Parameters
-    ----------
-    name : str
-        Of a file ``templates/NAME.html.j2``.
-    **values
-        What the template names; a missing one is an error.
-
-    Returns
-    -------
-    str
-        HTML in the classes of `style_sheet`.
-    """
+    """Fill in the template of a readout."""
     return _templates().get_template(f"{name}.html.j2").render(values)
 
 
 def message(text: str, value: str = "", *, small: bool = False) -> str:
-    """Put a sentence into a block of its own.
-
-    Parameters
-    ----------
-    text : str
-    value : str, optional
-        Name by which tests and scripts find it, in the attribute ``data-value``.
-    small : bool, optional
-        In small print.
-    """
+    """Put a sentence into a block of its own."""
     return render("message", text=text, value=value, small=small)
 
 

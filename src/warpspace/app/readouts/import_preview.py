@@ -6,12 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpspace.app.readouts.html import render
-from warpspace.formats.importing import Reading
-from warpspace.formats.measured import BACKWARD, BOTH, FORWARD, Series
-from warpspace.formats.summary import summaries
+from warpspace.formats.measured import BACKWARD, BOTH, FORWARD, Series, summaries
+from warpspace.formats.registry import Reading
 from warpspace.machine.axes import is_linear
 from warpspace.machine.parameters import parameter
-from warpspace.picture.words import spell_short
+from warpspace.spelling import spell_short
 from warpspace.units import Array
 
 MOST_CURVES, MOST_DOTS = 12, 400
@@ -46,25 +45,7 @@ def preview_html(
     *,
     stale: bool = False,
 ) -> str:
-    """Show what an import would bring.
-
-    Parameters
-    ----------
-    reading : Reading
-    names : sequence of str
-        Of the files; anything.
-    machine : str
-        Title of the machine.
-    notes : sequence of str
-        What would be replaced or kept.
-    stale : bool, optional
-        Whether it is of choices that have been changed since, to some that do not fit.
-
-    Returns
-    -------
-    str
-        HTML; every value is escaped.
-    """
+    """Show what an import would bring."""
     found = reading.found
     return render(
         "import_preview",
@@ -83,7 +64,6 @@ def preview_html(
 
 
 def _curve(one: Series) -> Curve:
-    """Lay out the chart of an error."""
     at = np.array(one.positions)
     means = {way: mean for way in COLOURS if (mean := one.mean(way)) is not None}
     readings = np.array([run.values for run in one.runs])
@@ -123,5 +103,4 @@ def _curve(one: Series) -> Curve:
 
 
 def _points(x: Array, y: Array) -> str:
-    """Spell the corners of a line."""
     return " ".join(f"{one:.1f},{other:.1f}" for one, other in zip(x, y, strict=True))

@@ -3,41 +3,18 @@
 from collections.abc import Mapping, Sequence
 
 from warpspace.app.readouts.html import render
-from warpspace.picture.coordinates import SEPARATOR, spell_axes, spell_coordinate
-from warpspace.picture.slices import Slice
+from warpspace.picture.model import Slice
+from warpspace.picture.words import SEPARATOR, spell_axes, spell_coordinate
 from warpspace.units import Array
 
 
 def tool_point_html(axes: Mapping[str, float], point_mm: Array) -> str:
-    """Spell where the tool point of the machine stands.
-
-    Parameters
-    ----------
-    axes : mapping of str to float, mm or degrees
-        Positions of all axes.
-    point_mm : ndarray, [3], mm
-        In R.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Spell where the tool point of the machine stands."""
     return render("tool_point", axes=axes, point_mm=point_mm)
 
 
 def slices_html(slices: Sequence[Slice]) -> str:
-    """Spell where slices lie; empty for none.
-
-    Parameters
-    ----------
-    slices : sequence of Slice
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Spell where slices lie; empty for none."""
     return render("slices", lines=[spell_slice(one) for one in slices]) if slices else ""
 
 

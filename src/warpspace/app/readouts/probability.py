@@ -6,14 +6,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from markupsafe import Markup
 
-from warpspace.app.readouts.html import render
-from warpspace.app.readouts.numbers import thousands
+from warpspace.app.readouts.html import render, thousands
 from warpspace.app.state.specification import MAX
 from warpspace.machine.parameters import Parameter
 from warpspace.units import Array
 
 if TYPE_CHECKING:
-    from warpspace.analysis.allocation import Allocation
+    from warpspace.analysis.allocate import AllocateResult
     from warpspace.app.evaluation.probability import Estimate
 
 FIXED = "fixed"
@@ -22,17 +21,7 @@ MARGIN = 1.02
 
 
 def spell_probability(estimated: "Estimate") -> str:
-    """Spell the probability and the limit: what stays at the top of the panel.
-
-    Parameters
-    ----------
-    estimated : Estimate
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Spell the probability and the limit: what stays at the top of the panel."""
     return render(
         "probability",
         probability=percent(estimated.probability.probability),
@@ -42,17 +31,7 @@ def spell_probability(estimated: "Estimate") -> str:
 
 
 def spell_scatter(estimated: "Estimate") -> str:
-    """Spell the key to the histogram, mean, P95 and the largest error, and the confidence interval.
-
-    Parameters
-    ----------
-    estimated : Estimate
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Spell the histogram's key, mean, P95 and largest error, and the confidence interval."""
     found = estimated.probability
     return render(
         "scatter",
@@ -67,24 +46,7 @@ def spell_scatter(estimated: "Estimate") -> str:
 def spell_tolerance(
     row: Parameter, share: float, longest: float, *, fixed: bool, button: Callable[[str], Markup]
 ) -> str:
-    """Draw the share of one error's tolerance as a bar, and its box "fixed".
-
-    Parameters
-    ----------
-    row : Parameter
-    share : float
-        Of the variance of E, between 0 and 1.
-    longest : float
-        Share whose bar is longest.
-    fixed : bool
-    button : callable
-        Gives the attributes of a button that sends a word.
-
-    Returns
-    -------
-    str
-        HTML to stand directly before the slider of the tolerance.
-    """
+    """Draw the share of one error's tolerance as a bar, and its box "fixed"."""
     return render(
         "tolerance",
         row=row,
@@ -96,21 +58,11 @@ def spell_tolerance(
     )
 
 
-def spell_allocation(found: "Allocation") -> str:
-    """Say what an allocation has reached.
-
-    Parameters
-    ----------
-    found : Allocation
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+def spell_allocation(found: "AllocateResult") -> str:
+    """Say what an allocation has reached."""
     return render(
         "allocation",
-        limit_um=found.wish.limit_um,
+        limit_um=found.asked.limit_um,
         before=percent(found.before.probability),
         after=percent(found.after.probability),
         low=percent(found.after.low),
@@ -120,7 +72,8 @@ def spell_allocation(found: "Allocation") -> str:
         cost_after=found.cost_after,
         count=len(found.tolerances),
         at_widest=found.at_widest,
-        widest=found.wish.widest,
+        widest=found.widest,
+        exact=found.exact.words().capitalize(),
     )
 
 
@@ -133,22 +86,7 @@ def percent(share: float) -> str:
 
 
 def histogram_lines(estimated: "Estimate") -> tuple[Array, Array, Array, Array]:
-    """Outline the bars of the histogram of the error, those outside the limit by themselves.
-
-    Parameters
-    ----------
-    estimated : Estimate
-
-    Returns
-    -------
-    error_um : ndarray, [n], µm
-        Ascending; each edge of a bar stands here twice, so that the lines go straight up and down.
-    within, outside : ndarray, [n]
-        Machines per bar, zero where the bar is of the other kind. A bar is within the limit where
-        its middle is.
-    limit : ndarray, [n]
-        From 0 to 1 at the limit, for an axis of its own; NaN elsewhere, where nothing is drawn.
-    """
+    """Outline the bars of the histogram of the error, those outside the limit by themselves."""
     edges, counts = estimated.histogram.edges_um, estimated.histogram.counts.astype(float)
     limit_um = estimated.probability.spec_um
     heights = np.append(np.repeat(counts, 2), [0.0, 0.0])

@@ -4,10 +4,13 @@ from collections.abc import Callable
 
 from markupsafe import Markup
 
-from warpspace.analysis.repair import Objective, Outcome, Repair, Repairs
+from warpspace.analysis.adjusting import Objective
+from warpspace.analysis.repair import AdjustedSet, RepairResult
+from warpspace.analysis.statistics import Summary
+from warpspace.analysis.typed import ALL
 from warpspace.app.readouts.html import message, render
 from warpspace.machine.parameters import parameter
-from warpspace.picture.words import spell, spell_short
+from warpspace.spelling import spell, spell_short
 
 SEEN = "seen"
 """Word that the page sends once a reader sees where the answer will be."""
@@ -23,20 +26,8 @@ def looking_html(button: Button) -> str:
     return render("repair_looking", attributes=button(SEEN))
 
 
-def repair_html(found: Repairs, button: Button) -> str:
-    """Spell what repairs a machine.
-
-    Parameters
-    ----------
-    found : Repairs
-    button : callable
-        Gives the attributes of a button by its word: "show 2" or "apply 2" for the set of two.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+def repair_html(found: RepairResult, button: Button) -> str:
+    """Spell what repairs a machine."""
     if not found.before.max_um:
         return NOTHING
     return render(
@@ -44,10 +35,10 @@ def repair_html(found: Repairs, button: Button) -> str:
         columns=COLUMNS,
         before=found.before,
         sets=[(len(one.adjust), one, _words(found, one)) for one in offered(found)],
-        effects=found.effects,
+        effects=found.errors,
         nothing=_why_none(found),
-        largest=found.plan.objective is Objective.MAX,
-        limit=spell_short(found.plan.limit),
+        largest=found.objective is Objective.MAX,
+        limit=spell_short(found.asked.limit_of(ALL)),
         tried=found.adjustable,
         proven=all(one.proven for one in found.repairs),
         cells=lambda outcome: _cells(found.before, outcome),
@@ -56,36 +47,33 @@ def repair_html(found: Repairs, button: Button) -> str:
     )
 
 
-def offered(found: Repairs) -> tuple[Repair, ...]:
+def offered(found: RepairResult) -> tuple[AdjustedSet, ...]:
     """Pick the sets that gain something over the smaller ones."""
-    name = f"{found.plan.objective}_um"
+    name = f"{found.objective}_um"
     least: float = getattr(found.before, name)
-    kept: list[Repair] = []
+    kept: list[AdjustedSet] = []
     for one in found.repairs:
-        value: float = getattr(one.outcome, name)
+        value: float = getattr(one, name)
         if least - value >= NO_GAIN_UM:
             kept.append(one)
             least = value
     return tuple(kept)
 
 
-def _why_none(found: Repairs) -> str:
-    """Say why no set is offered."""
+def _why_none(found: RepairResult) -> str:
     if not found.adjustable:
         return "No squareness or alignment error acts in this loop. Choose any error above."
     return f"{', '.join(found.adjustable)}: at their best values already."
 
 
-def _words(found: Repairs, one: Repair) -> str:
-    """Spell the adjustments of a set."""
+def _words(found: RepairResult, one: AdjustedSet) -> str:
     return ", ".join(
         f"{key} {spell_short(found.present[key])} → {spell(value)} {parameter(key).unit}"
         for key, value in one.adjust.items()
     )
 
 
-def _cells(before: Outcome, outcome: Outcome) -> list[dict[str, object]]:
-    """Spell mean, RMS, P95 and max, each marked where it got better or worse."""
+def _cells(before: Summary, outcome: Summary) -> list[dict[str, object]]:
     cells: list[dict[str, object]] = []
     for name, field in COLUMNS.items():
         value, was = (float(getattr(one, field)) for one in (outcome, before))

@@ -6,16 +6,18 @@ import numpy as np
 from markupsafe import Markup
 
 from warpspace.analysis.statistics import volume_statistics
-from warpspace.app.evaluation.chosen_trace import moved_traces
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.palette import palette
-from warpspace.app.readouts.html import render
-from warpspace.app.readouts.numbers import thousands
+from warpspace.app.evaluation.rotation import moved_traces
+from warpspace.app.readouts.html import message, render, thousands
+from warpspace.app.state.app_state import AppState
+from warpspace.app.state.comparison import SHOWN
 from warpspace.app.state.table import table_words
-from warpspace.field.basis import ErrorField
+from warpspace.field.evaluate import ErrorField, placed_words
 from warpspace.geometry.colour import ColourScale, colour_table
-from warpspace.geometry.deform import round_down
-from warpspace.picture.words import direction_words, spell_factor, spell_short
+from warpspace.geometry.surfaces import round_down
+from warpspace.picture.words import direction_words, spell_factor, spell_point
+from warpspace.spelling import spell_short
 from warpspace.units import MICROMETRE, MM_PER_UM
 
 BAR_PX = 190
@@ -41,7 +43,7 @@ def colour_bar(picture: LivePicture) -> str:
     scale = picture.scale
     return render(
         "colour_bar",
-        label=scale.label.partition("_"),
+        label=scale.label,
         unit=scale.unit,
         colours=colour_stops(diverging=scale.diverging),
         ticks=[(_height(scale, tick), spell_short(tick)) for tick in scale.ticks],
@@ -50,7 +52,6 @@ def colour_bar(picture: LivePicture) -> str:
 
 
 def _marked(picture: LivePicture) -> dict[str, float]:
-    """Choose what is marked, by name from the lowest value up, in the unit of the scale."""
     found, values = picture.statistics, picture.values
     if picture.scale.diverging:
         # the length of the error says nothing of a signed component: its own ends do
@@ -68,7 +69,6 @@ def _marked(picture: LivePicture) -> dict[str, float]:
 
 
 def _height(scale: ColourScale, value: float) -> float:
-    """Place a value on the bar, pixels above its foot."""
     part = (value - scale.low) / (scale.high - scale.low)
     return min(max(part, 0.0), 1.0) * BAR_PX
 
@@ -88,7 +88,6 @@ def _marks(picture: LivePicture) -> list[tuple[str, str, float, float]]:
 
 
 def _key_to_lines(picture: LivePicture) -> list[tuple[str, str, str]]:
-    """List the lines that are drawn: dashing, colour and meaning."""
     colours, shown = palette(picture), picture.state.shown
     rows = [("solid", colours.edge, "deformed working volume")]
     if shown.ghost:
@@ -118,25 +117,14 @@ def _scale_bars(picture: LivePicture) -> list[tuple[float, str]]:
 
 
 def summary(picture: LivePicture, *, bars: bool = True) -> str:
-    """Put colour bar, numbers, scale bars and key into one block.
-
-    Parameters
-    ----------
-    picture : LivePicture
-    bars : bool, optional
-        Whether two lengths show how much longer errors are drawn than the geometry.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Put colour bar, numbers, scale bars and key into one block."""
     found = picture.statistics
     return render(
         "summary",
         colour_bar=Markup(colour_bar(picture)),  # noqa: S704 - escaped by its template
+        length=picture.length_words,
         nodes=thousands(picture.field.norm_um.size),
-        loop=picture.both_words(lambda state: state.loop.value),
+        loop=picture.both_words(_loop_words),
         table="" if picture.is_difference else table_words(picture.drawn_state),
         numbers={
             "mean": found.mean_um,
@@ -150,18 +138,12 @@ def summary(picture: LivePicture, *, bars: bool = True) -> str:
     )
 
 
-def heading(picture: LivePicture) -> str:
-    """Spell machine, error set and exaggeration.
+def _loop_words(state: AppState) -> str:
+    return ", ".join((f"{state.loop} loop", *placed_words(state.view())))
 
-    Parameters
-    ----------
-    picture : LivePicture
 
-    Returns
-    -------
-    str
-        HTML.
-    """
+def heading(picture: LivePicture, order: str = "", left_behind: str = "") -> str:
+    """Spell machine, error set and exaggeration."""
     state = picture.drawn_state
     active, machine = state.active, state.scene.machine
     compared = picture.compared.title if picture.compared is not None else ""
@@ -179,4 +161,68 @@ def heading(picture: LivePicture) -> str:
         factor=f"exaggeration {spell_factor(picture.exaggeration)}",
         auto=picture.state.exaggeration is None,
         direction=" ".join(direction_words(state.scene)),
+        order=order,
+        left_behind=left_behind,
     )
+
+
+# --- Numbers of a comparison side by side, as HTML ------------------------------------------------
+
+NOTHING = message(
+    "Choose a scene for B, or pin the present errors as before and go on changing them: both are"
+    " drawn with the same colours, exaggeration and camera."
+)
+MARK = "▸ "
+"""Before the name of what is drawn."""
+ROWS = {"mean": "mean_um", "RMS": "rms_um", "P95": "p95_um", "max": "max_um"}
+"""Word on a row to field of `Statistics`."""
+
+
+def comparison_html(picture: LivePicture) -> str:
+    """Spell the numbers of a comparison."""
+    found = picture.compared
+    if found is None:
+        return NOTHING
+    return render(
+        "comparison",
+        titles=dict(zip("AB", found.titles, strict=True)),
+        rows=ROWS,
+        a=found.a,
+        b=found.b,
+        difference=found.difference,
+        refused=found.refused,
+        scale=picture.scale,
+        own=picture.is_difference,
+        colours=colour_stops(diverging=picture.scale.diverging),
+    )
+
+
+def marked(shown: str) -> tuple[str, ...]:
+    """Name what can be drawn, with a mark before what is: a key of `SHOWN`."""
+    return tuple(f"{MARK}{name}" if word == shown else name for word, name in SHOWN.items())
+
+
+# --- What is written over the drawing, as HTML ----------------------------------------------------
+# Heading, the strip of a phone, the buttons.
+
+
+def strip(picture: LivePicture) -> str:
+    """Put colours, mean and max into a strip: what a phone shows below the drawing."""
+    scale, found = picture.scale, picture.statistics
+    span = scale.high - scale.low
+    return render(
+        "strip",
+        label=scale.label,
+        length=picture.length_words,
+        unit=scale.unit,
+        colours=colour_stops(diverging=scale.diverging),
+        ticks=[(100.0 * (tick - scale.low) / span, spell_short(tick)) for tick in scale.ticks],
+        mean=found.mean_um,
+        max=found.max_um,
+        worst_place=spell_point(found.max_at_axes, found.max_at_mm),
+    )
+
+
+def buttons(*, ghost: bool, there: bool, attributes: Markup) -> str:
+    """Spell the switch of the machine's ghost."""
+    return render("buttons", ghost=ghost, there=there, attributes=attributes)

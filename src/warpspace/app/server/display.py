@@ -42,16 +42,7 @@ class Display:
     def add(
         self, picture: LivePicture, layers: Sequence[Layer] = (), panels: Sequence[Panel] = ()
     ) -> None:
-        """Add parts that have just been built.
-
-        Parameters
-        ----------
-        picture : LivePicture
-            What is shown.
-        layers : sequence of Layer
-            They show it already.
-        panels : sequence of Panel
-        """
+        """Add parts that have just been built."""
         for panel in panels:
             panel.show(picture)
         self.layers, self.panels = (*self.layers, *layers), (*self.panels, *panels)
@@ -65,14 +56,7 @@ class Display:
         self._unsettle()
 
     def show(self, picture: LivePicture, *, anew: bool = False) -> None:
-        """Show a picture; charts follow when changes pause.
-
-        Parameters
-        ----------
-        picture : LivePicture
-        anew : bool, optional
-            Also in parts that show the same as before: a widget may show what was refused.
-        """
+        """Show a picture; charts follow when changes pause."""
         self._state = picture.state
         for part in (*self.layers, *self.panels):
             selective = self._selective.get(part)
@@ -87,7 +71,6 @@ class Display:
         self._unsettle()
 
     def _unsettle(self) -> None:
-        """Have charts follow soon, and the slowest panels when changes have rested."""
         now = time.monotonic()
         if self._unsettled_since is None:
             self._unsettled_since = now
@@ -114,14 +97,7 @@ class Display:
         return self._restless_since is not None and now - self._restless_since >= REST_S
 
     def settle(self, picture: LivePicture, guarded: Callable[[Callable[[], object]], None]) -> None:
-        """Bring the next chart up to date; one at a time, so that a slider never waits for all.
-
-        Parameters
-        ----------
-        picture : LivePicture
-        guarded : callable
-            Runs a step and reports what it raises.
-        """
+        """Bring the next chart up to date; one at a time, so that a slider never waits for all."""
         if not self._waiting and self._unsettled_since is not None:
             self._unsettled_since = None
             self._waiting.extend(panel.settle for panel in self._deferred)

@@ -15,6 +15,7 @@ from warpspace.exceptions import OptionError
 
 TOKEN = re.compile(r"[A-Za-z0-9._~-]{12,200}")
 TOKEN_BYTES = 16
+COOKIE = "warpspace_token_"
 _AUTHORITY = re.compile(r"(?:\[([0-9A-Fa-f:.]+)\]|([A-Za-z0-9._-]+))(?::(\d{1,5}))?")
 _ORIGIN = re.compile(r"(https?)://(.+)", re.IGNORECASE)
 _DEFAULT_PORTS = {"http": 80, "https": 443}
@@ -24,39 +25,16 @@ _ELSEWHERE = ("websocket", "playbackPath")
 
 @dataclass(frozen=True)
 class Access:
-    """Who may use the app, as the command line says it.
+    """Who may use the app, as the command line says it."""
 
-    Parameters
-    ----------
-    allow_hosts : tuple of str
-        Further names, with a port where it is not the usual one, that a proxy serves the app under.
-    token : str, optional
-        Asked for; by default a random one where other machines can reach the app, else none.
-    no_token : bool
-        Whether nothing is asked for, whoever can reach the app.
-    """
-
+    # further names, with a port where it is not the usual one, that a proxy serves the app under
     allow_hosts: tuple[str, ...] = ()
+    # asked for; by default a random one where other machines can reach the app, else none
     token: str | None = None
-    no_token: bool = False
+    no_token: bool = False  # whether nothing is asked for, whoever can reach the app
 
     def choose_token(self, *, local: bool) -> str | None:
-        """Choose what is asked for.
-
-        Parameters
-        ----------
-        local : bool
-            Whether only this machine can reach the app.
-
-        Returns
-        -------
-        str or None
-
-        Raises
-        ------
-        OptionError
-            If the token given cannot be used.
-        """
+        """Choose what is asked for."""
         if self.token is None:
             return None if local or self.no_token else secrets.token_urlsafe(TOKEN_BYTES)
         if self.no_token:
@@ -94,13 +72,7 @@ def read_place(text: str) -> Place | None:
 
 
 def plain_address(text: str) -> str:
-    """Spell an address in the one way it is compared in.
-
-    Raises
-    ------
-    ValueError
-        If it is a name.
-    """
+    """Spell an address in the one way it is compared in."""
     address = ipaddress.ip_address(text.partition("%")[0])
     mapped = getattr(address, "ipv4_mapped", None)
     return str(mapped or address)
@@ -135,24 +107,6 @@ class Doors:
     Any page of the web can send requests to a server on this machine. Its browser names the page in
     `Origin`, and in `Host` the name the server was asked under, which is a foreign one where a
     name was made to point here (DNS rebinding). Programs other than browsers send no `Origin`.
-
-    Parameters
-    ----------
-    names : iterable of str
-        Hosts that are served, without a port.
-    port : int
-        The app's own, which its cookie is named after: cookies are common to all ports of a host.
-    everywhere : bool
-        Whether each address of the machine is served: the one a request came in by is right too.
-    allow_hosts : iterable of str
-        As in `Access`.
-    token : str, optional
-        What is asked for.
-
-    Raises
-    ------
-    OptionError
-        If an allowed host is none.
     """
 
     def __init__(
@@ -167,7 +121,8 @@ class Doors:
         self._allowed = frozenset(_allowed(text) for text in allow_hosts)
         self._hosts = frozenset(names) | {place.host for place in self._allowed}
         self._everywhere, self._token = everywhere, token
-        self._cookie = f"warpspace_token_{port}"
+        self._cookie = f"{COOKIE}{port}"
+        self._pass = hmac.new((token or "").encode(), b"warpspace cookie", "sha256").hexdigest()
 
     def check(self, asked: Asked) -> Refusal | None:
         """Tell why a request is refused, or give None where it is answered."""
@@ -200,30 +155,24 @@ class Doors:
 
     def has_token(self, asked: Asked) -> bool:
         """Tell whether the address of a request carries the token, or none is asked for."""
-        return self._token is None or any(map(self._is_token, asked.words("token")))
+        token = self._token
+        return token is None or any(_is(word, token) for word in asked.words("token"))
 
     def cookie(self, asked: Asked) -> str | None:
         """Give the cookie that spares a page the token from now on; its websocket has no other."""
         if self._token is None or not self.has_token(asked):
             return None
-        return f"{self._cookie}={self._token}; Path=/; HttpOnly; SameSite=Strict"
+        return f"{self._cookie}={self._pass}; Path=/; HttpOnly; SameSite=Strict"
 
     def _has_cookie(self, asked: Asked) -> bool:
-        """Tell whether a request brings the cookie of a page that had the token."""
         pairs = (
             pair.strip().partition("=")
             for header in asked.headers.get_all("Cookie")
             for pair in header.split(";")
         )
-        return any(self._is_token(value) for name, _, value in pairs if name == self._cookie)
-
-    def _is_token(self, text: str) -> bool:
-        """Compare with the token in a time that tells nothing about it."""
-        token = self._token or ""
-        return hmac.compare_digest(text.encode("utf-8", "replace"), token.encode())
+        return any(_is(value, self._pass) for name, _, value in pairs if name.startswith(COOKIE))
 
     def _place(self, asked: Asked) -> Place | None:
-        """Give the host that a request asks for, where it is served."""
         hosts = asked.headers.get_all("Host")
         place = read_place(hosts[0]) if len(hosts) == 1 else None
         if place is None or place.host in self._hosts:
@@ -231,7 +180,6 @@ class Doors:
         return place if self._everywhere and place.host == asked.arrived_at else None
 
     def _is_own(self, url: str, place: Place) -> bool:
-        """Tell whether an address belongs to the host asked for, or to one that is allowed."""
         found = _ORIGIN.fullmatch(re.sub(r"\Aws", "http", url))
         if found is None:
             return False
@@ -242,8 +190,11 @@ class Doors:
         return own == place.usual(scheme) or own in {at.usual(scheme) for at in self._allowed}
 
 
+def _is(text: str, secret: str) -> bool:
+    return hmac.compare_digest(text.encode("utf-8", "replace"), secret.encode())
+
+
 def _allowed(text: str) -> Place:
-    """Read a host that the command line allows."""
     place = read_place(text)
     if place is None:
         raise OptionError(

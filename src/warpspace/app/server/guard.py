@@ -5,6 +5,7 @@ import contextlib
 import logging
 import time
 import weakref
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from http import HTTPStatus
@@ -15,13 +16,18 @@ from websockets.exceptions import ConnectionClosed
 from websockets.frames import CloseCode
 from websockets.http11 import Request, Response
 
+from warpspace.app.browser.incoming import moved
 from warpspace.app.server.doors import Asked, Doors, Refusal, plain_address
 
 logger = logging.getLogger(__name__)
 HEADERS = {
     "X-Frame-Options": "DENY",
-    # a page that talks to another server would run its scripts as the app's own
-    "Content-Security-Policy": "frame-ancestors 'none'; connect-src 'self' data: blob:",
+    # viser's page is one file of scripts and styles; it unpacks itself, runs the scripts it is sent
+    # and starts workers of its own. What another server sends would run as the app's own.
+    "Content-Security-Policy": "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval'"
+    " blob:; worker-src 'self' blob:; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:;"
+    " font-src 'self' data:; connect-src 'self' data: blob:; object-src 'none'; base-uri 'none';"
+    " form-action 'none'; frame-ancestors 'none'",
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "same-origin",
 }
@@ -30,39 +36,24 @@ HEADERS = {
 
 @dataclass(frozen=True)
 class Limits:
-    """How much is taken at once.
+    """How much is taken at once."""
 
-    Parameters
-    ----------
-    sessions : int
-        Tabs that are open at the same time.
-    message_bytes : int
-        Largest message of a page: a picture of the view. A part of an upload has 0.5 MB.
-    messages_per_second : float
-        Of one connection, on average. A page sends 20 a second for each group of widgets in use.
-    burst : int
-        Messages that may come at once.
-    """
-
-    sessions: int = 64
+    sessions: int = 64  # tabs that are open at the same time
+    # largest message of a page: a picture of the view. A part of an upload has 0.5 MB.
     message_bytes: int = 16 * 2**20
+    # of one connection, on average. A page sends 20 a second for each group of widgets in use.
     messages_per_second: float = 400.0
-    burst: int = 2000
+    burst: int = 2000  # messages that may come at once
+    # more than that on average, and a page is listened to only once in a pause
+    usual_per_second: float = 60.0
+    pause_s: float = 0.5
 
 
 LIMITS = Limits()
 
 
 class Rate:
-    """Counts messages against a rate that may be exceeded for a moment.
-
-    Parameters
-    ----------
-    per_second : float
-    burst : int
-    clock : callable, optional
-        Gives the time in seconds.
-    """
+    """Counts messages against a rate that may be exceeded for a moment."""
 
     def __init__(
         self, per_second: float, burst: int, clock: Callable[[], float] = time.monotonic
@@ -95,17 +86,26 @@ class OnceLog:
 
 
 class LimitedConnection(ServerConnection):
-    """A websocket that is closed, with a reason, when too much comes in by it."""
+    """A websocket whose moves are put together, closed with a reason when too much comes by it.
 
-    _rate: Rate
-    _log: OnceLog
+    Of the moves of a widget that have come meanwhile, the last is what counts. A page that sends
+    more than a hand can is listened to only now and then.
+    """
+
+    _reader: "asyncio.Task[None] | None" = None
     _closing: "asyncio.Task[None] | None" = None
+    _closed: ConnectionClosed | None = None
+    _due = 0.0
 
     def limit(self, limits: Limits, log: OnceLog) -> None:
         """Set what is too much."""
         self._rate = Rate(limits.messages_per_second, limits.burst)
-        self._log = log
+        self._usual = Rate(limits.usual_per_second, int(limits.usual_per_second))
+        self._pause_s, self._log = limits.pause_s, log
         self._words = f"more than {limits.messages_per_second:g} messages a second"
+        self._waiting: dict[object, Any] = {}
+        self._ready: deque[Any] = deque()
+        self._there = asyncio.Event()
 
     def abort(self) -> None:
         """Cut the connection: nothing more is sent, and nothing is waited for."""
@@ -113,32 +113,51 @@ class LimitedConnection(ServerConnection):
             self.transport.abort()
 
     async def recv(self, decode: bool | None = None) -> Any:
-        """Receive a message; one too many ends the connection."""
+        """Receive a message; what comes by then of a page in haste is put together."""
+        if self._reader is None:
+            self._reader = asyncio.create_task(self._read(decode))
+        while not self._ready:
+            await self._there.wait()
+            if (pause_s := self._due - self.loop.time()) > 0.0:
+                await asyncio.sleep(pause_s)
+            self._ready.extend(self._waiting.values())
+            self._waiting.clear()
+            if self._reader.done():
+                self._reader.result()
+                if self._closed is not None and not self._ready:
+                    raise self._closed
+            else:
+                self._there.clear()
+        return self._ready.popleft()
+
+    async def _read(self, decode: bool | None) -> None:
         try:
             while True:
                 message = await super().recv(decode)
-                if self._closing is None and self._rate.take():
-                    return message
-                if self._closing is None:
+                if self._closing is not None:
+                    continue  # until the other side has closed as well
+                if not self._rate.take():
                     self._log.warn("rate", self._words, self.remote_address)
-                    # what still arrives until the other side has closed as well is dropped
                     self._closing = asyncio.ensure_future(
                         self.close(CloseCode.POLICY_VIOLATION, self._words)
                     )
+                    continue
+                if not self._usual.take() and not self._waiting:
+                    self._due = self.loop.time() + self._pause_s
+                key = moved(message) or object()
+                self._waiting.pop(key, None)  # the last stands where it came
+                self._waiting[key] = message
+                self._there.set()
         except ConnectionClosed as closed:
+            self._closed = closed
             if closed.sent is not None and closed.sent.code == CloseCode.MESSAGE_TOO_BIG:
                 self._log.warn("size", f"a message too large, {closed.sent}", self.remote_address)
-            raise
+        finally:
+            self._there.set()
 
 
 class Guard:
-    """Checks each request before viser answers it, and limits each connection.
-
-    Parameters
-    ----------
-    doors : Doors
-    limits : Limits, optional
-    """
+    """Checks each request before viser answers it, and limits each connection."""
 
     def __init__(self, doors: Doors, limits: Limits = LIMITS) -> None:
         self._doors, self._limits = doors, limits
@@ -152,13 +171,7 @@ class Guard:
                 connection.loop.call_soon_threadsafe(connection.abort)
 
     def options(self, theirs: dict[str, Any]) -> dict[str, Any]:
-        """Give the options that a server of `websockets` starts with, from those viser has.
-
-        Parameters
-        ----------
-        theirs : dict
-            Keyword arguments of `websockets.asyncio.server.serve`.
-        """
+        """Give the options that a server of `websockets` starts with, from those viser has."""
         answer = theirs["process_request"]
 
         def process_request(connection: ServerConnection, request: Request) -> Any:
@@ -193,7 +206,6 @@ class Guard:
         }
 
     def _check(self, connection: ServerConnection, request: Request) -> Refusal | None:
-        """Tell why a request is refused."""
         refusal = self._doors.check(_asked(connection, request))
         if refusal is not None:
             return refusal
@@ -208,5 +220,4 @@ class Guard:
 
 
 def _asked(connection: ServerConnection, request: Request) -> Asked:
-    """Read a request."""
     return Asked(request.path, request.headers, plain_address(str(connection.local_address[0])))

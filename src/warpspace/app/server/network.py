@@ -4,8 +4,15 @@ import contextlib
 import errno
 import io
 import ipaddress
+import logging
 import os
 import socket
+import sys
+import threading
+import time
+import warnings
+from collections.abc import Callable
+from pathlib import Path
 
 from warpspace.app.server.doors import plain_address
 from warpspace.exceptions import OptionError
@@ -13,27 +20,12 @@ from warpspace.exceptions import OptionError
 DEFAULT_PORT = 8080
 PORTS_TRIED = 100
 MAX_PORT = 65535
+NOBODY = 65534
 LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
 
 
 def resolve_host(host: str) -> str:
-    """Turn a host name into an address of this machine.
-
-    Parameters
-    ----------
-    host : str
-        Name or address to serve on.
-
-    Returns
-    -------
-    str
-        The address.
-
-    Raises
-    ------
-    OptionError
-        If it cannot be resolved.
-    """
+    """Turn a host name into an address of this machine."""
     try:
         found = socket.getaddrinfo(host or " ", None, type=socket.SOCK_STREAM)
     except (OSError, UnicodeError, ValueError):
@@ -55,20 +47,7 @@ def is_everywhere(address: str) -> bool:
 
 
 def served_names(host: str, address: str) -> frozenset[str]:
-    """List the names and addresses under which a page may ask for the app.
-
-    Parameters
-    ----------
-    host : str
-        Name or address to serve on, as it was given.
-    address : str
-        What it was resolved to.
-
-    Returns
-    -------
-    frozenset of str
-        In lower case.
-    """
+    """List the names and addresses under which a page may ask for the app."""
     names = {host.lower(), plain_address(address)}
     if is_local(address):
         return frozenset(names | LOOPBACK_NAMES)
@@ -79,6 +58,23 @@ def served_names(host: str, address: str) -> frozenset[str]:
         if address in {str(found[4][0]) for found in socket.getaddrinfo(own, None)}:
             names.add(own.lower())
     return frozenset(names)
+
+
+def has_other_users() -> bool:
+    """Tell whether others have an account on this machine, or are logged in to it."""
+    if sys.platform == "win32":
+        return False
+    import pwd
+
+    first = 501 if sys.platform == "darwin" else 1000
+    people = {
+        entry.pw_uid
+        for entry in pwd.getpwall()
+        if not entry.pw_shell.endswith(("/nologin", "/false"))
+    }
+    with contextlib.suppress(OSError):
+        people |= {int(at.name) for at in Path("/run/user").iterdir() if at.name.isdecimal()}
+    return any(first <= uid != NOBODY for uid in people - {os.getuid()})
 
 
 def reachable_address(address: str) -> str:
@@ -105,7 +101,6 @@ def draw_code(link: str) -> str:
 
 
 def _bind_error(address: str, port: int) -> OSError | None:
-    """Try to take a port; give what went wrong."""
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     with socket.socket(family, socket.SOCK_STREAM) as probe:
         if os.name == "posix":
@@ -119,23 +114,7 @@ def _bind_error(address: str, port: int) -> OSError | None:
 
 
 def free_port(address: str, port: int | None) -> int:
-    """Choose the port to serve on.
-
-    Parameters
-    ----------
-    address : str
-    port : int or None
-        The port asked for; None takes the first free one from 8080.
-
-    Returns
-    -------
-    int
-
-    Raises
-    ------
-    OptionError
-        If the port asked for, or the address, cannot be used.
-    """
+    """Choose the port to serve on."""
     if port is not None and not 1 <= port <= MAX_PORT:
         raise OptionError(f"--port {port}: expected 1 to {MAX_PORT}")
     first = DEFAULT_PORT if port is None else port
@@ -164,3 +143,58 @@ def page_url(address: str, port: int) -> str:
     wildcard = {"0.0.0.0": "127.0.0.1", "::": "[::1]"}.get(address)  # noqa: S104
     host = wildcard or (f"[{address}]" if ":" in address else address)
     return f"http://{host}:{port}"
+
+
+# --- A log that a client cannot fill --------------------------------------------------------------
+# Of lines of one kind the first is written, the rest counted.
+
+EVERY_S = 60.0
+MOST_KINDS = 256
+LONGEST_LINE = 300
+OURS = "warpspace"
+
+
+class RepeatedLines(logging.Filter):
+    """Lets one line of a kind pass a minute; the next one says how many were left out.
+
+    A kind is a logger, the first line of a message before its values are put in, and the type of
+    what was raised. Libraries' tracebacks become one line; those of the app are kept.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        super().__init__()
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._known: dict[tuple[str, str, str], tuple[float, int]] = {}
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Tell whether a line is written; shorten and complete it."""
+        raised = record.exc_info[0] if record.exc_info else None
+        name = raised.__name__ if raised is not None else ""
+        kind = (record.name, str(record.msg).partition("\n")[0], name)
+        now = self._clock()
+        with self._lock:
+            since, left_out = self._known.get(kind, (None, 0))
+            if since is not None and now - since < EVERY_S:
+                self._known[kind] = (since, left_out + 1)
+                return False
+            if len(self._known) >= MOST_KINDS:
+                self._known.clear()
+            self._known[kind] = (now, 0)
+        if not record.name.startswith(OURS):
+            line = record.getMessage().partition("\n")[0]
+            record.msg, record.args = line[:LONGEST_LINE] + (f" ({name})" if name else ""), ()
+            record.exc_info = record.exc_text = record.stack_info = None
+        if left_out:
+            record.msg, record.args = f"{record.getMessage()} ({left_out} more before it)", ()
+        return True
+
+
+def limit_log() -> None:
+    """Have all that the program logs to the terminal limited."""
+    # names the file that a page has sent: another line, and another entry of a register, each time
+    warnings.filterwarnings("ignore", message=r"\[viser\] Dropping upload")
+    limit = RepeatedLines()
+    for handler in (logging.lastResort, *logging.getLogger().handlers):
+        if handler is not None:
+            handler.addFilter(limit)

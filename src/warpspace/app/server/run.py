@@ -7,8 +7,7 @@ from collections.abc import Callable, Mapping
 
 from warpspace.app.documents.services import Services
 from warpspace.app.server.doors import Access
-from warpspace.app.server.network import draw_code
-from warpspace.app.server.repeated_lines import limit_log
+from warpspace.app.server.network import draw_code, has_other_users, limit_log
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import AppState
 from warpspace.scene.model import Scene
@@ -19,15 +18,13 @@ NO_AUTHENTICATION = (
     " for a token or a password: whoever reaches it sees its scenes, and can use it"
 )
 
+OTHER_USERS = (
+    "Others who use this machine can open it too, without a token; --token TEXT asks for one"
+)
+
 
 def open_browser(url: str) -> bool:
-    """Open a page in a graphical browser.
-
-    Returns
-    -------
-    bool
-        False where there is none.
-    """
+    """Open a page in a graphical browser."""
     try:
         browser = webbrowser.get()
     except webbrowser.Error:
@@ -52,29 +49,7 @@ def run_viewer(
     say: Say,
     warn: Say,
 ) -> None:
-    """Serve the app until it is interrupted.
-
-    Parameters
-    ----------
-    scene : Scene
-    scenes : mapping of str to Scene
-    start : AppState, optional
-        How the scene is first shown.
-    host : str
-    port : int or None
-    services : Services, optional
-        Draw figures and write exports.
-    shared : bool, optional
-        Whether all tabs see and steer one state.
-    access : Access, optional
-        Hosts allowed besides those served, and the token asked for.
-    code : bool, optional
-        Whether to draw the link as a QR code, where other machines can reach it.
-    browser : bool
-        Whether to open the page.
-    say, warn : callable
-        Print a line for the user.
-    """
+    """Serve the app until it is interrupted."""
     # a tab may close while something is on its way to it
     warnings.filterwarnings("ignore", message="Queued an? .* on a closed connection")
     limit_log()
@@ -96,6 +71,8 @@ def run_viewer(
                     say(draw_code(viewer.network_link))
                 if viewer.token is None:
                     warn(NO_AUTHENTICATION.format(host=host))
+            elif viewer.token is None and has_other_users():
+                warn(OTHER_USERS)
             if browser and not open_browser(viewer.link):
                 say(f"no browser could be opened; open {viewer.link} yourself")
             threading.Event().wait()

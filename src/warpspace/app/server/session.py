@@ -14,23 +14,26 @@ however fast the slider was moved.
 """
 
 import logging
+import math
 import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from functools import partial
 
 from viser import ClientHandle, ViserServer
 
 from warpspace.app.browser.arrivals import Arrival, rename_script
-from warpspace.app.documents.scene_list import SceneList
+from warpspace.app.documents.scene_file import SceneList
 from warpspace.app.documents.services import Services
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import PanelContext
 from warpspace.app.server.display import Display
-from warpspace.app.server.layout import Places, apply_theme
 from warpspace.app.server.page_steps import PageSteps
 from warpspace.app.server.tab_keeper import TabKeeper
 from warpspace.app.server.tab_memory import TabRecord, new_token
+from warpspace.app.server.tabs import Places, apply_theme
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.store import StateStore, apply_each
 from warpspace.app.viewport.tab_camera import focus
@@ -38,34 +41,58 @@ from warpspace.app.viewport.tab_camera import focus
 logger = logging.getLogger(__name__)
 TOKEN_WAIT_S = 0.25
 """How long the first picture waits for a tab that may have been here before."""
-ONE_AT_A_TIME = threading.Lock()
-"""Pictures of all tabs are made one after the other: made at once, all of them would be late."""
+USE_FADES_S = 2.0
+"""How long a tab that has kept the server busy stands back behind the others."""
+
+
+class Turns:
+    """Pictures of all tabs are made one after the other: made at once, all of them would be late.
+
+    Of the tabs that wait, the one goes first that has lately kept the server busy the least.
+    """
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._used: dict[object, tuple[float, float]] = {}  # seconds of work, and when that was
+        self._waiting: list[object] = []
+        self._busy = False
+
+    @contextmanager
+    def take(self, who: object) -> Generator[None]:
+        """Wait for the turn of a tab, and end it."""
+        with self._changed:
+            self._waiting.append(who)
+            self._changed.wait_for(lambda: not self._busy and who is self._next())
+            self._waiting.remove(who)
+            self._busy, began = True, time.monotonic()
+        try:
+            yield
+        finally:
+            with self._changed:
+                ended = time.monotonic()
+                self._used[who] = self._lately(who, ended) + ended - began, ended
+                self._busy = False
+                self._changed.notify_all()
+
+    def forget(self, who: object) -> None:
+        """Drop what is known of a tab."""
+        with self._changed:
+            self._used.pop(who, None)
+
+    def _next(self) -> object:
+        now = time.monotonic()
+        return min(self._waiting, key=lambda who: self._lately(who, now))
+
+    def _lately(self, who: object, now: float) -> float:
+        seconds, at = self._used.get(who, (0.0, now))
+        return seconds * math.exp((at - now) / USE_FADES_S)
+
+
+TURNS = Turns()
 
 
 class Session:
-    """The app of one browser tab.
-
-    Parameters
-    ----------
-    server : viser.ViserServer
-    client : viser.ClientHandle
-    live : LiveModel
-        Shared by all sessions.
-    scenes : SceneList
-        Scenes to choose from.
-    store : StateStore
-        What is shown: the tab's own, or that of a shared review.
-    places : Places
-    arrival : Arrival
-        Tells which tab it is.
-    claim : callable, optional
-        Takes the session and the token its page has handed over; gives what the tab left behind
-        when its connection was dropped.
-    services : Services, optional
-        Draw figures and write exports.
-    shared : bool, optional
-        Whether others steer the same state.
-    """
+    """The app of one browser tab."""
 
     def __init__(
         self,
@@ -127,7 +154,6 @@ class Session:
         store.subscribe(self.context.changed)
 
     def _run(self) -> None:
-        """Build the page, then follow what changes until stopped."""
         self.use(self.context.store)
         try:
             self._guarded(self._build)
@@ -136,9 +162,9 @@ class Session:
         finally:
             self.context.store.unsubscribe(self.context.changed)
             self._guarded(self.context.page.leave)
+            TURNS.forget(self)
 
     def _turn(self) -> None:
-        """Wait for a change, for the page, or for a pause in the changes, and follow."""
         waits = (self.display.pause_s, self.steps.remaining_s())
         changed = self.context.wait(min((wait for wait in waits if wait is not None), default=None))
         if changed and not self._stopped.is_set():
@@ -150,7 +176,6 @@ class Session:
             self._guarded(partial(self._settle, picture))
 
     def _guarded(self, step: Callable[[], object]) -> None:
-        """Run a step; what it raises is logged and shown to this user, and the session goes on."""
         try:
             step()
         except Exception as error:
@@ -176,7 +201,6 @@ class Session:
         self.context.shown = picture
 
     def _recognize(self, arrival: Arrival) -> None:
-        """Take over what the tab has left behind, if it was here before."""
         self._arrival = None
         self.context.camera.page_width = arrival.width
         record = self._claim(self, arrival.token) if self._claim is not None else None
@@ -187,7 +211,6 @@ class Session:
             self._keeper.begin(known=record is not None)
 
     def _follow(self) -> None:
-        """Take in what has changed and show the outcome."""
         context = self.context
         if self._arrival is not None and self._arrival.is_there:
             self._recognize(self._arrival)
@@ -203,11 +226,10 @@ class Session:
         if context.camera.wanted and shown is not None and focus(shown.state) == focus(state):
             context.camera.place(shown)
         if notes or state is not self.display.state:
-            with ONE_AT_A_TIME:
+            with TURNS.take(self):
                 self._show(self._live.evaluate(state), notes)
 
     def _show(self, picture: LivePicture, notes: tuple[str, ...]) -> None:
-        """Make page and drawing show a picture."""
         context, before = self.context, self.context.shown
         with self._client.atomic():
             self.display.show(picture, anew=bool(notes))
@@ -221,7 +243,6 @@ class Session:
             context.notify("Clamped", "\n".join(notes), "yellow")
 
     def _settle(self, picture: LivePicture) -> None:
-        """Let charts follow."""
-        with ONE_AT_A_TIME, self._client.atomic():
+        with TURNS.take(self), self._client.atomic():
             self.display.settle(picture, self._guarded)
         self._client.flush()

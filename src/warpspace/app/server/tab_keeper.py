@@ -33,14 +33,7 @@ CAMERA_PAUSE_S = 1.0
 
 
 class TabKeeper:
-    """The memory of a tab that is in its page.
-
-    Parameters
-    ----------
-    context : PanelContext
-    shared : bool
-        Whether others steer the same state.
-    """
+    """The memory of a tab that is in its page."""
 
     def __init__(self, context: PanelContext, *, shared: bool) -> None:
         self._context, self._shared = context, shared
@@ -62,13 +55,7 @@ class TabKeeper:
         context.page.run_script(watch_script())
 
     def begin(self, *, known: bool) -> None:
-        """Find out what the page has kept, once the server knows whether it knows the tab.
-
-        Parameters
-        ----------
-        known : bool
-            Whether the tab has its state already.
-        """
+        """Find out what the page has kept, once the server knows whether it knows the tab."""
         self._may_keep, self._asked = True, not known
         self._context.page.run_script(back_script(dom_id(self._carrier), known=known))
 
@@ -85,7 +72,6 @@ class TabKeeper:
             self._keep(picture.state)
 
     def _keep(self, state: AppState) -> None:
-        """Have the page keep a state, once it has been asked for what it had kept before."""
         if not self._may_keep:
             return
         self._kept = state
@@ -94,7 +80,6 @@ class TabKeeper:
         context.page.run_script(keep_script(text))
 
     def _keep_camera_soon(self) -> None:
-        """Have the page keep where the camera stands, once it stands still for a while."""
         if self._kept is None or not self._due.acquire(blocking=False):
             return
         timer = threading.Timer(CAMERA_PAUSE_S, self._context.act, [self._keep_camera])
@@ -102,13 +87,11 @@ class TabKeeper:
         timer.start()
 
     def _keep_camera(self) -> None:
-        """Have the page keep the camera with the state shown."""
         self._due.release()
         if self._context.shown is not None and self._context.page.is_open:
             self._keep(self._context.shown.state)
 
     def _restore(self, text: str) -> None:
-        """Show what the page had kept, if it was asked for; once for a connection."""
         if not self._asked:
             return
         self._asked = False
@@ -124,5 +107,4 @@ class TabKeeper:
         self._say(RESTORED_TITLE, RESTORED, MISSING.format("; ".join(found.missing)))
 
     def _say(self, title: str, *lines: str) -> None:
-        """Say what has happened, until the message is closed."""
         self._context.page.run_script(say_script(title, lines))

@@ -28,27 +28,14 @@ _TOKEN = re.compile(r"[0-9a-f]{32}")
 
 @dataclass(frozen=True, slots=True)
 class TabRecord:
-    """What a tab leaves behind.
+    """What a tab leaves behind."""
 
-    Attributes
-    ----------
-    store : StateStore
-        State and history.
-    camera : CameraMemory or None
-    """
-
-    store: StateStore
+    store: StateStore  # state and history
     camera: CameraMemory | None
 
 
 class TabMemory:
-    """Keeps what tabs leave behind, bounded in time and number; usable from any thread.
-
-    Parameters
-    ----------
-    clock : callable, optional
-        Gives the time, s.
-    """
+    """Keeps what tabs leave behind, bounded in time and number; usable from any thread."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
@@ -80,7 +67,6 @@ class TabMemory:
             return len(self._cache)
 
     def _forget(self) -> None:
-        """Drop what is too old."""
         now = self._clock()
         for token in [token for token, (until, _) in self._cache.items() if until < now]:
             del self._cache[token]

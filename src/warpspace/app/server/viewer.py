@@ -6,22 +6,21 @@ import io
 import logging
 import threading
 from collections.abc import Mapping
+from dataclasses import replace
 from types import TracebackType
 from typing import Self
 
 import viser
 
-from warpspace.app.browser.arrangement import page_style
 from warpspace.app.browser.arrivals import Arrivals
 from warpspace.app.browser.incoming import guard_server, guard_widgets
-from warpspace.app.browser.page import style_script
+from warpspace.app.browser.page import TIDY_ADDRESS, page_style, style_script
 from warpspace.app.browser.viser_private import send_script_to_all, serve_with
-from warpspace.app.documents.scene_list import SceneList
+from warpspace.app.documents.scene_file import SceneList
 from warpspace.app.documents.services import Services
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.server.doors import Access, Doors
 from warpspace.app.server.guard import Guard
-from warpspace.app.server.layout import lay_out
 from warpspace.app.server.network import (
     free_port,
     is_everywhere,
@@ -33,10 +32,11 @@ from warpspace.app.server.network import (
 )
 from warpspace.app.server.session import Session
 from warpspace.app.server.tab_memory import TabMemory, TabRecord, is_token, new_token
+from warpspace.app.server.tabs import lay_out
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.store import StateStore
+from warpspace.app.viewport.layers.adding import light_scene
 from warpspace.app.viewport.layers.box import surface_glb
-from warpspace.app.viewport.layers.lights import light_scene
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 
@@ -48,31 +48,7 @@ FAREWELL_S = 0.5
 
 
 class Viewer:
-    """A running app.
-
-    Parameters
-    ----------
-    scene : Scene
-        Shown first.
-    scenes : mapping of str to Scene
-        Scenes to choose from, by the title shown.
-    start : AppState, optional
-        How the scene is first shown; by default as `start_state` has it.
-    host : str, optional
-    port : int or None, optional
-        None takes the next free one from 8080.
-    services : Services, optional
-        Draw figures and write exports.
-    shared : bool, optional
-        Whether all tabs see and steer one state; by default each has its own.
-    access : Access, optional
-        Hosts allowed besides those served, and the token asked for.
-
-    Raises
-    ------
-    OptionError
-        If host or port cannot be used.
-    """
+    """A running app."""
 
     def __init__(
         self,
@@ -86,9 +62,9 @@ class Viewer:
         services: Services | None = None,
         access: Access | None = None,
     ) -> None:
-        self._services = services
         self.address = resolve_host(host)
         self.token = (access := access or Access()).choose_token(local=self.is_local)
+        self._services = replace(services or Services(), token=self.token)
         self.port = free_port(self.address, port)
         doors = Doors(
             served_names(host, self.address),
@@ -109,6 +85,7 @@ class Viewer:
         light_scene(self._server.scene)
         self._arrivals = Arrivals(self._server)
         send_script_to_all(self._server, style_script("page", page_style()))
+        send_script_to_all(self._server, TIDY_ADDRESS)
         self._places = lay_out(self._server.gui, dark=self._start.shown.dark)
         self._server.on_client_connect(self._connect)
         self._server.on_client_disconnect(self._disconnect)
@@ -135,7 +112,6 @@ class Viewer:
         return self._with_token(page_url(reachable_address(self.address), self.port))
 
     def _with_token(self, url: str) -> str:
-        """Have an address carry the token, if one is asked for."""
         return url if self.token is None else f"{url}/?token={self.token}"
 
     @property
@@ -155,7 +131,6 @@ class Viewer:
         importlib.import_module("warpspace.app.evaluation.probability")
 
     def _connect(self, client: viser.ClientHandle) -> None:
-        """Give a new tab its session."""
         guard_widgets(client)
         store = self._shared or StateStore(self._start)
         session = Session(
@@ -177,7 +152,6 @@ class Viewer:
             self._end(client.client_id)
 
     def _claim(self, session: Session, token: str) -> TabRecord | None:
-        """Find what the tab whose page hands over a token has left behind."""
         if not is_token(token):
             return None
         with self._lock:
@@ -196,11 +170,9 @@ class Viewer:
         return left
 
     def _disconnect(self, client: viser.ClientHandle) -> None:
-        """End the session of a tab that is gone."""
         self._end(client.client_id)
 
     def _end_left(self) -> None:
-        """End the sessions whose connection is gone, should viser fail to say so."""
         while not self._ended.wait(WATCH_S):
             with self._lock:
                 known = set(self._sessions)
@@ -209,7 +181,6 @@ class Viewer:
                 self._end(client_id)
 
     def _end(self, client_id: int) -> None:
-        """End a session, and keep what its tab leaves for a while."""
         self._arrivals.forget(client_id)
         with self._lock:
             session = self._sessions.pop(client_id, None)
@@ -245,7 +216,6 @@ class Viewer:
 
 
 def _with(scene: Scene, scenes: Mapping[str, Scene]) -> dict[str, Scene]:
-    """Add the scene shown first to those to choose from, under a title of its own."""
     if any(known is scene for known in scenes.values()):
         return dict(scenes)
     title = scene.title or scene.name
@@ -255,7 +225,6 @@ def _with(scene: Scene, scenes: Mapping[str, Scene]) -> dict[str, Scene]:
 
 
 def _serve(address: str, port: int, guard: Guard) -> viser.ViserServer:
-    """Start viser's server behind the guard, without its banner and without its public tunnel."""
     guard_server()
     with contextlib.redirect_stdout(io.StringIO()), serve_with(guard.options) as guarded:
         server = viser.ViserServer(host=address, port=port, verbose=False)

@@ -11,18 +11,17 @@ from typing import TYPE_CHECKING, Any
 
 from warpspace.app.state.bench import BenchLook
 from warpspace.app.state.comparison import Comparison
-from warpspace.app.state.exclusions import Exclusions
 from warpspace.app.state.look import Look, MachineLook, RotaryLook
 from warpspace.app.state.picked import Picked
-from warpspace.app.state.ranges import Span, amplitude_spans, position_spans
+from warpspace.app.state.ranges import Exclusions, Span, amplitude_spans, position_spans
 from warpspace.app.state.specification import Specification
+from warpspace.field.evaluate import View
 from warpspace.geometry.colour import COMPONENTS
 from warpspace.kinematics.model import Loop
-from warpspace.machine.errors import ErrorFunction, ErrorSet
+from warpspace.machine.errors import ErrorFunction, ErrorSet, ToleranceSet
 from warpspace.machine.limits import EXAGGERATION as FACTORS
 from warpspace.machine.limits import LIVE_NODES
 from warpspace.machine.parameters import parameter
-from warpspace.machine.tolerances import ToleranceSet
 from warpspace.scene.model import Scene
 
 if TYPE_CHECKING:
@@ -48,78 +47,48 @@ class Shown:
 
 @dataclass(frozen=True, slots=True)
 class AppState:
-    """All that a picture depends on.
+    """All that a picture depends on."""
 
-    Attributes
-    ----------
-    scene : Scene
-        Machine, curves of the errors, working volume; its amplitudes are where reset goes.
-    amplitudes : mapping of str to float, µm or µrad
-        Amplitude of every parameter of the scene.
-    positions : mapping of str to float, degrees
-        Where the rotary axes stand.
-    start : mapping of str to float, µm or µrad
-        Amplitudes that reset goes back to: the scene's.
-    spans, position_spans : mapping of str to Span
-        Ranges of the amplitudes and of the positions.
-    exaggeration : float or None
-        Display factor; None chooses a round one.
-    component : str
-        What is coloured: norm, x, y or z.
-    loop : Loop
-    nodes : int
-        Grid nodes per axis.
-    shown : Shown
-    exclusions : Exclusions
-        Parameters that do not take part, or alone do.
-    tolerances : ToleranceSet
-        What machines are sampled from: the scene's, as far as they have not been moved.
-    specification : Specification
-        What the tolerances are held against.
-    loaded : Scene or None
-        The scene as it was opened, where curves of `scene` have been edited since.
-    look, machine, rotary, bench : Look, MachineLook, RotaryLook, BenchLook
-        What is shown of the field and of the schematic machine, traced, and run as a test.
-    picked : Picked or None
-        The point whose error is explained.
-    lever : str
-        Key of the contribution whose axis and lever are drawn; empty for none.
-    comparison : Comparison
-        What is compared.
-    controller : Controller or None
-        Whose table corrects the machine that is drawn; never saved or linked.
-    chosen_error : str
-        Key of the error whose curve is shown: chosen, or the one moved last; empty for none yet. It
-        counts in no comparison of states, and undo leaves it.
-    notes : tuple of str
-        What the latest change had to clamp.
-    """
-
+    # machine, curves of the errors, working volume; its amplitudes are where reset goes
     scene: Scene
-    amplitudes: Mapping[str, float]
-    positions: Mapping[str, float]
-    start: Mapping[str, float]
-    spans: Mapping[str, Span]
+    amplitudes: Mapping[str, float]  # µm or µrad; amplitude of every parameter of the scene
+    positions: Mapping[str, float]  # degrees; where the rotary axes stand
+    start: Mapping[str, float]  # µm or µrad; amplitudes that reset goes back to: the scene's
+    spans: Mapping[str, Span]  # ranges of the amplitudes and of the positions
     position_spans: Mapping[str, Span]
-    exaggeration: float | None = None
-    component: str = "norm"
+    exaggeration: float | None = None  # display factor; None chooses a round one
+    component: str = "norm"  # what is coloured: norm, x, y or z
     loop: Loop = Loop.TOOL
-    nodes: int = START_NODES
+    # whether the placement of the workpiece is fitted out of the relative loop
+    placed: bool = False
+    nodes: int = START_NODES  # grid nodes per axis
     shown: Shown = field(default_factory=Shown)
+    # parameters that do not take part, or alone do
     exclusions: Exclusions = field(default_factory=Exclusions)
+    # what machines are sampled from: the scene's, as far as they have not been moved
     tolerances: ToleranceSet = field(default_factory=ToleranceSet)
+    # what the tolerances are held against
     specification: Specification = field(default_factory=Specification)
+    # the scene as it was opened, where curves of `scene` have been edited since
     loaded: Scene | None = None
+    # title of the scene whose errors a machine chosen from the library left behind; empty for none,
+    # and after the next change of scene
+    left_behind: str = ""
+    # MachineLook, RotaryLook, BenchLook; what is shown of the field and of the schematic machine,
+    # traced, and run as a test
     look: Look = field(default_factory=Look)
     machine: MachineLook = field(default_factory=MachineLook)
     rotary: RotaryLook = field(default_factory=RotaryLook)
     bench: BenchLook = field(default_factory=BenchLook)
-    picked: Picked | None = None
-    lever: str = ""
-    comparison: "Comparison[AppState]" = field(default_factory=Comparison[Any])
+    picked: Picked | None = None  # the point whose error is explained
+    lever: str = ""  # key of the contribution whose axis and lever are drawn; empty for none
+    comparison: "Comparison[AppState]" = field(default_factory=Comparison[Any])  # what is compared
+    # whose table corrects the machine that is drawn; never saved or linked
     controller: "Controller | None" = None
+    # key of the error whose curve is shown: chosen, or the one moved last; empty for none yet. It
+    # counts in no comparison of states, and undo leaves it.
     chosen_error: str = field(default="", compare=False)
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # what the latest change had to clamp
 
     @property
     def origin(self) -> Scene:
@@ -143,6 +112,17 @@ class AppState:
     def active(self) -> Mapping[str, float]:
         """Amplitudes that count, µm or µrad: those that are excluded are zero."""
         return self.exclusions.effective(self.amplitudes)
+
+    @property
+    def seen(self) -> tuple[Loop, bool]:
+        """The loop, and whether the placement of the workpiece is left out: a key to keep by."""
+        return self.loop, self.placed and self.loop is Loop.RELATIVE
+
+    def view(self, loop: Loop | None = None) -> View:
+        """Give the view through a loop, the present one by default, at the present positions."""
+        workspace = self.scene.workspace.moved(self.positions)
+        scene = replace(self.scene, placed=self.placed, workspace=workspace)
+        return scene.view(loop or self.loop)
 
     def with_amplitude(self, key: str, value: float) -> "AppState":
         """Set the amplitude of one parameter, µm or µrad, within its slider's range."""
@@ -243,13 +223,11 @@ class AppState:
         return tuple(key for key, value in self.amplitudes.items() if value != self.start[key])
 
     def _noted(self, note: str) -> "AppState":
-        """Add a note."""
         return replace(self, notes=(*self.notes, note))
 
     def _clamped(
         self, value: float, fallback: float, span: Span, what: str, unit: str
     ) -> tuple[float, "AppState"]:
-        """Bring a number into its range and note it where that changed it."""
         kept = span.clamp(value, fallback)
         if kept == value:
             return kept, self
@@ -260,18 +238,7 @@ class AppState:
 
 
 def start_state(scene: Scene, **changes: Any) -> AppState:
-    """Build the state a scene is first shown in.
-
-    Parameters
-    ----------
-    scene : Scene
-    **changes
-        Fields that differ from the start.
-
-    Returns
-    -------
-    AppState
-    """
+    """Build the state a scene is first shown in."""
     start = {key: scene.errors.amplitude(key) for key in scene.parameter_keys}
     at = scene.workspace.positions
     ranges = position_spans(scene)
@@ -285,6 +252,7 @@ def start_state(scene: Scene, **changes: Any) -> AppState:
         ranges,
         scene.exaggeration,
         loop=start_loop(scene),
+        placed=scene.placed,
         tolerances=scene.tolerances,
     )
     return replace(state, **changes)

@@ -3,8 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
-from warpspace.bench.options import options_of
-from warpspace.bench.registry import bench_names, find_test
+from warpspace.bench.base import bench_names, find_test
 
 LONGEST = 80
 """Characters of one option."""
@@ -12,21 +11,12 @@ LONGEST = 80
 
 @dataclass(frozen=True, slots=True)
 class BenchLook:
-    """The test that is looked at.
+    """The test that is looked at."""
 
-    Attributes
-    ----------
-    name : str
-        Of the test; empty for none.
-    options : mapping of str to str
-        Its options as somebody typed or chose them; those left out are the test's own choice.
-    path : bool
-        Whether its path is drawn.
-    """
-
-    name: str = ""
+    name: str = ""  # of the test; empty for none
+    # its options as somebody typed or chose them; those left out are the test's own choice
     options: Mapping[str, str] = field(default_factory=dict[str, str])
-    path: bool = True
+    path: bool = True  # whether its path is drawn
 
     def pairs(self) -> Iterator[tuple[str, str]]:
         """Spell what differs from no test, for a line of settings."""
@@ -52,6 +42,4 @@ class BenchLook:
 
 def option_names() -> frozenset[str]:
     """List the names of the options of all tests."""
-    return frozenset(
-        option.name for name in bench_names() for option in options_of(find_test(name))
-    )
+    return frozenset(option.name for name in bench_names() for option in find_test(name).settings())

@@ -16,46 +16,24 @@ BEFORE, AFTER = "before", "after"
 
 @dataclass(frozen=True)
 class Side(Generic[State]):
-    """One side of a comparison.
+    """One side of a comparison."""
 
-    Attributes
-    ----------
-    title : str
-        What it is called on the page.
-    state : State or None
-        What it is; None for what is steered.
-    is_scene : bool
-        Whether it is a scene as opened, which is looked at as what is steered (rotary positions,
-        loop), rather than what was pinned, which keeps its own.
-    """
-
-    title: str = PRESENT
-    state: State | None = None
+    title: str = PRESENT  # what it is called on the page
+    state: State | None = None  # what it is; None for what is steered
+    # whether it is a scene as opened, which is looked at as what is steered (rotary positions,
+    # loop), rather than what was pinned, which keeps its own
     is_scene: bool = False
 
 
 @dataclass(frozen=True)
 class Comparison(Generic[State]):
-    """What is compared.
-
-    Attributes
-    ----------
-    a : Side
-    b : Side or None
-        None while nothing is compared.
-    shown : str
-        What is drawn: a key of `SHOWN`.
-    ghost : bool
-        Whether the other one is drawn as a wireframe.
-    pinned : Side or None
-        What was pinned last: the state before.
-    """
+    """What is compared."""
 
     a: Side[State] = field(default_factory=Side[State])
-    b: Side[State] | None = None
-    shown: str = "a"
-    ghost: bool = True
-    pinned: Side[State] | None = None
+    b: Side[State] | None = None  # none while nothing is compared
+    shown: str = "a"  # what is drawn: a key of `SHOWN`
+    ghost: bool = True  # whether the other one is drawn as a wireframe
+    pinned: Side[State] | None = None  # what was pinned last: the state before
 
     def with_shown(self, shown: str) -> "Comparison[State]":
         """Choose what is drawn; an unknown word changes nothing."""

@@ -1,11 +1,12 @@
 """Which table of compensation is wanted: format, points, resolution, sign, loop, orientation."""
 
 from dataclasses import dataclass
+from typing import Any, cast
 
 from warpspace.app.state.ranges import Span
 from warpspace.exceptions import OptionError
-from warpspace.formats.compensation.compensate import RESOLUTION, Plan, read_points
-from warpspace.formats.compensation.corrector import LOOPS
+from warpspace.formats.compensation.compensate import RESOLUTION, Compensate, read_points
+from warpspace.formats.compensation.wanted import LOOPS
 from warpspace.formats.kind import SIGNS
 from warpspace.formats.registry import find_format, formats
 from warpspace.machine.axes import is_linear
@@ -23,50 +24,41 @@ LOOP_WORDS = {SUITS: "", **{str(loop): str(loop) for loop in LOOPS}}
 
 @dataclass(frozen=True, slots=True)
 class CompensationChoice:
-    """A table that is wanted, as chosen on a page.
-
-    Attributes
-    ----------
-    format : str
-    points : str
-        As typed; empty or 0 for what suits the format.
-    resolution : float, mm
-        0 for that of the format.
-    sign, loop : str
-        Empty for what the manual says, and what suits the machine.
-    orientation : bool
-    """
+    """A table that is wanted, as chosen on a page."""
 
     format: str = ""
-    points: str = ""
-    resolution: float = 0.0
-    sign: str = ""
+    points: str = ""  # as typed; empty or 0 for what suits the format
+    resolution: float = 0.0  # mm; 0 for that of the format
+    sign: str = ""  # empty for what the manual says, and what suits the machine
     loop: str = ""
     orientation: bool = False
 
-    def plan(self) -> Plan:
-        """Say what is to be computed.
-
-        Raises
-        ------
-        OptionError, UnknownNameError
-            If the points cannot be read, are more than a page may ask for, or there is no such
-            format.
-        """
+    def plan(self) -> Compensate:
+        """Say what is to be computed."""
         find_format(self.format)
         points = None
         typed = self.points.strip()
         if len(typed) > LONGEST_POINTS:
             raise OptionError(f"points per axis: expected at most {LONGEST_POINTS} characters")
         if typed:
-            points = read_points(typed)
-            asked = (points,) if isinstance(points, int) else points.values()
+            try:
+                points = read_points(typed)
+            except ValueError as error:
+                raise OptionError(f"{{points}} {typed!r}; {error}") from None
+            asked = (points,) if isinstance(points, int) else dict(points).values()
             if max(asked, default=0) > MOST_POINTS:
                 raise OptionError(
                     f"points per axis: {max(asked)}; expected at most {MOST_POINTS} here,"
                     " `warpspace compensate` takes as many as the control"
                 )
-        return Plan(self.format, points, self.resolution, self.sign, self.loop, self.orientation)
+        return Compensate(
+            formats=(self.format,),
+            points=points,
+            resolution=self.resolution,
+            sign=cast("Any", self.sign or None),
+            loop=cast("Any", self.loop or None),
+            orientation=self.orientation,
+        )
 
 
 def format_titles() -> dict[str, str]:

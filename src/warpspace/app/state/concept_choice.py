@@ -10,26 +10,17 @@ LIMIT_UM = Span(0.1, 10_000.0, 0.1)
 PRESENT = "the present machine"
 TOLERANCES = {"those of A, for all": False, "own of each": True}
 """Words to whether each machine has its own tolerances."""
-OVERS = {"a random point": "sampled", "everywhere": "max"}
+OVERS = {"everywhere": "max", "a random point": "sampled"}
 LOOPS = {"tool against workpiece": "relative", "tool": "tool", "workpiece": "workpiece"}
 
 
 @dataclass(frozen=True, slots=True)
 class Chosen:
-    """A machine that was chosen.
-
-    Attributes
-    ----------
-    title : str
-    scene : Scene or None
-        None is what is steered, as it stands when machines are compared.
-    picture : str
-        Name of the machine in the library that shows it; empty for none.
-    """
+    """A machine that was chosen."""
 
     title: str
-    scene: Scene | None = None
-    picture: str = ""
+    scene: Scene | None = None  # none is what is steered, as it stands when machines are compared
+    picture: str = ""  # name of the machine in the library that shows it; empty for none
 
     def is_same(self, other: "Chosen") -> bool:
         """Tell whether both mean one scene."""
@@ -38,23 +29,13 @@ class Chosen:
 
 @dataclass(frozen=True, slots=True)
 class ConceptChoice:
-    """What is compared, and how.
+    """What is compared, and how."""
 
-    Attributes
-    ----------
-    machines : tuple of Chosen
-        In their order; tolerances are those of the first.
-    limit_um : float, µm
-    own_tolerances : bool
-    over : str
-        "sampled" or "max", as the command has it.
-    loop : str
-    """
-
+    # in their order; tolerances are those of the first
     machines: tuple[Chosen, ...] = (Chosen(PRESENT),)
     limit_um: float = 50.0
     own_tolerances: bool = False
-    over: str = "sampled"
+    over: str = "max"  # "sampled" or "max", as the command has it
     loop: str = "relative"
 
     def holds(self, machine: Chosen) -> bool:

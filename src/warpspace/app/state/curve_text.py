@@ -6,9 +6,9 @@ import numpy as np
 
 from warpspace.app.state.typed_numbers import comma_rows, read_rows, spell_typed
 from warpspace.exceptions import OptionError, UnknownNameError
-from warpspace.machine.curves.constant import Constant
 from warpspace.machine.curves.curve import ErrorFunction
 from warpspace.machine.curves.registry import CurveKind, curve_kind, curve_kinds
+from warpspace.machine.curves.simple import Constant
 from warpspace.machine.limits import MAX_CURVE_ROWS, MAX_CURVE_TEXT, MAX_ERROR
 from warpspace.units import Array
 
@@ -19,17 +19,10 @@ MAX_KINKS = 500
 
 @dataclass(frozen=True, slots=True)
 class EnteredCurve:
-    """A curve that a user has entered.
-
-    Attributes
-    ----------
-    function : ErrorFunction
-    remarks : tuple of str
-        What was left out or put in order, a sentence each.
-    """
+    """A curve that a user has entered."""
 
     function: ErrorFunction
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()  # what was left out or put in order, a sentence each
 
 
 def kind_titles() -> tuple[str, ...]:
@@ -64,26 +57,7 @@ def parse_shape(kind: str, text: str, span: tuple[float, float]) -> ErrorFunctio
 
 
 def read_curve(kind: str, text: str, span: tuple[float, float]) -> EnteredCurve:
-    """Read the rows that a user has edited, or pasted from a spreadsheet.
-
-    Parameters
-    ----------
-    kind : str
-        Title of a kind of curve.
-    text : str
-        Rows of numbers as `warpspace.app.state.typed_numbers.read_rows` reads them.
-    span : tuple of float, (2,), mm or degrees
-        Range of the axis.
-
-    Returns
-    -------
-    EnteredCurve
-
-    Raises
-    ------
-    OptionError
-        Naming the row, what it holds and what was expected.
-    """
+    """Read the rows that a user has edited, or pasted from a spreadsheet."""
     chosen = _kind(kind)
     if len(text) > MAX_CURVE_TEXT:
         raise OptionError(f"{len(text):,} characters; expected at most {MAX_CURVE_TEXT:,}")
@@ -97,7 +71,6 @@ def read_curve(kind: str, text: str, span: tuple[float, float]) -> EnteredCurve:
 
 
 def _read(kind: CurveKind, text: str, span: tuple[float, float]) -> EnteredCurve:
-    """Read a curve from rows, put in order."""
     rows, left_out = read_rows(text)
     if not rows:
         raise OptionError(f"no numbers; expected {kind.row_words}")
@@ -112,33 +85,13 @@ def _read(kind: CurveKind, text: str, span: tuple[float, float]) -> EnteredCurve
 def convert_shape(
     function: ErrorFunction | None, kind: str, span: tuple[float, float]
 ) -> ErrorFunction:
-    """Give a first curve of another kind with the amplitude of a present one.
-
-    Parameters
-    ----------
-    function : ErrorFunction or None
-    kind : str
-        Title of a kind of curve.
-    span : tuple of float, (2,), mm or degrees
-
-    Returns
-    -------
-    ErrorFunction
-        What the kind starts from; the present curve where the kind stays.
-    """
+    """Give a first curve of another kind with the amplitude of a present one."""
     present = function or Constant(span)
     return present if shape_kind(function) == kind else _kind(kind).from_curve(present, span)
 
 
 def sample_curve(function: ErrorFunction | None, span: tuple[float, float]) -> tuple[Array, Array]:
-    """Sample a curve along the travel for a chart.
-
-    Returns
-    -------
-    position : ndarray, [n], mm or degrees
-    value : ndarray, [n], µm or µrad
-        What no number holds is left out (NaN).
-    """
+    """Sample a curve along the travel for a chart."""
     at = np.linspace(*span, CHART_SAMPLES)
     kinks = () if function is None else function.kinks
     if inside := [q for q in kinks if span[0] < q < span[1]][:MAX_KINKS]:
@@ -148,7 +101,6 @@ def sample_curve(function: ErrorFunction | None, span: tuple[float, float]) -> t
 
 
 def _kind(title: str) -> CurveKind:
-    """Find a kind of curve."""
     try:
         return curve_kind(title)
     except UnknownNameError as error:

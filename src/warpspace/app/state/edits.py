@@ -8,10 +8,9 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.ranges import Span, amplitude_span, round_up
 from warpspace.app.state.specification import Specification
 from warpspace.app.state.spelling import Unreadable
-from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet
+from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet, Tolerance
 from warpspace.machine.limits import MAX_ERROR, MAX_HALF_WIDTH, MIN_HALF_WIDTH
 from warpspace.machine.parameters import parameter
-from warpspace.machine.tolerances import Tolerance
 
 LEAST_HALF_WIDTH = 10.0
 FINE_UP_TO = 100.0
@@ -30,21 +29,7 @@ def curve_of(state: AppState, key: str) -> ErrorFunction:
 
 
 def with_curve(state: AppState, key: str, function: ErrorFunction) -> AppState:
-    """Give a parameter another curve and its amplitude.
-
-    Parameters
-    ----------
-    state : AppState
-    key : str
-    function : ErrorFunction
-        Checked, see `warpspace.app.state.curve_text.read_curve`.
-
-    Returns
-    -------
-    AppState
-        The slider's range grows where the amplitude lies beyond. A parameter that the machine does
-        not have, and a curve for a constant one, change nothing but the notes.
-    """
+    """Give a parameter another curve and its amplitude."""
     if key not in state.amplitudes:
         return replace(state, notes=(*state.notes, f"{key}: no parameter of this machine"))
     row = parameter(key)
@@ -65,7 +50,6 @@ def with_curve(state: AppState, key: str, function: ErrorFunction) -> AppState:
 
 
 def _grown_span(state: AppState, key: str, amplitude: float) -> Span:
-    """Give the range of a slider: the present one, or a wider one that holds an amplitude."""
     span = state.spans[key]
     if span.low <= amplitude <= span.high:
         return span
@@ -128,15 +112,7 @@ def with_scene_tolerances(state: AppState) -> AppState:
 
 
 def with_scaled_tolerances(state: AppState, keys: Collection[str], factor: float) -> AppState:
-    """Widen or narrow tolerances in the same ratio; those that are fixed stay.
-
-    Parameters
-    ----------
-    state : AppState
-    keys : collection of str
-        Parameters meant; one without a tolerance above zero stays at zero.
-    factor : float
-    """
+    """Widen or narrow tolerances in the same ratio; those that are fixed stay."""
     half_widths = {
         key: min(half_width * factor, max(MAX_HALF_WIDTH, half_width))
         for key in keys

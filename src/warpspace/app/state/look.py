@@ -9,11 +9,12 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from warpspace.app.state.ranges import Span
-from warpspace.geometry.slices import slice_ranges
+from warpspace.field.grid import slice_ranges
 from warpspace.geometry.traces import TILT_STEP_DEG
 from warpspace.machine import limits
 from warpspace.machine.axes import is_linear
 from warpspace.machine.description import Vector
+from warpspace.scene.files import parse_number
 from warpspace.scene.model import Scene
 
 SURFACES = {
@@ -34,37 +35,23 @@ MOST_HELD = 8
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What is shown of the field, and how.
+    """What is shown of the field, and how."""
 
-    Attributes
-    ----------
-    surface : str
-        A key of `SURFACES`.
-    quantity : str
-        "position" or "orientation": the position error in µm or the tool-axis tilt in µrad.
-    range_mode : str
-        auto: round ends for what is shown; fixed: `range_top`; shared: one range for all
-        components, for now and for the scene as it was opened.
-    range_top : float
-        End of a fixed range, µm or µrad.
-    isolines, arrows, worst, bars : bool
-        Lines of equal value, corner arrows, marker of the worst point, scale bars in the picture.
-    slices_mm : mapping of str to float, mm
-        Where slices lie; an axis not given in the middle of its range.
-    follow : bool
-        Whether the slices pass through the tool point instead.
-    """
-
-    surface: str = "surface"
+    surface: str = "surface"  # A key of `SURFACES`
+    # "position" or "orientation": the position error in µm or the tool-axis tilt in µrad
     quantity: str = "position"
+    # auto: round ends for what is shown; fixed: `range_top`; shared: one range for all components,
+    # for now and for the scene as it was opened
     range_mode: str = "auto"
-    range_top: float = START_TOP
+    range_top: float = START_TOP  # end of a fixed range, µm or µrad
+    # lines of equal value, corner arrows, marker of the worst point, scale bars in the picture
     isolines: bool = False
     arrows: bool = False
     worst: bool = True
     bars: bool = True
+    # where slices lie; an axis not given in the middle of its range
     slices_mm: Mapping[str, float] = field(default_factory=dict[str, float])
-    follow: bool = False
+    follow: bool = False  # whether the slices pass through the tool point instead
 
     @property
     def tilts(self) -> bool:
@@ -96,23 +83,13 @@ class Look:
 
 @dataclass(frozen=True, slots=True)
 class MachineLook:
-    """The schematic machine.
+    """The schematic machine."""
 
-    Attributes
-    ----------
-    shown : bool
-        Whether its bodies are drawn.
-    bent : bool
-        Whether they are bent by the exaggerated errors.
-    ghost : bool
-        Whether, where they are not drawn, a ghost of them lies around the working volume.
-    linear_mm : mapping of str to float, mm
-        Positions of the linear axes; an axis not given in the middle of its workspace.
-    """
-
-    shown: bool = False
-    bent: bool = True
+    shown: bool = False  # whether its bodies are drawn
+    bent: bool = True  # whether they are bent by the exaggerated errors
+    # whether, where they are not drawn, a ghost of them lies around the working volume
     ghost: bool = True
+    # positions of the linear axes; an axis not given in the middle of its workspace
     linear_mm: Mapping[str, float] = field(default_factory=dict[str, float])
 
     def with_linear(self, axis: str, value: float, span: Span) -> "MachineLook":
@@ -127,25 +104,15 @@ class MachineLook:
 
 @dataclass(frozen=True, slots=True)
 class RotaryLook:
-    """Which points are traced, and where the axes stand that do not turn.
+    """Which points are traced, and where the axes stand that do not turn."""
 
-    Attributes
-    ----------
-    off : frozenset of int
-        Numbers of the scene's trace points that are not traced.
-    own_mm : tuple of float, (3,), or None
-        A point of the user's own in the workpiece frame.
-    held : tuple of (str, tuple of float), degrees
-        Positions an axis is held at while another one turns; an axis not given where
-        `warpspace.geometry.traces` puts it.
-    chosen : str
-        Name of the trace that is looked at (`picture.axis_motion.name_trace`); a name of none of
-        them, for instance an empty one, lets the app choose.
-    """
-
-    off: frozenset[int] = frozenset()
-    own_mm: Vector | None = None
+    off: frozenset[int] = frozenset()  # numbers of the scene's trace points that are not traced
+    own_mm: Vector | None = None  # or None; A point of the user's own in the workpiece frame
+    # degrees; positions an axis is held at while another one turns; an axis not given where
+    # `warpspace.geometry.traces` puts it
     held: tuple[tuple[str, tuple[float, ...]], ...] = ()
+    # name of the trace that is looked at (`picture.traces.name_trace`); a name of none of
+    # them, for instance an empty one, lets the app choose
     chosen: str = ""
 
     def with_chosen(self, name: str) -> "RotaryLook":
@@ -228,27 +195,14 @@ def quarters(scene: Scene, axis: str) -> tuple[float, ...]:
 
 
 def parse_positions(text: str, span: Span) -> tuple[tuple[float, ...], str]:
-    """Read a list of positions that a user has typed.
-
-    Parameters
-    ----------
-    text : str
-        Numbers with commas, semicolons or blanks between them; empty for the default.
-    span : Span
-        Travel of the axis.
-
-    Returns
-    -------
-    tuple of (tuple of float, str)
-        Positions within the travel in rising order, and what had to be changed (empty for nothing).
-    """
+    """Read a list of positions that a user has typed."""
     spaced = text[:MOST_TYPED].replace("−", "-").replace("°", " ").replace(",", " ")
     words = [word for word in spaced.replace(";", " ").split() if word not in {"-", "+", "."}]
     found: set[float] = set()
     wrong: list[str] = []
     for word in words:
         try:
-            value = float(word)
+            value = parse_number(word)
         except ValueError:
             value = math.nan
         if math.isfinite(value) and span.low <= value <= span.high:

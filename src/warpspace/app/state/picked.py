@@ -13,21 +13,14 @@ FARTHEST_MM = 1e5
 
 @dataclass(frozen=True, slots=True)
 class Picked:
-    """A point somebody asks about; it stays where the axes stand while errors change.
+    """A point somebody asks about; it stays where the axes stand while errors change."""
 
-    Attributes
-    ----------
-    at : mapping of str to float, mm or degrees
-        Axis positions: those of the linear axes for a point of the surface (the rotary ones stand
-        where the state has them), those of all axes for a point of a trace.
-    loop : Loop or None
-        Loop of a trace; None for a point of the surface, which follows the loop of the view.
-    point_mm : tuple of float, (3,), mm, or None
-        The traced point in the workpiece (or tool) frame; None for the surface.
-    """
-
+    # mm or degrees; axis positions: those of the linear axes for a point of the surface (the rotary
+    # ones stand where the state has them), those of all axes for a point of a trace
     at: Mapping[str, float]
+    # loop of a trace; None for a point of the surface, which follows the loop of the view
     loop: Loop | None = None
+    # or None; the traced point in the workpiece (or tool) frame; None for the surface
     point_mm: Vector | None = None
 
 
@@ -37,13 +30,7 @@ def spell_trace(picked: Picked) -> str:
 
 
 def read_trace(text: str) -> Picked:
-    """Read which trace a point lies on; where the axes stand is still to come.
-
-    Raises
-    ------
-    Unreadable
-        If it means nothing.
-    """
+    """Read which trace a point lies on; where the axes stand is still to come."""
     loop, _, point = text.partition(",")
     point_mm = read_point(point)
     if loop not in [*Loop] or max(map(abs, point_mm)) > FARTHEST_MM:

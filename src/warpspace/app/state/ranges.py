@@ -1,11 +1,12 @@
 """Ranges and steps of the controls, and how a wild number is brought into them."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
 
+from warpspace.machine.errors import Tolerance
 from warpspace.machine.limits import MAX_ERROR, MIN_HALF_WIDTH, MIN_NUMBER
 from warpspace.machine.parameters import parameter
-from warpspace.machine.tolerances import Tolerance
 from warpspace.scene.model import Scene
 
 LEAST_TRANSLATION_UM = 20.0
@@ -18,19 +19,11 @@ _ROUND = (1.0, 2.0, 5.0, 10.0)
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """Range of a control.
+    """Range of a control."""
 
-    Attributes
-    ----------
-    low, high : float
-        Ends, in the unit of the control.
-    step : float
-        Distance between two positions of a slider.
-    """
-
-    low: float
+    low: float  # ends, in the unit of the control
     high: float
-    step: float
+    step: float  # distance between two positions of a slider
 
     @property
     def marks(self) -> tuple[tuple[float, str], ...]:
@@ -52,30 +45,13 @@ def round_up(value: float) -> float:
 
 
 def _step(high: float) -> float:
-    """Step of a slider that ends at a round number."""
     if _FINE_ABOVE <= high <= _FINE_BELOW:
         return FINE_STEP
     return 10.0 ** (math.ceil(math.log10(high)) - 3)
 
 
 def amplitude_span(key: str, value: float, tolerance: Tolerance | None) -> Span:
-    """Choose the slider range of a parameter.
-
-    Parameters
-    ----------
-    key : str
-        Parameter key.
-    value : float, µm or µrad
-        Value it starts with.
-    tolerance : Tolerance or None
-        Range it may fall in.
-
-    Returns
-    -------
-    Span
-        Symmetric about zero with round ends; holds the tolerance and twice the value, as far as the
-        model holds.
-    """
+    """Choose the slider range of a parameter."""
     least = LEAST_ROTATION_URAD if parameter(key).is_rotation else LEAST_TRANSLATION_UM
     if tolerance is not None:
         reach = abs(tolerance.centre) + tolerance.half_width
@@ -108,3 +84,45 @@ def position_spans(scene: Scene) -> dict[str, Span]:
         for axis in scene.machine.axes.values()
         if not axis.is_linear and axis.name not in spanning
     }
+
+
+# --- Which errors take part: those that were excluded do not, or only the chosen ones do ----------
+
+
+@dataclass(frozen=True, slots=True)
+class Exclusions:
+    """Parameters that do not take part, and those that alone do."""
+
+    excluded: frozenset[str] = frozenset()  # keys that do not take part
+    # where there are any, only these take part; an excluded one among them still does not
+    only: frozenset[str] = frozenset()
+
+    def __bool__(self) -> bool:
+        """Whether anything is left out."""
+        return bool(self.excluded or self.only)
+
+    def active(self, key: str) -> bool:
+        """Tell whether a parameter takes part."""
+        return key not in self.excluded and (not self.only or key in self.only)
+
+    def effective(self, amplitudes: Mapping[str, float]) -> Mapping[str, float]:
+        """Give the amplitudes that count, µm or µrad: zero for what does not take part."""
+        if not self:
+            return amplitudes
+        return {key: value if self.active(key) else 0.0 for key, value in amplitudes.items()}
+
+    def with_excluded(self, key: str, excluded: bool) -> "Exclusions":
+        """Exclude one parameter, or include it again."""
+        return replace(self, excluded=_with(self.excluded, key, excluded))
+
+    def with_only(self, key: str, only: bool) -> "Exclusions":
+        """Add one parameter to those that alone take part, or take it away."""
+        return replace(self, only=_with(self.only, key, only))
+
+    def within(self, keys: Collection[str]) -> "Exclusions":
+        """Keep what concerns the parameters of a machine."""
+        return Exclusions(self.excluded & frozenset(keys), self.only & frozenset(keys))
+
+
+def _with(keys: frozenset[str], key: str, on: bool) -> frozenset[str]:
+    return keys | {key} if on else keys - {key}

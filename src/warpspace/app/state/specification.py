@@ -12,7 +12,7 @@ LIMIT_UM = Span(1.0, 300.0, 0.5)
 PERCENT = Span(100.0 * PROBABILITY[0], 100.0 * PROBABILITY[1], 0.1)
 START_UM = 50.0
 SAMPLED, MAX = "sampled", "max"
-"""One random point of each machine (as in the thesis), or its worst point."""
+"""One random point of each machine (as in the thesis), or its worst point, which is the rule."""
 UNIFORM, NORMAL = "uniform", "normal"
 MOST_COSTS_TEXT = 2000
 """Characters of a list of costs."""
@@ -20,30 +20,16 @@ MOST_COSTS_TEXT = 2000
 
 @dataclass(frozen=True, slots=True)
 class Specification:
-    """The specification of a review.
+    """The specification of a review."""
 
-    Attributes
-    ----------
-    limit_um : float, µm
-        Largest |E| allowed.
-    over : str
-        "sampled" or "max".
-    distribution : str
-        "uniform", or "normal" with 3σ at the limits.
-    percent : float, %
-        Share of the machines that is to keep the limit once tolerances are allocated.
-    fixed : frozenset of str
-        Parameters whose tolerance is neither allocated nor scaled.
-    costs : str
-        Cost of tolerances where it is not 1, for instance ``EA0Z=4,EXX=0.5``.
-    """
-
-    limit_um: float = START_UM
-    over: str = SAMPLED
-    distribution: str = UNIFORM
+    limit_um: float = START_UM  # largest |E| allowed
+    over: str = MAX  # "sampled" or "max"
+    distribution: str = UNIFORM  # "uniform", or "normal" with 3σ at the limits
+    # %; share of the machines that is to keep the limit once tolerances are allocated
     percent: float = 95.0
+    # parameters whose tolerance is neither allocated nor scaled
     fixed: frozenset[str] = frozenset()
-    costs: str = ""
+    costs: str = ""  # cost of tolerances where it is not 1, for instance ``EA0Z=4,EXX=0.5``
 
     def with_limit(self, value: float) -> "Specification":
         """Set the limit, µm, within its range; what is no number changes nothing."""
@@ -68,35 +54,12 @@ class Specification:
         return replace(self, fixed=keys)
 
     def with_costs(self, text: str, known: Collection[str]) -> "Specification":
-        """Set the costs from a list as a user types it.
-
-        Raises
-        ------
-        Unreadable
-            Saying what cannot be read.
-        """
+        """Set the costs from a list as a user types it."""
         return replace(self, costs=spell_costs(read_costs(text, known)))
 
 
 def read_costs(text: str, known: Collection[str]) -> dict[str, float]:
-    """Read a list of costs: pairs like ``EA0Z=4`` or ``EA0Z 4``, with commas or new lines between.
-
-    Parameters
-    ----------
-    text : str
-        Anything: it comes from a browser or a link.
-    known : collection of str
-        Parameters there are.
-
-    Returns
-    -------
-    dict of str to float
-
-    Raises
-    ------
-    Unreadable
-        Saying what cannot be read, and what was expected.
-    """
+    """Read costs: pairs like ``EA0Z=4`` or ``EA0Z 4``, with commas or new lines between."""
     found: dict[str, float] = {}
     for part in re.split(r"[,;\n]", text[:MOST_COSTS_TEXT]):
         words = part.replace("=", " ").split()

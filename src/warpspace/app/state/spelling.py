@@ -1,9 +1,9 @@
 """Numbers, switches and points as they stand in a line of settings, and back."""
 
-import math
 from typing import NoReturn
 
 from warpspace.machine.description import Vector
+from warpspace.scene.files import parse_number
 
 
 class Unreadable(ValueError):  # noqa: N818 - it is handled where text is read
@@ -37,12 +37,9 @@ def read_switch(text: str) -> bool:
 def read_number(text: str) -> float:
     """Read a finite number."""
     try:
-        value = float(text)
+        return parse_number(text)
     except ValueError:
         raise Unreadable from None
-    if not math.isfinite(value):
-        raise Unreadable
-    return value
 
 
 def read_numbers(text: str, count: int | None = None) -> tuple[float, ...]:

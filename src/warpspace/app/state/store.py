@@ -6,24 +6,138 @@ overwrites what somebody else has just done with an older state of the whole.
 
 import threading
 import time
-from collections.abc import Callable, Iterable
-from typing import TypeAlias
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Any, Generic, TypeAlias, TypeVar, cast
 
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.history import History
+
+# --- Undo and redo of any frozen state, as one frozen value itself --------------------------------
+# What a slider drag sends in quick succession becomes one step. The number of steps kept is
+# bounded.
+
+S = TypeVar("S")
+
+STEPS = 100
+"""Steps that can be undone; the oldest are forgotten."""
+SAME_STEP_S = 0.8
+"""Changes of one thing that follow each other faster than this are one step."""
+
+
+@dataclass(frozen=True, slots=True)
+class Step(Generic[S]):
+    """A state that can be gone back to, and what was changed after it."""
+
+    state: S
+    what: str  # the change between this state and the next one, for instance "amplitudes.EAX"
+
+
+@dataclass(frozen=True, slots=True)
+class History(Generic[S]):
+    """A present state with its past and, after undoing, its future."""
+
+    present: S
+    past: tuple[Step[S], ...] = ()  # latest last
+    future: tuple[Step[S], ...] = ()
+    changed_at: float = float("-inf")  # when the present was last changed, s
+    limit: int = STEPS  # steps of the past that are kept
+
+    def push(self, state: S, at: float) -> "History[S]":
+        """Take in a new present state."""
+        what = describe_change(self.present, state)
+        if not what:
+            kept = _with_choices(self.present, state)
+            return self if kept is self.present else replace(self, present=kept)
+        same = (
+            bool(self.past)
+            and not self.future
+            and self.past[-1].what == what
+            and at - self.changed_at < SAME_STEP_S
+        )
+        past = self.past if same else (*self.past, Step(self.present, what))[-self.limit :]
+        return replace(self, present=state, past=past, future=(), changed_at=at)
+
+    def undo(self) -> "History[S]":
+        """Go back one step; the same one where there is none."""
+        if not self.past:
+            return self
+        *past, last = self.past
+        future = (*self.future, Step(self.present, last.what))
+        state = _with_choices(last.state, self.present)
+        return History(state, tuple(past), future, limit=self.limit)
+
+    def redo(self) -> "History[S]":
+        """Go forward again one step; the same one where there is none."""
+        if not self.future:
+            return self
+        *future, coming = self.future
+        past = (*self.past, Step(self.present, coming.what))
+        state = _with_choices(coming.state, self.present)
+        return History(state, past, tuple(future), limit=self.limit)
+
+    @property
+    def undoes(self) -> str:
+        """What undo would take back; empty where there is nothing."""
+        return self.past[-1].what if self.past else ""
+
+    @property
+    def redoes(self) -> str:
+        """What redo would do again; empty where there is nothing."""
+        return self.future[-1].what if self.future else ""
+
+
+def _with_choices(state: S, other: S) -> S:
+    """Give a state those fields of another one that count in no comparison; undo leaves them."""
+    if not is_dataclass(state) or isinstance(state, type) or type(state) is not type(other):
+        return state
+    names = [field.name for field in fields(state) if not field.compare]
+    changes = {n: getattr(other, n) for n in names if getattr(other, n) != getattr(state, n)}
+    return cast("S", replace(state, **changes)) if changes else state
+
+
+def describe_change(old: object, new: object) -> str:
+    """Name the fields in which two values differ."""
+    return ", ".join(_differences(old, new))
+
+
+def _differences(old: object, new: object) -> list[str]:
+    if old is new:
+        return []
+    if is_dataclass(old) and type(old) is type(new) and type(old).__eq__ is not object.__eq__:
+        parts: list[tuple[str, Any, Any]] = [
+            (field.name, getattr(old, field.name), getattr(new, field.name))
+            for field in fields(old)
+            if field.compare
+        ]
+    elif isinstance(old, Mapping) and isinstance(new, Mapping):
+        before, after = cast("Mapping[str, Any]", old), cast("Mapping[str, Any]", new)
+        keys = dict.fromkeys((*before, *after))
+        parts = [(str(key), before.get(key), after.get(key)) for key in keys]
+    elif isinstance(old, frozenset) and isinstance(new, frozenset):
+        gone, come = cast("frozenset[Any]", old - new), cast("frozenset[Any]", new - old)
+        return [*sorted(f"-{item}" for item in gone), *sorted(f"+{item}" for item in come)]
+    else:
+        return [] if _equal(old, new) else [""]
+    return [
+        f"{name}.{rest}" if rest else name
+        for name, before, after in parts
+        for rest in _differences(before, after)
+    ]
+
+
+def _equal(old: object, new: object) -> bool:
+    try:
+        return bool(old == new)
+    except ValueError:
+        return False
+
 
 Update: TypeAlias = Callable[[AppState], AppState]
 Listener: TypeAlias = Callable[[], None]
 
 
 class StateStore:
-    """A state with its history that any number of sessions share.
-
-    Parameters
-    ----------
-    state : AppState
-        What is shown first.
-    """
+    """A state with its history that any number of sessions share."""
 
     def __init__(self, state: AppState) -> None:
         self._history = History(state)
@@ -43,22 +157,7 @@ class StateStore:
     def apply(
         self, update: Update, by: Listener | None = None, at: float | None = None
     ) -> tuple[str, ...]:
-        """Apply a pure update to the present state.
-
-        Parameters
-        ----------
-        update : callable
-        by : callable, optional
-            The listener of who does it: it is not called.
-        at : float, optional
-            When the user did it on the monotonic clock, s; now by default. A busy server is late,
-            and must not make two steps of one drag.
-
-        Returns
-        -------
-        tuple of str
-            What had to be clamped.
-        """
+        """Apply a pure update to the present state."""
         with self._lock:
             before = self._history
             state = update(before.present)
@@ -96,7 +195,6 @@ class StateStore:
             self._listeners = [known for known in self._listeners if known != listener]
 
     def _travel(self, move: Callable[[History[AppState]], tuple[History[AppState], str]]) -> str:
-        """Go through the history."""
         with self._lock:
             self._history, what = move(self._history)
         if what:
@@ -104,7 +202,6 @@ class StateStore:
         return what
 
     def _notify(self, by: Listener | None) -> None:
-        """Call all listeners but one."""
         with self._lock:
             listeners = [listener for listener in self._listeners if listener != by]
         for listener in listeners:
@@ -114,19 +211,7 @@ class StateStore:
 def apply_each(
     state: AppState, updates: Iterable[Update], guarded: Callable[[Callable[[], object]], None]
 ) -> AppState:
-    """Apply updates one by one; what one of them raises keeps none of the others back.
-
-    Parameters
-    ----------
-    state : AppState
-    updates : iterable of callable
-    guarded : callable
-        Runs a callable and deals with what it raises.
-
-    Returns
-    -------
-    AppState
-    """
+    """Apply updates one by one; what one of them raises keeps none of the others back."""
     for update in updates:
         found: list[AppState] = []
         guarded(lambda update=update, state=state, found=found: found.append(update(state)))

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpspace.picture.views import VIEWS, Direction
+from warpspace.picture.model import VIEWS, Direction
 from warpspace.units import Array
 
 FOV_DEG = 22.0
@@ -16,13 +16,7 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class CameraMemory:
-    """Where a tab's camera stood, in units of the drawing.
-
-    Attributes
-    ----------
-    position, look_at, up : tuple of float, (3,)
-    fov_rad : float
-    """
+    """Where a tab's camera stood, in units of the drawing."""
 
     position: Vector
     look_at: Vector
@@ -48,26 +42,7 @@ def fit_camera(
     top: float = 0.0,
     bottom: float = 0.0,
 ) -> CameraPose:
-    """Place a camera so that points fill the picture.
-
-    Parameters
-    ----------
-    points : ndarray, [..., 3]
-    aspect : float
-        Width over height of the picture.
-    direction : tuple of float, (3,), optional
-        From the points towards the camera.
-    fov_deg : float, optional
-        Vertical field of view, degrees.
-    margin : float, optional
-        Room around the points, 1 for none.
-    top, bottom : float, optional
-        Parts of the height that are kept free at the top and at the bottom, together below one.
-
-    Returns
-    -------
-    CameraPose
-    """
+    """Place a camera so that points fill the picture."""
     flat = points.reshape(-1, 3)
     back = np.asarray(direction, dtype=float) / np.linalg.norm(direction)
     right = np.cross((0.0, 0.0, 1.0), back)

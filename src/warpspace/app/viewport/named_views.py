@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpspace.app.viewport.camera import FOV_DEG, CameraPose, fit_camera
-from warpspace.picture import views
-from warpspace.picture.views import Direction
+from warpspace.picture import model
+from warpspace.picture.model import Direction
 from warpspace.units import Array
 
 TELEPHOTO_DEG = 3.0
@@ -19,24 +19,16 @@ NEAR, FAR = 0.01, 1000.0
 """Clipping planes of the usual camera, scene units."""
 STEEPEST = 1e-3
 """How far the view from above leans to the front: exactly above, an orbiting camera has no up."""
-VIEWS: Mapping[str, Direction] = {**views.VIEWS, "top": (0.0, -STEEPEST, 1.0)}
+VIEWS: Mapping[str, Direction] = {**model.VIEWS, "top": (0.0, -STEEPEST, 1.0)}
 """From what is looked at towards the camera."""
 
 
 @dataclass(frozen=True, slots=True)
 class CameraSetup:
-    """How the camera is set up.
+    """How the camera is set up."""
 
-    Attributes
-    ----------
-    view : str
-        A key of `VIEWS`.
-    orthographic : bool
-        Whether it is the telephoto.
-    """
-
-    view: str = "iso"
-    orthographic: bool = False
+    view: str = "iso"  # A key of `VIEWS`
+    orthographic: bool = False  # whether it is the telephoto
 
     @property
     def fov_deg(self) -> float:
@@ -47,58 +39,17 @@ class CameraSetup:
 def view_pose(
     points: Array, aspect: float, stand: CameraSetup, top: float = 0.0, bottom: float = 0.0
 ) -> CameraPose:
-    """Place a camera for a named view so that points fill the picture.
-
-    Parameters
-    ----------
-    points : ndarray, [..., 3]
-    aspect : float
-        Width over height of the picture.
-    stand : CameraSetup
-    top, bottom : float, optional
-        Parts of the height that are kept free at the top and at the bottom.
-
-    Returns
-    -------
-    CameraPose
-    """
+    """Place a camera for a named view so that points fill the picture."""
     return fit_camera(points, aspect, VIEWS[stand.view], stand.fov_deg, top=top, bottom=bottom)
 
 
 def change_lens(position: Array, look_at: Array, fov_rad: float, new_fov_rad: float) -> Array:
-    """Move a camera along its line of sight so that what it looks at keeps its size.
-
-    Parameters
-    ----------
-    position, look_at : ndarray, [3]
-    fov_rad, new_fov_rad : float, rad
-        Vertical field of view before and after.
-
-    Returns
-    -------
-    ndarray, [3]
-        Position for the new field of view.
-    """
+    """Move a camera along its line of sight so that what it looks at keeps its size."""
     ratio = float(np.tan(fov_rad / 2.0) / np.tan(new_fov_rad / 2.0))
     return look_at + ratio * (position - look_at)
 
 
 def clipping(position: Array, points: Array, *, orthographic: bool) -> tuple[float, float]:
-    """Choose near and far planes, as distances from a camera.
-
-    Parameters
-    ----------
-    position : ndarray, [3]
-    points : ndarray, [..., 3]
-        What is looked at.
-    orthographic : bool
-        For the telephoto the nearer plane is pushed out: at its distance depths would otherwise be
-        too coarse to tell a line from the surface it lies on. One may still come fifty times
-        nearer.
-
-    Returns
-    -------
-    tuple of float, (2,)
-    """
+    """Choose near and far planes, as distances from a camera."""
     distance = float(np.linalg.norm(position - points.reshape(-1, 3), axis=-1).max())
     return (0.02 * distance if orthographic else NEAR), max(FAR, 5.0 * distance)

@@ -33,19 +33,7 @@ def focus(state: AppState) -> tuple[object, ...]:
 
 
 class TabCamera:
-    """The camera of a tab.
-
-    Parameters
-    ----------
-    client : viser.ClientHandle
-
-    Attributes
-    ----------
-    wanted : CameraMemory or None
-        Where it goes with the next picture, instead of where all of the box is seen.
-    page_width : float or None
-        Of the whole page, CSS pixels, where the page has said so.
-    """
+    """The camera of a tab."""
 
     def __init__(self, client: ClientHandle) -> None:
         self._camera = client.camera
@@ -63,16 +51,7 @@ class TabCamera:
     def choose(
         self, picture: LivePicture, view: str | None = None, lens: bool | None = None
     ) -> None:
-        """Take a named view, or another lens from where the camera stands.
-
-        Parameters
-        ----------
-        picture : LivePicture
-        view : str or None
-            A key of `VIEWS`; None stays, or with no lens goes back to it.
-        lens : bool or None
-            Whether to be orthographic; None stays.
-        """
+        """Take a named view, or another lens from where the camera stands."""
         if view is not None and view not in VIEWS:
             return
         stand = self._stand
@@ -84,7 +63,6 @@ class TabCamera:
             self._change_lens(picture)
 
     def _change_lens(self, picture: LivePicture) -> None:
-        """Go to the other field of view; what is looked at keeps its size."""
         camera, fov = self._camera, float(np.deg2rad(self._stand.fov_deg))
         look_at = camera.look_at.copy()
         position = change_lens(camera.position, look_at, camera.fov, fov)
@@ -94,7 +72,6 @@ class TabCamera:
         camera.look_at = look_at  # the former takes it along
 
     def _clip(self, position: Array, points_mm: Array) -> None:
-        """Set the clipping planes for a position in scene units."""
         near, far = clipping(
             position, points_mm * SCENE_PER_MM, orthographic=self._stand.orthographic
         )
@@ -119,19 +96,7 @@ class TabCamera:
         )
 
     def take_room(self, room: Room, picture: LivePicture) -> bool:
-        """Take note of the drawing's room; a camera that nobody has moved fills it again.
-
-        Parameters
-        ----------
-        room : Room
-        picture : LivePicture
-            What is shown.
-
-        Returns
-        -------
-        bool
-            Whether the camera has been put elsewhere.
-        """
+        """Take note of the drawing's room; a camera that nobody has moved fills it again."""
         self._told = room
         if self._put is None or not _near(self._put, self.remember()):
             return False
@@ -159,19 +124,7 @@ class TabCamera:
         self._put = self.remember()
 
     def px_per_mm(self, picture: LivePicture, height: float) -> float | None:
-        """Give how long a millimetre across the line of sight is, in the middle of the volume.
-
-        Parameters
-        ----------
-        picture : LivePicture
-        height : float
-            Of the picture as it is drawn, pixels.
-
-        Returns
-        -------
-        float or None
-            None where no scale bars are wanted, or the camera has passed the middle.
-        """
+        """Give how long a millimetre across the line of sight is, in the middle of the volume."""
         camera = self._camera
         sight = camera.look_at - camera.position
         away = picture.grid.bounds_mm.mean(axis=0) * SCENE_PER_MM - camera.position
@@ -203,7 +156,6 @@ class TabCamera:
 
 
 def _near(a: CameraMemory, b: CameraMemory) -> bool:
-    """Tell whether a camera stands where another one does."""
     least = MOVED * float(np.linalg.norm(np.subtract(a.position, a.look_at)))
     moved = np.linalg.norm(np.subtract(a.position, b.position))
     turned = np.linalg.norm(np.subtract(a.look_at, b.look_at))

@@ -10,8 +10,13 @@ from functools import cache, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.geometry.colour import LEVELS, ColourScale, colour_table
-from warpspace.geometry.srgb import linear_to_srgb, srgb_to_linear
+from warpspace.geometry.colour import (
+    LEVELS,
+    ColourScale,
+    colour_table,
+    linear_to_srgb,
+    srgb_to_linear,
+)
 from warpspace.units import Array
 
 Floats = NDArray[np.float32]
@@ -37,18 +42,7 @@ def tone_map(linear: Array) -> Array:
 
 
 def inverse_tone_map(srgb: NDArray[np.uint8]) -> Floats:
-    """Find the linear colours that the client turns into given ones.
-
-    Parameters
-    ----------
-    srgb : ndarray of uint8, [..., 3]
-        Wanted colours on screen.
-
-    Returns
-    -------
-    ndarray of float32, [..., 3]
-        Linear; some components are negative or above 1.
-    """
+    """Find the linear colours that the client turns into given ones."""
     wanted = srgb_to_linear(srgb.astype(float) / 255.0) @ np.linalg.inv(_OUT).T
     # wanted = (v² + A·v − B) / (C·v² + D·v + E), solved for the positive v
     a, b, c = 1.0 - _C * wanted, _A - _D * wanted, -(_B + _E * wanted)
@@ -58,7 +52,6 @@ def inverse_tone_map(srgb: NDArray[np.uint8]) -> Floats:
 
 @cache
 def _table(*, diverging: bool) -> Floats:
-    """Colours of a scale made ready for the client, [256, 3]."""
     return inverse_tone_map(colour_table(diverging=diverging))
 
 

@@ -2,21 +2,26 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Literal
 
 import numpy as np
 
+from warpspace.analysis.blocks import Curve, Lines
+from warpspace.analysis.options import option
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import DataColumn, Table
-from warpspace.bench.evaluation.layout import round_factor
-from warpspace.bench.options import check_count, option
-from warpspace.bench.outcome import Chart, Curve, Outcome, Quantity
-from warpspace.bench.paths.placing import following_axes, relative_point
-from warpspace.bench.paths.planes import PLANES, axis_vector, find_plane, plane_axes
-from warpspace.bench.plan import Plan, build_plan
+from warpspace.bench.evaluation import round_factor
+from warpspace.bench.placing import (
+    PLANES,
+    axis_vector,
+    find_plane,
+    following_axes,
+    plane_axes,
+    relative_point,
+    tool_points,
+)
+from warpspace.bench.plan import Outcome, Plan, Quantity, build_plan
 from warpspace.exceptions import OptionError
-from warpspace.kinematics.chain import nominal_point
-from warpspace.kinematics.model import Loop
 from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM, Array
 
@@ -28,19 +33,17 @@ SHOWN = 0.35
 class BallPlate(BenchTest):
     """Balls of a plate in one plane, at several heights."""
 
-    name: ClassVar[str] = "ball-plate"
-    title: ClassVar[str] = "Ball plate"
-    standard: ClassVar[str] = "ISO 10360-2, ASME B89.4.10360.2 (artefact)"
-    words: ClassVar[str] = (
-        "A plate with a grid of balls (or holes) lies in a plane of the machine and is measured in"
-        " several positions along the third axis. In each the six ways in which the plate can"
-        " lie are"
-        " fitted; what is left are errors of the machine. An affine fit gives the scales of"
-        " both axes"
-        " and their squareness; the largest error of a distance between any two balls is what"
-        " acceptance tests ask for."
+    name = "ball-plate"
+    title = "Ball plate"
+    standard = "ISO 10360-2, ASME B89.4.10360.2 (artefact)"
+    words = (
+        "A plate with a grid of balls (or holes) lies in a plane of the machine and is measured"
+        " in several positions along the third axis. In each the six ways in which the plate can"
+        " lie are fitted; what is left are errors of the machine. An affine fit gives the scales"
+        " of both axes and their squareness; the largest error of a distance between any two balls"
+        " is what acceptance tests ask for."
     )
-    columns: ClassVar[tuple[DataColumn, ...]] = (
+    columns = (
         DataColumn("position", "number"),
         DataColumn("row", "number"),
         DataColumn("column", "number"),
@@ -48,12 +51,12 @@ class BallPlate(BenchTest):
         DataColumn("y_um"),
         DataColumn("z_um"),
     )
-    plane: str = option("XY", "choice", "Plane of the plate.", choices=tuple(PLANES))
-    balls: int = option(5, "count", "Balls along each side.")
+    plane: Literal["XY", "XZ", "YZ"] = option("XY", "Plane of the plate")
+    balls: int = option(5, "Balls along each side", low=2, high=20)
     pitch_mm: float | None = option(
-        None, "number", "Distance of the balls; by default the plate fills the range.", unit="mm"
+        None, "Distance of the balls", unset="the plate fills the range", unit="mm"
     )
-    positions: int = option(3, "count", "Positions of the plate along the third axis.")
+    positions: int = option(3, "Positions of the plate along the third axis", low=1, high=10)
 
     def plan(self, scene: Scene) -> Plan:
         """Measure every ball in every position."""
@@ -61,9 +64,6 @@ class BallPlate(BenchTest):
         return self._lay(scene, number, row, column)
 
     def _grid(self) -> tuple[Array, Array, Array]:
-        """Give position, row and column of every ball, row by row."""
-        check_count("--balls", self.balls, 2, 20)
-        check_count("--positions", self.positions, 1, 10)
         grid = np.meshgrid(
             np.arange(self.positions), np.arange(self.balls), np.arange(self.balls), indexing="ij"
         )
@@ -97,7 +97,6 @@ class BallPlate(BenchTest):
         return self._lay(scene, given["position"], given["row"], given["column"]), readings
 
     def _lay(self, scene: Scene, number: Array, row: Array, column: Array) -> Plan:
-        """Lay the plan: one site a ball, readings along the three linear axes."""
         first, second, _ = plane_axes(scene.machine, self.plane)
         names = following_axes(scene.model)
         third = next(name for name in names if name not in (first, second))
@@ -113,7 +112,7 @@ class BallPlate(BenchTest):
             third: heights[number.astype(int)],
         }
         count = len(number)
-        point = np.broadcast_to(nominal_point(model, Loop.TOOL, coordinates), (count, 3))
+        point = tool_points(model, coordinates, count)
         axes = np.stack([axis_vector(model, stand, name) for name in names], -1)
         seen = np.broadcast_to(relative_point(model, coordinates), (count, 3)) @ axes
         sign = find_plane(model, stand, self.plane).sign
@@ -134,15 +133,14 @@ class BallPlate(BenchTest):
         )
 
     def _side(self, scene: Scene, name: str, index: Array) -> Array:
-        """Give the positions of an axis at balls along one side."""
         low, high = scene.workspace.ranges[name]
         if not low < high:
             raise OptionError(f"a ball plate needs a range of {name} in [workspace]")
         pitch = (high - low) / (self.balls - 1) if self.pitch_mm is None else self.pitch_mm
         if not 0.0 < pitch <= (high - low) / (self.balls - 1) + 1e-9:
             raise OptionError(
-                f"--pitch {pitch:g} mm: {self.balls} balls take {pitch * (self.balls - 1):g} mm,"
-                f" {name} has {high - low:g} mm"
+                f"{{pitch_mm}} {pitch:g} mm: {self.balls} balls take"
+                f" {pitch * (self.balls - 1):g} mm, {name} has {high - low:g} mm"
             )
         return (low + high) / 2.0 + pitch * (index - (self.balls - 1) / 2.0)
 
@@ -191,7 +189,7 @@ class BallPlate(BenchTest):
         )  # fmt: skip
         return Outcome(quantities, {"positions": rows, "squareness_key": key})
 
-    def charts(self, runs: Sequence[Run]) -> tuple[Chart, ...]:
+    def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
         """Draw the plate of each position, deviations exaggerated."""
         first, second = PLANES[self.plane][:2]
         columns = ["XYZ".index(name) for name in (first, second)]
@@ -201,7 +199,7 @@ class BallPlate(BenchTest):
         seen = np.stack([marks[f"seen_{axis}_mm"] for axis in "xyz"], -1)[:count][:, columns]
         pitch = float(np.ptp(seen, axis=0).min()) / max(self.balls - 1, 1)
         factor = round_factor(SHOWN * pitch * UM_PER_MM / largest) if largest > 1e-6 else 1.0
-        charts: list[Chart] = []
+        charts: list[Lines] = []
         for index in np.unique(marks["position"]):
             chosen = marks["position"][:count] == index
             ball_row = marks["row"][:count][chosen]
@@ -213,7 +211,7 @@ class BallPlate(BenchTest):
                 style = "dots" if run.is_measured else "line"
                 curves += _net(run.named("actual"), moved, ball_row, ball_column, 0, style)
             charts.append(
-                Chart(
+                Lines(
                     "plane", f"Position {int(index) + 1}", f"{first.lower()} [mm]",
                     f"{second.lower()} [mm]", tuple(curves), (),
                     f"Deviations {factor:,.0f} × exaggerated.",
@@ -230,7 +228,6 @@ def left_over(plan: Plan, readings: Array) -> Array:
 
 
 def _lying(number: Array, seen: Array) -> dict[str, Array]:
-    """Give the readings of each way of lying in each position: three shifts, three small turns."""
     found: dict[str, Array] = {}
     for index in np.unique(number):
         inside = (number == index).astype(float)
@@ -265,7 +262,6 @@ def _length_error(seen: Array, deviation: Array) -> float:
 def _net(
     name: str, place: Array, row: Array, column: Array, colour: int, style: str
 ) -> tuple[Curve, ...]:
-    """Give the rows and columns of a plate as curves; the first one has the name."""
     if style == "dots":
         return (Curve(name, place[:, 0], place[:, 1], colour, "dots"),)
     curves: list[Curve] = []

@@ -2,29 +2,38 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, Literal, cast
 
 import numpy as np
 
-from warpspace.bench.base import BenchTest, Run
+from warpspace.analysis.blocks import Curve, Lines
+from warpspace.analysis.description import Watch
+from warpspace.analysis.options import option
+from warpspace.analysis.typed import Axis
+from warpspace.bench.base import BenchResult, BenchTest, Run, run_test
 from warpspace.bench.data import DataColumn, Table
-from warpspace.bench.evaluation.circle import CircleFit, fit_circle_readings, is_full
-from warpspace.bench.options import check_count, option
-from warpspace.bench.outcome import Chart, Curve, Outcome, Quantity
-from warpspace.bench.paths.following import FollowedCircle, lay_followed
-from warpspace.bench.paths.placing import relative_point
-from warpspace.bench.paths.planes import PLANES, find_plane, plane_axes
-from warpspace.bench.plan import Plan, build_plan
+from warpspace.bench.evaluation import CircleFit, fit_circle_readings, is_full
+from warpspace.bench.placing import (
+    PLANES,
+    find_plane,
+    lay_followed,
+    plane_axes,
+    relative_point,
+    tool_points,
+)
+from warpspace.bench.plan import Outcome, Plan, Quantity, build_plan
+from warpspace.bench.readings import RELATIVE, simulate
 from warpspace.exceptions import OptionError
+from warpspace.field.evaluate import evaluate_first_order
 from warpspace.field.grid import Workspace
-from warpspace.kinematics.chain import nominal_point
-from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
-from warpspace.scene.model import Scene
+from warpspace.scene.model import Scene, second_order
 from warpspace.units import UM_PER_MM_URAD, Array
 
 DEFAULT_POINTS, MIN_POINTS, MAX_POINTS = 360, 8, 100_000
 TURN = 360.0
+LEEWAY_DEG = 5.0
+"""By which the ends of an arc may differ, unsaid."""
 ALIKE_UM = 1e-6
 """Runs that differ by less are drawn as one."""
 SENSES = {1.0: "counter-clockwise", -1.0: "clockwise"}
@@ -34,39 +43,38 @@ SENSES = {1.0: "counter-clockwise", -1.0: "clockwise"}
 class Circular(BenchTest):
     """Circular test with a ball bar."""
 
-    name: ClassVar[str] = "circular"
-    title: ClassVar[str] = "Circular test"
-    standard: ClassVar[str] = "ISO 230-4"
-    words: ClassVar[str] = (
+    name = "circular"
+    title = "Circular test"
+    standard = "ISO 230-4"
+    words = (
         "A ball bar reads the distance of the tool from a ball on the table while two axes run a"
-        " circle or an arc, counter-clockwise and back. About the least-squares centre, circular"
-        " deviation G is the largest minus the smallest radial deviation; an ellipse at 45° is"
-        " squareness, one along the axes a difference of their scales, a step where an axis turns"
-        " back its reversal. With --rotary the linear axes follow a ball on a rotary axis, and the"
-        " bar stands in the radial, tangential or axial direction of its circle; these readings"
-        " count as they are."
+        " circle or an arc, counter-clockwise and back. Circular deviation is the largest minus"
+        " the smallest radial deviation about the least-squares centre: G of one sense about its"
+        " own, G(b) of both about the common one. Radial deviations Fmax and Fmin are as read,"
+        " about the centre of the instrument. An ellipse at 45° is squareness, one along the axes"
+        " a difference of their scales, a step where an axis turns back its reversal. With"
+        " --rotary the linear axes follow a ball on a rotary axis, and the bar stands in the"
+        " radial, tangential or axial direction of its circle; these readings count as they are."
     )
-    columns: ClassVar[tuple[DataColumn, ...]] = (
+    columns = (
         DataColumn("direction", "sign", default="+"),
         DataColumn("angle_deg", "number"),
         DataColumn("radial_um"),
     )
-    plane: str = option("XY", "choice", "Plane of the circle.", choices=tuple(PLANES))
-    radius_mm: float = option(100.0, "number", "Radius of the circle.", unit="mm")
+    plane: Literal["XY", "XZ", "YZ"] = option("XY", "Plane of the circle")
+    radius_mm: float = option(100.0, "Radius of the circle", unit="mm")
     start_deg: float = option(
-        0.0, "number", "Where an arc begins, from the first axis towards the second.", unit="°"
+        0.0, "Where an arc begins, from the first axis towards the second", unit="°"
     )
-    end_deg: float = option(TURN, "number", "Where it ends; 360 for a full circle.", unit="°")
-    points: int = option(DEFAULT_POINTS, "count", "Points of the circle.")
-    rotary: str = option("", "axis", "Rotary axis that the linear axes follow instead.")
-    bar: str = option(
-        "radial", "choice", "Direction of the bar, with --rotary.",
-        choices=("radial", "tangential", "axial"),
-    )  # fmt: skip
+    end_deg: float = option(TURN, "Where it ends; 360 for a full circle", unit="°")
+    points: int = option(DEFAULT_POINTS, "Points of the circle", low=MIN_POINTS, high=MAX_POINTS)
+    rotary: Axis = option("", "Rotary axis that the linear axes follow instead")
+    bar: Literal["radial", "tangential", "axial"] = option(
+        "radial", "Direction of the bar, with --rotary"
+    )
 
     def plan(self, scene: Scene) -> Plan:
         """Run the circle counter-clockwise, then clockwise."""
-        check_count("points", self.points, MIN_POINTS, MAX_POINTS)
         span = self.end_deg - self.start_deg
         if not 0.0 < span <= TURN:
             raise OptionError(
@@ -87,11 +95,20 @@ class Circular(BenchTest):
             )
         return self._lay(scene, table["angle_deg"], table["direction"]), table["radial_um"]
 
+    def data_notes(self, table: Table) -> tuple[str, ...]:
+        """Say where the readings are along another arc."""
+        angle = np.unique(table["angle_deg"])
+        leeway = max(LEEWAY_DEG, 1.5 * float(np.median(np.diff(angle))))
+        ends = float(angle[0]), float(angle[-1])
+        if max(abs(ends[0] - self.start_deg), abs(ends[1] - self.end_deg)) <= leeway:
+            return ()
+        run = f"the readings run {ends[0]:g} … {ends[1]:g}°, the test is set to"
+        return (f"{run} {self.start_deg:g} … {self.end_deg:g}°: the figures are of the readings",)
+
     def _lay(self, scene: Scene, angle_deg: Array, sense: Array) -> Plan:
-        """Lay the plan through programmed angles."""
         if self.rotary:
-            wanted = FollowedCircle(self.rotary, self.radius_mm, self.bar, self.at)
-            return lay_followed(scene, self.model(scene), wanted, angle_deg, sense)
+            how = self.rotary, self.radius_mm, self.bar, self.stand(scene)
+            return lay_followed(scene, self.model(scene), *how, angle_deg, sense)
         first, second, _ = plane_axes(scene.machine, self.plane)
         if not 0.0 < self.radius_mm < np.inf:
             raise OptionError(f"radius: {self.radius_mm:g} mm; expected above 0")
@@ -108,8 +125,8 @@ class Circular(BenchTest):
         count = len(theta)
         outward = relative_point(model, coordinates) - relative_point(model, stand)
         outward = outward / np.linalg.norm(outward, axis=-1, keepdims=True)
-        points = np.broadcast_to(nominal_point(model, Loop.TOOL, coordinates), (count, 3))
-        centre = np.broadcast_to(nominal_point(model, Loop.TOOL, stand), (1, 3))
+        points = tool_points(model, coordinates, count)
+        centre = tool_points(model, stand, 1)
         # A little further on: at a point of reversal an axis is about to move.
         ahead = theta + sense * 1e-6
         return build_plan(
@@ -139,18 +156,30 @@ class Circular(BenchTest):
         )  # fmt: skip
 
     def evaluate(self, plan: Plan, readings: Array) -> Outcome:
-        """Take circular deviation, hysteresis, squareness, scales and centre."""
+        """Take circular and radial deviations, hysteresis, squareness, scales and centre."""
         fit = fit_circle_readings(plan, readings)
+        letter = "G" if fit.mean_radial_um is None else "G(b)"
+        deviation = fit.deviation_um
         quantities = [
-            Quantity("circular_deviation_um", "circular deviation G", fit.deviation_um, "µm")
+            Quantity("circular_deviation_um", f"circular deviation {letter}", deviation, "µm")
         ]
         for sense, value in fit.by_sense.items():
             word = SENSES[sense].replace("-", "_")
             quantities.append(
                 Quantity(f"circular_deviation_{word}_um", f"G, {SENSES[sense]}", value, "µm")
             )
-        if fit.hysteresis_um is not None:
-            quantities.append(Quantity("hysteresis_um", "hysteresis H", fit.hysteresis_um, "µm"))
+        most, least = float(readings.max()), float(readings.min())
+        bar = self.bar if self.rotary else "radial"
+        quantities += [
+            Quantity("radial_deviation_max_um", f"{bar} deviation Fmax", most, "µm"),
+            Quantity("radial_deviation_min_um", f"{bar} deviation Fmin", least, "µm"),
+        ]
+        if fit.mean_radial_um is not None and fit.hysteresis_um is not None:
+            label = f"mean bi-directional {bar} deviation D"
+            quantities += [
+                Quantity("mean_radial_deviation_um", label, fit.mean_radial_um, "µm"),
+                Quantity("hysteresis_um", "hysteresis H", fit.hysteresis_um, "µm"),
+            ]
         radius = fit.radius_um
         quantities.append(Quantity("radius_um", "mean radius − nominal", radius, "µm"))
         details: dict[str, object] = {}
@@ -169,7 +198,7 @@ class Circular(BenchTest):
         details["radial_um"] = fit.radial_um.tolist()
         return Outcome(tuple(quantities), details)
 
-    def charts(self, runs: Sequence[Run]) -> tuple[Chart, ...]:
+    def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
         """Draw the radial deviation on the nominal circle, both ways round."""
         curves: list[Curve] = []
         for run in runs:
@@ -192,14 +221,13 @@ class Circular(BenchTest):
         if fit.squareness_urad is not None and not self.rotary:
             curves.append(self._squareness(fit, runs[0].plan))
         return (
-            Chart(
+            Lines(
                 "polar", self._title(), "angle [°]", "deviation [µm]", tuple(curves), (),
                 "As read." if self.rotary else "About the least-squares centre.",
             ),
         )  # fmt: skip
 
     def _title(self) -> str:
-        """Say what circle it is."""
         if self.rotary:
             return f"{self.bar} deviation along the circle about {self.rotary}"
         return f"{self.plane} plane, 0° at +{self.plane[0]}, 90° at +{self.plane[1]}"
@@ -220,13 +248,7 @@ def check_circle(
     radius_mm: float,
     angle_deg: Array,
 ) -> None:
-    """Refuse a circle or arc that leaves the working volume.
-
-    Raises
-    ------
-    OptionError
-        With the axes, and the largest radius about this centre.
-    """
+    """Refuse a circle or arc that leaves the working volume."""
     problems: list[str] = []
     full = is_full(angle_deg)
     ends = np.deg2rad(angle_deg)
@@ -250,3 +272,139 @@ def check_circle(
         )
         hint = f"; largest radius about this centre: {room:g} mm" if full and room > 0.0 else ""
         raise OptionError(f"the circle leaves the working volume: {'; '.join(problems)}{hint}")
+
+
+# --- In the words of a ball bar, to first order ---------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Ballbar:
+    """Result of a circular test."""
+
+    plane: str  # "XY", "XZ" or "YZ"
+    radius_mm: float
+    centre: Mapping[str, float]  # mm or degrees; axis positions of the centre
+    angle_deg: Array  # [n]; from the first axis of the plane towards the second, counter-clockwise
+    # [n]; radial deviation from the nominal circle about the least-squares centre, run counter-
+    # clockwise
+    radial_um: Array
+    # [n]; the same of the clockwise run, in the order it is run. It differs only where errors
+    # depend on the direction of travel: a rigid-body model has no following errors.
+    clockwise_um: Array
+    # G of ISO 230-4: largest minus smallest radial deviation, both runs together
+    circular_deviation_um: float
+    # out of the sin 2φ part of the trace, in the sign of `squareness_key`: what a ball bar calls
+    # squareness, angular errors that look like it included
+    squareness_urad: float
+    squareness_key: str  # parameter it stands for
+    given_urad: float  # value of that parameter in the error set
+    centre_um: tuple[float, float]  # position of the least-squares centre against the commanded one
+    radius_um: float  # mean radius minus nominal radius
+    # amplitude of the cos 2φ part: the first axis runs longer than the second
+    scale_difference_um: float
+
+    @property
+    def both_alike(self) -> bool:
+        """Whether both runs trace the same."""
+        return self.hysteresis_um < ALIKE_UM
+
+    @property
+    def clockwise_there_um(self) -> Array:
+        """The clockwise run at the angles of the other one, µm."""
+        return np.concatenate([self.clockwise_um[:1], self.clockwise_um[:0:-1]])
+
+    @property
+    def hysteresis_um(self) -> float:
+        """H of ISO 230-4: largest difference of the runs at one angle, µm."""
+        return float(np.abs(self.radial_um - self.clockwise_there_um).max())
+
+
+def ballbar(
+    scene: Scene,
+    *,
+    plane: str,
+    radius_mm: float,
+    centre: Mapping[str, float] | None = None,
+    points: int = DEFAULT_POINTS,
+) -> Ballbar:
+    """Run the circular test of ISO 230-4 on the errors of a scene, to first order.
+
+    Parameters
+    ----------
+    scene : Scene
+    plane : str
+        "XY", "XZ" or "YZ".
+    radius_mm : float, mm
+    centre : mapping of str to float, mm or degrees, optional
+        Axis positions; the middle of the working volume where absent.
+    points : int, optional
+
+    Returns
+    -------
+    Ballbar
+
+    Raises
+    ------
+    OptionError, UnknownNameError
+        If the circle cannot be run in the working volume of the scene.
+
+    Examples
+    --------
+    >>> import warpspace
+    >>> scene = warpspace.load_scene("dvf5000_first")
+    >>> result = warpspace.ballbar(scene, plane="XY", radius_mm=150)
+    >>> round(result.circular_deviation_um, 2), round(result.squareness_urad, 2)
+    (6.86, 2.94)
+    """
+    key = plane_axes(scene.machine, plane)[2]
+    at = tuple((centre or {}).items())
+    test = Circular(plane=cast("Any", plane), radius_mm=radius_mm, at=at, points=points)
+    plan = test.plan(scene)
+    fit = fit_circle_readings(plan, simulate(scene, plan, exact=False))
+    stand = test.stand(scene)
+    middle = evaluate_first_order(scene.model, scene.errors, stand, RELATIVE).error_um
+    found = find_plane(scene.model, stand, plane)
+    there = [float(middle @ vector) for vector in (found.along, found.up)]
+    back = fit.radial_um[points:][::-1]
+    return Ballbar(
+        plane,
+        radius_mm,
+        {name: float(value) for name, value in stand.items()},
+        plan.marks["angle_deg"][:points],
+        fit.radial_um[:points],
+        np.concatenate([back[:1], back[:0:-1]]),
+        fit.deviation_um,
+        fit.squareness_urad or 0.0,
+        key,
+        scene.errors.amplitude(key),
+        (fit.centre_um[0] + there[0], fit.centre_um[1] + there[1]),
+        fit.radius_um,
+        fit.scale_difference_um,
+    )
+
+
+@dataclass(frozen=True)
+class FormerResult(BenchResult):
+    """What the former command `ballbar` gives."""
+
+    def as_json(self) -> dict[str, Any]:
+        """Spell it."""
+        found = self.model.outcome
+        sense = self.model.plan.marks["sense"]
+        return {
+            "circular_deviation_um": found["circular_deviation_um"],
+            "squareness_urad": found["squareness_urad"],
+            "radial_um": np.asarray(found.details["radial_um"])[sense > 0.0].tolist(),
+            "second_order_um": self.second_order.um if self.second_order else None,
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class FormerBallbar(Circular):
+    """The circular test as the former command `ballbar` has it: to first order."""
+
+    def run(self, scene: Scene, _watch: Watch, /) -> FormerResult:
+        """Run it on the model."""
+        found = run_test(scene, self, self.data, exact=False)
+        left_out = second_order(scene, RELATIVE.loop)
+        return FormerResult(found.test, found.scene, found.runs, found.notes, second_order=left_out)

@@ -1,26 +1,120 @@
 """Cone frustum: a circle on a tilted cone, all five axes moving (ISO 10791-7, NAS 979)."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
+from warpspace.analysis.blocks import Curve, Lines
+from warpspace.analysis.options import option
+from warpspace.analysis.typed import Vector
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import DataColumn, Table
-from warpspace.bench.evaluation.circle import fit_circle_readings
-from warpspace.bench.options import check_count, option
-from warpspace.bench.outcome import Chart, Curve, Outcome, Quantity
-from warpspace.bench.paths.following import ball_columns, travels
-from warpspace.bench.paths.orienting import orient
-from warpspace.bench.paths.placing import ball_point, check_travel, follow
-from warpspace.bench.plan import Plan, build_plan
+from warpspace.bench.evaluation import fit_circle_readings
+from warpspace.bench.placing import (
+    ball_columns,
+    ball_point,
+    check_travel,
+    follow,
+    tool_points,
+    travels,
+)
+from warpspace.bench.plan import Outcome, Plan, Quantity, build_plan
 from warpspace.exceptions import OptionError
 from warpspace.kinematics import transforms
-from warpspace.kinematics.chain import branch_pose, nominal_point
-from warpspace.kinematics.model import Loop
+from warpspace.kinematics.chain import branch_pose, tool_axis
+from warpspace.kinematics.model import Model
+from warpspace.machine.description import Machine
 from warpspace.scene.model import Scene
 from warpspace.units import Array
+
+# --- Rotary axes that turn the tool axis where it is wanted on the workpiece ----------------------
+
+SEEDS = 73
+"""Positions of each rotary axis at which a start is looked for."""
+STEPS = 30
+CLOSE = 1e-9
+"""Length of what is left of the direction: a thousandth of a microradian."""
+PENALTY = 0.02
+"""Of a way of one radian from the position before, where several positions fit."""
+
+
+def orient(
+    machine: Machine, model: Model, stand: Mapping[str, Array], wanted: Array
+) -> dict[str, Array]:
+    """Turn two rotary axes so that the tool axis has given directions in the workpiece.
+
+    The directions are unit vectors in the workpiece frame along a closed way, [n, 3].
+
+    Raises
+    ------
+    OptionError
+        If the machine has not two rotary axes, or they cannot reach a direction.
+
+    Notes
+    -----
+    Newton steps from a coarse search over the travel, then from one direction to the next, so that
+    the axes go a continuous way. An axis that goes all the way round is brought back into its
+    travel by whole turns.
+    """
+    names = [axis.name for axis in machine.axes.values() if not axis.is_linear]
+    if len(names) < 2:
+        raise OptionError(
+            f"the machine {machine.chain} has {len(names)} rotary"
+            f" {'axis' if len(names) == 1 else 'axes'}; expected two to turn the tool along"
+            f" the cone"
+        )
+    names = names[:2]
+    limits = np.array([machine.axes[name].travel for name in names])
+
+    def direction(angles: Array) -> Array:
+        at = {**stand, names[0]: angles[..., 0], names[1]: angles[..., 1]}
+        pose = np.asarray(branch_pose(model, "workpiece", at))[..., :3, :3]
+        return transforms.rotate(np.swapaxes(pose, -1, -2), tool_axis(model, at))
+
+    seeds = np.stack(
+        np.meshgrid(
+            *(np.linspace(float(low), float(high), SEEDS) for low, high in limits), indexing="ij"
+        ),
+        -1,
+    ).reshape(-1, 2)
+    reached = direction(seeds)
+    here = np.array([float(stand[name]) for name in names])
+    cost = np.linalg.norm(reached - wanted[0], axis=-1)
+    cost = cost + PENALTY * np.abs(np.deg2rad(seeds - here)).sum(axis=-1)
+    angles = seeds[int(np.argmin(cost))]
+    found = np.empty((len(wanted), 2))
+    for row, target in enumerate(wanted):
+        angles = _newton(direction, angles, target)
+        missed = float(np.linalg.norm(direction(angles) - target))
+        if missed > 1e-6:
+            raise OptionError(
+                f"{names[0]} and {names[1]} cannot turn the tool along the cone:"
+                f" {np.rad2deg(missed):.2g}° are missing at point {row + 1}"
+            )
+        found[row] = angles
+    for column, (low, high) in enumerate(limits):
+        if high - low >= 360.0 - 1e-9:
+            found[:, column] = low + np.mod(found[:, column] - low, 360.0)
+    shape = (len(wanted),)
+    coordinates = {name: np.broadcast_to(values, shape) for name, values in stand.items()}
+    return {**coordinates, names[0]: found[:, 0], names[1]: found[:, 1]}
+
+
+def _newton(direction: Callable[[Array], Array], start: Array, target: Array) -> Array:
+    angles = start.copy()
+    step_deg = 1e-4
+    for _ in range(STEPS):
+        tried = angles + step_deg * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+        values = direction(tried)
+        gap = target - values[0]
+        if np.linalg.norm(gap) < CLOSE:
+            break
+        slope = (values[1:] - values[0]).T / step_deg
+        move = np.linalg.lstsq(slope, gap, rcond=1e-6)[0]
+        angles = angles + move * min(1.0, 20.0 / max(float(np.abs(move).max()), 1e-12))
+    return angles
+
 
 MOST = 3_600
 """Readings of one file: the rotary axes are found for one after the other."""
@@ -30,34 +124,32 @@ MOST = 3_600
 class ConeFrustum(BenchTest):
     """A circle on a cone whose base is tilted; the tool axis follows its flank."""
 
-    name: ClassVar[str] = "cone-frustum"
-    title: ClassVar[str] = "Cone frustum"
-    standard: ClassVar[str] = "ISO 10791-7, M3"
-    words: ClassVar[str] = (
-        "The tool runs round a cone that stands tilted on the table, its axis along the flank,"
-        " so that three linear and two rotary axes move at once. A ball bar from the middle of the"
-        " circle, or"
-        " the roundness of the machined cone, gives the radial deviation: circularity about the"
-        " least-squares centre."
+    name = "cone-frustum"
+    title = "Cone frustum"
+    standard = "ISO 10791-7, M3"
+    words = (
+        "The tool runs round a cone that stands tilted on the table, its axis along the flank, so"
+        " that three linear and two rotary axes move at once. A ball bar from the middle of the"
+        " circle, or the roundness of the machined cone, gives the radial deviation: circularity"
+        " about the least-squares centre."
     )
-    columns: ClassVar[tuple[DataColumn, ...]] = (
+    columns = (
         DataColumn("angle_deg", "number"),
         DataColumn("radial_um"),
     )
-    radius_mm: float = option(50.0, "number", "Radius of the circle.", unit="mm")
-    half_apex_deg: float = option(15.0, "number", "Half the apex angle of the cone.", unit="°")
-    tilt_deg: float = option(
-        10.0, "number", "Tilt of its base, about y of the workpiece.", unit="°"
+    radius_mm: float = option(50.0, "Radius of the circle", unit="mm")
+    half_apex_deg: float = option(15.0, "Half the apex angle of the cone", unit="°")
+    tilt_deg: float = option(10.0, "Tilt of its base, about y of the workpiece", unit="°")
+    centre: Vector = option(
+        None,
+        "Middle of the circle in the workpiece frame",
+        unit="mm",
+        unset="that of the working volume",
     )
-    centre: tuple[float, float, float] | None = option(
-        None, "vector", "Middle of the circle in the workpiece frame, x,y,z in mm; by default that"
-        " of the working volume.", unit="mm",
-    )  # fmt: skip
-    points: int = option(72, "count", "Points of the circle.")
+    points: int = option(72, "Points of the circle", low=8, high=720)
 
     def plan(self, scene: Scene) -> Plan:
         """Run the circle once."""
-        check_count("--points", self.points, 8, 720)
         return self._lay(scene, np.linspace(0.0, 360.0, self.points, endpoint=False))
 
     def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
@@ -73,14 +165,12 @@ class ConeFrustum(BenchTest):
         return self._lay(scene, angle), table["radial_um"][order]
 
     def _lay(self, scene: Scene, angle_deg: Array) -> Plan:
-        """Lay the plan: rotary axes turn the tool along the flank, linear axes follow."""
         if not 0.0 < self.radius_mm < 1e4:
-            raise OptionError(f"--radius {self.radius_mm:g} mm; expected above 0")
+            raise OptionError(f"{{radius_mm}} {self.radius_mm:g} mm; expected above 0")
         if not 0.0 <= self.half_apex_deg < 90.0 or not -90.0 < self.tilt_deg < 90.0:
             raise OptionError(
-                f"--half-apex {self.half_apex_deg:g}, --tilt {self.tilt_deg:g}; expected 0 to"
-                f" 90 and"
-                " -90 to 90 degrees"
+                f"{{half_apex_deg}} {self.half_apex_deg:g}, {{tilt_deg}} {self.tilt_deg:g};"
+                " expected 0 to 90 and -90 to 90 degrees"
             )
         model, stand = self.model(scene), self.stand(scene)
         middle = (
@@ -105,7 +195,7 @@ class ConeFrustum(BenchTest):
         spelled = ", ".join(f"{value:.4g}" for value in middle)
         return build_plan(
             coordinates,
-            np.broadcast_to(nominal_point(model, Loop.TOOL, coordinates), (len(theta), 3)),
+            tool_points(model, coordinates, len(theta)),
             direction,
             place=f"cone {2 * self.half_apex_deg:g}° tilted by {self.tilt_deg:g}° · radius"
             f" {self.radius_mm:g} mm about ({spelled}) mm",
@@ -139,18 +229,15 @@ class ConeFrustum(BenchTest):
             },
         )
 
-    def charts(self, runs: Sequence[Run]) -> tuple[Chart, ...]:
+    def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
         """Draw the radial deviation on the nominal circle."""
         curves: list[Curve] = []
         for run in runs:
             fit = fit_circle_readings(run.plan, run.readings)
-            x, y = run.plan.marks["angle_deg"], fit.radial_um
-            if not run.is_measured:
-                x, y = np.append(x, x[0] + 360.0), np.append(y, y[0])
-            style = "dots" if run.is_measured else "line"
-            curves.append(Curve(run.named("radial deviation"), x, y, 0, style))
+            x = run.plan.marks["angle_deg"]
+            curves.append(run.curve("radial deviation", x, fit.radial_um, once_round=True))
         return (
-            Chart(
+            Lines(
                 "polar", "Circle on the cone", "angle [°]", "radial deviation [µm]", tuple(curves),
                 (), "About the least-squares centre.",
             ),

@@ -2,58 +2,115 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Literal
 
 import numpy as np
 
+from warpspace.analysis.blocks import Curve, Lines
+from warpspace.analysis.options import option
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import DataColumn, Table
-from warpspace.bench.evaluation.diagonal import (
-    KINDS,
-    diagonal_names,
-    diagonal_signs,
-    means_along,
-    squareness_of_diagonals,
-    steps_by_axis,
-)
-from warpspace.bench.options import check_count, option
-from warpspace.bench.outcome import Chart, Curve, Outcome, Quantity
-from warpspace.bench.paths.placing import following_axes, relative_point
-from warpspace.bench.paths.planes import PLANES, find_plane
-from warpspace.bench.plan import Plan, Whole, build_plan
+from warpspace.bench.placing import PLANES, find_plane, following_axes, relative_point, tool_points
+from warpspace.bench.plan import Outcome, Plan, Quantity, Whole, build_plan
 from warpspace.exceptions import OptionError
-from warpspace.kinematics.chain import nominal_point
-from warpspace.kinematics.model import Loop
 from warpspace.scene.model import Scene
 from warpspace.units import Array
+
+# --- Diagonals of a volume: their names, what readings along them come to (ISO 230-6) -------------
+
+BODY = ("PPP", "NPP", "PNP", "PPN")
+"""Which way x, y and z run: P upwards, N downwards."""
+KINDS = ("body", "face", "step")
+
+
+def diagonal_names(kind: str) -> tuple[str, ...]:
+    """List the diagonals of a kind: ``NPP``, or ``XY:NP`` for those of a face."""
+    if kind == "face":
+        return tuple(f"{plane}:{way}" for plane in PLANES for way in ("PP", "NP"))
+    return BODY
+
+
+def diagonal_signs(name: str) -> Array:
+    """Give which way x, y and z run along a diagonal, [3]: +1, −1, or 0 where one stands."""
+    plane, colon, ways = name.partition(":")
+    if not colon:
+        return np.array([1.0 if way == "P" else -1.0 for way in plane])
+    signs = np.zeros(3)
+    for axis, way in zip(plane, ways, strict=True):
+        signs["XYZ".index(axis)] = 1.0 if way == "P" else -1.0
+    return signs
+
+
+def means_along(position: Array, way: Array, readings: Array) -> dict[str, Array]:
+    """Take the mean at each position: of each direction, of both, and their difference."""
+    places, index = np.unique(np.round(position, 3), return_inverse=True)
+    sums = np.zeros((2, len(places)))
+    counts = np.zeros((2, len(places)))
+    for row, sign in enumerate((1.0, -1.0)):
+        np.add.at(sums[row], index.reshape(-1)[way == sign], readings[way == sign])
+        np.add.at(counts[row], index.reshape(-1)[way == sign], 1.0)
+    ways = [sums[row] / counts[row] for row in (0, 1) if (counts[row] > 0.0).all()]
+    if not ways:
+        ways = [sums.sum(axis=0) / counts.sum(axis=0)]
+    found = {"all": np.concatenate(ways), "mean": np.mean(ways, axis=0)}
+    if len(ways) == 2:
+        found["reversal"] = ways[0] - ways[1]
+    return found
+
+
+def steps_by_axis(axis: Array, readings: Array) -> dict[str, float]:
+    """Add up what the steps of each axis contribute along a step diagonal, µm."""
+    steps = np.diff(readings, prepend=readings[:1])
+    return {name: float(steps[axis == index].sum()) for index, name in enumerate("XYZ")}
+
+
+def squareness_of_diagonals(plan: Plan, names: Sequence[str], lengths: Array) -> dict[str, float]:
+    """Squareness errors that the lengths of diagonals look like, µrad.
+
+    A squareness of γ between axes of lengths a and b changes a diagonal of length L by ±γ·a·b/L;
+    what all diagonals have in common is scale.
+    """
+    start = {name: np.flatnonzero(plan.marks["diagonal"] == i) for i, name in enumerate(names)}
+    if any(len(rows) == 0 for rows in start.values()):
+        return {}
+    size = np.array([np.ptp(plan.marks["position_mm"][rows]) for rows in start.values()])
+    first = [rows[0] for rows in start.values()]
+    keys = [key for _, _, key in PLANES.values()]
+    columns = [plan.marks[key][first] * size for key in keys]
+    if len(names) == len(BODY):
+        design = np.stack([np.ones(len(names)), *columns], -1)
+    else:
+        faces = np.kron(np.eye(3), np.ones((2, 1)))
+        design = np.concatenate([faces, np.stack(columns, -1)], axis=-1)
+    solution = np.linalg.lstsq(design, lengths, rcond=None)[0]
+    return dict(zip(keys, solution[-3:].tolist(), strict=True))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Diagonals(BenchTest):
     """Displacement along the diagonals of the working volume."""
 
-    name: ClassVar[str] = "diagonals"
-    title: ClassVar[str] = "Diagonal displacement"
-    standard: ClassVar[str] = "ISO 230-6"
-    words: ClassVar[str] = (
+    name = "diagonals"
+    title = "Diagonal displacement"
+    standard = "ISO 230-6"
+    words = (
         "A laser interferometer looks along the four body diagonals of the working volume, or the"
         " two diagonals of each face through its middle; the tool runs along them and back."
         " Displacements count from the start. E, M and B are those of ISO 230-2 along each"
-        " diagonal; diagonals of different length betray squareness errors. Step diagonals move one"
-        " axis after the other, so that the part of each axis can be told."
+        " diagonal; diagonals of different length betray squareness errors. Step diagonals move"
+        " one axis after the other, so that the part of each axis can be told."
     )
-    columns: ClassVar[tuple[DataColumn, ...]] = (
+    columns = (
         DataColumn("diagonal", "name"),
         DataColumn("direction", "sign", default="+"),
         DataColumn("position_mm", "number"),
         DataColumn("deviation_um"),
     )
-    kind: str = option("body", "choice", "Which diagonals.", choices=KINDS)
-    targets: int = option(11, "count", "Targets along each diagonal.")
+    kind: Literal["body", "face", "step"] = option("body", "Which diagonals")
+    targets: int = option(11, "Targets along each diagonal", low=2, high=500)
 
     def plan(self, scene: Scene) -> Plan:
         """Run every diagonal there and back; step diagonals there only."""
-        check_count("--targets", self.targets, 2, 500)
         share = np.linspace(0.0, 1.0, self.targets)
         if self.kind == "step":
             return self._steps(scene)
@@ -100,7 +157,6 @@ class Diagonals(BenchTest):
         return plan, table["deviation_um"]
 
     def _box(self, scene: Scene, names: Sequence[str]) -> tuple[Array, Array]:
-        """Give lower and upper ends of the three axes, [2, 3], and the length of each diagonal."""
         axes = following_axes(scene.model)
         ranges = np.array([scene.workspace.ranges[name] for name in axes]).T
         needed = {index for name in names for index in np.flatnonzero(diagonal_signs(name))}
@@ -113,7 +169,6 @@ class Diagonals(BenchTest):
         return ranges, np.linalg.norm(extent, axis=-1)
 
     def _positions(self, scene: Scene, names: Sequence[str]) -> tuple[Array, Array]:
-        """Give axis positions at start and end of each diagonal, [d, 3] each."""
         ranges, _ = self._box(scene, names)
         stand = self.stand(scene)
         here = np.array([float(stand[name]) for name in following_axes(scene.model)])
@@ -124,7 +179,6 @@ class Diagonals(BenchTest):
         return start, end
 
     def _lay(self, scene: Scene, number: Array, way: Array, share: Array) -> Plan:
-        """Lay the plan through shares of diagonals."""
         names = diagonal_names(self.kind)
         start, end = self._positions(scene, names)
         index = number.astype(np.intp)
@@ -134,7 +188,6 @@ class Diagonals(BenchTest):
         return self._plan(scene, positions, signs * way[:, None], index, marks)
 
     def _steps(self, scene: Scene) -> Plan:
-        """Run the step diagonals: one axis after the other."""
         names = diagonal_names("step")
         start, end = self._positions(scene, names)
         steps = self.targets - 1
@@ -155,7 +208,6 @@ class Diagonals(BenchTest):
         return self._plan(scene, positions, signs, index, marks)
 
     def _step_data(self, scene: Scene, table: Table, number: Array) -> tuple[Plan, Array]:
-        """Put the readings of step diagonals in order: all steps of each, from its start."""
         plan = self._steps(scene)
         names = diagonal_names("step")
         values: list[Array] = []
@@ -173,7 +225,6 @@ class Diagonals(BenchTest):
     def _plan(
         self, scene: Scene, positions: Array, ways: Array, index: Whole, marks: dict[str, Array]
     ) -> Plan:
-        """Put the plan together from axis positions, [m, 3]; sites of the starts come last."""
         names = diagonal_names(self.kind)
         model, axes = self.model(scene), following_axes(scene.model)
         start, end = self._positions(scene, names)
@@ -204,7 +255,7 @@ class Diagonals(BenchTest):
         ends = np.flatnonzero(np.diff(index, append=-1) != 0) + 1
         return build_plan(
             coordinates,
-            np.broadcast_to(nominal_point(model, Loop.TOOL, coordinates), (len(every), 3)),
+            tool_points(model, coordinates, len(every)),
             along[index],
             place=f"{self.kind} diagonals · {self.place_words(scene, axes)}",
             marks={**marks, "position_mm": distance},
@@ -261,7 +312,7 @@ class Diagonals(BenchTest):
         ]
         return Outcome(tuple(quantities), {"diagonals": rows})
 
-    def charts(self, runs: Sequence[Run]) -> tuple[Chart, ...]:
+    def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
         """Draw the deviation along each diagonal."""
         names = diagonal_names(self.kind)
         curves: list[Curve] = []
@@ -278,7 +329,7 @@ class Diagonals(BenchTest):
                     x, y = marks["position_mm"][chosen], run.readings[chosen]
                     curves.append(Curve(run.named(name + word), x, y, index, style))
         return (
-            Chart(
+            Lines(
                 "lines", f"Along the {self.kind} diagonals", "distance from the start [mm]",
                 "deviation [µm]", tuple(curves), (),
                 "P: the axis runs upwards, N: downwards, in the order x, y, z.",
@@ -287,7 +338,6 @@ class Diagonals(BenchTest):
 
 
 def _alike(run: Run, index: int) -> bool:
-    """Tell whether a diagonal reads the same there and back."""
     marks = run.plan.marks
     there, back = (
         run.readings[(marks["diagonal"] == index) & (marks["way"] == way)] for way in (1.0, -1.0)
@@ -296,5 +346,4 @@ def _alike(run: Run, index: int) -> bool:
 
 
 def _largest(rows: Sequence[dict[str, object]], key: str) -> float:
-    """Give the largest of a number over the diagonals."""
     return max(float(str(row[key])) for row in rows if key in row)

@@ -2,19 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
+from warpspace.analysis.blocks import Band, Curve, Lines
+from warpspace.analysis.options import option
+from warpspace.analysis.typed import Axis
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import DataColumn, Table
-from warpspace.bench.options import check_count, option
-from warpspace.bench.outcome import Band, Chart, Curve, Outcome, Quantity
-from warpspace.bench.paths.placing import axis_line, motion_direction
-from warpspace.bench.plan import Plan, build_plan
+from warpspace.bench.placing import axis_line, motion_direction, tool_points
+from warpspace.bench.plan import Outcome, Plan, Quantity, build_plan
 from warpspace.exceptions import OptionError, UnknownNameError
-from warpspace.kinematics.chain import nominal_point
-from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
 from warpspace.scene.model import Scene
 from warpspace.units import Array
@@ -30,19 +28,11 @@ ALIKE = 1e-6
 
 @dataclass(frozen=True)
 class Statistics:
-    """Means and standard deviations at the targets, NaN where an axis did not come that way.
+    """Means and standard deviations at the targets, NaN where an axis did not come that way."""
 
-    Attributes
-    ----------
-    target : ndarray, [t], mm or degrees
-    mean : ndarray, [2, t], µm or µrad
-        Forward and backward.
-    deviation : ndarray, [2, t], µm or µrad
-        Estimated standard deviation; 0 for the one run of a model.
-    """
-
-    target: Array
-    mean: Array
+    target: Array  # [t], mm or degrees
+    mean: Array  # [2, t], µm or µrad; forward and backward
+    # [2, t], µm or µrad; estimated standard deviation; 0 for the one run of a model
     deviation: Array
 
 
@@ -66,26 +56,26 @@ def target_statistics(target: Array, way: Array, readings: Array) -> Statistics:
 class Positioning(BenchTest):
     """Positioning of one axis, both directions."""
 
-    name: ClassVar[str] = "positioning"
-    title: ClassVar[str] = "Positioning accuracy"
-    standard: ClassVar[str] = "ISO 230-2"
-    words: ClassVar[str] = (
+    name = "positioning"
+    title = "Positioning accuracy"
+    standard = "ISO 230-2"
+    words = (
         "One axis runs to targets along its range, upwards and back; a laser interferometer, a"
         " rotary encoder or an autocollimator reads where the tool is against the workpiece. Means"
         " and ±2s bands of both directions give accuracy A, systematic deviation E, mean deviation"
         " M, repeatability R and reversal B. The readings hold what the axis does at this place:"
         " angular errors on the lever to the measuring line count in."
     )
-    columns: ClassVar[tuple[DataColumn, ...]] = (
+    columns = (
         DataColumn("run", "number"),
         DataColumn("direction", "sign"),
         DataColumn("target_mm", "number"),
         DataColumn("deviation_um"),
     )
-    axis: str = option("", "axis", "Axis that runs; the first one by default.")
-    targets: int = option(11, "count", "Targets along the range.")
-    start: float | None = option(None, "number", "First target, mm or degrees; the range's end.")
-    end: float | None = option(None, "number", "Last target, mm or degrees; the range's other end.")
+    axis: Axis = option("", "Axis that runs", unset="the first one")
+    targets: int = option(11, "Targets along the range", low=2, high=1_000)
+    start: float | None = option(None, "First target, mm or degrees; the range's end")
+    end: float | None = option(None, "Last target, mm or degrees; the range's other end")
 
     def own_axis(self, scene: Scene) -> str:
         """Give the axis that runs."""
@@ -102,7 +92,6 @@ class Positioning(BenchTest):
 
     def plan(self, scene: Scene) -> Plan:
         """Run the targets upwards and downwards, once."""
-        check_count("--targets", self.targets, 2, 1_000)
         axis = self.own_axis(scene)
         low, high = scene.axis_span(axis)
         low = low if self.start is None else self.start
@@ -138,7 +127,6 @@ class Positioning(BenchTest):
         return self._lay(scene, target, table["direction"], table["run"]), readings
 
     def _lay(self, scene: Scene, target: Array, way: Array, run: Array) -> Plan:
-        """Lay the plan through targets."""
         axis, model = self.own_axis(scene), self.model(scene)
         coordinates = {**self.stand(scene), axis: target}
         marks = {"target": target, "way": way, "run": run}
@@ -146,7 +134,7 @@ class Positioning(BenchTest):
         zero = {"zero_um" if is_linear(axis) else "zero_urad": np.ones(len(target))}
         count = len(target)
         if is_linear(axis):
-            point = np.broadcast_to(nominal_point(model, Loop.TOOL, coordinates), (count, 3))
+            point = tool_points(model, coordinates, count)
             direction = motion_direction(model, coordinates, axis)
             return build_plan(
                 coordinates, point, direction, place=place, marks=marks,
@@ -179,7 +167,7 @@ class Positioning(BenchTest):
         ]
         return Outcome(tuple(quantities), {"targets": _target_rows(found, unit)})
 
-    def charts(self, runs: Sequence[Run]) -> tuple[Chart, ...]:
+    def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
         """Draw the means of both directions with their bands over the targets."""
         curves: list[Curve] = []
         bands: list[Band] = []
@@ -202,16 +190,13 @@ class Positioning(BenchTest):
                 if not kept.any():
                     continue
                 x, mean = found.target[kept], found.mean[row, kept]
-                style = "dots" if run.is_measured else "line"
-                curves.append(
-                    Curve(run.named("both directions" if alike else word), x, mean, row, style)
-                )
+                curves.append(run.curve("both directions" if alike else word, x, mean, row))
                 spread = COVERAGE * found.deviation[row, kept]
                 if run.is_measured:
                     bands.append(Band(f"{word} ±2s", x, mean - spread, mean + spread, row))
         axis = plan.place.partition(" ")[0]
         return (
-            Chart(
+            Lines(
                 "lines", f"Positioning of {axis}", f"{axis} [{'mm' if linear else '°'}]",
                 f"deviation [{unit}]", tuple(curves), tuple(bands), note,
             ),
@@ -248,7 +233,6 @@ def _numbers(found: Statistics) -> list[tuple[str, str, float]]:
 
 
 def _target_rows(found: Statistics, unit: str) -> list[dict[str, float]]:
-    """Spell the statistics of each target."""
     suffix = "um" if unit == "µm" else "urad"
     place = "target_mm" if unit == "µm" else "target_deg"
     rows: list[dict[str, float]] = []

@@ -2,17 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
+from warpspace.analysis.blocks import Curve, Lines
+from warpspace.analysis.options import option
+from warpspace.analysis.typed import Axis
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import DataColumn, Table
-from warpspace.bench.evaluation.circle import is_full
-from warpspace.bench.options import check_count, option
-from warpspace.bench.outcome import Chart, Curve, Outcome, Quantity
-from warpspace.bench.paths.placing import axis_line, ball_point, rotary_axis
-from warpspace.bench.plan import Plan, build_plan
+from warpspace.bench.evaluation import is_full
+from warpspace.bench.placing import axis_line, ball_point, rotary_axis
+from warpspace.bench.plan import Outcome, Plan, Quantity, build_plan
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose
 from warpspace.scene.model import Scene
@@ -27,27 +27,18 @@ LETTERS = ("X", "Y", "Z", "A", "B", "C")
 
 @dataclass(frozen=True)
 class Motions:
-    """Error motions of an axis over its position.
+    """Error motions of an axis over its position."""
 
-    Attributes
-    ----------
-    angle_deg : ndarray, [n], degrees
-        Ascending.
-    radial, tilt : ndarray, [n], µm and µrad
-        Towards a point that turns with the axis (rotating sensitive direction), about the
-        least-squares centre.
-    axial, angular : ndarray, [n], µm and µrad
-        About their means; the angular one NaN where it was not measured.
-    average_line : tuple of float, (4,)
-        Location in µm along the two directions across the axis, orientation in µrad about them:
-        the axis average line.
-    """
-
-    angle_deg: Array
+    angle_deg: Array  # [n]; ascending
+    # [n], µm and µrad; towards a point that turns with the axis (rotating sensitive direction),
+    # about the least-squares centre
     radial: Array
     tilt: Array
+    # [n], µm and µrad; about their means; the angular one NaN where it was not measured
     axial: Array
     angular: Array
+    # location in µm along the two directions across the axis, orientation in µrad about them: the
+    # axis average line
     average_line: tuple[float, float, float, float]
 
 
@@ -55,35 +46,33 @@ class Motions:
 class RotaryAxis(BenchTest):
     """Error motions of a rotary table, a swivelling head or a spindle."""
 
-    name: ClassVar[str] = "rotary-axis"
-    title: ClassVar[str] = "Error motions of a rotary axis"
-    standard: ClassVar[str] = "ISO 230-7"
-    words: ClassVar[str] = (
-        "Sensors at two heights read an artefact on the axis while it turns: two radial, two tilt,"
-        " one axial deviation, and the angular one against an encoder; the linear axes stand."
-        " Radial"
-        " and tilt error motion are taken towards a point that turns with the axis, about the"
-        " least-squares centre; axial and angular about their means. The mean of the readings"
-        " over a"
-        " full turn is the axis average line: where the axis is and how it leans, as the place"
-        " of the"
-        " test sees it."
+    name = "rotary-axis"
+    title = "Error motions of a rotary axis"
+    standard = "ISO 230-7"
+    words = (
+        "Sensors at two heights read an artefact on the axis while it turns: two radial, two"
+        " tilt, one axial deviation, and the angular one against an encoder; the linear axes"
+        " stand. Radial and tilt error motion are taken towards a point that turns with the axis,"
+        " about the least-squares centre; axial and angular about their means. The mean of the"
+        " readings over a full turn is the axis average line: where the axis is and how it leans,"
+        " as the place of the test sees it."
     )
-    columns: ClassVar[tuple[DataColumn, ...]] = (
+    columns = (
         DataColumn("angle_deg", "number"),
         *(DataColumn(name) for name in CHANNELS[:5]),
         DataColumn("c_urad", default=0.0),
     )
-    axis: str = option("", "axis", "Rotary axis that turns; the last one by default.")
+    axis: Axis = option("", "Rotary axis that turns", unset="the last one")
     height_mm: float | None = option(
-        None, "number", "Height of the sensors along the axis above its origin; by default that of"
-        " the middle of the working volume.", unit="mm",
-    )  # fmt: skip
-    points: int = option(72, "count", "Positions along the turn.")
+        None,
+        "Height of the sensors along the axis above its origin",
+        unit="mm",
+        unset="that of the middle of the working volume",
+    )
+    points: int = option(72, "Positions along the turn", low=8, high=3_600)
 
     def plan(self, scene: Scene) -> Plan:
         """Turn the axis through its travel, at most once round."""
-        check_count("--points", self.points, 8, 3_600)
         axis = rotary_axis(scene.machine, self.axis)
         low, high = scene.machine.axes[axis].travel
         full = high - low >= 360.0
@@ -100,7 +89,6 @@ class RotaryAxis(BenchTest):
         return self._lay(scene, table["angle_deg"]), readings
 
     def _lay(self, scene: Scene, angle_deg: Array) -> Plan:
-        """Lay the plan: three sites a position, six readings."""
         axis, model = rotary_axis(scene.machine, self.axis), self.model(scene)
         stand = self.stand(scene)
         line = axis_line(model, stand, axis)
@@ -173,44 +161,27 @@ class RotaryAxis(BenchTest):
             details[f"{name}_motion"] = getattr(found, name).tolist()
         return Outcome(tuple(quantities), details)
 
-    def charts(self, runs: Sequence[Run]) -> tuple[Chart, ...]:
+    def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
         """Draw the polar plots of the four motions."""
         axis = runs[0].plan.place.partition(" ")[0]
-        charts: list[Chart] = []
-        for name, unit in (
-            ("radial", "µm"),
-            ("tilt", "µrad"),
-            ("axial", "µm"),
-            ("angular", "µrad"),
-        ):
+        charts: list[Lines] = []
+        units = {"radial": "µm", "tilt": "µrad", "axial": "µm", "angular": "µrad"}
+        for name, unit in units.items():
             curves: list[Curve] = []
             for run in runs:
                 found = motions(run.plan, run.readings)
                 x, y = found.angle_deg, getattr(found, name)
-                if is_full(x) and not run.is_measured:
-                    x, y = np.append(x, x[0] + 360.0), np.append(y, y[0])
-                style = "dots" if run.is_measured else "line"
-                curves.append(Curve(run.named(f"{name} error motion"), x, y, 0, style))
+                words = f"{name} error motion"
+                curves.append(run.curve(words, x, y, once_round=is_full(x)))
             title = f"{axis}: {name}"
             charts.append(
-                Chart("polar", title, f"{axis} [°]", f"deviation [{unit}]", tuple(curves))
+                Lines("polar", title, f"{axis} [°]", f"deviation [{unit}]", tuple(curves))
             )
         return tuple(charts)
 
 
 def motions(plan: Plan, readings: Array) -> Motions:
-    """Take the readings of the six channels apart.
-
-    Parameters
-    ----------
-    plan : Plan
-        Of the test.
-    readings : ndarray, [6 n]
-
-    Returns
-    -------
-    Motions
-    """
+    """Take the readings of the six channels, [6 n], apart."""
     channels = readings.reshape(6, -1)
     angle_deg = plan.marks["angle_deg"][: channels.shape[1]]
     order = np.argsort(angle_deg, kind="stable")
@@ -242,7 +213,6 @@ def once_mean(values: Array, theta: Array) -> float:
 
 
 def _eccentricity(theta: Array) -> dict[str, Array]:
-    """Give the readings of an eccentric or leaning artefact: it turns with the axis."""
     zero, cosine, sine = np.zeros_like(theta), np.cos(theta), np.sin(theta)
     one = np.ones_like(theta)
     return {

@@ -2,17 +2,25 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Literal
 
 import numpy as np
 
+from warpspace.analysis.blocks import Curve, Lines
+from warpspace.analysis.options import option
+from warpspace.analysis.typed import Axis, Vector
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import DataColumn, Table
-from warpspace.bench.options import check_count, option
-from warpspace.bench.outcome import Chart, Curve, Outcome, Quantity
-from warpspace.bench.paths.following import ball_columns, default_ball, followed, reachable, travels
-from warpspace.bench.paths.placing import rotary_axis
-from warpspace.bench.plan import Plan, build_plan
+from warpspace.bench.placing import (
+    ball_columns,
+    default_ball,
+    followed,
+    reachable,
+    rotary_axis,
+    tool_points,
+    travels,
+)
+from warpspace.bench.plan import Outcome, Plan, Quantity, build_plan
 from warpspace.kinematics.chain import branch_pose
 from warpspace.scene.model import Scene
 from warpspace.units import Array
@@ -24,45 +32,49 @@ AXES = ("x", "y", "z")
 class Sphere(BenchTest):
     """R-test with the controller's compensation of the tool centre point on."""
 
-    name: ClassVar[str] = "sphere"
-    title: ClassVar[str] = "R-test with a ball"
-    standard: ClassVar[str] = "ISO 10791-6, tests AK, BK, CK"
-    words: ClassVar[str] = (
-        "A ball stands on the table, three sensors on the tool (or the other way round) read where"
-        " it is along x, y and z. A rotary axis turns; the linear axes follow, so that"
-        " nominally the"
-        " tool stays on the ball. Readings are tool minus ball, in R or, with --frame workpiece, in"
-        " directions that turn with the table. The range of each is what the standard asks"
-        " for; with"
-        " the ball's place fitted (it is never known as well) the ranges that are left are"
-        " given too."
+    name = "sphere"
+    title = "R-test with a ball"
+    standard = "ISO 10791-6, tests AK, BK, CK"
+    words = (
+        "A ball stands on the table, three sensors on the tool (or the other way round) read"
+        " where it is along x, y and z. A rotary axis turns; the linear axes follow, so that"
+        " nominally the tool stays on the ball. Readings are tool minus ball, in R or, with"
+        " --frame workpiece, in directions that turn with the table. The range of each is what the"
+        " standard asks for; with the ball's place fitted (it is never known as well) the ranges"
+        " that are left are given too."
     )
-    columns: ClassVar[tuple[DataColumn, ...]] = (
+    columns = (
         DataColumn("angle_deg", "number"),
         DataColumn("x_um"),
         DataColumn("y_um"),
         DataColumn("z_um"),
     )
-    axis: str = option("", "axis", "Rotary axis that turns; the last one by default.")
-    ball: tuple[float, float, float] | None = option(
-        None, "vector", "Centre of the ball in the workpiece frame, x,y,z in mm; by default one"
-        " that can be reached.", unit="mm",
-    )  # fmt: skip
+    axis: Axis = option("", "Rotary axis that turns", unset="the last one")
+    ball: Vector = option(
+        None,
+        "Centre of the ball in the workpiece frame",
+        unit="mm",
+        unset="one that can be reached",
+    )
     start: float | None = option(
-        None, "number", "First position of the axis; as far as the others can follow.", unit="°"
+        None, "First position of the axis; as far as the others can follow", unit="°"
     )
-    end: float | None = option(None, "number", "Last position, likewise.", unit="°")
-    points: int = option(73, "count", "Positions along the way.")
-    frame: str = option(
-        "machine", "choice", "Directions of the readings.", choices=("machine", "workpiece")
-    )
+    end: float | None = option(None, "Last position, likewise", unit="°")
+    points: int = option(73, "Positions along the way", low=4, high=3_600)
+    frame: Literal["machine", "workpiece"] = option("machine", "Directions of the readings")
 
     def plan(self, scene: Scene) -> Plan:
         """Turn the axis as far as the linear axes can follow."""
-        check_count("--points", self.points, 4, 3_600)
         axis, ball = self._set_up(scene)
         angle = reachable(
-            scene, self.model(scene), axis, ball, self.at, self.start, self.end, self.points
+            scene,
+            self.model(scene),
+            axis,
+            ball,
+            self.stand(scene),
+            self.start,
+            self.end,
+            self.points,
         )
         return self._lay(scene, angle)
 
@@ -76,31 +88,29 @@ class Sphere(BenchTest):
         return self._lay(scene, table["angle_deg"]), readings
 
     def _set_up(self, scene: Scene) -> tuple[str, Array]:
-        """Give the axis and the place of the ball."""
         axis = rotary_axis(scene.machine, self.axis)
         if self.ball is not None:
             return axis, np.asarray(self.ball, dtype=float)
         return axis, default_ball(scene, self.model(scene), axis, self.stand(scene), None)
 
     def _lay(self, scene: Scene, angle_deg: Array) -> Plan:
-        """Lay the plan: one site a position, three readings."""
         axis, ball = self._set_up(scene)
         model = self.model(scene)
-        path = followed(scene, model, axis, angle_deg, ball, self.at)
+        coordinates = followed(scene, model, axis, angle_deg, ball, self.stand(scene))
         count = len(angle_deg)
         turned = np.broadcast_to(np.eye(3), (count, 3, 3))
         if self.frame == "workpiece":
-            pose = np.asarray(branch_pose(model, "workpiece", path.coordinates))
+            pose = np.asarray(branch_pose(model, "workpiece", coordinates))
             turned = np.broadcast_to(pose[..., :3, :3], (count, 3, 3))
         direction = np.concatenate([turned[:, :, index] for index in range(3)])
         columns = {
             f"ball_{name}_um": np.sum(np.tile(column, (3, 1)) * direction, axis=-1)
-            for name, column in ball_columns(model, path.coordinates).items()
+            for name, column in ball_columns(model, coordinates).items()
         }
         spelled = ", ".join(f"{value:.4g}" for value in ball)
         return build_plan(
-            path.coordinates,
-            path.point_mm,
+            coordinates,
+            tool_points(model, coordinates, count),
             direction,
             place=f"{axis} turns · ball at ({spelled}) mm of the workpiece · readings in"
             f" {'R' if self.frame == 'machine' else 'the workpiece frame'}",
@@ -109,7 +119,7 @@ class Sphere(BenchTest):
                 "channel": np.repeat(np.arange(3.0), count),
             },
             site=np.tile(np.arange(count), 3),
-            travel=travels(path.coordinates, np.ones(count)),
+            travel=travels(coordinates, np.ones(count)),
             setup=columns,
         )
 
@@ -141,21 +151,20 @@ class Sphere(BenchTest):
             details[f"{name}_readings_um"] = raw[index].tolist()
         return Outcome(tuple(quantities), details)
 
-    def charts(self, runs: Sequence[Run]) -> tuple[Chart, ...]:
+    def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
         """Draw x, y and z against the angle."""
         curves: list[Curve] = []
         for run in runs:
             rows = run.readings.reshape(3, -1)
             angle = run.plan.marks["angle_deg"][: rows.shape[1]]
             order = np.argsort(angle, kind="stable")
-            style = "dots" if run.is_measured else "line"
             curves += [
-                Curve(run.named(name), angle[order], rows[index][order], index, style)
+                run.curve(name, angle[order], rows[index][order], index)
                 for index, name in enumerate(AXES)
             ]
         axis = runs[0].plan.place.partition(" ")[0]
         return (
-            Chart(
+            Lines(
                 "lines", f"Tool minus ball while {axis} turns", f"{axis} [°]", "reading [µm]",
                 tuple(curves),
             ),

@@ -2,18 +2,25 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Literal
 
 import numpy as np
 
+from warpspace.analysis.blocks import Curve, Lines
+from warpspace.analysis.options import option
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import DataColumn, Table
-from warpspace.bench.evaluation.lines import REFERENCES, WORDS, ReferenceLine, reference_lines
-from warpspace.bench.kinds.straightness import check_across, line_plan, mean_by_position
-from warpspace.bench.options import check_count, option
-from warpspace.bench.outcome import Chart, Curve, Outcome, Quantity
-from warpspace.bench.paths.planes import PLANES, Plane, find_plane, plane_axes
-from warpspace.bench.plan import Plan
+from warpspace.bench.kinds.straightness import (
+    REFERENCES,
+    WORDS,
+    ReferenceLine,
+    check_across,
+    line_plan,
+    mean_by_position,
+    reference_lines,
+)
+from warpspace.bench.placing import PLANES, Plane, find_plane, plane_axes
+from warpspace.bench.plan import Outcome, Plan, Quantity, build_plan
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
@@ -22,29 +29,28 @@ from warpspace.units import Array
 class Squareness(BenchTest):
     """Squareness of two axes with a square or two straightness runs."""
 
-    name: ClassVar[str] = "squareness"
-    title: ClassVar[str] = "Squareness"
-    standard: ClassVar[str] = "ISO 230-1"
-    words: ClassVar[str] = (
+    name = "squareness"
+    title = "Squareness"
+    standard = "ISO 230-1"
+    words = (
         "A probe runs along both arms of a square (or a laser along two lines made square by a"
         " pentaprism): each axis moves, the deviation across it is read. The angle between the"
         " reference lines of both is the squareness error, in the sign of EC0Y, EB0Z or EA0Z:"
         " positive where the second axis is turned by the right-hand rule against the first."
-        " End-point,"
-        " least-squares and minimum-zone lines may differ. The square itself is taken as perfect."
+        " End-point, least-squares and minimum-zone lines may differ. The square itself is taken"
+        " as perfect."
     )
-    columns: ClassVar[tuple[DataColumn, ...]] = (
+    columns = (
         DataColumn("line", "name"),
         DataColumn("direction", "sign", default="+"),
         DataColumn("position_mm", "number"),
         DataColumn("deviation_um"),
     )
-    plane: str = option("XY", "choice", "Plane of the two axes.", choices=tuple(PLANES))
-    points: int = option(21, "count", "Positions along each axis.")
+    plane: Literal["XY", "XZ", "YZ"] = option("XY", "Plane of the two axes")
+    points: int = option(21, "Positions along each axis", low=3, high=2_000)
 
     def plan(self, scene: Scene) -> Plan:
         """Run the first axis there and back, then the second."""
-        check_count("--points", self.points, 3, 2_000)
         axes = plane_axes(scene.machine, self.plane)[:2]
         positions = [np.linspace(*scene.axis_span(axis), self.points) for axis in axes]
         return self._lay(
@@ -77,7 +83,6 @@ class Squareness(BenchTest):
         return plan, table["deviation_um"][order]
 
     def _lay(self, scene: Scene, which: Array, position: Array, way: Array) -> Plan:
-        """Join the plans of both lines; `which` is 0 for all of the first, then 1."""
         plane = find_plane(self.model(scene), self.stand(scene), self.plane)
         parts: list[Plan] = []
         for index, axis in enumerate((plane.first, plane.second)):
@@ -104,9 +109,9 @@ class Squareness(BenchTest):
             )
         return Outcome(tuple(quantities), {"squareness_key": key})
 
-    def charts(self, runs: Sequence[Run]) -> tuple[Chart, ...]:
+    def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
         """Draw the deviations along both axes with their least-squares lines."""
-        charts: list[Chart] = []
+        charts: list[Lines] = []
         for index, axis in enumerate(self.plane):
             curves: list[Curve] = []
             for run in runs:
@@ -115,8 +120,7 @@ class Squareness(BenchTest):
                     run.plan.marks["along_mm"][chosen], run.readings[chosen]
                 )
                 level = mean.mean()
-                style = "dots" if run.is_measured else "line"
-                curves.append(Curve(run.named("deviation"), position, mean - level, 0, style))
+                curves.append(run.curve("deviation", position, mean - level))
                 if run is runs[-1]:
                     lines = reference_lines(position, mean)
                     curves += [
@@ -131,7 +135,7 @@ class Squareness(BenchTest):
                     ]
             other = self.plane[1 - index]
             charts.append(
-                Chart(
+                Lines(
                     "lines", f"{axis} runs, deviation along {other}", f"along {axis} [mm]",
                     "deviation [µm]", tuple(curves),
                 )
@@ -140,7 +144,6 @@ class Squareness(BenchTest):
 
 
 def _lines(plan: Plan, readings: Array) -> list[dict[str, ReferenceLine]]:
-    """Lay the reference lines of both axes."""
     found: list[dict[str, ReferenceLine]] = []
     for index in (0.0, 1.0):
         chosen = plan.marks["line"] == index
@@ -150,42 +153,31 @@ def _lines(plan: Plan, readings: Array) -> list[dict[str, ReferenceLine]]:
 
 
 def _join(first: Plan, second: Plan, plane: Plane) -> Plan:
-    """Put two plans one behind the other; the square may be turned, and each line has its zero."""
     n, m = first.readings, second.readings
     one, two = np.repeat([1.0, 0.0], [n, m]), np.repeat([0.0, 1.0], [n, m])
-    along = np.concatenate([first.marks["along_mm"], second.marks["along_mm"]])
-    travel = {
-        name: np.concatenate(
-            [plan.travel.get(name, np.zeros(plan.readings)) for plan in (first, second)]
-        )
-        for name in (*first.travel, *second.travel)
-    }
-    return Plan(
-        {
-            name: np.concatenate([first.coordinates[name], second.coordinates[name]])
-            for name in first.coordinates
-        },
+
+    def joined(name: str) -> dict[str, Array]:
+        parts = [getattr(first, name), getattr(second, name)]
+        none = [np.zeros(n), np.zeros(m)]
+        return {
+            key: np.concatenate(
+                [part.get(key, zero) for part, zero in zip(parts, none, strict=True)]
+            )
+            for key in {**parts[0], **parts[1]}
+        }
+
+    marks = joined("marks")
+    return build_plan(
+        joined("coordinates"),
         np.concatenate([first.point_mm, second.point_mm]),
-        travel,
-        np.arange(n + m),
         np.concatenate([first.direction, second.direction]),
-        np.full(n + m, -1),
-        np.ones(n + m),
-        np.full(n + m, np.inf),
-        {
-            "position_mm": np.concatenate(
-                [first.marks["position_mm"], second.marks["position_mm"]]
-            ),
-            "along_mm": along,
-            "gain_sign": np.full(n + m, plane.sign),
-            "way": np.concatenate([first.marks["way"], second.marks["way"]]),
-            "line": two,
-        },
-        {
+        place=f"{plane.first}{plane.second} · {first.place}",
+        marks={**marks, "gain_sign": np.full(n + m, plane.sign), "line": two},
+        travel=joined("travel"),
+        setup={
             f"zero_{plane.first}_um": one,
             f"zero_{plane.second}_um": two,
-            "turned_urad": (one - two) * along * 1e-3,
+            "turned_urad": (one - two) * marks["along_mm"] * 1e-3,
         },
-        f"{plane.first}{plane.second} · {first.place}",
-        (np.arange(n), np.arange(n, n + m)),
+        path=(np.arange(n), np.arange(n, n + m)),
     )

@@ -2,22 +2,20 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
-from warpspace.bench.base import BenchTest
+from warpspace.analysis.options import Option
+from warpspace.bench.base import BenchTest, bench_names, find_test
 from warpspace.bench.data import parse_table
-from warpspace.bench.options import TestOption, options_of
 from warpspace.bench.plan import Plan
 from warpspace.bench.readings import respond, simulate
-from warpspace.bench.registry import bench_names, find_test
-from warpspace.calibration.kinds.kind import Kind
-from warpspace.calibration.readings import Readings, check_spread
-from warpspace.calibration.table import ReadingTable
+from warpspace.calibration.kinds.kind import Guess, Kind
+from warpspace.calibration.readings import Readings, ReadingTable, check_spread
 from warpspace.exceptions import OptionError, UnknownNameError
-from warpspace.machine.errors import ErrorSet
 from warpspace.machine.limits import MAX_ERROR
+from warpspace.scene.files import parse_number
 from warpspace.scene.model import Scene
 from warpspace.units import MM_PER_UM, Array
 
@@ -28,15 +26,9 @@ NAMES = {RENAMED[name]: name for name in RENAMED}
 
 @dataclass(frozen=True, slots=True)
 class PlannedReadings(Readings):
-    """Readings along the path of a test.
+    """Readings along the path of a test."""
 
-    Attributes
-    ----------
-    plan : Plan or None
-        Always there.
-    """
-
-    plan: Plan | None = None
+    plan: Plan | None = None  # always there
 
 
 def test_kinds() -> tuple[str, ...]:
@@ -45,28 +37,17 @@ def test_kinds() -> tuple[str, ...]:
 
 
 class TestReadings(Kind):
-    """Readings of one test with its options, for instance ``circular:plane=XZ:radius=150``.
-
-    Parameters
-    ----------
-    text : str
-        Name of the test, and options with colons between.
-
-    Raises
-    ------
-    OptionError, UnknownNameError
-        If there is no such test or option.
-    """
+    """Readings of one test with its options, for instance ``circular:plane=XZ:radius=150``."""
 
     __test__ = False
-    own_columns: ClassVar[bool] = True
-    words: ClassVar[str] = "readings of a standard test (warpspace test --list)"
-    columns: ClassVar[str] = "those of warpspace test NAME --data FILE"
+    own_columns = True
+    words = "readings of a standard test (warpspace test --list)"
+    columns = "those of warpspace test NAME --data FILE"
 
     def __init__(self, text: str) -> None:
         given, *options = text.split(":")
         kind = find_test(RENAMED.get(given, given))
-        known = {option.flag.removeprefix("--"): option for option in options_of(kind)}
+        known = {option.flag.removeprefix("--"): option for option in kind.settings()}
         values: dict[str, Any] = {}
         for part in options:
             name, equals, value = part.partition("=")
@@ -90,15 +71,27 @@ class TestReadings(Kind):
         check_spread(float(np.abs(measured).max()) * MM_PER_UM, MAX_ERROR * 1e-3, own.source, hint)
         count = len(measured)
         lines = own.lines if len(own) == count else np.arange(2, count + 2)
+        found = self._readings(plan, measured, own.source, tuple(int(line) for line in lines))
+        return replace(found, notes=(*found.notes, *own.notes, *self.test.data_notes(own)))
+
+    def planned(self, scene: Scene) -> PlannedReadings:
+        """Lay the path of the test as it would be run; nothing is read yet."""
+        plan = self.test.plan(scene)
+        lines = tuple(range(1, plan.readings + 1))
+        return self._readings(plan, np.zeros(plan.readings), self._text, lines)
+
+    def _readings(
+        self, plan: Plan, read_um: Array, source: str, lines: tuple[int, ...]
+    ) -> PlannedReadings:
         return PlannedReadings(
             self._text,
             {name: values[plan.site] for name, values in plan.coordinates.items()},
             plan.point_mm[plan.site],
-            measured[:, None] * MM_PER_UM,
+            read_um[:, None] * MM_PER_UM,
             None,
-            (table.source,) * count,
-            tuple(int(line) for line in lines),
-            own.source,
+            (source,) * len(lines),
+            lines,
+            source,
             (f"{self.test.title}: {plan.place}",),
             plan=plan,
         )
@@ -112,37 +105,22 @@ class TestReadings(Kind):
         del readings
         return np.zeros(len(unknowns))
 
-    def observe(
-        self,
-        scene: Scene,
-        readings: Readings,
-        errors: ErrorSet,
-        unknowns: tuple[str, ...],
-        values: Array,
-    ) -> Array:
+    def observe(self, scene: Scene, readings: Readings, guess: Guess) -> Array:
         """Run the test on the model, and add what the set-up gives."""
-        machine = replace(scene, model=self.test.model(scene), errors=errors)
+        machine = replace(scene, model=self.test.model(scene), errors=guess.errors)
         taken = simulate(machine, _plan(readings)) * MM_PER_UM
-        return (taken + _set_up(readings, unknowns) @ values)[:, None]
+        return (taken + _set_up(readings, guess.unknowns) @ guess.values)[:, None]
 
     def slopes(
-        self,
-        scene: Scene,
-        readings: Readings,
-        errors: ErrorSet,
-        keys: tuple[str, ...],
-        unknowns: tuple[str, ...],
-        values: Array,
+        self, scene: Scene, readings: Readings, guess: Guess, keys: tuple[str, ...]
     ) -> tuple[Array, Array]:
         """Take the linear response of the test."""
-        del values
-        machine = replace(scene, model=self.test.model(scene), errors=errors)
+        machine = replace(scene, model=self.test.model(scene), errors=guess.errors)
         matrix = respond(machine, _plan(readings), keys).matrix * MM_PER_UM
-        return matrix[:, None, :], _set_up(readings, unknowns)[:, None, :]
+        return matrix[:, None, :], _set_up(readings, guess.unknowns)[:, None, :]
 
 
 def _plan(readings: Readings) -> Plan:
-    """Give the path of readings of a test."""
     plan = getattr(readings, "plan", None)
     if not isinstance(plan, Plan):
         raise OptionError(f"{readings.source}: expected readings of a test")
@@ -150,41 +128,23 @@ def _plan(readings: Readings) -> Plan:
 
 
 def _set_up(readings: Readings, unknowns: tuple[str, ...]) -> Array:
-    """Give what a unit of each unknown adds to each reading, [m, unknowns]."""
     own: Mapping[str, Array] = {
         f"{readings.source} {name}": column for name, column in _plan(readings).setup.items()
     }
     none = np.zeros(len(readings))
-    return (
-        np.stack([own.get(name, none) for name in unknowns], -1)
-        if unknowns
-        else none[:, None][:, :0]
-    )
+    columns = [own.get(name, none) for name in unknowns]
+    return np.stack(columns, -1) if columns else np.zeros((len(none), 0))
 
 
-def _value(option: TestOption, text: str, given: str) -> Any:
-    """Read the value of an option of a test.
-
-    Raises
-    ------
-    OptionError
-        If it cannot be read.
-    """
+def _value(option: Option, text: str, given: str) -> Any:
+    """Read the value of an option of a test; axes are looked at where the test is laid."""
     try:
-        if option.kind == "count":
-            return int(text)
-        if option.kind == "number":
-            return float(text)
-        if option.kind == "point":
+        if option.name == "at":
             parts = (part.partition("=") for part in text.split(",") if part)
-            return {name.strip().upper(): float(number) for name, _, number in parts}
-        if option.kind == "vector":
-            return tuple(float(part) for part in text.split(","))
+            return {name.strip().upper(): parse_number(number) for name, _, number in parts}
+        return option.read(text, None)
     except ValueError:
-        raise OptionError(
-            f"--kind {given!r}: {text!r} is no {option.kind} for {option.flag}"
-        ) from None
-    if option.kind == "choice" and text not in option.choices:
-        choices = ", ".join(option.choices)
-        raise OptionError(f"--kind {given!r}: {option.flag} {text!r}; expected one of {choices}")
-    return text
+        raise OptionError(f"{{kinds}} {given!r}: {text!r} is no point for {option.flag}") from None
+    except OptionError as error:
+        said = error.said(lambda _: option.flag)
+        raise OptionError(f"{{kinds}} {given!r}: {said}") from None

@@ -1,12 +1,12 @@
 """What every kind of measurement is and can: columns, readings, and what the model predicts."""
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from warpspace.calibration.readings import Readings
-from warpspace.calibration.table import ReadingTable
+from warpspace.calibration.readings import Readings, ReadingTable
 from warpspace.field.evaluate import View, build_basis, evaluate_exact
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import sort_axes
@@ -18,28 +18,27 @@ VIEW = View(Loop.RELATIVE, "workpiece")
 """How errors are looked at: the tool point relative to the workpiece, in its nominal frame."""
 
 
+@dataclass(frozen=True, slots=True)
+class Guess:
+    """What readings are predicted from: errors, and what the set-ups leave unknown."""
+
+    errors: ErrorSet
+    unknowns: tuple[str, ...]  # (m,)
+    values: Array  # [m], mm
+
+
 class Kind(ABC):
     """A kind of measurement.
 
     A reading is a function of the errors of the machine and of a few numbers that nobody knows:
     where a sphere or a station stands, by how much a session is shifted.
-
-    Attributes
-    ----------
-    name : str
-        As ``--kind`` takes it.
-    words : str
-        What it is, for lists and help.
-    columns : str
-        Columns of its file.
-    own_columns : bool
-        Whether it takes the text of the file, columns of words among them, rather than its table.
     """
 
+    name: ClassVar[str]  # as an option takes it
+    words: ClassVar[str]  # what it is, for lists and help
+    columns: ClassVar[str]  # of its file
+    # whether it takes the text of the file, columns of words among them, rather than its table
     own_columns: ClassVar[bool] = False
-    name: ClassVar[str]
-    words: ClassVar[str]
-    columns: ClassVar[str]
 
     @abstractmethod
     def fits(self, table: ReadingTable, scene: Scene) -> bool:
@@ -47,13 +46,7 @@ class Kind(ABC):
 
     @abstractmethod
     def read(self, table: ReadingTable, scene: Scene) -> Readings:
-        """Give the readings of a file.
-
-        Raises
-        ------
-        SceneError
-            If a column is missing or holds what cannot be.
-        """
+        """Give the readings of a file; refuse one that lacks a column or holds what cannot be."""
 
     @abstractmethod
     def unknowns(self, readings: Readings) -> tuple[str, ...]:
@@ -64,50 +57,14 @@ class Kind(ABC):
         """Give values of the unknowns to begin with, [m], mm."""
 
     @abstractmethod
-    def observe(
-        self,
-        scene: Scene,
-        readings: Readings,
-        errors: ErrorSet,
-        unknowns: tuple[str, ...],
-        values: Array,
-    ) -> Array:
-        """Give the readings that errors would lead to, with the exact model.
-
-        Parameters
-        ----------
-        scene : Scene
-        readings : Readings
-        errors : ErrorSet
-        unknowns : tuple of str, (m,)
-        values : ndarray, [m], mm
-
-        Returns
-        -------
-        ndarray, [n, d], mm
-        """
+    def observe(self, scene: Scene, readings: Readings, guess: Guess) -> Array:
+        """Give the readings that errors would lead to, with the exact model, [n, d], mm."""
 
     @abstractmethod
     def slopes(
-        self,
-        scene: Scene,
-        readings: Readings,
-        errors: ErrorSet,
-        keys: tuple[str, ...],
-        unknowns: tuple[str, ...],
-        values: Array,
+        self, scene: Scene, readings: Readings, guess: Guess, keys: tuple[str, ...]
     ) -> tuple[Array, Array]:
         """Differentiate the readings, to first order in the errors.
-
-        Parameters
-        ----------
-        scene : Scene
-        readings : Readings
-        errors : ErrorSet
-            Gives the curve of each parameter.
-        keys : tuple of str, (K,)
-        unknowns : tuple of str, (m,)
-        values : ndarray, [m], mm
 
         Returns
         -------
@@ -116,7 +73,7 @@ class Kind(ABC):
         """
 
     def automatic_keys(self, readings: Readings, scene: Scene) -> tuple[str, ...]:
-        """List the parameters that ``--fit auto`` looks for, the likelier first."""
+        """List the parameters that are looked for where none are named, the likelier first."""
         del readings
         return scene.parameter_keys
 
@@ -125,73 +82,31 @@ class FromVectors(Kind):
     """A kind whose readings follow from the error vectors at its poses."""
 
     @abstractmethod
-    def predict(
-        self, readings: Readings, error_mm: Array, unknowns: tuple[str, ...], values: Array
-    ) -> Array:
-        """Give the readings that errors would lead to.
-
-        Parameters
-        ----------
-        readings : Readings
-        error_mm : ndarray, [n, 3], mm
-        unknowns : tuple of str, (m,)
-        values : ndarray, [m], mm
-
-        Returns
-        -------
-        ndarray, [n, d], mm
-        """
+    def predict(self, readings: Readings, error_mm: Array, guess: Guess) -> Array:
+        """Give the readings, [n, d], mm, that errors, [n, 3], mm, would lead to."""
 
     @abstractmethod
-    def derivatives(
-        self, readings: Readings, error_mm: Array, unknowns: tuple[str, ...], values: Array
-    ) -> tuple[Array, Array]:
-        """Differentiate the prediction.
+    def derivatives(self, readings: Readings, error_mm: Array, guess: Guess) -> tuple[Array, Array]:
+        """Differentiate the prediction: by the error, [n, d, 3], and by unknowns, [n, d, m]."""
 
-        Parameters
-        ----------
-        readings : Readings
-        error_mm : ndarray, [n, 3], mm
-        unknowns : tuple of str, (m,)
-        values : ndarray, [m], mm
-
-        Returns
-        -------
-        by_error : ndarray, [n, d, 3]
-        by_unknown : ndarray, [n, d, m]
-        """
-
-    def observe(
-        self,
-        scene: Scene,
-        readings: Readings,
-        errors: ErrorSet,
-        unknowns: tuple[str, ...],
-        values: Array,
-    ) -> Array:
+    def observe(self, scene: Scene, readings: Readings, guess: Guess) -> Array:
         """Evaluate the errors, and predict."""
-        return self.predict(readings, _error_mm(scene, readings, errors), unknowns, values)
+        return self.predict(readings, _error_mm(scene, readings, guess), guess)
 
     def slopes(
-        self,
-        scene: Scene,
-        readings: Readings,
-        errors: ErrorSet,
-        keys: tuple[str, ...],
-        unknowns: tuple[str, ...],
-        values: Array,
+        self, scene: Scene, readings: Readings, guess: Guess, keys: tuple[str, ...]
     ) -> tuple[Array, Array]:
         """Put what an error does to a reading behind what a parameter does to the error."""
-        error_mm = _error_mm(scene, readings, errors)
-        by_error, by_unknown = self.derivatives(readings, error_mm, unknowns, values)
-        basis = build_basis(scene.model, errors, keys, readings.coordinates, VIEW)
+        error_mm = _error_mm(scene, readings, guess)
+        by_error, by_unknown = self.derivatives(readings, error_mm, guess)
+        basis = build_basis(scene.model, guess.errors, keys, readings.coordinates, VIEW)
         gains = np.einsum("ndx,knx->ndk", by_error, basis.position) * MM_PER_UM
         return gains, by_unknown
 
 
-def _error_mm(scene: Scene, readings: Readings, errors: ErrorSet) -> Array:
+def _error_mm(scene: Scene, readings: Readings, guess: Guess) -> Array:
     """Evaluate the error at the poses of readings, exactly, [n, 3], mm."""
-    field = evaluate_exact(scene.model, errors, readings.coordinates, VIEW)
+    field = evaluate_exact(scene.model, guess.errors, readings.coordinates, VIEW)
     return field.error_um * MM_PER_UM
 
 
@@ -215,22 +130,16 @@ class Placed(FromVectors):
         total = np.einsum("ndm,nd->m", member, readings.observed_mm)
         return total / np.maximum(member.sum(axis=(0, 1)), 1.0)
 
-    def predict(
-        self, readings: Readings, error_mm: Array, unknowns: tuple[str, ...], values: Array
-    ) -> Array:
+    def predict(self, readings: Readings, error_mm: Array, guess: Guess) -> Array:
         """Add ± the error to the place."""
-        return self.sign * error_mm + self._members(readings, unknowns) @ values
+        return self.sign * error_mm + self._members(readings, guess.unknowns) @ guess.values
 
-    def derivatives(
-        self, readings: Readings, error_mm: Array, unknowns: tuple[str, ...], values: Array
-    ) -> tuple[Array, Array]:
+    def derivatives(self, readings: Readings, error_mm: Array, guess: Guess) -> tuple[Array, Array]:
         """Give ± one, and which place a reading belongs to."""
-        del error_mm, values
-        by_error = np.broadcast_to(self.sign * np.eye(3), (len(readings), 3, 3))
-        return by_error, self._members(readings, unknowns)
+        by_error = np.broadcast_to(self.sign * np.eye(3), (*error_mm.shape, 3))
+        return by_error, self._members(readings, guess.unknowns)
 
     def _head(self, session: str) -> str:
-        """Name the place of a session."""
         return f"{self.place} {session}".strip()
 
     def _members(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:

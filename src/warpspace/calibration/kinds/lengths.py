@@ -1,20 +1,18 @@
 """Lengths from stations whose places nobody knows (multilateration)."""
 
-from typing import ClassVar
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
-from warpspace.calibration.kinds.kind import FromVectors
-from warpspace.calibration.kinds.points import nominal_tip
+from warpspace.calibration.kinds.kind import FromVectors, Guess
 from warpspace.calibration.readings import (
     Readings,
+    ReadingTable,
     axis_columns,
     check_poses,
-    uncertainties_mm,
+    take_readings,
 )
-from warpspace.calibration.table import ReadingTable
 from warpspace.exceptions import SceneError
 from warpspace.scene.model import Scene
 from warpspace.units import Array
@@ -27,11 +25,9 @@ LEAST = 5
 class Lengths(FromVectors):
     """Distances between the tool point and stations, each with an unknown place and dead path."""
 
-    name: ClassVar[str] = "lengths"
-    words: ClassVar[str] = "lengths from unknown stations to the tool point (tracking laser)"
-    columns: ClassVar[str] = (
-        "an axis position each (x_mm, b_deg, …), length_mm; session names the station; u_um"
-    )
+    name = "lengths"
+    words = "lengths from unknown stations to the tool point (tracking laser)"
+    columns = "an axis position each (x_mm, b_deg, …), length_mm; session names the station; u_um"
 
     def fits(self, table: ReadingTable, scene: Scene) -> bool:
         """Look for lengths."""
@@ -49,17 +45,8 @@ class Lengths(FromVectors):
             if count < LEAST:
                 found = f"station {name!r} has {count} lengths"
                 raise SceneError(table.source, [f"{found}; expected at least {LEAST}"])
-        return Readings(
-            self.name,
-            coordinates,
-            nominal_tip(scene, coordinates),
-            observed,
-            uncertainties_mm(table),
-            labels,
-            table.lines,
-            table.source,
-            notes,
-        )
+        found = take_readings(self.name, scene, table, coordinates, observed, notes)
+        return replace(found, session=labels)
 
     def unknowns(self, readings: Readings) -> tuple[str, ...]:
         """Name place and dead path of each station."""
@@ -79,27 +66,27 @@ class Lengths(FromVectors):
             values[at : at + 4] = _locate(readings.nominal_mm[mine], readings.observed_mm[mine, 0])
         return values
 
-    def predict(
-        self, readings: Readings, error_mm: Array, unknowns: tuple[str, ...], values: Array
-    ) -> Array:
+    def predict(self, readings: Readings, error_mm: Array, guess: Guess) -> Array:
         """Take the distance, less the dead path."""
-        at = self._stations(readings, unknowns)
-        away = readings.nominal_mm + error_mm - _places(values, at)
-        return (np.linalg.norm(away, axis=-1) - values[at + 3])[:, None]
+        at, away = self._beams(readings, error_mm, guess)
+        return (np.linalg.norm(away, axis=-1) - guess.values[at + 3])[:, None]
 
-    def derivatives(
-        self, readings: Readings, error_mm: Array, unknowns: tuple[str, ...], values: Array
-    ) -> tuple[Array, Array]:
+    def derivatives(self, readings: Readings, error_mm: Array, guess: Guess) -> tuple[Array, Array]:
         """Give the direction of the beam."""
-        at = self._stations(readings, unknowns)
-        away = readings.nominal_mm + error_mm - _places(values, at)
+        at, away = self._beams(readings, error_mm, guess)
         beam = away / np.linalg.norm(away, axis=-1, keepdims=True)
-        by_unknown = np.zeros((len(readings), 1, len(unknowns)))
+        by_unknown = np.zeros((len(readings), 1, len(guess.unknowns)))
         rows = np.arange(len(readings))
         for component in range(3):
             by_unknown[rows, 0, at + component] = -beam[:, component]
         by_unknown[rows, 0, at + 3] = -1.0
         return beam[:, None, :], by_unknown
+
+    def _beams(self, readings: Readings, error_mm: Array, guess: Guess) -> tuple[Indices, Array]:
+        """Give where the unknowns of stations begin, [n], and the way from there, [n, 3], mm."""
+        at = self._stations(readings, guess.unknowns)
+        places = np.stack([guess.values[at + component] for component in range(3)], -1)
+        return at, readings.nominal_mm + error_mm - places
 
     def _stations(self, readings: Readings, unknowns: tuple[str, ...]) -> Indices:
         """Give where the unknowns of each reading's station begin, [n]."""
@@ -107,13 +94,10 @@ class Lengths(FromVectors):
         return np.array([index[f"station {name} x"] for name in readings.session], np.intp)
 
 
-def _places(values: Array, at: Indices) -> Array:
-    """Collect the places of stations, [n, 3], mm."""
-    return np.stack([values[at + component] for component in range(3)], -1)
-
-
 def _locate(points_mm: Array, length_mm: Array) -> Array:
     """Find a station that has given lengths to points: place and dead path, [4], mm."""
+    from scipy.optimize import least_squares
+
     middle = points_mm.mean(axis=0)
     reach = max(float(np.ptp(points_mm, axis=0).max()), float(np.ptp(length_mm)), 1.0)
 

@@ -1,73 +1,153 @@
 """Error vectors at points of the working volume, as a laser tracker or an artefact gives them."""
 
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 
 from warpspace.calibration.kinds.kind import Placed
 from warpspace.calibration.readings import (
+    FRAMES,
     Readings,
+    ReadingTable,
     axis_columns,
     check_poses,
     check_spread,
-    sessions,
-    uncertainties_mm,
+    take_readings,
 )
-from warpspace.calibration.table import ReadingTable
+from warpspace.exceptions import SceneError
 from warpspace.kinematics import transforms
-from warpspace.kinematics.chain import branch_pose, nominal_point
-from warpspace.kinematics.model import Loop
+from warpspace.kinematics.chain import branch_pose
 from warpspace.machine.limits import MAX_ERROR
 from warpspace.scene.model import Scene
-from warpspace.units import Array
+from warpspace.units import MM_PER_UM, Array
 
-VECTORS = (("ex_um", "ey_um", "ez_um"), ("ex_mm", "ey_mm", "ez_mm"))
+_COLUMN = re.compile(
+    r"(?:e(?P<short>[xyz])|error_(?P<loop>(?:tool|workpiece|relative)(?:_placed|_referenced)?))"
+    r"(?:_(?P<frame>[rw]))?(?:_(?P<long>[xyz]))?_(?P<unit>um|mm)"
+)
 
 
 class Points(Placed):
-    """Errors actual − nominal at axis positions; a session that is named has its own shift."""
+    """Errors actual − nominal at axis positions; a session that is named has its own shift.
 
-    name: ClassVar[str] = "points"
-    words: ClassVar[str] = "error vectors at points, tool relative to workpiece"
-    columns: ClassVar[str] = (
-        "an axis position each (x_mm, b_deg, …), ex_um, ey_um, ez_um (or _mm); u_um, session"
+    Readings are kept in the workpiece frame, whichever they were taken in.
+    """
+
+    name = "points"
+    words = "error vectors at points, tool relative to workpiece"
+    columns = (
+        "an axis position each (x_mm, b_deg, …), ex_um, ey_um, ez_um (or _mm; ex_R_um in the"
+        " machine frame R, ex_w_um in that of the workpiece); u_um, session"
     )
-    place: ClassVar[str] = "shift"
-    sign: ClassVar[float] = 1.0
+    loops: ClassVar[tuple[str, ...]] = ("relative",)
+    place = "shift"
+    sign = 1.0
 
     def fits(self, table: ReadingTable, scene: Scene) -> bool:
         """Look for the error vectors."""
         del scene
-        return any(set(names) <= set(table.columns) for names in VECTORS)
+        return _vectors(table) is not None
 
     def read(self, table: ReadingTable, scene: Scene) -> Readings:
         """Take positions of any axes, and the three components of the error."""
-        in_mm = "ex_mm" in table.columns
-        observed = table.need(VECTORS[in_mm]) * (1.0 if in_mm else 1e-3)
+        columns, loop, told = _vectors(table) or (("ex_um", "ey_um", "ez_um"), None, None)
+        observed = table.need(columns) * (1.0 if columns[0].endswith("_mm") else 1e-3)
+        if loop not in (None, *self.loops) and (
+            loop != "tool" or scene.machine.branch("workpiece")
+        ):
+            found = (
+                f"has column {columns[0]}; expected errors of field --loop relative, no reference"
+            )
+            raise SceneError(table.source, [f"{found} held (with --placed: --kind tracker)"])
+        if told and table.frame and told != table.frame:
+            found = f"has column {columns[0]}, so its vectors are in the {told} frame"
+            raise SceneError(table.source, [f"{found}; expected no --frame {table.frame}"])
         axes = tuple(scene.machine.axes)
         coordinates, notes = axis_columns(table, scene, axes)
+        frame = told or table.frame or "workpiece"
+        if frame == "machine":
+            observed = transforms.rotate(_from_machine(scene, coordinates), observed)
         check_poses(coordinates, table.source)
         hint = "Are the errors in the unit that their columns name?"
         check_spread(float(np.abs(observed).max()), MAX_ERROR * 1e-3, table.source, hint)
-        return Readings(
-            self.name,
-            coordinates,
-            nominal_tip(scene, coordinates),
-            observed,
-            uncertainties_mm(table),
-            sessions(table),
-            table.lines,
-            table.source,
-            notes,
-        )
+        readings = take_readings(self.name, scene, table, coordinates, observed, notes)
+        readings = replace(readings, frame=frame)
+        if told or table.frame or in_other_frame(scene, readings) is None:
+            return readings
+        note = f"{Path(table.source).name}: vectors are taken in the workpiece frame"
+        return replace(readings, notes=(*notes, note))
 
     def unknowns(self, readings: Readings) -> tuple[str, ...]:
         """Name a shift per session where the file names sessions."""
         return super().unknowns(readings) if any(readings.session) else ()
 
 
-def nominal_tip(scene: Scene, coordinates: dict[str, Array]) -> Array:
-    """Give the nominal tool point in the workpiece frame, [n, 3], mm."""
-    model = scene.model
-    tip = nominal_point(model, Loop.TOOL, coordinates)
-    return transforms.apply(transforms.inverse(branch_pose(model, "workpiece", coordinates)), tip)
+class Tracker(Points):
+    """Error vectors in the coordinates of an instrument whose place nobody knows: six numbers."""
+
+    name = "tracker"
+    words = (
+        "error vectors of a tracker whose place and turn are unknown in each session; turns in mrad"
+    )
+    loops = ("relative", "relative_placed")
+    place = "tracker"
+
+    def fits(self, table: ReadingTable, scene: Scene) -> bool:
+        """Say no: its columns are those of points."""
+        del table, scene
+        return False
+
+    def unknowns(self, readings: Readings) -> tuple[str, ...]:
+        """Name a shift and a turn per session."""
+        names = dict.fromkeys(name[:-2] for name in Placed.unknowns(self, readings))
+        return tuple(f"{name} {at}{x}" for name in names for at in ("", "turn ") for x in "xyz")
+
+    def start(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:
+        """Begin with none."""
+        del readings
+        return np.zeros(len(unknowns))
+
+    def _members(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:
+        """Tell what a unit of each unknown adds to each component, [n, 3, m]."""
+        member = super()._members(readings, unknowns)
+        heads = np.array([self._head(session) for session in readings.session])
+        for at, name in enumerate(unknowns):
+            head, turn, letter = name.partition(" turn ")
+            if turn:
+                lever_m = readings.nominal_mm * MM_PER_UM
+                turned = np.cross(np.eye(3)["xyz".index(letter)], lever_m)
+                member[:, :, at] = np.where((heads == head)[:, None], turned, 0.0)
+        return member
+
+
+def _vectors(table: ReadingTable) -> tuple[tuple[str, ...], str | None, str | None] | None:
+    found: dict[tuple[str | None, ...], dict[str, str]] = {}
+    for column in table.columns:
+        told = _COLUMN.fullmatch(column)
+        if told and bool(told["short"]) != bool(told["long"]):
+            group = told["loop"], told["frame"], told["unit"]
+            found.setdefault(group, {})[told["short"] or told["long"]] = column
+    for (loop, frame, _), columns in found.items():
+        if len(columns) == 3:
+            names = tuple(columns[letter] for letter in "xyz")
+            return names, loop, next((word for word in FRAMES if FRAMES[word] == frame), None)
+    return None
+
+
+def _from_machine(scene: Scene, coordinates: Mapping[str, Array]) -> Array:
+    """Give the rotations that turn vectors from R into the workpiece frame, [n, 3, 3]."""
+    return np.swapaxes(branch_pose(scene.model, "workpiece", coordinates)[..., :3, :3], -1, -2)
+
+
+def in_other_frame(scene: Scene, readings: Readings) -> Readings | None:
+    """Take vectors as if they were read in the other frame; None where that is the same."""
+    turn, was_machine = _from_machine(scene, readings.coordinates), readings.frame == "machine"
+    if not readings.frame or np.abs(turn - np.eye(3)).max() < 1e-9:
+        return None
+    turn = np.swapaxes(turn, -1, -2) if was_machine else turn
+    observed = transforms.rotate(turn, readings.observed_mm)
+    return replace(readings, observed_mm=observed, frame="workpiece" if was_machine else "machine")

@@ -6,27 +6,20 @@ from functools import lru_cache
 from warpspace.calibration.kinds.bench import TestReadings, test_kinds
 from warpspace.calibration.kinds.kind import Kind
 from warpspace.calibration.kinds.lengths import Lengths
-from warpspace.calibration.kinds.points import Points
-from warpspace.calibration.kinds.sphere import Sphere
-from warpspace.calibration.kinds.sphere_tcp import SphereTcp
-from warpspace.calibration.table import ReadingTable
+from warpspace.calibration.kinds.points import Points, Tracker
+from warpspace.calibration.kinds.spheres import Sphere, SphereTcp
+from warpspace.calibration.readings import ReadingTable
 from warpspace.exceptions import SceneError, UnknownNameError
 from warpspace.scene.model import Scene
 
 KINDS: Mapping[str, Kind] = {
-    kind.name: kind for kind in (Points(), Sphere(), SphereTcp(), Lengths())
+    kind.name: kind for kind in (Points(), Tracker(), Sphere(), SphereTcp(), Lengths())
 }
 """By name."""
 
 
 def find_kind(name: str) -> Kind:
-    """Look up a kind: one of this table, or a test with its options (``circular:plane=XZ``).
-
-    Raises
-    ------
-    UnknownNameError
-        If there is none of that name.
-    """
+    """Look up a kind: one of this table, or a test with its options (``circular:plane=XZ``)."""
     if name in KINDS:
         return KINDS[name]
     tests = test_kinds()
@@ -37,18 +30,11 @@ def find_kind(name: str) -> Kind:
 
 @lru_cache(maxsize=256)
 def _test_kind(text: str) -> Kind:
-    """Build the kind of a test with its options."""
     return TestReadings(text)
 
 
 def recognise(table: ReadingTable, scene: Scene) -> Kind:
-    """Tell the kind of a file by its columns.
-
-    Raises
-    ------
-    SceneError
-        If no kind has such columns.
-    """
+    """Tell the kind of a file by its columns."""
     found = next((kind for kind in KINDS.values() if kind.fits(table, scene)), None)
     if found is None:
         there = ", ".join((*table.labels, *table.columns))

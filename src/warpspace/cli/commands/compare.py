@@ -1,28 +1,29 @@
 """Command `compare`: two scenes and their difference."""
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from warpspace.cli.figure_options import draw_figure_file, figure_options, parse_settings
-from warpspace.cli.file_options import check_output, output_option
-from warpspace.cli.options import json_option, print_json, scene_argument
-from warpspace.cli.progress import progress
-from warpspace.cli.tables import Column, number_columns, print_table, print_text
-from warpspace.cli.terminal import echo
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from warpspace.analysis.statistics import Statistics
-    from warpspace.scene.model import Scene
+from warpspace.cli.analyses import print_blocks
+from warpspace.cli.options import (
+    FIGURES,
+    draw_figure_file,
+    figure_options,
+    json_option,
+    output_option,
+    parse_settings,
+    print_json,
+    say_first_order,
+    scene_argument,
+)
+from warpspace.cli.tables import echo, print_text, progress
 
 
 @click.command()
 @scene_argument("first", metavar="A")
 @scene_argument("second", metavar="B")
-@output_option("Draw both and their difference: .png, .svg or .pdf.", required=False)
+@output_option("Draw both and their difference: .png, .svg or .pdf.", *FIGURES, required=False)
 @figure_options()
 @json_option
 def compare(
@@ -31,6 +32,7 @@ def compare(
     output: str | None,
     direction: str | None,
     *,
+    placed: bool,
     force: bool,
     as_json: bool,
     **options: Any,
@@ -43,23 +45,23 @@ def compare(
     and one exaggeration.
     """
     from warpspace.analysis.statistics import statistics
-    from warpspace.outputs.drawing.style import FIGURE_ENDINGS
-    from warpspace.picture.comparison import scene_change, statistics_change
+    from warpspace.picture.comparison import scene_change, statistics_blocks, statistics_change
     from warpspace.picture.scene_picture import evaluate_picture
     from warpspace.scene.library import load_scene
-    from warpspace.scene.pipeline import in_direction
+    from warpspace.scene.model import in_direction, placed_in
 
-    target = None
-    if output is not None:
-        target = check_output(output, FIGURE_ENDINGS, force=force, scenes=[first, second])
     settings = parse_settings(**options)
-    scenes = [in_direction(load_scene(name), direction) for name in (first, second)]
+    scenes = [
+        placed_in(in_direction(load_scene(name), direction), settings.loop, placed=placed)
+        for name in (first, second)
+    ]
     with progress("evaluating", silent=as_json):
         pictures = [evaluate_picture(s, grid=settings.grid, loop=settings.loop) for s in scenes]
     compared = [*pictures, scene_change(pictures[0], pictures[1])]
+    say_first_order(settings.loop, *scenes)
     found = [picture.statistics for picture in compared]
-    if target is not None:
-        draw_figure_file("comparison", scenes, settings, target, force=force, silent=as_json)
+    if output is not None:
+        draw_figure_file("comparison", scenes, settings, output, force=force, silent=as_json)
     if as_json:
         names = ("a", "b", "difference")
         nodes = [statistics(picture.field, picture.grid.coordinates) for picture in compared]
@@ -73,41 +75,8 @@ def compare(
             }
         )
         return
-    _print(scenes, found)
-    if output is not None:
-        echo(f"wrote {output}")
-
-
-def _print(scenes: "Sequence[Scene]", found: "Sequence[Statistics]") -> None:
-    """Print the statistics of A, B, their change, and those of the length of the change."""
-    from warpspace.picture.comparison import (
-        CHANGE,
-        DIFFERENCE_LENGTH,
-        STATISTICS,
-        statistics_change,
-    )
-    from warpspace.picture.coordinates import own_axes, spell_at, spell_point
-
     for letter, scene in zip("AB", scenes, strict=True):
         print_text(f"{letter}  {scene.name}: {scene.title}")
-    change = statistics_change(found[0], found[1])
-    columns = (
-        Column("|E|", leads=True),
-        *number_columns(("A", "B", CHANGE, DIFFERENCE_LENGTH), "µm"),
-    )
-    rows = [
-        (
-            name,
-            f"{getattr(found[0], key):.2f}",
-            f"{getattr(found[1], key):.2f}",
-            f"{change[key]:+.2f}",
-            f"{getattr(found[2], key):.2f}",
-        )
-        for name, key in STATISTICS.items()
-    ]
-    print_table(columns, rows)
-    for name, part in zip(("A", "B", DIFFERENCE_LENGTH), found, strict=True):
-        if part.max_um > 0.0:
-            worst = own_axes(scenes[0], part.max_at_axes)
-            print_text(f"  max of {name} at {spell_point(worst, part.max_at_mm)} mm")
-            print_text(f"  --at {spell_at(worst)}")
+    print_blocks(statistics_blocks(scenes[0], "AB", found))
+    if output is not None:
+        echo(f"wrote {output}")

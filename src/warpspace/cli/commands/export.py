@@ -1,31 +1,36 @@
 """Command `export`: the deformed scene or its field, for other programs and for a browser."""
 
+from pathlib import Path
+
 import click
 
 from warpspace.cli.exports import export_formats, write_export
-from warpspace.cli.file_options import check_output, force_option, output_option, size_text
 from warpspace.cli.options import (
     component_option,
     direction_option,
     exaggeration_option,
+    force_option,
     grid_option,
     loop_option,
+    output_option,
     parse_exaggeration,
+    say_first_order,
     scene_argument,
+    size_text,
 )
-from warpspace.cli.progress import progress
-from warpspace.cli.tables import print_text
-from warpspace.cli.terminal import echo
+from warpspace.cli.tables import echo, print_text, progress
 
 
 def _formats_help() -> str:
-    """Say which endings there are, and what each is for."""
     return ", ".join(f"{form.ending} ({form.about})" for form in export_formats())
 
 
 @click.command()
 @scene_argument()
-@output_option(f"File to write: {_formats_help()}.")
+@output_option(
+    f"File to write: {_formats_help()}.",
+    added=lambda: [form.ending for form in export_formats()],
+)
 @exaggeration_option
 @grid_option()
 @component_option
@@ -46,15 +51,12 @@ def export(
     """Write SCENE into a file for other programs.
 
     The ending of FILE chooses the format. Every format carries the scene, the settings, the display
-    factor and the program's version. `warpspace view FILE.vts` shows a stored field again.
+    factor and the program's version.
     """
     from warpspace.picture.scene_picture import evaluate_picture
     from warpspace.scene.library import load_scene
-    from warpspace.scene.pipeline import in_direction
+    from warpspace.scene.model import in_direction
 
-    target = check_output(
-        output, [form.ending for form in export_formats()], force=force, scenes=[scene]
-    )
     with progress("writing"):
         picture = evaluate_picture(
             in_direction(load_scene(scene), direction),
@@ -63,13 +65,14 @@ def export(
             loop=loop,
             component=component,
         )
-        write_export(picture, target, overwrite=force)
-    kind = next(form for form in export_formats() if form.ending == target.suffix.lower())
+        write_export(picture, Path(output), overwrite=force)
+    kind = next(form for form in export_formats() if form.ending == Path(output).suffix.lower())
     if kind.left_out:
-        echo(f"{output}: {picture.scene.machine.title}, {size_text(target)}")
+        echo(f"{output}: {picture.scene.machine.title}, {size_text(output)}")
         print_text(f"  {kind.left_out}")
         return
+    say_first_order(loop, picture.scene)
     echo(
         f"{output}: {picture.scene.title}, displacement drawn ×{picture.exaggeration:g},"
-        f" {size_text(target)}"
+        f" {size_text(output)}"
     )

@@ -1,38 +1,35 @@
 """Command `field`: errors at points, or over the grid of the working volume."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from warpspace.cli.file_options import (
-    check_output,
-    check_targets,
-    csv_option,
-    force_option,
-    output_option,
-    size_text,
-)
+from warpspace.analysis.blocks import Column, Table, number_columns
+from warpspace.cli.analyses import print_blocks
 from warpspace.cli.options import (
     at_option,
+    csv_option,
     direction_option,
+    force_option,
     grid_option,
     json_option,
     loop_option,
+    output_option,
     parse_point,
+    placed_option,
+    say_second_order,
     scene_argument,
+    size_text,
     spell_json,
     warn_outside_travel,
 )
-from warpspace.cli.progress import progress
-from warpspace.cli.tables import Column, number_columns, print_table, print_text
+from warpspace.cli.tables import print_text, progress
 from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
     from warpspace.analysis.uncertain import FieldUncertainty
-    from warpspace.field.basis import ErrorField
-    from warpspace.field.evaluate import View
+    from warpspace.field.evaluate import ErrorField, View
     from warpspace.field.grid import Grid
     from warpspace.scene.model import Scene
     from warpspace.units import Array
@@ -42,11 +39,15 @@ POINTS_AT_ONCE = 5000
 """Points that are turned into JSON at a time."""
 
 
+FIELDS = (".parquet", ".npz", ".csv", ".vts")
+
+
 @click.command()
 @scene_argument()
 @at_option
 @grid_option(None)
 @loop_option
+@placed_option
 @direction_option
 @click.option(
     "--uncertainty",
@@ -64,7 +65,9 @@ POINTS_AT_ONCE = 5000
 )
 @csv_option
 @output_option(
-    "Write all points to this file: .parquet, .npz, .csv or, of a grid, .vts.", required=False
+    "Write all points to this file: .parquet, .npz, .csv or, of a grid, .vts.",
+    *FIELDS,
+    required=False,
 )
 @force_option
 @json_option
@@ -80,6 +83,7 @@ def field(
     *,
     force: bool,
     exact: bool,
+    placed: bool,
     uncertain: bool,
     as_json: bool,
 ) -> None:
@@ -91,26 +95,29 @@ def field(
     from dataclasses import asdict
 
     from warpspace.analysis.statistics import statistics, volume_statistics
-    from warpspace.picture.coordinates import own_axes, spell_at, spell_point
-    from warpspace.picture.words import direction_words
+    from warpspace.field.evaluate import placed_words
+    from warpspace.picture.words import direction_words, own_axes, spell_at, spell_point
     from warpspace.scene.library import load_scene
-    from warpspace.scene.pipeline import choose_view, in_direction
+    from warpspace.scene.model import choose_view, in_direction, placed_in, second_order
 
     if points and grid is not None:
         raise OptionError("--at and --grid exclude each other; give one of them")
-    check_targets(scene, force=force, csv_path=csv_path)
-    if output is not None:
-        _check_output(output, scene, force=force, points=bool(points))
-    loaded = in_direction(load_scene(scene), direction)
+    if points and output is not None and output.lower().endswith(".vts"):
+        others = ", ".join(ending for ending in FIELDS if ending != ".vts")
+        raise OptionError(
+            f"{output}: a .vts file holds a grid, --at gives points; expected {others}"
+        )
+    loaded = placed_in(in_direction(load_scene(scene), direction), loop, placed=placed)
     view = choose_view(loaded, loop, frame)
     spread = None
     with progress("evaluating", silent=as_json):
         axes, result, nodes = _evaluate(loaded, points, grid, view, exact=exact)
+        places = axes if points else None
         if uncertain:
-            from warpspace.scene.uncertainty import evaluate_uncertainty
+            from warpspace.analysis.uncertain import evaluate_uncertainty
 
-            at = axes if points else None
-            spread = evaluate_uncertainty(loaded, at=at, grid=grid, loop=loop, frame=frame)
+            spread = evaluate_uncertainty(loaded, at=places, grid=grid, loop=loop, frame=frame)
+        said = {} if exact else say_second_order(second_order(loaded, loop, at=places))
         plain = statistics(result, axes)
         summary = plain if nodes is None else volume_statistics(result, nodes)
     files = [path for path in (csv_path, output) if path is not None]
@@ -122,12 +129,10 @@ def field(
         with progress("writing", silent=as_json):
             for path in files:
                 write_field(FieldRecord(axes, result, about, spread), path, overwrite=force)
-    if spread is not None:
-        from warpspace.scene.uncertainty import flat_uncertainty
-
-        spread = flat_uncertainty(spread)
     if as_json:
-        found = {"statistics": asdict(summary)}
+        found: dict[str, object] = {"loop": loop, "frame": frame, "statistics": asdict(summary)}
+        found |= {} if view.placed_over is None else {"placement": "fitted out"}
+        found |= said if view.reference is None else {**said, "reference": dict(view.reference)}
         if nodes is not None:
             found["statistics_nodes"] = asdict(plain)
         if output is not None:
@@ -136,7 +141,8 @@ def field(
             return
         _print_json(axes, result, found, spread)
         return
-    words = (f"{loop} loop", *direction_words(loaded), "exact" if exact else "first order")
+    told = (*direction_words(loaded), *placed_words(view))
+    words = (f"{loop} loop", *told, "exact" if exact else "first order")
     print_text(" · ".join((loaded.title, *words)))
     if points:
         units = [loaded.machine.axes[name].unit for name in axes]
@@ -157,30 +163,17 @@ def field(
     print_text(f"  max at {spell_point(worst, summary.max_at_mm)} mm")
     print_text(f"  --at {spell_at(worst)}")
     for path in files:
-        print_text(f"  {path}: {size_text(Path(path))}")
-
-
-def _check_output(output: str, scene: str, *, force: bool, points: bool) -> None:
-    """Refuse a file that cannot be written, or cannot hold what it is to hold."""
-    from warpspace.outputs.exports.fields import FIELD_ENDINGS, GRID_ENDINGS
-
-    target = check_output(output, FIELD_ENDINGS, force=force, scenes=(scene,))
-    if points and target.suffix.lower() in GRID_ENDINGS:
-        others = ", ".join(ending for ending in FIELD_ENDINGS if ending not in GRID_ENDINGS)
-        raise OptionError(
-            f"{output}: a {target.suffix} file holds a grid, --at gives points; expected {others}"
-        )
+        print_text(f"  {path}: {size_text(path)}")
 
 
 def _evaluate(
     scene: "Scene", points: tuple[str, ...], grid: int | None, view: "View", *, exact: bool
 ) -> "tuple[Mapping[str, Array], ErrorField, Grid | None]":
-    """Evaluate at the points given or over the grid; axis positions broadcast to the field."""
     import numpy as np
 
     from warpspace.field.grid import DEFAULT_NODES, build_grid
     from warpspace.kinematics.model import complete_coordinates
-    from warpspace.scene.pipeline import evaluate, evaluate_grid
+    from warpspace.scene.model import evaluate, evaluate_grid
 
     if points:
         typed = [parse_point(text, scene.machine.axes) for text in points]
@@ -200,63 +193,42 @@ def _evaluate(
 def _print_json(
     axes: "Mapping[str, Array]",
     result: "ErrorField",
-    found: "Mapping[str, Mapping[str, object]]",
+    found: "Mapping[str, object]",
     spread: "FieldUncertainty | None",
 ) -> None:
     """Print the JSON object piece by piece: a million points are never held as one text."""
     import numpy as np
 
-    from warpspace.field.basis import ErrorField
-
-    arrays = (result.nominal_mm, result.error_um, result.norm_um, result.orientation_urad)
-    if not all(np.isfinite(values).all() for values in arrays):
-        raise OptionError("the field has points whose error is no number; JSON cannot hold them")
-    click.echo('{"points": [', nl=False)
-    nominal, error, orientation = (
-        values.reshape(-1, 3)
-        for values in (result.nominal_mm, result.error_um, result.orientation_urad)
-    )
-    positions = {
-        name: np.broadcast_to(values, result.norm_um.shape).reshape(-1)
-        for name, values in axes.items()
+    columns = {
+        "nominal_mm": result.nominal_mm,
+        "error_um": result.error_um,
+        "norm_um": result.norm_um,
+        "orientation_urad": result.orientation_urad,
     }
-    for start in range(0, result.norm_um.size, POINTS_AT_ONCE):
+    if not all(np.isfinite(values).all() for values in columns.values()):
+        raise OptionError("the field has points whose error is no number; JSON cannot hold them")
+    if spread is not None:
+        columns |= {
+            "uncertainty_um": spread.error_um,
+            "uncertainty_norm_um": spread.norm_um,
+            "uncertainty_urad": spread.orientation_urad,
+        }
+    shape, size = result.norm_um.shape, result.norm_um.size
+    positions = [np.broadcast_to(values, shape).reshape(-1) for values in axes.values()]
+    flat = [values.reshape(size, *values.shape[len(shape) :]) for values in columns.values()]
+    click.echo('{"points": [', nl=False)
+    for start in range(0, size, POINTS_AT_ONCE):
         part = slice(start, start + POINTS_AT_ONCE)
-        rows = _rows(
-            {name: values[part] for name, values in positions.items()},
-            ErrorField(nominal[part], error[part], orientation[part]),
-        )
-        if spread is not None:
-            for index, row in enumerate(rows, start=start):
-                row["uncertainty_um"] = spread.error_um[index].tolist()
-                row["uncertainty_norm_um"] = float(spread.norm_um[index])
-                row["uncertainty_urad"] = spread.orientation_urad[index].tolist()
+        places = zip(*(values[part].tolist() for values in positions), strict=True)
+        numbers = zip(*(values[part].tolist() for values in flat), strict=True)
+        rows = [
+            {"axes": dict(zip(axes, place, strict=True)), **dict(zip(columns, row, strict=True))}
+            for place, row in zip(places, numbers, strict=True)
+        ]
         click.echo((", " if start else "") + spell_json(rows)[1:-1], nl=False)
     click.echo(
         "]" + "".join(f', "{name}": {spell_json(part)}' for name, part in found.items()) + "}"
     )
-
-
-def _rows(axes: "dict[str, Array]", result: "ErrorField") -> list[dict[str, object]]:
-    """Spell points as the JSON output has them."""
-    positions = [dict(zip(axes, row, strict=True)) for row in zip(*axes.values(), strict=True)]
-    return [
-        {
-            "axes": {name: float(value) for name, value in position.items()},
-            "nominal_mm": nominal,
-            "error_um": error,
-            "norm_um": norm,
-            "orientation_urad": orientation,
-        }
-        for position, nominal, error, norm, orientation in zip(
-            positions,
-            result.nominal_mm.tolist(),
-            result.error_um.tolist(),
-            result.norm_um.tolist(),
-            result.orientation_urad.tolist(),
-            strict=True,
-        )
-    ]
 
 
 def _list_points(
@@ -265,38 +237,27 @@ def _list_points(
     units: "Sequence[str]",
     spread: "FieldUncertainty | None",
 ) -> None:
-    """Print the first points, one line each."""
-    listed = min(result.norm_um.size, MAX_LISTED)
-    errors, tilts = result.error_um.tolist(), result.orientation_urad.tolist()
-    places = result.nominal_mm.tolist()
     columns = (
-        Column("point", is_number=True, leads=True),
-        *(
-            Column(f"axis {name}", unit, is_number=True)
-            for name, unit in zip(axes, units, strict=True)
-        ),
-        *number_columns(("in R x", "y", "z"), "mm"),
-        *number_columns(("error x", "y", "z", "|E|"), "µm"),
-        *number_columns(("tilt x", "y", "z"), "µrad"),
-        *number_columns(() if spread is None else ("u x", "y", "z", "u |E|"), "µm"),
+        Column("point", "d", leads=True),
+        *(Column(f"axis {name}", "g", unit) for name, unit in zip(axes, units, strict=True)),
+        *number_columns(("in R x", "y", "z"), "g", "mm"),
+        *number_columns(("error x", "y", "z"), "+.3f", "µm"),
+        Column("|E|", ".3f", "µm", joins=True),
+        *number_columns(("tilt x", "y", "z"), "+.3f", "µrad"),
+        *number_columns(() if spread is None else ("u x", "y", "z", "u |E|"), ".3f", "µm"),
     )
     rows = [
         (
-            str(index + 1),
-            *(f"{values[index]:g}" for values in axes.values()),
-            *(f"{value:g}" for value in places[index]),
-            *(f"{value:+.3f}" for value in errors[index]),
-            f"{result.norm_um[index]:.3f}",
-            *(f"{value:+.3f}" for value in tilts[index]),
-            *(() if spread is None else _spelled(spread, index)),
+            index + 1,
+            *(values[index] for values in axes.values()),
+            *result.nominal_mm[index],
+            *result.error_um[index],
+            result.norm_um[index],
+            *result.orientation_urad[index],
+            *(() if spread is None else (*spread.error_um[index], spread.norm_um[index])),
         )
-        for index in range(listed)
+        for index in range(min(result.norm_um.size, MAX_LISTED))
     ]
-    print_table(columns, rows)
+    print_blocks([Table(columns, rows)])
     if result.norm_um.size > MAX_LISTED:
         print_text(f"  … {result.norm_um.size - MAX_LISTED} more; -o, --csv or --json has all")
-
-
-def _spelled(spread: "FieldUncertainty", index: int) -> list[str]:
-    """Spell the standard uncertainty of one point."""
-    return [f"{value:.3f}" for value in (*spread.error_um[index], spread.norm_um[index])]

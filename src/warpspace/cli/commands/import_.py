@@ -1,26 +1,36 @@
-"""Command `import`: measured errors and tables of controllers into a scene."""
+"""Command `import`: measured errors, tables of controllers and robots into a scene."""
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from warpspace.cli.file_options import force_option, output_option
-from warpspace.cli.options import json_option, print_json
-from warpspace.cli.progress import progress
-from warpspace.cli.tables import Column, number_columns, print_table, print_text
-from warpspace.cli.terminal import echo
+from warpspace.analysis.blocks import Column, Table, number_columns
+from warpspace.cli.analyses import print_blocks
+from warpspace.cli.guard import InputFile, SceneName, check_files
+from warpspace.cli.options import SCENES, force_option, json_option, output_option, print_json
+from warpspace.cli.tables import echo, print_table, print_text, progress
+from warpspace.exceptions import OptionError
+from warpspace.scene.files import parse_number
 
 if TYPE_CHECKING:
-    from warpspace.formats.importing import Reading
+    from warpspace.formats.registry import Reading
+
+ROBOT = "urdf"
+SHOWN = 30
+"""Remarks on a robot that are printed; all of them stand in the file."""
+MOST_ROWS = 100_000
+"""Rows of a table to fill in."""
 
 
 @click.command("import")
-@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
-@output_option("Scene file to write: .toml.")
+@click.argument("files", nargs=-1, type=InputFile(path_type=Path))
+@output_option("Scene file to write: .toml; for --template .csv.", *SCENES, ".csv", required=False)
 @click.option(
     "--machine",
+    type=SceneName(),
     metavar="M",
     help="Machine of the errors: a bundled name, or a scene whose other errors stay."
     "  [X, Y and Z with the travels of the data]",
@@ -29,7 +39,7 @@ if TYPE_CHECKING:
     "--format",
     "format_name",
     metavar="F",
-    help="Format of the files; see `warpspace formats`.  [recognised]",
+    help="Format of the files; --formats lists them.  [recognised]",
 )
 @click.option(
     "--axis",
@@ -47,40 +57,102 @@ if TYPE_CHECKING:
 @click.option(
     "--variant",
     metavar="V",
-    help="Published variant of the format; see `warpspace formats`.  [the usual one]",
+    help="Published variant of the format; --formats lists them.  [the usual one]",
 )
 @click.option("--title", help="Title of the scene.  [name of the first file]")
+@click.option("--tool", metavar="LINK", help="URDF: link of the tool point.  [by its name]")
+@click.option(
+    "--workpiece",
+    metavar="LINK",
+    help="URDF: link of the workpiece.  [by its name, else the link that hangs on nothing]",
+)
+@click.option(
+    "--mesh-root",
+    type=InputFile(exists=True, file_okay=False, path_type=Path),
+    metavar="FOLDER",
+    help="URDF: folder out of which no mesh is read.  [that of the file]",
+)
+@click.option(
+    "--template",
+    is_flag=True,
+    help="Write a table to fill in with the measured errors of an axis, named instead of FILES.",
+)
+@click.option(
+    "--positions",
+    metavar="Q1,Q2,…",
+    help="Positions of the rows of --template, in mm or degrees.  [-250 … 250, or a turn]",
+)
+@click.option(
+    "--over",
+    metavar="AXIS|AXIS=Q1,Q2,…",
+    help="Second axis that the errors of --template depend on, with its positions.",
+)
+@click.option("--formats", is_flag=True, help="List the formats, and what each holds.")
 @force_option
 @json_option
 def import_(
     files: tuple[Path, ...],
-    output: str,
+    output: str | None,
     machine: str | None,
     format_name: str | None,
     axes: tuple[str, ...],
     sign: str | None,
     variant: str | None,
     title: str | None,
+    tool: str | None,
+    workpiece: str | None,
+    mesh_root: Path | None,
+    positions: str | None,
+    over: str | None,
     *,
+    template: bool,
+    formats: bool,
     force: bool,
     as_json: bool,
 ) -> None:
-    """Read measured errors from FILES into a scene.
+    """Read measured errors, or a machine in URDF, into a scene.
 
     What was recognised, in which units the numbers are, and whatever the files do not say and is
     assumed stands in the output and in the description of the scene. A file that cannot be read
     rightly is refused with its line; nothing is written then.
+
+    The joints of a robot (.urdf) between workpiece and tool become axes, their limits travels,
+    their origins offsets and rotations, their shapes one mesh for each axis, written beside the
+    scene. What has no place is named, here and at the top of the scene.
     """
-    from warpspace.cli.inputs import input_files
-    from warpspace.formats.importing import open_files, read_errors
+    from warpspace.outputs.files import check_target
+
+    if formats:
+        _list_formats(as_json=as_json)
+        return
+    if not files:
+        raise click.UsageError("Missing argument 'FILES...'.")
+    for given, name in ((positions, "--positions"), (over, "--over")):
+        if given is not None and not template:
+            raise OptionError(f"{name} {given!r} belongs to --template")
+    if template:
+        if output is not None:
+            check_target(output, (".csv",), overwrite=force)
+        _write_template(files, output, positions, over, force=force)
+        return
+    robot = format_name == ROBOT or (format_name is None and files[0].suffix.lower() == ".urdf")
+    for given, name in ((tool, "--tool"), (workpiece, "--workpiece"), (mesh_root, "--mesh-root")):
+        if given is not None and not robot:
+            raise OptionError(f"{name} {str(given)!r} belongs to a URDF file")
+    if output is None:
+        raise click.UsageError("Missing option '-o' / '--output'.")
+    check_target(output, SCENES, overwrite=force)
+    if robot:
+        _import_robot(files, output, tool or "", workpiece or "", mesh_root, force=force)
+        return
+
     from warpspace.formats.kind import ReadOptions, parse_axis_options
+    from warpspace.formats.registry import open_files, read_errors
     from warpspace.formats.to_scene import base_scene, into_scene
-    from warpspace.outputs.files import check_target, write_atomically
+    from warpspace.outputs.files import write_atomically
     from warpspace.scene.machines import machine_names
 
     scenes = [machine] if machine and machine not in machine_names() else []
-    inputs = [*files, *input_files(*scenes)]
-    target = check_target(output, (".toml",), overwrite=force, inputs=inputs)
     axis, names = parse_axis_options(axes)
     with progress("reading", silent=as_json):
         base = base_scene(machine) if machine else None
@@ -90,12 +162,12 @@ def import_(
         reading = read_errors(open_files(files), options, format_name or "")
         what = files[0].name if len(files) == 1 else f"{files[0].name} and {len(files) - 1} more"
         if base is not None and (title or not scenes):
-            base = replace(base, title=title or files[0].stem, name=target.stem)
+            base = replace(base, title=title or files[0].stem, name=Path(output).stem)
         made = into_scene(reading, base, title or files[0].stem, what)
     kind = reading.format
     how = "recognised" if reading.recognised else "as told"
     echo(f"warpspace: {kind.name}, {kind.title} ({how})", err=True)
-    with write_atomically(target, overwrite=force) as temporary:
+    with write_atomically(output, overwrite=force) as temporary:
         temporary.write_text(made.text, encoding="utf-8")
     notes = [*reading.found.notes, *made.notes]
     if as_json:
@@ -123,58 +195,175 @@ def import_(
 
 
 def _errors(reading: "Reading") -> list[dict[str, object]]:
-    """Summarise each error for a program."""
-    from warpspace.formats.summary import summaries
+    from warpspace.formats.measured import summaries
 
+    keys = (
+        "key", "unit", "kind", "points", "runs", "directions", "range", "smallest", "largest",
+        "mean_reversal", "repeatability", "uncertainty",
+    )  # fmt: skip
     return [
-        {
-            "key": one.key,
-            "unit": one.unit,
-            "kind": one.kind,
-            "points": one.points,
-            "runs": one.runs,
-            "directions": one.directions,
-            "range": list(one.span) if one.span else None,
-            "smallest": one.smallest,
-            "largest": one.largest,
-            "mean_reversal": one.mean_reversal,
-            "repeatability": one.repeatability,
-            "uncertainty": one.uncertainty,
-        }
+        {key: getattr(one, "span" if key == "range" else key) for key in keys}
         for one in summaries(reading.found)
     ]
 
 
 def _print(reading: "Reading") -> None:
-    """Print a table of the errors."""
-    from warpspace.formats.summary import summaries
+    from warpspace.formats.measured import summaries
 
     rows = [
         (
-            one.key,
-            one.kind,
-            str(one.points),
-            str(one.runs) if one.runs else "",
-            one.directions,
+            one.key, one.kind, one.points, one.runs or None, one.directions,
             f"{one.span[0]:g} … {one.span[1]:g}" if one.span else "",
-            f"{one.smallest:.3f}",
-            f"{one.largest:.3f}",
-            one.unit,
-            "" if one.mean_reversal is None else f"{one.mean_reversal:.3f}",
-            "" if one.uncertainty is None else f"{one.uncertainty:.3f}",
+            one.smallest, one.largest, one.unit, one.mean_reversal, one.uncertainty,
         )
         for one in summaries(reading.found)
-    ]
+    ]  # fmt: skip
     columns = (
         Column("error", leads=True),
         Column("as"),
-        Column("points", is_number=True),
-        Column("runs", is_number=True),
+        Column("points", "d"),
+        Column("runs", "d"),
         Column("direction"),
         Column("from … to"),
-        *number_columns(("smallest", "largest")),
+        *number_columns(("smallest", "largest"), ".3f"),
         Column("unit"),
-        Column("reversal", is_number=True),
-        Column("u", is_number=True),
+        Column("reversal", ".3f"),
+        Column("u", ".3f"),
     )
-    print_table(columns, rows)
+    print_blocks([Table(columns, rows)])
+
+
+def _import_robot(
+    files: tuple[Path, ...],
+    output: str,
+    tool: str,
+    workpiece: str,
+    mesh_root: Path | None,
+    *,
+    force: bool,
+) -> None:
+    from warpspace.bodies.own_meshes import frame_meshes
+    from warpspace.outputs.files import mesh_files, write_atomically, write_meshes
+    from warpspace.scene.library import parse_scene
+    from warpspace.scene.urdf import imported_text, left_out, place_robot, read_robot
+
+    target, robot = Path(output), files[0]
+    if len(files) > 1:
+        raise OptionError(f"{files[1]}: expected one URDF file, found {len(files)}")
+    loaded, others = read_robot(robot)
+    found = place_robot(loaded, str(robot), tool, workpiece)
+    meshes, unread, read = frame_meshes(loaded, found.frame_of, robot.parent, mesh_root)
+    written = mesh_files(target, meshes, overwrite=force, inputs=read)
+    check_files(click.get_current_context(), written.values())
+    notes = [*found.notes, *unread, *left_out(loaded, others, found.frame_of)]
+    names = {frame: file.name for frame, file in written.items()}
+    text = imported_text(found.machine, robot.name, notes, names)
+    scene = parse_scene(text, target.stem, output)
+    write_meshes(written, meshes, overwrite=force)
+    with write_atomically(target, overwrite=force) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    axes = len(scene.machine.axes)
+    print_text(f"{output}: {scene.machine.chain}, {axes} {'axis' if axes == 1 else 'axes'}")
+    if written:
+        print_text(f"  meshes: {', '.join(file.name for file in written.values())}")
+    for note in notes[:SHOWN]:
+        print_text(f"  {note}")
+    if len(notes) > SHOWN:
+        print_text(f"  and {len(notes) - SHOWN} more remarks, at the top of {output}")
+
+
+def _write_template(
+    files: tuple[Path, ...],
+    output: str | None,
+    positions: str | None,
+    over: str | None,
+    *,
+    force: bool,
+) -> None:
+    from warpspace.formats.kinds.csv_own import surface_template, usual_places
+    from warpspace.formats.kinds.csv_own import template as spelled
+    from warpspace.machine.axes import is_axis_name
+    from warpspace.outputs.files import write_atomically
+
+    axis = str(files[0])
+    name = axis.strip().upper()
+    if len(files) > 1 or not is_axis_name(name):
+        raise OptionError(
+            f"axis {' '.join(map(str, files))!r}; expected one name such as X, C or C2"
+        )
+    places = _positions(positions, "--positions")
+    if over is None:
+        text = spelled(name, places)
+    else:
+        second, equals, given = over.partition("=")
+        other = second.strip().upper()
+        if not is_axis_name(other) or other == name:
+            raise OptionError(
+                f"--over {over!r}; expected another axis than {name}, such as Z=0,100"
+            )
+        beside = _positions(given if equals else None, "--over")
+        at = (places or usual_places(name), beside or usual_places(other))
+        if len(at[0]) * len(at[1]) > MOST_ROWS:
+            found = f"{len(at[0])} × {len(at[1])} points"
+            raise OptionError(f"{found}; expected at most {MOST_ROWS:,} rows")
+        text = surface_template((name, other), at)
+    if output is None:
+        click.echo(text, nl=False)
+        return
+    with write_atomically(output, overwrite=force) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    echo(f"wrote {output}")
+
+
+def _positions(text: str | None, option: str) -> tuple[float, ...]:
+    if text is None:
+        return ()
+    try:
+        found = tuple(parse_number(part) for part in text.split(","))
+    except ValueError:
+        found = ()
+    if not 2 <= len(found) <= 1000 or not all(abs(q) <= 1e5 for q in found):
+        raise OptionError(f"{option} {text!r}; expected 2 to 1000 numbers with commas between")
+    if any(high <= low for low, high in pairwise(found)):
+        raise OptionError(f"{option} {text!r}; expected ascending positions")
+    return found
+
+
+def _list_formats(*, as_json: bool) -> None:
+    from warpspace.formats.registry import formats as all_formats
+
+    found = all_formats()
+    if as_json:
+        said = (
+            "holds", "units", "grid", "limits", "points", "most_points", "orientation", "variants",
+            "endings", "source",
+        )  # fmt: skip
+        listed = [
+            {
+                "name": one.name,
+                "title": one.title,
+                "reads": True,
+                "writes": one.can_write,
+                "controller": one.tables is not None,
+                **{name: getattr(one, name) for name in said},
+            }
+            for one in found
+        ]
+        print_json({"formats": listed})
+        return
+    rows: list[tuple[str, str, str]] = []
+    for one in found:
+        rows.append((one.name, "read, write" if one.can_write else "read", one.title))
+        rows += [
+            ("", "", f"{word}: {text}")
+            for word, text in (
+                ("holds", one.holds),
+                ("units", one.units),
+                ("grid", one.grid),
+                ("limits", one.limits),
+                ("variants", ", ".join(one.variants)),
+                ("published", one.source),
+            )
+            if text
+        ]
+    print_table((Column(leads=True), Column(), Column(wraps=True)), rows, indent=0)

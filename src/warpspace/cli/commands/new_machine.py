@@ -1,14 +1,16 @@
 """Command `new-machine`: a scene to start from, for any chain of axes."""
 
+from pathlib import Path
+
 import click
 
-from warpspace.cli.file_options import check_output, force_option, output_option
+from warpspace.cli.options import SCENES, force_option, output_option
 from warpspace.cli.tables import print_text
 
 
 @click.command("new-machine")
 @click.argument("chain")
-@output_option("Scene file to write: .toml.")
+@output_option("Scene file to write: .toml.", *SCENES)
 @click.option("--title", default="", help="Of the machine and the scene.  [the chain]")
 @force_option
 def new_machine(chain: str, output: str, title: str, *, force: bool) -> None:
@@ -23,10 +25,9 @@ def new_machine(chain: str, output: str, title: str, *, force: bool) -> None:
     from warpspace.scene.library import parse_scene
     from warpspace.scene.starter import starter_text
 
-    target = check_output(output, [".toml"], force=force)
     text = starter_text(chain, title)
-    scene = parse_scene(text, target.stem, output)
-    with write_atomically(target, overwrite=force) as temporary:
+    scene = parse_scene(text, Path(output).stem, output)
+    with write_atomically(output, overwrite=force) as temporary:
         temporary.write_text(text, encoding="utf-8")
     print_text(
         f"{output}: {scene.machine.chain}, {len(scene.parameter_keys)} errors;"

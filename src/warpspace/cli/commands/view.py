@@ -2,15 +2,11 @@
 
 import os
 import sys
-from typing import TYPE_CHECKING
 
 import click
 
 from warpspace.cli.options import scene_argument
-from warpspace.cli.terminal import echo
-
-if TYPE_CHECKING:
-    from warpspace.app.state.app_state import AppState
+from warpspace.cli.tables import echo
 
 
 @click.command()
@@ -59,8 +55,7 @@ def view(
 ) -> None:
     """Open SCENE in the browser, with a slider per error.
 
-    SCENE is dvf5000_first where it is left out. A field that `warpspace export` wrote as .vts is
-    shown as it was stored: its scene, loop, grid, component and factor.
+    SCENE is dvf5000_first where it is left out.
     """
     # Before numpy is loaded: a slider move is one short product, and threads of OpenBLAS that spin
     # for it beside a browser that draws in software make it thirty times slower.
@@ -71,14 +66,12 @@ def view(
     from warpspace.cli.services import build_services
     from warpspace.scene.library import load_scene, scene_names
 
-    start = _stored_start(scene) if scene.lower().endswith(".vts") else None
-    shown = start.scene if start else load_scene(scene)
+    shown = load_scene(scene)
     check_meshes(shown.machine)
     bundled = {name: shown if name == scene else load_scene(name) for name in scene_names()}
     run_viewer(
         shown,
         {loaded.title: loaded for loaded in bundled.values()},
-        start=start,
         host=host,
         port=port,
         shared=shared,
@@ -88,19 +81,4 @@ def view(
         browser=not no_browser,
         say=echo,
         warn=lambda text: echo(text, err=True, fg="yellow"),
-    )
-
-
-def _stored_start(path: str) -> "AppState":
-    """Read a stored field and show it as it was stored."""
-    from warpspace.app.state.app_state import start_state
-    from warpspace.outputs.exports import load_stored_field
-
-    picture = load_stored_field(path).picture
-    return (
-        start_state(picture.scene)
-        .with_loop(picture.view.loop)
-        .with_nodes(max(picture.grid.shape))
-        .with_component(picture.component)
-        .with_exaggeration(picture.exaggeration)
     )

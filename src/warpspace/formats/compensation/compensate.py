@@ -1,82 +1,182 @@
 """A compensation from a scene to the controller and back: written, read, evaluated, applied."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
+import numpy as np
+
+from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table, number_columns
+from warpspace.analysis.description import Analysis, Result, Watch, plain
+from warpspace.analysis.options import Grammar, option
+from warpspace.analysis.statistics import Statistics
 from warpspace.exceptions import OptionError
+from warpspace.field.evaluate import find_placement, fit_placement
 from warpspace.field.grid import build_grid
-from warpspace.formats.compensation.controller import Controller, read_back
-from warpspace.formats.compensation.corrector import build_corrector
-from warpspace.formats.compensation.directions import BeforeAfter, evaluated, reversal_notes
-from warpspace.formats.compensation.wanted import Wanted
-from warpspace.formats.kind import SIGNS, Format
+from warpspace.formats.compensation.controller import (
+    BeforeAfter,
+    Controller,
+    evaluated,
+    read_back,
+    reversal_notes,
+)
+from warpspace.formats.compensation.wanted import Corrector, Wanted, build_corrector
+from warpspace.formats.kind import SIGNS, Files, Format
 from warpspace.formats.registry import find_format
-from warpspace.formats.source import source_of_text
-from warpspace.machine.travel import TravelDirection
-from warpspace.scene.model import Scene
+from warpspace.kinematics.model import Loop
+from warpspace.machine.axes import TravelDirection
+from warpspace.scene.files import parse_whole
+from warpspace.scene.model import Scene, placed_in
+from warpspace.units import Array
 
 NODES = 28
 """Nodes per axis that what is left is evaluated at: between the points of usual tables."""
+SMALL_NODES = 7
+"""Nodes and points per axis that the placement of a workpiece is fitted with."""
+STEP = 100.0
+"""µm and µrad by which a placement is changed to see what a table makes of it."""
+MOVABLE = 0.05
+"""A table that leaves less than this share of a displaced part can move it."""
+PLACED = (
+    "a part is judged by its shape: where it lies (three shifts, three small rotations) is fitted"
+    " out of the errors before and after"
+)
+NO_OFFSETS = ", since the format has no place for it"
 RESOLUTION = (0.0, 0.1)
 """mm or degrees."""
-EXPECTED_GRID = "expected a number of points, or AXIS=NUMBER with commas between"
+SIZES = (3, 5, 9, 17)
+MOST = 32
+"""Compensations of one sweep."""
+FEW = ("linuxcnc-matrix", "marlin")
+"""Formats without a grid that a sweep shows where none are named; Klipper's skew is Marlin's."""
+TABLES = ("sinumerik-enc", "sinumerik-cec", "heidenhain", "fanuc-3d", "isg-csv")
+LEAST_UM = 1e-3
+"""Lower end of the chart of a sweep, where nothing is left."""
+Points: TypeAlias = int | tuple[tuple[str, int], ...]
+"""Points of a table along every axis, or along each."""
+
+
+def read_points(text: str, _scene: Scene | None = None) -> Points:
+    """Read points per axis as a user types them: 9, or X=9,Y=5."""
+    try:
+        if "=" not in text:
+            return parse_whole(text)
+        pairs = [part.partition("=") for part in text.split(",")]
+        return tuple({name.strip().upper(): parse_whole(n) for name, _, n in pairs}.items())
+    except ValueError:
+        raise ValueError(
+            "expected a number of points, or AXIS=NUMBER with commas between"
+        ) from None
+
+
+def _read_format(text: str, _scene: Scene) -> str:
+    return find_format(text).name
+
+
+def _read_sizes(text: str, _scene: Scene) -> tuple[int, ...]:
+    try:
+        found = tuple(dict.fromkeys(parse_whole(part) for part in text.split(",")))
+    except ValueError:
+        found = ()
+    if not found or not all(2 <= count <= 1000 for count in found):
+        raise ValueError("expected numbers of points with commas between, for instance 3,5,9,17")
+    return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class Compensate(Analysis):
+    """Write a table of compensation, and say what it leaves.
+
+    The program reads its own file back and does with it what the controller does: it interpolates,
+    rounds and clips, and adds the result to the commanded positions. What is left is evaluated with
+    the exact chain over the working volume, between the points of the table.
+
+    A format that cannot move all positions by the same (Klipper, Marlin, the matrix of LinuxCNC)
+    corrects no part that lies elsewhere: in the relative loop it is always --placed.
+
+    --sweep 3,5,9,17 compares kinds of table by their size instead.
+    """
+
+    name = "compensate"
+    task = "improve"
+    doing = "compensating"
+    file_help = "File to write; tables of several files stand beside it."
+    has_chart = True
+    chart_help = "maps before and after, or what is left by the size of the table,"
+    formats: Annotated[tuple[str, ...], Grammar("F", _read_format, each=True)] = option(
+        (),
+        "Format of the table, see `warpspace import --formats`; with --sweep repeatable",
+        flag="--format",
+    )
+    points: Annotated[Points | None, Grammar("N|X=N,…", read_points, many=True)] = option(
+        None, "Points of the table along each axis", flag="--grid", unset="what suits the format"
+    )
+    resolution: float = option(
+        0.0,
+        "Smallest step of a value, mm or degrees; of fanuc-3d the detection unit",
+        low=RESOLUTION[0],
+        high=RESOLUTION[1],
+        unset="that of the format",
+    )
+    sign: Literal["error", "correction"] | None = option(
+        None,
+        "What the numbers of the table are: the error, which the controller takes back, or what it"
+        " adds",
+        unset="what the manual says",
+    )
+    loop: Literal["tool", "relative"] | None = option(
+        None,
+        "Structural loop that is corrected",
+        unset="relative where a linear axis, or with --orientation all rotary axes, carry the"
+        " workpiece",
+    )
+    placed: bool = option(
+        False,
+        "Leave out where the workpiece lies: three shifts and three small rotations of it, fitted"
+        " for the least RMS over the working volume. Looks at the relative loop",
+    )
+    orientation: bool = option(
+        False,
+        "Correct the tool axis too, with the rotary axes, where the format has a place for it",
+    )
+    sweep: Annotated[tuple[int, ...], Grammar("N,N,…", _read_sizes, many=True)] = option(
+        (), "Instead of one table, compare tables with so many points per axis"
+    )
+    stem: str = "compensation"  # name of the files
+
+    def written(self, stem: str | None) -> "Compensate":
+        """Give it with the name of its files."""
+        if not self.sweep and (len(self.formats) != 1 or stem is None):
+            raise OptionError(
+                "expected {formats} F and {output} FILE; {sweep} compares several tables"
+            )
+        if self.sweep and (stem or self.points or self.orientation):
+            raise OptionError(
+                "{sweep} writes no table: expected it without {output}, {points}, {orientation}"
+            )
+        return self if stem is None else replace(self, stem=stem)
+
+    def run(self, scene: Scene, watch: Watch, /) -> "Compensation | Sweep":
+        """Write the table and read it back, or compare several."""
+        asked = replace(self, loop="relative") if self.placed and self.loop is None else self
+        scene = placed_in(scene, asked.loop or "", placed=self.placed)
+        if self.sweep:
+            return sweep(scene, asked)
+        return compensate(scene, asked, watch=lambda: watch(0.0))
 
 
 @dataclass(frozen=True)
-class Plan:
-    """What is asked for.
+class Compensation(BeforeAfter, Result):
+    """A compensation and what it leaves."""
 
-    Attributes
-    ----------
-    format : str
-    points : int or mapping of str to int or None
-        Points of the table per axis; None for what suits the format.
-    resolution : float
-        Smallest step of a value, mm or degrees; 0 for that of the format.
-    sign : str
-        "error", "correction", or empty for what the manual says.
-    loop : str
-        "tool", "relative", or empty.
-    orientation : bool
-        Whether the tool axis is corrected too.
-    stem : str
-        Name of the files.
-    """
-
-    format: str
-    points: int | Mapping[str, int] | None = None
-    resolution: float = 0.0
-    sign: str = ""
-    loop: str = ""
-    orientation: bool = False
-    stem: str = "compensation"
-
-
-@dataclass(frozen=True)
-class Compensation(BeforeAfter):
-    """A compensation and what it leaves.
-
-    Attributes
-    ----------
-    format : Format
-    files : mapping of str to str
-        Texts by what is added to the name of the file.
-    points : mapping of str to int
-        Points of the table per axis.
-    controller : Controller
-        It has read the files.
-    directions : mapping of str to BeforeAfter
-        "forward" and "backward", where errors depend on the direction of travel.
-    reversal : tuple of str
-        What of that the format has no place for, in words.
-    """
-
+    drawn_by: ClassVar[str] = "warpspace.outputs.charts.results:compensation_chart"
     format: Format
-    files: Mapping[str, str]
-    points: Mapping[str, int]
-    controller: Controller
+    files: Mapping[str, str]  # texts by what is added to the name of the file
+    points: Mapping[str, int]  # points of the table per axis
+    controller: Controller  # it has read the files
+    # "forward" and "backward", where errors depend on the direction of travel
     directions: Mapping[str, BeforeAfter] = field(default_factory=dict[str, BeforeAfter])
-    reversal: tuple[str, ...] = ()
+    reversal: tuple[str, ...] = ()  # what of that the format has no place for, in words
 
     @property
     def size(self) -> int:
@@ -95,8 +195,24 @@ class Compensation(BeforeAfter):
 
     @property
     def assumed(self) -> tuple[str, ...]:
-        """What the documentation of the format leaves open."""
-        return self.controller.assumed
+        """What the format leaves open, in which sense axes move, and what is left out by itself."""
+        machine = self.controller.scene.machine
+        senses = (
+            (1, "the positive direction, as ISO 841 has it"),
+            (-1, "the negative direction, against ISO 841"),
+        )
+        said = (
+            f"positive {', '.join(axes)}: the tool moves over the workpiece in {words}"
+            for sense, words in senses
+            if (axes := [axis for axis in self.axes if machine.sense(axis) == sense])
+        )
+        placed = [f"{PLACED}{'' if self.format.offsets else NO_OFFSETS}"] if self.placed else []
+        return (*self.controller.assumed, *said, *placed)
+
+    @property
+    def placed(self) -> bool:
+        """Whether the errors before and after leave out where the workpiece lies."""
+        return self.controller.scene.view(self.controller.loop).placed_over is not None
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -113,22 +229,62 @@ class Compensation(BeforeAfter):
         """Size of the files."""
         return sum(len(text.encode()) for text in self.files.values())
 
+    def texts(self) -> Mapping[str, str]:
+        """Give the files."""
+        return self.files
 
-def read_points(text: str) -> int | dict[str, int]:
-    """Read points per axis as a user types them: 9, or X=9,Y=5.
+    def as_json(self) -> dict[str, Any]:
+        """Spell it; who writes the files names them."""
+        after = self.after_statistics
+        return {
+            "format": self.format.name,
+            "loop": self.loop,
+            "corrected": list(self.axes),
+            "points": dict(self.points) if not self.format.grid.startswith("none") else {},
+            "numbers": self.size,
+            "files": [],
+            "before": plain(self.before_statistics),
+            "after": plain(after),
+            "worst_after_um": after.max_um,
+            "orientation": {
+                word: dict(zip(("mean_urad", "max_urad"), self.tilt_urad(field), strict=True))
+                for word, field in (("before", self.before), ("after", self.after))
+            },
+            "directions": {
+                way: {
+                    "before": plain(one.before_statistics),
+                    "after": plain(one.after_statistics),
+                }
+                for way, one in self.directions.items()
+            },
+            "assumed": list(self.assumed),
+            "notes": list(self.notes),
+        }
 
-    Raises
-    ------
-    OptionError
-        If it is neither; whether a format takes so many is asked by `table_points`.
-    """
-    try:
-        if "=" not in text:
-            return int(text)
-        pairs = [part.partition("=") for part in text.split(",")]
-        return {name.strip().upper(): int(count) for name, _, count in pairs}
-    except ValueError:
-        raise OptionError(f"--grid {text!r}; {EXPECTED_GRID}") from None
+    def blocks(self) -> Iterator[Block]:
+        """Say what it leaves, how large it is and what it takes for granted."""
+        yield f"{self.controller.scene.title} · {self.format.title} · loop {self.loop}"
+        columns = (
+            Column("", leads=True),
+            *number_columns(("mean", "RMS", "P95", "max"), ".3f", "µm"),
+            *number_columns(("mean tilt", "max tilt"), ".2f", "µrad"),
+        )
+        rows = [
+            (f"{word} {way}".rstrip(), *_four(numbers), *one.tilt_urad(field))
+            for way, one in {"": self, **self.directions}.items()
+            for word, numbers, field in (
+                ("before", one.before_statistics, one.before),
+                ("after", one.after_statistics, one.after),
+            )
+        ]
+        yield Table(columns, rows)
+        yield f"  {self.size} numbers; corrected: {', '.join(self.axes)}; {self.points_words}"
+        yield from (f"  assumed: {text}" for text in self.assumed)
+        yield from (f"  {text}" for text in self.notes)
+
+
+def _four(found: Statistics) -> tuple[float, float, float, float]:
+    return found.mean_um, found.rms_um, found.p95_um, found.max_um
 
 
 def spell_points(kind: Format, points: Mapping[str, int]) -> str:
@@ -138,85 +294,59 @@ def spell_points(kind: Format, points: Mapping[str, int]) -> str:
     return ", ".join(f"{axis} {count}" for axis, count in points.items()) + " points"
 
 
-def table_points(
-    kind: Format, scene: Scene, asked: int | Mapping[str, int] | None
-) -> dict[str, int]:
-    """Give the points of a table along each axis of the volume.
-
-    Raises
-    ------
-    OptionError
-        If the controller takes fewer.
-    """
+def table_points(kind: Format, scene: Scene, asked: Points | None) -> dict[str, int]:
+    """Give the points of a table along each axis of the volume."""
     axes = [axis for axis in scene.machine.axes if axis in scene.workspace.volume_axes]
     if not axes:
         raise OptionError(f"{scene.name}: no axis has a range in [workspace]; nothing to correct")
-    if isinstance(asked, Mapping):
-        for axis in asked:
+    if isinstance(asked, tuple):
+        by_axis = dict(asked)
+        for axis in by_axis:
             if axis not in axes:
-                raise OptionError(f"--grid {axis}: expected one of {', '.join(axes)}")
-        given = {axis: asked.get(axis, kind.points) for axis in axes}
+                raise OptionError(f"{{points}} {axis}: expected one of {', '.join(axes)}")
+        given = {axis: by_axis.get(axis, kind.points) for axis in axes}
     else:
         given = dict.fromkeys(axes, asked or kind.points)
     for axis, count in given.items():
         if not 2 <= count <= kind.most_points:
             raise OptionError(
-                f"--grid {axis}={count}: {kind.name} takes 2 to {kind.most_points} points an axis"
+                f"{{points}} {axis}={count}: {kind.name} takes 2 to {kind.most_points} points an"
+                " axis"
             )
     return given
 
 
 def compensate(
-    scene: Scene, plan: Plan, nodes: int = NODES, *, watch: Callable[[], None] | None = None
+    scene: Scene,
+    asked: Compensate,
+    nodes: int = NODES,
+    *,
+    watch: Callable[[], None] = lambda: None,
 ) -> Compensation:
-    """Write the compensation of a scene, have it read and evaluated, and give what is left.
-
-    Parameters
-    ----------
-    scene : Scene
-    plan : Plan
-    nodes : int, optional
-        Nodes per axis that what is left is evaluated at.
-    watch : callable, optional
-        Called between the steps; what it raises ends the work.
-
-    Returns
-    -------
-    Compensation
-
-    Raises
-    ------
-    OptionError, SceneError, UnknownNameError
-        If the format cannot be written, or does not hold what is asked for.
-    """
-    kind = find_format(plan.format)
+    """Write the compensation of a scene, have it read and evaluated, and give what is left."""
+    kind, loop, sign = find_format(asked.formats[0]), asked.loop or "", asked.sign or ""
     if kind.write is None:
         raise OptionError(
-            f"{kind.name} is read only; `warpspace formats` lists what can be written"
+            f"{kind.name} is read only; `warpspace import --formats` lists what can be written"
         )
-    if plan.orientation and not kind.orientation:
-        raise OptionError(f"--orientation: {kind.name} corrects the position only")
-    low, high = RESOLUTION
-    if not low <= plan.resolution <= high:
-        raise OptionError(f"--resolution {plan.resolution:g}; expected {low:g} … {high:g} mm")
-    if plan.sign and (plan.sign not in SIGNS or kind.tables is None):
-        raise OptionError(f"--sign {plan.sign!r}: expected error or correction, of a table")
+    if asked.orientation and not kind.orientation:
+        raise OptionError(f"{{orientation}}: {kind.name} corrects the position only")
+    if sign and (sign not in SIGNS or kind.tables is None):
+        raise OptionError(f"{{sign}} {sign!r}: expected error or correction, of a table")
     if scene.model.direction == TravelDirection.DIFFERENCE:
         scene = replace(scene, model=replace(scene.model, direction=TravelDirection.MEAN))
-    watch = watch or _go_on
-    corrector = build_corrector(scene, plan.loop, orientation=plan.orientation)
-    points = table_points(kind, scene, plan.points)
-    wanted = Wanted(scene, corrector, points, plan.resolution, plan.sign, plan.stem)
+    scene = placed_for([kind], scene, loop)
+    corrector = build_corrector(scene, loop, orientation=asked.orientation)
+    points = table_points(kind, scene, asked.points)
+    wanted = Wanted(scene, corrector, points, asked.resolution, sign, asked.stem)
     watch()
+    if kind.tables is not None:
+        wanted = replace(wanted, corrector=_placed(kind, kind.write, wanted, watch))
     files = kind.write(wanted)
     watch()
     grid = build_grid(scene.model, scene.workspace, nodes)
-    sources = [
-        source_of_text(text, f"{plan.stem}{add}{'' if add else kind.endings[0]}")
-        for add, text in files.items()
-    ]
     label = f"{kind.name} ({spell_points(kind, points)})"
-    controller = read_back(kind, sources, wanted, label)
+    controller = read_back(kind, files, wanted, label)
     watch()
     own = evaluated(controller, grid, scene.model.direction)
     watch()
@@ -235,5 +365,162 @@ def compensate(
     )
 
 
-def _go_on() -> None:
-    """Let the work go on."""
+def placed_for(kinds: Sequence[Format], scene: Scene, loop: str) -> Scene:
+    """Leave out where the workpiece lies, should one of some formats have no place for it."""
+    unplaced = all(kind.offsets for kind in kinds)
+    if unplaced or build_corrector(scene, loop).loop is not Loop.RELATIVE:
+        return scene
+    return replace(scene, placed=True)
+
+
+def _placed(
+    kind: Format, write: Callable[[Wanted], Files], wanted: Wanted, watch: Callable[[], None]
+) -> Corrector:
+    """Let the corrector leave alone where the workpiece lies, if that is fitted out.
+
+    What a table does to the errors changes which placement fits best what it leaves. Both are
+    linear: seven small tables tell it. What a table could make of any placement stays as it is.
+    """
+    scene, corrector = wanted.scene, wanted.corrector
+    view = replace(scene.view(corrector.loop), reference=None)
+    start = find_placement(corrector.model, corrector.errors, view, exact=True)
+    if start is None:
+        return corrector
+    bare = replace(scene, placed=False, reference=None)
+    grid = build_grid(scene.model, scene.workspace, SMALL_NODES)
+    coarse = {axis: min(count, SMALL_NODES) for axis, count in wanted.points.items()}
+
+    def fitted(placement: Array) -> Array:
+        watch()
+        own = replace(corrector, placement=placement)
+        asked = replace(wanted, corrector=own, points=coarse, resolution=0.0)
+        controller = read_back(kind, write(asked), asked, kind.name)
+        field = controller.field(grid.coordinates, grid.nominal_mm, bare)
+        return fit_placement(scene.model, grid, field.error_um)
+
+    base = fitted(start)
+    slopes = [(fitted(start + STEP * one) - base) / STEP for one in np.eye(6)]
+    left, sizes, right = np.linalg.svd(np.eye(6) - np.array(slopes).T)
+    back = np.divide(1.0, sizes, out=np.zeros(6), where=sizes > MOVABLE)
+    found = start + right.T @ (back * (left.T @ (base - start)))
+    return replace(corrector, placement=found)
+
+
+@dataclass(frozen=True)
+class Step:
+    """One compensation of a sweep."""
+
+    keys: ClassVar[tuple[str, ...]] = (
+        "format", "points", "pitch", "numbers", "bytes", "after", "worst_after_um",
+    )  # fmt: skip
+    format: str
+    points: int  # per axis; 0 where there is no grid
+    numbers: int  # size in the controller and of the files
+    bytes: int
+    pitch: float  # largest step of the table, mm or degrees; 0 where there is none
+    after: Statistics
+    # whether it leaves out where the workpiece lies, as all of a sweep do then
+    placed: bool = False
+
+    @property
+    def worst_after_um(self) -> float:
+        """Largest error that is left."""
+        return self.after.max_um
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sweep(Result):
+    """Which table is worth it: what is left, by kind of table and number of points."""
+
+    title: str  # of the scene
+    before: Statistics
+    steps: tuple[Step, ...]
+    left_out: tuple[str, ...]  # formats of which no table can be made, and why
+
+    def as_json(self) -> dict[str, Any]:
+        """Spell it."""
+        steps = plain(self.steps)
+        return {"before": plain(self.before), "sweep": steps, "left_out": list(self.left_out)}
+
+    def blocks(self) -> Iterator[Block]:
+        """Say what each table leaves."""
+        mean, rms, p95, largest = (f"{number:.3f}" for number in _four(self.before))
+        yield f"{self.title} · before: mean {mean}, RMS {rms}, P95 {p95}, max {largest} µm"
+        columns = (
+            Column("format", leads=True), Column("points", "d"), Column("pitch", ".4g"),
+            Column("numbers", "d"), *number_columns(("mean", "RMS", "P95", "max"), ".3f", "µm"),
+        )  # fmt: skip
+        rows = [
+            (one.format, one.points or None, one.pitch or None, one.numbers, *_four(one.after))
+            for one in self.steps
+        ]
+        yield Table(columns, rows)
+        if any(one.placed for one in self.steps):
+            yield f"  assumed: {PLACED}"
+        yield from (f"  left out: {text}" for text in self.left_out)
+        for words, of in (("largest", "max_um"), ("mean over the volume", "mean_um")):
+            title = f"Left over the working volume: {words}"
+            yield Lines(
+                "lines", title, "numbers in the controller", "|E| [µm]", self._curves(of), log=True
+            )
+
+    def _curves(self, of: str) -> tuple[Curve, ...]:
+        sizes = [max(one.numbers, 1) for one in self.steps]
+        before = np.full(2, max(getattr(self.before, of), LEAST_UM))
+        curves = [Curve("before", np.array([min(sizes), max(sizes)], float), before, style="thin")]
+        for number, kind in enumerate(dict.fromkeys(one.format for one in self.steps)):
+            own = [one for one in self.steps if one.format == kind]
+            x = np.array([max(one.numbers, 1) for one in own], float)
+            y = np.array([max(getattr(one.after, of), LEAST_UM) for one in own])
+            curves += [Curve(kind, x, y, number), Curve("", x, y, number, "dots")]
+        return tuple(curves)
+
+
+def sweep(scene: Scene, asked: Compensate) -> Sweep:
+    """Compensate a scene with several tables."""
+    names = list(dict.fromkeys(asked.formats)) or [*TABLES, *FEW]
+    wanted: list[tuple[str, int]] = []
+    for name in names:
+        kind, sizes = find_format(name), asked.sweep or SIZES
+        gridless = kind.grid.startswith("none")
+        counts = [0] if gridless else [count for count in sizes if 2 <= count <= kind.most_points]
+        wanted += [(name, count) for count in counts]
+    if len(wanted) > MOST:
+        raise OptionError(f"{{sweep}} of {len(wanted)} tables; expected at most {MOST}")
+    title = scene.title
+    scene = placed_for([find_format(name) for name in names], scene, asked.loop or "")
+    before: Statistics | None = None
+    steps: list[Step] = []
+    left_out: dict[str, str] = {}
+    for name, count in wanted:
+        kind = find_format(name)
+        own = replace(
+            asked,
+            formats=(name,),
+            points=count or None,
+            resolution=0.0 if kind.parametric else asked.resolution,
+            sign=asked.sign if kind.tables else None,
+        )
+        try:
+            found = compensate(scene, own)
+        except OptionError as error:
+            if asked.formats:
+                raise
+            left_out[name] = str(error)
+            continue
+        before = found.before_statistics
+        steps.append(_step(scene, found, count))
+    if before is None:
+        raise OptionError(f"{{sweep}}: no table can be made: {'; '.join(left_out.values())}")
+    words = tuple(f"{name}: {why}" for name, why in left_out.items())
+    return Sweep(title=title, before=before, steps=tuple(steps), left_out=words)
+
+
+def _step(scene: Scene, found: Compensation, count: int) -> Step:
+    spans = [
+        (scene.workspace.ranges[axis][1] - scene.workspace.ranges[axis][0]) / (number - 1)
+        for axis, number in found.points.items()
+    ]
+    pitch = max(spans) if count else 0.0
+    size, after = (found.size, found.bytes), found.after_statistics
+    return Step(found.format.name, count, *size, pitch, after, found.placed)

@@ -4,18 +4,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from warpspace.analysis.statistics import Statistics, volume_statistics
 from warpspace.exceptions import OptionError
-from warpspace.field.basis import ErrorField
-from warpspace.formats.compensation.corrector import Corrector, Moved
-from warpspace.formats.compensation.wanted import Wanted
-from warpspace.formats.importing import Reading
-from warpspace.formats.kind import Format, ReadOptions
-from warpspace.formats.source import Source
+from warpspace.field.evaluate import ErrorField, fit_placement
+from warpspace.field.grid import Grid, build_grid
+from warpspace.formats.compensation.wanted import Corrector, Moved, Wanted
+from warpspace.formats.kind import Files, Format, ReadOptions
+from warpspace.formats.registry import Reading
+from warpspace.formats.source import source_of_text
 from warpspace.formats.terms import Tables
-from warpspace.formats.to_scene import into_scene
 from warpspace.kinematics.model import Coordinates, Loop
+from warpspace.machine.axes import DIRECTION_WORDS, TravelDirection
 from warpspace.machine.errors import ErrorSet
-from warpspace.machine.travel import TravelDirection
 from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM, URAD_PER_RAD, Array
 
@@ -24,28 +24,25 @@ WAYS = {TravelDirection.FORWARD: 1, TravelDirection.BACKWARD: -1}
 
 @dataclass(frozen=True)
 class Corrected:
-    """Points that a controller moves a machine to, before the errors of the machine count.
+    """Points that a controller moves a machine to, before the errors of the machine count."""
 
-    Attributes
-    ----------
-    nominal_mm : ndarray, [..., 3], mm
-    moved : Moved
-    held : Moved or None
-        The point that is held still; None for absolute errors.
-    less : Corrected or None
-        What is subtracted: the way back, where the difference of both directions is looked at.
-    """
-
-    nominal_mm: Array
+    nominal_mm: Array  # [..., 3]
     moved: Moved
-    held: Moved | None = None
+    held: Moved | None = None  # the point that is held still; None for absolute errors
+    # what is subtracted: the way back, where the difference of both directions is looked at
     less: "Corrected | None" = None
+    # or None; nodes over which the placement of the workpiece is fitted out; None leaves it in
+    volume: "tuple[Grid, Corrected] | None" = None
 
     def field(self, errors: ErrorSet) -> ErrorField:
         """Evaluate what is left with errors, by the exact chain, µm and µrad."""
-        position, orientation = self.moved.residual(errors)
+        placement = None
+        if self.volume is not None:
+            grid, nodes = self.volume
+            placement = fit_placement(self.moved.model, grid, nodes.field(errors).error_um)
+        position, orientation = self.moved.without(placement, *self.moved.residual(errors))
         if self.held is not None:
-            position = position - self.held.residual(errors)[0]
+            position = position - self.held.without(placement, *self.held.residual(errors))[0]
         shape = np.broadcast_shapes(position.shape, self.nominal_mm.shape)
         found = ErrorField(
             np.broadcast_to(self.nominal_mm, shape),
@@ -67,52 +64,26 @@ class Corrected:
         moved = self.moved
         arrays = (*moved.coordinates.values(), moved.point_mm, moved.shift_mm, moved.turn_rad)
         own = sum(array.nbytes for array in arrays)
+        own += 0 if self.volume is None else self.volume[1].nbytes
         return own + (0 if self.less is None else self.less.nbytes)
 
 
 @dataclass(frozen=True, eq=False)
 class Controller:
-    """A controller that has read the files of a table. Two are equal only if they are one.
+    """A controller that has read the files of a table. Two are equal only if they are one."""
 
-    Attributes
-    ----------
-    scene : Scene
-        The machine that the table was made for, with its errors of then.
-    loop : Loop
-        The loop that is corrected.
-    label : str
-        Name of the format and points of the table, for people.
-    corrector : Corrector
-        Axes that are corrected; where there is no table, with the errors that the files hold.
-    tables : Tables or None
-        What it adds to the positions; None where it works that out from errors.
-    size : int
-        Numbers that it holds.
-    assumed, notes : tuple of str
-    """
-
-    scene: Scene
-    loop: Loop
-    label: str
+    scene: Scene  # the machine that the table was made for, with its errors of then
+    loop: Loop  # the loop that is corrected
+    label: str  # name of the format and points of the table, for people
+    # axes that are corrected; where there is no table, with the errors that the files hold
     corrector: Corrector
-    tables: Tables | None
-    size: int
+    tables: Tables | None  # what it adds to the positions; None where it works that out from errors
+    size: int  # numbers that it holds
     assumed: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
     def moves(self, coordinates: Coordinates, direction: str = "") -> dict[str, Array]:
-        """Give what it adds to commanded positions.
-
-        Parameters
-        ----------
-        coordinates : mapping of str to ndarray, [...], mm or degrees
-        direction : str, optional
-            Direction of travel; that of the scene by default.
-
-        Returns
-        -------
-        dict of str to ndarray, [...], mm or degrees
-        """
+        """Give what it adds to commanded positions."""
         way = TravelDirection(direction or self.scene.model.direction)
         if self.tables is not None:
             return dict(self.tables.corrections(coordinates, WAYS.get(way, 0)))
@@ -138,10 +109,16 @@ class Controller:
             return replace(there, less=back)
         machine = Corrector(scene.model, scene.errors, loop, ())
         held = _reference(scene, coordinates)
+        over, volume = scene.view(loop).placed_over, None
+        if over is not None:
+            grid, absolute = build_grid(scene.model, over), replace(scene, reference=None)
+            at = (grid.coordinates, grid.nominal_mm, replace(absolute, placed=False), loop)
+            volume = grid, self.at(*at, grid.point_mm)
         return Corrected(
             nominal_mm,
             machine.move(coordinates, self.moves(coordinates, way), point_mm),
             None if held is None else machine.move(held, self.moves(held, way)),
+            volume=volume,
         )
 
     def field(
@@ -152,26 +129,7 @@ class Controller:
         loop: Loop | None = None,
         point_mm: Array | None = None,
     ) -> ErrorField:
-        """Evaluate the error that is left, by the exact chain.
-
-        Parameters
-        ----------
-        coordinates : mapping of str to ndarray, [...], mm or degrees
-            Commanded positions.
-        nominal_mm : ndarray, [..., 3], mm
-            Where the points are drawn.
-        scene : Scene, optional
-            The machine as it is now; by default as it was when the table was made.
-        loop : Loop, optional
-            The loop that is looked at; by default the one that is corrected.
-        point_mm : ndarray, [..., 3], mm, optional
-            Nominal points in R; by default the tool point.
-
-        Returns
-        -------
-        ErrorField
-            µm and µrad, less that of the reference point of the scene, should it have one.
-        """
+        """Evaluate the error that is left, by the exact chain."""
         errors = (scene or self.scene).errors
         return self.at(coordinates, nominal_mm, scene, loop, point_mm).field(errors)
 
@@ -186,35 +144,21 @@ def toward(scene: Scene, direction: str) -> Scene:
 
 
 def _reference(scene: Scene, coordinates: Coordinates) -> dict[str, Array] | None:
-    """Give the coordinates of the point that is held still; other axes stand as they do."""
     if scene.reference is None:
         return None
     still = scene.reference
     return {axis: np.asarray(still.get(axis, at)) for axis, at in coordinates.items()}
 
 
-def read_back(kind: Format, sources: list[Source], wanted: Wanted, label: str) -> Controller:
-    """Read files as the controller does.
+def read_back(kind: Format, files: Files, wanted: Wanted, label: str) -> Controller:
+    """Read files as the controller does."""
+    from warpspace.formats.to_scene import into_scene
 
-    Parameters
-    ----------
-    kind : Format
-    sources : list of Source
-    wanted : Wanted
-        What they were written for.
-    label : str
-        Name of the format and points of the table, for people.
-
-    Returns
-    -------
-    Controller
-
-    Raises
-    ------
-    OptionError, SceneError
-        If the controller would refuse them.
-    """
     scene, corrector = wanted.scene, wanted.corrector
+    sources = [
+        source_of_text(text, f"{wanted.stem}{add}{'' if add else kind.endings[0]}")
+        for add, text in files.items()
+    ]
     options = ReadOptions(scene.machine, sign=wanted.sign)
     if kind.tables is not None:
         tables = kind.tables(sources, options)
@@ -228,12 +172,15 @@ def read_back(kind: Format, sources: list[Source], wanted: Wanted, label: str) -
             tables.assumed,
             tables.notes,
         )
-    found = kind.read(sources, options)
+    found = kind.errors(sources, options)
     bare = replace(scene, errors=ErrorSet(), uncertainty={}, measured={})
     held = into_scene(Reading(found, kind, recognised=True), bare, scene.title, scene.name).scene
     errors = held.errors
     if wanted.resolution:
-        errors = _rounded(errors, wanted.resolution)
+        raise OptionError(
+            f"{{resolution}} {wanted.resolution:g}: formats of error parameters have as many digits"
+            " as they print; expected a table of corrections"
+        )
     model = replace(held.model, direction=scene.model.direction)
     notes = list(found.notes)
     lost = [key for key in scene.errors if key not in errors and scene.errors.amplitude(key)]
@@ -261,10 +208,58 @@ def read_back(kind: Format, sources: list[Source], wanted: Wanted, label: str) -
     )
 
 
-def _rounded(errors: ErrorSet, resolution: float) -> ErrorSet:
-    """Refuse: the resolution of error parameters is that of their digits."""
-    del errors
-    raise OptionError(
-        f"--resolution {resolution:g}: formats of error parameters have as many digits as they"
-        " print; expected a table of corrections"
+HELD = 0.05
+"""Share of the reversal that may be left where a format holds it: the steps of its table."""
+LEAST_UM = 0.01
+"""A reversal below it is none."""
+
+
+@dataclass(frozen=True)
+class BeforeAfter:
+    """The errors over the working volume before and after a compensation."""
+
+    before: ErrorField
+    after: ErrorField
+    grid: Grid
+
+    @property
+    def before_statistics(self) -> Statistics:
+        """Of the scene as it is."""
+        return volume_statistics(self.before, self.grid)
+
+    @property
+    def after_statistics(self) -> Statistics:
+        """Of what is left."""
+        return volume_statistics(self.after, self.grid)
+
+    def tilt_urad(self, field: ErrorField) -> tuple[float, float]:
+        """Give mean, by volume, and largest tilt of the tool axis in one of the fields, µrad."""
+        tilt = np.linalg.norm(field.orientation_urad, axis=-1)
+        return float(np.sum(self.grid.weights * tilt)), float(tilt.max())
+
+
+def evaluated(controller: Controller, grid: Grid, direction: str) -> BeforeAfter:
+    """Evaluate a machine before and after a compensation."""
+    at, nominal, scene = grid.coordinates, grid.nominal_mm, toward(controller.scene, direction)
+    before = controller.without().field(at, nominal, scene)
+    return BeforeAfter(before, controller.field(at, nominal, scene), grid)
+
+
+def reversal_notes(
+    there: BeforeAfter, back: BeforeAfter, errors: ErrorSet, direction: str
+) -> tuple[str, ...]:
+    """Say what of the reversal a format has no place for."""
+    before, after = (
+        float(np.linalg.norm(one.error_um - other.error_um, axis=-1).max())
+        for one, other in ((there.before, back.before), (there.after, back.after))
     )
+    if after <= max(LEAST_UM, HELD * before):
+        return ()
+    keys = ", ".join(key for key, curve in errors.functions.items() if curve.has_directions)
+    words = DIRECTION_WORDS[TravelDirection(direction)]
+    said = (
+        f"direction of travel is not held here, or not all of it: by {keys} forward and backward"
+        f" differ by up to {before:.3g} µm before and {after:.3g} µm after (where one value stands"
+        f" for both: {words})"
+    )
+    return (said,)

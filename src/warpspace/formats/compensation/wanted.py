@@ -6,42 +6,238 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpspace.formats.compensation.corrector import Corrector
+from warpspace.exceptions import OptionError
+from warpspace.field.evaluate import View, evaluate_exact, placement_effect
+from warpspace.kinematics import transforms
+from warpspace.kinematics.chain import branch_pose, nominal_point, tool_axis
+from warpspace.kinematics.model import Coordinates, Loop, Model, batch_shape
+from warpspace.machine.axes import TravelDirection, direction_index, is_linear
 from warpspace.machine.curves.directional import Directional
 from warpspace.machine.errors import ErrorSet
 from warpspace.machine.parameters import parameter
-from warpspace.machine.travel import TravelDirection
 from warpspace.scene.model import Scene
-from warpspace.units import Array
+from warpspace.units import MM_PER_UM, RAD_PER_URAD, Array
 
+# --- By how much the axes of a machine are moved so that no error is left -------------------------
+
+STEPS = 2
+"""Newton steps: an error grows by a ten-thousandth of the correction at most."""
+SMALL_MM, SMALL_DEG = 1e-2, 1e-3
+"""Moves by which the response of the tool to an axis is measured."""
+CUT = 1e-3
+"""Moves that act less than this share of the best one are not used."""
+LOOPS = (Loop.TOOL, Loop.RELATIVE)
+
+
+@dataclass(frozen=True)
+class Moved:
+    """Points of a machine whose axes were moved, before its errors count."""
+
+    model: Model
+    loop: Loop
+    coordinates: Coordinates  # [...], mm or degrees; where the axes stand after the moves
+    point_mm: Array  # [..., 3]; where the points nominally are then
+    # [..., 3]; by how much they have moved from where they were commanded, as the loop sees it
+    shift_mm: Array
+    turn_rad: Array  # [..., 3]; by how much the tool axis has turned
+
+    def residual(self, errors: ErrorSet) -> tuple[Array, Array]:
+        """Give what is left with errors; see `Corrector.residual`."""
+        view = View(self.loop)
+        field = evaluate_exact(self.model, errors, self.coordinates, view, self.point_mm)
+        return (
+            self.shift_mm + field.error_um * MM_PER_UM,
+            self.turn_rad + field.orientation_urad * RAD_PER_URAD,
+        )
+
+    def without(
+        self, placement: Array | None, position_mm: Array, orientation_rad: Array
+    ) -> tuple[Array, Array]:
+        """Leave out of a residual where the workpiece lies, if that is known."""
+        if placement is None:
+            return position_mm, orientation_rad
+        less = placement_effect(self.model, placement, self.coordinates, self.point_mm)
+        return position_mm - less[0] * MM_PER_UM, orientation_rad - less[1] * RAD_PER_URAD
+
+
+@dataclass(frozen=True)
+class Corrector:
+    """A machine with its errors and the axes that may be moved against them."""
+
+    model: Model
+    errors: ErrorSet
+    loop: Loop  # tool, or tool relative to workpiece
+    axes: tuple[str, ...]  # axes that correct the position
+    # rotary axes that correct the tilt of the tool axis, as far as they can; those of `axes` then
+    # take back what they move the tool point by
+    tilting: tuple[str, ...] = ()
+    # [6], or None; where the workpiece lies, as `fit_placement` gives it: that part of the error is
+    # left alone
+    placement: Array | None = None
+
+    @property
+    def moved(self) -> tuple[str, ...]:
+        """All axes that are corrected."""
+        return (*self.axes, *self.tilting)
+
+    def residual(
+        self, coordinates: Coordinates, moves: Mapping[str, Array], point_mm: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Give what is left at commanded positions after moves of the axes."""
+        moved = self.move(coordinates, moves, point_mm)
+        return moved.without(self.placement, *moved.residual(self.errors))
+
+    def move(
+        self, coordinates: Coordinates, moves: Mapping[str, Array], point_mm: Array | None = None
+    ) -> "Moved":
+        """Work out all of a residual that does not depend on the errors; see `residual`."""
+        after = {axis: q + moves[axis] if axis in moves else q for axis, q in coordinates.items()}
+        return Moved(
+            self.model, self.loop, after, *self._nominal_motion(coordinates, after, point_mm)
+        )
+
+    def _nominal_motion(
+        self, before: Coordinates, after: Coordinates, point_mm: Array | None = None
+    ) -> tuple[Array, Array, Array]:
+        """Place of a point after a move, its displacement, and the turn of the tool axis.
+
+        The point is the tool point by default. In the workpiece loop it rides on the workpiece, in
+        the relative loop the displacement is that of the tool against the workpiece.
+        """
+        start = nominal_point(self.model, Loop.TOOL, before) if point_mm is None else point_mm
+        aim, end = tool_axis(self.model, before), tool_axis(self.model, after)
+        if self.loop is Loop.TOOL:
+            point = self._tool_point(before, after, point_mm)
+            return point, point - start, np.cross(aim, end)
+        carried = self._carried("workpiece", before, after)
+        rides, turned = (
+            transforms.apply(carried, start),
+            transforms.rotate(carried[..., :3, :3], aim),
+        )
+        if self.loop is Loop.WORKPIECE:
+            return rides, rides - start, np.cross(aim, turned)
+        point = self._tool_point(before, after, point_mm)
+        return point, point - rides, np.cross(turned, end)
+
+    def _tool_point(self, before: Coordinates, after: Coordinates, point_mm: Array | None) -> Array:
+        """Give where a point of the tool side nominally is after a move, [..., 3], mm."""
+        if point_mm is None:
+            return nominal_point(self.model, Loop.TOOL, after)
+        return transforms.apply(self._carried("tool", before, after), point_mm)
+
+    def _carried(self, side: str, before: Coordinates, after: Coordinates) -> Array:
+        """Motion in R of what rides on a branch, [..., 4, 4]."""
+        return branch_pose(self.model, side, after) @ transforms.inverse(
+            branch_pose(self.model, side, before)
+        )
+
+    def moves(self, coordinates: Coordinates) -> dict[str, Array]:
+        """Give the moves of the axes that leave nothing, or as little as they can."""
+        shape = batch_shape(coordinates)
+        total = {axis: np.zeros(shape) for axis in self.moved}
+        shift, _ = self._response(coordinates, self.axes)
+        back = _inverse(shift)
+        carried, turn = self._response(coordinates, self.tilting)
+        upright = _inverse(turn)
+        for _ in range(STEPS):
+            position, orientation = self.residual(coordinates, total)
+            if self.tilting:
+                tilt = -_times(upright, orientation)
+                position = position + _times(carried, tilt)
+                total |= {a: total[a] + tilt[..., i] for i, a in enumerate(self.tilting)}
+            step = -_times(back, position)
+            total |= {a: total[a] + step[..., i] for i, a in enumerate(self.axes)}
+        return total
+
+    def _response(self, coordinates: Coordinates, axes: Sequence[str]) -> tuple[Array, Array]:
+        """Displacement and turn of the tool per move of each axis, [..., 3, K] twice."""
+        shifts: list[Array] = []
+        turns: list[Array] = []
+        shape = (*batch_shape(coordinates), 3)
+        for axis in axes:
+            small = SMALL_MM if is_linear(axis) else SMALL_DEG
+            up, down = (
+                self._nominal_motion(
+                    coordinates, {**coordinates, axis: coordinates[axis] + way * small}
+                )
+                for way in (1.0, -1.0)
+            )
+            for found, one, other in ((shifts, up[1], down[1]), (turns, up[2], down[2])):
+                found.append(np.broadcast_to((one - other) / (2.0 * small), shape))
+        none = np.zeros((*shape, 0))
+        return (
+            np.stack(shifts, -1) if shifts else none,
+            np.stack(turns, -1) if turns else none,
+        )
+
+
+def _inverse(matrix: Array) -> Array:
+    """Invert, as far as it can be, without directions that hardly act, [..., n, m]."""
+    if not matrix.shape[-1]:
+        return np.swapaxes(matrix, -1, -2)
+    return np.asarray(np.linalg.pinv(matrix, rcond=CUT), dtype=np.float64)
+
+
+def _times(matrix: Array, vector: Array) -> Array:
+    """Multiply matrices with vectors, [..., n]."""
+    return np.einsum("...ij,...j->...i", matrix, vector)
+
+
+def build_corrector(scene: Scene, loop: str = "", *, orientation: bool = False) -> Corrector:
+    """Build the corrector of a scene: its linear axes, with its rotary ones for the orientation."""
+    machine = scene.machine
+    linear = tuple(axis for axis in machine.axes if is_linear(axis))
+    rotary = tuple(axis for axis in machine.axes if not is_linear(axis))
+    if not linear:
+        raise OptionError(f"the machine {machine.chain} has no linear axis to correct")
+    if orientation and not rotary:
+        raise OptionError(
+            f"the machine {machine.chain} has no rotary axis; {{orientation}} needs one"
+        )
+    carried: set[str] = set(linear) & set(machine.chain.workpiece)
+    if orientation and not set(rotary) & set(machine.chain.tool):
+        carried |= set(rotary)
+    chosen = Loop(loop) if loop else Loop.RELATIVE if carried else Loop.TOOL
+    if chosen not in LOOPS:
+        raise OptionError(f"loop {chosen}; expected tool or relative for a compensation")
+    if chosen is Loop.TOOL:
+        linear = tuple(axis for axis in linear if axis in machine.chain.tool)
+        rotary = tuple(axis for axis in rotary if axis in machine.chain.tool)
+        if not linear or (orientation and not rotary):
+            raise OptionError(
+                "loop tool: no axis that could correct it carries the tool; expected loop relative"
+            )
+    spanning = tuple(axis for axis in rotary if axis in scene.workspace.volume_axes)
+    axes = (*_independent(linear, scene), *spanning)
+    tilting = tuple(axis for axis in rotary if axis not in spanning) if orientation else ()
+    return Corrector(scene.model, scene.errors, chosen, axes, tilting)
+
+
+def _independent(linear: Sequence[str], scene: Scene) -> tuple[str, ...]:
+    spanning = scene.workspace.volume_axes
+    found: dict[int, str] = {}
+    for axis in sorted(linear, key=lambda name: name not in spanning):
+        found.setdefault(direction_index(axis), axis)
+    return tuple(axis for axis in linear if axis in found.values())
+
+
+AXES = ("X", "Y", "Z")
 OTHER_NODES = 9
 """Positions of the other axes that a table of one axis is averaged over."""
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """What a table is to correct, and how fine it may be.
-
-    Attributes
-    ----------
-    scene : Scene
-    corrector : Corrector
-    points : mapping of str to int
-        Points of the table along each axis of the volume.
-    resolution : float
-        Smallest step of a value, mm or degrees; 0 for as many digits as are printed.
-    sign : str
-        What the values are: "error" or "correction"; empty for what the format's manual says.
-    stem : str
-        Name of the files to write, without an ending.
-    """
+    """What a table is to correct, and how fine it may be."""
 
     scene: Scene
     corrector: Corrector
-    points: Mapping[str, int]
+    points: Mapping[str, int]  # points of the table along each axis of the volume
+    # smallest step of a value, mm or degrees; 0 for as many digits as are printed
     resolution: float = 0.0
+    # what the values are: "error" or "correction"; empty for what the format's manual says
     sign: str = ""
-    stem: str = "compensation"
+    stem: str = "compensation"  # name of the files to write, without an ending
 
     @property
     def title(self) -> str:
@@ -76,15 +272,7 @@ class Wanted:
         return tuple(axis for axis in self.axes if axis in found)
 
     def toward(self, direction: str, axis: str = "") -> "Wanted":
-        """Give what is wanted for one direction of travel, of all axes or of one alone.
-
-        Parameters
-        ----------
-        direction : str
-            "mean", "forward" or "backward".
-        axis : str, optional
-            All other axes travel as in the scene; "forward" or "backward" then.
-        """
+        """Give what is wanted for one direction of travel, of all axes or of one alone."""
         model, errors = self.corrector.model, self.corrector.errors
         if not axis:
             corrector = replace(self.corrector, model=replace(model, direction=direction))
@@ -98,17 +286,7 @@ class Wanted:
         return replace(self, corrector=replace(self.corrector, errors=changed))
 
     def corrections(self, places: Mapping[str, Array]) -> dict[str, Array]:
-        """Give the corrections of all axes on a grid of places along the axes of the volume.
-
-        Parameters
-        ----------
-        places : mapping of str to ndarray, (n,)
-
-        Returns
-        -------
-        dict of str to ndarray, [n1, n2, …]
-            In the order of `axes`.
-        """
+        """Give the corrections of all axes on a grid of places along the axes of the volume."""
         still = self.scene.workspace.positions
         meshed = np.meshgrid(*(places[axis] for axis in self.axes), indexing="ij")
         coordinates = {name: np.asarray(still[name]) for name in self.scene.machine.axes}
@@ -116,27 +294,14 @@ class Wanted:
         return self.corrector.moves(coordinates)
 
     def averaged(self, kept: Sequence[str]) -> dict[str, Array]:
-        """Give the corrections over some axes, averaged over the volume along all others.
-
-        Parameters
-        ----------
-        kept : sequence of str
-            In the order of `axes`.
-
-        Returns
-        -------
-        dict of str to ndarray, [n1, …]
-            By corrected axis: the table of these axes that leaves the smallest RMS.
-        """
+        """Give the corrections over some axes, averaged over the volume along all others."""
         places = {
             axis: self.places(axis)
             if axis in kept
             else np.linspace(*self.scene.workspace.ranges[axis], OTHER_NODES)
             for axis in self.axes
         }
-        weights = np.ones(OTHER_NODES)
-        weights[[0, -1]] = 0.5
-        weights /= weights.sum()
+        weights = shares(OTHER_NODES)
         found = self.corrections(places)
         for index in reversed(range(len(self.axes))):
             if self.axes[index] not in kept:
@@ -144,3 +309,48 @@ class Wanted:
                     axis: np.moveaxis(value, index, -1) @ weights for axis, value in found.items()
                 }
         return found
+
+    def linear_fit(self, allowed: Sequence[tuple[str, str]]) -> dict[tuple[str, str], float]:
+        """Fit corrections of one axis in proportion to the position of another.
+
+        Notes
+        -----
+        Least squares over the working volume, its nodes weighed by their share of it. There is no
+        constant part: such a controller has no place for one.
+        """
+        scene, machine = self.scene, self.scene.machine
+        if missing := [axis for axis in AXES if axis not in machine.axes]:
+            found_axes = ", ".join(machine.axes)
+            raise OptionError(
+                f"the matrix is of X, Y and Z; the machine {machine.chain} has {found_axes}, no"
+                f" {missing[0]}"
+            )
+        places = {
+            axis: np.linspace(*scene.workspace.ranges[axis], OTHER_NODES) for axis in self.axes
+        }
+        needed, weights = self.corrections(places), np.ones(())
+        for _ in self.axes:
+            weights = weights[..., None] * shares(OTHER_NODES)
+        root = np.sqrt(weights).ravel()
+        at = dict(zip(self.axes, np.meshgrid(*places.values(), indexing="ij"), strict=True))
+        held = scene.reference or {}
+        if held:
+            still = {**scene.workspace.positions, **held}
+            there = self.corrector.moves({axis: np.asarray(still[axis]) for axis in machine.axes})
+            needed = {target: values - there[target] for target, values in needed.items()}
+        found: dict[tuple[str, str], float] = {}
+        for target in dict.fromkeys(target for target, _ in allowed):
+            sources = [axis for one, axis in allowed if one == target and axis in at]
+            if target in needed and sources:
+                columns = [at[axis] - held.get(axis, 0.0) for axis in sources]
+                matrix = np.stack([column.ravel() * root for column in columns], -1)
+                solved = np.linalg.lstsq(matrix, needed[target].ravel() * root, rcond=None)[0]
+                found |= {(target, axis): float(v) for axis, v in zip(sources, solved, strict=True)}
+        return found
+
+
+def shares(count: int) -> Array:
+    """Give the share of an axis that belongs to each of its points, trapezoidal, [n]."""
+    found = np.ones(count)
+    found[[0, -1]] = 0.5
+    return found / found.sum()

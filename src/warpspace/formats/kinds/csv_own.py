@@ -1,43 +1,250 @@
 """The measurement table of warpspace: a CSV file whose header names errors with their units.
 
-Documented in docs/import.md; `warpspace template AXIS` writes one to fill in.
+Documented in docs/import.md; `warpspace import --template AXIS` writes one to fill in.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpspace.formats.kind import Format, ReadOptions
+from warpspace.exceptions import SceneError, near_miss
+from warpspace.formats.compensation.wanted import Wanted
+from warpspace.formats.kind import Files, Format, ReadOptions
 from warpspace.formats.measured import (
     BACKWARD,
     BOTH,
     FORWARD,
     Imported,
     Plane,
+    Point,
     Run,
     Series,
+    distinct,
     merge,
+    plane_by_ways,
+    sampled,
+    tables_of,
+    zero_key,
 )
-from warpspace.formats.numbers import check_error, check_position, read_number, read_whole
-from warpspace.formats.parts.csv_header import (
-    DIRECTION,
-    DIRECTIONS,
-    RUN,
-    Column,
-    fields,
-    is_content,
-    read_header,
-    recognise,
-    separator_of,
+from warpspace.formats.source import (
+    DEG_PER,
+    MM_PER,
+    UM_PER,
+    URAD_PER,
+    Place,
+    Source,
+    shown,
+    source_of_text,
+    spell,
 )
-from warpspace.formats.parts.csv_writing import write
-from warpspace.formats.parts.planes import SAME, Point, distinct, plane_by_ways
-from warpspace.formats.source import Source, shown
+from warpspace.machine.axes import is_axis_name, is_linear
 from warpspace.machine.limits import MAX_POINTS, MAX_RUNS
-from warpspace.machine.parameters import parameter
+from warpspace.machine.parameters import PARAMETERS, parameter
+from warpspace.scene.files import CsvRows, unguard_cell
+from warpspace.units import Array
+
+RUN, DIRECTION = "run", "direction"
+SIGNS = {FORWARD: "+", BACKWARD: "-", BOTH: ""}
+DIGITS = 6
+"""Behind the point of a value, µm or µrad."""
+UNITS = "# Units stand in brackets and may be changed: um mm nm in, urad mrad rad arcsec deg."
+
+
+def usual_places(axis: str) -> tuple[float, ...]:
+    """Give positions of a table to fill in, mm or degrees."""
+    return (-250, -125, 0, 125, 250) if is_linear(axis) else (0, 90, 180, 270, 360)
+
+
+def _position(axis: str) -> str:
+    return f"{axis} [{'mm' if is_linear(axis) else 'deg'}]"
+
+
+def _value(key: str, spelled: str = "{}") -> str:
+    unit = "urad" if parameter(key).is_rotation else "um"
+    return f"{spelled.format(key)} [{unit}]"
+
+
+def _lines(rows: Iterable[Iterable[str]]) -> str:
+    return "".join(",".join(row) + "\n" for row in rows)
+
+
+def surface_template(axes: tuple[str, str], places: tuple[Sequence[float], Sequence[float]]) -> str:
+    """Write a table to fill in for the errors of the first axis over it and a second one."""
+    axis, other = axes
+    lines = [
+        f"# Errors of the {axis} axis over {axis} and {other}: actual - nominal, a row a point.",
+        "# Every point of the grid stands there once, in any order; between them the value is",
+        "# bilinear, beyond them that of the edge. Columns that are not needed may be left out.",
+    ]
+    cells = [f"{first:g},{second:g}" for first in places[0] for second in places[1]]
+    return _to_fill_in(axis, lines, map(_position, axes), cells)
+
+
+def template(axis: str, places: Sequence[float] = ()) -> str:
+    """Write a table to fill in for an axis."""
+    spans = places or usual_places(axis)
+    lines = [
+        f"# Errors of the {axis} axis: actual - nominal, a row a position of a run.",
+        "# run: 1, 2, 3 …; direction: + towards growing positions, - towards falling ones.",
+        "# u(…): standard uncertainties (k = 1). Columns that are not needed may be left out.",
+    ]
+    cells = [f"{q:g},1,+" for q in spans] + [f"{q:g},1,-" for q in reversed(spans)]
+    return _to_fill_in(axis, lines, (_position(axis), RUN, DIRECTION), cells, uncertain=True)
+
+
+def _to_fill_in(
+    axis: str,
+    words: list[str],
+    columns: Iterable[str],
+    cells: list[str],
+    *,
+    uncertain: bool = False,
+) -> str:
+    keys = [f"E{letter}{axis}" for letter in "XYZABC"]
+    values = [*map(_value, keys), *(_value(key, "u({})") for key in keys if uncertain)]
+    lines = [words[0], UNITS, *words[1:], *(f"# {key}: {parameter(key).name}" for key in keys)]
+    lines += [",".join([*columns, *values]), *(row + "," * len(values) for row in cells)]
+    return "\n".join(lines) + "\n"
+
+
+def write(wanted: Wanted) -> Files:
+    """Write the errors of a scene: constants in the main file, one file an axis beside it."""
+    files: dict[str, str] = {}
+    for table in tables_of(sampled(wanted)):
+        directed = [DIRECTION] if table.directed else []
+        rows = [[*map(_position, table.axes), *directed, *map(_value, table.keys)]]
+        for at, way, values in table.rows:
+            told = [SIGNS[way]] if directed else []
+            rows.append([*map(repr, at), *told, *(spell(value, DIGITS) for value in values)])
+        name = ("constant", *table.axes[:1], table.keys[0])[len(table.axes)]
+        files[f"_{name}.csv"] = _lines(rows)
+    if not files:
+        return {"": _lines([[_value(zero_key(wanted.scene))], ["0.0"]])}
+    files[""] = files.pop(next(iter(files)))
+    return files
+
 
 NAME = "csv"
+POSITION, ERROR, UNCERTAINTY = "position", "error", "uncertainty"
+DIRECTIONS: Mapping[str, int] = {
+    "": BOTH,
+    "0": BOTH,
+    "+": FORWARD,
+    "1": FORWARD,
+    "+1": FORWARD,
+    "forward": FORWARD,
+    "-": BACKWARD,
+    "-1": BACKWARD,
+    "−": BACKWARD,
+    "backward": BACKWARD,
+}
+_HEADING = re.compile(
+    r"(?:(u)\s*\(\s*)?([A-Za-z0-9]+)\s*\)?\s*"
+    r"(?:\[\s*([^\]]+?)\s*\]|\(\s*([^)]+?)\s*\)|_([A-Za-zµμ°/]+))?"
+)
+
+
+@dataclass(frozen=True)
+class _Column:
+    """One column of a table: what it holds, and the factor to µm, µrad, mm or degrees."""
+
+    role: str
+    name: str
+    factor: float = 1.0
+    unit: str = ""
+
+    def value(self, cell: str, at: Place, table: CsvRows) -> float:
+        """Read a cell."""
+        if self.role == DIRECTION:
+            way = unguard_cell(cell).lower()
+            if way not in DIRECTIONS:
+                at.refuse(f"direction {shown(cell)}", "+, - or nothing")
+            return DIRECTIONS[way]
+        if self.role == RUN:
+            return at.whole(cell, RUN, 0, 10**9)
+        if not cell and self.role != POSITION:
+            return math.nan
+        value = self.factor * table.number(cell, at.line, self.name)
+        if self.role == POSITION:
+            return at.checked_position(value, self.name)
+        if self.role == UNCERTAINTY and value < 0.0:
+            expected = "a standard uncertainty, which is not negative"
+            at.refuse(f"u({self.name}) {shown(cell)}", expected)
+        return at.checked_error(value, self.name)
+
+
+_Row = tuple[Place, dict[tuple[str, str], float]]
+
+
+@dataclass(frozen=True)
+class _Table:
+    """A file that was read: its columns and its rows."""
+
+    source: Source
+    head: Place
+    columns: tuple[_Column, ...]
+    rows: tuple[_Row, ...]
+
+    def of(self, role: str) -> list[str]:
+        """Name the columns of a role."""
+        return [one.name for one in self.columns if one.role == role]
+
+    def ways(self) -> list[int]:
+        """Give the direction of each row."""
+        return [int(row.get((DIRECTION, DIRECTION), BOTH)) for _, row in self.rows]
+
+
+# --- header -------------------------------------------------------------------------------------
+
+
+def recognise(head: str, name: str) -> bool:
+    """Tell it by a header that names an axis or an error with its unit."""
+    try:
+        header = source_of_text(head, name).rows(1).header
+    except SceneError:
+        return False
+    found = [matched for part in header if (matched := _HEADING.fullmatch(part))]
+    has_unit = any(one[3] or one[4] or one[5] for one in found)
+    return has_unit and any(one[2] in PARAMETERS for one in found)
+
+
+def _columns(at: Place, parts: Sequence[str]) -> tuple[_Column, ...]:
+    found = [_column(at, part) for part in parts]
+    seen = [(one.role, one.name) for one in found]
+    if twice := next((one for one in seen if seen.count(one) > 1), None):
+        at.refuse(f"column {twice[1]} stands there twice", "it once")
+    return tuple(found)
+
+
+def _column(at: Place, part: str) -> _Column:
+    lower = part.strip().lower()
+    if lower in (RUN, DIRECTION):
+        return _Column(lower, lower)
+    matched = _HEADING.fullmatch(part.strip())
+    if matched is None:
+        expected = "headings such as X [mm], EXX [um], u(EXX) [um], run, direction"
+        at.refuse(f"column {shown(part)}", expected)
+    uncertain, name = bool(matched[1]), matched[2].upper()
+    unit = (matched[3] or matched[4] or matched[5] or "").strip()
+    if name in PARAMETERS:
+        known = URAD_PER if parameter(name).is_rotation else UM_PER
+        role = UNCERTAINTY if uncertain else ERROR
+    elif is_axis_name(name) and not uncertain:
+        known, role = MM_PER if is_linear(name) else DEG_PER, POSITION
+    else:
+        errors = (f"E{a}{b}" for a in "XYZABC" for b in "XYZABC")
+        hint = near_miss(name, [*"XYZABCUVW", *errors])
+        at.refuse(f"column {shown(part)}", f"an axis, an error, u(error), run or direction{hint}")
+    if not unit:
+        units = ", ".join(one for one in known if one.isascii())
+        at.refuse(f"column {name} has no unit", f"{name} [unit], of {units}")
+    return _Column(role, name, at.unit(unit, known, name), unit)
+
+
+# --- rows ---------------------------------------------------------------------------------------
 
 
 def read(sources: Sequence[Source], options: ReadOptions) -> Imported:
@@ -47,211 +254,137 @@ def read(sources: Sequence[Source], options: ReadOptions) -> Imported:
 
 
 def _read_one(source: Source) -> Imported:
-    """Read one table."""
-    numbered = [(i, text) for i, text in enumerate(source.lines, 1) if is_content(text)]
-    if not numbered:
-        source.refuse("has no header; expected one such as X [mm],EXX [um]")
-    line, header = numbered[0]
-    mark = separator_of(header)
-    columns = read_header(source, line, fields(header, mark))
-    errors = [one for one in columns if one.role == "error"]
-    if not errors:
-        source.refuse("has no column of an error; expected for instance EXX [um]", line)
-    if len(numbered) < 2:
-        source.refuse("has no rows below its header; expected at least one", line)
-    if len(numbered) - 1 > MAX_POINTS:
-        found = f"has {len(numbered) - 1:,} rows"
-        source.refuse(f"{found}; expected at most {MAX_POINTS:,}", numbered[MAX_POINTS + 1][0])
-    rows = _rows(source, numbered[1:], columns, mark)
+    given = source.rows(MAX_POINTS)
+    if not given.header:
+        source.refuse("has no header", "one such as X [mm],EXX [um]")
+    head = source.at(given.line)
+    columns = _columns(head, given.header)
+    if not any(one.role == ERROR for one in columns):
+        head.refuse("has no column of an error", "for instance EXX [um]")
+    rows: list[_Row] = []
+    for number, cells in given:
+        at = source.at(number)
+        pairs = zip(columns, cells, strict=True)
+        rows.append((at, {(one.role, one.name): one.value(cell, at, given) for one, cell in pairs}))
+    given.check()
+    if not rows:
+        head.refuse("has no rows below its header", "at least one")
+    table = _Table(source, head, columns, tuple(rows))
     units = tuple(dict.fromkeys(one.unit for one in columns if one.unit))
-    positions = [one for one in columns if one.role == "position"]
+    notes = (*source.notes, *given.notes)
+    found = _errors(table)
+    return replace(found, units=units, notes=(*notes, *found.notes))
+
+
+def _errors(table: _Table) -> Imported:
+    errors, positions = table.of(ERROR), table.of(POSITION)
     if not positions:
-        return _constants(source, rows, columns, units, line)
-    if any(parameter(one.name).is_constant for one in errors):
-        wrong = next(one.name for one in errors if parameter(one.name).is_constant)
-        expected = "expected it in a file without positions"
-        source.refuse(f"column {wrong} is a constant error; {expected}", line)
-    if len(positions) == 2:
-        return _planes(source, rows, columns, units, line)
+        return _constants(table)
+    if constant := next((key for key in errors if parameter(key).is_constant), ""):
+        expected = "it in a file without positions"
+        table.head.refuse(f"column {constant} is a constant error", expected)
     if len(positions) > 2:
-        source.refuse(f"{len(positions)} columns of positions; expected one or two", line)
-    axis = positions[0].name
-    if other := next((one.name for one in errors if parameter(one.name).axis != axis), ""):
-        expected = f"expected errors of {axis} in a table over {axis}"
-        source.refuse(f"column {other} is an error of {parameter(other).axis}; {expected}", line)
-    series, notes = _all_series(source, rows, columns)
-    return Imported(NAME, tuple(series), units=units, notes=(*source.notes, *notes))
+        table.head.refuse(f"{len(positions)} columns of positions", "one or two")
+    if len(positions) == 2:
+        return _planes(table)
+    (axis,) = positions
+    if other := next((key for key in errors if parameter(key).axis != axis), ""):
+        expected = f"errors of {axis} in a table over {axis}"
+        table.head.refuse(f"column {other} is an error of {parameter(other).axis}", expected)
+    return _series(table, axis)
 
 
-Row = tuple[int, dict[tuple[str, str], float]]
+def _constants(table: _Table) -> Imported:
+    if len(table.rows) != 1:
+        expected = "one, or a column of positions such as X [mm]"
+        table.head.refuse(f"{len(table.rows)} rows of errors without positions", expected)
+    ((at, row),) = table.rows
+    constants = {key: row[ERROR, key] for key in table.of(ERROR)}
+    if empty := next((key for key, value in constants.items() if math.isnan(value)), ""):
+        at.refuse(f"{empty} is empty", "a number")
+    uncertain = {key: row[UNCERTAINTY, key] for key in table.of(UNCERTAINTY)}
+    given = {key: value for key, value in uncertain.items() if not math.isnan(value)}
+    return Imported(NAME, constants=constants, uncertainty=given)
 
 
-def _rows(
-    source: Source, numbered: Sequence[tuple[int, str]], columns: Sequence[Column], mark: str
-) -> list[Row]:
-    """Read the rows in the units of the model."""
-    comma = mark != ","
-    rows: list[Row] = []
-    for number, text in numbered:
-        parts = fields(text, mark)
-        if len(parts) != len(columns):
-            found = f"{len(parts)} fields"
-            if mark == "," and len(parts) > len(columns):
-                found += " (decimal commas? then semicolons or tabs must part the columns)"
-            source.refuse(f"{found}; expected {len(columns)} as in the header", number)
-        row: dict[tuple[str, str], float] = {}
-        for column, part in zip(columns, parts, strict=True):
-            bare = part.strip()
-            if column.role == DIRECTION:
-                if bare.lower() not in DIRECTIONS:
-                    expected = "expected +, - or nothing"
-                    source.refuse(f"direction {shown(part)}; {expected}", number)
-                row[DIRECTION, DIRECTION] = DIRECTIONS[bare.lower()]
-            elif column.role == RUN:
-                row[RUN, RUN] = read_whole(part, source, number, RUN, 0, 10**9)
-            elif not bare and column.role != "position":
-                row[column.role, column.name] = math.nan
-            else:
-                value = column.factor * read_number(part, source, number, column.name, comma=comma)
-                check = check_position if column.role == "position" else check_error
-                row[column.role, column.name] = check(value, source, number, column.name)
-        rows.append((number, row))
-    return rows
-
-
-def _constants(
-    source: Source,
-    rows: Sequence[Row],
-    columns: Sequence[Column],
-    units: tuple[str, ...],
-    line: int,
-) -> Imported:
-    """Read constant errors: one row."""
-    if len(rows) != 1:
-        expected = "expected one, or a column of positions such as X [mm]"
-        source.refuse(f"{len(rows)} rows of errors without positions; {expected}", line)
-    _, row = rows[0]
-    kinds = {
-        role: {c.name: row[role, c.name] for c in columns if c.role == role}
-        for role in ("error", "uncertainty")
-    }
-    if empty := next((key for key, value in kinds["error"].items() if math.isnan(value)), ""):
-        source.refuse(f"{empty} is empty; expected a number", rows[0][0])
-    return Imported(
-        NAME,
-        constants=kinds["error"],
-        uncertainty={k: v for k, v in kinds["uncertainty"].items() if not math.isnan(v)},
-        units=units,
-        notes=source.notes,
-    )
-
-
-def _all_series(
-    source: Source, rows: Sequence[Row], columns: Sequence[Column]
-) -> tuple[list[Series], list[str]]:
-    """Sort rows into runs over the positions of one axis."""
-    axis = next(one.name for one in columns if one.role == "position")
-    at = np.array([row["position", axis] for _, row in rows])
+def _series(table: _Table, axis: str) -> Imported:
+    at = np.array([row[POSITION, axis] for _, row in table.rows])
     places = distinct(at)
-    ways = [
-        (int(row.get((RUN, RUN), 1)), int(row.get((DIRECTION, DIRECTION), BOTH))) for _, row in rows
-    ]
+    runs = [int(row.get((RUN, RUN), 1)) for _, row in table.rows]
+    ways = list(zip(runs, table.ways(), strict=True))
     known = list(dict.fromkeys(ways))
     if len(known) > MAX_RUNS:
-        source.refuse(f"has {len(known)} runs; expected at most {MAX_RUNS}")
-    index = (
-        np.abs(places[None, :] - at[:, None]).argmin(axis=1)
-        if len(rows) < 5000
-        else (np.clip(np.searchsorted(places, at - SAME), 0, len(places) - 1))
-    )
+        table.source.refuse(f"has {len(known)} runs", f"at most {MAX_RUNS}")
+    index = np.searchsorted((places[1:] + places[:-1]) / 2.0, at).tolist()
     taken: dict[tuple[tuple[int, int], int], int] = {}
-    for place, way, (line, _) in zip(index.tolist(), ways, rows, strict=True):
+    for place, way, (line, _) in zip(index, ways, table.rows, strict=True):
         if (way, place) in taken:
             found = f"position {places[place]:g} of {axis} stands also in line {taken[way, place]}"
-            source.refuse(f"{found}; expected columns run and direction to tell them apart", line)
-        taken[way, place] = line
+            line.refuse(found, "columns run and direction to tell them apart")
+        taken[way, place] = line.line
     series: list[Series] = []
-    for column in columns:
-        if column.role != "error":
-            continue
-        table = {way: np.full(len(places), math.nan) for way in known}
-        for place, way, (_, row) in zip(index.tolist(), ways, rows, strict=True):
-            table[way][place] = row["error", column.name]
-        given = {way: values for way, values in table.items() if not np.isnan(values).all()}
+    for key in table.of(ERROR):
+        values = {way: np.full(len(places), math.nan) for way in known}
+        uncertain = np.zeros(len(places))
+        for place, way, (_, row) in zip(index, ways, table.rows, strict=True):
+            values[way][place] = row[ERROR, key]
+            uncertain[place] = np.fmax(uncertain[place], row.get((UNCERTAINTY, key), 0.0))
+        given = {way: own for way, own in values.items() if not np.isnan(own).all()}
         if not given:
-            source.refuse(f"column {column.name} is empty; expected numbers, or no such column")
-        holes = np.isnan(np.array(list(given.values()))).all(axis=0)
-        if holes.any():
-            found = f"{column.name} has no value at {axis} {places[holes][0]:g}"
-            source.refuse(f"{found}; expected one at every position")
-        _check_ways(source, column.name, given, places, axis)
-        runs = tuple(
-            Run(number, way, tuple(values.tolist())) for (number, way), values in given.items()
+            table.source.refuse(f"column {key} is empty", "numbers, or no such column")
+        _check_holes(table.source, key, given, places, axis)
+        series.append(
+            Series(
+                key,
+                tuple(places.tolist()),
+                tuple(Run(*way, tuple(own.tolist())) for way, own in given.items()),
+                tuple(uncertain.tolist()) if uncertain.any() else (),
+            )
         )
-        uncertain = _uncertainty(rows, column.name, index, len(places))
-        series.append(Series(column.name, tuple(places.tolist()), runs, uncertain))
-    notes: list[str] = []
-    if len(known) == 1 and np.any(np.diff(at) < 0.0):
-        notes.append(f"rows were sorted by the position of {axis}")
-    return series, notes
+    sorted_rows = len(known) == 1 and np.any(np.diff(at) < 0.0)
+    notes = (f"rows were sorted by the position of {axis}",) if sorted_rows else ()
+    return Imported(NAME, tuple(series), notes=notes)
 
 
-def _check_ways(
+def _check_holes(
     source: Source,
     key: str,
-    given: Mapping[tuple[int, int], np.ndarray],
-    places: np.ndarray,
+    given: Mapping[tuple[int, int], Array],
+    places: Array,
     axis: str,
 ) -> None:
-    """Refuse a position that all runs of one direction left out."""
+    holes = np.isnan(np.array(list(given.values()))).all(axis=0)
+    if holes.any():
+        found = f"{key} has no value at {axis} {places[holes][0]:g}"
+        source.refuse(found, "one at every position")
     for direction in {way for _, way in given}:
         own = np.array([values for (_, way), values in given.items() if way == direction])
         holes = np.isnan(own).all(axis=0)
         if holes.any():
             said = {FORWARD: "forward", BACKWARD: "backward"}.get(direction, "any")
             found = f"{key} has no value at {axis} {places[holes][0]:g} in {said} direction"
-            source.refuse(f"{found}; expected every direction at every position")
+            source.refuse(found, "every direction at every position")
 
 
-def _uncertainty(rows: Sequence[Row], key: str, index: np.ndarray, count: int) -> tuple[float, ...]:
-    """Give the standard uncertainty at each position, the largest of those given."""
-    found = np.zeros(count)
-    for place, (_, row) in zip(index.tolist(), rows, strict=True):
-        value = row.get(("uncertainty", key), math.nan)
-        if not math.isnan(value):
-            found[place] = max(found[place], abs(value))
-    return tuple(found.tolist()) if found.any() else ()
-
-
-def _planes(
-    source: Source,
-    rows: Sequence[Row],
-    columns: Sequence[Column],
-    units: tuple[str, ...],
-    line: int,
-) -> Imported:
-    """Read errors over two axes: a value a point of a grid, of each direction of travel if told."""
-    first, second = (one.name for one in columns if one.role == "position")
-    if unknown := next((one for one in columns if one.role in (RUN, "uncertainty")), None):
+def _planes(table: _Table) -> Imported:
+    first, second = table.of(POSITION)
+    if unknown := next((one for one in table.columns if one.role in (RUN, UNCERTAINTY)), None):
         what = RUN if unknown.role == RUN else f"u({unknown.name})"
-        expected = "expected positions, direction and errors over two axes"
-        source.refuse(f"column {what}; {expected}: one value a point", line)
+        expected = "positions, direction and errors over two axes: one value a point"
+        table.head.refuse(f"column {what}", expected)
     planes: list[Plane] = []
-    for column in columns:
-        if column.role != "error":
-            continue
-        own = parameter(column.name).axis
+    for key in table.of(ERROR):
+        own = parameter(key).axis
         if own not in (first, second):
-            expected = f"expected errors of {first} or {second}"
-            source.refuse(f"column {column.name} is an error of {own}; {expected}", line)
-        names = (own, second if own == first else first)
+            expected = f"errors of {first} or {second}"
+            table.head.refuse(f"column {key} is an error of {own}", expected)
+        other = second if own == first else first
         points: dict[int, list[Point]] = {}
-        for number, row in rows:
-            at = (row["position", names[0]], row["position", names[1]])
-            way = int(row.get((DIRECTION, DIRECTION), BOTH))
-            points.setdefault(way, []).append((number, *at, row["error", column.name]))
-        planes.append(plane_by_ways(column.name, names, points, source))
-    return Imported(NAME, planes=tuple(planes), units=units, notes=source.notes)
+        for way, (at, row) in zip(table.ways(), table.rows, strict=True):
+            point = (at, row[POSITION, own], row[POSITION, other], row[ERROR, key])
+            points.setdefault(way, []).append(point)
+        planes.append(plane_by_ways(key, (own, other), points, table.source))
+    return Imported(NAME, planes=tuple(planes))
 
 
 FORMAT = Format(
@@ -271,4 +404,6 @@ FORMAT = Format(
     most_points=2001,
     parametric=True,
     orientation=True,
+    measured=True,
 )
+FORMATS = (FORMAT,)

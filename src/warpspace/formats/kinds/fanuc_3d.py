@@ -6,18 +6,14 @@ the control itself reads is not published: what is read and written here is a ta
 that are entered into it, a row a point.
 """
 
-import csv
 from collections.abc import Sequence
 
 import numpy as np
 
 from warpspace.exceptions import OptionError
 from warpspace.formats.compensation.wanted import Wanted
-from warpspace.formats.kind import CORRECTION, Files, Format, ReadOptions, resolve_axis
-from warpspace.formats.measured import Imported
-from warpspace.formats.numbers import MM_PER, check_position, read_number, read_whole, unit_factor
-from warpspace.formats.source import Source
-from warpspace.formats.table_errors import errors_of
+from warpspace.formats.kind import CORRECTION, Files, Format, ReadOptions, has
+from warpspace.formats.source import MM_PER, Source
 from warpspace.formats.terms import Grid3, Tables
 
 MARK = "# three-dimensional error compensation"
@@ -35,81 +31,53 @@ LIMITS = (
 )
 
 
-def recognise(head: str, name: str) -> bool:
-    """Tell it by its first line."""
-    del name
-    return head.lstrip().startswith(MARK)
-
-
-def _settings(source: Source) -> tuple[float, int, list[tuple[int, str]]]:
-    """Read detection unit in mm, magnification, and the lines of the table."""
+def _settings(source: Source) -> tuple[float, int]:
+    """Read detection unit in mm and magnification."""
     unit, magnification = DETECTION_MM, 1
-    lines: list[tuple[int, str]] = []
-    for number, text in enumerate(source.lines, start=1):
-        bare = text.strip()
-        if not bare.startswith("#"):
-            if bare:
-                lines.append((number, bare))
-            continue
-        key, _, value = (part.strip() for part in bare.lstrip("# ").partition("="))
+    for at, text in source.scan():
+        key, _, value = (part.strip() for part in text.lstrip("# ").partition("="))
         if key == "detection unit":
             size, _, name = value.partition(" ")
-            unit = read_number(size, source, number, key)
-            unit *= unit_factor(name.strip(), MM_PER, source, number, key)
+            unit = at.number(size, key) * at.unit(name.strip(), MM_PER, key)
             if not 1e-7 <= unit <= 1.0:
-                source.refuse(f"{key} {value}; expected 0.0000001 … 1 mm", number)
+                at.refuse(f"{key} {value}", "0.0000001 … 1 mm")
         elif key == "magnification":
-            magnification = read_whole(value, source, number, key, 1, MOST_MAGNIFICATION)
-    return unit, magnification, lines
+            magnification = at.whole(value, key, 1, MOST_MAGNIFICATION)
+    return unit, magnification
 
 
 def _grid(source: Source, options: ReadOptions) -> Grid3:
-    """Read the grid of a file."""
-    unit, magnification, lines = _settings(source)
-    if not lines:
-        source.refuse(f"has no table; expected the columns {', '.join(HEADINGS)}")
-    heading = tuple(part.strip() for part in lines[0][1].split(","))
-    if heading != HEADINGS:
-        expected = f"expected {', '.join(HEADINGS)}"
-        source.refuse(f"columns {', '.join(heading)}; {expected}", lines[0][0])
+    unit, magnification = _settings(source)
+    given = source.rows(MOST_POINTS**3)
+    if not given.header:
+        source.refuse("has no table", f"the columns {', '.join(HEADINGS)}")
+    if tuple(given.header) != HEADINGS:
+        source.at(given.line).refuse(f"columns {', '.join(given.header)}", ", ".join(HEADINGS))
     rows: list[list[float]] = []
-    for count, (number, text) in enumerate(lines[1:], start=1):
-        parts = next(csv.reader([text]))
-        if len(parts) != len(HEADINGS):
-            source.refuse(f"{len(parts)} columns; expected {len(HEADINGS)}", number)
-        read_whole(parts[0], source, number, "point", count, count)
-        place = [
-            check_position(
-                read_number(part, source, number, "position"), source, number, "position"
-            )
-            for part in parts[1:4]
-        ]
-        counts = [
-            read_whole(part, source, number, "correction", -MOST_COUNT - 1, MOST_COUNT)
-            for part in parts[4:]
-        ]
+    for count, (number, parts) in enumerate(given, start=1):
+        at = source.at(number)
+        at.whole(parts[0], "point", count, count)
+        numbers = (given.number(part, number, "position") for part in parts[1:4])
+        place = [at.checked_position(value, "position") for value in numbers]
+        counts = [at.whole(part, "correction", -MOST_COUNT - 1, MOST_COUNT) for part in parts[4:]]
         rows.append([*place, *(float(c) for c in counts)])
-        if count > MOST_POINTS**3:
-            source.refuse(f"more than {MOST_POINTS**3} points; expected at most so many", number)
+    given.check()
     table = np.array(rows).reshape(-1, 6)
     along = [np.unique(table[:, index]) for index in range(3)]
     shape = tuple(len(places) for places in along)
     if len(table) != np.prod(shape) or min(shape) < 2:
         found = f"{len(table)} points for a grid of {' × '.join(map(str, shape))}"
-        source.refuse(f"{found}; expected every point of a grid once (is the file cut off?)")
+        source.refuse(found, "every point of a grid once (is the file cut off?)")
     if max(shape) > MOST_POINTS:
-        found = f"{max(shape)} points along an axis"
-        source.refuse(f"{found}; expected at most {MOST_POINTS}, as the control takes")
+        expected = f"at most {MOST_POINTS}, as the control takes"
+        source.refuse(f"{max(shape)} points along an axis", expected)
     for places, axis in zip(along, "XYZ", strict=True):
         steps = np.diff(places)
         if np.ptp(steps) > STEP_SHARE * steps.max():
-            source.refuse(
-                f"steps of {steps.min():g} to {steps.max():g} mm along {axis}; expected"
-                " equal steps, as the control has"
-            )
-    order = np.lexsort(table[:, :3].T[::-1])
-    ordered = table[order].reshape(*shape, 6)
-    first, second, third = (resolve_axis(axis, source, None, options) for axis in "XYZ")
+            found = f"steps of {steps.min():g} to {steps.max():g} mm along {axis}"
+            source.refuse(found, "equal steps, as the control has")
+    ordered = table[np.lexsort(table[:, :3].T[::-1])].reshape(*shape, 6)
+    first, second, third = (options.axis_named(axis, source) for axis in "XYZ")
     values = options.factor(CORRECTION) * ordered[..., 3:] * unit * magnification
     x, y, z = (tuple(places.tolist()) for places in along)
     return Grid3((first, second, third), (x, y, z), values)
@@ -118,15 +86,10 @@ def _grid(source: Source, options: ReadOptions) -> Grid3:
 def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
     """Read the grid as the control holds it."""
     if len(sources) > 1:
-        sources[1].refuse("is a second grid; expected one")
+        sources[1].refuse("is a second grid", "one")
     said = options.sign or "values are added to the commanded position"
     assumed = (f"sign: {said}", "beyond the grid its border is held", LIMITS)
     return Tables((_grid(sources[0], options),), assumed, (), ("mm", "detection units"))
-
-
-def read(sources: Sequence[Source], options: ReadOptions) -> Imported:
-    """Read the errors, of two axes each, that the grid corrects."""
-    return errors_of(read_tables(sources, options), FORMAT.name, sources[0], options)
 
 
 def write(wanted: Wanted) -> Files:
@@ -146,7 +109,7 @@ def write(wanted: Wanted) -> Files:
     if magnification > MOST_MAGNIFICATION:
         raise OptionError(
             f"fanuc-3d: corrections reach {largest:.3g} mm, more than {MOST_COUNT} ×"
-            f" {MOST_MAGNIFICATION} × {unit:g} mm; expected a larger --resolution"
+            f" {MOST_MAGNIFICATION} × {unit:g} mm; expected a larger {{resolution}}"
         )
     counts = np.rint(values / (unit * magnification)).astype(int)
     counts = np.clip(counts, -MOST_COUNT - 1, MOST_COUNT)
@@ -175,10 +138,10 @@ FORMAT = Format(
     units="mm, detection units",
     grid="equal steps along each of three axes",
     limits=f"{MOST_POINTS} points an axis, ±{MOST_COUNT} detection units times the magnification",
-    recognise=recognise,
-    read=read,
+    recognise=has(rf"\A\s*{MARK}"),
     tables=read_tables,
     write=write,
     points=9,
     most_points=MOST_POINTS,
 )
+FORMATS = (FORMAT,)

@@ -5,17 +5,199 @@ amplitude, which is what a slider moves: the value of a constant, the upper end 
 largest value (with its sign) of anything else.
 """
 
+import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from itertools import pairwise
+from typing import Any, ClassVar, Self, cast
 
 import numpy as np
 
-from warpspace.machine.curves.reading import ValueReader
-from warpspace.machine.travel import TravelDirection
+from warpspace.exceptions import SHOWN_PROBLEMS, OptionError, SceneError, near_miss
+from warpspace.machine.axes import TravelDirection
+from warpspace.machine.limits import MAX_ERROR, MIN_NUMBER
 from warpspace.units import Array
+
+# --- Checks of the raw values that a scene file spells, each problem with its place ---------------
+
+Path = tuple[int | str, ...]
+"""Keys and indices below the error, for instance ``("table", 3, 0)``."""
+Points = Sequence[tuple[float, float]]
+CsvColumn = Callable[[str, str], Points]
+"""Reads axis positions and one column, by file and name of the column; may raise SceneError."""
+ReadCurve = Callable[[object, Path], "ErrorFunction | None"]
+"""Reads a curve within a curve, by its raw value and its place; None where problems were noted."""
+MISSING = object()
+"""Stands where a table has not all keys of its form."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One problem: its place below the error, what was expected, and the value found."""
+
+    path: Path
+    text: str
+    value: object = ...  # the ellipsis where the message shows no value
+
+
+def is_number(value: object) -> bool:
+    """Tell whether a raw value is a number; a truth value is none."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+class ValueReader:
+    """Checks raw values and collects what is wrong with them.
+
+    Every method gives something usable, so that all problems are found in one reading.
+    """
+
+    def __init__(
+        self,
+        csv_column: CsvColumn | None = None,
+        *,
+        axis: str = "",
+        axes: Collection[str] = (),
+        curve: ReadCurve | None = None,
+    ) -> None:
+        self.findings: list[Finding] = []
+        self.axis, self.axes = axis, tuple(axes)
+        self._csv_column, self._curve = csv_column, curve
+
+    def note(self, path: Path, text: str, value: object = ...) -> None:
+        """Note a problem; of a missing value, that it is missing."""
+        found = Finding(path, "is missing") if value is MISSING else Finding(path, text, value)
+        self.findings.append(found)
+
+    def number(
+        self,
+        value: object,
+        path: Path,
+        low: float = -math.inf,
+        high: float = math.inf,
+        least: float = MIN_NUMBER,
+        expected: str = "a number",
+    ) -> float:
+        """Read a finite number between limits, and where it is not 0 of a least magnitude."""
+        try:
+            number = float(cast("float", value)) if is_number(value) else None
+        except OverflowError:
+            self.note(path, "is too large; expected a finite number", value)
+            return math.nan
+        if number is None:
+            self.note(path, f"expected {expected}", value)
+            return math.nan
+        if not math.isfinite(number):
+            self.note(path, "expected a finite number", value)
+        elif number < low:
+            self.note(path, f"expected at least {low:g}", value)
+        elif number > high:
+            self.note(path, f"expected at most {high:g}", value)
+        elif 0.0 < abs(number) < least:
+            self.note(path, f"expected 0, or at least {least:.3g}", value)
+        return number
+
+    def entries(self, value: object, path: Path, most: int, least: int = 1) -> Sequence[object]:
+        """Read a list with at least one entry, or none, and at most so many."""
+        if not isinstance(value, list | tuple):
+            self.note(path, "expected a list", value)
+            return ()
+        entries = cast("Sequence[object]", value)
+        if len(entries) < least:
+            self.note(path, "expected at least 1, not 0 entries", value)
+        elif len(entries) > most:
+            self.note(path, f"expected at most {most} entries", value)
+            return ()
+        return entries
+
+    def row(
+        self, value: object, path: Path, spelling: str, limits: Sequence[tuple[float, float]]
+    ) -> tuple[float, ...]:
+        """Read a list of numbers, each between its limits, spelled for instance "[q, value]"."""
+        if not isinstance(value, list | tuple) or len(cast("Sequence[object]", value)) != len(
+            limits
+        ):
+            self.note(path, f"expected {spelling}", value)
+            return (math.nan,) * len(limits)
+        return tuple(
+            self.number(entry, (*path, index), *limit)
+            for index, (entry, limit) in enumerate(
+                zip(cast("Sequence[object]", value), limits, strict=True)
+            )
+        )
+
+    def text(self, value: object, path: Path, longest: int, least: int = 1) -> str:
+        """Read a text that is not empty, or may be."""
+        if not isinstance(value, str):
+            self.note(path, "expected a text", value)
+            return ""
+        if len(value) < least:
+            self.note(path, "expected at least 1 character", value)
+        elif len(value) > longest:
+            self.note(path, f"expected at most {longest} characters", value)
+        return value
+
+    def dictionary(self, value: object, path: Path) -> dict[str, object]:
+        """Read a table with any keys."""
+        if isinstance(value, dict):
+            return cast("dict[str, object]", value)
+        self.note(path, "expected a table", value)
+        return {}
+
+    def only(self, table: Mapping[str, object], path: Path, known: Collection[str]) -> None:
+        """Note the keys of a table that it does not have."""
+        for key in table:
+            if key not in known:
+                hint = near_miss(key, known) if len(self.findings) < SHOWN_PROBLEMS else ""
+                self.note((*path, key), f"unknown key{hint}")
+
+    def table(self, value: object, path: Path, known: Collection[str]) -> dict[str, object]:
+        """Read a table with exactly so many keys; what is missing stands as `MISSING`."""
+        if not isinstance(value, dict):
+            return self.dictionary(value, path)
+        found = cast("dict[str, object]", value)
+        for key in found:
+            if key not in known:
+                self.note((*path, key), f"unknown key; expected {', '.join(known)}")
+        return {**dict.fromkeys(known, MISSING), **found}
+
+    def ascending(
+        self, value: object, path: Path, most: int, limit: tuple[float, float]
+    ) -> tuple[float, ...]:
+        """Read a list of ascending numbers between limits."""
+        before = len(self.findings)
+        found = tuple(
+            self.number(entry, (*path, index), *limit)
+            for index, entry in enumerate(self.entries(value, path, most))
+        )
+        for number, (low, high) in enumerate(pairwise(found), start=2):
+            if len(self.findings) == before and not low < high:
+                text = f"entry {number} is {high:g} after {low:g}; expected ascending positions"
+                self.note(path, text)
+        return found
+
+    def curve(self, value: object, path: Path) -> "ErrorFunction | None":
+        """Read a curve within this one; None where problems were noted."""
+        if self._curve is None:
+            self.note(path, "expected a number", value)
+            return None
+        return self._curve(value, path)
+
+    def csv_points(self, file: str, column: str) -> Points:
+        """Read a column of a CSV file; nothing where a problem was noted before."""
+        if self.findings:
+            return ()
+        if self._csv_column is None:
+            self.note((), "CSV files are not read here; expected the values as { table = }")
+            return ()
+        try:
+            return self._csv_column(file, column)
+        except SceneError as error:
+            for problem in error.problems:
+                self.note((), f"{error.source}: {problem}")
+            return ()
+
 
 SPAN_SAMPLES = 721
 """Positions at which the peak of a curve is looked for: every half degree of a turn."""
@@ -49,6 +231,8 @@ class ErrorFunction(ABC):
         The tables that spell it in a scene file, each by its keys; none where it is a number.
     row_words : str
         How its numbers are written as rows.
+    slider : str
+        What the amplitude is; the name of the kind and the axis stand in braces.
     edited_as_rows : bool
         Whether people can write its numbers as rows; if not, it comes from files.
     """
@@ -57,6 +241,7 @@ class ErrorFunction(ABC):
     title: ClassVar[str]
     forms: ClassVar[tuple[tuple[str, ...], ...]]
     row_words: ClassVar[str]
+    slider: ClassVar[str] = "{name} along {axis}; this is its largest value"
     edited_as_rows: ClassVar[bool] = True
     span: Span
 
@@ -261,7 +446,7 @@ class ErrorFunction(ABC):
 
     def slider_words(self, axis: str) -> str:
         """Say what the amplitude of the curve along an axis is."""
-        return f"{self.name} along {axis}; this is its largest value"
+        return self.slider.format(name=self.name, axis=axis)
 
     # --- edited as rows of numbers ----------------------------------------------------------------
 
@@ -278,21 +463,47 @@ class ErrorFunction(ABC):
         return rows, ()
 
     @classmethod
-    @abstractmethod
     def from_rows(cls, span: Span, rows: Rows) -> Self:
-        """Build a curve from the rows a user has edited, at least one.
+        """Build a curve from the rows a user has edited, at least one; a kind that is not refuses.
 
         Raises
         ------
         OptionError
             Naming the row, what it holds and what was expected.
         """
+        del span, rows
+        raise OptionError(cls.row_words)
 
     @abstractmethod
     def rows(self) -> Rows:
         """Give the rows that `from_rows` reads back to this curve."""
 
     @classmethod
-    @abstractmethod
     def from_curve(cls, present: "ErrorFunction", span: Span) -> Self:
         """Give the curve that a user who changes the kind of a present one starts from."""
+        if not isinstance(present, cls):
+            raise OptionError(cls.row_words)
+        return replace(present, span=span)
+
+
+# --- Checks of the rows of numbers that a user edits; problems name the row -----------------------
+
+
+def single_value(rows: Rows) -> float:
+    """Take the one number there is."""
+    if len(rows) != 1 or len(rows[0]) != 1:
+        raise OptionError("expected one number")
+    return limited(rows[0][0], 1)
+
+
+def limited(value: float, row: int, limit: float = MAX_ERROR, what: str = "value") -> float:
+    """Refuse what is too large."""
+    if abs(value) > limit:
+        raise OptionError(f"row {row}: {what} {value:g}; expected at most ±{limit:g}")
+    return value
+
+
+def refuse_more(count: int, most: int, what: str) -> None:
+    """Refuse too many numbers or rows."""
+    if count > most:
+        raise OptionError(f"{count} {what}; expected at most {most}")

@@ -3,15 +3,13 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 
-from warpspace.exceptions import OptionError
-from warpspace.machine.curves.constant import Constant
-from warpspace.machine.curves.curve import ErrorFunction, Rows, Span, Spell
-from warpspace.machine.curves.reading import ValueReader
-from warpspace.machine.travel import TravelDirection
+from warpspace.machine.axes import TravelDirection
+from warpspace.machine.curves.curve import ErrorFunction, Rows, Span, Spell, ValueReader
+from warpspace.machine.curves.simple import Constant
 from warpspace.units import Array
 
 SHARES = {
@@ -28,22 +26,19 @@ NOTHING = Constant((0.0, 1.0))
 class Directional(ErrorFunction):
     """An error whose value depends on the way that its axis has come.
 
-    Attributes
-    ----------
-    forward, backward : ErrorFunction
-        Reached towards growing positions, and towards falling ones; of any other kind.
-
     Notes
     -----
     `evaluate` gives the mean of both; `evaluate_at` takes a direction. The amplitude is the larger
     one of the two curves' and scales both, so that their ratio stays.
     """
 
-    name: ClassVar[str] = "directional"
-    title: ClassVar[str] = "by direction of travel"
-    forms: ClassVar[tuple[tuple[str, ...], ...]] = (("forward", "backward"),)
-    row_words: ClassVar[str] = "curves by direction come from a scene file or an import"
-    edited_as_rows: ClassVar[bool] = False
+    name = "directional"
+    title = "by direction of travel"
+    forms = (("forward", "backward"),)
+    row_words = "curves by direction come from a scene file or an import"
+    slider = "differs by direction of travel of {axis}; this is the larger one's amplitude"
+    edited_as_rows = False
+    # reached towards growing positions, and towards falling ones; of any other kind
     forward: ErrorFunction = NOTHING
     backward: ErrorFunction = NOTHING
 
@@ -150,16 +145,6 @@ class Directional(ErrorFunction):
             curve.describe(unit, value, position) for curve in (self.forward, self.backward)
         )
         return f"forward {there}, backward {back}"
-
-    def slider_words(self, axis: str) -> str:
-        """Say that both directions are scaled."""
-        return f"differs by direction of travel of {axis}; this is the larger one's amplitude"
-
-    @classmethod
-    def from_rows(cls, span: Span, rows: Rows) -> Self:
-        """Refuse: rows have no direction."""
-        del span, rows
-        raise OptionError(cls.row_words)
 
     def rows(self) -> Rows:
         """Give the rows of the curve forward, then those backward."""

@@ -3,16 +3,20 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
-from numpy.polynomial import chebyshev, polynomial
 
 from warpspace.exceptions import OptionError
-from warpspace.machine.curves.constant import Constant
-from warpspace.machine.curves.curve import SPAN_SAMPLES, ErrorFunction, Rows, Span, Spell
-from warpspace.machine.curves.poly import Poly
-from warpspace.machine.curves.reading import ValueReader
+from warpspace.machine.curves.curve import (
+    SPAN_SAMPLES,
+    ErrorFunction,
+    Rows,
+    Span,
+    Spell,
+    ValueReader,
+)
+from warpspace.machine.curves.simple import Constant, Poly
 from warpspace.machine.limits import MAX_LENGTH_MM, MAX_POINTS
 from warpspace.units import Array
 
@@ -26,28 +30,19 @@ PER_PIECE = 8
 
 @dataclass(frozen=True)
 class Pieces(ErrorFunction):
-    """Polynomials one behind the other, their ends held.
+    """Polynomials one behind the other, their ends held."""
 
-    Attributes
-    ----------
-    starts : tuple of float, (n,)
-        Ascending positions at which the pieces begin, mm or degrees.
-    end : float
-        Where the last one ends.
-    coefficients : tuple of tuple of float, (n, up to 6)
-        Of Σ cₖ·(q − start)ᵏ, per piece.
-    points : tuple of float
-        Positions at which it was measured, where it was converted from a table.
-    """
-
-    name: ClassVar[str] = "pieces"
-    title: ClassVar[str] = "pieces of polynomials"
-    forms: ClassVar[tuple[tuple[str, ...], ...]] = (("pieces", "end", "points"),)
-    row_words: ClassVar[str] = "pieces of polynomials come from a conversion"
-    edited_as_rows: ClassVar[bool] = False
+    name = "pieces"
+    title = "pieces of polynomials"
+    forms = (("pieces", "end", "points"),)
+    row_words = "pieces of polynomials come from a conversion"
+    edited_as_rows = False
+    # (n,); ascending positions at which the pieces begin, mm or degrees
     starts: tuple[float, ...] = (0.0,)
-    end: float = 1.0
+    end: float = 1.0  # where the last one ends
+    # (n, up to 6); of Σ cₖ·(q − start)ᵏ, per piece
     coefficients: tuple[tuple[float, ...], ...] = ((0.0,),)
+    # positions at which it was measured, where it was converted from a table
     points: tuple[float, ...] = ()
 
     @cached_property
@@ -125,22 +120,9 @@ class Pieces(ErrorFunction):
         del unit, value, position
         return f"{len(self.starts)} pieces of polynomials"
 
-    @classmethod
-    def from_rows(cls, span: Span, rows: Rows) -> Self:
-        """Refuse: nobody writes them."""
-        del span, rows
-        raise OptionError(cls.row_words)
-
     def rows(self) -> Rows:
         """Give one piece a row."""
         return [(s, *row) for s, row in zip(self.starts, self.coefficients, strict=True)]
-
-    @classmethod
-    def from_curve(cls, present: ErrorFunction, span: Span) -> Self:
-        """Refuse a curve that is none."""
-        if not isinstance(present, cls):
-            raise OptionError(cls.row_words)
-        return replace(present, span=span)
 
 
 def fit_curves(
@@ -195,9 +177,10 @@ def _fit(evaluate: Callable[[Array], Array], at: Array) -> tuple[Array, Array]:
     values = values.reshape(len(width), len(everything), -1)
     inside, beyond = values[:, : DEGREE + 1], values[:, DEGREE + 1 :]
     series = np.linalg.solve(
-        chebyshev.chebvander(nodes, DEGREE), inside.transpose(1, 0, 2).reshape(DEGREE + 1, -1)
+        np.polynomial.chebyshev.chebvander(nodes, DEGREE),
+        inside.transpose(1, 0, 2).reshape(DEGREE + 1, -1),
     )
-    found = np.tensordot(chebyshev.chebvander(checks, DEGREE), series, axes=1)
+    found = np.tensordot(np.polynomial.chebyshev.chebvander(checks, DEGREE), series, axes=1)
     missed = np.abs(found - beyond.transpose(1, 0, 2).reshape(len(checks), -1)).max(axis=0)
     size = np.abs(values).max(axis=1).ravel()
     missed = np.where(missed > 2e-14 * size, missed, 0.0)  # no number of this size is finer
@@ -209,13 +192,14 @@ def _fit(evaluate: Callable[[Array], Array], at: Array) -> tuple[Array, Array]:
 
 
 def _power_matrix() -> Array:
-    """Turn a Chebyshev series over −1 … 1 into powers of a share 0 … 1 of the piece."""
     rows = np.zeros((DEGREE + 1, DEGREE + 1))
     for k in range(DEGREE + 1):
-        plain = chebyshev.cheb2poly(np.eye(DEGREE + 1)[k])
+        plain = np.polynomial.chebyshev.cheb2poly(np.eye(DEGREE + 1)[k])
         shifted = np.zeros(1)
         for power, c in enumerate(plain):
-            shifted = polynomial.polyadd(shifted, c * polynomial.polypow([-1.0, 2.0], power))
+            shifted = np.polynomial.polynomial.polyadd(
+                shifted, c * np.polynomial.polynomial.polypow([-1.0, 2.0], power)
+            )
         rows[: len(shifted), k] = shifted
     return rows
 
@@ -233,7 +217,9 @@ def _simplest(span: Span, at: Array, coefficients: Array) -> ErrorFunction | Non
     if len(kept) == 1:
         shifted = np.zeros(1)
         for power, c in enumerate(kept[0, : degree + 1]):
-            shifted = polynomial.polyadd(shifted, c * polynomial.polypow([-at[0], 1.0], power))
+            shifted = np.polynomial.polynomial.polyadd(
+                shifted, c * np.polynomial.polynomial.polypow([-at[0], 1.0], power)
+            )
         return Poly(span, tuple(float(c) for c in shifted))
     rows = tuple(tuple(float(c) for c in row[: degree + 1]) for row in kept)
     return Pieces(span, tuple(at[:-1].tolist()), float(at[-1]), rows)

@@ -3,15 +3,11 @@
 from collections.abc import Mapping
 
 from warpspace.exceptions import OptionError, UnknownNameError
-from warpspace.machine.curves.constant import Constant
 from warpspace.machine.curves.curve import ErrorFunction
 from warpspace.machine.curves.directional import Directional
-from warpspace.machine.curves.harmonics import Harmonics
 from warpspace.machine.curves.pieces import Pieces
-from warpspace.machine.curves.poly import Poly
-from warpspace.machine.curves.ramp import Ramp
-from warpspace.machine.curves.table import Table
-from warpspace.machine.curves.two_arguments import TwoArguments
+from warpspace.machine.curves.simple import Constant, Harmonics, Poly, Ramp
+from warpspace.machine.curves.table import Table, TwoArguments
 from warpspace.plugins import load_plugins
 
 CurveKind = type[ErrorFunction]
@@ -32,13 +28,7 @@ def curve_kinds() -> tuple[CurveKind, ...]:
 
 
 def curve_kind(title: str) -> CurveKind:
-    """Find a kind of curve by its title.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is none.
-    """
+    """Find a kind of curve by its title."""
     kinds = {kind.title: kind for kind in curve_kinds()}
     if title not in kinds:
         raise UnknownNameError("kind of curve", title, kinds)
@@ -48,15 +38,7 @@ def curve_kind(title: str) -> CurveKind:
 def register_curve(kind: CurveKind) -> None:
     """Add a kind of curve; it appears in scene files, the app, reports and figures.
 
-    Parameters
-    ----------
-    kind : type
-        A subclass of `ErrorFunction` with a name, a title and keys in scene files of its own.
-
-    Raises
-    ------
-    OptionError
-        If another kind has one of them.
+    Its name, title and keys in scene files must be its own.
     """
     for other in _KINDS.values():
         keys = {form[0] for form in kind.forms} & {form[0] for form in other.forms}

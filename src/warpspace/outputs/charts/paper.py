@@ -1,17 +1,21 @@
 """The sheet charts are drawn on, and writing them."""
 
-from collections.abc import Generator
+import io
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
 from warpspace.outputs.drawing.style import FIGURE_ENDINGS, FONT, LIGHT, SAVE_RC, Theme
-from warpspace.outputs.encoding import encode_figure
 from warpspace.outputs.files import check_target, write_atomically
 
 CHART_ENDINGS = FIGURE_ENDINGS
@@ -72,21 +76,7 @@ def style() -> Any:
 def sheet(
     width: float, height: float, title: str, subtitle: str, top_in: float = 0.85
 ) -> tuple[Figure, float]:
-    """Start a figure with a title and a line below it.
-
-    Parameters
-    ----------
-    width, height : float, inches
-    title, subtitle : str
-    top_in : float, optional
-        Height kept for both, inches.
-
-    Returns
-    -------
-    figure : Figure
-    top : float
-        Upper end of the room for axes, share of the height.
-    """
+    """Start a figure with a title and a line below it."""
     figure = Figure(figsize=(width, height), dpi=DPI, facecolor=ground().paper)
     left = 0.3 / width
     for words, size, down, weight, colour in (
@@ -111,28 +101,39 @@ def quiet(axes: Axes, grid: str = "x") -> None:
 
 
 def write_chart(figure: Figure, path: str | Path, *, overwrite: bool = True) -> Path:
-    """Write a chart; the ending chooses the format, the same chart gives the same bytes.
-
-    Parameters
-    ----------
-    figure : Figure
-    path : str or Path
-        Ending .png, .svg or .pdf.
-    overwrite : bool, optional
-        Whether an existing file may be replaced.
-
-    Returns
-    -------
-    Path
-        The file written.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be written.
-    """
+    """Write a chart; the ending chooses the format, the same chart gives the same bytes."""
     target = check_target(path, CHART_ENDINGS, overwrite=overwrite)
     content = encode_figure(figure, target.suffix.lower().lstrip("."))
     with write_atomically(target, overwrite=overwrite) as temporary:
         temporary.write_bytes(content)
     return target
+
+
+_UNDATED: Final[dict[str, dict[str, str | None]]] = {
+    "svg": {"Date": None, "Creator": None},
+    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+}
+"""What matplotlib would write of its own accord: dates and versions, which differ between runs."""
+
+
+def encode_figure(figure: Figure, form: str, facts: Mapping[str, str] | None = None) -> bytes:
+    """Write a figure into memory."""
+    buffer = io.BytesIO()
+    with mpl.rc_context(SAVE_RC):
+        if form == "png":
+            text = PngInfo()
+            for key, value in (facts or {}).items():
+                text.add_itxt(key, value)
+            canvas = FigureCanvasAgg(figure)
+            canvas.draw()
+            # the paper is opaque: without the transparency files are a quarter smaller
+            pixels = np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3])
+            Image.fromarray(pixels).save(
+                buffer, format="png", pnginfo=text, dpi=(figure.dpi, figure.dpi)
+            )
+        else:
+            figure.savefig(
+                buffer, format=form, dpi="figure", metadata={**_UNDATED[form], **(facts or {})},
+                facecolor=figure.get_facecolor(),
+            )  # fmt: skip
+    return buffer.getvalue()

@@ -1,19 +1,52 @@
-"""A sheet to draw on in pixels: matplotlib draws text and lines, at any size and in any format."""
+"""A sheet to draw on in pixels: matplotlib draws text and lines, at any size and in any format.
+
+Labels are measured before they are drawn, at sizes still to be chosen, and placed by the box of
+their ink: matplotlib's text paths give both, while `Text.get_window_extent` measures only drawn
+text and gives the height of a whole line, up to 8 px more.
+"""
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Polygon, Rectangle
 from matplotlib.patheffects import Normal, Stroke
+from matplotlib.textpath import text_to_path
 
 from warpspace.outputs.drawing.style import FONT, SIZES, Theme, factor
-from warpspace.outputs.drawing.typography import clean, text_extent
 from warpspace.units import Array
+
+_REPLACEMENT = "\N{WHITE VERTICAL RECTANGLE}"
+
+
+@lru_cache(maxsize=8)
+def _font(weight: str) -> FontProperties:
+    return FontProperties(family=[FONT], weight=weight, size=100.0)
+
+
+@lru_cache(maxsize=4096)
+def text_extent(text: str, weight: str) -> tuple[float, float]:
+    """Width and height of a line of text of size 1."""
+    width, height, _ = text_to_path.get_text_width_height_descent(text, _font(weight), ismath=False)
+    return width / 100.0, height / 100.0
+
+
+@lru_cache(maxsize=1)
+def _glyphs() -> frozenset[int]:
+    return frozenset(get_font(findfont(_font("normal"))).get_charmap())
+
+
+def clean(text: str) -> str:
+    """Make text drawable: one line, no control characters, no missing glyphs."""
+    flat = " ".join(text.split())
+    return "".join(c if ord(c) in _glyphs() else _REPLACEMENT for c in flat if c.isprintable())
+
 
 DPI = 100.0
 POINTS_PER_PX = 72.0 / DPI
@@ -21,25 +54,7 @@ _ELLIPSIS = "…"
 
 
 class Canvas:
-    """A figure whose coordinates are its pixels, origin bottom left.
-
-    Parameters
-    ----------
-    width, height : int, px
-    theme : Theme
-    exact : bool, optional
-        Whether bodies are placed pixel by pixel (PNG) or at the full resolution they were drawn
-        with (vector formats).
-
-    Attributes
-    ----------
-    figure : matplotlib Figure
-    factor : float
-        What sizes of text and lines are multiplied by.
-    rects : list of tuple of float, (4,)
-        Boxes of all text drawn so far, several along text that stands askew: left, bottom, right,
-        top.
-    """
+    """A figure whose coordinates are its pixels, origin bottom left."""
 
     def __init__(self, width: int, height: int, theme: Theme, *, exact: bool = True) -> None:
         self.width, self.height, self.theme, self.exact = width, height, theme, exact
@@ -68,21 +83,7 @@ class Canvas:
     def fit(
         self, text: str, room: float, size: float = SIZES.text, weight: str = "normal"
     ) -> tuple[str, float]:
-        """Shrink a line of text into a width, shorten it where that is not enough.
-
-        Parameters
-        ----------
-        text : str
-        room : float, px
-        size : float
-            For a 1600 × 1200 figure.
-        weight : str
-
-        Returns
-        -------
-        tuple of (str, float)
-            Text and size to draw it with.
-        """
+        """Shrink a line of text into a width, shorten it where that is not enough."""
         text = clean(text)
         room *= 0.98  # what is drawn may be a little wider than what was measured
         width = self.text_size(text, size, weight)[0]
@@ -112,24 +113,7 @@ class Canvas:
         halo: str | None = None,
         zorder: float = 6.0,
     ) -> tuple[float, float, float, float]:
-        """Write a line of text.
-
-        Parameters
-        ----------
-        x, y : float, px
-        text : str
-        size : float
-            For a 1600 × 1200 figure.
-        colour, weight, ha, va, rotation, zorder
-            As in matplotlib; the colour of the ink by default.
-        halo : str, optional
-            Colour of an outline.
-
-        Returns
-        -------
-        tuple of float, (4,), px
-            Box around it: left, bottom, right, top.
-        """
+        """Write a line of text."""
         text = clean(text)
         drawn = self.axes.text(
             x, y, text, ha=ha, va=va, rotation=rotation, zorder=zorder, parse_math=False,
@@ -148,7 +132,6 @@ class Canvas:
     def _pieces(
         rect: tuple[float, float, float, float], extent: tuple[float, float], rotation: float
     ) -> list[tuple[float, float, float, float]]:
-        """Cover text that stands askew with boxes side by side: one around it is mostly empty."""
         width, height = extent
         count = max(1, math.ceil(width / height))
         c, s = math.cos(math.radians(rotation)), math.sin(math.radians(rotation))
@@ -166,7 +149,6 @@ class Canvas:
     def _text_rect(
         x: float, y: float, extent: tuple[float, float], ha: str, va: str, rotation: float
     ) -> tuple[float, float, float, float]:
-        """Box around a line of text."""
         width, height = extent
         left = {"left": 0.0, "center": -width / 2, "right": -width}[ha]
         low = {"baseline": 0.0, "bottom": 0.0, "top": -height}.get(va, -height / 2)

@@ -1,80 +1,129 @@
-"""Bodies drawn off screen: colours exact, background transparent, depth in millimetres."""
+"""Bodies drawn off screen in a parallel projection, and which parts of lines they hide.
+
+Colours are exact, the background is transparent, depths are in millimetres.
+"""
 
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib import import_module
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.colors import ListedColormap
 from numpy.typing import NDArray
 from PIL import Image
-from scipy.ndimage import maximum_filter
 
-from warpspace.exceptions import RenderError
+from warpspace.exceptions import NoRendererError, RenderError
 from warpspace.geometry.colour import LEVELS, ColourScale, colour_table
-from warpspace.outputs.drawing.projection import Projection
+from warpspace.picture.model import UPWARDS, VIEWS
 from warpspace.units import Array
 
 if TYPE_CHECKING:
     import pyvista as pv
 
+
+Rect = tuple[float, float, float, float]
+"""Left, bottom, right, top, px."""
+
+
+@dataclass(frozen=True, slots=True)
+class Projection:
+    """A parallel projection onto the pixels of a figure."""
+
+    # [3]; unit vectors in R: to the right and upwards in the picture, and towards the viewer
+    right: Array
+    up: Array
+    towards: Array
+    px_per_mm: float
+    centre_mm: Array  # [3]; point of R ..
+    centre_px: Array  # [2], px; ... and where it is drawn, origin bottom left.
+
+    def project(self, points_mm: Array) -> Array:
+        """Project points."""
+        relative = points_mm - self.centre_mm
+        plane = np.stack([relative @ self.right, relative @ self.up], -1)
+        return self.centre_px + self.px_per_mm * plane
+
+    def depth_mm(self, points_mm: Array) -> Array:
+        """Distance behind the plane through the centre, [...], mm; larger is farther away."""
+        return -((points_mm - self.centre_mm) @ self.towards)
+
+    def moved(self, shift_px: Array) -> "Projection":
+        """Give the same projection elsewhere in the figure."""
+        return replace(self, centre_px=self.centre_px + shift_px)
+
+
+def view_axes(view: str) -> tuple[Array, Array, Array]:
+    """Give the unit vectors right, up and towards of a named view."""
+    towards = np.array(VIEWS[view])
+    upwards = np.array(UPWARDS.get(view, (0.0, 0.0, 1.0)))
+    towards /= np.linalg.norm(towards)
+    right = np.cross(upwards, towards)
+    right /= np.linalg.norm(right)
+    return right, np.cross(towards, right), towards
+
+
+def fit_projection(view: str, points_mm: Array, rect: Rect) -> Projection:
+    """Choose the projection that makes points fill a box of the figure."""
+    right, up, towards = view_axes(view)
+    flat = points_mm.reshape(-1, 3)
+    centre = (flat.min(axis=0) + flat.max(axis=0)) / 2.0
+    plane = np.stack([(flat - centre) @ right, (flat - centre) @ up], -1)
+    low, high = plane.min(axis=0), plane.max(axis=0)
+    room = np.array([rect[2] - rect[0], rect[3] - rect[1]])
+    spans = np.maximum(high - low, 1e-9)
+    px_per_mm = float(np.min(room / spans)) if (high - low).max() > 1e-9 else 1.0
+    middle = np.array([(rect[0] + rect[2]) / 2.0, (rect[1] + rect[3]) / 2.0])
+    return Projection(
+        right, up, towards, px_per_mm, centre, middle - px_per_mm * (low + high) / 2.0
+    )
+
+
 Bytes = NDArray[np.uint8]
 _LARGEST_SIDE_PX = 8192
 _LARGEST_AREA_PX = 24_000_000
 SUPERSAMPLING = 2
+PACKAGES = "libegl1 libgl1-mesa-dri"
+WINDOW_VARIABLE = "VTK_DEFAULT_OPENGL_WINDOW"
+FALLBACK = "vtkOSOpenGLRenderWindow"
+WINDOWS = (
+    "vtkEGLRenderWindow",
+    FALLBACK,
+    "vtkXOpenGLRenderWindow",
+    "vtkWin32OpenGLRenderWindow",
+    "vtkCocoaRenderWindow",
+)
+"""What the variable may name."""
 
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """Triangles to draw.
+    """Triangles to draw."""
 
-    Attributes
-    ----------
-    vertices_mm : ndarray, [M, 3], mm
-        Where they are drawn.
-    triangles : ndarray of int, [T, 3]
-    values : ndarray, [M], optional
-        What the colour shows; interpolated over each triangle before it becomes a colour.
-    scale : ColourScale, optional
-        Colours of the values.
-    colour : tuple of float, (3,), optional
-        One colour (sRGB, 0 to 1) for a body without values.
-    shaded : bool
-        Whether light falls on it: for machine bodies, never for coloured errors.
-    opacity : float
-    """
-
-    vertices_mm: Array
-    triangles: NDArray[np.intp]
+    vertices_mm: Array  # [M, 3]; where they are drawn
+    triangles: NDArray[np.intp]  # [T, 3]
+    # [M]; what the colour shows; interpolated over each triangle before it becomes a colour
     values: Array | None = None
-    scale: ColourScale | None = None
+    scale: ColourScale | None = None  # colours of the values
+    # one colour (sRGB, 0 to 1) for a body without values
     colour: tuple[float, float, float] = (0.7, 0.7, 0.7)
-    shaded: bool = False
+    shaded: bool = False  # whether light falls on it: for machine bodies, never for coloured errors
     opacity: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class Raster:
-    """Drawn bodies.
+    """Drawn bodies."""
 
-    Attributes
-    ----------
-    rgba : ndarray of uint8, [h, w, 4]
-        First row at the top.
-    depth_mm : ndarray, [h, w], mm
-        As `Projection.depth_mm`; infinite where nothing is.
-    farthest_mm : ndarray, [h, w], mm
-        The largest depth within a pixel of the figure around each.
-    rect : tuple of float, (4,), px
-        Box of the figure it covers.
-    """
-
-    rgba: Bytes
-    depth_mm: NDArray[np.float32]
+    rgba: Bytes  # [h, w, 4]; first row at the top
+    depth_mm: NDArray[np.float32]  # [h, w]; as `Projection.depth_mm`; infinite where nothing is
+    # [h, w]; the largest depth within a pixel of the figure around each
     farthest_mm: NDArray[np.float32]
-    rect: tuple[float, float, float, float]
+    rect: tuple[float, float, float, float]  # px; box of the figure it covers
 
     @property
     def sampling(self) -> float:
@@ -92,19 +141,7 @@ class Raster:
         return np.asarray(image.convert("RGBA"))
 
     def depth_at(self, points_px: Array, *, spread: bool = False) -> Array:
-        """Read the depth at pixels of the figure.
-
-        Parameters
-        ----------
-        points_px : ndarray, [..., 2], px
-        spread : bool
-            Give the farthest depth close around each point.
-
-        Returns
-        -------
-        ndarray, [...], mm
-            Infinite outside the raster and where nothing is.
-        """
+        """Read the depth at pixels of the figure."""
         left, _, _, top = self.rect
         i = np.floor((top - points_px[..., 1]) * self.sampling).astype(np.intp)
         j = np.floor((points_px[..., 0] - left) * self.sampling).astype(np.intp)
@@ -115,25 +152,7 @@ class Raster:
 
 
 def render_bodies(bodies: Sequence[Body], projection: Projection, margin_px: int = 4) -> Raster:
-    """Draw bodies.
-
-    Parameters
-    ----------
-    bodies : sequence of Body
-        At least one with triangles.
-    projection : Projection
-    margin_px : int, optional
-        Room around them.
-
-    Returns
-    -------
-    Raster
-
-    Raises
-    ------
-    RenderError
-        If VTK gives no picture.
-    """
+    """Draw bodies."""
     points = np.concatenate([body.vertices_mm for body in bodies])
     spots = projection.project(points)
     left, bottom = (np.floor(spots.min(axis=0)) - margin_px).astype(int)
@@ -144,8 +163,21 @@ def render_bodies(bodies: Sequence[Body], projection: Projection, margin_px: int
     step = SUPERSAMPLING if small else 1
     middle = np.array([(left + right) / 2.0, (bottom + top) / 2.0])
     rgba, depth = _draw(bodies, projection, middle, (width * step, height * step), step)
-    farthest = np.asarray(maximum_filter(depth, size=2 * step + 1, mode="nearest"), np.float32)
-    return Raster(rgba, depth, farthest, (float(left), float(bottom), float(right), float(top)))
+    return Raster(
+        rgba, depth, _farthest(depth, step), (float(left), float(bottom), float(right), float(top))
+    )
+
+
+def _farthest(depth: NDArray[np.float32], reach: int) -> NDArray[np.float32]:
+    """Give the largest depth within so many pixels of each, [h, w]."""
+    for axis in (0, 1):
+        near = np.moveaxis(depth, axis, 0)
+        found = near.copy()
+        for shift in range(1, reach + 1):
+            np.maximum(found[shift:], near[:-shift], out=found[shift:])
+            np.maximum(found[:-shift], near[shift:], out=found[:-shift])
+        depth = np.moveaxis(found, 0, axis)
+    return depth
 
 
 def _draw(
@@ -155,9 +187,7 @@ def _draw(
     size: tuple[int, int],
     step: int,
 ) -> tuple[Bytes, NDArray[np.float32]]:
-    """Let PyVista draw; colours and depth, first row at the top."""
-    if sys.platform == "linux":
-        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+    check_renderer()
     import pyvista as pv
 
     offset = (middle_px - projection.centre_px) / projection.px_per_mm
@@ -195,8 +225,32 @@ def _draw(
     return np.array(rgba), depth.astype(np.float32)
 
 
+@cache
+def check_renderer() -> None:
+    """Refuse to draw where VTK finds no OpenGL, since drawing there would end the program."""
+    if sys.platform == "linux":
+        os.environ.setdefault(WINDOW_VARIABLE, "vtkEGLRenderWindow")
+    from vtkmodules.vtkCommonCore import vtkLogger
+    from vtkmodules.vtkRenderingCore import vtkRenderWindow
+
+    import_module("vtkmodules.vtkRenderingOpenGL2")  # registers the windows there are
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
+    found = vtkRenderWindow().GetClassName()
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_INFO)
+    if found == FALLBACK != os.environ.get(WINDOW_VARIABLE):
+        raise NoRendererError(f"VTK cannot draw off screen here. {_advice()}")
+
+
+def _advice() -> str:
+    window = os.environ.get(WINDOW_VARIABLE)
+    if window is not None and window not in WINDOWS:
+        return f"The variable {WINDOW_VARIABLE} is {window!r}, which VTK does not know; unset it."
+    if sys.platform == "linux":
+        return f"Install the Debian packages {PACKAGES} (apt-get install {PACKAGES})."
+    return "Check the OpenGL driver."
+
+
 def _add_body(plotter: "pv.Plotter", body: Body) -> None:
-    """Put a body on the stage."""
     import pyvista as pv
 
     mesh = pv.PolyData.from_regular_faces(
@@ -220,10 +274,64 @@ def _add_body(plotter: "pv.Plotter", body: Body) -> None:
 
 
 def _add_light(plotter: "pv.Plotter", projection: Projection) -> None:
-    """Light machine bodies from above on the left of the viewer."""
     import pyvista as pv
 
     direction = projection.towards + 1.1 * projection.up - 0.7 * projection.right
     plotter.add_light(
         pv.Light(position=tuple(direction), focal_point=(0.0, 0.0, 0.0), light_type="scene light")
     )
+
+
+STEP_PX = 1.5
+SHORTEST_PX = 4.0
+
+
+def split_visible(
+    line_mm: Array, projection: Projection, raster: Raster | None
+) -> tuple[list[Array], list[Array]]:
+    """Split a polyline into its visible and its hidden parts."""
+    spots = projection.project(line_mm)
+    if raster is None:
+        return [spots], []
+    fine_px, fine_depth = _resample(spots, projection.depth_mm(line_mm), STEP_PX)
+    surface = raster.depth_at(fine_px, spread=True)
+    tolerance = 1.5 / projection.px_per_mm
+    visible = _steady(fine_depth <= surface + tolerance, round(SHORTEST_PX / STEP_PX))
+    changes = np.flatnonzero(np.diff(visible)) + 1
+    seen: list[Array] = []
+    hidden: list[Array] = []
+    bounds = [0, *changes.tolist(), len(visible)]
+    for start, end in pairwise(bounds):
+        part = fine_px[start : min(end + 1, len(visible))]
+        if len(part) > 1:
+            (seen if visible[start] else hidden).append(_thin(part))
+    return seen, hidden
+
+
+def _resample(spots: Array, depth: Array, step: float) -> tuple[Array, Array]:
+    lengths = np.hypot(*np.diff(spots, axis=0).T)
+    pieces = np.maximum(1, np.ceil(lengths / step)).astype(int)
+    # position along the polyline, in numbers of its points
+    along = np.concatenate([[0.0], np.cumsum(np.repeat(1.0 / pieces, pieces))])
+    known = np.arange(len(spots))
+    fine = np.stack([np.interp(along, known, spots[:, axis]) for axis in range(2)], -1)
+    return fine, np.interp(along, known, depth)
+
+
+def _thin(spots: Array) -> Array:
+    if len(spots) < 3:
+        return spots
+    before, after = spots[1:-1] - spots[:-2], spots[2:] - spots[1:-1]
+    turn = np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])
+    bent = turn > 1e-6 * np.hypot(*before.T) * np.hypot(*after.T)
+    return spots[np.concatenate([[True], bent, [True]])]
+
+
+def _steady(visible: np.ndarray, shortest: int) -> np.ndarray:
+    result = visible.copy()
+    edges = [0, *(np.flatnonzero(np.diff(visible)) + 1).tolist(), len(visible)]
+    for start, end in pairwise(edges):
+        inner = start > 0 and end < len(visible)
+        if inner and end - start < shortest:
+            result[start:end] = not visible[start]
+    return result

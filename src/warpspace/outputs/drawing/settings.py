@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from warpspace.analysis.concepts import Concepts
 from warpspace.exceptions import OptionError
 from warpspace.geometry.colour import COMPONENTS, ColourScale
 from warpspace.machine.limits import MAX_FIGURE_AREA_PX as LARGEST_AREA
@@ -11,65 +12,36 @@ from warpspace.machine.limits import MAX_FIGURE_SIDE_PX as LARGEST_SIDE
 from warpspace.machine.limits import MIN_FIGURE_PX as SMALLEST_SIZE
 from warpspace.machine.limits import RANGE_TOP
 from warpspace.outputs.drawing.style import DARK, LIGHT, Theme
-from warpspace.picture.exaggeration import Exaggeration, given_exaggeration
-from warpspace.picture.model import Picture, choose_scale
+from warpspace.picture.model import VIEWS, Exaggeration, Picture, choose_scale, given_exaggeration
 from warpspace.picture.scene_picture import ScenePicture, evaluate_picture
-from warpspace.picture.views import VIEWS
 from warpspace.picture.words import range_words
-from warpspace.scene.concepts import ConceptPlan
 from warpspace.scene.model import Scene
 
 
 @dataclass(frozen=True, slots=True)
 class FigureSettings:
-    """Options of a figure.
+    """Options of a figure."""
 
-    Attributes
-    ----------
-    component : str
-        "norm", "x", "y" or "z".
-    exaggeration : float, "auto" or None
-        Display factor of displacements; "auto" chooses a round one, None takes the scene's.
-    view : str
-        "iso", "front", "right" or "top".
-    size : tuple of int, (2,), px
-        Width and height; vector formats take 100 px for an inch.
-    dark : bool
-        Light ink on a dark ground.
-    loop : str
-        "tool", "workpiece" or "relative".
-    grid : int
-        Nodes per axis of the working volume.
-    range_top : float or None, µm or µrad
-        Where the colours end (a signed component's begin at its negative); None for a round value
-        that holds all of the map.
-    range_fixed : bool
-        Whether somebody chose that end: the figure then says so.
-    conditions : tuple of str
-        What the figure must say beside its scenes, for instance "excluded: EA0Z".
-    concepts : ConceptPlan
-        How machines are sampled that are set side by side.
-    strip : bool
-        Whether machines side by side are pictures alone, one below the other, each as high as the
-        others: for a page that has words and colour bar of its own.
-
-    Raises
-    ------
-    OptionError
-        If a value cannot be drawn with.
-    """
-
-    component: str = "norm"
+    component: str = "norm"  # "norm", "x", "y" or "z"
+    # "auto" or None; display factor of displacements; "auto" chooses a round one, None takes the
+    # scene's
     exaggeration: Exaggeration = None
-    view: str = "iso"
+    view: str = "iso"  # "iso", "front", "right" or "top"
+    # px; width and height; vector formats take 100 px for an inch
     size: tuple[int, int] = (1600, 1200)
-    dark: bool = False
-    loop: str = "tool"
-    grid: int = 21
+    dark: bool = False  # light ink on a dark ground
+    loop: str = "tool"  # "tool", "workpiece" or "relative"
+    grid: int = 21  # nodes per axis of the working volume
+    # µm or µrad; where the colours end (a signed component's begin at its negative); None for a
+    # round value that holds all of the map
     range_top: float | None = None
-    range_fixed: bool = False
+    range_fixed: bool = False  # whether somebody chose that end: the figure then says so
+    # what the figure must say beside its scenes, for instance "excluded: EA0Z"
     conditions: tuple[str, ...] = ()
-    concepts: ConceptPlan = field(default_factory=ConceptPlan)
+    # how machines are sampled that are set side by side
+    concepts: Concepts = field(default_factory=Concepts)
+    # whether machines side by side are pictures alone, one below the other, each as high as the
+    # others: for a page that has words and colour bar of its own
     strip: bool = False
 
     def __post_init__(self) -> None:
@@ -93,13 +65,7 @@ class FigureSettings:
 
 
 def check_size(size: tuple[int, int]) -> None:
-    """Refuse sizes that cannot be drawn.
-
-    Raises
-    ------
-    OptionError
-        With the limits.
-    """
+    """Refuse sizes that cannot be drawn."""
     width, height = size
     small = width < SMALLEST_SIZE[0] or height < SMALLEST_SIZE[1]
     if small or max(size) > LARGEST_SIDE or width * height > LARGEST_AREA:
@@ -113,19 +79,7 @@ def check_size(size: tuple[int, int]) -> None:
 def evaluate_for(
     settings: FigureSettings, scene: Scene, quantity: str = "position"
 ) -> ScenePicture:
-    """Evaluate the picture that a figure of a scene draws.
-
-    Parameters
-    ----------
-    settings : FigureSettings
-    scene : Scene
-    quantity : str, optional
-        What is coloured: the "position" or the "orientation" error.
-
-    Returns
-    -------
-    ScenePicture
-    """
+    """Evaluate the picture that a figure of a scene draws."""
     picture = evaluate_picture(
         scene,
         grid=settings.grid,
@@ -135,15 +89,10 @@ def evaluate_for(
         quantity=quantity,
     )
     scale = shared_colours(settings, [picture])
-    conditions = (*picture.conditions, *settings.conditions, *range_facts(settings, scale))
+    conditions = (*picture.conditions, *settings.conditions)
+    if settings.range_fixed and settings.range_top is not None:
+        conditions = (*conditions, range_words(scale.low, scale.high, scale.unit))
     return replace(picture, colours=scale, conditions=conditions)
-
-
-def range_facts(settings: FigureSettings, scale: ColourScale) -> tuple[str, ...]:
-    """Say where somebody has chosen the end of the colours."""
-    if not settings.range_fixed or settings.range_top is None:
-        return ()
-    return (range_words(scale.low, scale.high, scale.unit),)
 
 
 def shared_colours(settings: FigureSettings, pictures: Sequence[Picture]) -> ColourScale:

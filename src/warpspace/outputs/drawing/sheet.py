@@ -1,23 +1,22 @@
-"""What every figure carries around its content: heading, facts, legend, provenance."""
+"""What every figure carries around its content: heading, facts, legend, panel, provenance.
 
-from collections.abc import Sequence
+The symbols of the legend are drawn with the strokes of the picture itself, and entries for which
+there is no room are left out; matplotlib's legend does neither.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from matplotlib.figure import Figure
 
-from warpspace import __version__
+from warpspace.geometry.colour import ColourScale, colour_table
+from warpspace.geometry.surfaces import round_down
 from warpspace.machine.parameters import parameter
 from warpspace.outputs.drawing.canvas import Canvas
-from warpspace.outputs.drawing.legend import (
-    LegendEntry,
-    dark_isoline_symbol,
-    draw_legend,
-    grid_symbol,
-    isoline_symbol,
-)
-from warpspace.outputs.drawing.projection import Rect
+from warpspace.outputs.drawing.render import Projection, Raster, Rect
 from warpspace.outputs.drawing.settings import FigureSettings, spell_settings
-from warpspace.outputs.drawing.style import SIZES
+from warpspace.outputs.drawing.style import SIZES, Theme
 from warpspace.picture.scene_picture import ScenePicture
 from warpspace.picture.words import (
     LOOP_WORDS,
@@ -25,35 +24,199 @@ from warpspace.picture.words import (
     convention_words,
     reference_words,
     spell_factor,
-    spell_short,
 )
+from warpspace.resources import __version__
 from warpspace.scene.model import Scene
+from warpspace.spelling import spell_short
+from warpspace.units import MM_PER_UM, Array
+
+
+@dataclass(frozen=True, slots=True)
+class DrawnMap:
+    """A map as it stands in a figure: enough to read it back."""
+
+    projection: Projection
+    scale: ColourScale
+    values: Array  # [nx, ny, nz]; what the colour shows at the nodes
+    drawn_mm: Array  # [nx, ny, nz, 3]; where the nodes are drawn
+    exaggeration: float
+    raster: Raster | None  # the drawn body; None where there is no surface
+    rects: tuple[Rect, ...] = ()  # (n, 4), px; boxes of its labels
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """A finished figure."""
+
+    figure: Figure
+    title: str
+    facts: Mapping[str, str]  # scene, version, settings: what the file carries as metadata
+    maps: tuple[DrawnMap, ...] = ()
+    rects: tuple[Rect, ...] = ()  # (n, 4), px; boxes of all text
+
+
+Symbol = Callable[[Canvas, float, float, float], None]
+
+
+@dataclass(frozen=True, slots=True)
+class LegendEntry:
+    """One entry of the legend at the bottom."""
+
+    # draws it, given the canvas, its left end, the height of its middle and its width, px
+    symbol: Symbol
+    text: str
+
+
+def line_entry(
+    text: str,
+    colour: Callable[[Theme], str],
+    width: float = SIZES.line,
+    dashes: tuple[float, float] | None = None,
+    alpha: float = 1.0,
+) -> LegendEntry:
+    """Give the entry of a line."""
+
+    def symbol(canvas: Canvas, x: float, y: float, length: float) -> None:
+        ends = [(x, y), (x + length, y)]
+        ink = colour(canvas.theme)
+        canvas.line(ends, width=width, colour=ink, dashes=dashes, alpha=alpha)
+
+    return LegendEntry(symbol, text)
+
+
+def draw_legend(
+    canvas: Canvas, legend: Sequence[LegendEntry], x: float, y: float, room: float
+) -> None:
+    """Draw the entries of a legend in a row; those that do not fit are left out."""
+    swatch, gap = canvas.px(36.0), canvas.px(10.0)
+    end = x + room
+    for entry in legend:
+        width = swatch + gap + canvas.text_size(entry.text, SIZES.small)[0]
+        if x + width > end:
+            return
+        entry.symbol(canvas, x, y, swatch)
+        canvas.text(
+            x + swatch + gap, y, entry.text, size=SIZES.small, colour=canvas.theme.muted,
+            va="center_baseline",
+        )  # fmt: skip
+        x += width + canvas.px(34.0)
+
+
+def dark_isoline_symbol(canvas: Canvas, x: float, y: float, width: float) -> None:
+    """Show a dark line on a light ground."""
+    height = canvas.px(14.0)
+    canvas.rectangle(x, y - height / 2, width, height, facecolor="#d9a98c", edgecolor="none")
+    canvas.line([(x, y), (x + width, y)], width=SIZES.thin, colour=canvas.theme.grid, zorder=3.5)
+
+
+def isoline_symbol(canvas: Canvas, x: float, y: float, width: float) -> None:
+    """Show a white line on a coloured ground."""
+    height = canvas.px(14.0)
+    canvas.rectangle(x, y - height / 2, width, height, facecolor="#2f6b8e", edgecolor="none")
+    canvas.line([(x, y), (x + width, y)], width=SIZES.line, colour=canvas.theme.isoline, zorder=3.5)
+
+
+Row = tuple[str, str]
+
+
+def draw_colour_bar(
+    canvas: Canvas, rect: Rect, scale: ColourScale, marks: Sequence[tuple[str, float]] = ()
+) -> None:
+    """Draw a colour bar with numbers on its right and marked values on its left."""
+    left, low, right, high = rect
+    theme = canvas.theme
+    table = colour_table(diverging=scale.diverging)[::-1, None, :]
+    opaque = np.concatenate([table, np.full((len(table), 1, 1), 255, np.uint8)], -1)
+    canvas.image(opaque, (left, low, right, high), zorder=2.0)
+    canvas.rectangle(
+        left, low, right - left, high - low, fill=False, edgecolor=theme.muted,
+        linewidth=canvas.px(1.0) * 0.72, zorder=2.6,
+    )  # fmt: skip
+    span = scale.high - scale.low
+    height = canvas.text_size("0", SIZES.text)[1]
+    every = 1
+    while (high - low) / max(1, (len(scale.ticks) - 1) / every) < 1.6 * height:
+        every += 1
+    zero = min(range(len(scale.ticks)), key=lambda i: abs(scale.ticks[i]))
+    for index, tick in enumerate(scale.ticks):
+        y = low + (tick - scale.low) / span * (high - low)
+        if scale.low < tick < scale.high:
+            colour = theme.grid if scale.diverging else theme.isoline
+            canvas.line([(left, y), (right, y)], width=SIZES.thin, colour=colour, zorder=2.5)
+        if (index - zero) % every:
+            continue
+        canvas.line([(right, y), (right + canvas.px(7.0), y)], width=SIZES.thin, colour=theme.muted)
+        canvas.text(right + canvas.px(13.0), y, spell_short(tick), va="center_baseline")
+    _draw_marks(canvas, rect, scale, marks)
+
+
+def _draw_marks(
+    canvas: Canvas, rect: Rect, scale: ColourScale, marks: Sequence[tuple[str, float]]
+) -> None:
+    left, low, _, high = rect
+    distance = canvas.px(19.0)
+    ordered = sorted(marks, key=lambda mark: mark[1])
+    spots = [low + float(scale.fraction(np.asarray(value))) * (high - low) for _, value in ordered]
+    heights = list(spots)
+    for index in range(1, len(heights)):
+        heights[index] = max(heights[index], heights[index - 1] + distance)
+    over = heights[-1] - (high + canvas.px(6.0)) if heights else 0.0
+    if over > 0.0:
+        heights[-1] -= over
+        for index in range(len(heights) - 2, -1, -1):
+            heights[index] = min(heights[index], heights[index + 1] - distance)
+    for (name, value), spot, height in zip(ordered, spots, heights, strict=True):
+        beyond = " ↑" if value > scale.high else " ↓" if value < scale.low else ""
+        tip = left - canvas.px(2.0)
+        side = canvas.px(5.0)
+        base = tip - canvas.px(9.0)
+        canvas.polygon(
+            [(tip, spot), (base, spot + side), (base, spot - side)], canvas.theme.ink, zorder=3.0
+        )
+        if abs(height - spot) > canvas.px(1.0):
+            canvas.line([(base, spot), (base - canvas.px(5.0), height)], width=SIZES.hair)
+        canvas.text(
+            base - canvas.px(7.0), height, name + beyond, size=SIZES.small, ha="right",
+            va="center_baseline",
+        )  # fmt: skip
+
+
+def draw_scale_bars(
+    canvas: Canvas, rect: Rect, px_per_mm: float, exaggeration: float | None
+) -> float:
+    """Draw one bar for lengths and one for displacements, both as seen in the picture plane."""
+    left, y, right, _ = rect
+    room = min(right - left, canvas.px(190.0))
+    theme = canvas.theme
+    y += canvas.px(6.0)
+    if exaggeration is not None:
+        px_per_um = px_per_mm * MM_PER_UM * exaggeration
+        length = round_down(room / px_per_um)
+        _draw_bar(canvas, left, y, length * px_per_um, theme.accent)
+        name = f"{spell_short(length)} µm displacement ({spell_factor(exaggeration)})"
+        text, size = canvas.fit(name, right - left, SIZES.small)
+        canvas.text(left, y + canvas.px(13.0), text, size=size, colour=theme.accent)
+        y += canvas.px(52.0)
+    length = round_down(room / px_per_mm)
+    _draw_bar(canvas, left, y, length * px_per_mm, theme.ink)
+    text, size = canvas.fit(f"{spell_short(length)} mm geometry", right - left, SIZES.small)
+    canvas.text(left, y + canvas.px(13.0), text, size=size)
+    return y + canvas.px(34.0)
+
+
+def _draw_bar(canvas: Canvas, x: float, y: float, length: float, colour: str) -> None:
+    foot = canvas.px(6.0)
+    points = [(x, y - foot), (x, y), (x + length, y), (x + length, y - foot)]
+    canvas.line(points, width=SIZES.line, colour=colour, cap="butt")
+
 
 HINTED = 0.92
 """Share of a room that measured text may take beside other text: small letters are drawn wider."""
 
 
-def new_canvas(settings: FigureSettings, *, exact: bool) -> Canvas:
-    """Start a figure."""
-    return Canvas(*settings.size, settings.theme, exact=exact)
-
-
 def draw_heading(canvas: Canvas, title: str, facts: Sequence[str]) -> float:
-    """Write title and subtitle with a rule below.
-
-    Parameters
-    ----------
-    canvas : Canvas
-    title : str
-    facts : sequence of str
-        Joined with dots, on up to two lines.
-
-    Returns
-    -------
-    float, px
-        Height of the rule.
-    """
-    margin = canvas.px(SIZES.margin) * min(1.0, canvas.width / canvas.px(1000.0))
+    """Write title and subtitle with a rule below."""
+    margin = _margin(canvas)
     room = canvas.width - 2.0 * margin
     y = canvas.height - canvas.px(54.0)
     text, size = canvas.fit(title, room, SIZES.title, "bold")
@@ -128,18 +291,11 @@ def draw_footer(
     canvas: Canvas,
     scenes: Sequence[Scene],
     legend: Sequence[LegendEntry],
-    notes: Sequence[str] = (),
     *,
-    errors: bool = True,
+    errors: bool,
 ) -> float:
-    """Draw legend, parameters (where `errors` is true), convention and provenance at the bottom.
-
-    Returns
-    -------
-    float, px
-        Height above which the figure is free.
-    """
-    margin = canvas.px(SIZES.margin) * min(1.0, canvas.width / canvas.px(1000.0))
+    """Draw legend, parameters (where `errors` is true), convention and provenance at the bottom."""
+    margin = _margin(canvas)
     room = canvas.width - 2.0 * margin
     theme = canvas.theme
     y = canvas.px(26.0)
@@ -151,7 +307,6 @@ def draw_footer(
         " / ".join(dict.fromkeys(map(convention_words, scenes))),
         "error = actual − nominal",
         "coordinates in the machine frame R",
-        *notes,
     ]
     text, size = canvas.fit(" · ".join(words), left, SIZES.small)
     canvas.text(margin, y, text, size=size, colour=theme.muted)
@@ -167,7 +322,6 @@ def draw_footer(
 
 
 def _as_many(canvas: Canvas, head: str, items: Sequence[str], room: float) -> tuple[str, float]:
-    """Join as many items as fit and count the others."""
     if not items:
         return head + "all zero", SIZES.small
     for count in range(len(items), 0, -1):
@@ -183,13 +337,8 @@ def map_legend(
 ) -> list[LegendEntry]:
     """Build the legend of a map; `isolines` is empty where there are none."""
     entries = [
-        LegendEntry(
-            lambda c, x, y, w: c.line(
-                [(x, y), (x + w, y)], width=SIZES.line, colour=c.theme.ghost, dashes=(11.0, 7.0)
-            ),
-            "nominal volume",
-        ),
-        LegendEntry(grid_symbol, surface),
+        line_entry("nominal volume", lambda theme: theme.ghost, dashes=(11.0, 7.0)),
+        line_entry(surface, lambda theme: theme.ink),
         LegendEntry(
             lambda c, x, y, w: c.arrow(np.array([x, y]), np.array([x + w, y])),
             "displacement of corners, |E|",
@@ -213,46 +362,58 @@ def metadata(
     }
 
 
-def content_rect(canvas: Canvas, top: float, bottom: float, *, panel: bool = True) -> Rect:
-    """Give the box between heading and footer, left of the panel where there is one."""
-    margin = canvas.px(SIZES.margin) * min(1.0, canvas.width / canvas.px(1000.0))
-    right = canvas.width - margin
-    if panel:
-        right -= panel_width(canvas) + canvas.px(12.0)
-    return (0.6 * margin, bottom, right, top - canvas.px(6.0))
-
-
-def panel_width(canvas: Canvas) -> float:
-    """Width of the column with colour bar and numbers, px."""
-    return canvas.px(SIZES.panel)
-
-
-def panel_rect(canvas: Canvas, top: float, bottom: float) -> Rect:
-    """Give the box of that column."""
-    margin = canvas.px(SIZES.margin) * min(1.0, canvas.width / canvas.px(1000.0))
-    right = canvas.width - margin
-    return (right - panel_width(canvas), bottom, right, top - canvas.px(18.0))
-
-
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """A figure with heading and footer, waiting for its content.
+    """A figure with heading and footer, waiting for its content."""
 
-    Attributes
-    ----------
-    canvas : Canvas
-    title : str
-    content, panel : tuple of float, (4,), px
-        Room for the content and for the column beside it.
-    """
-
+    name: str  # of the figure
     canvas: Canvas
     title: str
-    content: Rect
+    content: Rect  # px; room for the content and for the column beside it
     panel: Rect
+    scenes: Sequence[Scene]
+    settings: FigureSettings
+
+    def draw_panel(
+        self,
+        scale: ColourScale,
+        heading: str,
+        marks: Sequence[tuple[str, float]],
+        rows: Sequence[Row],
+        bars: tuple[float, float | None],
+    ) -> None:
+        """Draw colour bar, statistics and scale bars beside the content."""
+        canvas, rect = self.canvas, self.panel
+        left, _, right, top = rect
+        y = draw_scale_bars(canvas, rect, *bars) + canvas.px(24.0)
+        step = canvas.px(27.0)
+        room = top - y - canvas.px(150.0)
+        shown = rows[: max(1, int(room / step))]
+        for index, (name, value) in enumerate(reversed(shown)):
+            weight = "bold" if index == len(shown) - 1 else "normal"
+            height = y + index * step
+            text, size = canvas.fit(value, 0.8 * (right - left), SIZES.text, weight)
+            canvas.text(right, height, text, size=size, weight=weight, ha="right")
+            space = right - left - canvas.text_size(text, size, weight)[0] - canvas.px(8.0)
+            label, small = canvas.fit(name, space)
+            canvas.text(left, height, label, size=small, colour=canvas.theme.muted)
+        y += len(shown) * step + canvas.px(26.0)
+        text, size = canvas.fit(heading, right - left, SIZES.heading, "bold")
+        canvas.text(left, top, text, size=size, weight="bold", va="top")
+        high = top - canvas.px(40.0)
+        low = max(y, high - canvas.px(560.0))
+        draw_colour_bar(
+            canvas, (left + canvas.px(64.0), low, left + canvas.px(94.0), high), scale, marks
+        )
+
+    def finish(self, factor: float, maps: Sequence[DrawnMap] = ()) -> Drawing:
+        """Say what the file says about itself; no dates, so that it can be repeated."""
+        about = metadata(self.title, self.scenes, self.settings, factor, self.name)
+        return Drawing(self.canvas.figure, self.title, about, tuple(maps), tuple(self.canvas.rects))
 
 
 def start_sheet(
+    name: str,
     settings: FigureSettings,
     title: str,
     facts: Sequence[str],
@@ -261,40 +422,21 @@ def start_sheet(
     *,
     exact: bool,
     panel: bool = True,
-    notes: Sequence[str] = (),
     errors: bool = True,
 ) -> Sheet:
-    """Start a figure and draw what surrounds its content.
-
-    Parameters
-    ----------
-    settings : FigureSettings
-    title : str
-    facts : sequence of str
-        For the lines below the title.
-    scenes : sequence of Scene
-    legend : sequence of LegendEntry
-    exact : bool
-        Whether the figure becomes pixels of its own size.
-    panel : bool, optional
-        Whether there is a column beside the content.
-    notes : sequence of str, optional
-        For the last line.
-    errors : bool, optional
-        Whether the errors of the scenes are listed at the bottom.
-
-    Returns
-    -------
-    Sheet
-    """
-    canvas = new_canvas(settings, exact=exact)
+    """Start a figure and draw what surrounds its content."""
+    canvas = Canvas(*settings.size, settings.theme, exact=exact)
     said = " · ".join(facts)
     facts = [*facts, *(words for words in settings.conditions if words not in said)]
     top = draw_heading(canvas, title, facts)
-    bottom = draw_footer(canvas, scenes, legend, notes, errors=errors)
-    return Sheet(
-        canvas,
-        title,
-        content_rect(canvas, top, bottom, panel=panel),
-        panel_rect(canvas, top, bottom),
-    )
+    bottom = draw_footer(canvas, scenes, legend, errors=errors)
+    margin = _margin(canvas)
+    right, width = canvas.width - margin, canvas.px(SIZES.panel)
+    edge = right - width - canvas.px(12.0) if panel else right
+    content = (0.6 * margin, bottom, edge, top - canvas.px(6.0))
+    column = (right - width, bottom, right, top - canvas.px(18.0))
+    return Sheet(name, canvas, title, content, column, scenes, settings)
+
+
+def _margin(canvas: Canvas) -> float:
+    return canvas.px(SIZES.margin) * min(1.0, canvas.width / canvas.px(1000.0))

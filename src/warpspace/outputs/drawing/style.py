@@ -18,39 +18,20 @@ PRINT: Final = 1.3
 
 @dataclass(frozen=True, slots=True)
 class Theme:
-    """Colours of a figure.
-
-    Attributes
-    ----------
-    name : str
-    paper, ink, muted, faint : str
-        Background, main text, secondary text, hair lines.
-    accent : str
-        Displacements: arrows, their labels and the error scale bar.
-    ghost : str
-        The nominal volume.
-    grid, isoline : str
-        Lines on the coloured surface.
-    band : str
-        Tolerance bands.
-    series : tuple of str
-        Curves and bars.
-    body : str
-        Machine bodies.
-    """
+    """Colours of a figure."""
 
     name: str
-    paper: str
+    paper: str  # background, main text, secondary text, hair lines
     ink: str
     muted: str
     faint: str
-    accent: str
-    ghost: str
-    grid: str
+    accent: str  # displacements: arrows, their labels and the error scale bar
+    ghost: str  # the nominal volume
+    grid: str  # lines on the coloured surface
     isoline: str
-    band: str
-    series: tuple[str, ...]
-    body: str
+    band: str  # tolerance bands
+    series: tuple[str, ...]  # curves and bars
+    body: str  # machine bodies
 
 
 LIGHT = Theme(
@@ -116,17 +97,6 @@ SAVE_RC: Any = {
 
 
 def factor(width: int, height: int) -> float:
-    """Choose the factor on text and lines for a figure of another size.
-
-    Parameters
-    ----------
-    width, height : int, px
-
-    Returns
-    -------
-    float
-        `PRINT` for 1600 × 1200; larger figures grow in proportion, smaller ones shrink less than
-        that.
-    """
+    """Choose the factor on text and lines for a figure of another size."""
     ratio = min(width / REFERENCE_SIZE[0], height / REFERENCE_SIZE[1])
     return PRINT * ratio if ratio >= 1.0 else max(PRINT * ratio**0.85, SMALLEST_FACTOR)

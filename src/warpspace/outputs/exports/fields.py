@@ -1,21 +1,24 @@
 """Error fields of any size as files: Parquet, CSV, NPZ and VTS, written block by block."""
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from dataclasses import field as attribute
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from warpspace.exceptions import OptionError
-from warpspace.field.basis import ErrorField
-from warpspace.field.grid import DIMENSIONS
-from warpspace.field.pieces import cut, pieces
+from warpspace.field.evaluate import ErrorField
+from warpspace.field.grid import DIMENSIONS, cut, pieces
 from warpspace.machine.axes import is_linear
 from warpspace.outputs.files import check_target, write_atomically
-from warpspace.units import MICROMETRE, MICRORADIAN, Array
+from warpspace.picture.scene_picture import ScenePicture
+from warpspace.resources import __version__
+from warpspace.scene.files import guard_cell, spell_row
+from warpspace.units import MICROMETRE, MICRORADIAN, MM_PER_UM, Array
 
 if TYPE_CHECKING:
     from warpspace.analysis.uncertain import FieldUncertainty
@@ -29,23 +32,13 @@ _UNITS = {"mm": "mm", "deg": "°", "um": MICROMETRE, "urad": MICRORADIAN}
 
 @dataclass(frozen=True)
 class FieldRecord:
-    """An error field and what it belongs to.
+    """An error field and what it belongs to."""
 
-    Attributes
-    ----------
-    axes : mapping of str to ndarray, mm or degrees
-        Axis positions, shaped to broadcast to the points.
-    field : ErrorField
-        Of points in a batch of any shape; of a grid for a VTS file.
-    about : mapping of str to str
-        Scene, loop, reference, convention, program.
-    uncertainty : FieldUncertainty or None
-        Standard uncertainty (k = 1) of each point, in columns of its own.
-    """
-
-    axes: Mapping[str, Array]
-    field: ErrorField
+    axes: Mapping[str, Array]  # mm or degrees; axis positions, shaped to broadcast to the points
+    field: ErrorField  # of points in a batch of any shape; of a grid for a VTS file
+    # scene, loop, reference, convention, program
     about: Mapping[str, str] = attribute(default_factory=dict[str, str])
+    # standard uncertainty (k = 1) of each point, in columns of its own
     uncertainty: "FieldUncertainty | None" = None
 
     @property
@@ -55,18 +48,28 @@ class FieldRecord:
 
     @property
     def columns(self) -> dict[str, Array]:
-        """Columns of the table by name, each broadcastable to the points; names end in units."""
+        """Columns of the table by name, each broadcastable to the points; names end in units.
+
+        Those of errors say the loop and what was taken off (the placement, the error at a
+        reference), those of all vectors the frame: R, or w for the workpiece's.
+        """
+        frame = "w" if self.about.get("frame") == "workpiece" else "R"
+        error = f"error_{self.about.get('loop', 'tool')}"
+        error += "_placed" if "placement" in self.about else ""
+        error += "_referenced" if self.about.get("reference", "absolute") != "absolute" else ""
+        error += f"_{frame}"
         found = {
             f"axis_{name}_{'mm' if is_linear(name) else 'deg'}": values
             for name, values in self.axes.items()
         }
-        vectors = {"R_{}_mm": self.field.nominal_mm, "error_{}_um": self.field.error_um}
-        tilts = {"orientation_{}_urad": self.field.orientation_urad}
+        vectors = {"R_{}_mm": self.field.nominal_mm, error + "_{}_um": self.field.error_um}
+        tilts = {f"orientation_{frame}_" + "{}_urad": self.field.orientation_urad}
         found |= _by_component(vectors) | {"norm_um": self.field.norm_um} | _by_component(tilts)
         if self.uncertainty is not None:
-            found |= _by_component({"uncertainty_{}_um": self.uncertainty.error_um})
+            found |= _by_component({f"uncertainty_{frame}_" + "{}_um": self.uncertainty.error_um})
             found["uncertainty_norm_um"] = self.uncertainty.norm_um
-            tilts = {"uncertainty_orientation_{}_urad": self.uncertainty.orientation_urad}
+            name = f"uncertainty_orientation_{frame}_" + "{}_urad"
+            tilts = {name: self.uncertainty.orientation_urad}
             found |= _by_component(tilts)
         return found
 
@@ -82,7 +85,6 @@ class FieldRecord:
 
 
 def _by_component(vectors: Mapping[str, Array]) -> dict[str, Array]:
-    """Name the components of vectors."""
     return {
         name.format(letter): values[..., index]
         for name, values in vectors.items()
@@ -97,20 +99,6 @@ def column_unit(name: str) -> str:
 
 def write_field(record: FieldRecord, path: str | Path, *, overwrite: bool = True) -> None:
     """Write a field in the format that the ending of a path names.
-
-    Parameters
-    ----------
-    record : FieldRecord
-    path : str or Path
-    overwrite : bool, optional
-        Whether an existing file may be replaced.
-
-    Raises
-    ------
-    OptionError
-        If the format cannot hold the field.
-    OutputError
-        If the file cannot be written.
 
     Notes
     -----
@@ -152,7 +140,6 @@ def write_numbers_csv(
 
 
 def _write_parquet(record: FieldRecord, path: Path) -> None:
-    """Write a Parquet file, a row group for each block."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -170,7 +157,6 @@ def _write_parquet(record: FieldRecord, path: Path) -> None:
 
 
 def _arrays(record: FieldRecord) -> dict[str, Array]:
-    """Arrays of a field by name, units in the names."""
     found, spread = record.field, record.uncertainty
     arrays = {
         "nominal_mm": found.nominal_mm,
@@ -186,7 +172,6 @@ def _arrays(record: FieldRecord) -> dict[str, Array]:
 
 
 def _write_npz(record: FieldRecord, path: Path) -> None:
-    """Write a NumPy archive, an array at a time."""
     axes = {name: values for name, values in record.columns.items() if name.startswith("axis_")}
     about = np.array(json.dumps(dict(record.about), ensure_ascii=False))
     with path.open("wb") as file:
@@ -194,17 +179,11 @@ def _write_npz(record: FieldRecord, path: Path) -> None:
 
 
 def _write_vts(record: FieldRecord, path: Path) -> None:
-    """Write a VTK structured grid, arrays behind the XML as they are in memory."""
-    from vtkmodules.vtkIOXML import vtkXMLStructuredGridWriter
-
     from warpspace.outputs.exports.multiblock import structured_grid
 
     arrays = _arrays(record)
     mesh = structured_grid(arrays.pop("nominal_mm"), arrays)
-    text = json.dumps(dict(record.about), ensure_ascii=False)
-    mesh.field_data[ABOUT] = np.frombuffer(text.encode(), dtype=np.uint8)
-    writer = vtkXMLStructuredGridWriter()
-    writer.SetInputData(mesh)
+    writer = _vts_writer(mesh, ABOUT, record.about)
     writer.SetDataModeToAppended()
     writer.EncodeAppendedDataOff()
     writer.SetCompressorTypeToNone()
@@ -212,6 +191,16 @@ def _write_vts(record: FieldRecord, path: Path) -> None:
     writer.SetFileName(str(path))
     if not writer.Write():
         raise OSError(f"VTK could not write {path}")
+
+
+def _vts_writer(mesh: Any, name: str, about: Mapping[str, Any]) -> Any:
+    from vtkmodules.vtkIOXML import vtkXMLStructuredGridWriter
+
+    text = json.dumps(dict(about), ensure_ascii=False, allow_nan=False)
+    mesh.field_data[name] = np.frombuffer(text.encode(), dtype=np.uint8)
+    writer = vtkXMLStructuredGridWriter()
+    writer.SetInputData(mesh)
+    return writer
 
 
 _WRITERS: dict[str, Callable[[FieldRecord, Path], None]] = {
@@ -223,3 +212,113 @@ _WRITERS: dict[str, Callable[[FieldRecord, Path], None]] = {
 FIELD_ENDINGS = tuple(_WRITERS)
 GRID_ENDINGS = (".vts",)
 """Formats that hold grids only."""
+
+
+def write_csv(picture: ScenePicture, path: str | Path, *, overwrite: bool = True) -> None:
+    """Write the field of a scene over its grid.
+
+    Notes
+    -----
+    Behind the numbers every row says what it belongs to (scene, loop, reference, convention,
+    program), so that tables of several scenes can be put under each other.
+    """
+    record = FieldRecord(picture.grid.coordinates, picture.field, picture.remarks)
+    remarks = {name: guard_cell(text) for name, text in picture.remarks.items()}
+    with write_atomically(path, overwrite=overwrite) as temporary:
+        write_numbers_csv(record, temporary, remarks)
+
+
+PROVENANCE = "warpspace_json"
+
+
+def write_vts(picture: ScenePicture, path: str | Path, *, overwrite: bool = True) -> None:
+    """Write the field of a scene as a VTK structured grid, deformed as it is drawn."""
+    data = build_vts(picture)
+    with write_atomically(path, overwrite=overwrite) as temporary:
+        temporary.write_bytes(data)
+
+
+def build_vts(picture: ScenePicture) -> bytes:
+    """Build the field as a VTK structured grid."""
+    from warpspace.outputs.exports.multiblock import structured_grid
+
+    field = picture.field
+    arrays = {
+        "error_um": field.error_um,
+        "norm_um": field.norm_um,
+        "orientation_urad": field.orientation_urad,
+        "deformed_mm": picture.drawn_mm,
+        "displacement_mm": field.error_um * (picture.exaggeration * MM_PER_UM),
+    }
+    mesh = structured_grid(picture.grid.nominal_mm, arrays)
+    mesh.point_data.active_vectors_name = "displacement_mm"
+    mesh.field_data["exaggeration"] = np.array([picture.exaggeration])
+    for key, row in picture.provenance["parameters"].items():
+        unit = "urad" if row["unit"].endswith("rad") else "um"
+        mesh.field_data[f"{key}_{unit}"] = np.array([row["amplitude"]])
+    writer = _vts_writer(mesh, PROVENANCE, picture.provenance)
+    writer.SetDataModeToBinary()
+    writer.SetWriteToOutputString(True)
+    writer.Write()
+    return str(writer.GetOutputString()).encode()
+
+
+Kind: TypeAlias = str
+"""What a column holds: "text", "integer" or "number"."""
+Columns: TypeAlias = Mapping[str, Sequence[Any] | Any]
+"""Values by column, all of one length; arrays are taken as they are."""
+Append: TypeAlias = Callable[[Columns], None]
+
+
+@contextmanager
+def write_rows(
+    path: str | Path, kinds: Mapping[str, Kind], *, overwrite: bool = True
+) -> Generator[Append]:
+    """Open a table; the file is there once the block has ended well."""
+    write = _parquet if Path(path).suffix.lower() == ".parquet" else _csv
+    with (
+        write_atomically(path, overwrite=overwrite) as temporary,
+        write(temporary, kinds) as append,
+    ):
+        yield append
+
+
+@contextmanager
+def _parquet(path: Path, kinds: Mapping[str, Kind]) -> Generator[Append]:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    types = {
+        "text": pa.dictionary(pa.int32(), pa.string()),
+        "integer": pa.int64(),
+        "number": pa.float64(),
+    }
+    fields = [(name, types[kind]) for name, kind in kinds.items()]
+    schema = pa.schema(fields, metadata={"warpspace": __version__})
+    with pq.ParquetWriter(path, schema, compression="zstd") as writer:
+
+        def append(columns: Columns) -> None:
+            arrays = [pa.array(columns[name], kind) for name, kind in fields]
+            writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
+
+        yield append
+
+
+@contextmanager
+def _csv(path: Path, kinds: Mapping[str, Kind]) -> Generator[Append]:
+    with path.open("w", encoding="utf-8", newline="") as file:
+        file.write(spell_row(kinds))
+
+        def append(columns: Columns) -> None:
+            spelt = [
+                [_spell(value, kind) for value in columns[name]] for name, kind in kinds.items()
+            ]
+            file.writelines(map(spell_row, zip(*spelt, strict=True)))
+
+        yield append
+
+
+def _spell(value: object, kind: Kind) -> object:
+    if value is None or kind == "integer":
+        return value
+    return str(value) if kind == "text" else float(value)  # pyright: ignore[reportArgumentType]

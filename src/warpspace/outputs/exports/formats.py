@@ -18,27 +18,13 @@ Write = Callable[..., None]
 
 @dataclass(frozen=True, slots=True)
 class ExportFormat:
-    """A format of exports.
+    """A format of exports."""
 
-    Attributes
-    ----------
-    ending : str
-        Of its files, for instance ".glb".
-    about : str
-        What it is for, a few words: help of the command line, buttons of the app.
-    write : str or callable
-        ``"module:function"``, imported when it is written, or the function itself.
-    in_app : bool
-        Whether the app offers it.
-    left_out : str
-        What of a scene has no place in it; said when it is written.
-    """
-
-    ending: str
-    about: str
-    write: str | Write
-    in_app: bool = True
-    left_out: str = ""
+    ending: str  # of its files, for instance ".glb"
+    about: str  # what it is for, a few words: help of the command line, buttons of the app
+    write: str | Write  # "module:function", imported when it is written, or the function itself
+    in_app: bool = True  # whether the app offers it
+    left_out: str = ""  # what of a scene has no place in it; said when it is written
 
     def load(self) -> Write:
         """Give the function that writes it."""
@@ -69,8 +55,8 @@ def export_formats() -> tuple[ExportFormat, ...]:
 _HERE = "warpspace.outputs.exports"
 for _form in (
     ExportFormat(".glb", "3-D viewers, CAD", f"{_HERE}.glb:write_glb"),
-    ExportFormat(".vts", "ParaView", f"{_HERE}.vts:write_vts"),
-    ExportFormat(".csv", "the field", f"{_HERE}.table:write_csv"),
+    ExportFormat(".vts", "ParaView", f"{_HERE}.fields:write_vts"),
+    ExportFormat(".csv", "the field", f"{_HERE}.fields:write_csv"),
     ExportFormat(
         ".urdf",
         "robot simulators: joints, limits, meshes",
@@ -84,22 +70,7 @@ for _form in (
 
 
 def write_export(picture: "ScenePicture", path: Path, *, overwrite: bool = True) -> None:
-    """Write a picture in the format that the ending of a path names.
-
-    Parameters
-    ----------
-    picture : ScenePicture
-    path : Path
-    overwrite : bool, optional
-        Whether an existing file may be replaced.
-
-    Raises
-    ------
-    OptionError
-        If there is no such format.
-    OutputError
-        If the file cannot be written.
-    """
+    """Write a picture in the format that the ending of a path names."""
     load_plugins()
     form = _FORMATS.get(path.suffix.lower())
     if form is None:

@@ -5,18 +5,19 @@ from pathlib import Path
 import numpy as np
 
 from warpspace.bodies.gltf import Material, Part, build_gltf, to_gltf
-from warpspace.geometry.deform import deform
-from warpspace.geometry.srgb import srgb_to_linear
+from warpspace.bodies.placed import place_bodies, scene_motions
+from warpspace.geometry.colour import srgb_to_linear
 from warpspace.geometry.surfaces import (
     box_edges,
+    deform,
     grid_lines,
+    is_thin,
     line_spacing,
     outer_surface,
     segments,
+    spread_nodes,
 )
-from warpspace.geometry.thicken import is_thin, spread_nodes
 from warpspace.outputs.files import write_atomically
-from warpspace.picture.bodies import place_bodies, scene_motions
 from warpspace.picture.mesh import thick_nodes
 from warpspace.picture.scene_picture import ScenePicture
 from warpspace.picture.traces import TraceLine, trace_lines
@@ -32,41 +33,14 @@ _ATTRIBUTES = {
 
 
 def write_glb(picture: ScenePicture, path: str | Path, *, overwrite: bool = True) -> None:
-    """Write the deformed scene as binary glTF.
-
-    Parameters
-    ----------
-    picture : ScenePicture
-    path : str or Path
-    overwrite : bool, optional
-        Whether an existing file may be replaced.
-
-    Raises
-    ------
-    OutputError
-        If the file cannot be written.
-    """
+    """Write the deformed scene as binary glTF."""
     data = build_glb(picture)
     with write_atomically(path, overwrite=overwrite) as temporary:
         temporary.write_bytes(data)
 
 
 def build_glb(picture: ScenePicture) -> bytes:
-    """Build the deformed scene as binary glTF.
-
-    Parameters
-    ----------
-    picture : ScenePicture
-
-    Returns
-    -------
-    bytes
-        Metres, Y up. Nodes: deformed surface, deformed grid lines and edges, ghost of the nominal
-        box, nominal and actual traces, bodies of the machine. Colours are unlit, so that a viewer
-        shows those of the colour scale. Every displaced node has a morph target "nominal" that
-        takes it back to where it nominally is. Display factor, scene, settings and program are in
-        the extras of the asset, the factor also in the name of the root.
-    """
+    """Build the deformed scene as binary glTF."""
     parts = [
         *_surface(picture),
         *_lines(picture),
@@ -82,7 +56,6 @@ def build_glb(picture: ScenePicture) -> bytes:
 
 
 def _colours(picture: ScenePicture) -> dict[str, object]:
-    """Say what the colours mean."""
     scale = picture.scale
     return {
         "map": scale.name,
@@ -96,7 +69,6 @@ def _colours(picture: ScenePicture) -> dict[str, object]:
 def _placed(
     nominal_mm: Array, error_um: Array, exaggeration: float
 ) -> tuple[Array, dict[str, Array]]:
-    """Positions where they are drawn, and the morph target that takes them back."""
     position = to_gltf(deform(nominal_mm, error_um, exaggeration))
     return position, {"nominal": to_gltf(error_um * (-exaggeration * MM_PER_UM))}
 
@@ -131,7 +103,6 @@ def _surface(picture: ScenePicture) -> list[Part]:
 
 
 def _lines(picture: ScenePicture) -> list[Part]:
-    """Build grid lines and edges of the deformed box, and the ghost of the nominal one."""
     grid = picture.grid
     nominal = grid.nominal_mm.reshape(-1, 3)
     error = picture.field.error_um.reshape(-1, 3)
@@ -155,7 +126,6 @@ def _lines(picture: ScenePicture) -> list[Part]:
 
 
 def _traces(traces: tuple[TraceLine, ...], exaggeration: float) -> list[Part]:
-    """Build the nominal and the actual traces of the rotary axes."""
     nominal, actual = Material("trace nominal", NOMINAL), Material("trace actual", TRACE)
     found: list[Part] = []
     for drawn in traces:
@@ -173,7 +143,6 @@ def _traces(traces: tuple[TraceLine, ...], exaggeration: float) -> list[Part]:
 
 
 def _bodies(picture: ScenePicture) -> list[Part]:
-    """Build the bodies of the machine where there are any, bent by the same factor."""
     motions = scene_motions(picture.scene, picture.view)
     return [
         Part(

@@ -5,16 +5,14 @@ from collections.abc import Mapping
 import numpy as np
 import pyvista as pv
 
+from warpspace.bodies.placed import place_bodies, scene_motions
 from warpspace.field.grid import DEFAULT_NODES
-from warpspace.geometry.surfaces import outer_surface
-from warpspace.geometry.thicken import is_thin
+from warpspace.geometry.surfaces import is_thin, outer_surface
 from warpspace.kinematics.model import Loop
-from warpspace.picture.bodies import place_bodies, scene_motions
-from warpspace.picture.exaggeration import Exaggeration
+from warpspace.picture.model import Exaggeration
 from warpspace.picture.scene_picture import ScenePicture, evaluate_picture
 from warpspace.picture.traces import TraceLine, trace_lines
-from warpspace.scene.model import Scene
-from warpspace.scene.pipeline import grid_basis
+from warpspace.scene.model import Scene, grid_basis
 from warpspace.units import Array
 
 
@@ -90,18 +88,7 @@ def to_pyvista(
 
 
 def structured_grid(points_mm: Array, arrays: Mapping[str, Array]) -> pv.StructuredGrid:
-    """Build a structured grid from nodes and what is known at them.
-
-    Parameters
-    ----------
-    points_mm : ndarray, [nx, ny, nz, 3], mm
-    arrays : mapping of str to ndarray, [nx, ny, nz] or [nx, ny, nz, 3]
-        Become point arrays.
-
-    Returns
-    -------
-    pyvista.StructuredGrid
-    """
+    """Build a structured grid from nodes and what is known at them."""
     mesh = pv.StructuredGrid()
     mesh.points = _in_order_of_vtk(points_mm)
     mesh.dimensions = points_mm.shape[:3]
@@ -141,7 +128,6 @@ def _parts(picture: ScenePicture) -> dict[str, Array]:
 
 
 def _surface(picture: ScenePicture, arrays: Mapping[str, Array]) -> pv.PolyData:
-    """Build the outside of the deformed volume."""
     surface = outer_surface(picture.grid.shape)
     drawn = picture.drawn_mm.reshape(-1, 3)
     if is_thin(picture.shape):
@@ -158,7 +144,6 @@ def _surface(picture: ScenePicture, arrays: Mapping[str, Array]) -> pv.PolyData:
 
 
 def _traces(traces: tuple[TraceLine, ...]) -> pv.MultiBlock:
-    """Build the nominal and the actual polyline of each trace."""
     blocks = pv.MultiBlock()
     for drawn in traces:
         point = ", ".join(f"{value:g}" for value in drawn.trace.point_mm)
@@ -172,7 +157,6 @@ def _traces(traces: tuple[TraceLine, ...]) -> pv.MultiBlock:
 
 
 def _bodies(picture: ScenePicture) -> pv.MultiBlock:
-    """Build the bodies of the machine where they are drawn."""
     blocks = pv.MultiBlock()
     motions = scene_motions(picture.scene, picture.view)
     for part in place_bodies(picture.scene, motions, picture.exaggeration):

@@ -11,8 +11,7 @@ from warpspace.exceptions import OptionError
 from warpspace.kinematics.transforms import placed
 from warpspace.machine.axes import direction_index
 from warpspace.machine.description import Axis, Machine
-from warpspace.outputs.files import write_atomically
-from warpspace.outputs.mesh_files import mesh_files, write_meshes
+from warpspace.outputs.files import mesh_files, write_atomically, write_meshes
 from warpspace.picture.scene_picture import ScenePicture
 from warpspace.units import Array
 
@@ -23,22 +22,7 @@ EFFORT, VELOCITY = 1000.0, 1.0
 
 
 def write_urdf(picture: ScenePicture, path: str | Path, *, overwrite: bool = True) -> None:
-    """Write the machine of a scene, nominal, with a mesh beside it for each frame with bodies.
-
-    Parameters
-    ----------
-    picture : ScenePicture
-    path : str or Path
-    overwrite : bool, optional
-        Whether existing files may be replaced.
-
-    Raises
-    ------
-    OutputError
-        If a file cannot be written, or one would replace a mesh that the scene reads.
-    OptionError
-        If yourdfpy is not installed.
-    """
+    """Write the machine of a scene, nominal, with a mesh beside it for each frame with bodies."""
     try:
         from yourdfpy import URDF
     except ImportError:
@@ -58,7 +42,6 @@ def write_urdf(picture: ScenePicture, path: str | Path, *, overwrite: bool = Tru
 
 
 def _meshes(picture: ScenePicture) -> dict[str, Any]:
-    """Put the bodies of each frame together, mm in that frame."""
     import trimesh
 
     parts: dict[str, list[Any]] = {}
@@ -69,19 +52,7 @@ def _meshes(picture: ScenePicture) -> dict[str, Any]:
 
 
 def build_robot(machine: Machine, meshes: dict[str, str]) -> Any:
-    """Build the links and joints of a machine.
-
-    Parameters
-    ----------
-    machine : Machine
-    meshes : dict of str to str
-        Frame (R, an axis, S, t or w) to the name of its mesh, mm.
-
-    Returns
-    -------
-    yourdfpy.urdf.Robot
-        Joints have the names of the axes; the links of both ends are called tool and workpiece.
-    """
+    """Build the links and joints of a machine."""
     from yourdfpy import urdf
 
     links = [_link(ROOT, "R", meshes)]
@@ -104,7 +75,6 @@ def build_robot(machine: Machine, meshes: dict[str, str]) -> Any:
 
 
 def _link(name: str, frame: str, meshes: dict[str, str]) -> Any:
-    """Build a link with the mesh of its frame."""
     from yourdfpy import urdf
 
     visuals: list[Any] = []
@@ -116,7 +86,6 @@ def _link(name: str, frame: str, meshes: dict[str, str]) -> Any:
 
 
 def _moving(axis: Axis, parent: str, child: str) -> Any:
-    """Build the joint of an axis."""
     from yourdfpy import urdf
 
     direction = np.zeros(3)
@@ -136,7 +105,6 @@ def _moving(axis: Axis, parent: str, child: str) -> Any:
 
 
 def _metres(pose: Array) -> Array:
-    """Give a pose in metres, [4, 4]."""
     found = np.array(pose, dtype=float)
     found[:3, 3] /= MM_PER_M
     return found

@@ -1,7 +1,7 @@
 """The figures there are: one entry here, and one module that draws it."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING
 
@@ -10,8 +10,8 @@ from warpspace.machine.limits import MOST_CONCEPTS
 from warpspace.plugins import load_plugins
 
 if TYPE_CHECKING:
-    from warpspace.outputs.drawing.content import Drawing
     from warpspace.outputs.drawing.settings import FigureSettings
+    from warpspace.outputs.drawing.sheet import Drawing
     from warpspace.scene.model import Scene
 
 Draw = Callable[..., "Drawing"]
@@ -20,41 +20,73 @@ Draw = Callable[..., "Drawing"]
 
 @dataclass(frozen=True, slots=True)
 class FigureKind:
-    """A kind of figure.
+    """A kind of figure."""
 
-    Attributes
-    ----------
-    name : str
-        As it is asked for.
-    caption : str
-        What it shows, one sentence: help of the command line, list of the app, report.
-    draw : str or callable
-        ``"module:function"``, imported when it is drawn, or the function itself.
-    scenes : int
-        How many scenes it is drawn from ...
-    most_scenes : int or None
-        ... or at most, where that may differ.
-    command : str
-        The command that draws it where `snapshot` does not.
-    evidence : bool
-        Whether a report shows it after the error map of a scene.
-    """
-
-    name: str
-    caption: str
-    draw: str | Draw
-    scenes: int = 1
-    evidence: bool = False
-    most_scenes: int | None = None
-    command: str = ""
+    name: str  # as it is asked for
+    caption: str  # what it shows, one sentence: help of the command line, list of the app, report
+    draw: str | Draw  # "module:function", imported when it is drawn, or the function itself
+    scenes: int = 1  # how many scenes it is drawn from ...
+    evidence: bool = False  # whether a report shows it after the error map of a scene
+    most_scenes: int | None = None  # ... or at most, where that may differ
+    command: str = ""  # that draws it where `draw` does not
 
     def load(self) -> Draw:
         """Give the function that draws it."""
         return resolve_name(self.draw) if isinstance(self.draw, str) else self.draw
 
 
-_HERE = "warpspace.outputs.figures"
-_KINDS: dict[str, FigureKind] = {}
+_HERE = "warpspace.outputs.figures."
+_KINDS = {
+    kind.name: replace(kind, draw=f"{_HERE}{kind.draw}")
+    for kind in (
+        FigureKind(
+            "error-map", "The deformed working volume, coloured.", "error_map:draw_error_map"
+        ),
+        FigureKind(
+            "slices", "Three slices through the working volume.", "slices:draw_slices",
+            evidence=True,
+        ),
+        FigureKind(
+            "orientation-map", "Orientation error of the tool axis.",
+            "orientation:draw_orientation", evidence=True,
+        ),
+        FigureKind(
+            "error-curves", "Errors along each axis, with their tolerance bands.",
+            "curves:draw_curves", evidence=True,
+        ),
+        FigureKind(
+            "traces", "Traces of the rotary table, nominal and actual.", "traces:draw_traces",
+            evidence=True,
+        ),
+        FigureKind(
+            "rotary", "Error motions of the rotary axes, ISO 230-7.", "charts:draw_rotary"
+        ),
+        FigureKind(
+            "machine", "The machine with its deformed bodies.", "machine:draw_machine",
+            evidence=True,
+        ),
+        FigureKind("gains", "Largest error gains over the travel.", "charts:draw_gains"),
+        FigureKind(
+            "montecarlo", "Volumetric error of machines within tolerance.",
+            "charts:draw_montecarlo",
+        ),
+        FigureKind(
+            "repair",
+            "Before and after the best repair, and what each error does to the whole volume.",
+            "repair:draw_repair",
+        ),
+        FigureKind("ballbar", "Circular test, ISO 230-4.", "charts:draw_ballbar"),
+        FigureKind(
+            "comparison", "Two scenes and their difference.", "comparison:draw_comparison",
+            scenes=2, command="compare A B -o FILE",
+        ),
+        FigureKind(
+            "concepts", "Machines side by side within the same tolerances.",
+            "concepts:draw_concepts", scenes=2, most_scenes=MOST_CONCEPTS,
+            command="concepts SCENE… --plot FILE",
+        ),
+    )
+}  # fmt: skip
 
 
 def register_figure(kind: FigureKind) -> None:
@@ -86,76 +118,6 @@ def figure_names(scenes: int = 1) -> tuple[str, ...]:
     return tuple(kind.name for kind in figure_kinds() if kind.scenes == scenes)
 
 
-for _kind in (
-    FigureKind(
-        "error-map", "The deformed working volume, coloured.", f"{_HERE}.error_map:draw_error_map"
-    ),
-    FigureKind(
-        "slices",
-        "Three slices through the working volume.",
-        f"{_HERE}.slices:draw_slices",
-        evidence=True,
-    ),
-    FigureKind(
-        "orientation-map",
-        "Orientation error of the tool axis.",
-        f"{_HERE}.orientation:draw_orientation",
-        evidence=True,
-    ),
-    FigureKind(
-        "error-curves",
-        "Errors along each axis, with their tolerance bands.",
-        f"{_HERE}.curves:draw_curves",
-        evidence=True,
-    ),
-    FigureKind(
-        "traces",
-        "Traces of the rotary table, nominal and actual.",
-        f"{_HERE}.traces:draw_traces",
-        evidence=True,
-    ),
-    FigureKind(
-        "rotary",
-        "Error motions of the rotary axes, ISO 230-7.",
-        f"{_HERE}.rotary:draw_rotary",
-    ),
-    FigureKind(
-        "machine",
-        "The machine with its deformed bodies.",
-        f"{_HERE}.machine:draw_machine",
-        evidence=True,
-    ),
-    FigureKind("gains", "Largest error gains over the travel.", f"{_HERE}.charts:draw_gains"),
-    FigureKind(
-        "montecarlo",
-        "Volumetric error of machines within tolerance.",
-        f"{_HERE}.charts:draw_montecarlo",
-    ),
-    FigureKind(
-        "repair",
-        "Before and after the best repair, and what each error does to the whole volume.",
-        f"{_HERE}.repair:draw_repair",
-    ),
-    FigureKind("ballbar", "Circular test, ISO 230-4.", f"{_HERE}.charts:draw_ballbar"),
-    FigureKind(
-        "comparison",
-        "Two scenes and their difference.",
-        f"{_HERE}.comparison:draw_comparison",
-        scenes=2,
-        command="compare A B -o FILE",
-    ),
-    FigureKind(
-        "concepts",
-        "Machines side by side within the same tolerances.",
-        f"{_HERE}.concepts:draw_concepts",
-        scenes=2,
-        most_scenes=MOST_CONCEPTS,
-        command="concepts SCENE… --plot FILE",
-    ),
-):
-    register_figure(_kind)
-
-
 def draw_figure(
     name: str,
     scenes: "Sequence[Scene]",
@@ -163,27 +125,7 @@ def draw_figure(
     *,
     exact: bool = True,
 ) -> "Drawing":
-    """Draw a figure by its name.
-
-    Parameters
-    ----------
-    name : str
-        One of `figure_kinds`.
-    scenes : sequence of Scene
-        One; two for a comparison.
-    settings : FigureSettings, optional
-    exact : bool, optional
-        Whether the figure becomes pixels of its own size (PNG), or is to be scaled (SVG, PDF).
-
-    Returns
-    -------
-    Drawing
-
-    Raises
-    ------
-    UnknownNameError, OptionError
-        If there is no such figure, or it needs another number of scenes.
-    """
+    """Draw a figure by its name."""
     from warpspace.outputs.drawing.settings import FigureSettings
 
     load_plugins()

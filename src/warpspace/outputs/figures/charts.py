@@ -1,86 +1,126 @@
-"""Charts as figures of the catalogue: gains, Monte Carlo, circular test."""
+"""Charts as figures of the catalogue: gains, Monte Carlo, circular test, rotary axes."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from matplotlib.figure import Figure
 
-from warpspace import __version__
-from warpspace.analysis.gains import DEFAULT_SHARE
-from warpspace.bench.ballbar import ballbar
-from warpspace.outputs.charts import ballbar_chart, gains_chart, montecarlo_chart
+from warpspace.analysis.cases import Plan
+from warpspace.analysis.description import silent
+from warpspace.analysis.gains import Gains
+from warpspace.analysis.machines import Machines, sampled_histogram
+from warpspace.analysis.montecarlo import montecarlo
+from warpspace.bench.base import run_test
+from warpspace.bench.kinds.circular import Circular
+from warpspace.exceptions import OptionError
+from warpspace.field.evaluate import placed_words
+from warpspace.kinematics.model import Loop
+from warpspace.outputs.charts.blocks import bars_chart, charts_sheet, histogram_chart
 from warpspace.outputs.charts.paper import on_ground
-from warpspace.outputs.drawing.content import Drawing
+from warpspace.outputs.charts.results import bench_chart
 from warpspace.outputs.drawing.settings import FigureSettings
-from warpspace.outputs.drawing.sheet import LOOP_WORDS, metadata
+from warpspace.outputs.drawing.sheet import LOOP_WORDS, Drawing, metadata
 from warpspace.outputs.drawing.style import FONT
-from warpspace.scene import verbs
-from warpspace.scene.model import Scene
-from warpspace.scene.pipeline import choose_view
+from warpspace.picture.traces import (
+    TraceLine,
+    evaluate_axis_motion,
+    evaluate_traces,
+    motion_lines,
+    name_trace,
+    trace_lines,
+)
+from warpspace.resources import __version__
+from warpspace.scene.model import Scene, choose_view
+from warpspace.spelling import spell_count
 
-RADIUS_MM = 150.0
-PLANE = "XY"
+CIRCLE = Circular(plane="XY", radius_mm=150.0)
 
 
 def draw_gains(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
     """Draw the largest error gains over the travel of a scene's machine."""
     scene = scenes[0]
-    found = verbs.gains(scene, loop=settings.loop, over_travel=True)
+    bars = Gains(loop=Loop(settings.loop), over_travel=True).run(scene, silent).bars()
     title = f"Error gains: {scene.machine.title}"
     where = f"{_loop(scene, settings)} · largest absolute gains over the travel"
-    with on_ground(settings.theme):
-        figure = gains_chart(found, title, where, DEFAULT_SHARE)
-    return finish_chart(figure, title, scene, settings, "gains")
+    chart = replace(bars, title=title, subtitle=where)
+    return _draw("gains", title, scene, settings, lambda: bars_chart(chart))
 
 
 def draw_montecarlo(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
     """Draw the volumetric error of machines drawn from a scene's tolerances."""
     scene = scenes[0]
-    result = verbs.montecarlo(scene, loop=settings.loop)
+    asked = Machines(loop=Loop(settings.loop))
+    found = montecarlo(asked.case(scene, Plan()))
     title = f"Machines within tolerance: {scene.title}"
+    loop = " · ".join((_loop(scene, settings), *placed_words(found.view)))
     what = (
-        f"{_loop(scene, settings)} · {result.plan.samples:,} machines, one random point each ·"
-        f" {result.draws.distribution} over the tolerances · seed {result.plan.seed}"
-    ).replace(",", " ", 1)
-    with on_ground(settings.theme):
-        figure = montecarlo_chart(result, title, what)
-    return finish_chart(figure, title, scene, settings, "montecarlo")
+        f"{loop} · {spell_count(found.plan.samples)} machines, one random point each ·"
+        f" {found.draws.distribution} over the tolerances · seed {found.plan.seed}"
+    )
+    histogram = sampled_histogram(found, title, what)
+    draw = lambda: histogram_chart(histogram)  # noqa: E731
+    return _draw("montecarlo", title, scene, settings, draw)
 
 
 def draw_ballbar(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
     """Draw the circular test of ISO 230-4 on a scene."""
     scene = scenes[0]
-    result = ballbar(scene, plane=PLANE, radius_mm=RADIUS_MM)
-    middle = ", ".join(f"{name} {value:g}" for name, value in result.centre.items())
+    found = run_test(scene, CIRCLE)
     title = f"Circular test: {scene.title}"
-    where = f"{PLANE} plane · radius {RADIUS_MM:g} mm · centre {middle}"
-    with on_ground(settings.theme):
-        figure = ballbar_chart(result, title, where)
-    return finish_chart(figure, title, scene, settings, "ballbar")
+    return _draw("ballbar", title, scene, settings, lambda: bench_chart(found, title))
+
+
+def draw_rotary(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
+    """Draw radial, axial and tilt error motion of every rotary axis of a scene, one row an axis.
+
+    Each is drawn for the first traced point of the scene, with the other axes where they stand.
+    """
+    scene = scenes[0]
+    chosen = first_lines(scene)
+    if not chosen:
+        raise OptionError(
+            f"figure 'rotary': {scene.name} has no traces; expected a machine with a rotary axis"
+            " and points in [points_mm] traces"
+        )
+    charts = [
+        motion_lines(name_trace(line.trace), motion, part)
+        for line in chosen
+        if (motion := evaluate_axis_motion(scene, line)) is not None
+        for part in motion.motions
+    ]
+    title = f"Error motions of the rotary axes: {scene.title}"
+    what = (
+        "ISO 230-7 · over the position of the axis, at the height of the point and in its"
+        " direction, which turns with it"
+    )
+    for name in (name_trace(line.trace) for line in chosen):
+        if not any(chart.title.startswith(name) for chart in charts):
+            what += f" · {name}: the point lies on the axis"
+    draw = lambda: charts_sheet(charts, title, what, columns=3)  # noqa: E731
+    return _draw("rotary", title, scene, settings, draw)
+
+
+def first_lines(scene: Scene) -> list[TraceLine]:
+    """Give one trace of every rotary axis: of the first point, the other axes where they stand."""
+    stands = scene.workspace.positions
+    found: dict[str, TraceLine] = {}
+    for line in trace_lines(evaluate_traces(scene, 1.0)):
+        here = all(stands.get(axis, 0.0) == at for axis, at in line.trace.at.items())
+        if here:
+            found.setdefault(line.trace.axis, line)
+    return list(found.values())
 
 
 def _loop(scene: Scene, settings: FigureSettings) -> str:
-    """Name the loop."""
     return LOOP_WORDS[choose_view(scene, settings.loop).loop]
 
 
-def finish_chart(
-    figure: Figure, title: str, scene: Scene, settings: FigureSettings, name: str
+def _draw(
+    name: str, title: str, scene: Scene, settings: FigureSettings, draw: Callable[[], Figure]
 ) -> Drawing:
-    """Give a chart the width asked for (its height follows) and say where it comes from.
-
-    Parameters
-    ----------
-    figure : Figure
-    title : str
-    scene : Scene
-    settings : FigureSettings
-    name : str
-        Of the figure.
-
-    Returns
-    -------
-    Drawing
-    """
+    """Give a chart the width asked for (its height follows) and say where it comes from."""
+    with on_ground(settings.theme):
+        figure = draw()
     width, height = figure.get_size_inches()
     dpi = settings.size[0] / width
     figure.set_size_inches(round(width * dpi) / dpi, round(height * dpi) / dpi)

@@ -6,26 +6,32 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from warpspace.analysis.concepts import LETTERS, Concept, compare_concepts
+from warpspace.bodies.placed import PlacedBody
 from warpspace.geometry.colour import ColourScale
+from warpspace.kinematics.model import Loop
 from warpspace.machine.parameters import parameter
 from warpspace.outputs.drawing.canvas import Canvas
-from warpspace.outputs.drawing.content import Drawing, DrawnMap
-from warpspace.outputs.drawing.legend import LegendEntry, grid_symbol, isoline_symbol
-from warpspace.outputs.drawing.lines import split_visible
 from warpspace.outputs.drawing.map3d import draw_map
-from warpspace.outputs.drawing.panel import draw_panel
-from warpspace.outputs.drawing.projection import Projection, Rect, fit_projection
+from warpspace.outputs.drawing.render import Projection, Rect, fit_projection
 from warpspace.outputs.drawing.settings import FigureSettings, shared_colours
-from warpspace.outputs.drawing.sheet import metadata, new_canvas, start_sheet
+from warpspace.outputs.drawing.sheet import (
+    Drawing,
+    DrawnMap,
+    LegendEntry,
+    isoline_symbol,
+    line_entry,
+    metadata,
+    start_sheet,
+)
 from warpspace.outputs.drawing.style import SIZES
 from warpspace.outputs.figures.error_map import isoline_words
-from warpspace.outputs.figures.machine import bodies_of, render_placed
-from warpspace.picture.bodies import PlacedBody
-from warpspace.picture.concepts import ConceptPicture, picture_concept
-from warpspace.picture.views import view_words
-from warpspace.picture.words import LOOP_WORDS, spell, spell_count, spell_short, tolerance_words
-from warpspace.scene.concepts import LETTERS, Concept, compare_concepts
+from warpspace.outputs.figures.machine import bodies_of, draw_bodies
+from warpspace.picture.model import view_words
+from warpspace.picture.scene_picture import ConceptPicture, picture_concept
+from warpspace.picture.words import LOOP_WORDS, tolerance_words
 from warpspace.scene.model import Scene
+from warpspace.spelling import spell, spell_count, spell_short
 from warpspace.units import Array
 
 BODY_ALPHA = 0.55
@@ -44,60 +50,47 @@ class _Machine:
 
 
 def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
-    """Draw machines within the same tolerances side by side.
-
-    Parameters
-    ----------
-    scenes : sequence of Scene
-    settings : FigureSettings
-        Its `concepts` says how machines are sampled.
-    exact : bool
-        Whether the figure becomes pixels of its own size.
-
-    Returns
-    -------
-    Drawing
-    """
+    """Draw machines within the same tolerances side by side."""
     if settings.strip:
         return _draw_strip(scenes, settings, exact=exact)
-    plan = settings.concepts
-    concepts = compare_concepts(scenes, plan, loop=settings.loop)
+    plan = replace(settings.concepts, loop=Loop(settings.loop))
+    concepts = compare_concepts(scenes, plan)
     machines, scale = _machines(concepts, settings)
     title = f"Concepts within {'their own' if plan.own_tolerances else 'the same'} tolerances"
     first = concepts[0]
     facts = [
         *([] if plan.own_tolerances else [tolerance_words(first.scene.tolerances)]),
-        f"{spell_count(plan.samples)} sampled machines each, {plan.distribution}",
+        f"{spell_count(plan.samples)} sampled machines each, {plan.drawn}",
         "largest |E| of each" if plan.over == "max" else "|E| at a random point of each",
         LOOP_WORDS[first.sampled.view.loop],
         view_words(settings.view, (2, 2, 2)),
     ]
-    legend = [LegendEntry(grid_symbol, "working volume, RMS of |E|")]
+    legend = [line_entry("working volume, RMS of |E|", lambda theme: theme.ink)]
     if isolines := isoline_words(scale):
         legend.append(LegendEntry(isoline_symbol, isolines))
     drawn = [concept.scene for concept in concepts]
-    sheet = start_sheet(settings, title, facts, drawn, legend, exact=exact, errors=False)
+    sheet = start_sheet(
+        "concepts", settings, title, facts, drawn, legend, exact=exact, errors=False
+    )
     canvas = sheet.canvas
     cells = _cells(sheet.content, len(machines))
     rooms = [_room(canvas, cell) for cell in cells]
     maps, factor = _draw_machines(canvas, machines, rooms, settings)
     for letter, cell, concept in zip(LETTERS, cells, concepts, strict=False):
         _draw_words(canvas, cell, letter, concept)
-    draw_panel(
-        canvas, sheet.panel, scale, "RMS |E|  [µm]", [],
+    sheet.draw_panel(
+        scale, "RMS |E|  [µm]", [],
         [(f"mean {letter}", f"{spell(one.sampled.mean_um)} µm")
          for letter, one in zip(LETTERS, concepts, strict=False)],
         (factor, None),
     )  # fmt: skip
-    about = metadata(title, drawn, settings, 1.0, "concepts")
-    return Drawing(canvas.figure, title, about, maps, tuple(canvas.rects))
+    return sheet.finish(1.0, maps)
 
 
 def _draw_strip(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
-    """Draw the pictures alone, one below the other; no machine is sampled for that."""
-    plan = replace(settings.concepts, samples=1)
-    machines, _ = _machines(compare_concepts(scenes, plan, loop=settings.loop), settings)
-    canvas = new_canvas(settings, exact=exact)
+    plan = replace(settings.concepts, samples=1, loop=Loop(settings.loop))
+    machines, _ = _machines(compare_concepts(scenes, plan), settings)
+    canvas = Canvas(*settings.size, settings.theme, exact=exact)
     width, height = float(canvas.width), canvas.height / len(machines)
     margin = STRIP_MARGIN * min(width, height)
     rooms = [
@@ -113,7 +106,6 @@ def _draw_strip(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
 def _machines(
     concepts: Sequence[Concept], settings: FigureSettings
 ) -> tuple[list[_Machine], ColourScale]:
-    """Evaluate what is drawn of machines, and the colours they share."""
     pictures = [picture_concept(concept, settings.grid) for concept in concepts]
     scale = shared_colours(replace(settings, component="norm"), pictures)
     pictures = [replace(picture, colours=scale) for picture in pictures]
@@ -135,7 +127,9 @@ def _draw_machines(
     maps: list[DrawnMap] = []
     for machine, points, room in zip(machines, seen, rooms, strict=True):
         projection = _centred(points, room, settings.view, factor)
-        _draw_bodies(canvas, machine.placed, projection, settings)
+        draw_bodies(
+            canvas, machine.placed, projection, opacity=BODY_ALPHA, nominal=False, zorder=0.8
+        )
         maps.append(
             draw_map(
                 canvas, machine.picture, room, settings.view, labels=False,
@@ -146,7 +140,6 @@ def _draw_machines(
 
 
 def _cells(rect: Rect, count: int) -> list[Rect]:
-    """Divide a box into a cell for each picture, row by row."""
     left, bottom, right, top = rect
     columns = min(count, max(1, round(math.sqrt(count * (right - left) / (top - bottom)))))
     rows = math.ceil(count / columns)
@@ -158,7 +151,6 @@ def _cells(rect: Rect, count: int) -> list[Rect]:
 
 
 def _room(canvas: Canvas, cell: Rect) -> Rect:
-    """Leave room in a cell for title, numbers and the labels of axes."""
     left, bottom, right, top = cell
     side = min(canvas.px(AXIS_LABELS), 0.15 * (right - left))
     foot = min(canvas.px(CELL_FOOT + AXIS_LABELS), 0.45 * (top - bottom))
@@ -167,7 +159,6 @@ def _room(canvas: Canvas, cell: Rect) -> Rect:
 
 
 def _points_mm(picture: ConceptPicture, placed: Sequence[PlacedBody]) -> Array:
-    """Collect what is to be seen, [n, 3], mm."""
     parts = [picture.grid.nominal_mm.reshape(-1, 3), *(part.vertices_mm for part in placed)]
     if not picture.grid.longest_edge_mm > 0.0:
         parts.append(picture.grid.bounds_mm + 0.5 * picture.size_mm * np.array([[-1.0], [1.0]]))
@@ -175,7 +166,6 @@ def _points_mm(picture: ConceptPicture, placed: Sequence[PlacedBody]) -> Array:
 
 
 def _centred(points: Array, room: Rect, view: str, px_per_mm: float) -> Projection:
-    """Give the projection of a scale that puts points into the middle of a box."""
     fitted = fit_projection(view, points, room)
     scaled = replace(fitted, px_per_mm=px_per_mm)
     spots = scaled.project(points)
@@ -184,23 +174,7 @@ def _centred(points: Array, room: Rect, view: str, px_per_mm: float) -> Projecti
     return scaled.moved(wanted - middle)
 
 
-def _draw_bodies(
-    canvas: Canvas, placed: Sequence[PlacedBody], projection: Projection, settings: FigureSettings
-) -> None:
-    """Draw the machine behind its working volume."""
-    raster = render_placed(placed, settings.theme, projection)
-    if raster is None:
-        return
-    rgba = (raster.reduced() if canvas.exact else raster.rgba).copy()
-    rgba[..., 3] = (rgba[..., 3] * BODY_ALPHA).astype(np.uint8)
-    canvas.image(rgba, raster.rect, zorder=0.8)
-    edges = [edge for part in placed for edge in part.edges_mm]
-    seen = [line for edge in edges for line in split_visible(edge, projection, raster)[0]]
-    canvas.lines(seen, width=SIZES.hair, colour=canvas.theme.grid, alpha=0.75, zorder=0.9)
-
-
 def _draw_words(canvas: Canvas, cell: Rect, letter: str, concept: Concept) -> None:
-    """Write the title of a machine above its picture, its numbers below."""
     left, bottom, right, top = cell
     room = right - left - canvas.px(16.0)
     x, scene, found = left + canvas.px(8.0), concept.scene, concept.sampled

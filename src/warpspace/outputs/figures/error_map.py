@@ -3,69 +3,55 @@
 from collections.abc import Mapping, Sequence
 
 from warpspace.geometry.colour import ColourScale
-from warpspace.geometry.isolines import isoline_levels
+from warpspace.geometry.surfaces import isoline_levels
 from warpspace.machine.axes import is_linear
-from warpspace.outputs.drawing.content import Drawing
 from warpspace.outputs.drawing.map3d import draw_map
-from warpspace.outputs.drawing.panel import Row, draw_panel
 from warpspace.outputs.drawing.settings import FigureSettings, evaluate_for
 from warpspace.outputs.drawing.sheet import (
-    content_rect,
-    draw_footer,
-    draw_heading,
+    Drawing,
+    Row,
+    Sheet,
     map_legend,
-    metadata,
-    new_canvas,
-    panel_rect,
     scene_facts,
+    start_sheet,
 )
-from warpspace.picture.coordinates import list_axes, spell_coordinate
-from warpspace.picture.model import Picture
-from warpspace.picture.views import view_words
-from warpspace.picture.words import quantity_words, spell, spell_short
+from warpspace.picture.model import Picture, view_words
+from warpspace.picture.words import list_axes, quantity_words, spell_coordinate
 from warpspace.scene.model import Scene
+from warpspace.spelling import spell, spell_short
 from warpspace.units import Array
+
+EVERY = "isolines every "
 
 
 def draw_error_map(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
-    """Draw the error map of a scene.
-
-    Parameters
-    ----------
-    scenes : sequence of Scene, (1,)
-    settings : FigureSettings
-    exact : bool
-        Whether the figure becomes pixels of its own size.
-
-    Returns
-    -------
-    Drawing
-    """
+    """Draw the error map of a scene."""
     picture = evaluate_for(settings, scenes[0])
     scene = picture.scene
-    title = f"{map_title(settings.component)}: {scene.title}"
-    canvas = new_canvas(settings, exact=exact)
+    component = settings.component
+    what = "Volumetric error map" if component == "norm" else f"Error map, {component} component"
+    title = f"{what}: {scene.title}"
     facts = [*scene_facts(picture, picture.exaggeration), view_words(settings.view, picture.shape)]
-    top = draw_heading(canvas, title, facts)
-    isolines = isoline_words(picture.scale, picture.values)
-    bottom = draw_footer(canvas, [scene], map_legend(isolines, diverging=picture.scale.diverging))
-    drawn = draw_map(canvas, picture, content_rect(canvas, top, bottom), settings.view)
-    draw_panel(
-        canvas,
-        panel_rect(canvas, top, bottom),
-        picture.scale,
-        quantity_words(settings.component),
-        value_marks(picture),
-        statistics_rows(picture),
-        (drawn.projection.px_per_mm, picture.exaggeration),
+    legend = map_legend(
+        isoline_words(picture.scale, picture.values), diverging=picture.scale.diverging
     )
-    facts_of_file = metadata(title, [scene], settings, picture.exaggeration, "error-map")
-    return Drawing(canvas.figure, title, facts_of_file, (drawn,), tuple(canvas.rects))
+    sheet = start_sheet("error-map", settings, title, facts, scenes, legend, exact=exact)
+    drawn = draw_map(sheet.canvas, picture, sheet.content, settings.view)
+    say_statistics(sheet, picture, drawn.projection.px_per_mm)
+    return sheet.finish(picture.exaggeration, [drawn])
 
 
-def map_title(component: str) -> str:
-    """Name the map of a component."""
-    return "Volumetric error map" if component == "norm" else f"Error map, {component} component"
+def say_statistics(
+    sheet: Sheet, picture: Picture, px_per_mm: float, *, above: Sequence[Row] = ()
+) -> None:
+    """Draw colours, statistics and scale bars of a picture beside it."""
+    sheet.draw_panel(
+        picture.scale,
+        quantity_words(picture.component),
+        value_marks(picture),
+        [*above, *statistics_rows(picture)],
+        (px_per_mm, picture.exaggeration),
+    )
 
 
 def isoline_words(scale: ColourScale, values: Array | None = None) -> str:
@@ -78,7 +64,7 @@ def isoline_words(scale: ColourScale, values: Array | None = None) -> str:
     if not levels:
         return ""
     step = scale.ticks[1] - scale.ticks[0]
-    return f"isolines every {spell_short(step)} {scale.unit}"
+    return f"{EVERY}{spell_short(step)} {scale.unit}"
 
 
 def value_marks(picture: Picture) -> list[tuple[str, float]]:

@@ -1,26 +1,42 @@
 """Figures with the machine: its bent bodies around the bent volume, and the traces of its table."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np
 
-from warpspace.geometry.faces import crease_lines, face_lines, outer_faces
-from warpspace.geometry.surfaces import box_edges, line_spacing, triangulate
-from warpspace.kinematics.bodies import BASE
+from warpspace.bodies.placed import PlacedBody, place_bodies, scene_motions
+from warpspace.geometry.surfaces import (
+    box_edges,
+    crease_lines,
+    face_lines,
+    line_spacing,
+    outer_faces,
+    triangulate,
+)
+from warpspace.kinematics.firstorder import BASE
 from warpspace.outputs.drawing.canvas import Canvas
-from warpspace.outputs.drawing.content import Drawing, DrawnMap
-from warpspace.outputs.drawing.lines import split_visible
 from warpspace.outputs.drawing.map3d import GHOST_DASHES, draw_lone_line, map_room_mm
-from warpspace.outputs.drawing.panel import draw_panel
-from warpspace.outputs.drawing.projection import Projection, Rect, fit_projection
-from warpspace.outputs.drawing.render import Body, Raster, render_bodies
+from warpspace.outputs.drawing.render import (
+    Body,
+    Projection,
+    Raster,
+    Rect,
+    fit_projection,
+    render_bodies,
+    split_visible,
+)
 from warpspace.outputs.drawing.settings import FigureSettings, evaluate_for
-from warpspace.outputs.drawing.sheet import LegendEntry, metadata, scene_facts, start_sheet
+from warpspace.outputs.drawing.sheet import (
+    Drawing,
+    DrawnMap,
+    LegendEntry,
+    line_entry,
+    scene_facts,
+    start_sheet,
+)
 from warpspace.outputs.drawing.style import SIZES, Theme
-from warpspace.outputs.figures.error_map import statistics_rows, value_marks
-from warpspace.picture.bodies import PlacedBody, place_bodies, scene_motions
+from warpspace.outputs.figures.error_map import say_statistics
 from warpspace.picture.scene_picture import ScenePicture
-from warpspace.picture.words import quantity_words
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
@@ -46,19 +62,7 @@ def bodies_of(
 
 
 def draw_machine(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
-    """Draw a machine with its bent bodies and its bent working volume.
-
-    Parameters
-    ----------
-    scenes : sequence of Scene, (1,)
-    settings : FigureSettings
-    exact : bool
-        Whether the figure becomes pixels of its own size.
-
-    Returns
-    -------
-    Drawing
-    """
+    """Draw a machine with its bent bodies and its bent working volume."""
     picture = evaluate_for(settings, scenes[0])
     exaggeration, scale, values = picture.exaggeration, picture.scale, picture.values
     title = f"Machine and working volume: {picture.scene.title}"
@@ -67,15 +71,12 @@ def draw_machine(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bo
         *scene_facts(picture, exaggeration),
         "bodies schematic, deformed and tilted like their frames",
     ]
-    sheet = start_sheet(settings, title, facts, scenes, _legend(), exact=exact)
+    sheet = start_sheet("machine", settings, title, facts, scenes, _legend(), exact=exact)
     canvas = sheet.canvas
     drawn_mm = picture.drawn_mm
     points = [map_room_mm(picture), *(part.vertices_mm for part in placed)]
     projection = fit_projection(settings.view, np.concatenate(points), _room(canvas, sheet.content))
-    machine = render_placed(placed, settings.theme, projection)
-    if machine is not None:
-        canvas.image(machine.reduced() if canvas.exact else machine.rgba, machine.rect)
-        draw_body_edges(canvas, placed, projection, machine)
+    machine = draw_bodies(canvas, placed, projection)
     faces = outer_faces(picture.grid.shape)
     surface = triangulate(faces)
     volume: Raster | None = None
@@ -87,53 +88,51 @@ def draw_machine(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bo
     _draw_volume_lines(canvas, picture, drawn_mm, projection, volume, machine)
     draw_lone_line(canvas, picture, projection)
     label_bodies(canvas, placed, projection, machine, sheet.content)
-    draw_panel(
-        canvas, sheet.panel, scale, quantity_words(settings.component),
-        value_marks(picture),
-        statistics_rows(picture),
-        (projection.px_per_mm, exaggeration),
-    )  # fmt: skip
-    about = metadata(title, scenes, settings, exaggeration, "machine")
-    maps = (DrawnMap(projection, scale, values, drawn_mm, exaggeration, volume),)
-    return Drawing(canvas.figure, title, about, maps, tuple(canvas.rects))
+    say_statistics(sheet, picture, projection.px_per_mm)
+    drawn = DrawnMap(projection, scale, values, drawn_mm, exaggeration, volume)
+    return sheet.finish(exaggeration, [drawn])
 
 
-def render_placed(
-    placed: Sequence[PlacedBody], theme: Theme, projection: Projection
+def draw_bodies(
+    canvas: Canvas,
+    placed: Sequence[PlacedBody],
+    projection: Projection,
+    *,
+    opacity: float = 1.0,
+    nominal: bool = True,
+    zorder: float = 1.0,
 ) -> Raster | None:
-    """Draw the bodies of a machine; None where it has none."""
+    """Draw the bodies of a machine with their edges, faintly also where these would be nominally.
+
+    None where there is no body.
+    """
     if not placed:
         return None
-    return render_bodies([drawn_body(part, theme) for part in placed], projection)
+    theme = canvas.theme
+    raster = render_bodies([drawn_body(part, theme) for part in placed], projection)
+    rgba = (raster.reduced() if canvas.exact else raster.rgba).copy()
+    rgba[..., 3] = (rgba[..., 3] * opacity).astype(np.uint8)
+    canvas.image(rgba, raster.rect, zorder)
+
+    def seen(edges: Iterable[Array]) -> list[Array]:
+        return [line for edge in edges for line in split_visible(edge, projection, raster)[0]]
+
+    edges = seen(edge for part in placed for edge in part.edges_mm)
+    canvas.lines(edges, width=SIZES.hair, colour=theme.grid, alpha=0.75, zorder=zorder + 0.1)
+    if nominal:
+        moving = [part for part in placed if part.body.frame != BASE]
+        edges = seen(edge for part in moving for edge in part.nominal_edges_mm)
+        canvas.lines(edges, width=SIZES.hair, colour=theme.ghost, alpha=0.8, zorder=zorder + 0.05)
+    return raster
 
 
 def _room(canvas: Canvas, rect: Rect) -> Rect:
-    """Leave room for the labels of bodies at the right."""
     left, bottom, right, top = rect
     side = canvas.px(20.0)
     return (left + side, bottom + side, right - canvas.px(150.0), top - side)
 
 
-def draw_body_edges(
-    canvas: Canvas, placed: Sequence[PlacedBody], projection: Projection, raster: Raster
-) -> None:
-    """Draw the visible edges of bodies, and faintly where they would be nominally."""
-    theme = canvas.theme
-    seen: list[Array] = []
-    for part in placed:
-        for edge in part.edges_mm:
-            seen += split_visible(edge, projection, raster)[0]
-    canvas.lines(seen, width=SIZES.hair, colour=theme.grid, alpha=0.75, zorder=1.4)
-    nominal: list[Array] = []
-    for part in placed:
-        if part.body.frame != BASE:
-            for edge in part.nominal_edges_mm:
-                nominal += split_visible(edge, projection, raster)[0]
-    canvas.lines(nominal, width=SIZES.hair, colour=theme.ghost, alpha=0.8, zorder=1.3)
-
-
 def _overlay(canvas: Canvas, volume: Raster, machine: Raster | None) -> None:
-    """Lay the coloured volume over the machine, fainter where bodies stand before it."""
     rgba = volume.rgba.copy()
     before = np.ones(rgba.shape[:2], dtype=bool)
     if machine is not None:
@@ -155,7 +154,6 @@ def _draw_volume_lines(
     volume: Raster | None,
     machine: Raster | None,
 ) -> None:
-    """Draw the grid of the bent volume and the ghost of the nominal one."""
     theme, shape = canvas.theme, picture.grid.shape
     nodes = drawn_mm.reshape(-1, 3)
     faces = outer_faces(shape)
@@ -164,9 +162,10 @@ def _draw_volume_lines(
         (face_lines(faces, shape, (nx, ny, nz)), SIZES.hair, 0.35),
         (crease_lines(faces, shape) or box_edges(shape), SIZES.line, 0.95),
     ):
-        for line in lines:
-            for part in split_visible(nodes[line], projection, volume)[0]:
-                canvas.line(part, width=width, colour=theme.grid, alpha=alpha, zorder=2.0)
+        seen = [
+            part for line in lines for part in split_visible(nodes[line], projection, volume)[0]
+        ]
+        canvas.lines(seen, width=width, colour=theme.grid, alpha=alpha, zorder=2.0)
     nominal = picture.grid.nominal_mm.reshape(-1, 3)
     for edge in box_edges(shape):
         seen, hidden = split_visible(nominal[edge], projection, machine)
@@ -210,7 +209,6 @@ def label_bodies(
 def _visible_spot(
     part: PlacedBody, projection: Projection, raster: Raster
 ) -> tuple[float, float] | None:
-    """Find the point of a body to lead a label to: visible, well inside what is seen of it."""
     corners = part.vertices_mm[part.body.triangles]
     rng = np.random.default_rng(0)
     weights = rng.dirichlet([1.0, 1.0, 1.0], size=(24, len(corners)))
@@ -226,23 +224,8 @@ def _visible_spot(
 
 
 def _legend() -> list[LegendEntry]:
-    """Build the legend."""
     return [
-        LegendEntry(
-            lambda c, x, y, w: c.line(
-                [(x, y), (x + w, y)], width=SIZES.thin, colour=c.theme.ink, alpha=0.6,
-                dashes=GHOST_DASHES,
-            ),
-            "nominal volume",
-        ),
-        LegendEntry(
-            lambda c, x, y, w: c.line([(x, y), (x + w, y)], width=SIZES.line, colour=c.theme.ink),
-            "deformed volume",
-        ),
-        LegendEntry(
-            lambda c, x, y, w: c.line(
-                [(x, y), (x + w, y)], width=SIZES.thin, colour=c.theme.ghost, alpha=0.6
-            ),
-            "nominal bodies",
-        ),
-    ]  # fmt: skip
+        line_entry("nominal volume", lambda theme: theme.ink, SIZES.thin, GHOST_DASHES, 0.6),
+        line_entry("deformed volume", lambda theme: theme.ink),
+        line_entry("nominal bodies", lambda theme: theme.ghost, SIZES.thin, alpha=0.6),
+    ]

@@ -10,29 +10,25 @@ from warpspace.geometry.surfaces import Index, corners, triangulate
 from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import TOOL_AXIS
 from warpspace.outputs.drawing.canvas import Canvas
-from warpspace.outputs.drawing.content import Drawing
 from warpspace.outputs.drawing.labels import Occupancy, place_label
-from warpspace.outputs.drawing.lines import split_visible
 from warpspace.outputs.drawing.map3d import draw_map, fit_map
-from warpspace.outputs.drawing.panel import draw_panel
-from warpspace.outputs.drawing.projection import Projection, Rect
-from warpspace.outputs.drawing.render import Raster
+from warpspace.outputs.drawing.render import Projection, Raster, Rect, split_visible
 from warpspace.outputs.drawing.settings import FigureSettings, evaluate_for
 from warpspace.outputs.drawing.sheet import (
+    Drawing,
     LegendEntry,
+    line_entry,
     map_legend,
-    metadata,
     scene_facts,
     start_sheet,
 )
 from warpspace.outputs.drawing.style import SIZES
 from warpspace.outputs.figures.error_map import isoline_words, place_rows
-from warpspace.picture.model import Picture
+from warpspace.picture.model import Picture, map_faces, view_words
 from warpspace.picture.scene_picture import ScenePicture
-from warpspace.picture.topology import map_faces
-from warpspace.picture.views import view_words
-from warpspace.picture.words import spell, spell_factor
+from warpspace.picture.words import spell_factor
 from warpspace.scene.model import Scene
+from warpspace.spelling import spell
 from warpspace.units import MICRORADIAN, RAD_PER_URAD, Array
 
 LEAN_RAD = 0.45
@@ -46,22 +42,12 @@ _ROUND = (1.0, 2.0, 5.0, 10.0)
 
 @dataclass(frozen=True, slots=True)
 class Needles:
-    """Tool axes to draw at the nodes.
+    """Tool axes to draw at the nodes."""
 
-    Attributes
-    ----------
-    axis : ndarray, [N, 3]
-        Nominal tool axis, unit vectors.
-    lean : ndarray, [N, 3]
-        Exaggerated lean of its end, per length of the needle.
-    length_mm : float, mm
-    tilt_urad : ndarray, [N], µrad
-    """
-
-    axis: Array
-    lean: Array
+    axis: Array  # [N, 3]; nominal tool axis, unit vectors
+    lean: Array  # [N, 3]; exaggerated lean of its end, per length of the needle
     length_mm: float
-    tilt_urad: Array
+    tilt_urad: Array  # [N]
 
     def ends_mm(self, nodes_mm: Array, at: Index) -> tuple[Array, Array]:
         """Give nominal and drawn ends of needles, [n, 2, 3] each, mm."""
@@ -72,20 +58,7 @@ class Needles:
 
 
 def draw_orientation(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
-    """Draw the orientation-error map of a scene.
-
-    Parameters
-    ----------
-    scenes : sequence of Scene, (1,)
-    settings : FigureSettings
-        The exaggeration is that of the lean.
-    exact : bool
-        Whether the figure becomes pixels of its own size.
-
-    Returns
-    -------
-    Drawing
-    """
+    """Draw the orientation-error map of a scene."""
     picture = evaluate_for(settings, scenes[0], quantity="orientation")
     orientation, values, scale = picture.field.orientation_urad, picture.values, picture.scale
     given = settings.exaggeration
@@ -100,7 +73,7 @@ def draw_orientation(scenes: Sequence[Scene], settings: FigureSettings, *, exact
         view_words(settings.view, picture.grid.shape),
     ]
     legend = _legend(isoline_words(scale, values))
-    sheet = start_sheet(settings, title, facts, scenes, legend, exact=exact)
+    sheet = start_sheet("orientation-map", settings, title, facts, scenes, legend, exact=exact)
     needles = _needles(picture, factor)
 
     def annotate(
@@ -149,12 +122,9 @@ def draw_orientation(scenes: Sequence[Scene], settings: FigureSettings, *, exact
     marks = [("mean", float(values.mean())), ("max", float(values.max()))]
     if settings.component != "norm":
         marks.insert(0, ("min", float(values.min())))
-    draw_panel(
-        sheet.canvas, sheet.panel, scale, f"{heading}  [{MICRORADIAN}]", marks, rows,
-        (drawn.projection.px_per_mm, None),
-    )  # fmt: skip
-    about = metadata(title, scenes, settings, factor, "orientation-map")
-    return Drawing(sheet.canvas.figure, title, about, (drawn,), tuple(sheet.canvas.rects))
+    bars = (drawn.projection.px_per_mm, None)
+    sheet.draw_panel(scale, f"{heading}  [{MICRORADIAN}]", marks, rows, bars)
+    return sheet.finish(factor, [drawn])
 
 
 def lean_factor(largest_urad: float) -> float:
@@ -167,7 +137,6 @@ def lean_factor(largest_urad: float) -> float:
 
 
 def _needles(picture: ScenePicture, factor: float) -> Needles:
-    """Find nominal and leaning tool axes at all nodes."""
     pose = branch_pose(picture.scene.model, "tool", picture.grid.coordinates)
     axis = pose[..., :3, :3] @ np.array(TOOL_AXIS)
     axis = np.broadcast_to(axis, picture.grid.nominal_mm.shape).reshape(-1, 3)
@@ -187,7 +156,6 @@ def _draw_needles(
     frame: Rect | None,
     view: str,
 ) -> None:
-    """Draw tool axes on the visible surface and label those at the corners."""
     nodes = content.grid.nominal_mm.reshape(-1, 3)
     nominal, drawn = needles.ends_mm(nodes, _feet(content, view))
     theme = canvas.theme
@@ -217,7 +185,6 @@ def _draw_needles(
 
 
 def _feet(content: Picture, view: str) -> Index:
-    """Choose nodes of the surface, evenly spread, to stand needles on."""
     shape = content.shape
     surface = triangulate(map_faces(shape, cut=view == "iso")).nodes
     surface = surface if len(surface) else np.arange(np.prod(shape))
@@ -230,19 +197,8 @@ def _feet(content: Picture, view: str) -> Index:
 
 
 def _legend(isolines: str) -> list[LegendEntry]:
-    """Build the legend."""
-    entries = [
-        LegendEntry(
-            lambda c, x, y, w: c.line(
-                [(x, y), (x + w, y)], width=SIZES.thin, colour=c.theme.ghost, dashes=(6.0, 4.0)
-            ),
-            "nominal tool axis",
-        ),
-        LegendEntry(
-            lambda c, x, y, w: c.line(
-                [(x, y), (x + w, y)], width=SIZES.bold, colour=c.theme.accent
-            ),
-            "actual tool axis, lean exaggerated",
-        ),
+    return [
+        line_entry("nominal tool axis", lambda theme: theme.ghost, SIZES.thin, (6.0, 4.0)),
+        line_entry("actual tool axis, lean exaggerated", lambda theme: theme.accent, SIZES.bold),
+        *map_legend(isolines)[3:],
     ]
-    return entries + map_legend(isolines)[3:]

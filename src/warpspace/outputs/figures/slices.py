@@ -7,57 +7,38 @@ import numpy as np
 
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import evaluate_first_order
-from warpspace.geometry.faces import crease_lines, outer_faces
-from warpspace.geometry.slices import PLANES, build_slice, slice_ranges
-from warpspace.geometry.surfaces import box_edges, triangulate
+from warpspace.field.grid import PLANES, build_slice, slice_ranges
+from warpspace.geometry.surfaces import box_edges, crease_lines, outer_faces, triangulate
 from warpspace.outputs.drawing.canvas import Canvas
-from warpspace.outputs.drawing.content import Drawing, DrawnMap
-from warpspace.outputs.drawing.lines import split_visible
 from warpspace.outputs.drawing.map3d import GHOST_DASHES, draw_map, fit_map
-from warpspace.outputs.drawing.panel import draw_panel
-from warpspace.outputs.drawing.projection import Rect, fit_projection
-from warpspace.outputs.drawing.render import Body, render_bodies
-from warpspace.outputs.drawing.settings import FigureSettings, evaluate_for
-from warpspace.outputs.drawing.sheet import map_legend, metadata, scene_facts, start_sheet
-from warpspace.outputs.drawing.style import SIZES
-from warpspace.outputs.figures.error_map import (
-    isoline_words,
-    statistics_rows,
-    value_marks,
+from warpspace.outputs.drawing.render import (
+    Body,
+    Rect,
+    fit_projection,
+    render_bodies,
+    split_visible,
 )
+from warpspace.outputs.drawing.settings import FigureSettings, evaluate_for
+from warpspace.outputs.drawing.sheet import (
+    Drawing,
+    DrawnMap,
+    map_legend,
+    scene_facts,
+    start_sheet,
+)
+from warpspace.outputs.drawing.style import SIZES
+from warpspace.outputs.figures.error_map import isoline_words, say_statistics
+from warpspace.picture.model import Slice
 from warpspace.picture.scene_picture import ScenePicture
-from warpspace.picture.slices import Slice
-from warpspace.picture.words import quantity_words, spell_short
 from warpspace.scene.model import Scene
+from warpspace.spelling import spell_short
 from warpspace.units import Array
 
 VIEW_OF = {"Z": "top", "Y": "front", "X": "right"}
 
 
-def _name(part: Slice) -> str:
-    """Head the map of a slice."""
-    return f"{PLANES[part.axis]} plane at axis {part.axis} = {spell_short(part.position_mm)} mm"
-
-
 def draw_slices(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
-    """Draw three slices through the middle of a scene's working volume.
-
-    Parameters
-    ----------
-    scenes : sequence of Scene, (1,)
-    settings : FigureSettings
-    exact : bool
-        Whether the figure becomes pixels of its own size.
-
-    Returns
-    -------
-    Drawing
-
-    Raises
-    ------
-    OptionError
-        If the working volume does not extend along three axes.
-    """
+    """Draw three slices through the middle of a scene's working volume."""
     picture = evaluate_for(settings, scenes[0])
     exaggeration, scale = picture.exaggeration, picture.scale
     slices = _evaluate_slices(picture, settings.grid)
@@ -66,7 +47,7 @@ def draw_slices(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
         isoline_words(scale, picture.values), surface="deformed slice", diverging=scale.diverging
     )
     sheet = start_sheet(
-        settings, title, scene_facts(picture, exaggeration), scenes, legend, exact=exact
+        "slices", settings, title, scene_facts(picture, exaggeration), scenes, legend, exact=exact
     )
     canvas = sheet.canvas
     cells = _cells(canvas, sheet.content, slices)
@@ -82,22 +63,15 @@ def draw_slices(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
         centre = (nominal.min(axis=0) + nominal.max(axis=0)) / 2.0
         projection = replace(fitted, px_per_mm=px_per_mm, centre_mm=centre, centre_px=middle)
         maps.append(draw_map(canvas, part, cell, view, projection=projection))
-        canvas.text(
-            middle[0], cell[3] - canvas.px(12.0), _name(part), weight="bold", ha="center", va="top"
-        )
+        name = f"{PLANES[part.axis]} plane at axis {part.axis} = {spell_short(part.position_mm)} mm"
+        high = cell[3] - canvas.px(12.0)
+        canvas.text(middle[0], high, name, weight="bold", ha="center", va="top")
     _draw_key(canvas, picture, slices, cells["key"])
-    draw_panel(
-        canvas, sheet.panel, scale, quantity_words(settings.component),
-        value_marks(picture),
-        [("whole volume", ""), *statistics_rows(picture)],
-        (px_per_mm, exaggeration),
-    )  # fmt: skip
-    facts = metadata(title, scenes, settings, exaggeration, "slices")
-    return Drawing(canvas.figure, title, facts, tuple(maps), tuple(canvas.rects))
+    say_statistics(sheet, picture, px_per_mm, above=[("whole volume", "")])
+    return sheet.finish(exaggeration, maps)
 
 
 def _evaluate_slices(picture: ScenePicture, nodes: int) -> list[Slice]:
-    """Evaluate the slices through the middle where they lie, in the colours of the volume."""
     scene = picture.scene
     ranges = slice_ranges(scene.model, scene.workspace)
     if not ranges:
@@ -128,7 +102,6 @@ def _evaluate_slices(picture: ScenePicture, nodes: int) -> list[Slice]:
 
 
 def _cells(canvas: Canvas, rect: Rect, slices: Sequence[Slice]) -> dict[str, Rect]:
-    """Divide the sheet: XY above XZ, YZ to the right of XZ, the key in the corner left."""
     spans = {part.axis: np.ptp(part.grid.nominal_mm.reshape(-1, 3), axis=0) for part in slices}
     x, y, z = float(spans["Z"][0]), float(spans["Z"][1]), float(spans["Y"][2])
     left, bottom, right, top = rect
@@ -145,7 +118,6 @@ def _cells(canvas: Canvas, rect: Rect, slices: Sequence[Slice]) -> dict[str, Rec
 
 
 def _draw_key(canvas: Canvas, picture: ScenePicture, slices: Sequence[Slice], rect: Rect) -> None:
-    """Show where the slices lie in the nominal volume."""
     inset = canvas.px(46.0)
     room = (rect[0] + inset, rect[1] + inset, rect[2] - inset, rect[3] - inset)
     nodes = picture.grid.nominal_mm.reshape(-1, 3)

@@ -9,22 +9,25 @@ from warpspace.exceptions import OptionError
 from warpspace.geometry.colour import ColourScale, component_values
 from warpspace.machine.description import Vector
 from warpspace.outputs.drawing.canvas import Canvas
-from warpspace.outputs.drawing.content import Drawing
 from warpspace.outputs.drawing.labels import Occupancy, place_label
-from warpspace.outputs.drawing.lines import split_visible
-from warpspace.outputs.drawing.panel import Row, draw_panel
-from warpspace.outputs.drawing.projection import Projection, Rect, fit_projection
-from warpspace.outputs.drawing.render import Raster
+from warpspace.outputs.drawing.render import Projection, Raster, Rect, fit_projection, split_visible
 from warpspace.outputs.drawing.settings import FigureSettings
-from warpspace.outputs.drawing.sheet import LegendEntry, metadata, scene_facts, start_sheet
+from warpspace.outputs.drawing.sheet import (
+    Drawing,
+    LegendEntry,
+    Row,
+    line_entry,
+    scene_facts,
+    start_sheet,
+)
 from warpspace.outputs.drawing.style import SIZES
-from warpspace.outputs.figures.machine import bodies_of, draw_body_edges, render_placed
-from warpspace.picture.exaggeration import choose_exaggeration
-from warpspace.picture.model import choose_scale
+from warpspace.outputs.figures.machine import bodies_of, draw_bodies
+from warpspace.picture.model import choose_exaggeration, choose_scale
 from warpspace.picture.scene_picture import evaluate_picture
 from warpspace.picture.traces import TraceLine, evaluate_traces, trace_lines
-from warpspace.picture.words import MINUS, quantity_words, spell, spell_vector
+from warpspace.picture.words import quantity_words, spell_vector
 from warpspace.scene.model import Scene
+from warpspace.spelling import MINUS, spell
 from warpspace.units import MICROMETRE, Array
 
 PIECE = 2
@@ -33,24 +36,7 @@ FADED = 0.55
 
 
 def draw_traces(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
-    """Draw the nominal and the actual traces of a scene's rotary axes.
-
-    Parameters
-    ----------
-    scenes : sequence of Scene, (1,)
-    settings : FigureSettings
-    exact : bool
-        Whether the figure becomes pixels of its own size.
-
-    Returns
-    -------
-    Drawing
-
-    Raises
-    ------
-    OptionError
-        If the machine has no rotary axis, or the scene no points to trace.
-    """
+    """Draw the nominal and the actual traces of a scene's rotary axes."""
     scene = scenes[0]
     groups = evaluate_traces(scene, 1.0)
     lines = trace_lines(groups)
@@ -81,7 +67,7 @@ def draw_traces(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     ]
     facts.append("nothing moves these points: no error of a rotary axis" if largest == 0.0 else "")
     sheet = start_sheet(
-        settings, title, [fact for fact in facts if fact], scenes, _legend(), exact=exact
+        "traces", settings, title, [fact for fact in facts if fact], scenes, _legend(), exact=exact
     )
     canvas = sheet.canvas
     points = [nominal, *(line.actual_mm for line in traces)]
@@ -90,12 +76,7 @@ def draw_traces(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     left, bottom, right, top = sheet.content
     room = (left + inset, bottom + inset / 2, right - inset, top - inset / 2)
     projection = fit_projection(settings.view, np.concatenate(points), room)
-    raster = render_placed(placed, settings.theme, projection)
-    if raster is not None:
-        rgba = (raster.reduced() if canvas.exact else raster.rgba).copy()
-        rgba[..., 3] = (rgba[..., 3] * FADED).astype(np.uint8)
-        canvas.image(rgba, raster.rect)
-        draw_body_edges(canvas, placed, projection, raster)
+    raster = draw_bodies(canvas, placed, projection, opacity=FADED)
     _draw_lines(canvas, traces, coloured, scale, projection, raster)
     _label(canvas, traces, projection, sheet.content)
     bars = (projection.px_per_mm, factor)
@@ -108,9 +89,8 @@ def draw_traces(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     ]
     marks = [("max", float(values.max())), ("mean", float(values.mean()))]
     heading = quantity_words(settings.component)
-    draw_panel(canvas, sheet.panel, scale, heading, marks, rows, bars)
-    about = metadata(title, scenes, settings, factor, "traces")
-    return Drawing(canvas.figure, title, about, (), tuple(canvas.rects))
+    sheet.draw_panel(scale, heading, marks, rows, bars)
+    return sheet.finish(factor)
 
 
 def _draw_lines(
@@ -121,23 +101,28 @@ def _draw_lines(
     projection: Projection,
     raster: Raster | None,
 ) -> None:
-    """Draw nominal traces grey, actual ones coloured; faint where the table hides them."""
     theme = canvas.theme
+    seen: list[Array] = []
+    hidden: list[Array] = []
+    seen_colours: list[Array] = []
+    hidden_colours: list[Array] = []
     for trace, values in zip(traces, coloured, strict=True):
-        actual = trace.actual_mm
-        seen, hidden = split_visible(trace.nominal_mm, projection, raster)
-        canvas.lines(seen, width=SIZES.thin, colour=theme.muted, dashes=(7.0, 5.0), zorder=3.0)
-        canvas.lines(
-            hidden, width=SIZES.hair, colour=theme.muted, alpha=0.5, dashes=(7.0, 5.0), zorder=3.0
-        )
-        for start in range(0, len(actual) - 1, PIECE):
-            piece = actual[start : start + PIECE + 1]
-            middle = values[start : start + PIECE + 1].mean()
-            colour = scale.colours(np.asarray(middle)) / 255.0
-            seen, hidden = split_visible(piece, projection, raster)
-            canvas.lines(seen, width=4.6, colour=theme.ink, zorder=3.4)
-            canvas.lines(seen, width=3.4, colour=colour, zorder=3.5)
-            canvas.lines(hidden, width=3.4, colour=colour, alpha=0.45, zorder=3.3)
+        before, behind = split_visible(trace.nominal_mm, projection, raster)
+        for parts, width, alpha in ((before, SIZES.thin, 1.0), (behind, SIZES.hair, 0.5)):
+            canvas.lines(
+                parts, width=width, colour=theme.muted, alpha=alpha, dashes=(7.0, 5.0), zorder=3.0
+            )
+        for start in range(0, len(values) - 1, PIECE):
+            piece = slice(start, start + PIECE + 1)
+            colour = scale.colours(values[piece].mean()) / 255.0
+            before, behind = split_visible(trace.actual_mm[piece], projection, raster)
+            seen += before
+            hidden += behind
+            seen_colours += [colour] * len(before)
+            hidden_colours += [colour] * len(behind)
+    canvas.lines(hidden, width=3.4, colour=np.array(hidden_colours), alpha=0.45, zorder=3.3)
+    canvas.lines(seen, width=4.6, colour=theme.ink, zorder=3.4)
+    canvas.lines(seen, width=3.4, colour=np.array(seen_colours), zorder=3.5)
 
 
 def _label(
@@ -146,7 +131,6 @@ def _label(
     projection: Projection,
     frame: Rect,
 ) -> None:
-    """Name each trace beside its outermost point."""
     taken = Occupancy(canvas.width, canvas.height, 2.0 * canvas.factor)
     taken.add_rects(canvas.rects)
     spots = [projection.project(trace.actual_mm) for trace in traces]
@@ -174,25 +158,17 @@ def _label(
 
 
 def _points(traces: Sequence[TraceLine]) -> dict[Vector, str]:
-    """Give numbers to the points that run through the traces."""
     points = dict.fromkeys(trace.trace.point_mm for trace in traces)
     return {point: f"P{number}" for number, point in enumerate(points, 1)}
 
 
 def _legend() -> list[LegendEntry]:
-    """Build the legend."""
     return [
-        LegendEntry(
-            lambda c, x, y, w: c.line(
-                [(x, y), (x + w, y)], width=SIZES.thin, colour=c.theme.muted, dashes=(7.0, 5.0)
-            ),
-            "nominal trace",
-        ),
+        line_entry("nominal trace", lambda theme: theme.muted, SIZES.thin, (7.0, 5.0)),
         LegendEntry(_trace_symbol, "actual trace, exaggerated, coloured by its error"),
     ]
 
 
 def _trace_symbol(canvas: Canvas, x: float, y: float, width: float) -> None:
-    """Show a coloured line with a dark rim."""
     canvas.line([(x, y), (x + width, y)], width=4.6)
     canvas.line([(x, y), (x + width, y)], width=3.4, colour="#2f8f8e", zorder=3.1)

@@ -1,5 +1,6 @@
 """The design review of one scene or two: a page a manager reads first, the evidence after it."""
 
-from warpspace.outputs.report.build import Embed, ReportSettings, build_report, write_report
+from warpspace.outputs.report.review import ReportSettings
+from warpspace.outputs.report.sections import Embed, build_report, write_report
 
 __all__ = ["Embed", "ReportSettings", "build_report", "write_report"]

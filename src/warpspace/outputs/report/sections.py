@@ -1,195 +1,368 @@
-"""From the numbers of a review to the parts of its report."""
+"""The design review from scenes to a file: numbers, then sections, then one of two templates."""
 
-from collections.abc import Sequence
+import hashlib
+import platform
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
-from warpspace.analysis.gains import DEFAULT_SHARE, Gain
+from warpspace.analysis.blocks import Bars, Column, Histogram, Lines, Mark, Table, number_columns
+from warpspace.analysis.blocks import Block as AnyBlock
+from warpspace.analysis.concepts import Concepts, ConceptsResult
+from warpspace.analysis.description import Result, silent
+from warpspace.analysis.distribution import choose_distribution
+from warpspace.exceptions import NoRendererError, OptionError, RenderError, WarpspaceError
+from warpspace.machine.limits import MOST_CONCEPTS
 from warpspace.machine.parameters import parameter
-from warpspace.outputs.report.blocks import (
+from warpspace.outputs.drawing.settings import FigureSettings
+from warpspace.outputs.figures.catalogue import figure_kinds
+from warpspace.outputs.files import check_target, write_atomically
+from warpspace.outputs.report.render import (
     Block,
-    Card,
-    Cards,
-    Column,
-    Mark,
+    Code,
+    Embedded,
+    Items,
+    Picture,
+    Report,
     Section,
     Text,
-    table,
+    report_time,
 )
-from warpspace.outputs.report.review import Review, Reviewed
-from warpspace.outputs.report.wording import (
+from warpspace.outputs.report.review import (
+    ReportSettings,
+    Review,
+    Reviewed,
+    build_review,
+    first_page,
     given,
-    limit,
-    microns,
-    percent,
+    share_pictures,
     signed,
-    spell_function,
-    verdict,
-    worst_place,
 )
-from warpspace.picture.comparison import (
-    CHANGE,
-    DIFFERENCE_LENGTH,
-    STATISTICS,
-    statistics_change,
+from warpspace.outputs.worker import FigureWorker
+from warpspace.picture.comparison import statistics_blocks
+from warpspace.picture.scene_picture import ScenePicture
+from warpspace.picture.traces import trace_lines
+from warpspace.picture.words import (
+    convention_sentences,
+    list_axes,
+    reference_words,
+    spell_factor,
 )
-from warpspace.picture.coordinates import own_axes, spell_at, spell_point
-from warpspace.picture.words import spell, spell_short, spell_signed, spell_vector
-from warpspace.units import MICROMETRE
+from warpspace.resources import __version__
+from warpspace.scene.model import Scene
+from warpspace.scene.save import scene_to_toml
+from warpspace.spelling import spell, spell_short
 
-MOST_ROWS = 15
-LETTERS = ("A", "B")
-
-
-def letters(review: Review) -> Sequence[tuple[str, Reviewed]]:
-    """Scenes with what they are called in headings: nothing for one, A and B for two."""
-    if len(review.scenes) == 1:
-        return [("", review.scenes[0])]
-    return list(zip(LETTERS, review.scenes, strict=True))
+PAPER_SHARE = 0.87
+"""Width of a map among the evidence: two of them then stand on a page."""
+CHART = "warpspace.outputs.charts.blocks:chart_figure"
+Chart = Bars | Lines | Histogram
+Drawn = Callable[[], Block]
+"""Waits for a figure; gives what stands in its place where it cannot be drawn."""
 
 
-def prefixed(letter: str, text: str) -> str:
-    """Put the letter of a scene before a heading."""
-    return f"{letter}: {text}" if letter else text
+class ReportFigures:
+    """Draws the figures of one report; its maps are begun as soon as it is there."""
 
-
-def summary_blocks(review: Review) -> list[Block]:
-    """Give the verdict and the numbers to remember."""
-    return [Text(verdict(review), "lead"), Cards(tuple(_cards(review)))]
-
-
-def _cards(review: Review) -> list[Card]:
-    """Numbers to remember."""
-    if len(review.scenes) == 2:
-        a, b = (reviewed.statistics for reviewed in review.scenes)
-        found = [
-            Card(f"mean, A → B, {MICROMETRE}", f"{spell(a.mean_um)} → {spell(b.mean_um)}"),
-            Card(f"P95, A → B, {MICROMETRE}", f"{spell(a.p95_um)} → {spell(b.p95_um)}"),
-            Card(f"max, A → B, {MICROMETRE}", f"{spell(a.max_um)} → {spell(b.max_um)}"),
-        ]
-        if review.difference is not None:
-            largest = microns(review.difference.max_um)
-            found.append(Card(f"max {DIFFERENCE_LENGTH}", largest, "largest change of a point"))
-        return found
-    reviewed = review.scenes[0]
-    stats = reviewed.statistics
-    found = [
-        Card("mean |E|", microns(stats.mean_um)),
-        Card("P95", microns(stats.p95_um)),
-        Card("max", microns(stats.max_um), f"at {worst_place(reviewed)}"),
-    ]
-    if reviewed.sampling is not None:
-        worst = reviewed.sampling.worst
-        if worst.probability is not None:
-            kept = percent(worst.probability.probability)
-            found.append(Card(f"keep {limit(worst.probability.spec_um)}", kept, "of machines"))
+    def __init__(
+        self,
+        worker: FigureWorker,
+        pictures: Sequence[ScenePicture],
+        loop: str,
+        grid: int,
+        form: str,
+    ) -> None:
+        self._worker, self._form = worker, form
+        self._loop, self._grid, self._factor = loop, grid, pictures[0].exaggeration
+        self.missing: list[str] = []
+        scenes = [picture.scene for picture in pictures]
+        drawn = f"displacement drawn {spell_factor(self._factor)}"
+        compares = len(scenes) == 2
+        if compares:
+            self.first = self._begin("comparison", scenes, f"A, B and their difference; {drawn}.")
         else:
-            found.append(Card("P95 by tolerances", microns(worst.p95_um), "worst point, machines"))
-    return found
+            self.first = self._begin(
+                "error-map", scenes, f"Error map of {scenes[0].title}; {drawn}."
+            )
+        self._evidence: list[list[Drawn]] = []
+        for number, picture in enumerate(pictures):
+            scene = picture.scene
+            own = f"Error map of {scene.title}; {drawn}; colour scale of its own."
+            # what would tell nothing: no trace displaced, the same machine again
+            still = not any(trace.error_um.any() for trace in trace_lines(picture.traces))
+            left_out = {"traces" if still else "", "machine" if number else ""}
+            wanted = [("error-map", own)] if compares else []
+            wanted += [
+                (kind.name, kind.caption)
+                for kind in figure_kinds()
+                if kind.evidence and kind.name not in left_out
+            ]
+            self._evidence.append(
+                [self._begin(name, [scene], caption, PAPER_SHARE) for name, caption in wanted]
+            )
+
+    def evidence(self, number: int) -> list[Block]:
+        """Give the maps of one scene: its error map and whatever else the catalogue has."""
+        return [drawn() for drawn in self._evidence[number]]
+
+    def repair(self, scene: Scene, prefix: str) -> Block:
+        """Draw the volume before and after the repair, with bars of what each error does."""
+        caption = f"{prefix}Before and after the last set of the table; bars of the whole volume."
+        return self._begin("repair", [scene], caption)()
+
+    def concepts(self, scenes: Sequence[Scene], plan: Concepts, caption: str) -> Block:
+        """Draw machines side by side."""
+        settings = FigureSettings(loop=str(plan.loop), grid=self._grid, concepts=plan)
+        return self._begin("concepts", scenes, caption, settings=settings)()
+
+    def chart(self, chart: Chart) -> Block:
+        """Draw a chart of a result."""
+        data = self._worker.begin_chart("chart", CHART, self._form, chart)()
+        return Picture("chart", chart.title, data, self._form)
+
+    def _begin(
+        self,
+        name: str,
+        scenes: Sequence[Scene],
+        caption: str,
+        width: float = 1.0,
+        settings: FigureSettings | None = None,
+    ) -> Drawn:
+        """Begin a figure; it is drawn a second time where the first fails, then it is missing.
+
+        Where a scene has no such figure, its place says why.
+        """
+        # the lean of the tool axis has a factor of its own, at which it is seen
+        factor = "auto" if name == "orientation-map" else self._factor
+        chosen = settings or FigureSettings(exaggeration=factor, loop=self._loop, grid=self._grid)
+        begun = self._worker.begin(name, scenes, chosen, self._form)
+
+        def drawn() -> Block:
+            for wait in (begun, lambda: self._worker.render(name, scenes, chosen, self._form)):
+                try:
+                    return Picture(name, caption, wait(), self._form, width)
+                except NoRendererError:
+                    raise
+                except RenderError as error:
+                    failed = f"{name} ({error})"
+                except WarpspaceError as error:
+                    return Text(f"{caption} {error}", "note")
+            self.missing.append(failed)
+            return Text(f"{caption} This figure is missing: {failed}.", "note")
+
+        return drawn
 
 
-def statistics_table(review: Review) -> Block:
-    """Statistics of the fields, side by side where there are two."""
-    found = [reviewed.statistics for reviewed in review.scenes]
-    names = [letter or "value" for letter, _ in letters(review)]
-    change: dict[str, float] = {}
-    if len(found) == 2:
-        change = statistics_change(found[0], found[1])
-        names.append(CHANGE)
+ENDINGS = (".html", ".pdf")
+OVERLINE = "Design review · volumetric error"
+MOST_ROWS, MOST_BARS = 15, 20
+LOOPS = {
+    "tool": "The tool point, actual minus nominal.",
+    "workpiece": "The workpiece point, actual minus nominal.",
+    "relative": "The tool point minus the workpiece point that nominally coincides.",
+}
+
+
+class Embed(Protocol):
+    """Builds a page with the interactive scene; handed in, since that needs a server."""
+
+    def __call__(
+        self, scene: Scene, *, exaggeration: float, nodes: int, loop: str, largest: float
+    ) -> str:
+        """Give the page as HTML that requests nothing."""
+        ...
+
+
+def write_report(
+    scenes: Sequence[Scene],
+    path: str | Path,
+    settings: ReportSettings | None = None,
+    *,
+    embed: Embed | None = None,
+    concepts: Sequence[Scene] = (),
+    results: Mapping[str, Result] | None = None,
+    files: Sequence[Path] = (),
+    overwrite: bool = True,
+) -> Report:
+    """Write the design review of one scene or two, with results of other analyses by heading."""
+    target = check_target(path, ENDINGS, overwrite=overwrite)
+    page = target.suffix.lower() == ".html"
+    report = build_report(
+        scenes,
+        settings,
+        form="svg" if page else "pdf",
+        embed=embed if page else None,
+        concepts=concepts,
+        results=results,
+        files=files,
+    )
+    from warpspace.outputs.report.render import render_html, render_pdf
+
+    content = render_html(report).encode() if page else render_pdf(report)
+    with write_atomically(target, overwrite=overwrite) as temporary:
+        temporary.write_bytes(content)
+    return report
+
+
+def build_report(
+    scenes: Sequence[Scene],
+    settings: ReportSettings | None = None,
+    *,
+    form: str = "svg",
+    embed: Embed | None = None,
+    concepts: Sequence[Scene] = (),
+    results: Mapping[str, Result] | None = None,
+    files: Sequence[Path] = (),
+) -> Report:
+    """Put the report of one scene or two together; see `write_report` for the parameters."""
+    if form not in ("svg", "pdf"):
+        raise OptionError(f"figures of a report as {form!r}; expected svg or pdf")
+    settings = settings or ReportSettings()
+    pictures = share_pictures(scenes, settings)
+    with FigureWorker() as worker:
+        painter = ReportFigures(worker, pictures, settings.loop, settings.grid, form)
+        review = build_review(scenes, settings, pictures)
+        compared = compare_with(scenes, concepts, settings)
+        found = {
+            "": [*first_page(review), painter.first()],
+            "Where the error is": where(review, painter, embed),
+            "Error budget at the worst point": map(explanation, review.scenes),
+            "Repair": told(review, painter, "repair"),
+            **({"What differs": differences(review)} if len(scenes) == 2 else {}),
+            "Errors and tolerances": map(parameters, review.scenes),
+            "How errors arrive at the point": told(review, painter, "gains"),
+            "What the tolerances promise": told(review, painter, "worst", "sampled", "shares"),
+            **({"Concepts side by side": concept_blocks(compared, painter)} if compared else {}),
+            **{name: said(result.blocks(), painter) for name, result in (results or {}).items()},
+            "Conventions": [conventions(review)],
+            "Provenance": provenance(review, files),
+        }
+        parts = tuple(Section(heading, tuple(blocks)) for heading, blocks in found.items())
+    machines = [one.scene.machine for one in review.scenes]
+    facts = (
+        *dict.fromkeys(f"{machine.title}, chain {machine.chain}" for machine in machines),
+        *dict.fromkeys(one.volume for one in review.scenes),
+        f"{settings.loop} loop",
+        *dict.fromkeys(reference_words(one.scene) for one in review.scenes),
+        report_time().strftime("%Y-%m-%d"),
+        f"warpspace {__version__}",
+    )
+    title = " and ".join(one.titled(one.scene.title) for one in review.scenes)
+    return Report(title, OVERLINE, facts, parts, tuple(painter.missing))
+
+
+def said(found: Iterable[AnyBlock], painter: ReportFigures | None = None) -> Iterator[Block]:
+    """Give what a result of any analysis says; its charts where somebody draws them."""
+    for block in found:
+        if isinstance(block, str):
+            yield Text(block.strip(), "note" if block.startswith(" ") else "body")
+        elif isinstance(block, Table) and block.rows:
+            left = len(block.rows) - MOST_ROWS
+            more = f" {left} more rows are left out." if left > 0 else ""
+            title = f"{block.title.strip()}{more}"
+            yield replace(block, title=title, rows=block.rows[:MOST_ROWS])
+        elif isinstance(block, Table):
+            yield Text(f"{block.title} {block.empty.strip()}".strip(), "note")
+        elif painter is not None:
+            yield painter.chart(_first_bars(block) if isinstance(block, Bars) else block)
+
+
+def _first_bars(bars: Bars) -> Bars:
+    panels = [
+        replace(
+            panel,
+            series=tuple(
+                replace(one, values=one.values[:MOST_BARS], spread=one.spread[:MOST_BARS])
+                for one in panel.series
+            ),
+        )
+        for panel in bars.panels
+    ]
+    rows, keys = bars.rows[:MOST_BARS], bars.keys[:MOST_BARS]
+    return replace(bars, rows=rows, keys=keys, panels=tuple(panels))
+
+
+def told(review: Review, painter: ReportFigures, *names: str) -> Iterator[Block]:
+    """Give what analyses say of each scene; once where they say the same."""
+    for name in names:
+        before = None
+        for reviewed in review.scenes:
+            found = reviewed.results[name]
+            if isinstance(found, str):
+                yield Text(reviewed.titled(found), "note")
+                continue
+            if (numbers := found.as_json()) == before:
+                yield Text(reviewed.titled("the same."), "note")
+                continue
+            before = numbers
+            title, *blocks = found.blocks()
+            yield Text(reviewed.titled(str(title)), "heading")
+            if name != "repair":
+                yield from said(blocks, painter)
+                continue
+            yield from said(blocks)
+            if found.changes():
+                yield painter.repair(reviewed.scene, reviewed.titled(""))
+
+
+def where(review: Review, painter: ReportFigures, embed: Embed | None) -> Iterator[Block]:
+    """Give statistics, the views that are turned with the mouse, and the maps."""
+    names = [one.letter or "|E|" for one in review.scenes]
+    found = [one.statistics for one in review.scenes]
     if review.difference is not None:
         found.append(review.difference)
-        names.append(DIFFERENCE_LENGTH)
-    rows: list[tuple[str, ...]] = []
-    for label, field in STATISTICS.items():
-        numbers = [spell(getattr(stats, field)) for stats in found]
-        numbers[2:2] = [spell_signed(change[field])] if change else []
-        rows.append((f"{label}, {MICROMETRE}", *numbers))
-    columns = [Column("|E| over the volume", width=1.4)]
-    columns += [Column(name, "right") for name in names]
-    note = (
-        f" {CHANGE} is the change of each statistic; {DIFFERENCE_LENGTH} the length of the change"
-        " of the error vector, node by node."
-        if change
-        else ""
-    )
-    return table(
-        "Statistics of the length of the position error, each node counting for its share of the"
-        f" volume.{note}",
-        columns,
-        rows,
-    )
+    yield Text("Each node counts for its share of the volume.")
+    yield from said(statistics_blocks(review.scenes[0].scene, names, found))
+    for number, reviewed in enumerate(review.scenes):
+        if embed is not None:
+            page = embed(
+                reviewed.scene,
+                exaggeration=review.exaggeration,
+                nodes=min(max(reviewed.picture.grid.shape), 21),
+                loop=review.settings.loop,
+                largest=review.largest_um,
+            )
+            title = reviewed.titled(f"{reviewed.scene.title}: turn it with the mouse")
+            yield Embedded(title, page)
+        yield from painter.evidence(number)
 
 
-def places_table(review: Review) -> Block | None:
-    """Say where each field is largest: axis positions, point of R, argument of a command."""
-    found = [
-        (letter or "|E|", reviewed.scene, reviewed.statistics)
-        for letter, reviewed in letters(review)
-    ]
-    if review.difference is not None:
-        found.append((DIFFERENCE_LENGTH, review.scenes[0].scene, review.difference))
-    rows: list[tuple[str, ...]] = []
-    for name, scene, stats in found:
-        if stats.max_um > 0.0:
-            own = own_axes(scene, stats.max_at_axes)
-            axes, _, point = f"{spell_point(own, stats.max_at_mm)} mm".rpartition(" · ")
-            rows.append((name, axes, point, f"--at {spell_at(own)}"))
-    if not rows:
-        return None
-    columns = [
-        Column("max of", width=0.8),
-        Column("axis positions, mm", width=1.7),
-        Column("point in R", width=1.7),
-        Column("as an argument", width=2.0),
-    ]
-    return table("Where the error is largest.", columns, rows)
-
-
-def explanation_blocks(letter: str, reviewed: Reviewed) -> list[Block]:
-    """Contributions at the worst point, adding up to its error."""
+def explanation(reviewed: Reviewed) -> Table:
+    """Give the contributions at the worst point, adding up to its error."""
     found = reviewed.explanation
-    rows: list[tuple[str, ...]] = []
     ranked = sorted(found.contributions, key=lambda part: -abs(part.along_um))
+    rows: list[tuple[str, ...]] = []
     for part in ranked[:MOST_ROWS]:
         row = parameter(part.key)
-        rows.append(
-            (
-                part.key,
-                row.name,
-                f"{given(part.value)} {row.unit}",
-                *(signed(value) for value in part.error_um),
-                signed(part.along_um),
-            )
-        )
-    rest = ranked[MOST_ROWS:]
-    if rest:
+        value = f"{given(part.value)} {row.unit}"
+        numbers = map(signed, (*part.error_um, part.along_um))
+        rows.append((part.key, row.name, value, *numbers))
+    if rest := ranked[MOST_ROWS:]:
         vector = np.sum([part.error_um for part in rest], axis=0)
         along = sum(part.along_um for part in rest)
-        rows.append((f"{len(rest)} more", "", "", *(signed(v) for v in vector), signed(along)))
-    rows.append(("remainder", "second order", "", *(signed(v, 2) for v in found.remainder_um), ""))
-    rows.append(("total", "exact chain", "", *(signed(v) for v in found.error_um), ""))
-    columns = [
-        Column("key", width=1.15),
-        Column("error", width=2.2),
-        Column("value there", "right", 1.3),
-        *(Column(f"{axis}, {MICROMETRE}", "right", 0.95) for axis in "xyz"),
-        Column(f"along E, {MICROMETRE}", "right", 1.15),
-    ]
-    marks: list[Mark] = ["" for _ in rows]
-    marks[-1] = "strong"
-    caption = (
-        f"What each error does to the worst point, {worst_place(reviewed)}. The parts along E"
-        " add up to the length of the first-order error. This is no advice what to repair: what"
-        " adds most here may make up for other errors elsewhere; see Repair."
+        rows.append((f"{len(rest)} more", "", "", *map(signed, (*vector, along))))
+    remainder = (signed(value, 2) for value in found.remainder_um)
+    rows.append(("remainder", "second order", "", *remainder, ""))
+    rows.append(("total", "exact chain", "", *map(signed, found.error_um), ""))
+    title = (
+        f"{reviewed.titled(reviewed.scene.title)}. What each error does to the worst point,"
+        f" {reviewed.worst_place}. The parts along E add up to the length of the first-order error."
+        " This is no advice what to repair: what adds most here may make up for other errors"
+        " elsewhere; see Repair."
     )
-    return [
-        Text(prefixed(letter, reviewed.scene.title), "heading"),
-        table(caption, columns, rows, marks),
-    ]
+    columns = (
+        *(Column("key"), Column("error"), Column("value there", "s")),
+        *number_columns(("x", "y", "z", "along E"), "s", "µm"),
+    )
+    marks: list[Mark] = [*("" for _ in rows[1:]), "key"]
+    return Table(columns, rows, title, marks=marks)
 
 
-def parameters_table(letter: str, reviewed: Reviewed) -> Block:
-    """Every error that is not zero or has a tolerance, and whether it keeps it."""
+def parameters(reviewed: Reviewed) -> Block:
+    """List every error that is not zero or has a tolerance, and whether it keeps it."""
     scene = reviewed.scene
     rows: list[tuple[str, ...]] = []
     marks: list[Mark] = []
@@ -203,82 +376,140 @@ def parameters_table(letter: str, reviewed: Reviewed) -> Block:
             centre = "" if tolerance.centre == 0.0 else f"{given(tolerance.centre)} "
             limits = f"{centre}± {spell_short(tolerance.half_width)}"
             kept = "yes" if abs(value - tolerance.centre) <= tolerance.half_width else "no"
-        curve = spell_function(scene.errors.functions.get(key), row.unit) if value else ""
+        function = scene.errors.functions.get(key) if value else None
+        curve = "" if function is None else function.describe(row.unit, spell, spell_short)
         number = given(value) if value else "0"
         rows.append((key, row.symbol, row.name, number, limits, row.unit, kept, curve))
-        marks.append("bad" if kept == "no" else "strong" if value else "")
-    columns = [
-        Column("key", width=0.85),
-        Column("symbol", width=0.9),
-        Column("error", width=2.4),
-        Column("value", "right", 0.9),
-        Column("tolerance", "right", 1.15),
-        Column("unit", width=0.75),
-        Column("kept", width=0.65),
-        Column("along the axis", width=2.4),
-    ]
-    caption = prefixed(letter, f"Errors and tolerances of {scene.title}.")
+        marks.append("worse" if kept == "no" else "key" if value else "")
+    title = reviewed.titled(f"Errors and tolerances of {scene.title}.")
     if not rows:
-        return Text(f"{caption} All errors are zero, and there are no tolerances.", "note")
-    return table(
-        f"{caption} Errors that are zero and have no tolerance are left out.", columns, rows, marks
+        return Text(f"{title} All errors are zero, and there are no tolerances.", "note")
+    title += " Errors that are zero and have no tolerance are left out."
+    columns = (
+        *(Column("key"), Column("symbol"), Column("error"), Column("value", "s")),
+        *(Column("tolerance", "s"), Column("unit"), Column("kept"), Column("along the axis")),
     )
+    return Table(columns, rows, title, marks=marks)
 
 
-def difference_table(review: Review) -> Block:
-    """Parameters in which two scenes differ."""
+def differences(review: Review) -> Iterator[Block]:
+    """List the parameters in which two scenes differ."""
     first, second = (reviewed.scene for reviewed in review.scenes)
     rows: list[tuple[str, ...]] = []
-    keys = dict.fromkeys([*first.parameter_keys, *second.parameter_keys])
-    for key in keys:
+    for key in dict.fromkeys([*first.parameter_keys, *second.parameter_keys]):
         a, b = (scene.errors.amplitude(key) for scene in (first, second))
         shapes = [scene.errors.functions.get(key) for scene in (first, second)]
         if shapes[0] == shapes[1] or (a == 0.0 and b == 0.0):
             continue
         row = parameter(key)
         rows.append((key, row.name, given(a), given(b), given(b - a), row.unit))
-    columns = [
-        Column("key"),
-        Column("error", width=2.2),
-        Column("A", "right"),
-        Column("B", "right"),
-        Column("B − A", "right"),
-        Column("unit", width=0.8),
-    ]
-    if not rows:
-        return Text("The error sets of A and B are the same.", "note")
-    return table("Errors in which A and B differ (largest values along the axis).", columns, rows)
+    columns = (
+        Column("key"), Column("error"), *number_columns(("A", "B", "B − A"), "s"), Column("unit")
+    )  # fmt: skip
+    title = "Errors in which A and B differ (largest values along the axis)."
+    same = Text("The error sets of A and B are the same.", "note")
+    yield Table(columns, rows, title) if rows else same
+    if review.difference is None:
+        yield Text("A and B have different working volumes: no difference is formed.", "note")
 
 
-def gains_table(letter: str, gains: Sequence[Gain]) -> Block:
-    """List the largest gains and the levers that explain them."""
-    rows = [
-        (
-            gain.key,
-            gain.parameter.name,
-            spell(gain.norm),
-            *(spell(value) for value in (gain.x, gain.y, gain.z)),
-            gain.unit,
-            spell_vector(gain.lever_mm),
+def compare_with(
+    scenes: Sequence[Scene], others: Sequence[Scene], settings: ReportSettings
+) -> ConceptsResult | None:
+    """Compare the reviewed machines with others within the tolerances of the first.
+
+    They are sampled as the report samples those of its tolerances; axes count on whichever side
+    they are, whatever the loop of the report.
+    """
+    if not others:
+        return None
+    every = (*scenes, *others)
+    if len(every) > MOST_CONCEPTS:
+        raise OptionError(
+            f"{len(every)} machines side by side; expected at most {MOST_CONCEPTS}"
+            f" with the {len(scenes)} of the report"
         )
-        for gain in gains[:MOST_ROWS]
-    ]
-    marks: list[Mark] = ["strong" if gain.is_key else "" for gain in gains[:MOST_ROWS]]
-    columns = [
-        Column("key", width=0.9),
-        Column("error", width=2.2),
-        Column("|E|", "right", 0.8),
-        *(Column(axis, "right", 0.8) for axis in "xyz"),
-        Column("unit", width=1.1),
-        Column("lever x, y, z, mm", "right", 2.0),
-    ]
-    caption = (
-        "Largest gains over the travel: how much of a unit of error arrives at the point. Strong:"
-        f" the key errors, which make {percent(DEFAULT_SHARE, 0)} of the sum of squares."
+    asked = Concepts(
+        limit_um=settings.spec_um,
+        samples=settings.samples,
+        seed=settings.seed,
+        distribution=choose_distribution(settings.distribution),
     )
-    return table(prefixed(letter, caption), columns, rows, marks)
+    return asked.run_all(every, silent)
 
 
-def section(heading: str, blocks: Sequence[Block | None]) -> Section:
-    """Put a section together, leaving out what there is none of."""
-    return Section(heading, tuple(block for block in blocks if block is not None))
+def concept_blocks(found: ConceptsResult, painter: ReportFigures) -> Iterator[Block]:
+    """Tell how machines compare, with pictures in one scale."""
+    yield from said(found.blocks())
+    caption = "The machines in one scale; colours are the RMS of |E| within tolerance."
+    yield painter.concepts([one.scene for one in found.concepts], found.asked, caption)
+
+
+def conventions(review: Review) -> Items:
+    """Say how to read signs, frames and factors."""
+    second_order = ", ".join(
+        f"{spell(max(one.linearisation_um, 0.0), 2)} µm" + (one.letter and f" in {one.letter}")
+        for one in review.scenes
+    )
+    each = [(_reference(one.scene), *convention_sentences(one.scene)) for one in review.scenes]
+    differ = len(set(each)) > 1
+    own = [
+        one.titled(text) if differ else text
+        for one, words in zip(review.scenes, each if differ else each[:1], strict=False)
+        for text in words
+    ]
+    loop = review.settings.loop
+    return Items(
+        (
+            "Error = actual − nominal. Lengths in mm, errors in µm, small angles in µrad.",
+            (
+                "Right-handed machine frame R with the axis directions of ISO 841; parameters as in"
+                " ISO 230-1 (EAX: rotation about x of the X axis; EC0Y: squareness of Y to X)."
+            ),
+            f"Loop: {loop}. {LOOPS[loop]}",
+            *own,
+            (
+                f"In all pictures: displacement drawn {spell_factor(review.exaggeration)}; the"
+                " dashed box is nominal."
+            ),
+            (
+                "First order in the errors; over a 5 × 5 × 5 grid the exact chain (full rotations,"
+                f" all products) differs by at most {second_order}."
+            ),
+            "Sampled machines have one constant value per error and point, drawn independently.",
+        )
+    )
+
+
+def _reference(scene: Scene) -> str:
+    if scene.reference is None:
+        return "Absolute: errors include the part that is the same everywhere."
+    return f"Relative to the reference point {list_axes(scene.reference)}, which is held still."
+
+
+def provenance(review: Review, files: Sequence[Path]) -> Iterator[Block]:
+    """Tell what the report was made from and with."""
+    settings = review.settings
+    rows = [
+        ("program", f"warpspace {__version__}"),
+        ("made", report_time().strftime("%Y-%m-%d %H:%M UTC")),
+        ("with", f"Python {platform.python_version()}, NumPy {np.__version__}"),
+        ("grid", f"{settings.grid} nodes per axis"),
+        ("loop", settings.loop),
+        ("exaggeration", f"displacement drawn {spell_factor(review.exaggeration)}"),
+        (
+            "sampling",
+            f"{settings.samples} machines, {settings.distribution}, seed {settings.seed}",
+        ),
+    ]
+    texts = [scene_to_toml(one.scene).encode() for one in review.scenes]
+    inputs = [
+        *zip((one.titled(f"scene {one.scene.name}") for one in review.scenes), texts, strict=True),
+        *((f"file {path.name}", path.read_bytes()) for path in files),
+    ]
+    rows += [(name, f"SHA-256 {hashlib.sha256(data).hexdigest()}") for name, data in inputs]
+    yield Table((Column("what"), Column("value")), rows, "Program, settings and input.")
+    for one, text in zip(review.scenes, texts, strict=True):
+        words = f"{one.scene.name}.toml, complete: saved as a file it is the scene of this report."
+        yield Text(one.titled(words), "heading")
+        yield Code(text.decode())

@@ -7,18 +7,20 @@ from numpy.typing import NDArray
 from viser import SceneApi
 
 from warpspace.app.browser.handles import Handle
+from warpspace.app.evaluation.bench import BenchPicture
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.palette import palette
-from warpspace.app.viewport.layers import SCENE_PER_MM
-from warpspace.app.viewport.layers.adding import add_ball
-from warpspace.geometry.arrows import build_arrows
+from warpspace.app.viewport.layers import NOTHING, SCENE_PER_MM, colour_bytes, polyline_pieces
+from warpspace.app.viewport.layers.adding import add_ball, add_lines
 from warpspace.picture.marks import (
     CornerArrows,
     WorstPoint,
+    build_arrows,
     corner_arrows,
     spell_micrometres,
     worst_point,
 )
+from warpspace.spelling import spell_short
 from warpspace.units import MICROMETRE
 
 RADIUS, HEAD, BALL = 0.0032, 0.034, 0.009
@@ -27,20 +29,13 @@ CORNERS = 8
 
 
 def _spell_value(value: float, unit: str) -> str:
-    """Spell a largest value with its unit."""
     if unit == MICROMETRE:
         return f"max {spell_micrometres(value)}"
     return f"max {value:.1f} {unit}".replace("-", "−")
 
 
 class AnnotationsLayer:
-    """Arrows, marker and their numbers.
-
-    Parameters
-    ----------
-    scene : viser.SceneApi
-    picture : LivePicture
-    """
+    """Arrows, marker and their numbers."""
 
     def __init__(self, scene: SceneApi, picture: LivePicture) -> None:
         self._scene = scene
@@ -53,7 +48,6 @@ class AnnotationsLayer:
         self.show(picture)
 
     def _label(self, name: str, anchor: Any) -> Handle:
-        """Add a label without text yet, which the map may hide."""
         return Handle(
             self._scene.add_label(
                 name, "", visible=False, font_screen_scale=0.8, anchor=anchor, depth_test=True
@@ -67,7 +61,6 @@ class AnnotationsLayer:
         self._show_worst(picture, worst)
 
     def _show_arrows(self, picture: LivePicture, worst: WorstPoint) -> None:
-        """Draw the displacement of the corners."""
         if not picture.state.look.arrows:
             for part in (*self._corner_labels, *([self._arrows] if self._arrows else ())):
                 part.put(visible=False)
@@ -107,7 +100,6 @@ class AnnotationsLayer:
             label.put(text=text, position=at * SCENE_PER_MM, visible=not hidden)
 
     def _show_worst(self, picture: LivePicture, found: WorstPoint) -> None:
-        """Mark the largest value."""
         on = picture.state.look.worst and found.value != 0.0
         self._worst.put(visible=on)
         if self._ball is not None:
@@ -134,3 +126,48 @@ def carries_worst(
     if not look.worst or look.tilts or picture.state.component != "norm":
         return np.zeros(len(arrows.norm_um), dtype=bool)
     return np.all(np.isclose(arrows.start_mm, worst.nominal_mm), axis=1)
+
+
+# --- The path of the standard test that is run ----------------------------------------------------
+# Nominal, and actual with the factor of the box.
+
+
+class BenchLayer:
+    """The path of a test and its name."""
+
+    def __init__(self, scene: SceneApi, picture: LivePicture) -> None:
+        colours = palette(picture)
+        self._nominal = add_lines(scene, "/test/nominal", colours.trace_nominal, 1.5, visible=False)
+        self._actual = add_lines(scene, "/test/actual", colours.trace_actual, 3.0, visible=False)
+        self._name = Handle(
+            scene.add_label(
+                "/test/name", "", visible=False, font_screen_scale=0.8, anchor="bottom-center"
+            )
+        )
+        self.show(picture)
+
+    def show(self, picture: LivePicture) -> None:
+        """Draw the path."""
+        found = picture.bench
+        shown = isinstance(found, BenchPicture) and picture.state.bench.path
+        for part in (self._nominal, self._actual, self._name):
+            part.put(visible=shown)
+        if not isinstance(found, BenchPicture) or not shown:
+            return
+        lines = found.lines_mm(picture.exaggeration)
+        colours = palette(picture)
+        nominal = polyline_pieces([one for one, _ in lines])
+        actual = polyline_pieces([other for _, other in lines])
+        self._nominal.put(
+            points=nominal if len(nominal) else NOTHING, colors=colour_bytes(colours.trace_nominal)
+        )
+        self._actual.put(
+            points=actual if len(actual) else NOTHING, colors=colour_bytes(colours.trace_actual)
+        )
+        ends = np.concatenate([other for _, other in lines])
+        factor = spell_short(picture.exaggeration)
+        self._name.put(
+            text=f"{found.prepared.test.name}: max {spell_micrometres(found.largest_um)},"
+            f" drawn {factor} ×",
+            position=ends[np.argmax(ends[:, 2])] * SCENE_PER_MM,
+        )

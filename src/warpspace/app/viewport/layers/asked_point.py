@@ -12,7 +12,7 @@ from warpspace.app.viewport.layers import NOTHING, SCENE_PER_MM
 from warpspace.app.viewport.layers.adding import add_lines
 from warpspace.app.viewport.layers.box import dashes
 from warpspace.machine.parameters import parameter
-from warpspace.picture.coordinates import spell_axes, spell_in_r
+from warpspace.picture.words import spell_axes, spell_in_r
 from warpspace.units import Array
 
 ACCENT = (194, 24, 91)
@@ -27,13 +27,7 @@ LABEL_AT = 0.25
 
 
 class AskedPointLayer:
-    """Marker, displacement, axis, lever and their labels.
-
-    Parameters
-    ----------
-    scene : viser.SceneApi
-    picture : LivePicture
-    """
+    """Marker, displacement, axis, lever and their labels."""
 
     def __init__(self, scene: SceneApi, picture: LivePicture) -> None:
         self._marker = Handle(
@@ -89,7 +83,6 @@ class AskedPointLayer:
             self._hide(*(self._labels[k] for k in ("axis", "lever")))
 
     def _show_lever(self, found: Answer, part: Contribution, size: float) -> None:
-        """Draw the axis through the frame's origin, and the line from there to the point."""
         row = parameter(part.key)
         origin = part.origin_mm + found.shift_mm
         point = found.explanation.nominal_mm + found.shift_mm
@@ -112,6 +105,5 @@ class AskedPointLayer:
         self._labels[name].put(text=text, position=at * SCENE_PER_MM, visible=True)
 
     def _hide(self, *parts: Handle) -> None:
-        """Hide what is shown."""
         for part in parts:
             part.put(visible=False)

@@ -9,8 +9,8 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.palette import palette
 from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes
 from warpspace.app.viewport.layers.adding import add_lines
-from warpspace.geometry.thicken import is_thin
-from warpspace.picture.ticks import tick_values
+from warpspace.geometry.surfaces import is_thin
+from warpspace.picture.marks import tick_values
 from warpspace.units import Array
 
 AWAY = 0.13
@@ -48,13 +48,7 @@ def axes_room_mm(picture: LivePicture) -> Array:
 
 
 class AxesLayer:
-    """Lines, ticks and numbers; laid out anew when the nominal box changes.
-
-    Parameters
-    ----------
-    scene : viser.SceneApi
-    picture : LivePicture
-    """
+    """Lines, ticks and numbers; laid out anew when the nominal box changes."""
 
     def __init__(self, scene: SceneApi, picture: LivePicture) -> None:
         self._scene = scene
@@ -77,7 +71,6 @@ class AxesLayer:
             label.put(visible=visible)
 
     def _lay_out(self, box: Array, longest: float) -> None:
-        """Build lines and labels for a nominal box, [2, 3]."""
         for label in self._labels:
             label.handle.remove()
         self._labels = []

@@ -14,7 +14,7 @@ from warpspace.app.evaluation.palette import palette
 from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes
 from warpspace.app.viewport.layers.adding import add_lines
 from warpspace.app.viewport.tone_map import Rgb, vertex_colours
-from warpspace.bodies.gltf_template import GltfTemplate
+from warpspace.bodies.gltf import GltfTemplate
 from warpspace.geometry.surfaces import box_edges
 from warpspace.picture.mesh import (
     Pieces,
@@ -23,6 +23,7 @@ from warpspace.picture.mesh import (
     isoline_pieces,
     line_mesh,
     map_mesh,
+    outline_pieces,
 )
 from warpspace.units import Array
 
@@ -34,19 +35,7 @@ DARK_ISOLINE: Rgb = (60, 68, 80)
 
 
 def dashes(points: Array, dash: float, gap: float) -> NDArray[np.float32]:
-    """Cut straight lines into dashes.
-
-    Parameters
-    ----------
-    points : ndarray, [L, 2, 3]
-        Ends of the lines.
-    dash, gap : float
-        Lengths, fitted so that each line begins and ends with a dash.
-
-    Returns
-    -------
-    ndarray of float32, [S, 2, 3]
-    """
+    """Cut straight lines into dashes."""
     parts: list[Array] = []
     for start, end in points:
         length = float(np.linalg.norm(end - start))
@@ -82,18 +71,11 @@ def surface_glb(picture: LivePicture) -> bytes:
 
 @lru_cache(maxsize=32)
 def _template(triangles: Identity, count: int) -> GltfTemplate:
-    """Lay out the file of a map; that of one topology once."""
     return GltfTemplate("surface", triangles.thing, count)
 
 
 class BoxLayer:
-    """Surface, lines and ghost.
-
-    Parameters
-    ----------
-    scene : viser.SceneApi
-    picture : LivePicture
-    """
+    """Surface, lines and ghost."""
 
     def __init__(self, scene: SceneApi, picture: LivePicture) -> None:
         self._nominal: Array | None = None
@@ -140,3 +122,26 @@ class BoxLayer:
 def isoline_colour(picture: LivePicture) -> Rgb:
     """Choose a line that is seen on every colour of the scale."""
     return DARK_ISOLINE if picture.scale.diverging else LIGHT_ISOLINE
+
+
+# --- Wireframe of the side of a comparison that is not drawn --------------------------------------
+
+
+class OtherSideLayer:
+    """Edges and grid lines of the other bent box, every second piece: dotted."""
+
+    def __init__(self, scene: SceneApi, picture: LivePicture) -> None:
+        self._edges = add_lines(scene, "/compare/other", palette(picture).edge, 2.0, visible=False)
+        self.show(picture)
+
+    def show(self, picture: LivePicture) -> None:
+        """Follow the other side."""
+        other = None if picture.compared is None else picture.compared.other_mm
+        if other is None or not picture.state.comparison.ghost:
+            self._edges.put(visible=False)
+            return
+        self._edges.put(
+            points=outline_pieces(picture, other)[::2],
+            colors=colour_bytes(palette(picture).edge),
+            visible=True,
+        )

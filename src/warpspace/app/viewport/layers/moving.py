@@ -7,16 +7,12 @@ from viser import ClientHandle, SceneApi
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.rotation import played_position
 from warpspace.app.viewport.layers import Layer
-from warpspace.app.viewport.layers.annotations import AnnotationsLayer
+from warpspace.app.viewport.layers.annotations import AnnotationsLayer, BenchLayer
 from warpspace.app.viewport.layers.asked_point import AskedPointLayer
 from warpspace.app.viewport.layers.axes import AxesLayer
-from warpspace.app.viewport.layers.bench import BenchLayer
-from warpspace.app.viewport.layers.ghost_machine import GhostMachineLayer
-from warpspace.app.viewport.layers.machine import MachineLayer
-from warpspace.app.viewport.layers.other_side import OtherSideLayer
-from warpspace.app.viewport.layers.rotation import RotationLayer
-from warpspace.app.viewport.layers.traces import TracesLayer
-from warpspace.app.viewport.rotation_player import Player
+from warpspace.app.viewport.layers.box import OtherSideLayer
+from warpspace.app.viewport.layers.machine import GhostMachineLayer, MachineLayer
+from warpspace.app.viewport.layers.traces import Player, RotationLayer, TracesLayer
 
 Tell = Callable[[Mapping[str, float]], None]
 """Takes the position of the played axis, degrees; none where the play is over."""
@@ -32,13 +28,6 @@ class MovingLayer:
     """Everything around the map that may also move by itself.
 
     The player only asks for a picture; the session's worker draws it, as it draws all else.
-
-    Parameters
-    ----------
-    client : viser.ClientHandle
-    picture : LivePicture
-    act : callable
-        Queues something for the session's worker; returns at once.
     """
 
     def __init__(
@@ -107,7 +96,6 @@ class MovingLayer:
             self._act(self._turn)
 
     def _turn(self) -> None:
-        """Draw the table and its points where the player is."""
         self._due = False
         if not self._player.playing:
             return

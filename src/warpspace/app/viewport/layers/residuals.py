@@ -5,8 +5,8 @@ from viser import SceneApi
 
 from warpspace.app.browser.handles import Handle
 from warpspace.app.viewport.layers import SCENE_PER_MM
-from warpspace.geometry.arrows import build_arrows
-from warpspace.geometry.deform import round_down
+from warpspace.geometry.surfaces import round_down
+from warpspace.picture.marks import build_arrows
 from warpspace.units import Array
 
 COLOURS = {True: (138, 143, 152), False: (47, 116, 192)}
@@ -17,12 +17,7 @@ MOST = 400
 
 
 class ResidualsLayer:
-    """Arrows that are added when there is something to show, and taken away.
-
-    Parameters
-    ----------
-    scene : viser.SceneApi
-    """
+    """Arrows that are added when there is something to show, and taken away."""
 
     def __init__(self, scene: SceneApi) -> None:
         self._scene = scene
@@ -30,22 +25,7 @@ class ResidualsLayer:
         self._shape: tuple[int, bool] = (0, False)
 
     def show(self, foot_mm: Array, vector_mm: Array, size_mm: float, *, before: bool) -> float:
-        """Draw residuals; the longest is a fifth of the box or a little less.
-
-        Parameters
-        ----------
-        foot_mm, vector_mm : ndarray, [n, 3], mm
-            Of many, every so manyth is drawn.
-        size_mm : float, mm
-            Longest edge of the box.
-        before : bool
-            Whether they are those before the calibration.
-
-        Returns
-        -------
-        float
-            The display factor; 0 where nothing is drawn.
-        """
+        """Draw residuals; the longest is a fifth of the box or a little less."""
         every = max(1, -(-len(foot_mm) // MOST))
         foot, vector = foot_mm[::every], vector_mm[::every]
         longest = float(np.linalg.norm(vector, axis=-1).max(initial=0.0))

@@ -1,0 +1,240 @@
+"""The best values of errors over the volume: of one set of them, and of the best sets.
+
+The volume is a linear function of its errors. The least RMS of a set is found in closed form, its
+least maximum as a convex problem.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+from itertools import combinations
+from math import comb
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpspace.analysis.statistics import Statistics, volume_statistics
+from warpspace.field.evaluate import ErrorBasis
+from warpspace.field.grid import Grid
+from warpspace.units import Array
+
+NODES_REDUCED = 1000
+"""Nodes whose rows are reduced at a time, so that memory stays small."""
+SILENT = 1e-12
+"""µm per µm or µrad: a response below it everywhere is none."""
+CLOSE_UM = 1e-4
+"""The largest error is found to within this of the least there can be, µm."""
+NODES_AT_ONCE = 40
+"""Worst nodes for which planes are added in one step."""
+MOST_STEPS = 300
+
+
+@dataclass(frozen=True)
+class Volume:
+    """Response of all nodes of a volume, and the present errors."""
+
+    basis: ErrorBasis  # First-order response of the nodes of `grid`
+    grid: Grid
+    amplitudes: Array  # [K], µm or µrad; present values in the order of `basis.keys`
+
+    @cached_property
+    def response(self) -> Array:
+        """Response of every node, [K, N, 3], µm per µm or µrad."""
+        return self.basis.position.reshape(len(self.basis.keys), -1, 3)
+
+    @cached_property
+    def error_um(self) -> Array:
+        """Present error of every node, [N, 3], µm."""
+        return np.tensordot(self.amplitudes, self.response, 1)
+
+    @cached_property
+    def acting(self) -> tuple[int, ...]:
+        """Indices of the errors that move any node at all in this loop."""
+        largest = np.abs(self.response).max(axis=(1, 2), initial=0.0)
+        return tuple(int(index) for index in np.flatnonzero(largest > SILENT))
+
+    @cached_property
+    def triangle(self) -> tuple[Array, Array]:
+        """What the RMS depends on: a matrix, [M, K], and the present error in it, [M].
+
+        The RMS of a change d of the amplitudes is |matrix @ d + error|, in µm. It is the triangle
+        of the QR decomposition of all weighted nodes, so that thousands of sets cost little.
+        """
+        nodes = self.error_um.shape[0]
+        root = np.sqrt(self.grid.weights.reshape(-1))
+        triangle = np.empty((0, len(self.basis.keys) + 1))
+        for first in range(0, nodes, NODES_REDUCED):
+            part = slice(first, first + NODES_REDUCED)
+            columns = [*self.response[:, part], self.error_um[part]]
+            rows = [(column * root[part, None]).reshape(-1) for column in columns]
+            stacked = np.concatenate([triangle, np.array(rows).T])
+            triangle = cast("Array", np.linalg.qr(stacked, mode="r"))
+        return triangle[:, :-1], triangle[:, -1]
+
+    def rms_um(self, indices: tuple[int, ...], change: Array) -> float:
+        """Root mean square of the volume after a change of some amplitudes, µm."""
+        matrix, error = self.triangle
+        return float(np.linalg.norm(matrix[:, indices] @ change + error))
+
+    def changed(self, indices: tuple[int, ...], values: Array) -> Array:
+        """Give all amplitudes with some of them set to other values, [K], µm or µrad."""
+        amplitudes = self.amplitudes.copy()
+        amplitudes[list(indices)] = values
+        return amplitudes
+
+    def statistics(self, amplitudes: Array) -> Statistics:
+        """Summarise the volume for any amplitudes, [K], µm or µrad."""
+        return volume_statistics(self.basis.evaluate(amplitudes, orientation=False), self.grid)
+
+
+class Objective(StrEnum):
+    """What is made as small as possible over the volume."""
+
+    RMS = "rms"
+    MAX = "max"
+
+
+MOST_SETS = {Objective.RMS: 4000, Objective.MAX: 300}
+"""Sets of one size that are all tried; of more, a path through them is followed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """The best change of a set of errors."""
+
+    indices: tuple[int, ...]  # which errors, by their place in the basis
+    change: Array  # [k], µm or µrad; new minus present value
+    value_um: float  # the objective then
+
+
+@dataclass(frozen=True, slots=True)
+class Search:
+    """What is made smallest, and how far each error may be changed."""
+
+    volume: Volume
+    objective: Objective
+    bounds: Array  # [K, 2], µm or µrad; least and largest change of every error of the basis
+
+    def least(self, indices: tuple[int, ...], give_up_um: float = np.inf) -> Solution | None:
+        """Find the best change of some errors; None where it is proven to be of no use."""
+        if self.objective is Objective.RMS:
+            return least_rms(self.volume, indices, self.bounds)
+        return least_max(self.volume, indices, self.bounds, give_up_um)
+
+    def best(
+        self, sets: Iterator[tuple[int, ...]], start: Solution | None = None
+    ) -> Solution | None:
+        """Give the best of some sets; None where none is better than the start."""
+        best = start
+        for indices in sets:
+            limit = np.inf if best is None else best.value_um
+            found = self.least(indices, limit)
+            if found is not None and (best is None or found.value_um < best.value_um - 1e-9):
+                best = found
+        return None if best is start else best
+
+    def best_sets(self, candidates: Sequence[int], count: int) -> Iterator[tuple[Solution, bool]]:
+        """Find the best set of one adjustment, of two, up to a number of them.
+
+        With each comes whether all sets of this size were compared. Where there are too many, the
+        set before is extended by its best partner, and members are then swapped for others as long
+        as that helps.
+        """
+        before: Solution | None = None
+        for size in range(1, min(count, len(candidates)) + 1):
+            proven = comb(len(candidates), size) <= MOST_SETS[self.objective]
+            if proven or before is None:
+                found = self.best(_joined(group) for group in combinations(candidates, size))
+            else:
+                found = self._extended(before, candidates)
+            if found is None:
+                return
+            yield found, proven
+            before = found
+
+    def _extended(self, before: Solution, candidates: Sequence[int]) -> Solution | None:
+        others = [index for index in candidates if index not in before.indices]
+        best = self.best(_joined((*before.indices, index)) for index in others)
+        while best is not None:
+            members = best.indices
+            swaps = (
+                _joined((*(index for index in members if index != old), new))
+                for old in members
+                for new in candidates
+                if new not in members
+            )
+            better = self.best(swaps, best)
+            if better is None:
+                return best
+            best = better
+        return best
+
+
+def least_rms(volume: Volume, indices: tuple[int, ...], bounds: Array) -> Solution:
+    """Make the root mean square of the volume smallest: weighted least squares within bounds."""
+    from scipy.optimize import lsq_linear
+
+    matrix, error = volume.triangle
+    low, high = bounds[list(indices)].T
+    change: Array = np.asarray(np.linalg.lstsq(matrix[:, indices], -error)[0], dtype=float)
+    if np.any(change < low) or np.any(change > high):
+        found = lsq_linear(matrix[:, indices], -error, (low, high), method="bvls", tol=1e-12)
+        change = np.clip(np.asarray(found.x, dtype=float), low, high)
+    return Solution(indices, change, volume.rms_um(indices, change))
+
+
+def least_max(
+    volume: Volume, indices: tuple[int, ...], bounds: Array, give_up_um: float = np.inf
+) -> Solution | None:
+    """Make the largest error of all nodes smallest; see `Search.least`.
+
+    Notes
+    -----
+    min over x of max over nodes of |e + A x| is a convex (second-order cone) problem. The length of
+    a vector is at least its part along any unit vector u, so that each node and each u give a plane
+    u · (e + A x) ≤ t below the objective. A linear program with the planes found so far gives a
+    lower bound and the next x; there the worst nodes give new planes, u being the direction of
+    their error. It ends when the best x met is within `CLOSE_UM` of the lower bound, which is
+    proof for all nodes at once.
+    """
+    from scipy.optimize import linprog
+
+    chosen = volume.response[list(indices)]
+    size = len(indices)
+    change = least_rms(volume, indices, bounds).change
+    ranges = [*map(tuple, bounds[list(indices)]), (0.0, None)]
+    goal = np.zeros(size + 1)
+    goal[-1] = 1.0
+    planes: list[Array] = []
+    offsets: list[Array] = []
+    best, best_um = change, np.inf
+    for _ in range(MOST_STEPS):
+        error = volume.error_um + np.tensordot(change, chosen, 1)
+        norm = np.sqrt(np.einsum("nc,nc->n", error, error))
+        if (largest := float(norm.max())) < best_um:
+            best, best_um = change, largest
+        worst = _worst(norm)
+        unit = error[worst] / np.maximum(norm[worst], np.finfo(float).tiny)[:, None]
+        slopes = np.einsum("knc,nc->nk", chosen[:, worst], unit)
+        planes.append(np.column_stack([slopes, -np.ones(len(worst))]))
+        offsets.append(-np.einsum("nc,nc->n", volume.error_um[worst], unit))
+        found = linprog(goal, np.concatenate(planes), np.concatenate(offsets), bounds=ranges)
+        if found.status != 0:
+            break
+        if found.fun > give_up_um - CLOSE_UM:
+            return None
+        if best_um - found.fun < CLOSE_UM:
+            break
+        change = np.clip(found.x[:size], *bounds[list(indices)].T)
+    return Solution(indices, best, best_um)
+
+
+def _worst(norm: Array) -> NDArray[np.intp]:
+    count = min(NODES_AT_ONCE, norm.size)
+    return np.argpartition(norm, norm.size - count)[norm.size - count :]
+
+
+def _joined(indices: Sequence[int]) -> tuple[int, ...]:
+    return tuple(sorted(indices))

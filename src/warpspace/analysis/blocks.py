@@ -1,0 +1,190 @@
+"""What an analysis says, in order: sentences, tables and charts in numbers, drawn nowhere yet."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+if TYPE_CHECKING:
+    from warpspace.units import Array
+
+Form: TypeAlias = str | Callable[[Any], str]
+Role: TypeAlias = Literal["plain", "key", "set", "none"]
+Kind: TypeAlias = Literal["lines", "polar", "plane"]
+Style: TypeAlias = Literal["line", "dashed", "dots", "thin"]
+Mark: TypeAlias = Literal["", "better", "worse", "key"]
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One column of a table: its rows hold raw values, the form spells them."""
+
+    heading: str = ""
+    form: Form = ""  # format specification, or what spells a value; None is an empty cell
+    unit: str = ""  # stands in brackets below the heading
+    key: str = ""  # heading in a CSV file; without one it is in none
+    wraps: bool = False  # long cells may take several lines, broken between words
+    leads: bool = False  # repeated where the table goes on below; such columns come first
+    joins: bool = False  # never parted from the column before it
+    shows: bool = True  # in text and on pages; otherwise only in the CSV file
+
+    @property
+    def head(self) -> str:
+        """Heading and unit, in two lines."""
+        return f"{self.heading}\n[{self.unit}]" if self.unit else self.heading
+
+    @property
+    def is_number(self) -> bool:
+        """Whether its cells are aligned at the right."""
+        return isinstance(self.form, str) and bool(self.form)
+
+    def spell(self, value: Any) -> str:
+        """Spell a cell."""
+        if value is None:
+            return ""
+        if callable(self.form):
+            return self.form(value)
+        return f"{value:{self.form}}" if self.form else str(value)
+
+
+def number_columns(
+    heads: Iterable[str], form: str = ".2f", unit: str = "", keys: Sequence[str] = ()
+) -> tuple[Column, ...]:
+    """Give columns of numbers that have the same unit and stay side by side."""
+    heads = tuple(heads)
+    return tuple(
+        Column(head, form, unit, key, joins=index > 0)
+        for index, (head, key) in enumerate(zip(heads, keys or [""] * len(heads), strict=True))
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table; one whose columns have keys can be written as CSV."""
+
+    columns: tuple[Column, ...]
+    rows: Sequence[Sequence[Any]]  # raw values, one a column
+    title: str = ""
+    empty: str = ""  # what stands there instead where there is no row
+    marks: Sequence[Mark] = ()  # of rows, on a page
+    csv_order: tuple[str, ...] = ()  # keys, where a file has them in another order
+    file_rows: Sequence[Sequence[Any]] = ()  # of a file, where text shows fewer
+    exact: bool = False  # numbers of a file with all their digits; otherwise nine
+
+    @property
+    def shown(self) -> tuple[Column, ...]:
+        """The columns of text and pages."""
+        return tuple(column for column in self.columns if column.shows)
+
+    def cells(self) -> list[list[str]]:
+        """Spell the rows of the columns shown."""
+        return [
+            [c.spell(v) for c, v in zip(self.columns, row, strict=True) if c.shows]
+            for row in self.rows
+        ]
+
+    def csv_rows(self) -> list[list[Any]]:
+        """Give the rows of a CSV file, headings first."""
+        place = {column.key: i for i, column in enumerate(self.columns) if column.key}
+        order = [place[key] for key in self.csv_order] if self.csv_order else [*place.values()]
+        head = [self.columns[i].key for i in order]
+        rows = self.file_rows or self.rows
+        return [head, *([_plain(row[i], exact=self.exact) for i in order] for row in rows)]
+
+
+def _plain(value: Any, *, exact: bool) -> Any:
+    if isinstance(value, bool):
+        return int(value)
+    if isinstance(value, float) and not exact:
+        return float(f"{value:.9g}")
+    return "" if value is None else value
+
+
+@dataclass(frozen=True, slots=True)
+class Series:
+    """Bars of one kind, one a row; None where a row has none."""
+
+    values: Sequence[float | None]
+    word: str = ""  # in the legend
+    role: Role = "plain"  # its colour; "key" stands out, "set" is of another kind
+    spread: Sequence[float] = ()  # half lengths of intervals
+    as_mark: bool = False  # a stroke instead of a bar
+    form: str = ""  # of the number beside each bar; empty for none
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """One column of bars; panels of a chart share their rows."""
+
+    title: str
+    series: tuple[Series, ...]
+    unit: str = ""
+    before: float | None = None  # a line across all rows
+    signed: bool = False
+    width: float = 1.0  # beside the others
+
+
+@dataclass(frozen=True, slots=True)
+class Bars:
+    """A chart of horizontal bars."""
+
+    title: str
+    subtitle: str
+    rows: Sequence[str]
+    panels: tuple[Panel, ...]
+    keys: Sequence[bool] = ()  # rows whose plain bars stand out
+    legend: tuple[tuple[str, Role | Literal["before"]], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """One curve of a chart."""
+
+    name: str  # in the legend; a curve without one is not in it
+    x: "Array"  # [n]; in polar charts the angle in degrees
+    y: "Array"  # [n]
+    colour: int = 0  # which colour of series; the same thing has the same, whoever measured it
+    style: Style = "line"  # for the model; "dots" for data, "dashed" for fits, "thin" for nominal
+
+
+@dataclass(frozen=True, slots=True)
+class Band:
+    """What lies between two curves: scatter."""
+
+    name: str
+    x: "Array"  # [n]
+    low: "Array"
+    high: "Array"
+    colour: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Lines:
+    """A chart of curves: "lines" over an abscissa, "polar" around the angle, "plane" to scale."""
+
+    kind: Kind
+    title: str
+    x_label: str  # with unit
+    y_label: str
+    curves: tuple[Curve, ...]
+    bands: tuple[Band, ...] = ()
+    note: str = ""  # what a reader has to know: a factor, a reference
+    log: bool = False  # whether both scales are logarithmic
+
+
+@dataclass(frozen=True, slots=True)
+class Histogram:
+    """A distribution with marks and a limit."""
+
+    title: str
+    subtitle: str
+    x_label: str  # with unit
+    y_label: str
+    edges: "Array"  # [n + 1]
+    heights: "Array"  # [n]
+    marks: tuple[tuple[str, float], ...] = ()  # word and place
+    limit: float | None = None
+    told: tuple[str, ...] = ()  # in words, in the chart: the first of them large
+
+
+Block: TypeAlias = str | Table | Bars | Lines | Histogram
+"""A sentence (the blanks it begins with indent it in text), a table or a chart."""

@@ -1,0 +1,182 @@
+"""The analyses there are: one line here, one file each; plug-ins register theirs.
+
+Nothing is imported before an analysis is asked for, so that the list costs nothing.
+"""
+
+from dataclasses import dataclass
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+from warpspace.exceptions import UnknownNameError
+from warpspace.plugins import load_plugins
+
+if TYPE_CHECKING:
+    from warpspace.analysis.description import Analysis, Result, Task, Watch
+    from warpspace.scene.model import Scene
+
+TASKS: "dict[Task, str]" = {
+    "see": "See",
+    "understand": "Understand",
+    "measure": "Measure",
+    "improve": "Improve",
+    "design": "Design",
+    "machine": "Scenes and machines",
+}
+"""What the commands of a task are listed under."""
+_HERE = "warpspace.analysis"
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """What the list says of an analysis: the first line of its docstring, and where it is."""
+
+    name: str
+    task: "Task"
+    sentence: str
+    place: str = ""  # module:Class
+
+    def load(self) -> "type[Analysis]":
+        """Import it."""
+        return resolve_name(self.place) if self.place else _ADDED[self.name]
+
+
+R_co = TypeVar("R_co", bound="Result", covariant=True)
+
+
+class Verb(Protocol[R_co]):
+    """An analysis as a function: ``warpspace.NAME(scene, **options)``."""
+
+    def __call__(self, *scenes: "Scene", watch: "Watch" = ..., **options: Any) -> R_co:
+        """Answer it for a scene, or for several where it takes as many.
+
+        Parameters
+        ----------
+        *scenes : Scene
+        watch : callable, optional
+            Called with the share of the work that is done; what it raises ends the work.
+        **options
+            Those of its command, as Python has them: ``at={"X": 0}``, ``over_travel=True``.
+
+        Raises
+        ------
+        OptionError, UnknownNameError
+            If an option is out of range, or there is none of this name.
+        SceneError
+            If a scene lacks what the analysis needs, for instance tolerances.
+        """
+        ...
+
+
+_ADDED: "dict[str, type[Analysis]]" = {}
+_ENTRIES: dict[str, Entry] = {
+    entry.name: entry
+    for entry in (
+        Entry(
+            "gains", "understand", "Rank the error parameters of SCENE by their gain.",
+            f"{_HERE}.gains:Gains",
+        ),
+        Entry(
+            "line", "understand",
+            "Follow the error of SCENE along a straight line.",
+            f"{_HERE}.line:Line",
+        ),
+        Entry(
+            "reach", "understand", "Say which part of the volume of SCENE keeps a limit.",
+            f"{_HERE}.reach:Reach",
+        ),
+        Entry(
+            "certify", "understand",
+            "Certify flatness, straightness, squareness of SCENE.",
+            f"{_HERE}.certify:Certify",
+        ),
+        Entry(
+            "repair", "improve", "Find which errors of SCENE to adjust, and to what.",
+            f"{_HERE}.repair:Repair",
+        ),
+        Entry(
+            "convert", "measure", "Write the errors of SCENE in another convention.",
+            f"{_HERE}.convert:Convert",
+        ),
+        Entry(
+            "calibrate", "measure", "Find the errors of the machine of SCENE in measured data.",
+            "warpspace.calibration.calibrate:Calibrate",
+        ),
+        Entry(
+            "compensate", "improve", "Write a table of compensation, and say what it leaves.",
+            "warpspace.formats.compensation.compensate:Compensate",
+        ),
+        Entry(
+            "montecarlo", "design", "Show how large |E| gets on machines within tolerance.",
+            f"{_HERE}.machines:Machines",
+        ),
+        Entry(
+            "allocate", "design", "Find the widest tolerances that keep a limit of |E|.",
+            f"{_HERE}.allocate:Allocate",
+        ),
+        Entry(
+            "concepts", "design", "Compare machines before one of them is built.",
+            f"{_HERE}.concepts:Concepts",
+        ),
+        Entry(
+            "contributions", "design",
+            "Show which tolerances the volumetric error comes from.",
+            f"{_HERE}.contributions:Shares",
+        ),
+    )
+}  # fmt: skip
+
+
+def register(kind: "type[Analysis]") -> None:
+    """Add an analysis; it then is a command, a page and a section of the report."""
+    if kind.name in _ENTRIES:
+        raise ValueError(f"an analysis {kind.name!r} is there already")
+    _ADDED[kind.name] = kind
+    _ENTRIES[kind.name] = Entry(kind.name, kind.task, first_line(kind))
+
+
+def unregister(name: str) -> None:
+    """Take an analysis that was added away again."""
+    del _ADDED[name], _ENTRIES[name]
+
+
+def first_line(kind: "type[Analysis]") -> str:
+    """Give the sentence that lists say of an analysis."""
+    return (kind.__doc__ or "").partition("\n")[0]
+
+
+def entries() -> tuple[Entry, ...]:
+    """List all analyses without importing any."""
+    load_plugins()
+    return tuple(_ENTRIES.values())
+
+
+def find_analysis(name: str) -> "type[Analysis]":
+    """Look up an analysis."""
+    load_plugins()
+    if name not in _ENTRIES:
+        raise UnknownNameError("analysis", name, _ENTRIES)
+    return _ENTRIES[name].load()
+
+
+def verb(name: str) -> "Verb[Result]":
+    """Give an analysis as a function of scenes and options."""
+    from warpspace.analysis.description import silent
+    from warpspace.analysis.options import options_of
+
+    kind = find_analysis(name)
+    names = {one.name: one.name for one in options_of(kind)}
+    for one in options_of(kind):
+        names |= {flag.strip("-").replace("-", "_"): one.name for flag in one.former}
+    of_run = kind.run_all.__kwdefaults__ or {}
+
+    def answer(*scenes: "Scene", watch: "Watch" = silent, **options: Any) -> "Result":
+        for given in options:
+            if given not in names and given not in of_run:
+                raise UnknownNameError(f"option of {name}", given, [*names, *of_run])
+        asked = kind(**{names[one]: options[one] for one in options if one in names})
+        others = {one: value for one, value in options.items() if one in of_run}
+        return asked.run_all(scenes, watch, **others)
+
+    answer.__name__ = answer.__qualname__ = name
+    answer.__doc__ = kind.__doc__
+    return answer

@@ -1,0 +1,198 @@
+"""What an analysis is: options as fields, one computation, one result that says itself.
+
+Command, ``--json``, page, section of the report and contract tests come out of it.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from enum import Enum
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, TypeAlias, TypeVar
+
+import numpy as np
+
+from warpspace.analysis.blocks import Block, Table
+from warpspace.analysis.options import Option, options_of
+
+if TYPE_CHECKING:
+    from warpspace.field.evaluate import SecondOrder
+    from warpspace.scene.model import Scene
+
+Task: TypeAlias = Literal["see", "understand", "measure", "improve", "design", "machine"]
+Watch: TypeAlias = Callable[[float], None]
+"""Called with the share of the work that is done; raises where nobody waits for it any more."""
+A = TypeVar("A", bound="type[Analysis]")
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """What one number of a result is: ``Annotated[float, Quantity("Flatness", "µm")]``."""
+
+    head: str
+    unit: str = ""
+    form: str = ".2f"
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A scene that a result proposes: -o on the command line, Compare and Apply on the page."""
+
+    words: str
+    scene: "Scene"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Result(ABC):
+    """What an analysis found. Fields are the keys of its JSON object, unless `keys` lists them."""
+
+    keys: ClassVar[tuple[str, ...]] = ()
+    # "module:function" that draws its chart, where bars and curves do not say it
+    drawn_by: ClassVar[str] = ""
+    no_change: ClassVar[str] = "nothing is to be changed"
+    # what its numbers leave out if they are of first order: a warning, and in its JSON object
+    second_order: "SecondOrder | None" = None
+
+    @abstractmethod
+    def blocks(self) -> Iterable[Block]:
+        """Say it, in order: sentences, tables, charts."""
+
+    def changes(self) -> Sequence[Change]:
+        """Give the scenes it proposes, the best last."""
+        return ()
+
+    def doubts(self) -> Iterable[str]:
+        """Say what a reader should doubt of its numbers."""
+        return ()
+
+    def texts(self) -> Mapping[str, str]:
+        """Give the files that -o writes, by what is added to its name: "", "_X.COM"."""
+        return {}
+
+    def as_json(self) -> dict[str, Any]:
+        """Give what ``--json`` prints."""
+        said, left_out = plain(self), self.second_order
+        said.pop("second_order", None)
+        return said | ({"second_order_um": left_out.um} if left_out else {})
+
+    def blocks_of(self, kind: type[Any]) -> list[Any]:
+        """Give its tables, or its charts."""
+        return [block for block in self.blocks() if isinstance(block, kind)]
+
+    def file_table(self) -> Table | None:
+        """Give the table that --csv writes: the first whose columns have keys."""
+        tables = self.blocks_of(Table)
+        return next((one for one in tables if any(c.key for c in one.columns)), None)
+
+    def _repr_html_(self) -> str:
+        from warpspace.analysis.html import blocks_html
+
+        return blocks_html(self.blocks())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Analysis(ABC):
+    """A question about a scene. A subclass is one file; its fields are its options.
+
+    Attributes
+    ----------
+    name : str
+        Of the command.
+    task : str
+        Where it stands: one of `catalogue.TASKS`.
+    scenes : tuple of (int, int or None)
+        How many scenes it takes, at least and at most.
+    doing : str
+        What is said while it works.
+    makes_scenes : bool
+        Whether its results propose scenes, so that there is an -o.
+    scene_help : str
+        What that -o writes.
+    file_help : str
+        What -o writes where that is no scene; empty where there is no such -o.
+    has_chart : bool
+        Whether its results hold a chart, so that there is a --plot.
+    chart_help : str
+        What that --plot draws.
+    has_table : bool
+        Whether its results hold a table for --csv.
+    """
+
+    name: ClassVar[str]
+    task: ClassVar[Task]
+    scenes: ClassVar[tuple[int, int | None]] = (1, 1)
+    doing: ClassVar[str] = "computing"
+    makes_scenes: ClassVar[bool] = False
+    scene_help: ClassVar[str] = "Write the scene proposed last"
+    file_help: ClassVar[str] = ""
+    file_endings: ClassVar[tuple[str, ...]] = ()  # of what -o writes there; any where empty
+    needs_file: ClassVar[bool] = False  # whether a command line must give -o
+    has_chart: ClassVar[bool] = False
+    chart_help: ClassVar[str] = "chart"
+    has_table: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        """Take words and mappings as Python users give them; refuse numbers out of range."""
+        for one in options_of(type(self)):
+            value = one.hold(getattr(self, one.name))
+            one.check(value)
+            object.__setattr__(self, one.name, value)
+
+    @classmethod
+    def options(cls) -> tuple[Option, ...]:
+        """List its options as they are shown."""
+        return options_of(cls)
+
+    @classmethod
+    def explained(cls) -> str:
+        """Give the help text of its command."""
+        return cls.__doc__ or ""
+
+    @abstractmethod
+    def run(self, scene: "Scene", watch: Watch, /) -> Result:
+        """Answer it.
+
+        Parameters
+        ----------
+        scene : Scene
+        watch : callable
+            To be called with the share of the work that is done, 0 to 1.
+
+        Raises
+        ------
+        OptionError
+            If an option cannot be used with the scene; names it as ``{name}``.
+        """
+
+    def written(self, stem: str | None) -> Self:  # noqa: ARG002 - for others
+        """Give it as it is run for a file of this name; refuse one too many, or none."""
+        return self
+
+    def run_all(self, scenes: "Sequence[Scene]", watch: Watch, /) -> Result:
+        """Answer it for several scenes; an analysis of one scene takes the only one."""
+        (scene,) = scenes
+        return self.run(scene, watch)
+
+    def warnings(self, scene: "Scene") -> Iterable[str]:  # noqa: ARG002 - for others
+        """Say what a user should doubt of the options with this scene."""
+        return ()
+
+
+def silent(_share: float) -> None:
+    """Watch nothing."""
+
+
+def plain(value: Any) -> Any:
+    """Spell a value in what JSON has: objects by their fields, or by the `keys` of their class."""
+    keys: Sequence[str] = getattr(type(value), "keys", ())
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, Mapping):
+        return {str(key): plain(one) for key, one in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if is_dataclass(value) and not isinstance(value, type):
+        names = keys or [entry.name for entry in fields(value)]
+        return {name: plain(getattr(value, name)) for name in names}
+    if isinstance(value, (list, tuple, set, frozenset)):
+        return [plain(one) for one in value]
+    return value

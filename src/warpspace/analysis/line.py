@@ -1,0 +1,135 @@
+"""Where along a line: the error along a straight path between two points, six components."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table, number_columns
+from warpspace.analysis.description import Analysis, Result, Watch
+from warpspace.analysis.options import option
+from warpspace.analysis.typed import LOOP_HELP, Place, outside_travel, place_words
+from warpspace.exceptions import OptionError
+from warpspace.kinematics.model import Loop, complete_coordinates
+from warpspace.machine.axes import is_linear
+from warpspace.units import Array
+
+if TYPE_CHECKING:
+    from warpspace.scene.model import Scene
+
+SHOWN = 21
+"""Points that the table of a longer line shows; the file has all."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Line(Analysis):
+    """Follow the error of SCENE along a straight line.
+
+    All axes go in proportion from one point to the other, by default along the diagonal of the
+    working volume. Six components: position error x, y, z in µm, orientation error about x, y, z
+    in µrad.
+    """
+
+    name = "line"
+    task = "understand"
+    has_chart = True
+    has_table = True
+    start: Place = option(
+        (), "Where it begins, mm and degrees", unset="lower ends of the working volume",
+        flag="--from", label="From",
+    )  # fmt: skip
+    end: Place = option(
+        (), "Where it ends", unset="upper ends of the working volume", flag="--to", label="To"
+    )
+    points: int = option(101, "Points along it", low=2, high=10_001)
+    loop: Loop = option(Loop.TOOL, LOOP_HELP)
+    exact: bool = option(False, "The exact chain instead of the first order")
+
+    def run(self, scene: "Scene", watch: Watch, /) -> "LineResult":
+        """Evaluate the points of the line."""
+        from warpspace.scene.model import evaluate
+
+        ends = self._ends(scene)
+        share = np.linspace(0.0, 1.0, self.points)
+        axes = {name: low + (high - low) * share for name, (low, high) in ends.items()}
+        field = evaluate(scene, at=axes, loop=self.loop, exact=self.exact)
+        watch(1.0)
+        nominal = field.nominal_mm
+        way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(nominal, axis=0), axis=1))])
+        return LineResult(
+            length_mm=float(way[-1]),
+            axes={name: np.broadcast_to(at, share.shape) for name, at in axes.items()},
+            along_mm=way,
+            nominal_mm=nominal,
+            error_um=field.error_um,
+            orientation_urad=field.orientation_urad,
+            title=f"{scene.title} · {self.loop} loop",
+        )
+
+    def _ends(self, scene: "Scene") -> dict[str, tuple[float, float]]:
+        ranges, stand = scene.workspace.ranges, scene.workspace.positions
+        low = {name: ranges.get(name, (at,))[0] for name, at in stand.items()}
+        high = {name: ranges.get(name, (at,))[-1] for name, at in stand.items()}
+        given = self.start or self.end
+        first, last = (
+            complete_coordinates(scene.machine, dict(place), stand if given else default)
+            for place, default in ((self.start, low), (self.end, high))
+        )
+        ends = {name: (float(first[name]), float(last[name])) for name in first}
+        if all(a == b for a, b in ends.values()):
+            raise OptionError("{start} and {end} are one point; expected two")
+        return ends
+
+    def warnings(self, scene: "Scene") -> Iterator[str]:
+        """Say which ends lie outside the travel."""
+        for name, place in (("start", self.start), ("end", self.end)):
+            for words in outside_travel(scene.machine, dict(place)):
+                yield f"{{{name}}} {words}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class LineResult(Result):
+    """Errors along a line."""
+
+    keys = ("length_mm", "axes", "along_mm", "nominal_mm", "error_um", "orientation_urad")
+    length_mm: float
+    axes: Mapping[str, Array]  # [n], mm or degrees
+    along_mm: Array  # [n], way of the nominal point
+    nominal_mm: Array  # [n, 3], in R
+    error_um: Array  # [n, 3], in R
+    orientation_urad: Array  # [n, 3], in R
+    title: str
+
+    def blocks(self) -> Iterator[Block]:
+        """Say the largest error, the components along the way and their chart."""
+        norm = np.linalg.norm(self.error_um, axis=1)
+        worst = int(np.argmax(norm))
+        place = {name: float(at[worst]) for name, at in self.axes.items()}
+        yield f"{self.title} · {self.length_mm:.1f} mm"
+        yield f"  largest |E| {norm[worst]:.2f} µm at {place_words(place)}"
+        everything = np.column_stack(
+            [self.along_mm, *self.axes.values(), norm, self.error_um, self.orientation_urad]
+        )
+        step = -(-(len(norm) - 1) // (SHOWN - 1)) if len(norm) > SHOWN else 1
+        units = {name: "mm" if is_linear(name) else "deg" for name in self.axes}
+        columns = (
+            Column("along", ".1f", "mm", key="along_mm", leads=True),
+            *(Column(key=f"{name}_{unit}", shows=False) for name, unit in units.items()),
+            *number_columns(
+                ("|E|", "x", "y", "z"), ".2f", "µm", ("norm_um", "x_um", "y_um", "z_um")
+            ),
+            *number_columns(
+                ("about x", "y", "z"),
+                ".2f",
+                "µrad",
+                ("about_x_urad", "about_y_urad", "about_z_urad"),
+            ),
+        )
+        yield Table(columns, everything[::step].tolist(), file_rows=everything.tolist())
+        for title, unit, values in (
+            ("Position error", "µm", self.error_um),
+            ("Orientation error", "µrad", self.orientation_urad),
+        ):
+            curves = [Curve(x, self.along_mm, values[:, i], i) for i, x in enumerate("xyz")]
+            yield Lines("lines", title, "along the line [mm]", f"error [{unit}]", tuple(curves))

@@ -1,0 +1,238 @@
+"""Options of an analysis: fields of its dataclass; command line and page build theirs from them."""
+
+import math
+import types
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
+from enum import StrEnum
+from functools import cache
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Literal,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
+
+from warpspace.exceptions import OptionError
+
+if TYPE_CHECKING:
+    from warpspace.scene.model import Scene
+
+T = TypeVar("T")
+UNIT_ENDINGS = ("_mm", "_um", "_urad", "_deg")
+
+
+@dataclass(frozen=True, slots=True)
+class Grammar:
+    """How a value is typed that is no number, word or choice: ``Annotated[T, Grammar(…)]``.
+
+    Attributes
+    ----------
+    metavar : str
+        What stands in its place in a help text.
+    read : callable
+        Takes what was typed and the scene, gives the value, which is hashable; raises `ValueError`
+        with what was expected.
+    many : bool
+        Whether it may be typed in several parts, with commas between or one by one.
+    """
+
+    metavar: str
+    read: Callable[[str, Any], Any]
+    many: bool = False
+    each: bool = False  # whether it may be given several times, each value read by itself
+    is_file: bool = False  # whether it names a file that is read
+
+
+@dataclass(frozen=True, slots=True)
+class Option:
+    """One option of an analysis, as its field says it."""
+
+    name: str
+    about: str
+    default: Any
+    kind: Any  # bool, int, float, str, or None with a grammar
+    choices: tuple[str, ...]
+    grammar: Grammar | None
+    enum: type[StrEnum] | None
+    unit: str
+    low: float | None
+    high: float | None
+    unset: str  # what None or nothing means
+    needs: str  # name of the switch it belongs to
+    flag: str  # on the command line
+    former: tuple[str, ...]  # flags it had before; understood, not listed
+    label: str  # on a page
+    words: Mapping[str, str]  # what choices are called on a page
+    required: bool  # whether a command line must give it
+
+    @property
+    def help(self) -> str:
+        """The sentence with unit, limits and default."""
+        parts = [self.about]
+        if self.unit and self.grammar is None:
+            parts.append(f", {self.unit}")
+        if self.low is not None and self.high is not None:
+            parts.append(f"; {_spell(self.low)} to {_spell(self.high)}")
+        parts.append(".")
+        if self.needs:
+            parts.append(f" Belongs to --{self.needs.replace('_', '-')}.")
+        if self.default_words:
+            parts.append(f"  [{self.default_words}]")
+        return "".join(parts)
+
+    @property
+    def default_words(self) -> str:
+        """What stands for the default in a help text."""
+        if self.unset:
+            return self.unset
+        if self.kind is bool or self.default is None or self.default in ("", ()):
+            return ""
+        return f"{self.default:g}" if isinstance(self.default, float) else str(self.default)
+
+    def hold(self, value: Any) -> Any:
+        """Give a value as its field holds it: a word as a member, a mapping as pairs."""
+        if isinstance(value, Mapping):
+            return tuple(value.items())
+        if self.enum is None or value is None:
+            return tuple(value) if isinstance(value, list) else value
+        if value not in self.choices:
+            known = ", ".join(self.choices)
+            raise OptionError(f"{{{self.name}}} {str(value)!r}; expected one of {known}")
+        return self.enum(value)
+
+    def check(self, value: Any) -> None:
+        """Refuse a number out of its range."""
+        if self.kind not in (int, float) or value is None:
+            return
+        low = -math.inf if self.low is None else self.low
+        high = math.inf if self.high is None else self.high
+        if not (math.isfinite(value) and low <= value <= high):
+            unit, span = f" {self.unit}" if self.unit else "", _span(self.low, self.high)
+            raise OptionError(f"{{{self.name}}} {_spell(value)}{unit}; expected {span}{unit}")
+
+    def read(self, text: str, scene: "Scene | None") -> Any:
+        """Read a value that was typed."""
+        word = text.strip()
+        try:
+            if self.grammar is not None:
+                return self.grammar.read(word, scene)
+        except ValueError as error:
+            joint = ";" if str(error).startswith("expected") else ":"
+            raise OptionError(f"{{{self.name}}} {text!r}{joint} {error}") from None
+        if self.enum is not None:
+            return self.hold(word)
+        if self.choices and word not in self.choices:
+            known = ", ".join(self.choices)
+            raise OptionError(f"{{{self.name}}} {text!r}; expected one of {known}")
+        try:
+            return self.kind(word) if self.kind in (int, float) and "_" not in word else word
+        except ValueError:
+            what = "a whole number" if self.kind is int else "a number"
+            raise OptionError(f"{{{self.name}}} {text!r}; expected {what}") from None
+
+
+def _span(low: float | None, high: float | None) -> str:
+    if low is None:
+        return "a finite number" if high is None else f"at most {_spell(high)}"
+    return f"at least {_spell(low)}" if high is None else f"{_spell(low)} to {_spell(high)}"
+
+
+def _spell(value: float) -> str:
+    return f"{value:,}" if isinstance(value, int) else f"{value:g}"
+
+
+def option(
+    default: T,
+    about: str,
+    *,
+    unit: str = "",
+    low: float | None = None,
+    high: float | None = None,
+    unset: str = "",
+    needs: str = "",
+    flag: str = "",
+    former: tuple[str, ...] = (),
+    label: str = "",
+    words: Mapping[str, str] | None = None,
+    required: bool = False,
+) -> T:
+    """Give a field of an analysis that a user may set; its kind comes from its annotation.
+
+    Parameters
+    ----------
+    default : T
+    about : str
+        What it is, without a full stop.
+    unit : str, optional
+    low, high : float, optional
+        Both belong to the range.
+    unset : str, optional
+        What None means, for instance "the middle".
+    needs : str, optional
+        Name of the switch that it belongs to.
+    flag : str, optional
+        On the command line, where the name without its unit does not do.
+    former : tuple of str, optional
+        Flags it had before, which are still understood.
+    label : str, optional
+        On a page; else the name in words.
+    words : mapping of str to str, optional
+        What choices are called on a page.
+    required : bool, optional
+        Whether a command line must give it.
+    """
+    said = {
+        "about": about, "unit": unit, "low": low, "high": high, "unset": unset, "needs": needs,
+        "flag": flag, "former": former, "label": label, "words": words or {},
+        "required": required,
+    }  # fmt: skip
+    return field(default_factory=lambda: default, metadata={"option": said})
+
+
+@cache
+def options_of(kind: type) -> tuple[Option, ...]:
+    """List the options of an analysis, in the order of its fields."""
+    hints = get_type_hints(kind, include_extras=True)
+    return tuple(
+        _build(entry.name, entry.default_factory(), hints[entry.name], entry.metadata["option"])
+        for entry in fields(kind)
+        if "option" in entry.metadata and callable(entry.default_factory)
+    )
+
+
+def _build(name: str, default: Any, hint: Any, said: Mapping[str, Any]) -> Option:
+    base, grammar = _resolve(hint)
+    enum = base if isinstance(base, type) and issubclass(base, StrEnum) else None
+    choices = tuple(str(one) for one in enum) if enum else ()
+    if get_origin(base) is Literal:
+        choices = tuple(map(str, get_args(base)))
+    plain = name
+    for ending in UNIT_ENDINGS:
+        plain = plain.removesuffix(ending)
+    return Option(
+        name=name, about=said["about"], default=default,
+        kind=base if base in (bool, int, float, str) else None, choices=choices, grammar=grammar,
+        enum=enum, unit=said["unit"], low=said["low"], high=said["high"], unset=said["unset"],
+        needs=said["needs"], flag=said["flag"] or "--" + plain.replace("_", "-"),
+        former=said["former"], label=said["label"] or plain.replace("_", " ").capitalize(),
+        words=said["words"], required=said["required"],
+    )  # fmt: skip
+
+
+def _resolve(hint: Any) -> tuple[Any, Grammar | None]:
+    """Take a hint apart: what it is without None, and how it is typed."""
+    if get_origin(hint) is Annotated:
+        base, *extras = get_args(hint)
+        grammar = next((one for one in extras if isinstance(one, Grammar)), None)
+        return _resolve(base)[0], grammar
+    if get_origin(hint) in (Union, types.UnionType):
+        kinds = [one for one in get_args(hint) if one is not type(None)]
+        if len(kinds) == 1:
+            return _resolve(kinds[0])
+    return hint, None

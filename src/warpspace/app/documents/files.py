@@ -1,0 +1,169 @@
+"""Files that a page gives and takes: links, what was received, what an export asks for."""
+
+import base64
+import binascii
+import re
+from dataclasses import replace
+
+from warpspace.app.browser.uploads import size_message
+from warpspace.app.documents.conditions import state_conditions
+from warpspace.app.documents.services import Beside, Request
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.evaluation.resulting_scene import active_scene
+from warpspace.app.state.app_state import AppState
+from warpspace.app.state.comparison import AFTER, BEFORE, Side
+from warpspace.app.state.table import drawn_tables, without_words
+from warpspace.exceptions import OptionError
+from warpspace.machine.limits import MAX_SCENE_BYTES
+from warpspace.picture.comparison import conditions_of_both
+from warpspace.scene.model import Scene
+
+# --- Links: a state as one word in the page's address ---------------------------------------------
+# It consists of letters and digits only, since viser's client writes the address anew when it
+# starts (which drops what stands behind a #, and would unpack an encoded value).
+
+MAX_WORD = 8_000
+"""Characters of a packed link: servers take request lines of 8 kB."""
+
+
+def pack(link: str) -> str:
+    """Spell a query string as one word that needs no escaping in an address."""
+    return base64.urlsafe_b64encode(link.encode()).decode().rstrip("=")
+
+
+def unpack(word: str) -> str:
+    """Read what `pack` has written."""
+    if len(word) > MAX_WORD:
+        raise OptionError(
+            f"the link is {len(word):,} characters long; expected at most {MAX_WORD:,}"
+        )
+    try:
+        return base64.urlsafe_b64decode(word + "=" * (-len(word) % 4)).decode()
+    except (binascii.Error, ValueError):
+        raise OptionError("the link cannot be read; was it cut?") from None
+
+
+# --- Files that a browser sends: a name that can be used, and the text in them --------------------
+
+_UNSAFE = re.compile(r"[^A-Za-z0-9._ -]+")
+LONGEST_NAME = 60
+
+
+def safe_name(name: str, fallback: str = "scene") -> str:
+    """Make a file name of what a user or a browser calls something."""
+    last = name.replace("\\", "/").rsplit("/", 1)[-1]
+    stem = last.rsplit(".", 1)[0] if "." in last.strip(".") else last
+    clean = _UNSAFE.sub("_", stem).strip(" ._-")[:LONGEST_NAME].strip(" ._-")
+    return clean or fallback
+
+
+def safe_file_name(name: str) -> str:
+    """Make a file name that keeps its ending, or gets ``.txt`` where it has none."""
+    last = name.replace("\\", "/").rsplit("/", 1)[-1]
+    ending = last.rsplit(".", 1)[-1] if "." in last else "txt"
+    return f"{safe_name(last, 'file')}.{safe_name(ending, 'txt')}"
+
+
+def upload_text(
+    content: bytes, source: str, most_bytes: int = MAX_SCENE_BYTES, what: str = "scene file"
+) -> str:
+    """Read the bytes of an uploaded file."""
+    if len(content) > most_bytes:
+        raise OptionError(size_message(source, len(content), most_bytes, what))
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise OptionError(
+            f"{source} is not UTF-8 text (byte {error.start}); expected a {what}"
+        ) from None
+
+
+# --- What files show while two states are compared: what is drawn, under its own name -------------
+
+AS_DRAWN = "View and HTML show what is drawn."
+
+
+def build_request(picture: LivePicture) -> Request:
+    """Say what a figure or an export of a picture is made of."""
+    found, drawn = picture.compared, picture.drawn_state
+    if found is None:
+        return _request(picture, drawn, _scene(drawn, picture))
+    a, b = (
+        replace(_scene(side, picture), name=f"{name}: {title}", title=title)
+        for name, title, side in zip("AB", found.titles, found.sides, strict=True)
+    )
+    side, scene = (found.sides[1], b) if found.shown == "b" else (found.sides[0], a)
+    request = _request(picture, side, scene)
+    loops = [side.loop for side in found.sides]
+    return replace(
+        request,
+        beside=Beside(b, loops[1].value, state_conditions(found.sides[1]))
+        if found.shown == "difference"
+        else None,
+        pair_conditions=conditions_of_both(*map(state_conditions, found.sides)),
+        pair=(a, b) if not found.refused and loops[0] == loops[1] else None,
+    )
+
+
+def _scene(state: AppState, picture: LivePicture) -> Scene:
+    """Give the scene of a state, its active errors only, with the factor of the picture."""
+    return replace(active_scene(state), exaggeration=picture.exaggeration)
+
+
+def _request(picture: LivePicture, state: AppState, scene: Scene) -> Request:
+    return Request(
+        scene,
+        state.loop.value,
+        picture.state.component,
+        picture.state.nodes,
+        picture.exaggeration,
+        picture.state.shown.dark,
+        picture.state.look.tilts,
+        picture.scale,
+        conditions=state_conditions(state),
+        range_fixed=picture.state.look.range_mode == "fixed",
+    )
+
+
+def file_stem(picture: LivePicture) -> str:
+    """Name the files of a picture, without an ending; of one with a table say so."""
+    found, plain = picture.compared, safe_name(picture.state.scene.name)
+    if drawn_tables(picture.state):
+        return f"{plain}_with_table"
+    if found is None:
+        return plain
+    a, b = (
+        _side_stem(side, picture.state.comparison.pinned)
+        for side in (picture.state.comparison.a, picture.state.comparison.b)
+        if side is not None
+    )
+    words = {"a": f"A_{a}", "b": f"B_{b}", "difference": f"{b}_minus_{a}"}
+    return safe_name(words[found.shown])
+
+
+def _side_stem(side: Side[AppState], pinned: Side[AppState] | None) -> str:
+    """Name one side of a comparison in the name of a file."""
+    if side.state is None:
+        return AFTER if pinned is not None else "present"
+    return side.state.scene.name if side.is_scene else BEFORE
+
+
+def exported_words(picture: LivePicture) -> str:
+    """Say what pictures and exports show, where that is not simply what is steered."""
+    found = picture.compared
+    if without := without_words(picture.state):
+        return f"Figure, exports, Save and Link: {without[0].lower()}{without[1:]} {AS_DRAWN}"
+    if found is None:
+        tilts = picture.state.look.tilts
+        return "The figure shows the tilts of the tool axis as needles on the box." if tilts else ""
+    sheet = build_sheet_words(picture)
+    return f"Pictures and exports show {found.title}.{sheet} Save and Link keep the comparison."
+
+
+def build_sheet_words(picture: LivePicture) -> str:
+    """Say what the figure shows beyond what is drawn."""
+    found = picture.compared
+    if found is None or found.refused or found.sides[0].loop != found.sides[1].loop:
+        return ""
+    what = "the position errors of " if picture.state.look.tilts else ""
+    return f" The figure shows {what}A, B and B − A on one sheet."

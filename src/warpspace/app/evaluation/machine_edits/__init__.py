@@ -1,1 +1,0 @@
-"""The machine of a state while it is being changed: pure updates, and the library to start from."""

@@ -1,1 +1,0 @@
-"""HTML of the machine editor: its boxes, and the machines to start from."""

@@ -1,0 +1,418 @@
+"""Where axes have to stand: directions of motion, axes of rotation, the tool held on a point."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpspace.bench.plan import Plan, build_plan
+from warpspace.exceptions import OptionError, UnknownNameError
+from warpspace.kinematics import transforms
+from warpspace.kinematics.chain import branch_frames, branch_pose, nominal_point
+from warpspace.kinematics.model import Coordinates, Loop, Model
+from warpspace.machine.axes import direction_index
+from warpspace.machine.description import Machine
+from warpspace.machine.parameters import parameter
+from warpspace.scene.model import Scene
+from warpspace.units import Array
+
+FLAT = 1e-9
+"""Determinant of three directions of motion below which they lie in a plane."""
+SLACK = 1e-6
+"""mm or degrees by which a path may seem to leave a range: rounding."""
+
+
+@dataclass(frozen=True, slots=True)
+class AxisLine:
+    """Where a rotary axis lies."""
+
+    origin_mm: Array  # [..., 3]; of its frame, in R
+    # [..., 3]; unit vector that positive errors turn about, by the right-hand rule
+    direction: Array
+    # [..., 3]; the two following directions of its frame before the motion: x and y for C
+    across: Array
+    upright: Array
+    # +1 where it carries the tool, −1 where the workpiece: what turns the tool against the
+    # workpiece the other way
+    sign: float
+
+
+def linear_axis(machine: Machine, name: str) -> str:
+    """Give the name of a linear axis; the first one for an empty name."""
+    known = [axis.name for axis in machine.axes.values() if axis.is_linear]
+    return _named(machine, name, known, "linear")
+
+
+def rotary_axis(machine: Machine, name: str) -> str:
+    """Give the name of a rotary axis; the last one in the list (C before B) for an empty name."""
+    known = [axis.name for axis in machine.axes.values() if not axis.is_linear]
+    return _named(machine, name, known[::-1], "rotary")
+
+
+def _named(machine: Machine, name: str, known: list[str], kind: str) -> str:
+    if not known:
+        raise OptionError(f"the machine {machine.chain} has no {kind} axis")
+    if not name:
+        return known[0]
+    if name not in machine.axes:
+        raise UnknownNameError("axis", name, machine.axes)
+    if name not in known:
+        raise OptionError(f"axis {name} is not {kind}; expected one of {', '.join(sorted(known))}")
+    return name
+
+
+def relative_point(model: Model, coordinates: Coordinates) -> Array:
+    """Nominal tool point minus the origin of the workpiece frame, in R, [..., 3], mm."""
+    tool = nominal_point(model, Loop.TOOL, coordinates)
+    return tool - branch_pose(model, "workpiece", coordinates)[..., :3, 3]
+
+
+def tool_points(model: Model, coordinates: Coordinates, count: int) -> Array:
+    """Nominal tool points in R, one a site, [count, 3], mm."""
+    return np.broadcast_to(nominal_point(model, Loop.TOOL, coordinates), (count, 3))
+
+
+def motion_direction(model: Model, coordinates: Coordinates, axis: str) -> Array:
+    """Direction in which a linear axis moves the tool against the workpiece, [..., 3], per unit."""
+    further = {**coordinates, axis: coordinates[axis] + 1.0}
+    return relative_point(model, further) - relative_point(model, coordinates)
+
+
+def axis_line(model: Model, coordinates: Coordinates, axis: str) -> AxisLine:
+    """Find where a rotary axis lies nominally."""
+    for side, sign in (("tool", 1.0), ("workpiece", -1.0)):
+        for frames in branch_frames(model, side, coordinates):
+            if frames.axis.name == axis:
+                index = frames.axis.index
+                before = np.asarray(frames.before)
+                first, second = (index + 1) % 3, (index + 2) % 3
+                return AxisLine(
+                    before[..., :3, 3],
+                    before[..., :3, index],
+                    before[..., :3, first],
+                    before[..., :3, second],
+                    sign,
+                )
+    raise UnknownNameError("axis", axis, model.machine.axes)
+
+
+def following_axes(model: Model) -> tuple[str, str, str]:
+    """Give the three linear axes that hold the tool on a point: the first along each direction."""
+    found: dict[int, str] = {}
+    for axis in model.machine.axes.values():
+        if axis.is_linear:
+            found.setdefault(direction_index(axis.name), axis.name)
+    if len(found) != 3:
+        raise OptionError(
+            f"the machine {model.machine.chain} has not three linear axes; expected one along each"
+            " of x, y and z"
+        )
+    return found[0], found[1], found[2]
+
+
+def follow(model: Model, coordinates: Mapping[str, Array], target_mm: Array) -> dict[str, Array]:
+    """Hold the nominal tool point on points of the workpiece frame, [..., 3], as TCP does.
+
+    Rotary axes are where they are to stand, linear ones anywhere.
+
+    Raises
+    ------
+    OptionError
+        If the machine has no three linear axes, or these cannot reach every point.
+    """
+    names = following_axes(model)
+    start = dict(coordinates)
+
+    def gap(at: Coordinates) -> Array:
+        target = transforms.apply(branch_pose(model, "workpiece", at), target_mm)
+        return nominal_point(model, Loop.TOOL, at) - target
+
+    away = gap(start)
+    moves = np.stack([gap({**start, name: start[name] + 1.0}) - away for name in names], axis=-1)
+    if np.abs(np.linalg.det(moves)).min() < FLAT:
+        raise OptionError(
+            f"{', '.join(names)} move in one plane in some pose and cannot follow the point"
+        )
+    steps = np.linalg.solve(moves, -away[..., None])[..., 0]
+    for index, name in enumerate(names):
+        start[name] = start[name] + steps[..., index]
+    return start
+
+
+def ball_point(model: Model, coordinates: Coordinates) -> Array:
+    """Give where the nominal tool point is on the workpiece, in its frame, [..., 3], mm."""
+    pose = branch_pose(model, "workpiece", coordinates)
+    return transforms.apply(transforms.inverse(pose), nominal_point(model, Loop.TOOL, coordinates))
+
+
+def within_travel(machine: Machine, coordinates: Mapping[str, Array]) -> NDArray[np.bool_]:
+    """Tell at which sites all linear axes are within their travel, [n]."""
+    inside = np.ones((), dtype=bool)
+    for name, values in coordinates.items():
+        axis = machine.axes[name]
+        if axis.is_linear:
+            low, high = axis.travel
+            inside = inside & (values >= low - SLACK) & (values <= high + SLACK)
+    return np.asarray(inside)
+
+
+def check_travel(scene: Scene, coordinates: Mapping[str, Array], what: str) -> None:
+    """Refuse a path that leaves the travel of an axis."""
+    problems: list[str] = []
+    for name, values in coordinates.items():
+        axis = scene.machine.axes[name]
+        low, high = axis.travel
+        least, most = float(np.min(values)), float(np.max(values))
+        if least < low - SLACK or most > high + SLACK:
+            problems.append(
+                f"{name} would run {least:g} … {most:g} {axis.unit}, it has {low:g} … {high:g}"
+            )
+    if problems:
+        raise OptionError(f"{what} leaves the travel: {'; '.join(problems)}")
+
+
+# --- Planes of two linear axes: which way these run in R, and the squareness between them ---------
+
+PLANES: Mapping[str, tuple[str, str, str]] = {
+    "XY": ("X", "Y", "EC0Y"),
+    "XZ": ("X", "Z", "EB0Z"),
+    "YZ": ("Y", "Z", "EA0Z"),
+}
+"""Its axes, and the squareness between them."""
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A plane of two axes where a machine stands."""
+
+    first: str  # axes
+    second: str
+    key: str  # squareness between them: it turns the second axis
+    along: Array  # [3]; unit vectors in R: positive directions of the frames of both axes
+    up: Array
+    # sign of the distance that a positive squareness moves the second axis along the first one, per
+    # distance along the second: −1 for Y about z (towards −x), +1 for Z about y (towards +x), −1
+    # for Z about x (towards −y)
+    sign: float
+    # +1, or −1 where an axis moves the tool against the workpiece the other way than its frame
+    # points: a table, or a direction of −1
+    ways: tuple[float, float]
+
+
+def axis_vector(model: Model, coordinates: Coordinates, axis: str, letter: str = "") -> Array:
+    """Give the direction of the frame of an axis in R, [..., 3]."""
+    index = "XYZABC".index(letter) % 3 if letter else model.machine.axes[axis].index
+    for side in ("tool", "workpiece"):
+        for frames in branch_frames(model, side, coordinates):
+            if frames.axis.name == axis:
+                return np.asarray(frames.before)[..., :3, index]
+    raise OptionError(f"the machine {model.machine.chain} has no axis {axis}")
+
+
+def plane_axes(machine: Machine, plane: str) -> tuple[str, str, str]:
+    """Look up the axes of a plane and the squareness between them."""
+    if plane not in PLANES:
+        raise OptionError(f"plane {plane!r}; expected one of {', '.join(PLANES)}")
+    for name in PLANES[plane][:2]:
+        if name not in machine.axes:
+            raise OptionError(f"plane {plane}: the machine {machine.chain} has no axis {name}")
+    return PLANES[plane]
+
+
+def find_plane(model: Model, stand: Coordinates, plane: str) -> Plane:
+    """Lay a plane on a machine; see `plane_axes`."""
+    first, second, key = plane_axes(model.machine, plane)
+    along, up = axis_vector(model, stand, first), axis_vector(model, stand, second)
+    about = axis_vector(model, stand, parameter(key).axis, key[1])
+    sign = float(np.sign(np.cross(about, up) @ along))
+    ways = tuple(
+        float(np.sign(motion_direction(model, stand, name) @ vector))
+        for name, vector in ((first, along), (second, up))
+    )
+    return Plane(first, second, key, along, up, sign, (ways[0], ways[1]))
+
+
+# --- Circles about a rotary axis that the linear axes follow -------------------------------------
+
+
+BAR_MM = 100.0
+"""Length of a bar beside a rotary axis: what across it does is of second order."""
+SHARE = 0.3
+"""Radius that is chosen: share of the shortest edge of the working volume."""
+
+
+def default_ball(
+    scene: Scene, model: Model, axis: str, stand: Mapping[str, Array], radius_mm: float | None
+) -> Array:
+    """Choose where a ball stands, in the workpiece frame, [3], mm.
+
+    At the height of the middle of the working volume; on a table that turns at the radius from its
+    axis, or at a share of the shortest edge of the volume.
+    """
+    middle = np.asarray(ball_point(model, stand))
+    line = axis_line(model, stand, axis)
+    if line.sign > 0.0:  # the workpiece stands still: the tool swivels about the ball
+        return middle
+    pose = np.asarray(branch_pose(model, "workpiece", stand))
+    tool = transforms.apply(pose, middle)
+    height = float((tool - line.origin_mm) @ line.direction)
+    edges = [
+        high - low
+        for name, (low, high) in scene.workspace.ranges.items()
+        if scene.machine.axes[name].is_linear and low < high
+    ]
+    radius = radius_mm if radius_mm is not None else SHARE * min(edges, default=100.0)
+    turn = scene.machine.axes[axis].direction * float(stand[axis])
+    theta = np.deg2rad(turn)
+    placed = line.origin_mm + height * line.direction
+    placed = placed + radius * (np.cos(theta) * line.across + np.sin(theta) * line.upright)
+    return transforms.apply(transforms.inverse(pose), placed)
+
+
+def followed(
+    scene: Scene, model: Model, axis: str, angle_deg: Array, ball_mm: Array, stand: Coordinates
+) -> dict[str, Array]:
+    """Turn a rotary axis with the tool held on a ball of the workpiece: positions of all axes."""
+    coordinates = {
+        name: np.broadcast_to(values, angle_deg.shape)
+        for name, values in {**stand, axis: angle_deg}.items()
+    }
+    coordinates = follow(model, coordinates, ball_mm)
+    check_travel(scene, coordinates, f"the path about {axis}")
+    return coordinates
+
+
+def reachable(
+    scene: Scene,
+    model: Model,
+    axis: str,
+    ball_mm: Array,
+    stand: Mapping[str, Array],
+    start: float | None,
+    end: float | None,
+    points: int,
+) -> Array:
+    """Choose the positions of a rotary axis, [points], degrees.
+
+    Where no ends are given: the part of its travel around where it stands, at most a turn, along
+    which the linear axes can follow.
+    """
+    low, high = scene.machine.axes[axis].travel
+    here = float(np.clip(stand[axis], low, high))
+    if high - low > 360.0:
+        low = max(low, min(here - 180.0, high - 360.0))
+        high = low + 360.0
+    if start is not None or end is not None:
+        first, last = low if start is None else start, high if end is None else end
+        if not first < last:
+            raise OptionError(f"{axis} from {first:g} to {last:g}°; expected start below end")
+        return np.linspace(first, last, points)
+    fine = np.unique(np.append(np.linspace(low, high, 721), here))
+    coordinates = {
+        name: np.broadcast_to(values, fine.shape) for name, values in {**stand, axis: fine}.items()
+    }
+    inside = np.broadcast_to(
+        within_travel(scene.machine, follow(model, coordinates, ball_mm)), fine.shape
+    )
+    at_here = int(np.searchsorted(fine, here))
+    if not inside[at_here]:
+        spelled = ", ".join(f"{value:.4g}" for value in ball_mm)
+        raise OptionError(
+            f"the tool cannot reach the ball at ({spelled}) mm of the workpiece with"
+            f" {axis} = {here:g}; give {{ball}} x,y,z within the travel"
+        )
+    outside = np.flatnonzero(~inside)
+    before, after = outside[outside < at_here], outside[outside > at_here]
+    first = float(fine[before[-1] + 1] if len(before) else fine[0])
+    last = float(fine[after[0] - 1] if len(after) else fine[-1])
+    if last - first < 1.0:
+        raise OptionError(
+            f"{axis} could turn by {last - first:.2g}° only before a linear axis reaches its end;"
+            " give {ball} x,y,z nearer to the axis"
+        )
+    return np.linspace(first, last, points)
+
+
+def circle_directions(
+    model: Model, axis: str, coordinates: Coordinates, point_mm: Array
+) -> dict[str, Array]:
+    """Give the radial, tangential and axial directions at the ball in every pose, [n, 3]."""
+    line = axis_line(model, coordinates, axis)
+    axial = np.broadcast_to(line.direction, point_mm.shape)
+    arm = point_mm - line.origin_mm
+    arm = arm - np.sum(arm * axial, axis=-1, keepdims=True) * axial
+    length = np.linalg.norm(arm, axis=-1, keepdims=True)
+    if length.min() < 1e-3:
+        raise OptionError(f"the ball lies on {axis}; expected a distance from it")
+    radial = arm / length
+    tangential: Array = np.asarray(np.cross(axial, radial), dtype=np.float64)
+    return {"radial": radial, "tangential": tangential, "axial": axial}
+
+
+def lay_followed(
+    scene: Scene,
+    model: Model,
+    name: str,
+    radius_mm: float,
+    bar: str,
+    stand: Mapping[str, Array],
+    angle_deg: Array,
+    sense: Array,
+) -> Plan:
+    """Lay the plan of a radial, tangential or axial bar on a ball beside a rotary axis."""
+    axis = rotary_axis(scene.machine, name)
+    ball = default_ball(scene, model, axis, stand, radius_mm)
+    coordinates = followed(scene, model, axis, angle_deg, ball, stand)
+    count = len(angle_deg)
+    point = tool_points(model, coordinates, count)
+    direction = circle_directions(model, axis, coordinates, point)[bar]
+    theta = np.deg2rad(angle_deg)
+    return build_plan(
+        coordinates,
+        point,
+        direction,
+        place=f"{axis} turns · ball {radius_mm:g} mm from it · {bar} bar",
+        marks={
+            "angle_deg": angle_deg,
+            "sense": sense,
+            "along": np.cos(theta),
+            "up": np.sin(theta),
+            "radius_mm": np.full(count, radius_mm),
+            "gain_sign": np.ones(count),
+            "as_read": np.ones(count),
+        },
+        length_mm=BAR_MM,
+        travel=travels(coordinates, sense),
+        setup={
+            **{f"ball_{name}_um": np.sum(column * direction, axis=-1)
+               for name, column in ball_columns(model, coordinates).items()},
+            "bar_um": np.ones(count),
+        },
+    )  # fmt: skip
+
+
+def ball_columns(model: Model, coordinates: Mapping[str, Array]) -> dict[str, Array]:
+    """Give how a reading moves with the ball's place along x, y, z of the workpiece, [n, 3] each.
+
+    A ball that stands further along x is missed by as much: the tool against it moves along −x.
+    """
+    pose = np.asarray(branch_pose(model, "workpiece", coordinates))
+    count = np.broadcast_shapes(*(np.shape(values) for values in coordinates.values()))
+    pose = np.broadcast_to(pose, (*count, 4, 4))
+    return {name: -pose[..., :3, index] for index, name in enumerate("xyz")}
+
+
+def travels(coordinates: Mapping[str, Array], sense: Array) -> dict[str, Array]:
+    """Give the direction in which each axis has come along a path, [n], stretch by stretch."""
+    found: dict[str, Array] = {}
+    starts = np.flatnonzero(np.diff(sense, prepend=np.nan) != 0.0)
+    for name, values in coordinates.items():
+        step = np.diff(values, prepend=np.nan)
+        step[starts] = np.nan
+        for start in starts:  # the first point of a stretch is reached as the second one is
+            step[start] = step[start + 1] if start + 1 < len(step) else 0.0
+        step = np.where(np.abs(np.nan_to_num(step)) < 1e-9, 0.0, np.nan_to_num(step))
+        if step.any():
+            found[name] = np.sign(step)
+    return found

@@ -1,0 +1,477 @@
+"""What carries the head, walked from it to the bed: rams, carriages, beams, portals, columns, arms.
+
+i is the direction across (along a beam), j the depth, in which everything is put behind what is
+there: along the spindle where that is level, towards the back of R where it comes from above.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from warpspace.bodies.generated.ends import Mount, Stack, build_head
+from warpspace.bodies.generated.layout import UP, Layout, build_layout, half_travel
+from warpspace.bodies.mesh import LIGHT, MIDDLE, Body
+from warpspace.bodies.schematic import (
+    Colour,
+    Parts,
+    Range,
+    Shape,
+    about,
+    bar,
+    beside,
+    pair,
+    rod,
+    upright,
+)
+from warpspace.kinematics.firstorder import BASE
+from warpspace.machine.description import TOOL_SHAPES, Axis, Machine, Vector
+from warpspace.units import Array
+
+_LYING = 0.7
+"""Upward part of a tool axis below which the machine is built as one with a horizontal spindle."""
+_ARM = 0.9
+"""Thickness of an arm, in walls."""
+_LONG = 1.5
+"""Ratio of travels from which a machine is a gantry on rails instead of a saddle on a wall."""
+
+
+def build_frame(layout: Layout, parts: Parts, mount: Mount, stack: Stack) -> None:
+    """Build what carries the head, down to what stands on the bed."""
+    lying = abs(float(layout.tool_axis @ UP)) < _LYING
+    (_Behind if lying else _Overhead)(layout, parts, mount, stack).build()
+
+
+class _Frame:
+    """The tool side while it is built: what all of its bodies are placed by."""
+
+    i: int  # index of the direction across: 0 or 1
+    sign: float  # of the depth along the other one in R
+    zero_mm: float  # where depths count from
+
+    def __init__(self, layout: Layout, parts: Parts, mount: Mount, stack: Stack) -> None:
+        self.layout, self.parts, self.mount, self.stack = layout, parts, mount, stack
+        self.u, self.spine = layout.unit_mm, mount.point_mm
+        self.axes = list(reversed(mount.inner))
+
+    @property
+    def j(self) -> int:
+        return 1 - self.i
+
+    @property
+    def middle(self) -> float:
+        """Place of the spindle line across, mm."""
+        return float(self.spine[self.i])
+
+    def around(self, half: float) -> Range:
+        return about(self.middle, half)
+
+    def depth(self, point_mm: Array) -> float:
+        return self.sign * (float(point_mm[self.j]) - self.zero_mm)
+
+    def swept(self) -> float:
+        """Give the depth of all that the stack sweeps, with some room, mm."""
+        back = self.depth(self.stack.centre_mm) + float(self.stack.swept_mm[self.j])
+        return back + self.layout.gap_mm
+
+    def _in_r(self, j: Range) -> Range:
+        low, high = sorted(self.zero_mm + self.sign * depth for depth in j)
+        return (low, high)
+
+    def box(
+        self, frame: str, what: str, i: Range, j: Range, z: Range, colour: Colour | None = None
+    ) -> None:
+        self.parts.box(frame, what, i, self._in_r(j), z, along=self.i, colour=colour)
+
+    def stand(self, i: Range, j: Range) -> None:
+        self.parts.stand(i, self._in_r(j), along=self.i)
+
+    def posts(self, frame: str, what: str, inner: float, j: Range, z: Range, roof: float) -> None:
+        """Add two posts beside the spindle line, and what joins them at their upper ends."""
+        thick = 1.1 * self.u
+        for post in beside(self.middle, inner, thick):
+            self.box(frame, what, post, j, z)
+        self.box(frame, what, self.around(inner + thick), j, (z[1], z[1] + roof * self.u))
+
+
+class _Behind(_Frame):
+    """What carries a level head from behind: headstock, ram, and a column that may travel."""
+
+    def __init__(self, layout: Layout, parts: Parts, mount: Mount, stack: Stack) -> None:
+        super().__init__(layout, parts, mount, stack)
+        level = layout.tool_axis[:2]
+        self.i = int(np.argmin(np.abs(level)))
+        self.sign, self.zero_mm = float(np.sign(level[self.j])), float(layout.tip_mm[self.j])
+
+    def build(self) -> None:
+        u, w, middle = self.u, self.mount.half_mm, float(self.spine[2])
+        start, column_at, half, high = self.depth(self.spine), 0.0, w + 0.4 * u, middle + 2.4 * u
+        hangs = True  # the head, so far, on nothing that slides upwards
+        axes = self.axes.copy()  # those that are not built yet
+        while axes and axes[0].is_linear:
+            axis, reach = axes[0], half_travel(axes[0])
+            if self.layout.is_vertical(axis):
+                z, flange = about(middle, 1.3 * w), about(middle, 1.9 * w)
+                i, deep = self.around(half), (start + 0.5 * u, start + 0.8 * u)
+                self.box(axis.name, "headstock", i, (start, start + 3.6 * u), z, MIDDLE)
+                self.box(axis.name, "headstock", self.around(half + 0.35 * u), deep, flange)
+                half, high, column_at = half + 0.1 * u, middle + reach + 2.6 * w, start + 0.8 * u
+                hangs = False
+            elif self.layout.along(axis) == self.j and hangs:
+                j = (start, start + 2.0 * reach + 3.0 * u)
+                self.box(axis.name, "ram", self.around(w), j, about(middle, w), LIGHT)
+                start += 0.8 * u
+            else:
+                break
+            axes.pop(0)
+        column_at = max(column_at or start + 0.8 * u, self.swept())
+        if hangs and not axes:
+            j, wide = (start, max(column_at, start) + 1.5 * u), 1.2 * w
+            self.box(BASE, "headstock", self.around(wide), j, about(middle, wide), MIDDLE)
+        self._add_column(axes, half, column_at, high)
+
+    def _add_column(self, axes: list[Axis], half: float, at: float, high: float) -> None:
+        """Add a column, and below it a foot upon rails for each axis that it rides on."""
+        u, frames = self.u, [*(axis.name for axis in axes), BASE]
+        top = self.stack.bed_mm + 0.75 * u * len(axes)
+        self.posts(frames[0], "column", half, (at, at + 2.4 * u), (top, high), 0.9)
+        span, near, far = half + 1.5 * u, at - 0.2 * u, at + 2.9 * u
+        for number, axis in enumerate(axes):
+            what, below = "base" if number else "column", frames[number + 1]
+            self.box(axis.name, what, self.around(span), (near, far), (top - 0.55 * u, top))
+            rails = (top - 0.75 * u, top - 0.55 * u)
+            if axis.is_linear and self.layout.along(axis) == self.i:
+                span += half_travel(axis)
+                for line in ((at + 0.1 * u, at + 0.5 * u), (far - 0.7 * u, far - 0.3 * u)):
+                    self.box(below, "rails", self.around(span), line, rails)
+            else:
+                far += half_travel(axis)
+                for line in pair(self.middle, 0.7 * span, 0.2 * u):
+                    self.box(below, "rails", line, (near, far), rails)
+            top -= 0.75 * u
+        self.stand(self.around(span), (near, far))
+
+
+@dataclass
+class _Rear:
+    """The upright plane that the bodies so far end with; the next body is put behind it."""
+
+    plane: float  # position along j, mm
+    low: float  # ends upwards, mm
+    high: float
+    half: float  # half width across, mm
+    # what has to come next: "plate", "beam", "ledge", "column", "posts", "rails"
+    need: str = "plate"
+    reach: float = 0.0  # half travel along i (or upwards) that the next body has to cover, mm
+
+
+class _Overhead(_Frame):
+    """What carries a head from above."""
+
+    def __init__(self, layout: Layout, parts: Parts, mount: Mount, stack: Stack) -> None:
+        super().__init__(layout, parts, mount, stack)
+        level = [axis for axis in mount.inner if layout.slides_level(axis)]
+        self.i, self.sign, self.zero_mm = self._across(level), 1.0, 0.0
+        self.arm_step = _ARM * self.u
+        self.front = self.depth(self.spine)
+
+    def _across(self, level: list[Axis]) -> int:
+        ways = [self.layout.along(axis) for axis in level]
+        if len(level) < 2 or ways[0] == ways[1]:
+            return 0
+        lengths = [half_travel(axis) for axis in level[:2]]
+        if ways[0] == 0:
+            return 1 if lengths[0] >= _LONG * lengths[1] else 0
+        return ways[1]
+
+    def build(self) -> None:
+        top = float(self.spine[2])
+        rear: _Rear | None = None
+        at = self.spine.copy()
+        for place, axis in enumerate(self.axes):
+            if not axis.is_linear:
+                if rear is not None:
+                    at[self.j], top, rear = rear.plane, rear.high, None
+                at, top = self._add_turning(axis, at, top)
+            elif self.layout.is_vertical(axis):
+                rear, top = self._add_vertical(axis, rear, self.axes[place + 1 :], at, top)
+            else:
+                rear = self._add_level(axis, rear, top)
+        if self.axes and not self.axes[-1].is_linear:
+            self._add_pedestal(at, top)
+        else:
+            self._add_base(rear or self._add_cantilever(top))
+
+    # --- room -----------------------------------------------------------------------------------
+
+    def _behind(self, least: float = -np.inf) -> float:
+        """Give a position in depth behind the volume and all that the stack sweeps, mm."""
+        return max(least, self.depth(self.layout.high_mm) + self.layout.gap_mm, self.swept())
+
+    def _clear_half(self) -> float:
+        """Give a half width across beside the volume and all that the stack sweeps, mm."""
+        i, stack = self.i, self.stack
+        swept = float(stack.swept_mm[i] + abs(stack.centre_mm[i] - self.middle))
+        own = max(self.layout.high_mm[i] - self.middle, self.middle - self.layout.low_mm[i])
+        return max(float(own), swept) + self.layout.gap_mm
+
+    # --- axes -----------------------------------------------------------------------------------
+
+    def _add_vertical(
+        self, axis: Axis, rear: _Rear | None, rest: list[Axis], at: Array, top: float
+    ) -> tuple[_Rear | None, float]:
+        u, w, reach = self.u, self.mount.half_mm, half_travel(axis)
+        if rear is None and rest and not rest[0].is_linear:
+            arms = sum(not turning.is_linear for turning in rest)
+            first = top + reach + 0.2 * u + (arms - 1) * _ARM * u
+            self.arm_step = -_ARM * u
+            quill = upright(0.4 * u, (top, first + reach + 1.6 * u), at)
+            self.parts.add(axis.name, "quill", quill)
+            return None, first
+        if rear is None and any(map(self.layout.slides_level, rest)):
+            high = top + 1.7 * reach + 1.5 * u
+            z = (top, high + 0.5 * reach + 0.6 * u)
+            self.box(axis.name, "ram", self.around(w), about(self.front, w), z)
+            return _Rear(self.front + w, top + 0.5 * u, high, w + 0.5 * u), top
+        if rear is None:
+            return self._add_headstock(axis.name, top, reach), top
+        if rear.need == "beam":
+            self._add_beam(axis.name, rear, "beam")
+            ends = max(rear.half + rear.reach, self._clear_half())
+            return _Rear(rear.plane + 1.3 * u, rear.low, rear.high, ends, "posts", reach), top
+        rear = self._add_carriage(axis.name, rear)
+        return _Rear(rear.plane, rear.low - reach, rear.high + reach, rear.half, "column"), top
+
+    def _add_headstock(self, name: str, top: float, reach: float) -> _Rear:
+        u, w = self.u, 1.25 * self.mount.half_mm
+        column, high = self._behind(self.front + w + 1.2 * u), top + 3.2 * u
+        low, plate = top - 0.2 * u, (column - 0.35 * u, column - 0.12 * u)
+        self.box(name, "headstock", self.around(w), (self.front - w, plate[0]), (top, high))
+        self.box(name, "headstock", self.around(1.25 * w), plate, (low, high + 0.8 * u))
+        self.parts.add(name, "headstock", upright(0.62 * w, (high, high + 1.3 * u), self.spine))
+        return _Rear(column, low - reach, high + 0.8 * u + reach, 1.45 * w, "column")
+
+    def _add_level(self, axis: Axis, rear: _Rear | None, top: float) -> _Rear:
+        u, reach, name = self.u, half_travel(axis), axis.name
+        across = self.layout.along(axis) == self.i
+        if rear is None:
+            w, z = 1.2 * self.mount.half_mm, (top, top + 1.6 * u)
+            self.box(name, "carriage", self.around(w), about(self.front, w), z)
+            rear = _Rear(self.front + w, *z, w)
+        elif rear.need == "ledge" and across:
+            return self._add_ledge_saddle(name, rear, reach)
+        elif rear.need == "beam" and not across:
+            return self._add_bridge(name, rear, reach)
+        elif rear.need in ("column", "posts"):
+            self._add_column(name, rear, foot=True)
+            rear.need, rear.reach = "rails", reach
+            return rear
+        elif across:
+            rear = self._add_carriage(name, rear)
+        if not across:
+            return self._add_sliding_ram(name, rear, reach)
+        return _Rear(rear.plane, rear.low, rear.high, rear.half, "beam", reach)
+
+    def _add_carriage(self, name: str, rear: _Rear) -> _Rear:
+        plane = rear.plane + 0.6 * self.u
+        z = (rear.low, rear.high)
+        self.box(name, "carriage", self.around(rear.half), (rear.plane, plane), z)
+        return _Rear(plane, *z, rear.half)
+
+    def _add_sliding_ram(self, name: str, rear: _Rear, reach: float) -> _Rear:
+        u, middle, front = self.u, (rear.low + rear.high) / 2.0, rear.plane + 0.55 * self.u
+        under, over = max(rear.low, middle - 1.9 * u), middle + 1.5 * u
+        back = 2.0 * reach + max(rear.plane + 2.4 * u, self._behind(0.0) + 1.6 * u)
+        i, z = self.around(rear.half), (rear.low, rear.high)
+        self.box(name, "saddle", i, (rear.plane, front), z, LIGHT)
+        self.box(name, "saddle", self.around(0.92 * rear.half), (front, back), (under, over))
+        return _Rear(back, under, over, rear.half, "ledge", reach)
+
+    def _add_ledge_saddle(self, name: str, rear: _Rear, reach: float) -> _Rear:
+        u, half, low = self.u, 1.35 * rear.half, rear.low - 1.3 * self.u
+        j, rails = (self._behind(0.0), rear.plane - 0.1 * u), rear.low - 0.25 * u
+        self.box(name, "saddle", self.around(half), j, (low, rails))
+        for line in pair(self.middle, 0.6 * rear.half, 0.2 * u):
+            self.box(name, "saddle", line, j, (rails, rear.low))
+        return _Rear(rear.plane, low, rear.high, half + reach, "ledge", reach)
+
+    # --- what stands ----------------------------------------------------------------------------
+
+    def _add_beam(self, name: str, rear: _Rear, what: str) -> float:
+        """Add a beam, and give its half length."""
+        u = self.u
+        rear.low = max(rear.low, float(self.layout.high_mm[2]) + self.layout.gap_mm)
+        rear.high = max(rear.low + 2.6 * u, min(rear.high, rear.low + 3.6 * u))
+        half = max(rear.half + rear.reach + 0.3 * u, self._clear_half() + 0.2 * u)
+        i, front = self.around(half), rear.plane + 0.18 * u
+        self.box(name, what, i, (front, front + 1.5 * u), (rear.low + 0.15 * u, rear.high))
+        for z in (rear.low + 0.5 * u, rear.high - 0.5 * u):
+            self.box(name, what, i, (rear.plane, front), about(z, 0.16 * u))
+        return half
+
+    def _add_bridge(self, name: str, rear: _Rear, reach: float) -> _Rear:
+        """Add a beam on two legs that run on walls about as high as the table."""
+        u, bed = self.u, self.stack.bed_mm
+        wall = max(bed + 0.1 * u, float(self.layout.low_mm[2]) - 0.9 * u)
+        half, middle = self._add_beam(name, rear, "bridge"), rear.plane + 0.9 * u
+        foot, ends = wall + 0.55 * u, about(middle, 1.9 * u + reach)
+        for low, high in beside(self.middle, half, 1.0 * u):
+            self.box(name, "bridge", (low, high), about(middle, 1.1 * u), (foot, rear.high))
+            deep = about(middle, 1.9 * u)
+            self.box(name, "bridge", (low, high), deep, (wall + 0.12 * u, foot))
+            i, rail = (low - 0.12 * u, high + 0.12 * u), (low + 0.3 * u, high - 0.3 * u)
+            self.box(BASE, "sides", i, ends, (bed, wall))
+            self.box(BASE, "sides", rail, ends, (wall, wall + 0.12 * u))
+            self.stand(i, ends)
+        return _Rear(rear.plane, rear.low, rear.high, rear.half, "done")
+
+    def _add_cantilever(self, top: float) -> _Rear:
+        u, w = self.u, 1.25 * self.mount.half_mm
+        column, z = self._behind(self.front + w + 0.5 * u), (top, top + 2.2 * u)
+        self.box(BASE, "column", self.around(w), (self.front - w, column), z)
+        return _Rear(column, *z, 1.2 * w, "column")
+
+    def _add_base(self, rear: _Rear) -> None:
+        u, bed = self.u, self.stack.bed_mm
+        if rear.need in ("done", "rails"):
+            return
+        if rear.need == "beam":
+            half, j = self._add_beam(BASE, rear, "portal"), about(rear.plane + 1.1 * u, 1.4 * u)
+            for leg in beside(self.middle, half, 1.3 * u):
+                self.box(BASE, "portal", leg, j, (bed, rear.high + 0.25 * u))
+                self.stand(leg, j)
+        elif rear.need == "posts":
+            inner, middle = rear.half - 0.3 * u, rear.plane + 1.0 * u
+            z = (bed, rear.high + rear.reach + 0.6 * u)
+            self.posts(BASE, "portal", inner, about(middle, 0.6 * u), z, 0.7)
+            self.stand(self.around(inner + 1.1 * u), about(middle, 1.2 * u))
+        elif rear.need == "ledge":
+            self._add_ledge(rear)
+        else:
+            self._add_column(BASE, rear, foot=False)
+
+    def _add_ledge(self, rear: _Rear) -> None:
+        u, bed, rails = self.u, self.stack.bed_mm, rear.low - 0.25 * self.u
+        half = max(rear.half + 0.3 * u, 0.6 * float(self.stack.half_mm[self.i]))
+        i, (front, back) = self.around(half), (self._behind(0.0), rear.plane)
+        self.box(BASE, "column", i, (front, back), (bed, rails))
+        if rear.reach and half > rear.half:
+            for j in (front + 0.6 * u, back - 0.9 * u):
+                self.box(BASE, "column", i, about(j, 0.2 * u), (rails, rear.low))
+        self.stand(i, (front, back))
+
+    def _add_column(self, name: str, rear: _Rear, *, foot: bool) -> None:
+        u, bed = self.u, self.stack.bed_mm
+        low = bed + (0.9 * u if foot else 0.0)
+        rear.plane = max(rear.plane, self._behind(0.0))
+        i, j = (
+            self.around(1.15 * rear.half),
+            (rear.plane, rear.plane + max(2.0 * u, 1.3 * rear.half)),
+        )
+        self.box(name, "column", i, j, (low, rear.high + 0.3 * u))
+        guides = (max(rear.low, low), rear.high)
+        if guides[1] > guides[0]:
+            for line in pair(self.middle, 0.7 * rear.half, 0.16 * u):
+                self.box(name, "column", line, (rear.plane - 0.12 * u, rear.plane), guides)
+        if foot:
+            j = (j[0] - 0.2 * u, j[1] + 0.4 * u)
+            self.box(name, "column", self.around(1.4 * rear.half), j, (bed + 0.2 * u, low))
+            i = self.around(1.5 * rear.half + float(self.layout.half_mm[self.i]))
+            for at in (j[0] + 0.5 * u, j[1] - 0.5 * u):
+                self.box(BASE, "rails", i, about(at, 0.18 * u), (bed, bed + 0.2 * u))
+        self.stand(i, j)
+
+    # --- rotary axes before linear ones ---------------------------------------------------------
+
+    def _add_turning(self, axis: Axis, at: Array, top: float) -> tuple[Array, float]:
+        u, line = self.u, self.layout.origin(axis)
+        if not self.layout.is_vertical(axis):
+            out, hub = self.layout.direction(axis), np.array([*at[:2], top + 1.2 * u])
+            self.parts.add(axis.name, "hub", rod(hub - 1.4 * u * out, hub + 1.4 * u * out, 1.2 * u))
+            return at, top + 2.4 * u
+        low, high, wide = top + 0.06 * u, top + _ARM * u, 0.95 * u
+        for radius, end in ((wide, at), (1.15 * wide, line)):
+            self.parts.add(axis.name, "arm", upright(radius, (low, high), end))
+        if float(np.hypot(*(line[:2] - at[:2]))) > 0.5 * u:
+            start, end = (np.array([*p[:2], top + _ARM * u / 2.0]) for p in (line, at))
+            self.parts.add(axis.name, "arm", bar(start, end, wide, 0.42 * _ARM * u))
+        # the arm before this one lies below it
+        self.parts.add(axis.name, "arm", upright(0.75 * wide, (top, low), line))
+        return line.copy(), top + self.arm_step
+
+    def _add_pedestal(self, at: Array, top: float) -> None:
+        u, bed, below = self.u, self.stack.bed_mm, self.arm_step > 0.0
+        under = top if below else top + _ARM * u
+        if (np.abs(at[:2] - self.layout.tip_mm[:2]) < self.layout.half_mm[:2] + 1.8 * u).all():
+            front = np.array([*at[:2], under])
+            at = front.copy()
+            at[self.j] = self._behind(0.0) + 1.8 * u
+            # a shoulder below would cut the volume
+            lift = 0.4 * u if below else (0.4 + _ARM) * u
+            over = under + lift + 0.35 * u
+            raised = np.array([0.0, 0.0, lift])
+            self.parts.add(BASE, "pedestal", bar(front + raised, at + raised, 1.0 * u, 0.35 * u))
+            self.parts.add(BASE, "pedestal", upright(1.0 * u, (under, over), front))
+            under = over
+        foot = bed + 0.4 * u
+        self.parts.add(BASE, "pedestal", upright(1.15 * u, (foot, max(under, foot + 1.0)), at))
+        x, y = (about(place, 1.7 * u) for place in at[:2])
+        self.parts.box(BASE, "pedestal", x, y, (bed, foot))
+        self.parts.stand(x, y)
+
+
+_Key = tuple[str, tuple[Axis, ...], tuple[tuple[str, Vector], ...], tuple[tuple[str, Vector], ...]]
+
+
+def generate_bodies(machine: Machine) -> tuple[Body, ...]:
+    """Generate the schematic bodies of a machine from its chain, offsets and travels."""
+    key = (
+        str(machine.chain),
+        tuple(machine.axes.values()),
+        tuple(sorted(machine.fixed_mm.items())),
+        tuple(sorted(machine.fixed_deg.items())),
+    )
+    source = machine.bodies.get("t")
+    return _generate(key, (source.shape if source else "") or TOOL_SHAPES[0])
+
+
+@lru_cache(maxsize=32)
+def _generate(key: _Key, tool: str) -> tuple[Body, ...]:
+    from warpspace.machine.description import parse_chain
+
+    chain, axes, fixed_mm, fixed_deg = key
+    machine = Machine(
+        parse_chain(chain),
+        {axis.name: axis for axis in axes},
+        dict(fixed_mm),
+        fixed_deg=dict(fixed_deg),
+    )
+    layout = build_layout(machine)
+    parts = Parts(layout.poses)
+    stack = Stack(layout, parts)
+    stack.build()
+    build_frame(layout, parts, build_head(layout, parts, tool), stack)
+    _add_bed(layout, parts, stack.bed_mm)
+    return parts.bodies()
+
+
+def _add_bed(layout: Layout, parts: Parts, top: float) -> None:
+    """Add a slab under everything that stands on the bed, and a plinth a little smaller."""
+    u = layout.unit_mm
+    corners = np.concatenate(parts.floor)
+    x, y = np.array([corners.min(axis=0) - 0.25 * u, corners.max(axis=0) + 0.25 * u]).T
+    low, foot, inset = top - 1.1 * u, top - 1.45 * u, np.array([0.35 * u, -0.35 * u])
+    parts.box(BASE, "bed", x, y, (low, top))
+    parts.box(BASE, "bed", x + inset, y + inset, (foot, low))
+    if not np.allclose(layout.slant, np.eye(3)):
+        under = np.array([(at_x, at_y, foot) for at_x in x for at_y in y])
+        parts.add(BASE, "bed", _wedge(under, layout.slant, u))
+
+
+def _wedge(corners_mm: Array, slant: Array, unit_mm: float) -> Shape:
+    from trimesh import convex
+
+    lower = corners_mm @ slant.T  # in R
+    floor = lower.copy()
+    floor[:, 2] = lower[:, 2].min() - 0.5 * unit_mm
+    return convex.convex_hull(np.concatenate([lower, floor]) @ slant)

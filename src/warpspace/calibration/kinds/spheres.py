@@ -1,0 +1,239 @@
+"""Sphere centres, with TCP correction on or off.
+
+With it the centre should stay where it is; without it the linear axes read circles about the
+rotary ones.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from warpspace.analysis.axis_motion import fit_flat_circle
+from warpspace.calibration.kinds.kind import Placed, head_keys
+from warpspace.calibration.readings import (
+    Circle,
+    Readings,
+    ReadingTable,
+    axis_columns,
+    check_poses,
+    check_spread,
+    nominal_tip,
+    take_readings,
+)
+from warpspace.exceptions import SceneError
+from warpspace.machine.axes import direction_index
+from warpspace.scene.model import Scene
+from warpspace.units import Array
+
+PLANES = {0: (1, 2), 1: (0, 2), 2: (0, 1)}
+LEAST = 3
+SPREAD_MM = 100.0
+READ = ("x_mm", "y_mm", "z_mm")
+TCP_SPREAD_MM = 20.0
+"""Centres that wander further than this were not measured with TCP correction."""
+
+
+class SphereTcp(Placed):
+    """The tool point that the controller believes in, each time it stands at the sphere.
+
+    The controller moves the linear axes so that its nominal tool point stays; the errors of the
+    machine move the true one off, and the reading by the same amount the other way.
+    """
+
+    name = "sphere-tcp"
+    words = "centres of one sphere, TCP correction on (R-test, ISO 10791-6)"
+    columns = "rotary positions (b_deg, c_deg), x_mm, y_mm, z_mm; u_um, session"
+    place = "sphere"
+    sign = -1.0
+
+    def fits(self, table: ReadingTable, scene: Scene) -> bool:
+        """Look for centres that stay within a few millimetres."""
+        return has_centres(table, scene) and spread_mm(table) <= TCP_SPREAD_MM
+
+    def read(self, table: ReadingTable, scene: Scene) -> Readings:
+        """Take the centres, and find where the linear axes stood."""
+        observed = table.need(READ)
+        rotary = rotary_axes(scene)
+        coordinates, notes = axis_columns(table, scene, rotary, rotary)
+        check_poses({name: coordinates[name] for name in rotary}, table.source)
+        hint = "Were they measured with TCP correction off (--kind sphere), or in another unit?"
+        check_spread(spread_mm(table), TCP_SPREAD_MM, table.source, hint)
+        coordinates = solve_linear(scene, coordinates, places(observed, table), table.source)
+        return take_readings(self.name, scene, table, coordinates, observed, notes)
+
+    def automatic_keys(self, readings: Readings, scene: Scene) -> tuple[str, ...]:
+        """Look for rigid errors of the rotary axes that move."""
+        return head_keys(readings, scene)
+
+
+class Sphere(Placed):
+    """Positions of the linear axes, each time the tool point stands at the sphere."""
+
+    name = "sphere"
+    words = "centres of one sphere, TCP correction off: circles about rotary axes"
+    columns = (
+        "rotary positions (b_deg, c_deg), linear positions x_mm, y_mm, z_mm; u_um, session or run"
+    )
+    place = "sphere"
+    sign = -1.0
+
+    def fits(self, table: ReadingTable, scene: Scene) -> bool:
+        """Look for centres that wander."""
+        return has_centres(table, scene) and spread_mm(table) > TCP_SPREAD_MM
+
+    def read(self, table: ReadingTable, scene: Scene) -> Readings:
+        """Take the positions of the linear axes; an axis that turns against its name is noted."""
+        table.need(READ)
+        rotary = rotary_axes(scene)
+        linear = tuple(name for name in ("X", "Y", "Z") if name in scene.machine.axes)
+        if len(linear) < len(READ):
+            found = "holds positions of X, Y and Z"
+            raise SceneError(table.source, [f"{found}; expected a machine with these three axes"])
+        coordinates, notes = axis_columns(table, scene, (*rotary, *linear), rotary)
+        check_poses({name: coordinates[name] for name in rotary}, table.source)
+        circles = circles_of(table, scene)
+        for circle in circles:
+            if circle.against:
+                coordinates[circle.axis] = np.where(
+                    np.isin(table.session or ("",) * len(table), circle.sessions),
+                    -coordinates[circle.axis],
+                    coordinates[circle.axis],
+                )
+                note = (
+                    f"run {', '.join(circle.sessions)}: {circle.axis} turns against the machine of"
+                    " the scene; its positions are taken with the other sign"
+                )
+                notes = (*notes, note)
+        tip = nominal_tip(scene, coordinates)
+        nominal = solve_linear(scene, coordinates, places(tip, table), table.source)
+        readings = take_readings(self.name, scene, table, nominal, tip, notes)
+        readings = replace(readings, circles=circles)
+        unknown = self.unknowns(readings)
+        about = tip - self._members(readings, unknown) @ self.start(readings, unknown)
+        hint = "Are they in mm, and are the offsets of the scene those of the machine?"
+        check_spread(float(np.abs(about).max()), SPREAD_MM, table.source, hint)
+        return readings
+
+    def automatic_keys(self, readings: Readings, scene: Scene) -> tuple[str, ...]:
+        """Look for rigid errors of the rotary axes that move."""
+        return head_keys(readings, scene)
+
+
+def rotary_axes(scene: Scene) -> tuple[str, ...]:
+    """Name the rotary axes of a machine."""
+    return tuple(name for name, axis in scene.machine.axes.items() if not axis.is_linear)
+
+
+def has_centres(table: ReadingTable, scene: Scene) -> bool:
+    """Tell whether a file has centres at positions of rotary axes."""
+    rotary = {f"{name.lower()}_deg" for name in rotary_axes(scene)}
+    return set(READ) <= set(table.columns) and bool(rotary & set(table.columns))
+
+
+def spread_mm(table: ReadingTable) -> float:
+    """Give how far the centres of one session wander, mm."""
+    observed, labels = table.need(READ), table.session or ("",) * len(table)
+    groups = [np.array(labels) == name for name in dict.fromkeys(labels)]
+    return max(float(np.ptp(observed[group], axis=0).max()) for group in groups)
+
+
+def places(observed_mm: Array, table: ReadingTable) -> Array:
+    """Give the mean centre of the session of each reading, [n, 3], mm.
+
+    Errors are evaluated where the axes stand nominally. Positions that held the reading itself
+    would let an error of scale explain any reading.
+    """
+    labels = np.array(table.session or ("",) * len(table))
+    means = {name: observed_mm[labels == name].mean(axis=0) for name in dict.fromkeys(labels)}
+    return np.stack([means[name] for name in labels])
+
+
+def solve_linear(
+    scene: Scene, coordinates: dict[str, Array], target_mm: Array, source: str
+) -> dict[str, Array]:
+    """Find the positions of the linear axes that nominally bring the tool point to targets.
+
+    Coordinates are those of all axes; targets, [n, 3], lie in the workpiece frame. The nominal tool
+    point is an affine function of linear axes at given rotary positions.
+    """
+    one_per_direction: dict[int, str] = {}
+    for name, axis in scene.machine.axes.items():
+        if axis.is_linear:
+            one_per_direction.setdefault(direction_index(name), name)
+    linear = list(one_per_direction.values())
+    zero = {**coordinates, **{name: np.zeros(len(target_mm)) for name in linear}}
+    start = nominal_tip(scene, zero)
+    columns = [
+        nominal_tip(scene, {**zero, name: np.ones(len(target_mm))}) - start for name in linear
+    ]
+    system = np.stack(columns, -1) if columns else np.zeros((len(target_mm), 3, 0))
+    solved = np.linalg.pinv(system) @ (target_mm - start)[..., None]
+    missed = float(np.abs(system @ solved - (target_mm - start)[..., None]).max())
+    if missed > 1e-6:
+        names = ", ".join(linear) or "none"
+        found = f"lies up to {missed:.3g} mm from where linear axes ({names}) can bring the tool"
+        raise SceneError(source, [f"{found}; expected a machine that reaches the sphere"])
+    return {**zero, **{name: solved[:, at, 0] for at, name in enumerate(linear)}}
+
+
+def circles_of(table: ReadingTable, scene: Scene) -> tuple[Circle, ...]:
+    """Fit a circle per run in which one rotary axis turns, and one per axis to all such runs.
+
+    Notes
+    -----
+    As `warpspace.analysis.axis_motion.fit_flat_circle` has it, in the plane of the two linear axes
+    across the rotary one.
+    """
+    read = table.need(("x_mm", "y_mm", "z_mm"))
+    labels = np.array(table.session or ("",) * len(table))
+    rotary = [name for name, axis in scene.machine.axes.items() if not axis.is_linear]
+    turned = {name: table.columns.get(f"{name.lower()}_deg") for name in rotary}
+    runs: dict[str, list[str]] = {}
+    for session in dict.fromkeys(labels.tolist()):
+        mine = labels == session
+        moving = [
+            name
+            for name, values in turned.items()
+            if values is not None and len(np.unique(values[mine])) >= LEAST
+        ]
+        still = [
+            name
+            for name, values in turned.items()
+            if values is not None and np.ptp(values[mine]) > 0.0 and name not in moving
+        ]
+        if len(moving) == 1 and not still:
+            runs.setdefault(moving[0], []).append(session)
+    found: list[Circle] = []
+    for axis, sessions in runs.items():
+        groups = [(one,) for one in sessions] + ([tuple(sessions)] if len(sessions) > 1 else [])
+        for group in groups:
+            mine = np.isin(labels, group)
+            values = turned[axis]
+            assert values is not None  # noqa: S101 - runs hold axes with a column only
+            found.append(_fit(axis, group, read[mine], values[mine], scene))
+    return tuple(found)
+
+
+def _fit(
+    axis: str, sessions: tuple[str, ...], read_mm: Array, position_deg: Array, scene: Scene
+) -> Circle:
+    first, second = PLANES[direction_index(axis)]
+    flat = read_mm[:, (first, second)]
+    centre, radius = fit_flat_circle(flat)
+    away = np.linalg.norm(flat - centre, axis=-1) - radius
+    angle = np.deg2rad(position_deg) * scene.machine.axes[axis].direction
+    across = -1.0 if direction_index(axis) == 1 else 1.0  # from z to x about y, not from x to z
+    turn = np.exp(1j * across * angle)
+    complex_mm = (flat - centre) @ np.array([1.0, 1j])
+    along = abs(np.vdot(turn, complex_mm))
+    against = abs(np.vdot(np.conj(turn), complex_mm))
+    return Circle(
+        axis,
+        sessions,
+        "XYZ"[first] + "XYZ"[second],
+        (float(centre[0]), float(centre[1])),
+        radius,
+        float(np.sqrt(np.mean(away**2))),
+        len(flat),
+        bool(against > along),
+    )

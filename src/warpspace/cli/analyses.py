@@ -1,0 +1,290 @@
+"""Commands made from analyses: options from their fields, output from what their results say."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from importlib import import_module
+from pathlib import Path
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from warpspace.analysis.catalogue import Entry
+from warpspace.analysis.options import Option, options_of
+from warpspace.cli.guard import DataFile, check_files
+from warpspace.cli.options import (
+    SCENES,
+    RenamedOption,
+    csv_option,
+    force_option,
+    json_option,
+    output_option,
+    plot_option,
+    print_json,
+    scene_argument,
+)
+from warpspace.cli.tables import echo, progress
+from warpspace.exceptions import OptionError
+from warpspace.machine.limits import SWEEP_CASES
+
+if TYPE_CHECKING:
+    from warpspace.analysis.blocks import Block
+    from warpspace.analysis.description import Analysis, Result
+    from warpspace.scene.model import Scene
+
+MORE = {"concepts": "warpspace.cli.side_by_side", "montecarlo": "warpspace.cli.machines"}
+"""Analyses with options and files of the command line only: where these are."""
+
+
+def build_command(entry: Entry) -> click.Command:
+    """Build the command of an analysis."""
+    return command_of(entry.load())
+
+
+def command_of(kind: "type[Analysis]") -> click.Command:
+    """Build the command of a kind of analysis."""
+    more = import_module(MORE[kind.name]) if kind.name in MORE else None
+    command: Callable[..., None] = _runner(kind, more)
+    command.__doc__ = kind.explained()
+    decorators = [_scenes(kind), *map(_click_option, kind.options())]
+    if kind.has_table:
+        decorators.append(csv_option)
+    if kind.makes_scenes:
+        decorators.append(output_option(f"{kind.scene_help}: .toml.", *SCENES, required=False))
+    if kind.file_help:
+        decorators.append(
+            output_option(kind.file_help, *kind.file_endings, required=kind.needs_file)
+        )
+    if kind.has_chart:
+        decorators.append(plot_option(kind.chart_help))
+    if kind.has_table or kind.makes_scenes or kind.file_help or kind.has_chart or more:
+        decorators.append(force_option)
+    decorators += more.OPTIONS if more else ()
+    for decorate in reversed([*decorators, json_option]):
+        command = decorate(command)
+    return click.command(name=kind.name)(command)
+
+
+def _scenes(kind: "type[Analysis]") -> Callable[..., Any]:
+    if kind.scenes == (1, 1):
+        return scene_argument()
+    return scene_argument("scenes", nargs=-1, required=True)
+
+
+def _click_option(one: Option) -> Callable[..., Any]:
+    traits: dict[str, Any] = {"cls": RenamedOption, "former": one.former, "help": one.help}
+    if one.kind is bool:
+        traits |= {"is_flag": True}
+    elif one.grammar is not None:
+        traits |= {"metavar": one.grammar.metavar, "multiple": True, "required": one.required}
+        traits["type"] = DataFile() if one.grammar.is_file else str
+        traits["help"] += " Repeatable." if one.grammar.many or one.grammar.each else ""
+    elif one.choices:
+        default = None if one.default is None else str(one.default)
+        traits |= {"type": click.Choice(one.choices), "default": default}
+    else:
+        traits |= {"type": one.kind, "required": one.required}
+        traits |= {} if one.required else {"default": one.default}
+    return click.option(one.flag, one.name, **traits)
+
+
+def _runner(kind: "type[Analysis]", more: Any) -> Callable[..., None]:
+    def run(
+        *,
+        as_json: bool,
+        scene: str = "",
+        scenes: tuple[str, ...] = (),
+        csv_path: str | None = None,
+        plot: str | None = None,
+        output: str | None = None,
+        force: bool = False,
+        **values: Any,
+    ) -> None:
+        from warpspace.field.evaluate import second_order_words
+
+        flags = {one.name: one.flag.partition("/")[0] for one in options_of(kind)}
+        flags["output"] = "-o"
+        names, loaded = load_scenes(scenes or (scene,), kind.scenes)
+        try:
+            asked = read_options(kind, values, loaded[0])
+            asked = asked.written(Path(output).stem if output else None)
+            for words in asked.warnings(loaded[0]):
+                warn(OptionError(words).said(lambda name: flags[name]))
+            with progress(kind.doing, total=1.0, silent=as_json) as bar:
+                if more is None:
+                    found = asked.run_all(loaded, bar.reach)
+                else:
+                    its_own = {key: values[key] for key in values if key not in flags}
+                    files = {"plot": plot, "output": output, "force": force}
+                    found = more.run(asked, loaded, bar.reach, names=names, **files, **its_own)
+            warn(*found.doubts())
+            if left_out := found.second_order:
+                warn(*second_order_words(left_out))
+            chart, file = plot if kind.has_chart else None, None if more else output
+            wrote = write_result(found, csv_path, chart, file, force=force)
+        except OptionError as error:
+            raise OptionError(error.said(lambda name: flags.get(name, name))) from None
+        if as_json:
+            spelled = found.as_json()
+            print_json(spelled | ({"files": wrote} if "files" in spelled else {}))
+            return
+        print_blocks(found.blocks())
+        for path in filter(None, (*(wrote or [output]), csv_path, plot)):
+            echo(f"wrote {path}")
+
+    return run
+
+
+def read_options(kind: "type[Analysis]", values: dict[str, Any], scene: "Scene") -> "Analysis":
+    """Build an analysis from what click has read."""
+    given: dict[str, Any] = {}
+    for one in options_of(kind):
+        value = values[one.name]
+        if one.grammar is not None:
+            if one.grammar.each:
+                given[one.name] = tuple(one.read(text, scene) for text in value) or one.default
+                continue
+            if len(value) > 1 and not one.grammar.many:
+                raise OptionError(f"{{{one.name}}} is given {len(value)} times; expected one")
+            value = one.read(",".join(value), scene) if value else one.default
+        elif one.enum is not None and value is not None:
+            value = one.enum(value)
+        given[one.name] = value
+    return kind(**given)
+
+
+def warn(*sentences: str) -> None:
+    """Say on stderr what a reader should doubt."""
+    for words in sentences:
+        echo(f"warpspace: warning: {words}", err=True, fg="yellow")
+
+
+def print_blocks(blocks: "Iterable[Block]") -> None:
+    """Print sentences and tables; charts are for pages and files."""
+    from warpspace.analysis.blocks import Table
+    from warpspace.cli.tables import print_table, print_text
+
+    for block in blocks:
+        if isinstance(block, str):
+            print_text(block)
+        elif isinstance(block, Table):
+            if block.title:
+                print_text(block.title)
+            if block.rows:
+                print_table(block.shown, block.cells())
+            elif block.empty:
+                print_text(block.empty)
+
+
+def write_result(
+    found: "Result", csv_path: str | None, plot: str | None, output: str | None, *, force: bool
+) -> list[str]:
+    """Write what was asked for: scene or files, whose names it gives, table and chart."""
+    wrote = [output] if output else []
+    if output is not None and (texts := found.texts()):
+        wrote = write_texts(texts, Path(output), force=force)
+    elif output is not None:
+        write_scene(found, output, force=force)
+    if csv_path is not None:
+        write_csv(found, csv_path, force=force)
+    if plot is not None:
+        from warpspace.outputs.charts.paper import write_chart
+        from warpspace.outputs.charts.results import result_chart
+
+        draw = resolve_name(found.drawn_by) if found.drawn_by else result_chart
+        write_chart(draw(found), plot, overwrite=force)
+    return wrote
+
+
+def write_texts(texts: Mapping[str, str], path: Path, *, force: bool) -> list[str]:
+    """Write the files of a result: one of this name, others beside it."""
+    from warpspace.outputs.files import write_atomically
+
+    targets = {add: path.with_name(f"{path.stem}{add}") if add else path for add in texts}
+    check_files(click.get_current_context(), [target for add, target in targets.items() if add])
+    for add, target in targets.items():
+        with write_atomically(target, overwrite=force) as temporary:
+            temporary.write_text(texts[add], encoding="utf-8", newline="")
+    return [str(target) for target in targets.values()]
+
+
+def write_csv(found: "Result", path: str, *, force: bool) -> None:
+    """Write the table of a result."""
+    from warpspace.outputs.files import write_atomically
+    from warpspace.scene.files import spell_row
+
+    table = found.file_table()
+    with (
+        write_atomically(path, overwrite=force) as temporary,
+        temporary.open("w", newline="", encoding="utf-8") as file,
+    ):
+        if table is not None:
+            file.writelines(map(spell_row, table.csv_rows()))
+
+
+def write_scene(found: "Result", path: str, *, force: bool) -> None:
+    """Write the last scene that a result proposes."""
+    from warpspace.outputs.files import write_atomically
+    from warpspace.scene.save import scene_to_toml
+
+    changes = found.changes()
+    if not changes:
+        raise OptionError(f"-o {path}: {found.no_change}, so no scene is written")
+    text = scene_to_toml(changes[-1].scene)
+    with write_atomically(path, overwrite=force) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+# --- Scenes of a command -------------------------------------------------------------------------
+
+
+FEW = 32
+"""Scenes that are held in memory together."""
+
+
+class Fleet(Sequence["Scene"]):
+    """Many scenes, each loaded when it is asked for, so that they need not fit into the memory.
+
+    All are loaded once before the first is given, so that a mistake in the last one is said at
+    once and not after hours.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        from warpspace.scene.library import load_scene
+
+        self._names, self._load = names, load_scene
+        for name in names:
+            load_scene(name)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def __getitem__(self, index: Any) -> Any:
+        return self._load(self._names[int(index)])
+
+
+def load_scenes(
+    names: Sequence[str], expected: tuple[int, int | None]
+) -> "tuple[Sequence[str], Sequence[Scene]]":
+    """Load what arguments stand for; of any number of scenes a folder stands for those in it."""
+    from warpspace.scene.library import load_scene
+
+    least, most = expected
+    names = find_scenes(names) if most is None else names
+    if not least <= len(names) <= (most or SWEEP_CASES):
+        known = f"at most {most or SWEEP_CASES:,}" if len(names) > least else f"at least {least}"
+        raise OptionError(f"{len(names):,} scenes; expected {known}")
+    return names, [load_scene(name) for name in names] if len(names) <= FEW else Fleet(names)
+
+
+def find_scenes(names: Sequence[str]) -> list[str]:
+    """List the scenes that arguments stand for; a folder stands for the .toml files in it."""
+    found: list[str] = []
+    for name in names:
+        if Path(name).is_dir():
+            inside = sorted(str(path) for path in Path(name).glob("*.toml"))
+            if not inside:
+                raise OptionError(f"{name}: a folder without .toml files; expected scenes")
+            found += inside
+        else:
+            found.append(name)
+    return found

@@ -1,0 +1,189 @@
+"""What a command reads and writes: no output is a file that is read, or the file of another output.
+
+The types of its parameters say which they are; they are looked at before a command begins. Numbers
+are read as those of every table are.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from copy import copy
+from functools import wraps
+from pathlib import Path
+from typing import Any, cast
+
+import click
+from click.shell_completion import CompletionItem
+
+from warpspace.exceptions import OutputError, SceneError
+from warpspace.resources import assets_dir, check_address_space
+from warpspace.scene.files import parse_number
+
+LEAST_MB = 800
+"""Address space below which imported libraries abort."""
+NUMBERS = (click.types.IntParamType, click.types.FloatParamType)
+
+
+class InputFile(click.Path):
+    """A file that a command reads."""
+
+    def files(self, value: str | Path) -> Iterable[Path]:
+        """Find what is read for a value."""
+        return (Path(value),)
+
+
+class DataFile(InputFile):
+    """A file of readings, or the name of a bundled one."""
+
+    def files(self, value: str | Path) -> Iterable[Path]:
+        """Find the file by its name."""
+        from warpspace.calibration.readings import find_data
+
+        return (find_data(str(value)),)
+
+
+class SceneName(click.ParamType[str]):
+    """A bundled scene or machine, or a path; the shell completes both."""
+
+    name = "scene"
+
+    def shell_complete(
+        self,
+        ctx: click.Context,  # noqa: ARG002 - signature of click
+        param: click.Parameter,  # noqa: ARG002
+        incomplete: str,
+    ) -> list[CompletionItem]:
+        """Offer the bundled names, and files."""
+        from warpspace.scene.library import scene_names
+
+        names = [name for name in scene_names() if name.startswith(incomplete)]
+        return [CompletionItem(name) for name in names] or [CompletionItem(incomplete, type="file")]
+
+    def files(self, value: str | Path) -> Iterable[Path]:
+        """Find the scene, or those of a folder, and the machine, CSV files and meshes they name.
+
+        One that cannot be read names none; what is wrong with it is said when it is loaded.
+        """
+        from warpspace.machine.limits import MAX_SCENE_BYTES
+        from warpspace.scene.files import parse_toml, read_text
+        from warpspace.scene.library import scene_path
+        from warpspace.scene.machines import machine_names
+
+        machine: object = str(value)
+        with suppress(OSError, SceneError):
+            for inside in Path(value).glob("*.toml"):
+                yield from self.files(inside)
+            path = scene_path(value)
+            yield path
+            raw = parse_toml(read_text(path, MAX_SCENE_BYTES), str(path))
+            yield from (path.parent / name for name in _named_files(raw))
+            machine = raw.get("machine")
+        if machine in machine_names():
+            yield from (assets_dir() / "machines" / str(machine)).iterdir()
+
+
+class OutputFile(click.Path):
+    """A file that a command writes; its ending is one of those given, or any.
+
+    They may be given by a function, where a plug-in adds to them.
+    """
+
+    def __init__(self, *endings: str, added: Callable[[], Iterable[str]] = tuple) -> None:
+        super().__init__(readable=False)
+        self._endings, self._added = endings, added
+
+    @property
+    def endings(self) -> tuple[str, ...]:
+        """What it may end with."""
+        return (*self._endings, *self._added())
+
+
+def guarded(command: click.Command) -> click.Command:
+    """Have the files of a command looked at before it begins, and its numbers read strictly."""
+    command.context_settings.setdefault("help_option_names", ["-h", "--help"])
+    for param in command.params:
+        if isinstance(param.type, NUMBERS):
+            param.type = _strict(param.type)
+    run = command.callback
+    if run is not None:
+
+        @wraps(run)
+        def check_and_run(**values: Any) -> Any:
+            check_address_space(LEAST_MB, "warpspace")
+            check_files(click.get_current_context())
+            return run(**values)
+
+        command.callback = check_and_run
+    return command
+
+
+def _strict(kind: "click.ParamType[Any]") -> "click.ParamType[Any]":
+    strict, convert = copy(kind), kind.convert
+
+    def convert_number(
+        value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> object:
+        if isinstance(value, str):
+            try:
+                parse_number(value)
+            except ValueError:
+                kind.fail(f"{value!r} is not a valid {kind.name}.", param, ctx)
+        return convert(value, param, ctx)
+
+    strict.convert = convert_number
+    return strict
+
+
+def check_files(context: click.Context, beside: Iterable[Path] = ()) -> None:
+    """Refuse what a command must not write."""
+    from warpspace.outputs.files import check_target
+
+    values = [
+        (param, value)
+        for param in context.command.params
+        for value in _each(context.params.get(param.name or ""))
+    ]
+    outputs = [
+        (param.opts[0], Path(value), param.type.endings)
+        for param, value in values
+        if isinstance(param.type, OutputFile)
+    ]
+    outputs += [("a file beside it", path, ()) for path in beside]
+    force = bool(context.params.get("force"))
+    for index, (option, path, endings) in enumerate(outputs):
+        inputs = (
+            file
+            for param, value in values
+            if isinstance(param.type, (InputFile, SceneName))
+            for file in param.type.files(value)
+        )
+        check_target(path, endings, overwrite=force, inputs=inputs)
+        for other, written, _ in outputs[:index]:
+            if _is_one(path, written):
+                raise OutputError(
+                    f"{path}: {other} and {option} name one file; expected a name for each"
+                )
+
+
+def _each(value: object) -> tuple[Any, ...]:
+    """Give the values of a parameter, which may be given several times or not at all."""
+    if isinstance(value, tuple):
+        return cast("tuple[Any, ...]", value)
+    return () if value is None else (value,)
+
+
+def _is_one(first: Path, second: Path) -> bool:
+    """Tell whether two files that need not exist are one, also where case does not count."""
+    if str(first.resolve()).casefold() == str(second.resolve()).casefold():
+        return True
+    return first.exists() and second.exists() and first.samefile(second)
+
+
+def _named_files(value: object, key: str = "", table: str = "") -> Iterator[str]:
+    if isinstance(value, dict):
+        for name, part in cast("dict[str, object]", value).items():
+            yield from _named_files(part, name, key)
+    elif isinstance(value, list):
+        for part in cast("list[object]", value):
+            yield from _named_files(part, key, table)
+    elif isinstance(value, str) and (key in {"csv", "file"} or table == "bodies"):
+        yield value

@@ -1,1 +1,0 @@
-"""What commands say of a result: printed, as JSON and as CSV."""

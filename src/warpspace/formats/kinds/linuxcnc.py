@@ -1,0 +1,255 @@
+"""LinuxCNC: screw compensation of a joint, `COMP_FILE`, and the matrix of `matrixkins`.
+
+LinuxCNC documentation, INI configuration, [JOINT_<num>], and src/emc/motion/command.c: rows of
+nominal, forward and reverse, ascending, at most 256; type 0 holds actual positions, type 1 what is
+added to the commanded one; linear between rows, end values held, by direction of travel. Its
+usrmotintf.cc takes the first three numbers of a line and ends at the first line without them, be
+it blank or a comment.
+
+src/hal/components/matrixkins.comp: X_joint = C_xx·X + C_xy·Y + C_xz·Z and so on; of the diagonals
+A (X+/Y+) and B (X+/Y−) of a square part C_xy = (B² − A²) / (2·A·B).
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from warpspace.formats.compensation.wanted import AXES, Wanted
+from warpspace.formats.kind import Files, Format, ReadOptions, has
+from warpspace.formats.source import Source, shown, spell
+from warpspace.formats.terms import HELD, Affine, Line, Tables
+from warpspace.machine.axes import TravelDirection, is_linear
+
+MOST_POINTS = 256
+DIGITS = 6
+JOINTS = "XYZABCUVW"
+"""Axes of the joints 0 to 8, where ``coordinates=`` of KINEMATICS does not name them (trivkins)."""
+INCH_MM = 25.4
+POSITIONS, OFFSETS = "type-0", "type-1"
+NEAR = 0.1
+"""Share of its range by which an actual position may be off, for a file that names no type."""
+_NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
+_ROW = re.compile(rf"\s*{_NUMBER}\s+{_NUMBER}\s+{_NUMBER}(.*)", re.ASCII)
+_KINEMATICS = re.compile(r"(?mi)^\s*KINEMATICS\s*=.*\bcoordinates\s*=\s*([A-Z]+)")
+_INCH = re.compile(r"(?mi)^\s*LINEAR_UNITS\s*=\s*(?:in|inch|imperial)\b")
+_SECTION = re.compile(r"\[JOINT_([0-9])\]")
+
+
+def _is_comp(head: str, name: str) -> bool:
+    """Tell it by rows of three numbers, or by the keys of its INI section."""
+    if re.search(r"^\s*COMP_FILE\s*=", head, re.MULTILINE):
+        return True
+    rows = [line for line in head.splitlines() if line.strip()]
+    return name.lower().endswith(".comp") or (
+        len(rows) > 1 and all(_ROW.match(line) for line in rows)
+    )
+
+
+def _assignment(
+    sources: Sequence[Source],
+) -> tuple[dict[str, tuple[str, str, float]], list[Source]]:
+    """Read INI sections: file name to axis, type and mm in a unit of it; and give the tables."""
+    known: dict[str, tuple[str, str, float]] = {}
+    tables: list[Source] = []
+    for source in sources:
+        if not re.search(r"^\s*COMP_FILE", source.text, re.MULTILINE):
+            tables.append(source)
+            continue
+        named = _KINEMATICS.search(source.text)
+        joints = named[1].upper() if named else JOINTS
+        per_unit = INCH_MM if _INCH.search(source.text) else 1.0
+        joint, file, kind = "", "", POSITIONS
+        for at, bare in replace(source, lines=(*source.lines, "[END]")).scan("#", ";"):
+            if bare.startswith("["):
+                if joint and file:
+                    known[file] = (joint, kind, per_unit if is_linear(joint) else 1.0)
+                found = _SECTION.fullmatch(bare)
+                if found and int(found[1]) >= len(joints):
+                    expected = f"a joint from 0 to {len(joints) - 1}, {joints}"
+                    at.refuse(f"section {bare}", expected)
+                joint, file, kind = (joints[int(found[1])] if found else ""), "", POSITIONS
+                continue
+            key, _, value = (part.strip() for part in bare.partition("="))
+            if key == "COMP_FILE":
+                file = value.rsplit("/", 1)[-1]
+            elif key == "COMP_FILE_TYPE":
+                kind = f"type-{at.whole(value, key, 0, 1)}"
+    return known, tables
+
+
+def _rows(source: Source, per_unit: float, notes: list[str]) -> np.ndarray:
+    """Read the rows of a table as far as LinuxCNC does, [n, 3], mm or degrees."""
+    rows: list[list[float]] = []
+    for number, line in enumerate(source.lines, start=1):
+        at, found = source.at(number), _ROW.match(line)
+        if found is None:
+            left = sum(_ROW.match(one) is not None for one in source.lines[number:])
+            if not rows:
+                stops = f"LinuxCNC stops here, at {at.shown}, and has no table"
+                at.refuse(stops, "three numbers: nominal forward reverse")
+            if left:
+                notes.append(
+                    f"{source.name}: LinuxCNC stops at line {number}, {at.shown}: {left} rows"
+                    " behind it are not read"
+                )
+            break
+        if found[4].strip():
+            notes.append(
+                f"{source.name}: line {number}: {shown(found[4])} behind three numbers is not read"
+            )
+        row = [per_unit * at.number(found[n], "value") for n in (1, 2, 3)]
+        if rows and row[0] <= rows[-1][0]:
+            expected = "ascending positions, as LinuxCNC does"
+            at.refuse(f"nominal {row[0]:g} after {rows[-1][0]:g}", expected)
+        rows.append([at.checked_position(value, "value") for value in row])
+        if len(rows) > MOST_POINTS:
+            at.refuse(f"has more than {MOST_POINTS} rows; LinuxCNC takes {MOST_POINTS}")
+    return np.array(rows)
+
+
+def _kind(rows: np.ndarray, given: str) -> tuple[str, tuple[str, ...]]:
+    if given:
+        return given, ()
+    span = max(np.ptp(rows[:, 0]), abs(rows[:, 0]).max(), 1e-9)
+    positions = np.abs(rows[:, 1:] - rows[:, :1]).max() < NEAR * span
+    kind = POSITIONS if positions and np.abs(rows[:, 1]).max() > NEAR * span else OFFSETS
+    said = "actual positions (type 0)" if kind == POSITIONS else "offsets (type 1)"
+    return kind, (f"second and third column taken for {said}; --variant says otherwise",)
+
+
+def _read_comp(sources: Sequence[Source], options: ReadOptions) -> Tables:
+    """Read the tables as the motion controller holds them."""
+    known, tables = _assignment(sources)
+    terms: list[Line] = []
+    inches = any(size != 1.0 for _, _, size in known.values())
+    assumed: list[str] = [f"machine units {'inches' if inches else 'mm'} and degrees"]
+    notes: list[str] = []
+    for source in tables:
+        axis, kind, per_unit = known.get(source.base, ("", "", 1.0))
+        if not axis:
+            letter = source.stem.upper().rsplit("_", 1)[-1]
+            axis = options.axis or (letter if len(letter) == 1 and letter in JOINTS else "")
+        if not axis:
+            source.unsaid("does not say which axis it is for", "--axis X, or its INI file")
+        axis = options.axis_named(axis, source)
+        if any(term.source == axis for term in terms):
+            source.refuse(f"is a second table of {axis}", "one a joint, as LinuxCNC takes")
+        rows = _rows(source, per_unit, notes)
+        kind, said = _kind(rows, options.variant or kind)
+        assumed += said
+        trims = rows[:, :1] - rows[:, 1:] if kind == POSITIONS else rows[:, 1:]
+        nominal, forward, reverse = (tuple(column.tolist()) for column in (rows[:, 0], *trims.T))
+        backward = () if forward == reverse else reverse
+        terms.append(Line(axis, axis, nominal, forward, HELD, backward))
+    if not terms:
+        sources[0].refuse("names files", "the files of its COMP_FILE lines beside it")
+    return Tables(tuple(terms), tuple(dict.fromkeys(assumed)), tuple(notes))
+
+
+def _write_comp(wanted: Wanted) -> Files:
+    """Write a table of type 1 for each axis, and the INI lines that name them."""
+    files: dict[str, str] = {}
+    lines = [f"# {wanted.title}", f"# joints counted as {JOINTS}: trivkins without coordinates="]
+    for axis in wanted.axes:
+        if axis not in wanted.corrector.moved or axis not in JOINTS:
+            continue
+        places = wanted.places(axis)
+        ways = (TravelDirection.FORWARD, TravelDirection.BACKWARD)
+        forward, backward = (
+            wanted.round(wanted.toward(way, axis).averaged([axis])[axis]).tolist() for way in ways
+        )
+        files[f"_{axis}.comp"] = "".join(
+            f"{spell(q, DIGITS)} {spell(there, DIGITS)} {spell(back, DIGITS)}\n"
+            for q, there, back in zip(places.tolist(), forward, backward, strict=True)
+        )
+        lines += [
+            f"[JOINT_{JOINTS.index(axis)}]",
+            f"COMP_FILE = {wanted.stem}_{axis}.comp",
+            "COMP_FILE_TYPE = 1",
+        ]
+    return {"": "\n".join(lines) + "\n", **files}
+
+
+# --- the matrix of the kinematics -----------------------------------------------------------------
+
+MATRIX_DIGITS = 9
+MOST = 0.1
+"""Of a coefficient's distance from the identity: 0.1 rad or 10 %."""
+_SETP = re.compile(r"setp\s+matrixkins\.C_([xyz])([xyz])\s+(\S+)", re.IGNORECASE)
+
+
+def squareness(first_diagonal_mm: float, second_diagonal_mm: float) -> float:
+    """Give C_xy of a part from its diagonals."""
+    a, b = first_diagonal_mm, second_diagonal_mm
+    return (b * b - a * a) / (2.0 * a * b)
+
+
+def _read_matrix(sources: Sequence[Source], options: ReadOptions) -> Tables:
+    """Read the matrix as the kinematics module holds it."""
+    found: dict[tuple[str, str], float] = {}
+    for source in sources:
+        for at, bare in source.scan("#"):
+            if "matrixkins.C_" not in bare:
+                continue
+            matched = _SETP.fullmatch(bare)
+            if matched is None:
+                at.refuse(at.shown, "setp matrixkins.C_xy NUMBER")
+            row, column = matched[1].upper(), matched[2].upper()
+            value = at.number(matched[3], f"C_{matched[1]}{matched[2]}") - float(row == column)
+            if abs(value) > MOST:
+                at.refuse(at.shown, f"a matrix within ±{MOST:g} of the identity")
+            if (row, column) in found:
+                at.refuse(f"C_{row.lower()}{column.lower()} is set twice", "it once")
+            for axis in (row, column):
+                options.axis_named(axis, at)
+            found[row, column] = value
+        if not found:
+            source.refuse("sets no coefficient", "setp matrixkins.C_xx … C_zz")
+    matrix = tuple(tuple(found.get((row, axis), 0.0) for axis in AXES) for row in AXES)
+    return Tables((Affine(AXES, matrix),), (), (), ("mm/mm",))
+
+
+def _write_matrix(wanted: Wanted) -> Files:
+    """Write the matrix that leaves the smallest RMS."""
+    allowed = [(row, column) for row in AXES for column in AXES]
+    found = wanted.linear_fit(allowed)
+    lines = [f"# {wanted.title}"]
+    for row, column in allowed:
+        value = float(row == column) + found.get((row, column), 0.0)
+        text = spell(float(wanted.round(value)), MATRIX_DIGITS)
+        lines.append(f"setp matrixkins.C_{row.lower()}{column.lower()} {text}")
+    return {"": "\n".join(lines) + "\n"}
+
+
+COMP = Format(
+    name="linuxcnc-comp",
+    title="LinuxCNC COMP_FILE, screw compensation of a joint",
+    source="LinuxCNC documentation, INI Configuration, [JOINT_<num>] COMP_FILE",
+    endings=(".comp", ".ini", ".txt"),
+    holds="the positioning error of each axis, forward and backward",
+    units="mm, degrees (machine units)",
+    grid="any ascending positions",
+    limits="256 rows a joint; end values held",
+    recognise=_is_comp,
+    tables=_read_comp,
+    write=_write_comp,
+    most_points=MOST_POINTS,
+    variants=(POSITIONS, OFFSETS),
+)
+MATRIX = Format(
+    name="linuxcnc-matrix",
+    title="LinuxCNC matrixkins, 3 × 3 matrix of calibrated kinematics",
+    source="LinuxCNC manual page matrixkins(9)",
+    endings=(".hal",),
+    holds="squareness between X, Y and Z, and their scales",
+    units="mm/mm",
+    grid="none: the same everywhere",
+    offsets=False,
+    limits="nine numbers, no constant part",
+    recognise=has(r"matrixkins\.C_"),
+    tables=_read_matrix,
+    write=_write_matrix,
+)
+FORMATS = (COMP, MATRIX)

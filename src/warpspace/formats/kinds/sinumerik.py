@@ -1,0 +1,454 @@
+"""SINUMERIK tables: `$AA_ENC_COMP` of an axis for itself, `$AN_CEC` of one axis over another.
+
+Siemens SINUMERIK 840D sl/828D, Function Manual Extended Functions (03/2013, 6FC5397-1BP40-3BA1),
+K3, pages 237 to 264: linear between equidistant points, end values held, or repeated with the
+modulo function; a positive value of `$AA_ENC_COMP` makes the axis move in the negative direction.
+`$AN_CEC` has tables for one direction of travel, and adds the product of two tables. Archives
+assign system variables, `$NAME[index, …] = value ; comment`.
+
+A table of `$AN_CEC` holds the mean of the correction over the other axes. What two axes do together
+beyond that, such as an angle times a lever, is a sum of products of two tables. Where errors depend
+on the direction of travel, two tables act in one direction each, the values around their mean.
+"""
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from warpspace.exceptions import OptionError
+from warpspace.formats.compensation.wanted import Wanted, shares
+from warpspace.formats.kind import ERROR, Files, Format, ReadOptions, has
+from warpspace.formats.source import Place, Source, shown, spell
+from warpspace.formats.terms import HELD, MODULO, Line, Product, Tables, Term
+from warpspace.machine.axes import TravelDirection
+from warpspace.units import Array
+
+ENC, CEC = "AA_ENC_COMP", "AN_CEC"
+AXES = ("INPUT_AXIS", "OUTPUT_AXIS")
+RANGE = ("STEP", "MIN", "MAX")
+DIRECTION, FACTOR, IS_MODULO = "DIRECTION", "MULT_BY_TABLE", "IS_MODULO"
+MOST_TABLES = 62
+"""Twice the axes of an NC (manual, "Compensation table index")."""
+SIGN = "a positive value makes the axis move in the negative direction (manual, page 238)"
+CEC_SIGN = (
+    "a positive value makes the corrected axis move in the negative direction, as page 238 of the"
+    " manual says of $AA_ENC_COMP; it does not say so of $AN_CEC: try it on the machine, or give"
+    " --sign correction"
+)
+UNITS = "lengths mm, angles degrees (metric system)"
+DIGITS = 7
+"""Digits behind the point of a value: a tenth of a nanometre."""
+STEP_SHARE = 1e-4
+"""Share of a step by which start, end and step may disagree."""
+MOST_INDEX = 100_000
+MOST_PRODUCTS = 3
+"""Pairs of tables for one axis over two others."""
+LEAST_MM = 1e-5
+"""A product of tables below it is not worth two tables."""
+SWITCHES = {DIRECTION: (-1, 1), FACTOR: (0, MOST_TABLES), IS_MODULO: (0, 1)}
+"""Whole numbers of a table, each between limits."""
+Needed = Mapping[tuple[str, ...], Array]
+"""Corrections by the axis that is corrected and those that they are over."""
+_ASSIGNMENT = re.compile(r"\$([A-Z_]+)\s*\[([^\]]*)\]\s*=\s*(.+)")
+_QUIET = re.compile(r"(%.*|CHANDATA\(\d+\)|M17|M30|M02|N\d+)", re.IGNORECASE)
+
+
+# --- archives -----------------------------------------------------------------------------------
+
+
+@dataclass
+class Table:
+    """What a file says of one table, as it is read line by line."""
+
+    at: Place  # where it begins
+    values: dict[int, float] = field(default_factory=dict[int, float])  # by interpolation point
+    numbers: dict[str, float] = field(default_factory=dict[str, float])  # STEP, MIN and MAX
+    # IS_MODULO and the like; 0 where they are not set
+    switches: dict[str, int] = field(default_factory=dict[str, int])
+    axes: dict[str, str] = field(default_factory=dict[str, str])  # where the file names them
+
+    def line(self, axes: tuple[str, str], prefix: str, what: str, factor: float) -> Line:
+        """Give it as the controller evaluates it."""
+        for setting in RANGE:
+            if setting not in self.numbers:
+                found = f"{what}: ${prefix}_{setting} is missing"
+                self.at.refuse(found, "it (is the file cut off?)")
+        step, start, end = (self.numbers[setting] for setting in RANGE)
+        if step <= 0.0 or end <= start:
+            found = f"{what}: step {step:g} from {start:g} to {end:g}"
+            self.at.refuse(found, "a step above 0 and an end above the start")
+        steps = (end - start) / step
+        if abs(steps - round(steps)) > STEP_SHARE:
+            found = f"{what}: {start:g} to {end:g} is no whole number of steps of {step:g}"
+            self.at.refuse(f"{found} ({steps:.4g})", "equal steps from start to end")
+        if round(steps) > MOST_INDEX:
+            self.at.refuse(f"{what}: {round(steps):,} steps", f"at most {MOST_INDEX:,}")
+        last = round(steps)
+        missing = next((index for index in range(last + 1) if index not in self.values), None)
+        if missing is not None:
+            expected = f"points 0 … {last}, as start, end and step say"
+            self.at.refuse(f"{what}: interpolation point {missing} has no value", expected)
+        if len(self.values) > last + 1:
+            found = f"{what}: interpolation point {max(self.values)}"
+            self.at.refuse(found, f"the last one to be {last} at the end position")
+        return Line(
+            *axes,
+            tuple((start + step * np.arange(last + 1, dtype=np.float64)).tolist()),
+            tuple(factor * self.values[index] for index in range(last + 1)),
+            MODULO if self.switches.get(IS_MODULO) else HELD,
+            direction=self.switches.get("DIRECTION", 0),
+        )
+
+
+def _assigns(name: str) -> Callable[[str, str], bool]:
+    """Tell files that assign a variable, or one whose name begins so."""
+    return has(rf"^\s*(?:N\d+\s+)?\${name}[A-Z_]*\s*\[")
+
+
+def _assignments(
+    source: Source, prefix: str, settings: Sequence[str], indices: tuple[str, str]
+) -> Iterator[tuple[Place, str, list[str], str]]:
+    """Give place, setting (empty for a value), indices and value of each assignment.
+
+    How many indices a value has, and a setting, is seen from how they are spelled in messages.
+    """
+    names = (prefix, *(f"{prefix}_{setting}" for setting in settings))
+    any_found = False
+    for at, text in source.scan(";"):
+        bare = re.sub(r"^N\d+\s+", "", text)
+        if _QUIET.fullmatch(bare):
+            continue
+        matched = _ASSIGNMENT.fullmatch(bare)
+        if matched is None:
+            at.refuse(at.shown, "$VARIABLE[index, …] = value")
+        name, inner, value = matched.groups()
+        if name not in names:
+            at.refuse(f"variable ${name}", f"one of {', '.join(f'${known}' for known in names)}")
+        parts = [part.strip() for part in re.split(r"[,.]", inner)]
+        expected = indices[name != prefix]
+        if len(parts) != expected.count(",") + 1:
+            at.refuse(f"${name}[{', '.join(parts)}]", expected)
+        any_found = True
+        yield at, name.removeprefix(prefix).removeprefix("_"), parts, value.strip()
+    if not any_found:
+        source.refuse(f"has no ${prefix}", "tables of this variable")
+
+
+def _index(text: str, at: Place) -> int:
+    """Read the index of a table or of an interpolation point."""
+    return at.whole(text, "index", 0, MOST_INDEX)
+
+
+def _axis_name(text: str, at: Place) -> str:
+    """Read the name of an axis: X1, (X1) or "X1"."""
+    bare = text.strip().strip("()").strip().strip('"').strip()
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9]{0,15}", bare):
+        at.refuse(f"axis {shown(text)}", "the name of an axis")
+    return bare.upper()
+
+
+def _point_lines(prefix: str, point: Callable[[int], str], values: Array) -> list[str]:
+    """Spell the values of a table; the indices of each point are given by a function."""
+    return [f"${prefix}[{point(i)}]={spell(v, DIGITS)}" for i, v in enumerate(values.tolist())]
+
+
+def _range_lines(prefix: str, index: str, places: Array) -> list[str]:
+    """Spell the range of a table in equal steps, whose own indices are given."""
+    step = (places[-1] - places[0]) / (len(places) - 1)
+    bounds = zip(RANGE, (step, places[0], places[-1]), strict=True)
+    return [f"${prefix}_{setting}[{index}]={float(number)!r}" for setting, number in bounds]
+
+
+def _archive(name: str, wanted: Wanted, sign: str, body: Sequence[str]) -> Files:
+    """Spell an archive with its head and its end."""
+    head = [f"%_N_{name}_INI", "CHANDATA(1)", f"; written by warpspace for {wanted.title}"]
+    head.append(f"; {'sign: ' + wanted.sign if wanted.sign else sign}")
+    return {"": "\n".join([*head, *body, "M17"]) + "\n"}
+
+
+def _read(
+    source: Source,
+    prefix: str,
+    indices: tuple[str, str],
+    key_of: Callable[[list[str], Place], tuple[Any, str]],
+    settings: Sequence[str] = (*RANGE, IS_MODULO),
+) -> dict[Any, Table]:
+    """Read the tables of a variable, by what its indices say; words for a table go with that."""
+    found: dict[Any, Table] = {}
+    for at, setting, parts, value in _assignments(source, prefix, settings, indices):
+        name = f"${prefix}_{setting}" if setting else f"${prefix}"
+        key, what = key_of(parts, at)
+        table = found.setdefault(key, Table(at))
+        if setting in AXES:
+            table.axes[setting] = _axis_name(value, at)
+        elif setting in RANGE:
+            table.numbers[setting] = at.number(value, name)
+        elif setting:
+            table.switches[setting] = at.whole(value, name, *SWITCHES[setting])
+        elif (index := _index(parts[1], at)) in table.values:
+            at.refuse(f"{what}: interpolation point {index} is given twice", "it once")
+        else:
+            table.values[index] = at.number(value, name)
+    return found
+
+
+# --- tables of an axis for itself ---------------------------------------------------------------
+
+
+def _read_enc(sources: Sequence[Source], options: ReadOptions) -> Tables:
+    terms: list[Line] = []
+    notes: list[str] = []
+
+    def key_of(parts: list[str], at: Place) -> tuple[tuple[int, str], str]:
+        return (_index(parts[0], at), _axis_name(parts[-1], at)), f"${ENC}"
+
+    for source in sources:
+        indices = ("[encoder, point, axis]", "[encoder, axis]")
+        for (encoder, name), table in _read(source, ENC, indices, key_of).items():
+            axis = options.axis_named(name, table.at)
+            what = f"table of {name}"
+            if any(term.source == axis for term in terms):
+                table.at.refuse(f"{what}: {axis} has a table already", "one an axis")
+            terms.append(table.line((axis, axis), ENC, what, options.factor(ERROR)))
+            if encoder:
+                notes.append(f"{name}: the table of measuring system {encoder + 1} was taken")
+    return Tables(tuple(terms), (options.said_sign(SIGN), UNITS), tuple(notes))
+
+
+def _write_enc(wanted: Wanted) -> Files:
+    body: list[str] = []
+    for axis in wanted.axes:
+        if axis not in wanted.corrector.moved:
+            continue
+        places = wanted.places(axis)
+        values = wanted.factor(ERROR) * wanted.averaged([axis])[axis]
+        body += [
+            f"; MD38000 $MA_MM_ENC_COMP_MAX_POINTS[0,{axis}] >= {len(places)}",
+            *_point_lines(ENC, f"0,{{}},{axis}".format, wanted.round(values)),
+            *_range_lines(ENC, f"0,{axis}", places),
+            f"${ENC}_{IS_MODULO}[0,{axis}]=0",
+        ]
+    return _archive("AX_EEC", wanted, SIGN, body)
+
+
+# --- tables of one axis over another --------------------------------------------------------------
+
+
+def _read_cec(sources: Sequence[Source], options: ReadOptions) -> Tables:
+    terms: list[Term] = []
+    factor = options.factor(ERROR)
+
+    def key_of(parts: list[str], at: Place) -> tuple[int, str]:
+        index = _index(parts[0], at)
+        if index >= MOST_TABLES:
+            at.refuse(f"table {index}", f"at most {MOST_TABLES - 1}")
+        return index, f"table {index}"
+
+    for source in sources:
+        settings = (*AXES, *RANGE, *SWITCHES)
+        tables = _read(source, CEC, ("[table, point]", "[table]"), key_of, settings)
+        lines = {}
+        for index, table in tables.items():
+            what = f"table {index}"
+            for setting in AXES:
+                if setting not in table.axes:
+                    found = f"{what}: ${CEC}_{setting} is missing"
+                    table.at.refuse(found, "it (is the file cut off?)")
+            along, target = (options.axis_named(table.axes[one], table.at) for one in AXES)
+            lines[index] = table.line((along, target), CEC, what, factor)
+        terms += lines.values()
+        for index, table in tables.items():
+            other = table.switches.get(FACTOR, 0) - 1
+            if other < 0:
+                continue
+            if other not in lines:
+                found = f"table {index} is multiplied by table number {other + 1}"
+                table.at.refuse(f"{found}, which the file does not have")
+            terms.append(Product(lines[index], lines[other], factor))
+    return Tables(tuple(terms), (options.said_sign(CEC_SIGN), UNITS))
+
+
+def _write_cec(wanted: Wanted) -> Files:
+    tables = _cross_tables(wanted, wanted.factor(ERROR), MOST_TABLES)
+    if len(tables) > MOST_TABLES:
+        raise OptionError(
+            f"sinumerik-cec: {len(tables)} tables; expected at most {MOST_TABLES}, as the control"
+            " takes: correct fewer axes"
+        )
+    body: list[str] = []
+    for index, table in enumerate(tables):
+        places = wanted.places(table.along)
+        body += [
+            f"; MD18342 $MN_MM_CEC_MAX_POINTS[{index}] = {len(places)}",
+            *_point_lines(CEC, f"{index},{{}}".format, wanted.round(table.values)),
+            f"${CEC}_INPUT_AXIS[{index}]=({table.along})",
+            f"${CEC}_OUTPUT_AXIS[{index}]=({table.target})",
+            *_range_lines(CEC, str(index), places),
+            f"${CEC}_DIRECTION[{index}]={table.direction}",
+            f"${CEC}_MULT_BY_TABLE[{index}]={index + table.number + 1 if table.number else 0}",
+            f"${CEC}_IS_MODULO[{index}]=0",
+        ]
+    return _archive("NC_CEC", wanted, CEC_SIGN, body)
+
+
+# --- the tables that a scene needs --------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class CrossTable:
+    """One table to write."""
+
+    along: str  # axis looked up, and corrected axis
+    target: str
+    values: Array  # (n,)
+    # 1 or −1 where it acts in one direction of travel of the axis looked up only
+    direction: int = 0
+    number: int = 0  # how many tables further the other factor of a product stands, 0 for none
+
+
+def _cross_tables(wanted: Wanted, factor: float, most: int) -> list[CrossTable]:
+    """Give the tables that correct all axes over all axes."""
+    mean, axes = wanted.toward(TravelDirection.MEAN), wanted.axes
+    needed = {
+        (target, *group): values
+        for group in ((), *((axis,) for axis in axes), *combinations(axes, 2))
+        for target, values in mean.averaged(group).items()
+    }
+    halves = {axis: _half_reversals(wanted, axis) for axis in wanted.directed}
+    for most_products in (MOST_PRODUCTS, 0):
+        tables = [
+            table
+            for target in wanted.corrector.moved
+            for table in _tables_for(wanted, factor, target, needed, halves, most_products)
+        ]
+        if len(tables) <= most:
+            break
+    # where there is nothing to correct: a table of zeros
+    zeros = np.zeros(len(wanted.places(axes[0])))
+    return tables or [CrossTable(axes[0], wanted.corrector.moved[0], zeros)]
+
+
+def _half_reversals(wanted: Wanted, axis: str) -> Needed:
+    """Give half the difference that the direction of one axis makes: over it, and it and another.
+
+    The first axis of each group is that one.
+    """
+    base = wanted.toward(TravelDirection.MEAN)
+    ways = [base.toward(way, axis) for way in (TravelDirection.FORWARD, TravelDirection.BACKWARD)]
+    found: dict[tuple[str, ...], Array] = {}
+    for other in ("", *wanted.axes):
+        if other == axis:
+            continue
+        group = tuple(name for name in wanted.axes if name in (axis, other))
+        there, back = (way.averaged(group) for way in ways)
+        for target in there:
+            half = (there[target] - back[target]) / 2.0
+            half = half.T if other and group[0] != axis else half
+            found[(target, axis, other) if other else (target, axis)] = half
+    return found
+
+
+def _tables_for(
+    wanted: Wanted,
+    factor: float,
+    target: str,
+    needed: Needed,
+    halves: Mapping[str, Needed],
+    most_products: int,
+) -> list[CrossTable]:
+    axes = wanted.axes
+    mean = float(needed[target,])
+    along = {axis: needed[target, axis] - mean for axis in axes}
+    home = target if target in axes else axes[0]
+    along[home] = along[home] + mean
+    products: list[CrossTable] = []
+    for first, second in combinations(axes, 2):
+        for one, other in _factors(
+            factor * _interaction(needed[target, first, second]), MOST_PRODUCTS
+        ):
+            # both tables also act by themselves: their axis' own table takes that back
+            along[first] = along[first] - factor * one
+            along[second] = along[second] - factor * other
+            products += [
+                CrossTable(first, target, one, number=1),
+                CrossTable(second, target, other),
+            ]
+    half = {axis: groups[target, axis] for axis, groups in halves.items()}
+    for axis, groups in halves.items():
+        for second in (other for other in axes if other != axis):
+            rest = groups[target, axis, second] - groups[target, axis][:, None]
+            for one, other in _factors(factor * rest, most_products):
+                half[axis] = half[axis] - factor * one
+                along[second] = along[second] - factor * other
+                products += [
+                    CrossTable(axis, target, one, 1, number=2),
+                    CrossTable(axis, target, -one, -1, number=1),
+                    CrossTable(second, target, other),
+                ]
+    own: list[CrossTable] = []
+    for axis, values in along.items():
+        turned = half.get(axis, np.zeros(()))
+        if np.abs(turned).max() > LEAST_MM / 100.0:
+            own += [
+                CrossTable(axis, target, factor * (values + way * turned), way) for way in (1, -1)
+            ]
+        else:
+            own.append(CrossTable(axis, target, factor * values))
+    kept = [table for table in own if np.abs(table.values).max() > LEAST_MM / 100.0]
+    return [*kept, *products]
+
+
+def _factors(both: Array, most: int) -> Iterator[tuple[Array, Array]]:
+    left, sizes, right = np.linalg.svd(both)
+    for rank, size in enumerate(sizes[:most].tolist()):
+        one, other = left[:, rank] * np.sqrt(size), right[rank] * np.sqrt(size)
+        if np.abs(one).max() * np.abs(other).max() < LEAST_MM:
+            return
+        yield one, other
+
+
+def _interaction(both: Array) -> Array:
+    """Take out of a table of two axes what depends on one of them alone, [n1, n2]."""
+    one, other = (shares(count) for count in both.shape)
+    first, second = both @ other, one @ both
+    return both - first[:, None] - second + one @ first
+
+
+_MANUAL = "Siemens, SINUMERIK 840D sl Function Manual Extended Functions, K3, 6FC5397-1BP40-3BA1"
+_ENDINGS = (".ini", ".spf", ".mpf", ".arc", ".txt")
+FORMATS = (
+    Format(
+        name="sinumerik-enc",
+        title="SINUMERIK $AA_ENC_COMP, measuring system error compensation",
+        source=_MANUAL,
+        endings=_ENDINGS,
+        holds="the positioning error of each axis (EXX, EYY, ECC …)",
+        units="mm, degrees",
+        grid="equal steps along each axis",
+        limits="as many points as MD38000 keeps; end values held, or modulo",
+        recognise=_assigns(ENC),
+        tables=_read_enc,
+        write=_write_enc,
+        apart=True,
+    ),
+    Format(
+        name="sinumerik-cec",
+        title="SINUMERIK $AN_CEC, sag and angularity compensation",
+        source=_MANUAL,
+        endings=_ENDINGS,
+        holds="displacements of any axis over any axis, by direction of travel, and products of"
+        " two",
+        units="mm, degrees",
+        grid="equal steps along the axis looked up",
+        limits="62 tables, as many points as MD18342 keeps; end values held, or modulo",
+        recognise=_assigns(CEC),
+        tables=_read_cec,
+        write=_write_cec,
+        apart=True,
+        orientation=True,
+    ),
+)

@@ -1,0 +1,342 @@
+"""Skew factors of printer firmware: Klipper and Marlin evaluate them alike.
+
+Klipper, klippy/extras/skew_correction.py, a port of Marlin's planner: of the diagonals AC and BD
+and the side AD of a printed part, with side = √(2·AC² + 2·BD² − 4·AD²) / 2, the factor is
+tan(π/2 − acos((AC² − side² − AD²) / (2·side·AD))); x is moved by −y·XY − z·(XZ − XY·YZ), and y by
+−z·YZ.
+
+Klipper documentation, Skew_Correction: a profile [skew_correction NAME] acts once SKEW_PROFILE
+LOAD=NAME is given; axis_twist_compensation.py: the twist is a height that a probe is off by, along
+X, its mean taken out; it corrects the probe, not the nozzle. Marlin documentation, M852 (I, J, K
+are the factors of XY, XZ, YZ; S that of XY), and Marlin/src/inc/Conditionals_post.h.
+"""
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from warpspace.formats.compensation.wanted import AXES, Wanted
+from warpspace.formats.kind import Files, Format, ReadOptions, has
+from warpspace.formats.measured import BOTH, Imported, Run, Series, merge
+from warpspace.formats.source import RAD_TO_URAD, Place, Source, spell
+from warpspace.formats.terms import Affine, Tables, errors_of
+
+PLANES = ("XY", "XZ", "YZ")
+MOST = 1.0
+"""Of a factor (Marlin, SKEW_FACTOR_MAX)."""
+OPEN = 0.02
+"""Share by which the side that two diagonals and a side give may differ from that side, unsaid."""
+SIDE_MM = 100.0
+"""Side of the part that a factor is spelled by."""
+
+
+def skew_factor(ac: float, bd: float, ad: float) -> float:
+    """Give the skew factor of a part from its lengths, mm."""
+    side = other_side(ac, bd, ad)
+    return math.tan(
+        math.pi / 2.0 - math.acos((ac * ac - side * side - ad * ad) / (2.0 * side * ad))
+    )
+
+
+def other_side(ac: float, bd: float, ad: float) -> float:
+    """Give the side AB that closes a part, mm."""
+    return math.sqrt(2.0 * ac * ac + 2.0 * bd * bd - 4.0 * ad * ad) / 2.0
+
+
+def open_notes(lengths: tuple[float, float, float], plane: str) -> tuple[str, ...]:
+    """Say where the lengths of a part do not close for a square one."""
+    ac, bd, ad = lengths
+    side = other_side(ac, bd, ad)
+    if abs(side / ad - 1.0) < OPEN:
+        return ()
+    shown = f"{plane}: AC {ac:g}, BD {bd:g} and AD {ad:g} mm close only with a side AB of"
+    share = 100.0 * (side / ad - 1.0)
+    return (
+        f"{shown} {side:.4g} mm, {share:+.1f} % from AD: is the part square, is none mistyped?",
+    )
+
+
+def skew_lengths(factor: float) -> tuple[float, float, float]:
+    """Give diagonals and side of a rhombus that has a skew factor, mm: AC, BD, AD."""
+    angle = math.pi / 2.0 - math.atan(factor)
+    return 2.0 * SIDE_MM * math.cos(angle / 2.0), 2.0 * SIDE_MM * math.sin(angle / 2.0), SIDE_MM
+
+
+def factor_of(lengths: tuple[float, float, float], at: Place, what: str) -> float:
+    """Give the factor of measured lengths."""
+    ac, bd, ad = lengths
+    # the diagonals of a parallelogram are together longer than twice a side, and differ by less
+    if not (min(lengths) > 0.0 and ac + bd > 2.0 * ad > abs(ac - bd)):
+        found = f"{what}: AC {ac:g}, BD {bd:g}, AD {ad:g} mm are no parallelogram"
+        at.refuse(found, "two diagonals and a side")
+    return skew_factor(ac, bd, ad)
+
+
+def skew_term(factors: Mapping[str, float]) -> Affine:
+    """Give the corrections of skew factors by plane."""
+    xy, xz, yz = (factors.get(plane, 0.0) for plane in PLANES)
+    return Affine(AXES, ((0.0, -xy, -(xz - xy * yz)), (0.0, 0.0, -yz), (0.0, 0.0, 0.0)))
+
+
+def fitted_factors(wanted: Wanted) -> dict[str, float]:
+    """Give the factors that leave the smallest RMS over the volume."""
+    found = wanted.linear_fit((("X", "Y"), ("X", "Z"), ("Y", "Z")))
+    xy, yz = -found.get(("X", "Y"), 0.0), -found.get(("Y", "Z"), 0.0)
+    xz = -found.get(("X", "Z"), 0.0) + xy * yz
+    return {"XY": xy, "XZ": xz, "YZ": yz}
+
+
+# --- Klipper ------------------------------------------------------------------------------------
+
+LEAST_OFFSET_MM = 1.0
+"""Between probe and nozzle: below it a twist cannot be told from the height."""
+PROBES = ("probe", "bltouch", "beacon", "cartographer", "smart_effector")
+_SET = re.compile(r"\b(XY|XZ|YZ)=([^\s]+)")
+_PROFILE = re.compile(r"\[skew_correction\s+([^\]]+?)\s*\]")
+_LOAD = re.compile(r"\bSKEW_PROFILE\s+LOAD=\"?([^\s\"]+)")
+_SAVED = re.compile(r"(xy|xz|yz)_skew\s*[=:]\s*(\S+)")
+_SECTION = re.compile(r"\[([a-z_]+)(?:\s+[^\]]*)?\]")
+Section = dict[str, tuple[Place, str]]
+
+
+def _sections(source: Source) -> dict[str, Section]:
+    found: dict[str, Section] = {}
+    section: Section = {}
+    for number, text in enumerate(source.lines, start=1):
+        bare = text.removeprefix("#*#").split(" ;")[0].strip()
+        if matched := _SECTION.fullmatch(bare):
+            section = found.setdefault(matched[1], {})
+        elif not bare.startswith(("#", ";")) and (pair := re.match(r"(\w+)\s*[:=]\s*(.*)", bare)):
+            section[pair[1]] = (source.at(number), pair[2].strip())
+    return found
+
+
+def _factors(source: Source, options: ReadOptions, notes: list[str]) -> dict[str, float]:
+    """Read the skew factors of a file: what its commands set, else its one profile."""
+    found: dict[str, float] = {}
+    profiles: dict[str, dict[str, float]] = {}
+    loaded, name = options.variant, ""
+    for number, text in enumerate(source.lines, start=1):
+        at, bare = source.at(number), text.removeprefix("#*#").strip()
+        commented = bare.startswith((";", "#"))
+        if matched := _PROFILE.fullmatch(bare):
+            name = matched[1]
+        elif not commented and (matched := _LOAD.search(bare)):
+            loaded = options.variant or matched[1]
+        elif "SET_SKEW" in bare and not commented:
+            if re.search(r"CLEAR\s*=\s*1", bare):
+                found.clear()
+                continue
+            for plane, value in _SET.findall(bare):
+                parts = value.split(",")
+                if len(parts) != 3:
+                    at.refuse(f"{plane}={value}", "three lengths AC,BD,AD in mm")
+                ac, bd, ad = (at.number(part, plane) for part in parts)
+                found[plane] = factor_of((ac, bd, ad), at, plane)
+                notes += open_notes((ac, bd, ad), plane)
+        elif matched := _SAVED.fullmatch(bare):
+            value = at.number(matched[2], matched[1])
+            profiles.setdefault(name, {})[matched[1].upper()] = value
+    if profiles and (loaded or not found):
+        names = ", ".join(profiles)
+        if len(profiles) == 1 and not loaded:
+            (loaded,) = profiles
+        elif not loaded or loaded not in profiles:
+            which = f"no profile {loaded!r} among" if loaded else "several skew profiles:"
+            source.unsaid(f"{which} {names}", "one of them (--variant NAME)")
+        found |= profiles[loaded]
+        notes.append(
+            f"profile {loaded!r} is taken as loaded: Klipper loads none by itself, only"
+            f" SKEW_PROFILE LOAD={loaded} does"
+        )
+    for axis in "".join(found):
+        options.axis_named(axis, source)
+    return found
+
+
+def _klipper_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
+    """Read the skew factors as the firmware holds them."""
+    factors: dict[str, float] = {}
+    notes: list[str] = []
+    for source in sources:
+        factors |= _factors(source, options, notes)
+    if not factors:
+        sources[0].refuse("has no skew factors", "SET_SKEW XY=AC,BD,AD or a saved profile")
+    return Tables((skew_term(factors),), (), tuple(notes), ("mm", "rad"))
+
+
+def _twist(source: Source, options: ReadOptions) -> Imported | None:
+    sections = _sections(source)
+    twist = sections.get("axis_twist_compensation", {})
+    if "z_compensations" not in twist:
+        return None
+    at, text = twist["z_compensations"]
+    heights = [at.number(part, "z_compensations") for part in text.split(",")]
+    ends: list[float] = []
+    for key in ("start_x", "end_x"):
+        names = (f"compensation_{key}", f"calibrate_{key}", key)
+        named = next((name for name in names if name in twist), None)
+        if named is None:
+            at.refuse(f"[axis_twist_compensation] has no calibrate_{key}", "it")
+        place, given = twist[named]
+        ends.append(place.number(given, named))
+    if len(heights) < 2 or ends[1] <= ends[0]:
+        found = f"{len(heights)} z_compensations from {ends[0]:g} to {ends[1]:g}"
+        at.refuse(found, "two or more along a range")
+    probe = next((name for name in PROBES if "y_offset" in sections.get(name, {})), None)
+    if probe is None:
+        expected = "y_offset in [probe]: without it a height tells no twist"
+        at.refuse("[axis_twist_compensation] without a probe", expected)
+    place, given = sections[probe]["y_offset"]
+    offset = place.number(given, "y_offset")
+    if abs(offset) < LEAST_OFFSET_MM:
+        place.refuse(f"y_offset {offset:g} mm", f"{LEAST_OFFSET_MM:g} mm or more to tell a twist")
+    options.axis_named("X", at)
+    places = np.linspace(ends[0], ends[1], len(heights))
+    values = np.array(heights) / offset * RAD_TO_URAD
+    said = (
+        f"the heights that the probe is off by, {offset:g} mm behind the nozzle, are taken for"
+        " roll of X; their mean is not in the file"
+    )
+    series = Series("EAX", tuple(places.tolist()), (Run(1, BOTH, tuple(values.tolist())),))
+    return Imported("klipper", (series,), units=("mm",), assumed=(said,))
+
+
+def _read_klipper(sources: Sequence[Source], options: ReadOptions) -> Imported:
+    """Read squareness errors from skew factors, and roll of X from a twist."""
+    parts: list[Imported] = []
+    for source in sources:
+        twist = _twist(source, options)
+        parts += [twist] if twist else []
+        if not twist or _factors(source, options, []):
+            tables = _klipper_tables([source], options)
+            parts.append(errors_of(tables, "klipper", source, options.machine))
+    return merge(parts)
+
+
+def _write_klipper(wanted: Wanted) -> Files:
+    """Write the command that sets the factors."""
+    parts = [
+        f"{plane}=" + ",".join(f"{length:.6f}" for length in skew_lengths(factor))
+        for plane, factor in fitted_factors(wanted).items()
+    ]
+    head = f"# {wanted.title}\n# [skew_correction] must stand in printer.cfg\n"
+    return {"": f"{head}SET_SKEW {' '.join(parts)}\n"}
+
+
+# --- Marlin -------------------------------------------------------------------------------------
+
+DIGITS = 6
+"""Behind the point of a factor, as the firmware reports it."""
+LETTERS = {"I": "XY", "S": "XY", "J": "XZ", "K": "YZ"}
+_WORD = re.compile(r"([A-Z])\s*([^A-Z\s]*)")
+_DEFINE = re.compile(r"#\s*define\s+(XY|XZ|YZ)_(DIAG_AC|DIAG_BD|SIDE_AD|SKEW_FACTOR)\s+(\S+)")
+_SWITCH = re.compile(r"#\s*define\s+(SKEW_CORRECTION(?:_FOR_Z)?)\b")
+_COMMENT = re.compile(r"/\*.*?(?:\*/|$)|//[^\n]*", re.DOTALL)
+
+
+def _is_marlin(head: str, name: str) -> bool:
+    """Tell it by its command, or by a setting of Configuration.h."""
+    known = re.search(r"^\s*M852\b|SKEW_CORRECTION", head, re.MULTILINE)
+    return known is not None or name.endswith("Configuration.h")
+
+
+def _marlin_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
+    """Read the skew factors as the firmware holds them."""
+    found: dict[str, tuple[Place, float]] = {}
+    defined: dict[str, dict[str, tuple[Place, float]]] = {}
+    notes: list[str] = []
+    for source in sources:
+        switches: set[str] = set()
+        text = _COMMENT.sub(lambda found: "\n" * found[0].count("\n"), source.text)
+        for at, bare in replace(source, lines=tuple(text.split("\n"))).scan(";"):
+            if matched := _SWITCH.match(bare):
+                switches.add(matched[1])
+            elif re.match(r"M852\b", bare):
+                for letter, value in _WORD.findall(bare[4:]):
+                    if letter not in LETTERS:
+                        at.refuse(f"M852 {letter}", "I, J, K or S")
+                    found[LETTERS[letter]] = (at, at.number(value, f"M852 {letter}"))
+            elif matched := _DEFINE.match(bare):
+                value = at.number(matched[3].rstrip("f"), matched[2])
+                defined.setdefault(matched[1], {})[matched[2]] = (at, value)
+        if defined and "SKEW_CORRECTION" not in switches:
+            at, _ = next(iter(next(iter(defined.values())).values()))
+            expected = "#define SKEW_CORRECTION, not commented out"
+            at.refuse("Marlin does not use these lengths", expected)
+        for plane in [plane for plane in defined if plane != "XY"]:
+            if "SKEW_CORRECTION_FOR_Z" not in switches:
+                del defined[plane]
+                notes.append(f"{plane}: not read, SKEW_CORRECTION_FOR_Z is not defined")
+        for plane, settings in defined.items():
+            side = defined.get("XY", {}).get("SIDE_AD") if plane == "XZ" else None
+            side = settings.get("SIDE_AD", side)
+            at, _ = next(iter(settings.values()))
+            if "SKEW_FACTOR" in settings:
+                found[plane] = settings["SKEW_FACTOR"]
+            elif {"DIAG_AC", "DIAG_BD"} <= settings.keys() and side:
+                at, ac = settings["DIAG_AC"]
+                lengths = (ac, settings["DIAG_BD"][1], side[1])
+                found[plane] = (at, factor_of(lengths, at, plane))
+                notes += open_notes(lengths, plane)
+            else:
+                expected = f"{plane}_DIAG_AC, {plane}_DIAG_BD and a side"
+                at.refuse(f"{plane}: {', '.join(settings)}", expected)
+        for plane, (at, factor) in found.items():
+            if abs(factor) > MOST:
+                at.refuse(f"factor {factor:g} of {plane}", f"at most ±{MOST:g}")
+            for axis in plane:
+                options.axis_named(axis, at)
+    if not found:
+        sources[0].refuse("has no skew factors", "M852 I… J… K… or XY_SKEW_FACTOR")
+    factors = {plane: factor for plane, (_, factor) in found.items()}
+    return Tables((skew_term(factors),), (), tuple(notes), ("mm", "rad"))
+
+
+def _write_marlin(wanted: Wanted) -> Files:
+    """Write the command that sets the factors."""
+    factors = fitted_factors(wanted)
+    words = [
+        f"{letter}{spell(float(wanted.round(factors[plane])), DIGITS)}"
+        for letter, plane in zip("IJK", PLANES, strict=True)
+    ]
+    return {
+        "": f"; {wanted.title}\n; SKEW_CORRECTION_FOR_Z and SKEW_CORRECTION_GCODE must be enabled\n"
+        f"M852 {' '.join(words)}\n"
+    }
+
+
+KLIPPER = Format(
+    name="klipper",
+    title="Klipper skew correction and axis twist compensation",
+    source="Klipper documentation, Skew Correction and Axis Twist Compensation",
+    endings=(".cfg", ".gcode"),
+    holds="squareness in XY, XZ and YZ; roll of X (read only)",
+    units="mm",
+    grid="none: the same everywhere",
+    offsets=False,
+    limits=f"three factors: {', '.join(PLANES)}",
+    names_variants=True,
+    recognise=has(r"SET_SKEW|\[skew_correction|\[axis_twist_compensation"),
+    read=_read_klipper,
+    tables=_klipper_tables,
+    write=_write_klipper,
+)
+MARLIN = Format(
+    name="marlin",
+    title="Marlin skew correction, M852 and Configuration.h",
+    source="Marlin documentation, M852 Bed Skew Compensation",
+    endings=(".gcode", ".h"),
+    holds="squareness in XY, XZ and YZ",
+    units="mm/mm",
+    grid="none: the same everywhere",
+    offsets=False,
+    limits="three factors of six decimals, at most ±1",
+    recognise=_is_marlin,
+    tables=_marlin_tables,
+    write=_write_marlin,
+)
+FORMATS = (KLIPPER, MARLIN)

@@ -1,0 +1,440 @@
+"""Volumetric compensation of the ISG kernel and TwinCAT CNC: two files with one set of parameters.
+
+ISG kernel documentation, FCT-C26: parameters in mm and rad, arguments in mm and degrees; position
+errors `C0B`, component errors `EXY`; GRID interpolation is linear. A rotation takes place about the
+nominal axis and is then subject to location and component errors in fixed directions (page
+"Alternative model"); with alternative_model = 1 it takes place about the distorted axis.
+
+ISG CSV (page 296429067, TwinCAT 3 CNC TF5280): a header of arguments and parameters, blocks parted
+by #; columns part by blanks; two arguments make an error of two axes. Etalon exchange format (page
+296430091): blocks named after ISO 230-1, `[C0B]` VALUE and `[EXY]` Gridpoints; of its two variants
+"Vendor" is the one to use. Rows of comments begin with // in both.
+"""
+
+import math
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from warpspace.exceptions import OptionError
+from warpspace.formats.compensation.wanted import Wanted
+from warpspace.formats.kind import Files, Format, ReadOptions
+from warpspace.formats.measured import (
+    BOTH,
+    Imported,
+    Plane,
+    Run,
+    Series,
+    in_one_direction,
+    merge,
+    plane_of,
+    sampled,
+    tables_of,
+    zero_key,
+)
+from warpspace.formats.source import MM_TO_UM, RAD_TO_URAD, Place, Source, spell
+from warpspace.machine.axes import direction_index, is_linear
+from warpspace.machine.limits import MAX_POINTS
+from warpspace.machine.parameters import PARAMETERS, parameter
+
+STANDARD, ALTERNATIVE = "standard", "alternative"
+ARGUMENTS = ("X", "Y", "Z", "A", "B", "C")
+VARIANTS = (STANDARD, ALTERNATIVE)
+CONVENTION = {"linear": "after_motion", "rotary": "before_motion"}
+DIGITS = 12
+ASSUMED = (
+    "a positive angle follows the right-hand rule, also of a squareness",
+    "errors of a linear axis ride on it, those of a rotary axis act in fixed directions",
+    "values beyond the points are held",
+)
+OTHER = re.compile(r"P0[XYZ]|N0[XYZ]|P[XYZ][ABC]|V[XYZ][XYZABC]|ID[XYZ]|LN[XYZABC]")
+"""Parameters of the kinematics, which are no errors."""
+FINE_DEG = 1.0
+"""Steps of a table that a wave is added to."""
+
+
+def error_name(name: str) -> str:
+    """Give the key of a parameter of a file; empty where it is no error."""
+    upper = name.strip().upper()
+    for key in (upper, f"E{upper}"):
+        if key in PARAMETERS:
+            return key
+    return ""
+
+
+def file_name(key: str) -> str:
+    """Give the name that a file has for a key: C0B for EC0B."""
+    return key[1:] if parameter(key).is_constant else key
+
+
+def factor_of(key: str) -> float:
+    """Give the factor from mm or rad to µm or µrad."""
+    return RAD_TO_URAD if parameter(key).is_rotation else MM_TO_UM
+
+
+def left_out(names: Sequence[str]) -> tuple[str, ...]:
+    """Say which parameters of a file are no errors."""
+    return (f"{', '.join(names)}: no errors, left out",) if names else ()
+
+
+def check_axes(held: Imported, name: str) -> None:
+    """Refuse errors of axes that the file has no name for."""
+    if other := next((axis for axis in held.axes if axis not in ARGUMENTS), ""):
+        raise OptionError(f"{name} knows the axes {', '.join(ARGUMENTS)}; the scene has {other}")
+
+
+def _finished(found: Imported, options: ReadOptions) -> Imported:
+    """Say what is assumed, and translate the alternative model."""
+    found = replace(
+        found,
+        units=("mm", "rad", "degrees for rotary positions"),
+        assumed=(*found.assumed, *ASSUMED),
+        convention=CONVENTION,
+    )
+    if options.variant != ALTERNATIVE:
+        said = "rotation about the nominal axis (alternative_model 0); --variant says otherwise"
+        return replace(found, assumed=(*found.assumed, said))
+    said = "rotation about the distorted axis (alternative_model 1)"
+    found = replace(found, assumed=(*found.assumed, said))
+    for axis in dict.fromkeys(parameter(key).axis for key in found.constants):
+        if not is_linear(axis):
+            found = _about_distorted_axis(found, axis, options)
+    return found
+
+
+def _about_distorted_axis(found: Imported, axis: str, options: ReadOptions) -> Imported:
+    """Take back, turned with the axis, what the constant errors of a rotary axis move at zero.
+
+    A rotation R about an axis that is displaced by E₀ is E₀·R·E₀⁻¹: to first order the constant
+    error minus the same error turned by R, which is one wave a turn of its component errors.
+    """
+    machine = options.machine
+    way = machine.axes[axis].direction if machine is not None and axis in machine.axes else 1
+    own = direction_index(axis)
+    first, second = (own + 1) % 3, (own + 2) % 3
+    for letters in ("XYZ", "ABC"):
+        one, other = (
+            found.constants.get(f"E{letters[index]}0{axis}", 0.0) for index in (first, second)
+        )
+        along = found.constants.get(f"E{letters[own]}0{axis}", 0.0)
+        found = _plus(found, f"E{letters[first]}{axis}", 0.0, -one, way * other)
+        found = _plus(found, f"E{letters[second]}{axis}", 0.0, -other, -way * one)
+        found = _plus(found, f"E{letters[own]}{axis}", -along)
+    return found
+
+
+def _plus(
+    found: Imported, key: str, offset: float = 0.0, cosine: float = 0.0, sine: float = 0.0
+) -> Imported:
+    """Add a constant and a wave a turn to an error: to its points, or as a curve of its own."""
+    size = math.hypot(cosine, sine)
+    if not size and not offset:
+        return found
+    present = next((one for one in found.series if one.key == key), None)
+    if present is None:
+        phase = math.degrees(math.atan2(sine, cosine))
+        curve = {"harmonics": [[1, size, phase]]} if size else {"poly": [offset]}
+        return replace(found, curves={**found.curves, key: curve})
+    at = np.array(present.positions)
+    if size:
+        at = np.union1d(at, np.arange(at[0], at[-1], FINE_DEG))
+    values = np.interp(at, present.positions, present.values) + offset
+    values = values + cosine * np.cos(np.deg2rad(at)) + sine * np.sin(np.deg2rad(at))
+    changed = Series(key, tuple(at.tolist()), (Run(1, BOTH, tuple(values.tolist())),))
+    series = tuple(changed if one.key == key else one for one in found.series)
+    return replace(found, series=series)
+
+
+def _read_with(
+    read_one: Callable[[Source], Sequence[Imported]],
+) -> Callable[[Sequence[Source], ReadOptions], Imported]:
+    return lambda sources, options: _finished(
+        merge([part for source in sources for part in read_one(source)]), options
+    )
+
+
+# --- ISG CSV ------------------------------------------------------------------------------------
+
+ISG = "isg-csv"
+_SPLIT = re.compile(r"[\s;,]+")
+Block = list[tuple[Place, list[str]]]
+Row = tuple[Place, dict[str, float]]
+
+
+def _is_isg(head: str, name: str) -> bool:
+    """Tell it by its first header: arguments and parameters, nothing else."""
+    del name
+    for text in head.splitlines():
+        bare = text.split("//")[0].strip()
+        if not bare or bare == "#":
+            continue
+        names = [part for part in _SPLIT.split(bare) if part]
+        known = [part for part in names if error_name(part)]
+        return bool(known) and len(known) + sum(part in ARGUMENTS for part in names) == len(names)
+    return False
+
+
+def _blocks(source: Source) -> list[Block]:
+    blocks: list[Block] = [[]]
+    for at, text in source.scan("//"):
+        bare = text
+        if bare.startswith("#"):
+            blocks.append([])
+            bare = bare[1:].strip()
+        if bare:
+            blocks[-1].append((at, [part for part in _SPLIT.split(bare) if part]))
+            if len(blocks[-1]) > MAX_POINTS:
+                at.refuse(f"a block has more than {MAX_POINTS:,} rows", "at most so many")
+    return [block for block in blocks if block]
+
+
+def _read_isg(source: Source) -> list[Imported]:
+    found: list[Imported] = []
+    known: set[str] = set()
+    for block in _blocks(source):
+        part = _read_block(source, block)
+        for key in part.keys:
+            if key in known:
+                name = file_name(key)
+                block[0][0].refuse(f"{name} stands in two blocks", "it in one")
+            known.add(key)
+        found.append(part)
+    if not known:
+        source.refuse("has no errors", "a header such as X EXX EYX")
+    return found
+
+
+def _read_block(source: Source, block: Block) -> Imported:
+    at, names = block[0]
+    arguments = [name for name in names if name in ARGUMENTS]
+    left = [name for name in names if OTHER.fullmatch(name)]
+    key_of = {name: error_name(name) for name in names}
+    for name in names:
+        if name not in (*arguments, *left) and not key_of[name]:
+            expected = "arguments X Y Z A B C and parameters such as EXX or C0B"
+            at.refuse(f"column {name!r}", expected)
+    if twice := next((name for name in names if names.count(name) > 1), ""):
+        at.refuse(f"column {twice} stands there twice", "it once")
+    if len(arguments) > 2:
+        expected = "one or two: no error here depends on more"
+        at.refuse(f"{len(arguments)} arguments {' '.join(arguments)}", expected)
+    if len(block) < 2:
+        at.refuse("a header without records", "at least one")
+    rows: list[Row] = []
+    for place, parts in block[1:]:
+        if len(parts) != len(names):
+            place.refuse(f"{len(parts)} fields", f"{len(names)} as in the header")
+        row: dict[str, float] = {}
+        for name, part in zip(names, parts, strict=True):
+            value = place.number(part, name)
+            if name in arguments:
+                row[name] = place.checked_position(value, name)
+            elif key := key_of[name]:
+                row[key] = place.checked_error(value * factor_of(key), name)
+        rows.append((place, row))
+    notes = (*source.notes, *left_out(left))
+    keys = [key for name in names if (key := key_of[name])]
+    if not arguments and len(rows) > 1:
+        rows[1][0].refuse(f"{len(rows)} records without arguments", "one")
+    for key in keys:
+        _check_arguments(at, key, arguments)
+    if not arguments:
+        return Imported(ISG, constants={key: rows[0][1][key] for key in keys}, notes=notes)
+    if len(arguments) == 2:
+        planes = tuple(_isg_plane(source, key, arguments, rows) for key in keys)
+        return Imported(ISG, planes=planes, notes=notes)
+    series = tuple(_isg_series(key, arguments[0], rows) for key in keys)
+    return Imported(ISG, series, notes=notes)
+
+
+def _check_arguments(at: Place, key: str, arguments: Sequence[str]) -> None:
+    """Refuse an error that does not depend on its own axis, and a constant that does."""
+    row = parameter(key)
+    if not arguments:
+        if not row.is_constant:
+            at.refuse(f"{key} without an argument", f"the argument {row.axis} beside it")
+    elif row.is_constant:
+        expected = "it in a block without arguments"
+        at.refuse(f"{file_name(key)} is constant", expected)
+    elif row.axis not in arguments:
+        at.refuse(f"{key} over {' and '.join(arguments)}", f"the argument {row.axis}")
+
+
+def _isg_series(key: str, argument: str, rows: Sequence[Row]) -> Series:
+    for (_, before), (at, row) in pairwise(rows):
+        if row[argument] <= before[argument]:
+            found = f"{argument} {row[argument]:g} after {before[argument]:g}"
+            at.refuse(found, "ascending positions")
+    run = Run(1, BOTH, tuple(row[key] for _, row in rows))
+    return Series(key, tuple(row[argument] for _, row in rows), (run,))
+
+
+def _isg_plane(source: Source, key: str, arguments: Sequence[str], rows: Sequence[Row]) -> Plane:
+    own = parameter(key).axis
+    other = next(axis for axis in arguments if axis != own)
+    points = [(at, row[own], row[other], row[key]) for at, row in rows]
+    return plane_of(key, (own, other), points, source)
+
+
+def _write_isg(wanted: Wanted) -> Files:
+    """Write the errors of a scene, a block an axis."""
+    held = in_one_direction(sampled(wanted), wanted)
+    check_axes(held, ISG)
+
+    def spelled(value: float, key: str) -> str:
+        return spell(value / factor_of(key), DIGITS)
+
+    blocks: list[list[list[str]]] = []
+    for table in tables_of(held):
+        names = [*reversed(table.axes), *map(file_name, table.keys)]
+        ordered = sorted(table.rows, key=lambda row: row[0][::-1])  # the first axis runs fastest
+        rows = [
+            [*map(repr, reversed(at)), *map(spelled, values, table.keys)]
+            for at, _, values in ordered
+        ]
+        blocks.append([names, *rows])
+    if not blocks:
+        key = zero_key(wanted.scene)
+        blocks = [[[parameter(key).axis, key], ["0.0", "0.0"]]]
+    texts = ["\n".join("\t".join(row) for row in block) for block in blocks]
+    return {"": f"// {wanted.title}\n// mm, rad, degrees\n" + "\n#\n".join(texts) + "\n"}
+
+
+# --- Etalon exchange format ---------------------------------------------------------------------
+
+ISO = "iso-text"
+_SECTION = re.compile(r"\[\s*([A-Za-z0-9]+)\s*\]")
+_VALUE = re.compile(r"VALUE\s*=\s*(\S+)", re.IGNORECASE)
+_OPEN = re.compile(r"Gridpoints\s*=\s*\{?", re.IGNORECASE)
+
+
+def _is_iso(head: str, name: str) -> bool:
+    """Tell it by its blocks."""
+    del name
+    blocks = [error for error in _SECTION.findall(head) if error_name(error)]
+    return bool(blocks) and bool(re.search(r"Gridpoints|VALUE\s*=", head, re.IGNORECASE))
+
+
+def _read_iso(source: Source) -> Imported:
+    constants: dict[str, float] = {}
+    series: list[Series] = []
+    left: list[str] = []
+    key, name = "", ""
+    opened: Place | None = None
+    rows: list[tuple[float, float]] = []
+    for at, bare in source.scan("//"):
+        if opened:
+            body, closed, _ = bare.partition("}")
+            _iso_row(at, body.replace("{", " ").split(), rows, name, key)
+            if closed:
+                if not rows:
+                    at.refuse(f"[{name}] has no points", "position and value")
+                if key:
+                    places, values = zip(*rows, strict=True)
+                    series.append(Series(key, places, (Run(1, BOTH, values),)))
+                opened, rows = None, []
+        elif matched := _SECTION.fullmatch(bare):
+            name = matched[1].upper()
+            key = error_name(name)
+            if not key and not OTHER.fullmatch(name):
+                at.refuse(f"[{name}]", "a parameter such as EXY or C0B")
+            if not key:
+                left.append(name)
+            elif key in constants or any(one.key == key for one in series):
+                at.refuse(f"[{name}] is given twice", "it once")
+        elif not name:
+            at.refuse(at.shown, "a block such as [EXY]")
+        elif matched := _VALUE.fullmatch(bare):
+            value = at.number(matched[1], f"VALUE of {name}")
+            if key and not parameter(key).is_constant:
+                at.refuse(f"[{name}] has one VALUE", "Gridpoints = { position value … }")
+            if key:
+                constants[key] = at.checked_error(value * factor_of(key), name)
+        elif _OPEN.fullmatch(bare):
+            if key and parameter(key).is_constant:
+                at.refuse(f"[{name}] has Gridpoints", "VALUE = number")
+            opened = at
+        elif bare != "{":
+            at.refuse(at.shown, "VALUE = number or Gridpoints = {")
+    if opened:
+        opened.refuse(f"Gridpoints of [{name}] do not end", "} (is the file cut off?)")
+    notes = (*source.notes, *left_out(left))
+    return Imported(ISO, tuple(series), constants=constants, notes=notes)
+
+
+def _iso_row(
+    at: Place, parts: list[str], rows: list[tuple[float, float]], name: str, key: str
+) -> None:
+    if not parts:
+        return
+    if len(parts) != 2:
+        at.refuse(f"{len(parts)} numbers in {at.shown}", "position and value")
+    position = at.position(parts[0], "position")
+    if rows and position <= rows[-1][0]:
+        found = f"position {position:g} of {name} after {rows[-1][0]:g}"
+        at.refuse(found, "ascending positions")
+    rows.append((position, at.error(parts[1], name, factor_of(key) if key else 1.0)))
+    if len(rows) > MAX_POINTS:
+        at.refuse(f"{name} has more points than {MAX_POINTS:,}", "at most so many")
+
+
+def _write_iso(wanted: Wanted) -> Files:
+    """Write the errors of a scene; those of two axes have no place and are left out."""
+    held = in_one_direction(sampled(wanted), wanted)
+    check_axes(held, ISO)
+    lines = [f"// {wanted.title}", "// mm, rad, degrees; variant Vendor"]
+    for plane in held.planes:
+        axes = " and ".join(plane.axes)
+        lines.append(f"// {plane.key} over {axes}: has no place here, left out")
+    for key, value in held.constants.items():
+        scaled = value / factor_of(key)
+        lines += [f"[{file_name(key)}]", f"VALUE = {scaled:.{DIGITS}f}"]
+    for one in held.series:
+        lines += [f"[{one.key}]", "Gridpoints = {"]
+        scale = factor_of(one.key)
+        lines += [
+            f"  {position!r} {value / scale:.{DIGITS}f}"
+            for position, value in zip(one.positions, one.values.tolist(), strict=True)
+        ]
+        lines.append(f"}}  // end of {one.key}")
+    return {"": "\n".join(lines) + "\n"}
+
+
+ISO_FORMAT = Format(
+    name=ISO,
+    title="text of volumetric compensation with ISO names (Etalon exchange format)",
+    source="ISG kernel documentation, FCT-C26 Volumetric Compensation, Etalon Exchange Format",
+    endings=(".exc", ".txt", ".ini"),
+    holds="any component error along its axis, and constants; not direction of travel",
+    units="mm, rad; positions mm, degrees",
+    grid="any ascending positions",
+    limits="as many records as max_records keeps; corrects the position only",
+    recognise=_is_iso,
+    read=_read_with(lambda source: [_read_iso(source)]),
+    write=_write_iso,
+    points=41,
+    most_points=2001,
+    parametric=True,
+    variants=VARIANTS,
+)
+ISG_FORMAT = Format(
+    name=ISG,
+    title="CSV of volumetric compensation (ISG kernel, TwinCAT CNC)",
+    source="ISG kernel documentation, FCT-C26 Volumetric Compensation, ISG CSV format",
+    endings=(".csv", ".txt"),
+    holds="any component error along its axis or over two axes, and constants",
+    units="mm, rad; arguments mm, degrees",
+    grid="any ascending positions; a full grid of two axes",
+    limits="as many records as max_records keeps; corrects the position only",
+    recognise=_is_isg,
+    read=_read_with(_read_isg),
+    write=_write_isg,
+    points=41,
+    most_points=2001,
+    parametric=True,
+    variants=VARIANTS,
+)
+FORMATS = (ISO_FORMAT, ISG_FORMAT)

@@ -1,1 +1,0 @@
-"""What several formats share, and the parts of large ones."""

@@ -1,0 +1,219 @@
+"""The errors of one axis as rigid motions along it, and back to curves."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from warpspace.exceptions import OptionError
+from warpspace.kinematics import transforms
+from warpspace.kinematics.chain import motion
+from warpspace.kinematics.model import ComponentErrors, Model
+from warpspace.machine.axes import DIRECTIONS, TravelDirection
+from warpspace.machine.curves.curve import ErrorFunction, Span
+from warpspace.machine.curves.directional import Directional
+from warpspace.machine.curves.pieces import SMALL, Pieces, fit_curves
+from warpspace.machine.curves.simple import Constant
+from warpspace.machine.curves.table import Table
+from warpspace.machine.errors import ErrorSet
+from warpspace.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM, URAD_PER_RAD, Array
+
+# --- Small rigid motions that keep their digits ---------------------------------------------------
+# A rotation by its half-angle vector, and a shift.
+#
+# Matrices near the unit matrix lose the digits of small angles; here every number is as small as
+# what it stands for, so that products and inverses are exact to its last digits.
+
+
+@dataclass(frozen=True, slots=True)
+class SmallMotion:
+    """``Trans(shift) · Rot``, the transformation of errors, in a batch."""
+
+    half: Array  # [..., 3]; direction of the rotation axis times the sine of half the angle
+    shift_mm: Array  # [..., 3]
+
+    @classmethod
+    def from_errors(cls, shift_um: Array, turn_urad: Array) -> "SmallMotion":
+        """Build the motion of errors, [..., 3] each."""
+        angle = np.asarray(turn_urad, dtype=float) * RAD_PER_URAD
+        size = np.linalg.norm(angle, axis=-1, keepdims=True)
+        share = np.sinc(size / (2.0 * np.pi)) / 2.0  # sin(a/2) / a
+        return cls(angle * share, np.asarray(shift_um, dtype=float) * MM_PER_UM)
+
+    def to_errors(self) -> tuple[Array, Array]:
+        """Give shift and rotation vector, [..., 3] each, µm and µrad."""
+        sine = np.linalg.norm(self.half, axis=-1, keepdims=True)
+        safe = np.where(sine > 0.0, sine, 1.0)
+        share = np.where(sine > 0.0, 2.0 * np.arcsin(np.minimum(sine, 1.0)) / safe, 2.0)
+        return self.shift_mm * UM_PER_MM, self.half * share * URAD_PER_RAD
+
+    def __matmul__(self, other: "SmallMotion") -> "SmallMotion":
+        """Multiply: the other motion first, then this one."""
+        half = (
+            self._cosine * other.half + other._cosine * self.half + np.cross(self.half, other.half)
+        )
+        return SmallMotion(half, self.shift_mm + other.shift_mm + self.arm(other.shift_mm))
+
+    @property
+    def _cosine(self) -> Array:
+        """Cosine of half the angle, [..., 1]."""
+        return np.sqrt(1.0 - np.sum(self.half**2, axis=-1, keepdims=True))
+
+    def arm(self, lever_mm: Array) -> Array:
+        """Give what the rotation alone moves a point by, ``(Rot − 1) · lever``, [..., 3], mm."""
+        across = np.cross(self.half, lever_mm)
+        return 2.0 * (self._cosine * across + np.cross(self.half, across))
+
+    @property
+    def inverse(self) -> "SmallMotion":
+        """The motion back."""
+        back = SmallMotion(-self.half, -self.shift_mm)
+        return SmallMotion(-self.half, back.shift_mm + back.arm(back.shift_mm))
+
+    def seen_from(self, pose: Array) -> "SmallMotion":
+        """Give ``pose · motion · pose⁻¹``; the pose, [..., 4, 4], may be of any size."""
+        turn, place = pose[..., :3, :3], pose[..., :3, 3]
+        turned = SmallMotion(transforms.rotate(turn, self.half), np.zeros(3))
+        shift = transforms.rotate(turn, self.shift_mm) - turned.arm(place)
+        return SmallMotion(turned.half, shift)
+
+
+Along = Callable[[Array, SmallMotion], SmallMotion]
+"""From positions, [n], and the component errors there to other component errors."""
+
+
+@dataclass(frozen=True, slots=True)
+class AxisErrors:
+    """The errors of one axis, to be read as motions and written as curves."""
+
+    model: Model
+    errors: ErrorSet
+    axis: str
+    span: Span  # mm or degrees; positions at which the numbers must hold
+
+    @property
+    def order(self) -> str:
+        """Name of the convention of component errors."""
+        name = self.model.convention(self.axis).name
+        if name not in [*ComponentErrors]:
+            known = ", ".join(ComponentErrors)
+            raise OptionError(
+                f"convention {name!r} of {self.axis} cannot be converted; only {known}"
+            )
+        return name
+
+    def keys(self, *, constant: bool = False) -> tuple[str, ...]:
+        """Keys of the six component or constant errors: shifts, then rotations."""
+        return tuple(f"E{letter}{'0' * constant}{self.axis}" for letter in DIRECTIONS)
+
+    def pose(self, position: Array) -> Array:
+        """Nominal motion of the axis, [..., 4, 4]."""
+        return motion(self.model.machine.axes[self.axis], position)
+
+    def at(self, position: Array, direction: str = TravelDirection.MEAN) -> SmallMotion:
+        """Give the component errors at positions, [n]; those of two arguments do not count."""
+        along = {self.axis: np.asarray(position, dtype=float)}
+        values = [
+            np.zeros(along[self.axis].shape)
+            if self.depends_on_others(key)
+            else self.errors.evaluate_at(key, along, direction)
+            for key in self.keys()
+        ]
+        return SmallMotion.from_errors(np.stack(values[:3], -1), np.stack(values[3:], -1))
+
+    def depends_on_others(self, key: str) -> bool:
+        """Tell whether an error depends on another axis as well."""
+        return any(axis != self.axis for axis in self.errors.arguments(key))
+
+    @property
+    def constant(self) -> SmallMotion:
+        """The constant errors."""
+        values = [self.errors.amplitude(key) for key in self.keys(constant=True)]
+        return SmallMotion.from_errors(np.array(values[:3]), np.array(values[3:]))
+
+    @property
+    def kinks(self) -> Array:
+        """Positions at which the slope of a curve may jump."""
+        functions = [self.errors.functions.get(key) for key in self.keys()]
+        return np.unique(np.concatenate([np.zeros(0), *(f.kinks for f in functions if f)]))
+
+    def points(self, key: str) -> tuple[float, ...]:
+        """Positions at which an error was measured, as far as its curve knows them."""
+        function = self.errors.functions.get(key)
+        if isinstance(function, Pieces):
+            return function.points
+        return function.kinks if isinstance(function, Table) else ()
+
+    def with_components(self, along: Along, *, adds: bool = False) -> ErrorSet:
+        """Give the set with other component errors of the axis."""
+        self.refuse_two_arguments(adds=adds)
+        ways = [TravelDirection.MEAN]
+        functions = [self.errors.functions.get(key) for key in self.keys()]
+        if any(function and function.has_directions for function in functions):
+            ways = [TravelDirection.FORWARD, TravelDirection.BACKWARD]
+        found = [fit_curves(self._changes(along, way), self.span, self.kinks) for way in ways]
+        new = [fit_curves(self._values(along, way), self.span, self.kinks) for way in ways]
+        chosen = dict(self.errors.functions)
+        for index, key in enumerate(self.keys()):
+            if all(change[index] is None for change in found):
+                continue
+            if self.depends_on_others(key):
+                raise OptionError(
+                    f"{key} depends on {' and '.join(self.errors.arguments(key))} and would change"
+                    " along one of them; this cannot be converted exactly"
+                )
+            curve = _joined([curves[index] for curves in new], self.span)
+            chosen.pop(key, None)
+            if isinstance(curve, Pieces):
+                curve = replace(curve, points=self.points(key))
+            if curve is not None:
+                chosen[key] = curve
+        return ErrorSet(chosen)
+
+    def refuse_two_arguments(self, *, adds: bool) -> None:
+        """Refuse errors of two arguments where they cannot stay as they are."""
+        for key in self.keys():
+            if self.depends_on_others(key) and not (adds and key[1] in DIRECTIONS[:3]):
+                other = " and ".join(self.errors.arguments(key))
+                raise OptionError(
+                    f"{key} depends on {other}; errors of {self.axis} cannot be converted exactly"
+                    " with it"
+                )
+
+    def _values(self, along: Along, way: str) -> Callable[[Array], Array]:
+        """Give the new values of the six errors at positions, [n, 6]."""
+
+        def values(position: Array) -> Array:
+            return np.concatenate(along(position, self.at(position, way)).to_errors(), axis=-1)
+
+        return values
+
+    def _changes(self, along: Along, way: str) -> Callable[[Array], Array]:
+        """Give the changes of the six errors at positions, [n, 6]."""
+        values = self._values(along, way)
+
+        def changes(position: Array) -> Array:
+            present = np.concatenate(self.at(position, way).to_errors(), axis=-1)
+            difference = values(position) - present
+            return np.where(np.abs(difference) > 1e-14 * np.abs(present), difference, 0.0)
+
+        return changes
+
+    def with_constant(self, constant: SmallMotion) -> ErrorSet:
+        """Give the set with other constant errors of the axis; what is nothing is left out."""
+        values = np.concatenate(constant.to_errors(), axis=-1)
+        chosen = dict(self.errors.functions)
+        for key, value in zip(self.keys(constant=True), values.tolist(), strict=True):
+            if abs(value - self.errors.amplitude(key)) <= SMALL:
+                continue
+            chosen.pop(key, None)
+            if abs(value) > SMALL:
+                chosen[key] = Constant(self.span, value)
+        return ErrorSet(chosen)
+
+
+def _joined(curves: list[ErrorFunction | None], span: Span) -> ErrorFunction | None:
+    there, back = curves[0], curves[-1]
+    if there == back:
+        return there
+    return Directional(span, there or Constant(span), back or Constant(span))

@@ -1,1 +1,0 @@
-"""The conventions for the component errors of an axis, one module each."""

@@ -1,0 +1,366 @@
+"""One error set in another convention: the same field from other numbers, exactly.
+
+What is exact is the rigid motion of every body at every position of its axis: products of full
+rotations, nothing linearised.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from enum import StrEnum
+from itertools import pairwise
+
+import numpy as np
+
+from warpspace.exceptions import OptionError
+from warpspace.kinematics import transforms
+from warpspace.kinematics.axis_errors import Along, AxisErrors, SmallMotion
+from warpspace.kinematics.chain import nominal_point
+from warpspace.kinematics.deviation import loop_error
+from warpspace.kinematics.model import ComponentErrors, Coordinates, Loop, Model
+from warpspace.machine.axes import direction_index, is_linear
+from warpspace.machine.curves.curve import Span
+from warpspace.machine.curves.pieces import SMALL
+from warpspace.machine.curves.simple import Constant
+from warpspace.machine.description import Machine, Vector
+from warpspace.machine.errors import ErrorSet
+from warpspace.machine.parameters import parameter
+from warpspace.units import MM_PER_UM, Array
+
+# --- Component errors before or after the motion --------------------------------------------------
+
+
+def convert_order(
+    model: Model, errors: ErrorSet, spans: Mapping[str, Span], orders: Mapping[str, str]
+) -> tuple[Model, ErrorSet]:
+    """Write component errors in another order of motion and errors.
+
+    Notes
+    -----
+    Exact: ``E_before = M · E_after · M⁻¹`` with the nominal motion M of the axis. A linear axis
+    changes its shifts by the arm of its position, −q × ε to first order; a rotary one turns the
+    directions of its errors by its angle.
+    """
+    for axis, wanted in orders.items():
+        own = AxisErrors(model, errors, axis, spans[axis])
+        present, target = own.order, replace(model, own_component_errors=((axis, wanted),))
+        if present != AxisErrors(target, errors, axis, spans[axis]).order:
+            forward = wanted == ComponentErrors.BEFORE_MOTION
+            linear = model.machine.axes[axis].is_linear
+            errors = own.with_components(_across(own, forward=forward), adds=linear)
+    names = {axis: model.convention(axis).name for axis in model.machine.axes} | dict(orders)
+    main = max(dict.fromkeys(names.values()), key=list(names.values()).count)
+    others = tuple((axis, name) for axis, name in names.items() if name != main)
+    return replace(model, component_errors=main, own_component_errors=others), errors
+
+
+def _across(own: AxisErrors, *, forward: bool) -> Along:
+    def along(position: Array, errors: SmallMotion) -> SmallMotion:
+        pose = own.pose(position)
+        return errors.seen_from(pose if forward else transforms.inverse(pose))
+
+    return along
+
+
+# --- A constant motion moved between the component errors of an axis and its constant errors ------
+
+
+def without(
+    own: AxisErrors, taken: SmallMotion, position: Array, present: SmallMotion
+) -> SmallMotion:
+    """Give the component errors, [n], that are left where a motion went to the constants.
+
+    The motion is one in the frame before that of the axis.
+    """
+    back = taken.inverse
+    if own.order == ComponentErrors.AFTER_MOTION:
+        back = back.seen_from(transforms.inverse(own.pose(position)))
+    return back @ present
+
+
+def moved_to_constants(own: AxisErrors, taken: SmallMotion) -> ErrorSet:
+    """Move a motion from the component errors of an axis to its constants; the field stays.
+
+    Notes
+    -----
+    ``E0 · M · E = (E0 · G) · M · (M⁻¹ · G⁻¹ · M · E)``, exactly; before the motion ``E0 · E · M =
+    (E0 · G) · (G⁻¹ · E) · M``.
+    """
+    own.refuse_two_arguments(adds=False)
+    if not taken.half.any() and not taken.shift_mm.any():
+        return own.errors
+    errors = own.with_components(lambda q, present: without(own, taken, q, present))
+    return AxisErrors(own.model, errors, own.axis, own.span).with_constant(own.constant @ taken)
+
+
+# --- Component errors that are zero at a position of their axis -----------------------------------
+
+
+def zero_at(
+    model: Model, errors: ErrorSet, spans: Mapping[str, Span], positions: Mapping[str, float]
+) -> ErrorSet:
+    """Make all six component errors of axes zero at a position; the field stays."""
+    for axis, position in positions.items():
+        own = AxisErrors(model, errors, axis, spans[axis])
+        there = np.asarray(float(position))
+        taken = own.at(there)
+        if own.order == ComponentErrors.AFTER_MOTION:
+            taken = taken.seen_from(own.pose(there))
+        errors = moved_to_constants(own, taken)
+    return errors
+
+
+# --- The reference point of zero ------------------------------------------------------------------
+
+AT_REST_UM = 1e-6
+"""µm: a point whose error is smaller is held still by the errors themselves."""
+
+
+def error_at(model: Model, errors: ErrorSet, at: Coordinates) -> Array:
+    """Give the exact error of the tool point in R at one position of the axes, [3], µm."""
+    point = nominal_point(model, Loop.TOOL, at)
+    values = {key: errors.evaluate_at(key, at, model.direction) for key in errors}
+    return loop_error(model, Loop.TOOL, at, values, point)[0]
+
+
+def shifted(model: Model, errors: ErrorSet, shift_um: Array) -> ErrorSet:
+    """Move the whole tool branch in R by the location of its first axis, [3], µm; exact."""
+    branch = model.machine.branch("tool")
+    if not branch:
+        raise OptionError("no axis carries the tool; its point is held by no location of an axis")
+    first = branch[0]
+    placed = transforms.placed(first.offset_mm, first.rotation_deg)[:3, :3]
+    functions = dict(errors.functions)
+    for letter, part in zip("XYZ", (placed.T @ shift_um).tolist(), strict=True):
+        key = f"E{letter}0{first.name}"
+        value = errors.amplitude(key) + part
+        functions.pop(key, None)
+        if abs(value) > SMALL:
+            functions[key] = Constant(first.travel, value)
+    return ErrorSet(functions)
+
+
+def held_by_constants(model: Model, errors: ErrorSet, at: Coordinates) -> ErrorSet:
+    """Give errors that are zero at a point by themselves, all others changed by the same vector."""
+    return shifted(model, errors, -error_at(model, errors, at))
+
+
+def held_by_view(model: Model, errors: ErrorSet, at: Coordinates) -> ErrorSet:
+    """Give errors without the location of the first axis, where the view may hold the point."""
+    there = error_at(model, errors, at)
+    if np.linalg.norm(there) > AT_REST_UM:
+        raise OptionError(
+            f"the error at that point is {np.linalg.norm(there):.3g} µm; expected a point whose"
+            " error is zero, since holding any other changes the map"
+        )
+    first = model.machine.branch("tool")[0].name if model.machine.branch("tool") else ""
+    gone = {f"E{letter}0{first}" for letter in "XYZ"}
+    kept = {key: one for key, one in errors.functions.items() if key not in gone}
+    return replace(errors, functions=kept)
+
+
+# --- The reference line of straightness -----------------------------------------------------------
+
+EVENLY = 101
+"""Positions that a line is laid through where a curve has no points of its own."""
+STEPS = 8
+"""Steps to the line of the exact motion; each leaves a millionth of the one before."""
+
+
+class ReferenceLine(StrEnum):
+    """Which straight line is laid through a straightness curve (ISO 230-1, 3.4.7 to 3.4.9)."""
+
+    END_POINT = "end_point"
+    LEAST_SQUARES = "least_squares"
+    MINIMUM_ZONE = "minimum_zone"
+
+
+def fit_line(position: Array, value: Array, line: ReferenceLine | str) -> tuple[float, float]:
+    """Lay a reference line through a straightness curve.
+
+    Parameters
+    ----------
+    position : ndarray, [n], mm
+        Ascending.
+    value : ndarray, [n], µm
+    line : ReferenceLine or str
+        Through the first and the last point; with the least sum of squares; or the middle of the
+        narrowest band, measured across the position, that holds all points.
+
+    Returns
+    -------
+    offset : float, µm
+        Of the line at position zero.
+    slope : float, µm/mm
+    """
+    match ReferenceLine(line):
+        case ReferenceLine.END_POINT:
+            slope = float((value[-1] - value[0]) / (position[-1] - position[0]))
+            return float(value[0]) - slope * float(position[0]), slope
+        case ReferenceLine.LEAST_SQUARES:
+            middle = position.mean()
+            away = position - middle
+            slope = float(away @ (value - value.mean()) / (away @ away))
+            return float(value.mean() - slope * middle), slope
+        case ReferenceLine.MINIMUM_ZONE:
+            return _minimum_zone(position, value)
+
+
+def _minimum_zone(position: Array, value: Array) -> tuple[float, float]:
+    found: list[tuple[float, float, float]] = []
+    for sign in (1.0, -1.0):
+        edge = _lower_hull(position, sign * value)
+        for first, last in pairwise(edge):
+            slope = (value[last] - value[first]) / (position[last] - position[first])
+            rest = value - slope * position
+            found.append((float(np.ptp(rest)), (rest.max() + rest.min()) / 2.0, slope))
+    _, offset, slope = min(found)
+    return float(offset), float(slope)
+
+
+def _lower_hull(x: Array, y: Array) -> list[int]:
+    hull: list[int] = []
+    for new in range(len(x)):
+        while len(hull) > 1:
+            a, b = hull[-2], hull[-1]
+            if (x[b] - x[a]) * (y[new] - y[a]) - (y[b] - y[a]) * (x[new] - x[a]) > 0.0:
+                break
+            hull.pop()
+        hull.append(new)
+    return hull
+
+
+def convert_reference_line(
+    model: Model, errors: ErrorSet, spans: Mapping[str, Span], lines: Mapping[str, str]
+) -> ErrorSet:
+    """Take the reference line out of the straightness of linear axes; the field stays.
+
+    Notes
+    -----
+    The line of a table is laid through its points within the range, as measured, and that of a
+    curve that was converted from one likewise; any other through 101 evenly spread positions.
+    """
+    for axis, line in lines.items():
+        own = AxisErrors(model, errors, axis, spans[axis])
+        if not model.machine.axes[axis].is_linear:
+            raise OptionError(f"{axis} is rotary; only linear axes have straightness")
+        if own.order != ComponentErrors.AFTER_MOTION:
+            raise OptionError(
+                f"errors of {axis} act {own.order}, where a rotation tilts the motion as well and a"
+                " straightness does not; expected component_errors after_motion"
+            )
+        errors = moved_to_constants(own, _line_motion(own, ReferenceLine(line)))
+    return errors
+
+
+def _line_motion(own: AxisErrors, line: ReferenceLine) -> SmallMotion:
+    axis = own.model.machine.axes[own.axis]
+    along = axis.direction * np.eye(3)[axis.index]
+    taken = SmallMotion(np.zeros(3), np.zeros(3))
+    for _ in range(STEPS):
+        offset, slope = np.zeros(3), np.zeros(3)
+        for index in range(3):
+            if index != axis.index:
+                at = _positions(own, own.keys()[index])
+                left = without(own, taken, at, own.at(at)).to_errors()[0][:, index]
+                offset[index], slope[index] = fit_line(at, left, line)
+        if not offset.any() and not slope.any():
+            break
+        turn = np.cross(along, slope * MM_PER_UM)
+        taken = taken @ SmallMotion(turn / 2.0, offset * MM_PER_UM)
+    return taken
+
+
+def _positions(own: AxisErrors, key: str) -> Array:
+    low, high = own.span
+    points = np.array(own.points(key))
+    points = points[(points >= low) & (points <= high)]
+    return points if len(points) > 1 else np.linspace(low, high, EVENLY)
+
+
+# --- Errors measured along a line beside the origin of the axis, moved to it with Abbe arms -------
+
+
+def move_measuring_line(
+    model: Model,
+    errors: ErrorSet,
+    spans: Mapping[str, Span],
+    lines_mm: Mapping[str, Vector],
+    *,
+    to_origin: bool,
+) -> ErrorSet:
+    """Move translations between the origin of an axis and a line beside it.
+
+    Notes
+    -----
+    The point at p moves by δ + (R(ε) − 1)·p, to first order by δ + ε × p: 10 µrad of pitch on an
+    arm of 100 mm are 1 µm. Exact, with the full rotation. Before the motion the arm is the place of
+    the same point there, ``M(q) · p``.
+    """
+    sign = -1.0 if to_origin else 1.0
+    for axis, place in lines_mm.items():
+        own = AxisErrors(model, errors, axis, spans[axis])
+        point = np.array(place, dtype=float)
+        fixed = own.order == ComponentErrors.BEFORE_MOTION
+
+        def along(
+            position: Array,
+            present: SmallMotion,
+            own: AxisErrors = own,
+            point: Array = point,
+            fixed: bool = fixed,
+        ) -> SmallMotion:
+            lever = transforms.apply(own.pose(position), point) if fixed else point
+            return SmallMotion(present.half, present.shift_mm + sign * present.arm(lever))
+
+        errors = own.with_components(along, adds=True)
+    return errors
+
+
+# --- The sign of squareness: by the right-hand rule, or by the angle between two axes -------------
+
+
+class SquarenessSign(StrEnum):
+    """What a positive squareness means."""
+
+    RIGHT_HAND = "right_hand"
+    OVER_90 = "over_90"
+    UNDER_90 = "under_90"
+
+
+def angle_sign(key: str) -> int:
+    """Tell what a positive squareness by the right-hand rule does to the angle between the axes.
+
+    Notes
+    -----
+    The axis along eᵢ turned about eₖ moves by eₖ × eᵢ, which is +eⱼ where k, i, j follow each other
+    like x, y, z: towards the other axis.
+    """
+    row = parameter(key)
+    own, about = direction_index(row.axis), row.direction
+    return -1 if (own - about) % 3 == 1 else 1
+
+
+def squareness_keys(machine: Machine) -> tuple[str, ...]:
+    """List the constants of a machine that are angles between two of its linear axes."""
+    directions = {direction_index(axis) for axis in machine.axes if is_linear(axis)}
+    found: list[str] = []
+    for axis in machine.axes:
+        own = direction_index(axis)
+        for letter in "ABC":
+            other = 3 - own - direction_index(letter)
+            if is_linear(axis) and direction_index(letter) != own and other in directions:
+                found.append(f"E{letter}0{axis}")
+    return tuple(found)
+
+
+def convert_squareness(machine: Machine, errors: ErrorSet, sign: SquarenessSign | str) -> ErrorSet:
+    """Write squareness errors with another sign, or read them; both are the same step."""
+    sign = SquarenessSign(sign)
+    if sign is SquarenessSign.RIGHT_HAND:
+        return errors
+    turned = 1 if sign is SquarenessSign.OVER_90 else -1
+    functions = dict(errors.functions)
+    for key in squareness_keys(machine):
+        if key in functions and angle_sign(key) != turned:
+            functions[key] = functions[key].scaled(-1.0)
+    return ErrorSet(functions)

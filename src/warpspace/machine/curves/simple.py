@@ -1,0 +1,332 @@
+"""The plain kinds of curve: constant, polynomial, ramp and harmonics."""
+
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+
+from warpspace.exceptions import OptionError
+from warpspace.machine import limits
+from warpspace.machine.curves.curve import (
+    SPAN_SAMPLES,
+    ErrorFunction,
+    Rows,
+    Span,
+    Spell,
+    ValueReader,
+    limited,
+    refuse_more,
+    single_value,
+)
+from warpspace.units import Array
+
+
+@dataclass(frozen=True)
+class Constant(ErrorFunction):
+    """The same value everywhere."""
+
+    name = "constant"
+    title = "constant"
+    forms = ()
+    row_words = "one number: the same everywhere"
+    slider = "the same everywhere"
+    value: float = 0.0
+
+    def evaluate(self, position: Array) -> Array:
+        """Give the value at every position."""
+        return np.full(np.shape(position), self.value)
+
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        """No axis: it does not vary."""
+        return ()
+
+    def scaled(self, factor: float) -> Self:
+        """Give the constant times a factor."""
+        return replace(self, value=self.value * factor)
+
+    @property
+    def amplitude(self) -> float:
+        """The value itself."""
+        return self.value
+
+    def with_amplitude(self, amplitude: float) -> Self:
+        """Give another constant."""
+        return replace(self, value=amplitude)
+
+    @classmethod
+    def read(cls, raw: Any, span: Span, reader: ValueReader) -> Self:
+        """Read a number."""
+        return cls(span, reader.number(raw, (), -limits.MAX_ERROR, limits.MAX_ERROR))
+
+    def to_toml(self) -> object:
+        """Spell it as a number."""
+        return self.value
+
+    @classmethod
+    def from_rows(cls, span: Span, rows: Rows) -> Self:
+        """Read one number."""
+        return cls(span, single_value(rows))
+
+    def rows(self) -> Rows:
+        """Give the value."""
+        return [[self.value]]
+
+    @classmethod
+    def from_curve(cls, present: ErrorFunction, span: Span) -> Self:
+        """Keep the amplitude."""
+        return cls(span, present.amplitude)
+
+
+@dataclass(frozen=True)
+class Poly(ErrorFunction):
+    """Polynomial Σ cₖ·qᵏ of the axis position in mm or degrees."""
+
+    name = "poly"
+    title = "polynomial"
+    forms = (("poly",),)
+    row_words = "coefficients c0, c1, … of Σ cₖ·qᵏ"
+    coefficients: tuple[float, ...] = ()
+
+    def evaluate(self, position: Array) -> Array:
+        """Give the value of the polynomial; infinite where no number can hold it."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            value = np.polynomial.polynomial.polyval(
+                np.asarray(position, dtype=float), np.array(self.coefficients)
+            )
+        return np.asarray(value, dtype=float)
+
+    def scaled(self, factor: float) -> Self:
+        """Multiply all coefficients."""
+        return replace(self, coefficients=tuple(factor * c for c in self.coefficients))
+
+    def grown(self) -> Self:
+        """Give the line from 0 at the lower end to 1 at the upper; of c0 alone the constant 1.
+
+        The number of coefficients stays.
+        """
+        if len(self.coefficients) < 2:
+            return replace(self, coefficients=(1.0,))
+        low, high = self.span
+        rest = (0.0,) * (len(self.coefficients) - 2)
+        return replace(self, coefficients=(-low / (high - low), 1.0 / (high - low), *rest))
+
+    @classmethod
+    def read(cls, raw: Any, span: Span, reader: ValueReader) -> Self:
+        """Read ``{ poly = [c0, c1, …] }``."""
+        entries = reader.entries(raw["poly"], ("poly",), limits.MAX_COEFFICIENTS)
+        return cls(span, tuple(reader.number(c, ("poly", k)) for k, c in enumerate(entries)))
+
+    def to_toml(self) -> object:
+        """Spell it as ``{ poly = [c0, c1, …] }``."""
+        return {"poly": list(self.coefficients)}
+
+    def describe(self, unit: str, value: Spell, position: Spell) -> str:
+        """Name the degree."""
+        del unit, value, position
+        return f"polynomial of degree {len(self.coefficients) - 1}"
+
+    @classmethod
+    def from_rows(cls, span: Span, rows: Rows) -> Self:
+        """Read coefficients, in one row or one below the other."""
+        coefficients = tuple(value for row in rows for value in row)
+        refuse_more(len(coefficients), limits.MAX_COEFFICIENTS, "coefficients")
+        return cls(span, coefficients)
+
+    def rows(self) -> Rows:
+        """Give the coefficients one below the other."""
+        return [[value] for value in self.coefficients]
+
+    @classmethod
+    def from_curve(cls, present: ErrorFunction, span: Span) -> Self:
+        """Give the line through both ends of the present curve."""
+        low, high = span
+        first, last = (float(v) for v in present.evaluate(np.array(span)))
+        slope = (last - first) / (high - low)
+        return cls(span, (first - slope * low, slope))
+
+
+@dataclass(frozen=True)
+class Ramp(ErrorFunction):
+    """Zero at the lower end of the span, the value at the upper one, linear between and beyond."""
+
+    name = "ramp"
+    title = "ramp"
+    forms = (("ramp",),)
+    row_words = "one number: the value at the upper end, from zero at the lower"
+    slider = "rises along {axis}; this is the value at its upper end"
+    value: float = 0.0
+
+    def evaluate(self, position: Array) -> Array:
+        """Give the point of the line at each position."""
+        lower, upper = self.span
+        return self.value * (np.asarray(position, dtype=float) - lower) / (upper - lower)
+
+    def scaled(self, factor: float) -> Self:
+        """Give the ramp to a multiple of the value."""
+        return replace(self, value=self.value * factor)
+
+    @property
+    def amplitude(self) -> float:
+        """The value at the upper end."""
+        return self.value
+
+    def with_amplitude(self, amplitude: float) -> Self:
+        """Give the ramp to that value; a ramp of zero stays a ramp."""
+        return replace(self, value=amplitude)
+
+    @classmethod
+    def read(cls, raw: Any, span: Span, reader: ValueReader) -> Self:
+        """Read ``{ ramp = value }``."""
+        return cls(span, reader.number(raw["ramp"], ("ramp",), -limits.MAX_ERROR, limits.MAX_ERROR))
+
+    def to_toml(self) -> object:
+        """Spell it as ``{ ramp = value }``."""
+        return {"ramp": self.value}
+
+    def for_span(self, span: Span) -> ErrorFunction:
+        """Give the polynomial it is where the range is another one."""
+        if span == self.span:
+            return self
+        low, high = self.span
+        slope = self.value / (high - low)
+        return Poly(self.span, (-slope * low, slope))
+
+    def describe(self, unit: str, value: Spell, position: Spell) -> str:
+        """Name both ends."""
+        del unit, value
+        low, high = map(position, self.span)
+        return f"ramp, 0 at {low} to the value at {high}"
+
+    @classmethod
+    def from_rows(cls, span: Span, rows: Rows) -> Self:
+        """Read one number."""
+        return cls(span, single_value(rows))
+
+    def rows(self) -> Rows:
+        """Give the value at the upper end."""
+        return [[self.value]]
+
+    @classmethod
+    def from_curve(cls, present: ErrorFunction, span: Span) -> Self:
+        """Keep the amplitude."""
+        return cls(span, present.amplitude)
+
+
+MAX_SAMPLES = 200_001
+MAX_COSINES = 2_000_000
+"""Cosines that the peak of a curve may take: terms × positions."""
+SAMPLES_PER_WAVE = 16
+SHOWN_TERMS = 3
+LEAST_PEAK = 1e-6
+"""Largest value below which a wave of amplitude one does not leave zero within the range."""
+LIMITS = (
+    (0.0, limits.MAX_ORDER),
+    (-limits.MAX_ERROR, limits.MAX_ERROR),
+    (-limits.MAX_LENGTH_MM, limits.MAX_LENGTH_MM),
+)
+"""Of order, amplitude and phase."""
+
+
+@dataclass(frozen=True)
+class Harmonics(ErrorFunction):
+    """Sum of A·cos(n·q − φ)."""
+
+    name = "harmonics"
+    title = "harmonics"
+    forms = (("harmonics",),)
+    row_words = "order, amplitude and phase in degrees in each row"
+    # (n, 3); order n, amplitude A, phase φ in degrees. The product n·q counts as degrees, so on a
+    # linear axis the wavelength is 360/n mm.
+    terms: tuple[tuple[float, float, float], ...] = ()
+
+    def evaluate(self, position: Array) -> Array:
+        """Give the sum of the harmonics."""
+        angle = np.asarray(position, dtype=float)
+        total = np.zeros(angle.shape)
+        for order, amplitude, phase in self.terms:
+            total = total + amplitude * np.cos(np.deg2rad(order * angle - phase))
+        return total
+
+    def scaled(self, factor: float) -> Self:
+        """Multiply all amplitudes."""
+        return replace(self, terms=tuple((n, factor * a, phase) for n, a, phase in self.terms))
+
+    def grown(self) -> Self:
+        """Give the first of its waves that is not zero by its order and phase, else one whole wave.
+
+        Orders and phases of all terms stay.
+        """
+        for index in range(len(self.terms)):
+            terms = tuple(
+                (n, float(k == index), phase) for k, (n, _, phase) in enumerate(self.terms)
+            )
+            wave = replace(self, terms=terms)
+            if abs(wave.amplitude) > LEAST_PEAK:
+                return wave
+        return replace(self, terms=((_one_wave(self.span), 1.0, 0.0),))
+
+    @property
+    def samples(self) -> int:
+        """Number of positions that resolves the shortest wave."""
+        highest = max((order for order, _, _ in self.terms), default=0.0)
+        waves = highest * (self.span[1] - self.span[0]) / 360.0
+        most = min(MAX_SAMPLES, MAX_COSINES // max(len(self.terms), 1))
+        return int(min(max(SPAN_SAMPLES, SAMPLES_PER_WAVE * waves + 1), most))
+
+    @property
+    def cosines(self) -> int:
+        """Number of cosines that its peak takes: what opening a scene with this curve costs."""
+        return self.samples * len(self.terms)
+
+    @classmethod
+    def read(cls, raw: Any, span: Span, reader: ValueReader) -> Self:
+        """Read ``{ harmonics = [[n, A, φ], …] }``."""
+        terms: list[tuple[float, float, float]] = []
+        for index, entry in enumerate(
+            reader.entries(raw["harmonics"], ("harmonics",), limits.MAX_TERMS)
+        ):
+            place = ("harmonics", index)
+            order, amplitude, phase = reader.row(entry, place, "[order, amplitude, phase]", LIMITS)
+            terms.append((order, amplitude, phase))
+        return cls(span, tuple(terms))
+
+    def to_toml(self) -> object:
+        """Spell it as ``{ harmonics = [[n, A, φ], …] }``."""
+        return {"harmonics": [list(term) for term in self.terms]}
+
+    def describe(self, unit: str, value: Spell, position: Spell) -> str:
+        """Name the first terms."""
+        del position
+        terms = ", ".join(f"{value(a)} {unit} × {n:g}" for n, a, _ in self.terms[:SHOWN_TERMS])
+        return f"harmonics: {terms}" + (" …" if len(self.terms) > SHOWN_TERMS else "")
+
+    @classmethod
+    def from_rows(cls, span: Span, rows: Rows) -> Self:
+        """Read terms of order, amplitude and phase; an absent phase is zero."""
+        refuse_more(len(rows), limits.MAX_TERMS, "terms")
+        terms: list[tuple[float, float, float]] = []
+        for number, row in enumerate(rows, start=1):
+            if len(row) not in (2, 3):
+                raise OptionError(f"row {number}: {len(row)} numbers; expected {cls.row_words}")
+            order, amplitude, phase = (*row, 0.0)[:3]
+            if not 0.0 <= order <= limits.MAX_ORDER:
+                raise OptionError(
+                    f"row {number}: order {order:g}; expected 0 to {limits.MAX_ORDER}"
+                )
+            limited(amplitude, number, what="amplitude")
+            terms.append((order, amplitude, limited(phase, number, limits.MAX_LENGTH_MM, "phase")))
+        return cls(span, tuple(terms))
+
+    def rows(self) -> Rows:
+        """Give one term a row."""
+        return self.terms
+
+    @classmethod
+    def from_curve(cls, present: ErrorFunction, span: Span) -> Self:
+        """Give one wave over the range, with the amplitude of the present curve."""
+        return cls(span, ((_one_wave(span), present.amplitude, 0.0),))
+
+
+def _one_wave(span: Span) -> float:
+    return float(f"{360.0 / (span[1] - span[0]):.6g}")

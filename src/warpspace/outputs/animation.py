@@ -1,0 +1,302 @@
+"""Animations: pictures with one camera and one scale, joined to a GIF, WebP or MP4."""
+
+import io
+import os
+import subprocess
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from warpspace.bodies.placed import PlacedBody
+from warpspace.exceptions import OptionError, OutputError, RenderError, WorkersLostError
+from warpspace.geometry.surfaces import deform
+from warpspace.kinematics.model import Loop
+from warpspace.machine.limits import ANIMATION_FRAMES
+from warpspace.outputs.drawing.map3d import draw_map, fit_map
+from warpspace.outputs.drawing.render import fit_projection
+from warpspace.outputs.drawing.settings import FigureSettings, evaluate_for
+from warpspace.outputs.drawing.sheet import Drawing, map_legend, scene_facts, start_sheet
+from warpspace.outputs.drawing.style import SIZES
+from warpspace.outputs.figures.error_map import isoline_words, say_statistics
+from warpspace.outputs.figures.machine import bodies_of, draw_bodies
+from warpspace.outputs.files import check_target, write_atomically
+from warpspace.outputs.processes import ProcessPool
+from warpspace.picture.model import choose_exaggeration, choose_scale
+from warpspace.picture.scene_picture import evaluate_picture
+from warpspace.picture.traces import TraceLine, evaluate_traces
+from warpspace.resources import __version__
+from warpspace.scene.model import Scene
+from warpspace.spelling import spell, spell_short
+from warpspace.units import Array
+
+MOTIONS = ("exaggeration", "rotation")
+MIN_FRAMES, MAX_FRAMES = ANIMATION_FRAMES
+MAX_PIXELS = 1_500_000_000
+"""Of all pictures together."""
+_TRACE_SAMPLES = 241
+
+
+@dataclass(frozen=True, slots=True)
+class AnimationSettings:
+    """Options of an animation."""
+
+    # "exaggeration" (from true scale to the display factor and back) or "rotation" (one turn of the
+    # rotary axis next to the workpiece)
+    motion: str = "exaggeration"
+    frames: int = 48  # pictures of one round; the last leads back to the first
+    fps: float = 15.0  # pictures a second
+    # component, display factor, view, size, loop, grid and theme
+    figure: FigureSettings = field(default_factory=lambda: FigureSettings(size=(960, 720)))
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        if self.motion not in MOTIONS:
+            raise OptionError(f"motion {self.motion!r}; expected one of {', '.join(MOTIONS)}")
+        if not MIN_FRAMES <= self.frames <= MAX_FRAMES:
+            raise OptionError(f"frames: {self.frames}; expected {MIN_FRAMES} to {MAX_FRAMES}")
+        if not 1.0 <= self.fps <= 60.0:
+            raise OptionError(f"fps: {self.fps:g}; expected 1 to 60 pictures a second")
+        width, height = self.figure.size
+        if self.frames * width * height > MAX_PIXELS:
+            raise OptionError(
+                f"{self.frames} pictures of {width}x{height} are too many; expected at most"
+                f" {MAX_PIXELS // (width * height)} of that size"
+            )
+
+
+def draw_frame(scene: Scene, settings: AnimationSettings, number: int) -> Drawing:
+    """Draw one picture of an animation."""
+    phase = number / settings.frames
+    if settings.motion == "rotation":
+        return _rotation_frame(scene, settings.figure, phase)
+    return _exaggeration_frame(scene, settings.figure, phase)
+
+
+def sweep_factor(top: float, phase: float) -> float:
+    """Give the display factor at a phase of the sweep: 1 at its ends, the top in its middle.
+
+    It is rounded to three digits, so that the picture is drawn with the number it shows.
+    """
+    share = (1.0 - np.cos(2.0 * np.pi * phase)) / 2.0
+    return float(f"{1.0 + (top - 1.0) * share:.3g}")
+
+
+def _exaggeration_frame(scene: Scene, figure: FigureSettings, phase: float) -> Drawing:
+    largest = evaluate_for(figure, scene)
+    factor = sweep_factor(largest.exaggeration, phase)
+    picture = replace(largest, exaggeration=factor)
+    scale = picture.scale
+    title = f"Volumetric error: {scene.title}"
+    facts = scene_facts(picture, factor)
+    legend = map_legend(isoline_words(scale))
+    sheet = start_sheet("exaggeration", figure, title, facts, [scene], legend, exact=True)
+    camera = fit_map(sheet.canvas, [picture, largest], sheet.content, figure.view)
+    drawn = draw_map(sheet.canvas, picture, sheet.content, figure.view, projection=camera)
+    say_statistics(sheet, picture, camera.px_per_mm)
+    return sheet.finish(factor, [drawn])
+
+
+def one_round(scene: Scene) -> tuple[str, Array, list[TraceLine]]:
+    """Give the rotary axis next to a scene's points, its positions, and their traces."""
+    groups = evaluate_traces(scene, 1.0, _TRACE_SAMPLES)
+    if not groups:
+        raise OptionError(
+            f"{scene.name}: nothing turns; expected a rotary axis, and points in [points_mm] traces"
+        )
+    positions, group = scene.workspace.positions, groups[0].group
+    side = "workpiece" if group.loop is Loop.WORKPIECE else "tool"
+    axis = [axis.name for axis in scene.machine.branch(side) if not axis.is_linear][-1]
+    chosen = {
+        number: line
+        for number, line in enumerate(groups[0].each())
+        if line.trace.axis == axis
+        and all(positions.get(name, 0.0) == at for name, at in line.trace.at.items())
+    }
+    return axis, group.coordinates[axis][next(iter(chosen))], list(chosen.values())
+
+
+def _rotation_frame(scene: Scene, figure: FigureSettings, phase: float) -> Drawing:
+    axis, turn_deg, lines = one_round(scene)
+    at = round(phase * (len(turn_deg) - 1))
+    angle = float(turn_deg[at])
+    turned = replace(scene, workspace=scene.workspace.moved({axis: angle}))
+    nominal = np.stack([line.nominal_mm for line in lines])
+    error = np.stack([line.error_um for line in lines])
+    size = np.linalg.norm(error, axis=-1)
+    edge = float(np.ptp(nominal.reshape(-1, 3), axis=0).max())
+    factor = choose_exaggeration(figure.exaggeration, scene.exaggeration, float(size.max()), edge)
+    actual = deform(nominal, error, factor)
+    scale = choose_scale([size], "norm")
+    picture = evaluate_picture(turned, grid=3, loop="workpiece", exaggeration=factor)
+    title = f"Rotary traces: {scene.title}"
+    facts = scene_facts(picture, factor)
+    sheet = start_sheet("rotation", figure, title, facts, [scene], [], exact=True)
+    canvas = sheet.canvas
+    carried = [axis.name for axis in scene.machine.branch("workpiece")]
+    placed = bodies_of(picture, factor, only=[*carried, "w"])
+    left, bottom, right, top = sheet.content
+    side = 0.03 * (right - left)
+    reach = [nominal.reshape(-1, 3), actual.reshape(-1, 3), *map(_swept, placed)]
+    camera = fit_projection(
+        figure.view, np.concatenate(reach), (left + side, bottom + side, right - side, top - side)
+    )
+    draw_bodies(canvas, placed, camera)
+    for still, moved, length in zip(nominal, actual, size, strict=True):
+        ghost, spots = camera.project(still), camera.project(moved)
+        canvas.lines([ghost], width=SIZES.line, colour=canvas.theme.ghost, dashes=(8.0, 5.0))
+        canvas.lines([spots], width=SIZES.hair, colour=canvas.theme.muted, alpha=0.6)
+        done = [spots[step : step + 2] for step in range(at)]
+        colours = scale.colours(length[:at]) / 255.0
+        canvas.lines(done, width=3.4, colour=colours, zorder=3.0)
+        canvas.disc(ghost[at], 4.0, canvas.theme.ghost)
+        canvas.disc(spots[at], 5.0, canvas.theme.accent)
+    rows = [(axis, f"{spell_short(round(angle, 1))}°")]
+    for point, length in zip(scene.trace_points_mm, size, strict=False):
+        words = ", ".join(map(spell_short, point))
+        rows.append((f"|E| of ({words})", f"{spell(float(length[at]))} µm"))
+    marks = [("max", float(size.max())), ("mean", float(size.mean()))]
+    sheet.draw_panel(scale, "|E|  [µm]", marks, rows, (camera.px_per_mm, factor))
+    return sheet.finish(factor)
+
+
+def _swept(part: PlacedBody) -> Array:
+    """Give corners of what a body sweeps when it turns upright, so that the camera stands still."""
+    points = part.nominal_mm
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle = (low + high) / 2.0
+    reach = float(np.linalg.norm((points - middle)[:, :2], axis=1).max())
+    ends = ([middle[0] - reach, middle[0] + reach], [middle[1] - reach, middle[1] + reach])
+    return np.stack(np.meshgrid(*ends, [low[2], high[2]]), -1).reshape(-1, 3)
+
+
+ENDINGS = (".gif", ".webp", ".mp4")
+MAX_WORKERS = 4
+VIDEO_EXTRA = "pip install 'warpspace[video]'"
+Progress = Callable[[int], object]
+
+
+def write_animation(
+    scene: Scene,
+    path: str | Path,
+    settings: AnimationSettings | None = None,
+    *,
+    overwrite: bool = True,
+    progress: Progress | None = None,
+) -> None:
+    """Draw an animation of a scene into a file."""
+    settings = settings or AnimationSettings()
+    target = check_target(path, ENDINGS, overwrite=overwrite)
+    ending = target.suffix.lower()
+    encoder = _find_encoder() if ending == ".mp4" else ""
+    about = f"warpspace {__version__}; scene={scene.name}; motion={settings.motion}"
+    pictures = [
+        Image.open(io.BytesIO(data)).convert("RGB") for data in _pictures(scene, settings, progress)
+    ]
+    with write_atomically(target, overwrite=overwrite) as temporary:
+        if ending == ".mp4":
+            _write_video(pictures, temporary, encoder, settings, about)
+        else:
+            temporary.write_bytes(_image_bytes(pictures, ending, settings, about))
+
+
+def _pictures(
+    scene: Scene, settings: AnimationSettings, progress: Progress | None
+) -> Iterator[bytes]:
+    workers = max(1, min(os.cpu_count() or 1, MAX_WORKERS, settings.frames))
+    pool = ProcessPool(workers)
+    try:
+        tasks = [pool.submit(_draw, scene, settings, number) for number in range(settings.frames)]
+        for task in tasks:
+            yield task.result()
+            if progress is not None:
+                progress(1)
+    except WorkersLostError:
+        if pool.ended:
+            raise RenderError("the animation was given up: its renderers were ended") from None
+        raise RenderError("the animation could not be drawn: the renderer crashed") from None
+    finally:
+        pool.kill()
+
+
+def _draw(scene: Scene, settings: AnimationSettings, number: int) -> bytes:
+    import matplotlib as mpl
+
+    from warpspace.outputs.drawing.style import SAVE_RC
+    from warpspace.outputs.save import figure_bytes
+
+    with mpl.rc_context(dict(SAVE_RC)):
+        drawing = draw_frame(scene, settings, number)
+    return figure_bytes(drawing, "png")
+
+
+def _image_bytes(
+    pictures: list[Image.Image], ending: str, settings: AnimationSettings, about: str
+) -> bytes:
+    duration = round(1000.0 / settings.fps)
+    buffer = io.BytesIO()
+    if ending == ".gif":
+        palette = shared_palette(pictures)
+        frames = [
+            picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures
+        ]
+        options: dict[str, Any] = {"comment": about.encode(), "optimize": False}
+    else:
+        frames = pictures
+        options = {"quality": 85, "method": 4}
+    frames[0].save(
+        buffer,
+        format=ending[1:],
+        save_all=True,
+        append_images=frames[1:],
+        duration=duration,
+        loop=0,
+        **options,
+    )
+    return buffer.getvalue()
+
+
+def shared_palette(pictures: Sequence[Image.Image]) -> Image.Image:
+    """Choose the 256 colours that all pictures of a GIF are drawn with."""
+    width, height = pictures[0].size
+    sheet = Image.new("RGB", (width, height * len(pictures)))
+    for number, picture in enumerate(pictures):
+        sheet.paste(picture, (0, number * height))
+    return sheet.quantize(256, dither=Image.Dither.NONE)
+
+
+def _find_encoder() -> str:
+    """Find the program that writes MP4; say what to install where there is none."""
+    try:
+        import imageio_ffmpeg
+
+        return imageio_ffmpeg.get_ffmpeg_exe()
+    except (ImportError, RuntimeError):
+        raise OutputError(
+            f"MP4 needs the package imageio-ffmpeg: {VIDEO_EXTRA}; GIF and WebP need nothing more"
+        ) from None
+
+
+def _write_video(
+    pictures: list[Image.Image], path: Path, encoder: str, settings: AnimationSettings, about: str
+) -> None:
+    width, height = (side // 2 * 2 for side in pictures[0].size)
+    raw = b"".join(picture.crop((0, 0, width, height)).tobytes() for picture in pictures)
+    given = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}"]
+    given += ["-r", f"{settings.fps:g}", "-i", "-"]
+    wanted = ["-an", "-c:v", "libx264", "-crf", "18", "-pix_fmt", "yuv420p"]
+    wanted += ["-movflags", "+faststart", "-metadata", f"comment={about}"]
+    wanted += ["-fflags", "+bitexact", "-flags:v", "+bitexact", "-f", "mp4"]
+    done = subprocess.run(
+        [encoder, "-y", "-loglevel", "error", *given, *wanted, str(path)],
+        input=raw,
+        capture_output=True,
+        check=False,
+    )
+    if done.returncode != 0:
+        lines = done.stderr.decode(errors="replace").strip().splitlines()
+        reason = lines[-1] if lines else f"the encoder ended with {done.returncode}"
+        raise OutputError(f"the video cannot be written: {reason}")

@@ -1,0 +1,423 @@
+"""Bars, curves and distributions of a result, drawn with matplotlib as their blocks say."""
+
+from collections.abc import Sequence
+from typing import Any, cast
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.patheffects import Normal, Stroke
+from matplotlib.transforms import Bbox
+
+from warpspace.analysis.blocks import Bars, Curve, Histogram, Lines, Panel, Series
+from warpspace.bench.evaluation import LEAST, lay_polar
+from warpspace.outputs.charts.paper import (
+    SMALL,
+    TEXT,
+    bar_colour,
+    ground,
+    key_colour,
+    quiet,
+    sheet,
+    style,
+)
+from warpspace.outputs.drawing.style import LIGHT
+
+CHART_IN, ROW_IN, GAP_IN = 4.9, 4.6, 0.25
+"""Width, height and distance of charts that stand side by side."""
+WIDTH_IN = 11.0
+BAR_IN = 0.235
+"""Height of one bar; rows of two are wider."""
+FEW = 8
+"""Rows below which bars beside other charts grow no wider."""
+ROOM = 1.14
+"""Of the longest bar: room for the number beside it."""
+LEGEND_IN = 0.19
+DASHES: dict[str, Any] = {"line": "-", "dashed": (0, (4, 3)), "thin": "-", "dots": "none"}
+Box = tuple[float, float, float, float]
+"""Left, bottom, width and height of a part of a figure, 0 to 1."""
+
+
+def chart_figure(chart: Bars | Lines | Histogram) -> Figure:
+    """Draw one chart on a sheet of its own."""
+    if isinstance(chart, Bars):
+        return bars_chart(chart)
+    if isinstance(chart, Histogram):
+        return histogram_chart(chart)
+    return charts_sheet([chart], chart.title, chart.note)
+
+
+def charts_sheet(
+    charts: Sequence[Bars | Lines],
+    title: str,
+    subtitle: str,
+    columns: int | None = None,
+    *,
+    beside_in: float = 0.0,
+    below_in: float = 0.0,
+) -> Figure:
+    """Draw charts side by side on a sheet, so many in a row; there is room left for more."""
+    columns = columns or len(charts)
+    rows = -(-len(charts) // columns)
+    width = columns * CHART_IN + beside_in
+    height = 0.85 + rows * (ROW_IN + GAP_IN) + below_in
+    with style():
+        figure, top = sheet(width, height, title, subtitle)
+        for number, chart in enumerate(charts):
+            row, column = divmod(number, columns)
+            bottom = top - (row * (ROW_IN + GAP_IN) + ROW_IN) / height
+            box = column * CHART_IN / width, bottom, CHART_IN / width, ROW_IN / height
+            if isinstance(chart, Lines):
+                draw_lines(figure, chart, box)
+            else:
+                draw_beside(figure, chart, box)
+        return figure
+
+
+# --- Bars -----------------------------------------------------------------------------------------
+
+
+def draw_beside(figure: Figure, bars: Bars, box: Box, size: float = SMALL) -> None:
+    """Draw bars into a part of a figure; text of a size in points."""
+    width, height = figure.get_size_inches() * SMALL / size
+    left, bottom, wide, high = box
+    longest = max((len(words) for words in bars.rows), default=0)
+    names = min((0.35 + 0.075 * longest) / width, 0.41 * wide)
+    step = (wide - names - 0.25 / width) / len(bars.panels)
+    under, tall = 0.5 / height, max(high - 0.85 / height, 0.1 * high)
+    axes = [
+        figure.add_axes((left + names + at * step, bottom + under, 0.92 * step, tall))
+        for at in range(len(bars.panels))
+    ]
+    for axis in axes[1:]:
+        axis.tick_params(labelleft=False)
+    draw_bars(axes, bars, size)
+    for axis in axes:
+        axis.set_ylim(max(len(bars.rows), FEW) - 0.4, -0.6)
+
+
+def bars_chart(bars: Bars) -> Figure:
+    """Draw a chart of bars on a sheet of its own."""
+    with style():
+        beside = max((_beside(panel) for panel in bars.panels), default=1)
+        row = BAR_IN * (1.0 + 0.55 * (beside - 1))
+        height = 1.75 + row * max(len(bars.rows), 3)
+        figure, top = sheet(WIDTH_IN, height, bars.title, bars.subtitle, top_in=1.15)
+        axes = figure.subplots(
+            1, len(bars.panels), sharey=True, squeeze=False,
+            width_ratios=[panel.width for panel in bars.panels],
+        )[0]  # fmt: skip
+        longest = max((len(words) for words in bars.rows), default=0)
+        left = min(max(1.2, 0.3 + 0.066 * longest), 3.6)
+        figure.subplots_adjust(
+            left=left / WIDTH_IN, right=0.98, top=top, bottom=0.62 / height, wspace=0.09
+        )
+        draw_bars(list(axes), bars)
+        if bars.legend:
+            figure.legend(
+                handles=legend_handles(bars), loc="lower left",
+                bbox_to_anchor=(left / WIDTH_IN, top + 0.16 / height), ncols=4, frameon=False,
+                fontsize=SMALL, borderpad=0.0, handlelength=1.0, handleheight=0.8,
+            )  # fmt: skip
+        return figure
+
+
+def draw_bars(axes: list[Axes], bars: Bars, size: float = SMALL) -> None:
+    """Draw the panels into axes side by side that share their rows; text of a size in points."""
+    for index, (axis, panel) in enumerate(zip(axes, bars.panels, strict=True)):
+        _draw_panel(axis, panel, bars, size, first=index == 0)
+    axes[0].set_yticks(range(len(bars.rows)), list(bars.rows), size=size)
+    axes[0].set_ylim(max(len(bars.rows), 1) - 0.4, -0.6)
+
+
+def legend_handles(bars: Bars) -> list[Patch | Line2D]:
+    """Say what colours and lines mean."""
+    return [
+        Line2D([], [], color=ground().ink, linestyle=(0, (4, 3)), label=words)
+        if role == "before"
+        else Patch(color="none" if role == "none" else _bar_colour(role), label=words)
+        for words, role in bars.legend
+    ]
+
+
+def _beside(panel: Panel) -> int:
+    bars = [one for one in panel.series if not one.as_mark]
+    rows = max((len(one.values) for one in bars), default=0)
+    counts = [sum(one.values[row] is not None for one in bars) for row in range(rows)]
+    return max(counts, default=1)
+
+
+def _bar_colour(role: str) -> str:
+    return {"key": key_colour(), "set": ground().series[2]}.get(role, bar_colour())
+
+
+def _longest(panel: Panel) -> float:
+    values = [
+        abs(value) + (one.spread[row] if one.spread else 0.0)
+        for one in panel.series
+        for row, value in enumerate(one.values)
+        if value is not None
+    ]
+    return max((*values, panel.before or 0.0), default=0.0)
+
+
+def _draw_panel(axis: Axes, panel: Panel, bars: Bars, size: float, *, first: bool) -> None:
+    alike = [one for one in bars.panels if one.signed] if panel.signed else [panel]
+    longest = max(map(_longest, alike)) or 1.0
+    drawn = [one for one in panel.series if not one.as_mark]
+    room = (ROOM if any(one.form for one in panel.series) else 1.05) * longest
+    for series in panel.series:
+        for row, value in enumerate(series.values):
+            if value is None:
+                continue
+            there = [one for one in drawn if one.values[row] is not None]
+            _draw_one(axis, series, row, value, there, bars, size)
+    if panel.before is not None:
+        axis.axvline(panel.before, color=ground().ink, linewidth=1.0, linestyle=(0, (4, 3)))
+    quiet(axis)
+    axis.spines["left"].set_visible(False)
+    axis.axvline(0.0, color=ground().muted, linewidth=0.8)
+    axis.tick_params(axis="y", length=0)
+    axis.tick_params(axis="x", labelsize=size)
+    axis.set_xlim(-1.05 * longest if panel.signed else 0.0, room)
+    axis.set_xlabel(panel.unit, size=size)
+    for series in panel.series:
+        if series.form:
+            _number(axis, series, drawn, room, size)
+    axis.set_title(
+        panel.title, size=TEXT * size / SMALL, weight="bold", loc="left" if first else "center"
+    )
+
+
+def _draw_one(
+    axis: Axes,
+    series: Series,
+    row: int,
+    value: float,
+    there: list[Series],
+    bars: Bars,
+    size: float,
+) -> None:
+    if series.as_mark:
+        axis.plot([value], [row], "|", color=ground().ink, markersize=size)
+        return
+    stands_out = series.role == "plain" and bool(bars.keys) and bars.keys[row]
+    spread = series.spread[row] if series.spread else None
+    axis.barh(
+        _place(series, row, there), value, height=0.7 / len(there),
+        color=_bar_colour("key" if stands_out else series.role),
+        error_kw={"elinewidth": 0.9, "ecolor": ground().muted}, xerr=spread,
+    )  # fmt: skip
+
+
+def _place(series: Series, row: int, there: list[Series]) -> float:
+    index = next(i for i, one in enumerate(there) if one is series)
+    return row + 0.7 * ((index + 0.5) / len(there) - 0.5)
+
+
+def _number(axis: Axes, series: Series, drawn: list[Series], end: float, size: float) -> None:
+    for row, value in enumerate(series.values):
+        if value is None:
+            continue
+        there = [one for one in drawn if one.values[row] is not None]
+        text = axis.text(
+            value + 0.012 * end, _place(series, row, there), f"{value:{series.form}}",
+            va="center", size=0.9 * size,
+        )  # fmt: skip
+        text.set_path_effects([Stroke(linewidth=2.5, foreground=ground().paper), Normal()])
+
+
+# --- Curves ---------------------------------------------------------------------------------------
+
+
+def draw_lines(figure: Figure, chart: Lines, box: Box, size: float = SMALL) -> None:
+    """Draw curves with their legend into a part of a figure; text of a size in points."""
+    width, height = figure.get_size_inches() * SMALL / size
+    left, bottom, wide, high = box
+    names = sum(bool(curve.name) for curve in chart.curves) + len(chart.bands)
+    lines = -(-names // 2)
+    legend = LEGEND_IN * lines / height
+    note = 0.2 / height if chart.note else 0.0
+    figure.text(left + 0.3 / width, bottom + high - 0.05 / height, chart.title,
+                size=TEXT * size / SMALL, weight="bold", va="top")  # fmt: skip
+    inner = 0.75 if chart.kind != "polar" else 0.15
+    under = 0.5 if chart.kind != "polar" else 0.1
+    axes = figure.add_axes(
+        (
+            left + inner / width,
+            bottom + under / height + legend + note,
+            max(wide - (inner + 0.2) / width, 0.2 * wide),
+            max(high - (under + 0.35) / height - legend - note, 0.1 * high),
+        )
+    )
+    if chart.kind == "polar":
+        _polar(axes, chart)
+    else:
+        _lines(axes, chart, size)
+    figure.legend(
+        handles=_handles(chart), loc="lower left",
+        bbox_to_anchor=(left + 0.2 / width, bottom + note), ncols=2, frameon=False,
+        fontsize=size - 0.5, handlelength=1.8, columnspacing=1.2, labelspacing=0.2,
+        borderaxespad=0.0,
+    )  # fmt: skip
+    figure.text(left + 0.3 / width, bottom + 0.05 / height, chart.note, size=size - 0.5,
+                color=ground().muted)  # fmt: skip
+
+
+def _curve_colour(curve: Curve) -> str:
+    if curve.style == "thin":
+        return ground().ghost
+    return ground().series[curve.colour % len(ground().series)]
+
+
+def _plot(axes: Axes, curve: Curve, x: "np.ndarray", y: "np.ndarray") -> None:
+    dots = curve.style == "dots"
+    axes.plot(
+        x, y,
+        color=_curve_colour(curve),
+        linestyle=DASHES[curve.style],
+        linewidth=0.9 if curve.style in {"thin", "dashed"} else 1.6,
+        marker="o" if dots else "",
+        markersize=4.0 if len(x) < 60 else 2.2,
+        markerfacecolor=ground().paper if dots and len(x) < 60 else _curve_colour(curve),
+        markeredgewidth=1.1,
+    )  # fmt: skip
+
+
+def _lines(axes: Axes, chart: Lines, size: float) -> None:
+    quiet(axes, "both")
+    for band in chart.bands:
+        colour = ground().series[band.colour % len(ground().series)]
+        axes.fill_between(band.x, band.low, band.high, color=colour, alpha=0.16, linewidth=0.0)
+    for curve in chart.curves:
+        _plot(axes, curve, curve.x, curve.y)
+    if chart.kind == "plane":
+        axes.set_aspect("equal", adjustable="datalim")
+    else:
+        values = np.concatenate([curve.y for curve in chart.curves])
+        if np.ptp(values) < LEAST and not chart.bands:  # nothing but rounding: no chart of noise
+            middle = float(np.round(values.mean(), 6))
+            axes.set_ylim(middle - 1.0, middle + 1.0)
+    if chart.log:
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.tick_params(which="minor", labelbottom=False, labelleft=False)
+    axes.set_xlabel(chart.x_label, size=size)
+    axes.set_ylabel(chart.y_label, size=size)
+    axes.tick_params(labelsize=size - 0.5)
+
+
+def _polar(axes: Axes, chart: Lines) -> None:
+    layout = lay_polar(chart)
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+    axes.set_xlim(-1.18, 1.18)
+    axes.set_ylim(-1.18, 1.18)
+    turn = np.linspace(0.0, 2.0 * np.pi, 361)
+    for value, radius in layout.rings:
+        colour = ground().ink if value == 0.0 else ground().faint
+        axes.plot(radius * np.cos(turn), radius * np.sin(turn), color=colour,
+                  linewidth=1.0 if value == 0.0 else 0.8)  # fmt: skip
+        if value != 0.0:
+            axes.text(0.0, radius, f"{value:+g}", size=SMALL - 2.0, color=ground().muted,
+                      ha="center", va="center", bbox=_paper(0.4))  # fmt: skip
+    for degrees in (0, 90, 180, 270):
+        x, y = np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))
+        axes.plot([0.0, x], [0.0, y], color=ground().faint, linewidth=0.8)
+        axes.text(1.1 * x, 1.1 * y, f"{degrees}°", size=SMALL - 1.0, color=ground().muted,
+                  ha="center", va="center")  # fmt: skip
+    for curve, points in zip(chart.curves, layout.curves, strict=True):
+        _plot(axes, curve, points[:, 0], points[:, 1])
+    axes.text(-1.15, -1.15, f"rings {layout.ring:g} {layout.unit} apart", size=SMALL - 1.0,
+              color=ground().muted)  # fmt: skip
+
+
+def _handles(chart: Lines) -> list[Line2D | Patch]:
+    lines = [
+        Line2D([], [], color=_curve_colour(curve), label=curve.name, linewidth=1.4,
+               linestyle=DASHES[curve.style], marker="o" if curve.style == "dots" else "",
+               markersize=4.0, markerfacecolor=ground().paper)
+        for curve in chart.curves
+        if curve.name
+    ]  # fmt: skip
+    colours = ground().series
+    bands = [
+        Patch(facecolor=colours[band.colour % len(colours)], alpha=0.16, label=band.name)
+        for band in chart.bands
+    ]
+    return [*lines, *bands]
+
+
+# --- Distributions, like figures 4-8 and 4-9 of the thesis ----------------------------------------
+
+HISTOGRAM_IN = 9.0, 5.4
+LABEL_ROWS = 4
+"""Rows of labels above the bars, at most."""
+
+
+def histogram_chart(found: Histogram) -> Figure:
+    """Draw a distribution with its marks and limit."""
+    with style():
+        figure, top = sheet(*HISTOGRAM_IN, found.title, found.subtitle, top_in=1.5)
+        axes = figure.add_axes((0.085, 0.115, 0.885, top - 0.115))
+        edges, heights, limit = found.edges, found.heights, found.limit
+        beyond = [limit is not None and low >= limit for low in edges[:-1]]
+        within, outside = ("#a9c4de", "#e3c3c6") if ground() is LIGHT else ("#3f6a92", "#7a4a52")
+        axes.bar(
+            edges[:-1], heights, np.diff(edges), align="edge", edgecolor=ground().paper,
+            color=[outside if one else within for one in beyond], linewidth=0.5,
+        )  # fmt: skip
+        quiet(axes, "y")
+        axes.set_xlabel(found.x_label)
+        axes.set_ylabel(found.y_label)
+        last = float(edges[1:][np.cumsum(heights) >= 0.9995 * heights.sum()][0])
+        printed = dict(found.marks).get("thesis", 0.0)
+        axes.set_xlim(0.0, max(last, 1.05 * (limit or 0.0), 1.05 * printed))
+        axes.set_ylim(0.0, 1.06 * float(heights.max()))
+        looks = {
+            "mean": (key_colour(), "-"), "P95": (ground().muted, "-"),
+            "thesis": (ground().series[4], "--"), "limit": (ground().accent, "-"),
+        }  # fmt: skip
+        marks = [*found.marks, *([] if limit is None else [("limit", limit)])]
+        _mark(axes, [(name, at, *looks.get(name, (ground().ink, "-"))) for name, at in marks])
+        told = ((0.95, TEXT + 2.0, "bold", ground().ink), (0.83, SMALL, "normal", ground().muted))
+        for words, (height, size, weight, colour) in zip(found.told, told, strict=False):
+            axes.text(
+                0.985, height, words, transform=axes.transAxes, ha="right", va="top", size=size,
+                weight=weight, color=colour, bbox=_paper(),
+            )  # fmt: skip
+        return figure
+
+
+def _mark(axes: Axes, marks: Sequence[tuple[str, float, str, str]]) -> None:
+    low, high = axes.get_xlim()
+    gap = 0.006 * (high - low)
+    renderer = FigureCanvasAgg(cast("Figure", axes.figure)).get_renderer()
+    taken: list[Bbox] = []
+    for name, value, colour, dash in sorted(marks, key=lambda mark: mark[1]):
+        label = axes.text(
+            value + gap, 0.0, f"{name} {value:.1f} µm", color=colour, size=TEXT, weight="bold",
+            va="bottom", transform=axes.get_xaxis_transform(), zorder=5, bbox=_paper(0.4),
+        )  # fmt: skip
+        box = label.get_window_extent(renderer).transformed(axes.transData.inverted())
+        width = box.width + 2.0 * gap
+        if (name == "mode" and value - width >= low) or value + width > high:
+            label.set(x=value - gap, ha="right")
+        for row in range(LABEL_ROWS):
+            label.set_y(1.02 + 0.058 * row)
+            # with the gap to its own line, and as much on the other side
+            box = label.get_window_extent(renderer).padded(0.006 * axes.bbox.width, 1.0)
+            if not box.count_overlaps(taken):
+                break
+        taken.append(box)
+        axes.plot(
+            [value, value], [0.0, label.get_position()[1] + 0.04], color=colour, linestyle=dash,
+            linewidth=1.4, transform=axes.get_xaxis_transform(), clip_on=False, zorder=4,
+        )  # fmt: skip
+
+
+def _paper(pad: float = 1.5) -> dict[str, Any]:
+    return {"facecolor": ground().paper, "edgecolor": "none", "pad": pad}

@@ -1,0 +1,341 @@
+"""A scene to start from: any chain, with sizes that fit together and a remark on every line."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import tomli_w
+
+from warpspace.machine.axes import direction_index, is_linear
+from warpspace.machine.description import ORIGIN, Chain, Range, Vector, parse_chain
+from warpspace.machine.parameters import ErrorKind, default_keys, parameter
+from warpspace.scene.library import parse_scene
+from warpspace.scene.model import Scene
+
+# --- Sizes of a machine that is only a chain so far -----------------------------------------------
+
+LYING: Vector = (90.0, 0.0, 180.0)
+"""Turns the frames of a machine with a horizontal spindle, degrees: y points up, z to the rear."""
+LEVEL_TRAVEL: Mapping[int, Range] = {0: (-300.0, 300.0), 1: (-250.0, 250.0), 2: (-250.0, 250.0)}
+"""Of the first linear axis along a level direction x, y or z, mm."""
+UP_TRAVEL: Mapping[int, Range] = {1: (0.0, 400.0), 2: (-400.0, 0.0)}
+"""Of the first one that is upright, y or z, mm: the tool touches the table at its lower end."""
+SECOND_TRAVEL = (-100.0, 100.0)
+"""Of a further linear axis along a direction, mm."""
+TILT_TRAVEL, TURN_TRAVEL, ARM_TRAVEL = (-90.0, 90.0), (0.0, 360.0), (-150.0, 150.0)
+"""Of axes that tilt, of the upright one, and of arms that turn about z in series, degrees."""
+ARM_RANGES = ((-60.0, 60.0), (20.0, 140.0))
+"""Where such arms reach the working volume, degrees."""
+ARMS_AT = ((-350.0, -200.0), (-50.0, -200.0))
+ARM_END = (200.0, -200.0)
+"""In a plan view with all arms at zero, mm."""
+TOOL_LENGTH, PIVOT, TURNING_HEAD = 150.0, 250.0, 400.0
+"""From the tool point along the spindle to its nose, to a tilting and to a turning head, mm."""
+ABOVE_TABLE = 100.0
+"""Height of the tool point where no linear axis is upright, mm."""
+TILTS_AT = 50.0
+"""Height of a tilting axis above the table, mm."""
+WORKPIECE_HEIGHT, WORKPIECE_SHARE = 200.0, 0.8
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Sizes of a machine, all frames at zero of their axes."""
+
+    # origin of each frame in the frame before it; R stands in the middle of the table
+    offset_mm: Mapping[str, Vector]
+    # of the first frame on either side, where the spindle is horizontal
+    rotation_deg: Mapping[str, Vector]
+    travel: Mapping[str, Range]  # mm or degrees
+    # −1 for linear axes that carry the workpiece: the tool then moves with the name over it
+    direction: Mapping[str, int]
+    # mm or degrees; ranges of the axes that span the volume, and the positions of the others
+    workspace: Mapping[str, Range]
+    # A point of the lower and one of the top rim of the largest workpiece
+    traces_mm: tuple[Vector, Vector]
+
+
+def layout(chain: Chain) -> Layout:
+    """Choose sizes for a chain."""
+    spanning = _spanning(chain)
+    lying = _is_lying(chain)
+    up = 1 if lying else 2
+    arms = () if lying else _arms(chain)
+    travel = {axis: _travel(axis, up, axis in spanning, axis in arms) for axis in chain.axes}
+    ranges = {axis: travel[axis] if axis in spanning else (0.0, 0.0) for axis in chain.axes}
+    ranges |= dict(zip(arms, ARM_RANGES, strict=False))
+    half = [min(map(abs, travel[axis])) for axis in spanning if direction_index(axis) != up]
+    radius = WORKPIECE_SHARE * min(half, default=LEVEL_TRAVEL[1][1])
+    lowest = [0.0 - travel[axis][0] for axis in spanning if direction_index(axis) == up]
+    tool = _tool_places(chain, arms, max(lowest, default=ABOVE_TABLE), lying=lying)
+    workpiece = _workpiece_places(chain, up)
+    first = (next(iter(tool)), next(iter(workpiece))) if lying else ()
+    rim = (0.0, radius, WORKPIECE_HEIGHT)
+    return Layout(
+        {**_steps(tool, lying=lying), **_steps(workpiece, lying=lying)},
+        dict.fromkeys(first, LYING),
+        travel,
+        {axis: -1 for axis in chain.workpiece if is_linear(axis)},
+        ranges,
+        ((radius, 0.0, 0.0), _turned(rim) if lying else rim),
+    )
+
+
+def _is_lying(chain: Chain) -> bool:
+    turning = [direction_index(axis) for axis in chain.workpiece if not is_linear(axis)]
+    return 2 not in turning and turning[-1:] == [1]
+
+
+def _spanning(chain: Chain) -> tuple[str, ...]:
+    found: dict[int, str] = {}
+    for axis in chain.axes:
+        if is_linear(axis):
+            found.setdefault(direction_index(axis), axis)
+    return tuple(found.values())
+
+
+def _arms(chain: Chain) -> tuple[str, ...]:
+    if any(direction_index(axis) != 2 for axis in _spanning(chain)):
+        return ()
+    turning = [axis for axis in chain.tool if not is_linear(axis) and direction_index(axis) == 2]
+    return tuple(turning[: len(ARM_RANGES)])
+
+
+def _travel(axis: str, up: int, spans: bool, is_arm: bool) -> Range:
+    """Choose the travel of an axis, mm or degrees."""
+    index = direction_index(axis)
+    if is_linear(axis):
+        return SECOND_TRAVEL if not spans else (UP_TRAVEL if index == up else LEVEL_TRAVEL)[index]
+    if is_arm:
+        return ARM_TRAVEL
+    return TURN_TRAVEL if index == up else TILT_TRAVEL
+
+
+def _tool_places(
+    chain: Chain, arms: tuple[str, ...], tip: float, *, lying: bool
+) -> dict[str, Vector]:
+    """Place the frames of the tool branch in R, mm: the spindle points up, or to the rear."""
+    linear = [axis for axis in chain.tool if is_linear(axis)]
+    over = ARM_END if len(arms) == len(ARMS_AT) else ARMS_AT[1] if arms else (0.0, 0.0)
+    places: dict[str, Vector] = {}
+    for axis in chain.tool:
+        if axis in arms:
+            x, y = ARMS_AT[arms.index(axis)]
+            places[axis] = (x, y, TURNING_HEAD)
+        elif is_linear(axis):
+            # guides stand behind the tool, each nearer to it than the one that carries it
+            nearer = (linear.index(axis) + 1) / (len(linear) + 1)
+            y = over[1] if arms else round(600.0 * (1.0 - nearer), -1)
+            places[axis] = (over[0], y, 250.0 + round(200.0 * nearer, -1))
+        else:
+            places[axis] = (*over, TURNING_HEAD if direction_index(axis) == 2 else PIVOT)
+    places |= {"S": (*over, TOOL_LENGTH), "t": (*over, 0.0)}
+    if lying:
+        return {frame: (x, y + along, tip) for frame, (x, y, along) in places.items()}
+    return {frame: (x, y, tip + along) for frame, (x, y, along) in places.items()}
+
+
+def _workpiece_places(chain: Chain, up: int) -> dict[str, Vector]:
+    """Place the frames of the workpiece branch in R, mm."""
+    places: dict[str, Vector] = {}
+    for axis in chain.workpiece:
+        if is_linear(axis):
+            places[axis] = (0.0, 0.0, -400.0 + 100.0 * len(places))
+        else:
+            places[axis] = (0.0, 0.0, 0.0 if direction_index(axis) == up else TILTS_AT)
+    return {**places, "w": ORIGIN}
+
+
+def _steps(places: Mapping[str, Vector], *, lying: bool) -> dict[str, Vector]:
+    before: Vector = ORIGIN
+    found: dict[str, Vector] = {}
+    for frame, (x, y, z) in places.items():
+        step = (x - before[0], y - before[1], z - before[2])
+        # the first frame stands in R itself
+        found[frame] = _turned(step) if lying and found else step
+        before = (x, y, z)
+    return found
+
+
+def _turned(vector: Vector) -> Vector:
+    x, y, z = vector
+    return (0.0 - x, z, y)
+
+
+# --- The text of a scene to start from ------------------------------------------------------------
+
+_COLUMN = 40
+"""Where remarks begin."""
+EXAMPLES = {
+    "positioning": ("{ ramp = 12 }", "0 at the lower end of the axis, 12 at the upper"),
+    "pitch": ("{ ramp = 30 }", "turns more and more along the axis"),
+    "squareness": ("25", "the same everywhere"),
+    "orientation": ("20", "the axis stands out of true"),
+    "wobble": ("{ harmonics = [[1, 15, 0]] }", "once a turn: order, amplitude, phase in degrees"),
+}
+
+
+def starter_scene(chain: str | Chain, title: str = "", name: str = "") -> Scene:
+    """Build the scene that `starter_text` spells."""
+    parsed = parse_chain(chain) if isinstance(chain, str) else chain
+    return parse_scene(starter_text(parsed, title), name or str(parsed))
+
+
+def starter_text(chain: str | Chain, title: str = "") -> str:
+    """Spell a scene to start from: sizes that fit together, and a remark on what each line says."""
+    parsed = parse_chain(chain) if isinstance(chain, str) else chain
+    sizes = layout(parsed)
+    count = len(parsed.axes)
+    name = title or f"{parsed}, {count} {'axis' if count == 1 else 'axes'}"
+    spelled = tomli_w.dumps({"title": name}).strip()
+    along = "carries the workpiece: the tool moves with the name over it"
+    parts = [
+        [
+            "# A machine to start from. Lengths in mm, errors in µm, small angles in µrad, rotary",
+            "# positions in degrees.",
+            "# Change what is not yours; `warpspace check FILE` names whatever does not fit.",
+            spelled,
+        ],
+        ["[machine]", spelled, _line(f'chain = "{parsed}"', "workpiece → frame F → tool")],
+        _table(
+            "[machine.offset_mm]",
+            "origin of each frame in the frame before it",
+            _offsets(parsed, sizes),
+        ),
+        _table(
+            "[machine.rotation_deg]",
+            "spindle horizontal: y points up, z to the rear",
+            ((frame, _list(angles), "") for frame, angles in sizes.rotation_deg.items()),
+        ),
+        _table(
+            "[machine.travel]",
+            "",
+            (
+                (axis, _list(ends), "mm" if is_linear(axis) else "degrees")
+                for axis, ends in sizes.travel.items()
+            ),
+        ),
+        _table(
+            "[machine.direction]",
+            "1 if left out",
+            ((axis, str(value), along) for axis, value in sizes.direction.items()),
+        ),
+        _choices(parsed, sizes),
+        _table(
+            "[workspace]",
+            "a range spans the volume, a number stands",
+            (
+                (axis, f"{low:.10g}" if low == high else _list((low, high)), "")
+                for axis, (low, high) in sizes.workspace.items()
+            ),
+        ),
+        _table("[points_mm]", "", _points(parsed, sizes)),
+        error_lines(parsed, sizes.travel),
+        [
+            _line("[tolerances]", "half widths about 0, of each class"),
+            "default = { translation = 10, rotation = 20, squareness = 25 }  # µm, µrad, µrad",
+        ],
+    ]
+    return "\n\n".join("\n".join(lines) for lines in parts if lines) + "\n"
+
+
+def _line(text: str, remark: str = "") -> str:
+    return f"{text:<{_COLUMN - 1}} # {remark}" if remark else text
+
+
+def _table(head: str, remark: str, rows: Iterable[tuple[str, str, str]]) -> list[str]:
+    """Spell a table of key, value and remark a line; nothing where there are none."""
+    lines = [_line(f"{key} = {value}", why) for key, value, why in rows]
+    return [_line(head, remark), *lines] if lines else []
+
+
+def _list(values: Sequence[float]) -> str:
+    """Spell numbers, without decimals where they have none."""
+    return "[" + ", ".join(f"{value:.10g}" for value in values) + "]"
+
+
+def _offsets(chain: Chain, sizes: Layout) -> Iterator[tuple[str, str, str]]:
+    remarks = {
+        "S": "spindle nose, in the last frame of the tool side",
+        "t": "tool point, before the spindle nose: the tool's length",
+        "w": "workpiece: middle of the table",
+    }
+    before = dict(
+        zip(
+            (*chain.tool[1:], *chain.workpiece[1:]),
+            (*chain.tool[:-1], *chain.workpiece[:-1]),
+            strict=True,
+        )
+    )
+    for frame, offset in sizes.offset_mm.items():
+        if frame in remarks:
+            yield frame, _list(offset), remarks[frame]
+        elif offset != ORIGIN:
+            yield frame, _list(offset), f"in {before.get(frame, 'R, R in the middle of the table')}"
+
+
+def _choices(chain: Chain, sizes: Layout) -> list[str]:
+    lines = ["# What else a machine may say (docs/scenes.md):"]
+    linear = [axis for axis in chain.axes if is_linear(axis)]
+    rotary = [axis for axis in chain.axes if not is_linear(axis)]
+    if not sizes.rotation_deg:
+        tilted = (rotary or linear)[0]
+        lines.append(
+            f"# [machine.rotation_deg]\n# {tilted} = [45, 0, 0]"
+            "   a frame that is turned about x, y, z: a nutating head, a slant bed"
+        )
+    if linear:
+        lines.append(
+            f"# [machine.gantry]\n# {linear[0]} = {{ span_mm = 1800 }}   two guides, each with"
+            " errors of its own"
+        )
+    lines.append(
+        '# [convention]\n# component_errors = { linear = "after_motion", rotary = "before_motion" }'
+    )
+    return lines
+
+
+def _points(chain: Chain, sizes: Layout) -> Iterator[tuple[str, str, str]]:
+    low, rim = map(_list, sizes.traces_mm)
+    yield "tool", "[0, 0, 0]", "the point whose error counts, in the tool frame"
+    yield "workpiece", rim, "on the top rim of the largest workpiece, from w"
+    if any(not is_linear(axis) for axis in chain.workpiece):
+        yield "traces", f"[{low}, {rim}]", "points whose way over a turn is drawn, from w"
+
+
+def error_lines(chain: Chain, travel: Mapping[str, Range]) -> list[str]:
+    """Spell example errors of a chain: a few that act, and a few to switch on."""
+    given, further = _example_keys(chain)
+    lines = [_line("[errors]", "examples; what is absent is 0, # takes one out")]
+    for key, kind in given:
+        (value, why), row = EXAMPLES[kind], parameter(key)
+        lines.append(_line(f"{key} = {value}", f"{row.name}, {row.unit}: {why}"))
+    for key in further:
+        row = parameter(key)
+        low, high = travel[row.axis]
+        table = f"{key} = {{ table = [[{low:g}, 0], [{high:g}, 5]] }}"
+        lines.append(f"# {_line(table, f'{row.name}, {row.unit}: measured points')}")
+    first = chain.axes[0]
+    key = f"E{'XYZ'[(direction_index(first) + 2) % 3]}{first}"
+    return [*lines, f'# {key} = {{ csv = "measured.csv", column = "{key}" }}']
+
+
+def _example_keys(chain: Chain) -> tuple[list[tuple[str, str]], list[str]]:
+    given: list[tuple[str, str]] = []
+    # those of the tool side first: the first picture is that of the tool point
+    axes = sorted(chain.axes, key=lambda axis: axis not in chain.tool)
+    linear = [axis for axis in axes if is_linear(axis)]
+    rotary = [axis for axis in axes if not is_linear(axis)]
+    rows = sorted(
+        (parameter(key) for key in default_keys(chain.axes)),
+        key=lambda row: row.axis not in chain.tool,
+    )
+    if linear:
+        first = linear[0]
+        own = direction_index(first)
+        given.append((f"E{'XYZ'[own]}{first}", "positioning"))
+        given.append((f"E{'ABC'[(own + 1) % 3]}{first}", "pitch"))
+    given += [(row.key, "squareness") for row in rows if row.kind is ErrorKind.SQUARENESS][:1]
+    given += [(row.key, "orientation") for row in rows if row.kind is ErrorKind.ORIENTATION][:1]
+    if rotary:
+        given.append((f"E{'ABC'[(direction_index(rotary[0]) + 1) % 3]}{rotary[0]}", "wobble"))
+    return given, [f"E{'XYZ'[(direction_index(axis) + 1) % 3]}{axis}" for axis in linear[:1]]

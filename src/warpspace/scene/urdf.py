@@ -1,0 +1,553 @@
+"""Machines from URDF files, the format of robot simulators: read, checked, turned into a scene."""
+
+import io
+import math
+import warnings
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warpspace.exceptions import OptionError, SceneError, near_miss
+from warpspace.field.grid import Workspace
+from warpspace.kinematics.model import Model
+from warpspace.kinematics.transforms import inverse
+from warpspace.machine import limits
+from warpspace.machine.axes import MAX_AXES, direction_index, is_axis_name, is_linear
+from warpspace.machine.description import (
+    Chain,
+    Machine,
+    Range,
+    Vector,
+    build_machine,
+    default_travel,
+)
+from warpspace.machine.errors import ToleranceSet
+from warpspace.scene.files import read_text
+from warpspace.scene.model import Scene
+from warpspace.scene.save import scene_to_toml
+from warpspace.scene.starter import error_lines
+from warpspace.units import Array
+
+# --- Reading a URDF file --------------------------------------------------------------------------
+
+MOVING = ("revolute", "continuous", "prismatic")
+JOINT_TYPES = (*MOVING, "fixed", "floating", "planar")
+
+
+def read_robot(path: Path) -> tuple[Any, tuple[str, ...]]:
+    """Read the links and joints of a URDF file."""
+    source = str(path)
+    text = read_text(path, limits.MAX_SCENE_BYTES)
+    others = _check_xml(text, source)
+    robot = _parse(text, source)
+    problems = list(_problems(robot))
+    if problems:
+        raise SceneError(source, problems)
+    return robot, others
+
+
+def _check_xml(text: str, source: str) -> tuple[str, ...]:
+    """Refuse what is no XML of a robot, and XML that defines text of its own."""
+    try:
+        from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
+    except ImportError:
+        raise _not_installed() from None
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise SceneError(source, ["defines a document type; expected a plain URDF file"])
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=False)
+    try:
+        root = etree.fromstring(text.encode(), parser)
+    except etree.XMLSyntaxError as error:
+        raise SceneError(source, [f"is not valid XML: {error.msg}"]) from None
+    if root.tag != "robot":
+        raise SceneError(source, [f"is no URDF: begins with <{root.tag}>; expected <robot>"])
+    names = [element.tag for element in root.iter() if isinstance(element.tag, str)]
+    for count, limit, what in (
+        (len(names), limits.MAX_URDF_ELEMENTS, "elements"),
+        (names.count("link"), limits.MAX_LINKS, "links"),
+        (names.count("joint"), limits.MAX_LINKS, "joints"),
+        (names.count("visual"), limits.MAX_SHAPES, "shapes"),
+    ):
+        if count > limit:
+            raise SceneError(source, [f"has {count:,} {what}; expected at most {limit:,}"])
+    if any("xacro" in name for name in names):
+        problem = "holds xacro macros; expected plain URDF (`xacro FILE > robot.urdf` expands it)"
+        raise SceneError(source, [problem])
+    return tuple(
+        element.tag
+        for element in root
+        if isinstance(element.tag, str) and element.tag not in ("link", "joint", "material")
+    )
+
+
+def _parse(text: str, source: str) -> Any:
+    try:
+        from yourdfpy import URDF
+    except ImportError:
+        raise _not_installed() from None
+    try:
+        # numbers that are not finite are refused by name later
+        with np.errstate(all="ignore"):
+            loaded = URDF.load(
+                io.BytesIO(text.encode()), build_scene_graph=False, load_meshes=False, mesh_dir=""
+            )
+    except (ValueError, TypeError, KeyError, IndexError, AttributeError, AssertionError) as error:
+        # yourdfpy reads without checking: what is missing or no number ends in one of these
+        reason = f"{type(error).__name__}: {error}".replace("\n", " ")[:200]
+        problem = (
+            f"is no complete URDF ({reason}); expected links, and joints with parent and child"
+        )
+        raise SceneError(source, [problem]) from None
+    return loaded.robot
+
+
+def _not_installed() -> OptionError:
+    return OptionError(
+        "URDF files need the package yourdfpy; expected it installed"
+        " (pip install 'warpspace[urdf]')"
+    )
+
+
+def _problems(robot: Any) -> Iterable[str]:
+    links = [link.name for link in robot.links]
+    for name in _twice(links):
+        yield f"link {name!r} is there twice; expected each name once"
+    for name in _twice([joint.name for joint in robot.joints]):
+        yield f"joint {name!r} is there twice; expected each name once"
+    if not links:
+        yield "has no link"
+        return
+    parents: dict[str, str] = {}
+    known = set(links)
+    for joint in robot.joints:
+        where = f"joint {joint.name!r}"
+        if joint.type not in JOINT_TYPES:
+            yield f"{where}: type {joint.type!r}; expected one of {', '.join(JOINT_TYPES)}"
+        for end in (joint.parent, joint.child):
+            if end not in known:
+                yield f"{where}: there is no link {end!r}"
+        if joint.child in parents:
+            yield (
+                f"link {joint.child!r} hangs on joints {parents[joint.child]!r} and {joint.name!r}:"
+                " a loop; expected one parent for each link"
+            )
+        parents[joint.child] = joint.name
+    roots = [name for name in links if name not in parents]
+    if not roots:
+        yield "every link has a parent: a loop; expected one link that hangs on nothing"
+    elif len(roots) > 1:
+        shown = ", ".join(map(repr, roots[:6]))
+        yield f"links {shown} hang on nothing; expected one such link, the frame of the machine"
+
+
+def _twice(names: list[str]) -> list[str]:
+    return sorted(str(name) for name, count in Counter(names).items() if count > 1)
+
+
+def root_of(robot: Any) -> str:
+    """Give the name of the link that hangs on nothing."""
+    children = {joint.child for joint in robot.joints}
+    return next(link.name for link in robot.links if link.name not in children)
+
+
+def path_to(robot: Any, link: str) -> list[Any]:
+    """List the joints from the root to a link."""
+    by_child = {joint.child: joint for joint in robot.joints}
+    found: list[Any] = []
+    while link in by_child and len(found) <= len(by_child):
+        found.append(by_child[link])
+        link = by_child[link].parent
+    return found[::-1]
+
+
+# --- Frames of axes in R, and the places of frames in the ones before them ------------------------
+
+PARALLEL = 1e-9
+"""Deviation of a direction from x, y or z below which the frame is not turned."""
+
+
+def axis_frame(origin_mm: Array, direction: Array) -> tuple[Array, int]:
+    """Give the frame of an axis in R, [4, 4], mm, and whether it moves with or against its name."""
+    index = int(np.argmax(np.abs(direction)))
+    sign = 1 if direction[index] > 0.0 else -1
+    own = np.zeros(3)
+    own[index] = sign
+    pose = np.eye(4)
+    pose[:3, 3] = origin_mm
+    if np.abs(direction - own).max() > PARALLEL:
+        from scipy.spatial.transform import Rotation
+
+        about = np.cross(own, direction)
+        angle = np.arctan2(np.linalg.norm(about), own @ direction)
+        pose[:3, :3] = Rotation.from_rotvec(about / np.linalg.norm(about) * angle).as_matrix()
+    return pose, sign
+
+
+def relative_places(
+    poses: dict[str, Array], chain: Chain
+) -> tuple[dict[str, Vector], dict[str, Vector]]:
+    """Turn frames in R into offsets and rotations of each in the frame before it."""
+    offsets: dict[str, Vector] = {}
+    rotations: dict[str, Vector] = {}
+    for branch, end in ((chain.tool, "t"), (chain.workpiece, "w")):
+        before = "R"
+        for frame in (*branch, end):
+            step = inverse(poses[before]) @ poses[frame]
+            offsets[frame] = _rounded(step[:3, 3], 10)
+            rotations[frame] = _rounded(roll_pitch_yaw_deg(step[:3, :3]), 12)
+            before = frame
+    return offsets, {frame: turn for frame, turn in rotations.items() if any(turn)}
+
+
+def _rounded(values: Array, digits: int) -> Vector:
+    x, y, z = (round(float(value), digits) + 0.0 for value in values)
+    return x, y, z
+
+
+def roll_pitch_yaw_deg(rotation: Array) -> Array:
+    """Give the rotations about the fixed x, y and z axes, [3], degrees, of a rotation, [3, 3]."""
+    from scipy.spatial.transform import Rotation
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of a pitch of 90°, where roll is set to 0
+        return Rotation.from_matrix(rotation).as_euler("xyz", degrees=True)
+
+
+# --- From the joints of a robot to the axes of a machine ------------------------------------------
+
+MOST_DEG = 720.0
+"""Of a limit: an axis that turns further, ±4π, is likely to be in degrees."""
+LARGEST = 1e9
+"""Metres, or the length of a direction: beyond, products overflow."""
+
+MM_PER_M = 1000.0
+TOOL_NAMES = ("tool", "tcp", "tool0", "tool_tip", "t", "ee_link", "flange")
+WORKPIECE_NAMES = ("workpiece", "work", "w", "table")
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """A machine read from a robot, and what became of its parts."""
+
+    machine: Machine
+    # by link: the frame of the machine it rides on, and its pose in that frame, [4, 4] in mm, all
+    # joints at zero
+    frame_of: dict[str, tuple[str, Array]]
+    # what was taken in another way, or has no place
+    notes: list[str] = field(default_factory=list[str])
+
+
+def place_robot(robot: Any, source: str, tool: str = "", workpiece: str = "") -> Placed:
+    """Find the chain of a robot between workpiece and tool.
+
+    Notes
+    -----
+    Each axis gets a frame whose directions are those of the root where its joint moves along or
+    about x, y or z of it, and else a frame turned by the smallest rotation that takes that
+    direction to the joint's. Nominal poses of tool and workpiece are those of the robot.
+    """
+    ends = _end(robot, source, "tool", tool), _end(robot, source, "workpiece", workpiece)
+    paths = [path_to(robot, end) for end in ends]
+    shared = 0
+    while shared < min(map(len, paths)) and paths[0][shared] is paths[1][shared]:
+        shared += 1
+    notes = [
+        f"joint {joint.name!r} carries both tool and workpiece: left out"
+        for joint in paths[0][:shared]
+        if joint.type != "fixed"
+    ]
+    branches = [path[shared:] for path in paths]
+    every = [joint for branch in branches for joint in branch]
+    _check_joints(every, source)
+    still = [joint.name for joint in every if _stands(joint)]
+    notes += [f"joint {name!r} has one position only: taken as fixed at zero" for name in still]
+    joints = [joint for joint in every if joint.type in MOVING and joint.name not in still]
+    lengths = {joint.name: float(np.linalg.norm(joint.axis)) for joint in joints}
+    notes += [
+        f"joint {name!r}: its axis has the length {length:g}; taken as 1"
+        for name, length in lengths.items()
+        if abs(length - 1.0) > 1e-3
+    ]
+    if not 1 <= len(joints) <= MAX_AXES:
+        found = f"{len(joints)} moving joints between workpiece and tool"
+        raise SceneError(source, [f"has {found}; expected one to {MAX_AXES}"])
+    moving = {joint.name for joint in joints}
+    places = {
+        joint.name: _pose_mm(branch[: index + 1])
+        for branch in branches
+        for index, joint in enumerate(branch)
+        if joint.name in moving  # a few; of each link it would take the square of their number
+    }
+    directions = {
+        joint.name: places[joint.name][:3, :3] @ (np.asarray(joint.axis) / lengths[joint.name])
+        for joint in joints
+    }
+    names = _axis_names(joints, directions)
+    poses = {"R": np.eye(4), "t": _pose_mm(branches[0]), "w": _pose_mm(branches[1])}
+    travel: dict[str, Range] = {}
+    direction: dict[str, int] = {}
+    for joint in joints:
+        axis = names[joint.name]
+        poses[axis], direction[axis] = axis_frame(places[joint.name][:3, 3], directions[joint.name])
+        travel[axis] = _travel(joint, axis, notes)
+    sides = (tuple(names[one.name] for one in way if one.name in names) for way in branches[::-1])
+    chain = Chain(*sides)
+    offsets, rotations = relative_places(poses, chain)
+    machine = build_machine(
+        chain,
+        offset_mm=offsets,
+        rotation_deg=rotations,
+        travel=travel,
+        direction={axis: sign for axis, sign in direction.items() if sign < 0},
+        name="machine",
+        title=str(robot.name or ""),
+    )
+    notes += [f"joint {name!r} is axis {axis}" for name, axis in names.items() if name != axis]
+    start = _pose_mm(paths[0][:shared])
+    return Placed(machine, _frames_of_links(robot, names, still, poses, start), notes)
+
+
+def _end(robot: Any, source: str, what: str, wanted: str) -> str:
+    links = [link.name for link in robot.links]
+    if wanted:
+        if wanted not in links:
+            raise SceneError(source, [f"has no link {wanted!r}{near_miss(wanted, links)}"])
+        return wanted
+    lower = {name.lower(): name for name in reversed(links)}
+    known = TOOL_NAMES if what == "tool" else WORKPIECE_NAMES
+    if found := next((lower[name] for name in known if name in lower), ""):
+        return found
+    if what == "workpiece":
+        return root_of(robot)
+    parents = {joint.parent for joint in robot.joints}
+    leaves = [name for name in links if name not in parents]
+    carried = [name for name in leaves if any(j.type in MOVING for j in path_to(robot, name))]
+    if len(carried) == 1:
+        return carried[0]
+    shown = ", ".join(map(repr, (carried or leaves)[:8]))
+    raise SceneError(source, [f"ends in {shown}; expected --tool LINK to say which is the tool"])
+
+
+def _check_joints(joints: Sequence[Any], source: str) -> None:
+    problems: list[str] = []
+    for joint in joints:
+        if joint.mimic is not None:
+            problems.append(
+                f"joint {joint.name!r} mimics {joint.mimic.joint!r}; expected joints between"
+                " workpiece and tool that move on their own"
+            )
+        elif joint.type in ("floating", "planar"):
+            problems.append(
+                f"joint {joint.name!r} is {joint.type}; expected joints with one axis each"
+            )
+        elif joint.type in MOVING and not _finite_direction(joint):
+            problems.append(f"joint {joint.name!r}: its axis is no direction")
+        if joint.origin is not None and not (np.abs(joint.origin) < LARGEST).all():
+            problems.append(f"joint {joint.name!r}: its origin is no finite number")
+    if problems:
+        raise SceneError(source, problems)
+
+
+def _finite_direction(joint: Any) -> bool:
+    axis = np.asarray(joint.axis, dtype=float)
+    if axis.shape != (3,) or not np.isfinite(axis).all():
+        return False
+    return PARALLEL < math.hypot(*axis) < LARGEST
+
+
+def _stands(joint: Any) -> bool:
+    """Tell whether a joint that could move has one position only."""
+    limit = joint.limit
+    if joint.type not in ("revolute", "prismatic") or limit is None:
+        return False
+    if None in (limit.lower, limit.upper):
+        return False
+    per_unit = MM_PER_M if joint.type == "prismatic" else 180.0 / np.pi
+    return bool(abs(limit.upper - limit.lower) * per_unit < limits.MIN_SPAN)
+
+
+def _pose_mm(joints: Sequence[Any]) -> Array:
+    """Multiply the origins of joints, all at zero, [4, 4], mm."""
+    pose = np.eye(4)
+    for joint in joints:
+        if joint.origin is not None:
+            step = np.array(joint.origin, dtype=float)
+            step[:3, 3] *= MM_PER_M
+            pose = pose @ step
+    return pose
+
+
+def _axis_names(joints: Sequence[Any], directions: dict[str, Array]) -> dict[str, str]:
+    """Name the axes: as their joints where that fits, else by direction, repeated with digits."""
+    letters = {
+        joint.name: ("XYZ" if joint.type == "prismatic" else "ABC")[
+            int(np.argmax(np.abs(directions[joint.name])))
+        ]
+        for joint in joints
+    }
+    found: dict[str, str] = {}
+    for joint in joints:
+        name, letter = joint.name, letters[joint.name]
+        fits = is_axis_name(name) and is_linear(name) == is_linear(letter)
+        if fits and direction_index(name) == direction_index(letter):
+            found[name] = name
+    for joint in joints:
+        if joint.name in found:
+            continue
+        letter = letters[joint.name]
+        alone = sum(other == letter for other in letters.values()) == 1
+        names = [letter] if alone else []
+        names += [f"{letter}{digit}" for digit in range(1, 10)]
+        found[joint.name] = next(name for name in names if name not in found.values())
+    return {joint.name: found[joint.name] for joint in joints}
+
+
+def _travel(joint: Any, axis: str, notes: list[str]) -> Range:
+    """Give the travel of an axis, mm or degrees."""
+    limit = joint.limit
+    if joint.type == "continuous":
+        return (0.0, 360.0) if direction_index(axis) == 2 else (-180.0, 180.0)
+    ends = () if limit is None else (limit.lower, limit.upper)
+    if len(ends) != 2 or None in ends or not np.isfinite(np.array(ends, float)).all():
+        low, high = default_travel(axis)
+        notes.append(f"joint {joint.name!r} has no limits: axis {axis} gets {low:g} … {high:g}")
+        return low, high
+    per_unit = MM_PER_M if joint.type == "prismatic" else 180.0 / np.pi
+    low, high = sorted(round(float(end) * per_unit, 9) for end in ends)
+    if ends[0] > ends[1]:
+        notes.append(f"joint {joint.name!r}: its lower limit is above the upper one; exchanged")
+    if joint.type != "prismatic" and max(-low, high) > MOST_DEG:
+        notes.append(
+            f"joint {joint.name!r}: limits {ends[0]:g} … {ends[1]:g} rad, {low:.4g} … {high:.4g}°,"
+            " reach beyond ±4π: are they degrees? URDF has radians"
+        )
+    return low, high
+
+
+def _frames_of_links(
+    robot: Any, names: dict[str, str], still: list[str], poses: dict[str, Array], start: Array
+) -> dict[str, tuple[str, Array]]:
+    found: dict[str, tuple[str, Array]] = {}
+    below: dict[str, list[Any]] = {}
+    for joint in robot.joints:
+        below.setdefault(joint.parent, []).append(joint)
+    before = {frame: inverse(pose) @ inverse(start) for frame, pose in poses.items()}
+    waiting = [(root_of(robot), "R", np.eye(4))]
+    while waiting:
+        link, frame, pose = waiting.pop()
+        found[link] = (frame, before[frame] @ pose)
+        for joint in below.get(link, ()):
+            moves = joint.type != "fixed" and joint.name not in still
+            if not moves or joint.name in names:
+                onto = names[joint.name] if moves else frame
+                waiting.append((joint.child, onto, pose @ _pose_mm([joint])))
+    return found
+
+
+TOLERANCES = {"translation": 10.0, "rotation": 20.0, "squareness": 25.0}
+ARM_RANGE = 30.0
+"""Half of the range that a rotary axis spans the volume with, degrees."""
+LONGEST_NOTE = 300
+
+
+def imported_text(
+    machine: Machine, source: str, notes: Sequence[str], meshes: Mapping[str, str]
+) -> str:
+    """Spell the scene of a machine that was read from another format."""
+    scene = Scene(
+        name="imported",
+        title=machine.title or source,
+        model=Model(machine),
+        workspace=Workspace(_ranges(machine)),
+        tolerances=ToleranceSet(TOLERANCES),
+    )
+    travel = {name: axis.travel for name, axis in machine.axes.items()}
+    head = [f"# Read from {_plain(source)}. Lengths mm, angles degrees."]
+    head += [f"# {_plain(note)}" for note in notes]
+    parts = ["\n".join(head), scene_to_toml(scene).strip()]
+    parts.append("\n".join(error_lines(machine.chain, travel)))
+    if meshes:
+        lines = ["[bodies]", *(f'{frame} = "{file}"' for frame, file in meshes.items())]
+        parts.append("\n".join(lines))
+    return "\n\n".join(parts) + "\n"
+
+
+def _plain(text: str) -> str:
+    shown = "".join(letter if letter.isprintable() else "?" for letter in text)
+    return shown if len(shown) <= LONGEST_NOTE else shown[: LONGEST_NOTE - 1] + "…"
+
+
+def _ranges(machine: Machine) -> dict[str, Range]:
+    """Choose the working volume: linear axes by direction, else rotary ones of the tool side."""
+    taken: set[int] = set()
+    found: dict[str, Range] = {}
+    for name, axis in machine.axes.items():
+        low, high = axis.travel
+        at = min(max(0.0, low), high)
+        found[name] = (at, at)
+        if is_linear(name) and direction_index(name) not in taken:
+            taken.add(direction_index(name))
+            found[name] = axis.travel
+    free = 3 - len(taken)
+    turning = [name for name in machine.chain.tool if not is_linear(name)]
+    if free > 1:
+        for name in turning[:free]:
+            low, high = machine.axes[name].travel
+            middle = min(max(0.0, low + ARM_RANGE), high - ARM_RANGE)
+            ends = max(low, middle - ARM_RANGE), min(high, middle + ARM_RANGE)
+            found[name] = ends if ends[0] < ends[1] else found[name]
+    return found
+
+
+# --- What of a robot has no place in a machine: named, so that nothing is lost unsaid -------------
+
+SHOWN = 6
+"""Names that a remark lists."""
+
+_OF_LINKS: tuple[tuple[str, Callable[[Any], object]], ...] = (
+    ("masses and inertias", lambda link: link.inertial is not None),
+    ("collision shapes", lambda link: bool(link.collisions)),
+    ("materials", lambda link: any(visual.material is not None for visual in link.visuals)),
+)
+_OF_JOINTS: tuple[tuple[str, Callable[[Any], object]], ...] = (
+    (
+        "largest efforts and velocities",
+        lambda joint: (
+            joint.limit is not None and (joint.limit.effort or joint.limit.velocity) is not None
+        ),
+    ),
+    ("damping and friction", lambda joint: joint.dynamics is not None),
+    ("safety controllers", lambda joint: joint.safety_controller is not None),
+    ("calibrations", lambda joint: joint.calibration is not None),
+)
+
+
+def left_out(robot: Any, others: Sequence[str], kept: Collection[str]) -> list[str]:
+    """Name the parts of a robot that a machine does not hold."""
+    notes: list[str] = []
+    gone = [link.name for link in robot.links if link.name not in kept]
+    if gone:
+        notes.append(f"not between workpiece and tool, left out: links {_listed(gone)}")
+    moving = [joint for joint in robot.joints if joint.child in gone]
+    mimics = [joint.name for joint in moving if joint.mimic is not None]
+    if mimics:
+        notes.append(f"mimic joints, left out: {_listed(mimics)}")
+    for what, has in _OF_LINKS:
+        if names := [link.name for link in robot.links if has(link)]:
+            notes.append(f"{what} have no place: links {_listed(names)}")
+    for what, has in _OF_JOINTS:
+        if names := [joint.name for joint in robot.joints if has(joint)]:
+            notes.append(f"{what} have no place: joints {_listed(names)}")
+    if others:
+        notes.append(f"have no place: {_listed(list(dict.fromkeys(others)))}")
+    return notes
+
+
+def _listed(names: Iterable[str]) -> str:
+    found = [repr(name) for name in names]
+    more = len(found) - SHOWN
+    return ", ".join(found[:SHOWN]) + (f" and {more} more" if more > 0 else "")

@@ -1,1 +1,0 @@
-"""Machines from URDF files, the format of robot simulators."""

@@ -1,0 +1,253 @@
+"""A real Chromium and its server: foreign pages, tokens, lost connections."""
+
+import re
+import threading
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from urllib.parse import parse_qs, urlsplit
+
+import viser
+
+from app.frames import new_visitor
+from app.page_tab import Tab, open_page, wait_until_open
+from app.raw_client import running_app
+from app.wire import end_work
+from warpspace.app.server.doors import Access
+from warpspace.app.server.viewer import Viewer
+from warpspace.app.state.app_state import start_state
+from warpspace.scene.library import load_scene
+
+TOKEN = "a-token-of-a-test"
+FOREIGN = "<!doctype html><title>another site</title><p>Hello"
+SOCKET = """([url, version]) => new Promise(done => {
+  const socket = new WebSocket(url, ["viser-v" + version]);
+  const end = word => { socket.close(); done(word); };
+  socket.onopen = () => end("open");
+  socket.onerror = () => end("refused");
+  setTimeout(() => end("no answer"), 10000);
+})"""
+FRAME = """url => new Promise(done => {
+  const frame = document.createElement("iframe");
+  frame.src = url;
+  frame.onload = () => done(frame.contentDocument === null ? "loaded" : "empty");
+  document.body.append(frame);
+  setTimeout(() => done("no answer"), 10000);
+})"""
+WORKER = """([url, version]) => new Promise(done => {
+  const worker = new Worker(URL.createObjectURL(new Blob([`
+    const socket = new WebSocket("${url}", "viser-v${version}");
+    socket.onopen = () => postMessage("open");
+    socket.onerror = () => postMessage("refused");`])));
+  worker.onmessage = event => { worker.terminate(); done(event.data); };
+  worker.onerror = () => done("refused");
+})"""
+POST = """url => {
+  const request = new XMLHttpRequest();
+  try { request.open("POST", url, false); request.send("x"); } catch { return "refused"; }
+  return request.responseText;
+}"""
+FETCH = """url => fetch(url).then(answer => answer.text(), () => "refused")"""
+
+
+@contextmanager
+def foreign_site():
+    """Serve a page of another origin: the same machine, another port."""
+
+    class Site(BaseHTTPRequestHandler):
+        def do_GET(self):
+            self.send_response(200)
+            self.send_header("Content-Type", "text/html")
+            self.end_headers()
+            self.wfile.write(FOREIGN.encode())
+
+        def log_message(self, *_): ...
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Site) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_address[1]}"
+        server.shutdown()
+
+
+def test_a_foreign_page_gets_neither_socket_nor_frame_nor_text(page):
+    with Viewer(load_scene("dvf5000_nominal")) as viewer, foreign_site() as site:
+        socket = viewer.url.replace("http", "ws", 1)
+        for name in (socket, socket.replace("127.0.0.1", "localhost")):
+            page.goto(site)
+            for way in (SOCKET, WORKER):
+                assert page.evaluate(way, [name, viser.__version__]) == "refused"
+            for way in (FETCH, POST):
+                assert page.evaluate(way, name.replace("ws", "http", 1)) == "refused"
+        assert viewer.sessions == ()
+        page.evaluate(FRAME, f"{viewer.url}/")
+        assert len(page.frames) == 2
+        assert page.frames[1].url.startswith("chrome-error://")
+        assert viewer.sessions == ()
+        # the very same from the app's own page, so that the test itself is right
+        page.goto(viewer.url)
+        assert page.evaluate(SOCKET, [socket, viser.__version__]) == "open"
+        # which connects to no other server
+        assert page.evaluate(FETCH, site) == "refused"
+        other = site.replace("http", "ws", 1)
+        assert page.evaluate(SOCKET, [other, viser.__version__]) == "refused"
+        end_work(viewer)
+
+
+def test_a_tab_with_the_token_lives_on(browser):
+    """Its page, its websocket, a connection that drops, a reload without the token's address."""
+    scene = load_scene("dvf5000_first")
+    moved = start_state(scene).with_amplitude("EXX", 7.0)
+    with Viewer(scene, access=Access(token=TOKEN)) as viewer:
+        tab = open_page(viewer, browser, f"&token={TOKEN}")
+        tab.until(lambda: "token" not in tab.page.evaluate("document.cookie"))
+        tab.until(lambda: "token" not in tab.page.url)
+        tab.until(lambda: "fixedDpr=1" in tab.page.url)
+        tab.send("EXX", "7")
+        tab.until(lambda: tab.session.state == moved)
+        before = tab.session
+        viewer._server._websock_server.disconnect_all_clients()
+        tab.until(lambda: before not in viewer.sessions)
+        tab.until(lambda: any(s.token == before.token for s in viewer.sessions))
+        tab.until(lambda: tab.session.state == moved)
+        tab.until(lambda: float(tab.box("EXX").input_value()) == 7.0)
+        tab.press("Control+z")  # its history as well
+        tab.until(lambda: tab.session.state == start_state(scene))
+        tab.press("Control+Shift+z")
+        tab.until(lambda: tab.session.state == moved)
+        tab.page.reload()
+        wait_until_open(tab.page)
+        tab.until_shown(moved)
+        # another tab of the same browser is another visitor
+        fresh = Tab(tab.page.context.new_page(), viewer)
+        fresh.until_shown(start_state(scene))
+        ended = fresh.session
+        fresh.page.close()
+        tab.until(lambda: ended not in viewer.sessions)
+        tab.until(lambda: tab.session.state == moved)
+        tab.page.evaluate(
+            "() => { window.warpspaceCopy = button => { window.put = button.dataset.copy; }; }"
+        )
+        tab.page.get_by_role("tab", name="Files", exact=True).click()
+        for name, carried in (("Link", []), ("Link with token", [TOKEN])):
+            tab.page.get_by_text(name, exact=True).click()
+            tab.page.wait_for_function("window.put")
+            copied = parse_qs(urlsplit(tab.page.evaluate("window.put")).query)
+            tab.page.evaluate("window.put = ''")
+            assert copied.get("token", []) == carried
+            assert copied["view"]
+            tab.until(lambda: "token" not in tab.page.url)
+        assert tab.errors == []
+        tab.page.context.close()
+        stranger = browser.new_context().new_page()
+        answer = stranger.goto(viewer.url)
+        assert answer.status == 403
+        assert "asks for a token" in stranger.inner_text("body")
+        stranger.context.close()
+        end_work(viewer)
+
+
+BOX = "#warpspace-server"
+SECONDS = 90.0
+
+
+def number_box(page, label):
+    """Number box of an error."""
+    return page.locator(f"input[data-number='{label}']")
+
+
+def maximum(page):
+    """The largest error, as the page spells it."""
+    return page.inner_text("[data-value='max']")
+
+
+def wait_for_maximum(page, wanted):
+    """Wait until the page says a largest error."""
+    script = "w => document.querySelector(\"[data-value='max']\")?.innerText === w"
+    page.wait_for_function(script, arg=wanted, timeout=SECONDS * 1000)
+
+
+def wait_for_another(page, before):
+    """Wait until the page says another largest error."""
+    page.wait_for_function(
+        "w => document.querySelector(\"[data-value='max']\").innerText !== w", arg=before
+    )
+
+
+def change(page):
+    """Change an error; give the largest error once the tab has kept what was changed."""
+    before, box = maximum(page), number_box(page, "EAX")
+    box.fill("12")
+    box.press("Enter")
+    wait_for_another(page, before)
+    page.wait_for_function(
+        "JSON.parse(sessionStorage.getItem('warpspace-kept') ?? '{}').text?.includes('EAX=12')"
+    )
+    return maximum(page)
+
+
+def test_killed_server_is_said_and_its_tab_restored(browser, tmp_path):
+    page = new_visitor(browser).new_page()
+    with running_app(tmp_path, "dvf5000_first") as server:
+        port = int(server.url.rpartition(":")[2])
+        page.goto(f"http://127.0.0.1:{port}/?fixedDpr=1")
+        wait_until_open(page)
+        changed = change(page)
+        server.process.kill()
+        page.wait_for_selector(BOX, timeout=SECONDS * 1000)
+    said = page.inner_text(BOX)
+    assert "does not answer" in said
+    assert re.search(r"Kept in this tab: .* as of \d", said)
+    page.wait_for_function(f"/tried again every second; so far for ([2-9]|\\d\\d+) s/.test("
+                           f"document.querySelector('{BOX}').innerText)")  # fmt: skip
+    assert page.get_attribute(BOX, "role") == "alert"
+    assert maximum(page) == changed  # the last picture stays
+    # another scene: what comes back is the tab's own
+    with running_app(tmp_path, "dvf5000_second", port=port):
+        page.wait_for_selector(f"{BOX}[role=status]", timeout=SECONDS * 1000)
+        wait_until_open(page)
+        wait_for_maximum(page, changed)
+        said = page.inner_text(BOX)
+        assert "This tab is restored" in said
+        assert "Not restored: what Undo and Redo could go back to;" in said
+        assert number_box(page, "EAX").input_value() == "12"
+        page.get_by_role("button", name="Close", exact=True).click()
+        assert page.locator(BOX).count() == 0
+        # Undo goes to what the server was started with, Redo back again
+        page.locator("canvas").first.focus()
+        page.keyboard.press("Control+z")
+        wait_for_another(page, changed)
+        page.keyboard.press("Control+Shift+z")
+        wait_for_maximum(page, changed)
+        page.context.close()
+
+
+def test_interrupted_connection_says_that_all_is_there_and_a_lost_state_that_it_is_not(browser):
+    with Viewer(load_scene("dvf5000_nominal")) as viewer:
+        tab = open_page(viewer, browser)
+        page = tab.page
+        tab.send("EXX", "7")
+        tab.until(lambda: tab.session.state.amplitudes["EXX"] == 7.0)
+        # viser connects at once while the page is in front: as if it were not
+        page.evaluate("document.hasFocus = () => false")
+        viewer._server._websock_server.disconnect_all_clients()
+        page.wait_for_selector(f"{BOX}[role=alert]")
+        tab.until(lambda: "as soon as this page is in front" in page.inner_text(BOX))
+        page.evaluate(
+            "() => { document.hasFocus = () => true; window.dispatchEvent(new Event('focus')); }"
+        )
+        page.wait_for_selector(f"{BOX}[role=status]")
+        tab.until(lambda: "everything is as it was, Undo too" in page.inner_text(BOX))
+        tab.until(lambda: tab.session.state.amplitudes["EXX"] == 7.0)
+        # what a page has kept may be anything
+        viewer._memory._cache.clear()
+        page.evaluate("sessionStorage.setItem('warpspace-tab', 'f'.repeat(32))")
+        page.evaluate(
+            "text => sessionStorage.setItem('warpspace-kept', JSON.stringify({at: 0, text}))",
+            '{"file": "<img src=x onerror=alert(1)>"}',
+        )
+        page.reload()
+        page.wait_for_selector(f"{BOX}[role=status]", timeout=SECONDS * 1000)
+        tab.until(lambda: "could not be restored" in page.inner_text(BOX))
+        assert page.locator(f"{BOX} img").count() == 0
+        wait_until_open(page)
+        end_work(viewer)
+        page.context.close()

@@ -1,0 +1,227 @@
+"""Numbers, curves and clicks as people enter them."""
+
+import numpy as np
+import pytest
+
+from warpspace import load_scene
+from warpspace.app.browser.clicks import LONGEST_WORD, MOST_CLICKS, read_clicks
+from warpspace.app.documents.view_settings import with_settings
+from warpspace.app.readouts.error_controls import with_switched
+from warpspace.app.state import edits
+from warpspace.app.state.app_state import start_state
+from warpspace.app.state.curve_text import (
+    convert_shape,
+    kind_titles,
+    parse_shape,
+    read_curve,
+    shape_kind,
+    spell_rows,
+)
+from warpspace.app.state.ranges import Exclusions
+from warpspace.app.state.store import History
+from warpspace.app.state.typed_numbers import read_typed, spell_typed
+from warpspace.exceptions import OptionError
+from warpspace.machine.errors import Constant, Harmonics, Poly, Ramp, Table
+from warpspace.machine.limits import MAX_ERROR
+
+START = start_state(load_scene("dvf5000_first"), nodes=7)
+SPAN = (-275.0, 275.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("87.3", 87.3),
+        ("1e-3", 1e-3),
+        ("1,5e2", 150.0),
+        ("1.23456789", 1.23456789),
+        ("−3,25", -3.25),
+        (" +.5 ", 0.5),
+        ("12 µrad", 12.0),
+        ("12\u202fμrad", 12.0),
+        ("5.", 5.0),
+    ],
+)
+def test_numbers_are_read_as_people_type_them(text, value):
+    assert read_typed(text, "µrad") == value
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("", "-", "1e", "abc", "1.234,5", "1,234.5", "1_000", "nan", "inf", "1e999", "٣"),
+        *("12 mm", "0x10", "1 2", "<b>", "1" * 41),
+    ],
+)
+def test_what_is_no_number_is_none(text):
+    assert read_typed(text, "µrad") is None
+
+
+@pytest.mark.parametrize("value", [1.23456789, 87.3, -0.0, 1e-3, 1e5, 0.1 + 0.2])
+def test_a_box_spells_what_it_reads_back(value):
+    assert read_typed(spell_typed(value)) == pytest.approx(value, rel=1e-12, abs=0.0)
+    assert spell_typed(-0.0) == "0"
+    assert spell_typed(0.1 + 0.2) == "0.3"
+
+
+@pytest.mark.parametrize(("value", "kept"), [(1e9, MAX_ERROR), (-1e300, -MAX_ERROR)])
+def test_what_no_model_holds_for_is_clamped_and_said(value, kept):
+    typed = edits.with_typed_amplitude(START, "EAX", value)
+    assert typed.amplitudes["EAX"] == kept
+    assert len(typed.notes) == 1
+    assert edits.with_typed_amplitude(START, "QQQ", 1.0).notes == (
+        "QQQ: no parameter of this machine",
+    )
+
+
+def test_a_link_says_what_is_excluded_and_what_alone_takes_part():
+    found = with_settings(START, "excluded=EXX&only=EAX,EBX").exclusions
+    assert found.excluded == {"EXX"}
+    assert found.only == {"EAX", "EBX"}
+
+
+WANTED = Table(SPAN, ((-275.0, -1.5), (0.0, 2.0), (275.0, 0.25)))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "X [mm]\tEXX [µm]\n-275\t-1,5\n0\t2\n275\t0,25",
+        "Position;Wert 1\r\n−275;−1,5\r\n0;2,0\r\n275;2,5e-1\r\n",
+        '"X","EXX"\n-275.0,-1.5\n0.0,2.0\n275.0,0.25',
+        "-275  -1.5\n\n0 2 # middle\n275 .25",
+        "275\t0.25\n-275\t-1.5\n0\t2",
+        "-275 -1.5\n0 1\n275 0.25\n0 3",
+    ],
+)
+def test_a_table_is_pasted_from_a_spreadsheet(text):
+    assert read_curve("table", text, SPAN).function == WANTED
+
+
+@pytest.mark.parametrize("order", [0.65, 2.0, 8.0, 30.0])
+def test_harmonics_become_a_table_of_the_same_shape(order):
+    span = (0.0, 360.0)
+    wave = Harmonics(span, ((order, 4.0, 30.0), (1.0, 1.0, 0.0)))
+    table = Table.from_curve(wave, span)
+    at = np.linspace(*span, 5000)
+    apart = np.abs(table.evaluate(at) - wave.evaluate(at)).max()
+    assert apart <= 0.0025 * abs(wave.amplitude)
+
+
+EXAMPLES = [
+    Constant(SPAN, 23.1),
+    Ramp(SPAN, -43.7),
+    Poly(SPAN, (0.5, 0.02, -1e-5)),
+    Harmonics(SPAN, ((1.0, 3.0, 0.0), (2.0, 0.5, 90.0))),
+    Table(SPAN, ((-275.0, 0.0), (0.0, 4.1), (275.0, -1.0))),
+]
+
+
+@pytest.mark.parametrize("function", EXAMPLES, ids=shape_kind)
+def test_rows_read_back_to_the_function(function):
+    assert parse_shape(shape_kind(function), spell_rows(function), SPAN) == function
+
+
+@pytest.mark.parametrize("function", EXAMPLES, ids=shape_kind)
+def test_an_error_that_is_taken_to_zero_keeps_its_curve(function):
+    entered = edits.with_curve(START, "EXX", function)
+    zeroed = entered.with_amplitude("EXX", 0.0)
+    assert shape_kind(edits.curve_of(zeroed, "EXX")) == shape_kind(function)
+    assert "-0" not in spell_rows(edits.curve_of(zeroed, "EXX")).split()
+    again = zeroed.with_amplitude("EXX", entered.amplitudes["EXX"])
+    assert edits.curve_of(again, "EXX") == edits.curve_of(entered, "EXX")
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "function"),
+    [
+        ("constant", " 5,5 ", Constant(SPAN, 5.5)),
+        ("ramp", "−3  # at the upper end", Ramp(SPAN, -3.0)),
+        ("polynomial", "0; 0.02", Poly(SPAN, (0.0, 0.02))),
+        ("polynomial", "0\n0.02\n", Poly(SPAN, (0.0, 0.02))),
+        ("harmonics", "1 3", Harmonics(SPAN, ((1.0, 3.0, 0.0),))),
+        ("table", "-275, 0\n275, 4.1", Table(SPAN, ((-275.0, 0.0), (275.0, 4.1)))),
+        ("table", "-275\t0\n\n275\t4,1", Table(SPAN, ((-275.0, 0.0), (275.0, 4.1)))),
+    ],
+)
+def test_spellings(kind, text, function):
+    assert parse_shape(kind, text, SPAN) == function
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "message"),
+    [
+        ("constant", "", "no numbers"),
+        ("constant", "1 2", "one number"),
+        ("constant", "nan", "finite"),
+        ("constant", "1e9", "at most"),
+        ("ramp", "<script>alert(1)</script>", "no number"),
+        ("polynomial", "0 1e9", "the curve reaches"),
+        ("polynomial", "1 " * 17, "at most 16"),
+        ("harmonics", "1", "row 1"),
+        ("harmonics", "-1 3", "order"),
+        ("harmonics", "1 3 0\n" * 65, "at most 64"),
+        ("table", "0 1 2\n1 2 3", "row 1: 3 numbers"),
+        ("table", "0 1\n1 x", "row 2: '1 x' holds what is no number"),
+        ("table", "O.5 3\n1 2", "row 1"),
+        ("table", "a b\nc d", "row 2"),
+        ("table", "0\t1.234,5\n1\t2", "row 1"),
+        ("table", "\n".join(f"{i} 0" for i in range(2001)), "at most 2000"),
+        ("table", "0 inf", "finite"),
+        ("spline", "0 1", "expected one of"),
+        ("constant", "1" * 80_001, "at most 80,000"),
+    ],
+)
+def test_refused_with_a_message(kind, text, message):
+    with pytest.raises(OptionError, match=message):
+        parse_shape(kind, text, SPAN)
+
+
+@pytest.mark.parametrize("kind", kind_titles())
+@pytest.mark.parametrize("function", [*EXAMPLES, None], ids=shape_kind)
+def test_another_kind_starts_from_the_present_curve(function, kind):
+    converted = convert_shape(function, kind, SPAN)
+    assert shape_kind(converted) == kind
+    if function is not None and kind in {"constant", "ramp", "harmonics"}:
+        assert converted.amplitude == pytest.approx(function.amplitude, rel=1e-6)
+    # what the editor would show is what it would read
+    assert parse_shape(kind, spell_rows(converted), SPAN) is not None
+
+
+def test_long_tables_are_thinned_out_for_editing():
+    points = tuple((float(q), 0.1 * q) for q in np.linspace(-275, 275, 5501))
+    rows = spell_rows(Table(SPAN, points)).splitlines()
+    assert len(rows) == 2000
+    assert rows[0].split() == ["-275", "-27.5"]
+    assert rows[-1].split() == ["275", "27.5"]
+
+
+@pytest.mark.parametrize("word", ["", "only", "only EXA", "exclude <script>", "delete EAX", " EAX"])
+def test_words_that_mean_nothing_change_nothing(word):
+    assert with_switched(START, word) is START
+
+
+def test_each_switch_is_a_step_however_fast_they_follow_each_other():
+    history = History(START)
+    for number, word in enumerate(("exclude EAX", "exclude EBX", "exclude EBX", "only EBX")):
+        history = history.push(with_switched(history.present, word), 0.01 * number)
+    assert history.undoes == "exclusions.only.+EBX"
+    history = history.undo()
+    assert history.present.exclusions == Exclusions(frozenset({"EAX"}))
+    history = history.undo()
+    assert history.present.exclusions == Exclusions(frozenset({"EAX", "EBX"}))
+    assert history.undo().undo().present == START
+
+
+def test_clicks_are_read_in_order_with_their_numbers():
+    assert read_clicks("7:only EAX\n8:exclude EBX") == ((7, "only EAX"), (8, "exclude EBX"))
+    assert read_clicks("3:a:b") == ((3, "a:b"),)
+    assert len(read_clicks("\n".join(f"{i}:a" for i in range(10_000)))) == MOST_CLICKS
+    assert len(read_clicks("1:" + "a" * 1_000_000)[0][1]) == LONGEST_WORD
+
+
+@pytest.mark.parametrize(
+    "text", ["", "only EAX", "x:only EAX", "-1:a", "²:a", "9" * 40 + ":a", "1.5:a", "None"]
+)
+def test_what_is_no_click_is_left_out(text):
+    assert read_clicks(text) == ()

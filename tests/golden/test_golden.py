@@ -1,0 +1,68 @@
+"""What every command says and writes stays what it was, to the digits that count."""
+
+import pytest
+
+from golden.cases import CASES
+from golden.running import (
+    INPUTS,
+    KEPT,
+    READ,
+    differences,
+    input_cases,
+    refusals,
+    run_case,
+    run_input,
+    run_read,
+    run_refused,
+)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_it_says_and_writes_what_it_did(name, tmp_path):
+    kept = (KEPT / f"{name}.txt").read_text("utf-8")
+    found = differences(kept, run_case(name, tmp_path))
+    assert not found, f"{CASES[name]}\n" + "\n".join(found[:12])
+
+
+@pytest.mark.parametrize(("line", "kept"), refusals().items())
+def test_what_cannot_be_is_refused_with_its_message(line, kept, tmp_path):
+    status, printed, said = run_refused(line, tmp_path)
+    assert (status, printed) == (2, "")
+    assert not differences(kept, said)
+    assert list(tmp_path.iterdir()) == []
+
+
+def cases_of(folder):
+    """Command, files and outcome of the cases of all texts of a folder."""
+    return pytest.mark.parametrize(
+        ("command", "files", "kept"),
+        [
+            pytest.param(*case, id=f"{path.stem}: {name}")
+            for path in sorted(folder.glob("*.txt"))
+            for name, *case in input_cases(path)
+        ],
+    )
+
+
+@cases_of(READ)
+def test_a_file_is_read_as_it_was(command, files, kept, tmp_path):
+    assert not differences(kept, run_read(command, files, tmp_path))
+
+
+@cases_of(INPUTS)
+def test_a_file_that_cannot_be_used_is_refused_with_its_message(command, files, kept, tmp_path):
+    status, printed, said = run_input(command, files, tmp_path)
+    assert (status, printed) == (2, "")
+    assert not differences(kept, said)
+    assert {path.name for path in tmp_path.iterdir()} == set(files)
+
+
+def test_nothing_is_kept_of_cases_that_are_gone():
+    assert {path.stem for path in KEPT.glob("*.txt")} == set(CASES)
+
+
+def test_a_changed_number_or_word_is_seen():
+    assert not differences("a 1.2345 b\n", "a  1.2346 b\n")
+    assert differences("a 1.2345 b\n", "a 1.2348 b\n")
+    assert differences("mean 3 µm\n", "mean 3 mm\n")
+    assert differences("one\n", "one\ntwo\n")

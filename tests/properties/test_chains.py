@@ -1,0 +1,308 @@
+"""Any chain: transforms, exact model, Jacobian, spelling."""
+
+from contextlib import suppress
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from chains import (
+    MAX_LINEAR_MM,
+    MAX_OFFSET_MM,
+    central_differences,
+    chains,
+    models,
+    positions,
+    vectors,
+)
+from warpspace.exceptions import ChainError
+from warpspace.field.evaluate import View, evaluate_exact, evaluate_first_order
+from warpspace.kinematics import transforms
+from warpspace.kinematics.chain import branch_pose, nominal_point
+from warpspace.kinematics.deviation import loop_error
+from warpspace.kinematics.firstorder import columns, jacobian
+from warpspace.kinematics.model import Loop, Model, convention_names
+from warpspace.machine.description import parse_chain
+from warpspace.machine.errors import Constant, ErrorSet
+from warpspace.machine.parameters import parameter
+
+ANGLES = st.floats(-10.0, 10.0)
+SHAPES = hnp.array_shapes(min_dims=0, max_dims=2, max_side=3)
+
+
+@st.composite
+def vector_batches(draw, limit=5.0):
+    """Batches of vectors, [..., 3]."""
+    shape = (*draw(SHAPES), 3)
+    return draw(hnp.arrays(float, shape, elements=st.floats(-limit, limit)))
+
+
+@given(turn=vector_batches(), shift=st.tuples(*[st.floats(-1e4, 1e4)] * 3))
+def test_inverse_undoes_a_rigid_motion(turn, shift):
+    pose = transforms.rigid(transforms.vector_rotation(turn), np.array(shift))
+    product = pose @ transforms.inverse(pose)
+    np.testing.assert_allclose(product, np.broadcast_to(np.eye(4), pose.shape), atol=1e-10)
+
+
+@given(turn=vector_batches())
+def test_rotations_are_orthonormal_and_right_handed(turn):
+    rotation = transforms.vector_rotation(turn)
+    product = rotation @ np.swapaxes(rotation, -1, -2)
+    np.testing.assert_allclose(product, np.broadcast_to(np.eye(3), rotation.shape), atol=1e-13)
+    np.testing.assert_allclose(np.linalg.det(rotation), 1.0, atol=1e-13)
+
+
+@given(turn=vector_batches())
+def test_turning_forth_and_back_is_the_identity(turn):
+    product = transforms.vector_rotation(turn) @ transforms.vector_rotation(-turn)
+    np.testing.assert_allclose(product, np.broadcast_to(np.eye(3), product.shape), atol=1e-13)
+
+
+@given(index=st.integers(0, 2), angle=hnp.arrays(float, SHAPES, elements=ANGLES))
+def test_axis_rotation_is_the_rotation_about_that_unit_vector(index, angle):
+    about = angle[..., None] * np.eye(3)[index]
+    np.testing.assert_allclose(
+        transforms.axis_rotation(index, angle), transforms.vector_rotation(about), atol=1e-13
+    )
+
+
+@given(exponent=st.integers(-14, -2), direction=vector_batches(1.0))
+def test_small_rotations_are_one_plus_skew_to_second_order(exponent, direction):
+    turn = 10.0**exponent * direction
+    cross = transforms.skew(turn)
+    second_order = np.eye(3) + cross + cross @ cross / 2.0
+    angle = np.linalg.norm(turn, axis=-1).max(initial=0.0)
+    difference = np.abs(transforms.vector_rotation(turn) - second_order).max()
+    assert difference <= angle**3 + 1e-15
+
+
+@given(left=vector_batches(), right=st.tuples(*[st.floats(-5, 5)] * 3))
+def test_skew_is_the_cross_product(left, right):
+    product = transforms.rotate(transforms.skew(left), np.array(right))
+    np.testing.assert_allclose(product, np.cross(left, np.array(right)), atol=1e-12)
+
+
+@given(first=vector_batches(1e3), second=st.tuples(*[st.floats(-1e3, 1e3)] * 3))
+def test_translations_add_up(first, second):
+    moved = transforms.apply(transforms.translation(first), np.array(second))
+    np.testing.assert_allclose(moved, first + np.array(second), atol=1e-9)
+    np.testing.assert_array_equal(
+        transforms.translation(np.zeros_like(first)),
+        np.broadcast_to(np.eye(4), (*first.shape[:-1], 4, 4)),
+    )
+
+
+@given(turn=vector_batches(), shift=st.tuples(*[st.floats(-10, 10)] * 3))
+def test_batch_gives_what_a_loop_gives(turn, shift):
+    point = np.array(shift)
+    pose = transforms.rigid(transforms.vector_rotation(turn), point)
+    moved, inverse = transforms.apply(pose, point), transforms.inverse(pose)
+    for index in np.ndindex(turn.shape[:-1]):
+        single = transforms.rigid(transforms.vector_rotation(turn[index]), point)
+        np.testing.assert_allclose(pose[index], single, atol=1e-14)
+        np.testing.assert_allclose(moved[index], transforms.apply(single, point), atol=1e-13)
+        np.testing.assert_allclose(inverse[index], transforms.inverse(single), atol=1e-13)
+
+
+REACH_MM = 8.0 * (MAX_OFFSET_MM + MAX_LINEAR_MM)
+SPAN = (-1.0, 1.0)
+
+
+@settings(max_examples=60)
+@given(data=st.data())
+def test_zero_errors_give_exactly_zero(data):
+    model, loop = data.draw(models()), data.draw(st.sampled_from(Loop))
+    coordinates = data.draw(positions(model, (3,)))
+    for value in (None, 0.0):
+        given_keys = model.machine.allowed_keys if value is not None else ()
+        errors = ErrorSet({key: Constant(SPAN, 0.0) for key in given_keys})
+        view = View(loop)
+        for solve in (evaluate_exact, evaluate_first_order):
+            field = solve(model, errors, coordinates, view)
+            np.testing.assert_allclose(field.error_um, 0.0, rtol=0, atol=1e-8)
+            np.testing.assert_allclose(field.orientation_urad, 0.0, rtol=0, atol=1e-8)
+
+
+@settings(max_examples=60)
+@given(data=st.data())
+def test_exact_minus_first_order_shrinks_with_the_square_of_the_errors(data):
+    model, loop = data.draw(models()), data.draw(st.sampled_from(Loop))
+    coordinates = data.draw(positions(model))
+    keys = model.machine.allowed_keys
+    amplitudes = np.array(
+        data.draw(st.lists(st.integers(-1000, 1000), min_size=len(keys), max_size=len(keys))),
+        dtype=float,
+    )
+    point = nominal_point(model, loop, coordinates)
+    gain, tilt = jacobian(model, loop, keys, coordinates, point)
+
+    def left_out(factor):
+        values = {key: np.asarray(factor * amplitudes[i]) for i, key in enumerate(keys)}
+        error, orientation = loop_error(model, loop, coordinates, values, point)
+        first = factor * amplitudes
+        return error - first @ gain, orientation - first @ tilt
+
+    turned = float(np.abs(amplitudes).sum()) * 1e-6
+    (whole, whole_tilt), (half, half_tilt) = left_out(1.0), left_out(0.5)
+    # |second order| ≤ ε²·L, and what is neither first nor second order ≤ ε³·L.
+    assert np.linalg.norm(whole) <= turned**2 * REACH_MM * 1e3 + 1e-6
+    assert np.linalg.norm(whole - 4.0 * half) <= turned**3 * REACH_MM * 1e3 + 1e-6
+    assert np.linalg.norm(whole_tilt) <= turned**2 * 1e6 + 1e-6
+    assert np.linalg.norm(whole_tilt - 4.0 * half_tilt) <= turned**3 * 1e6 + 1e-6
+
+
+@settings(max_examples=40)
+@given(data=st.data())
+def test_exact_batch_gives_what_a_loop_over_its_points_gives(data):
+    model, loop = data.draw(models()), data.draw(st.sampled_from(Loop))
+    coordinates = data.draw(positions(model, (2, 2)))
+    errors = ErrorSet({key: Constant(SPAN, 37.0) for key in model.machine.allowed_keys})
+    frame = data.draw(st.sampled_from(("machine", "workpiece")))
+    view = View(loop, frame)
+    field = evaluate_exact(model, errors, coordinates, view)
+    assert field.error_um.shape == (2, 2, 3)
+    for index in np.ndindex(2, 2):
+        one = {axis: values[index] for axis, values in coordinates.items()}
+        single = evaluate_exact(model, errors, one, view)
+        np.testing.assert_allclose(field.error_um[index], single.error_um, atol=1e-8)
+        np.testing.assert_allclose(
+            field.orientation_urad[index], single.orientation_urad, atol=1e-8
+        )
+
+
+@settings(max_examples=40)
+@given(data=st.data())
+def test_frame_of_the_result_turns_vectors_and_keeps_their_lengths(data):
+    model, loop = data.draw(models()), data.draw(st.sampled_from(Loop))
+    coordinates = data.draw(positions(model, (2,)))
+    errors = ErrorSet({key: Constant(SPAN, 20.0) for key in model.machine.allowed_keys})
+    rotation = branch_pose(model, "workpiece", coordinates)[..., :3, :3]
+    for solve in (evaluate_exact, evaluate_first_order):
+        in_machine = solve(model, errors, coordinates, View(loop, "machine"))
+        on_table = solve(model, errors, coordinates, View(loop, "workpiece"))
+        back = transforms.rotate(rotation, on_table.error_um)
+        np.testing.assert_allclose(back, in_machine.error_um, atol=1e-8)
+        np.testing.assert_allclose(on_table.norm_um, in_machine.norm_um, atol=1e-8)
+
+
+TOLERANCE = 1e-6
+"""Gains reach about 10 µm/µrad; the cubic term of a 50 µrad step is 1e-9 of that."""
+
+
+@pytest.mark.parametrize("convention", convention_names())
+@pytest.mark.parametrize("loop", Loop)
+@settings(max_examples=40)
+@given(data=st.data())
+def test_jacobian_is_the_central_difference_of_the_exact_chain(loop, convention, data):
+    model = data.draw(models(convention))
+    coordinates = data.draw(positions(model))
+    point = nominal_point(model, loop, coordinates)
+    keys = model.machine.allowed_keys
+    position, orientation = jacobian(model, loop, keys, coordinates, point)
+    expected_position, expected_orientation = central_differences(
+        model, loop, keys, coordinates, point
+    )
+    np.testing.assert_allclose(position, expected_position, rtol=0, atol=TOLERANCE)
+    np.testing.assert_allclose(orientation, expected_orientation, rtol=0, atol=TOLERANCE)
+
+
+@settings(max_examples=40)
+@given(data=st.data())
+def test_jacobian_holds_at_any_point_and_not_just_at_the_functional_one(data):
+    model, loop = data.draw(models()), data.draw(st.sampled_from(Loop))
+    coordinates, point = data.draw(positions(model)), np.array(data.draw(vectors()))
+    keys = model.machine.allowed_keys
+    found = jacobian(model, loop, keys, coordinates, point)
+    expected = central_differences(model, loop, keys, coordinates, point)
+    for ours, theirs in zip(found, expected, strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=0, atol=TOLERANCE)
+
+
+@settings(max_examples=40)
+@given(data=st.data())
+def test_batch_gives_what_a_loop_over_its_points_gives(data):
+    model, loop = data.draw(models()), data.draw(st.sampled_from(Loop))
+    batch = data.draw(positions(model, (2, 3)))
+    keys = model.machine.allowed_keys
+    point = nominal_point(model, loop, batch)
+    position, orientation = jacobian(model, loop, keys, batch, point)
+    assert position.shape == orientation.shape == (len(keys), 2, 3, 3)
+    for index in np.ndindex(2, 3):
+        one = {axis: values[index] for axis, values in batch.items()}
+        single = jacobian(model, loop, keys, one, nominal_point(model, loop, one))
+        np.testing.assert_allclose(position[(slice(None), *index)], single[0], atol=1e-12)
+        np.testing.assert_allclose(orientation[(slice(None), *index)], single[1], atol=1e-12)
+
+
+@settings(max_examples=60)
+@given(data=st.data())
+def test_every_parameter_of_every_axis_moves_some_point_of_its_loop_and_of_no_other(data):
+    model = data.draw(models())
+    coordinates = data.draw(positions(model))
+    corners = 2000.0 * np.array([[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0], [1.0, 1.0, 1.0]])
+    keys = model.machine.allowed_keys
+    assert len(keys) == 12 * len(model.machine.axes)
+    moved = {
+        loop: np.abs(jacobian(model, loop, keys, coordinates, corners)[0]).max(axis=(1, 2))
+        for loop in Loop
+    }
+    for index, key in enumerate(keys):
+        on_tool = parameter(key).axis in model.machine.chain.tool
+        own, other = (Loop.TOOL, Loop.WORKPIECE) if on_tool else (Loop.WORKPIECE, Loop.TOOL)
+        assert moved[own][index] > 0.1, key
+        assert moved[Loop.RELATIVE][index] > 0.1, key
+        assert moved[other][index] == 0.0, key
+
+
+@settings(max_examples=40)
+@given(data=st.data())
+def test_relative_loop_is_tool_minus_workpiece(data):
+    model: Model = data.draw(models())
+    coordinates = data.draw(positions(model))
+    point, keys = np.array(data.draw(vectors())), model.machine.allowed_keys
+    by_loop = {loop: jacobian(model, loop, keys, coordinates, point) for loop in Loop}
+    for part in (0, 1):
+        np.testing.assert_array_equal(
+            by_loop[Loop.RELATIVE][part], by_loop[Loop.TOOL][part] - by_loop[Loop.WORKPIECE][part]
+        )
+
+
+@settings(max_examples=40)
+@given(data=st.data())
+def test_lever_explains_the_gain_of_every_rotation(data):
+    model, loop = data.draw(models()), data.draw(st.sampled_from(Loop))
+    coordinates, point = data.draw(positions(model)), np.array(data.draw(vectors()))
+    found = columns(model, loop, model.machine.allowed_keys, coordinates, point)
+    for key, column in found.items():
+        rotation = parameter(key).is_rotation
+        gain = np.cross(column.direction, column.lever_mm) / 1e3 if rotation else column.direction
+        np.testing.assert_allclose(column.position, column.sign * gain, rtol=0, atol=1e-12)
+
+
+FILLERS = st.text(alphabet=" ()[]{}'’′-_\t", max_size=3)
+
+
+@given(chain=chains())
+def test_canonical_spelling_reads_back(chain):
+    assert parse_chain(str(chain)) == chain
+
+
+@given(chain=chains(), frame=st.sampled_from("Fb"), data=st.data())
+def test_brackets_primes_blanks_and_hyphens_change_nothing(chain, frame, data):
+    letters = str(chain).replace("F", frame)
+    spelling = "".join(data.draw(FILLERS) + letter for letter in letters) + data.draw(FILLERS)
+    assert parse_chain(spelling) == chain
+
+
+@given(text=st.text(alphabet="wtFbXYZABCxyzDW T-'()", max_size=14))
+def test_any_text_is_a_chain_that_reads_back_or_a_chain_error(text):
+    with suppress(ChainError):
+        chain = parse_chain(text)
+        assert parse_chain(str(chain)) == chain
+        assert 1 <= len(chain.axes) <= 6
+        return
+    with pytest.raises(ChainError, match="expected") as caught:
+        parse_chain(text)
+    assert repr(text) in str(caught.value)

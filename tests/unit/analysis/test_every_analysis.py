@@ -1,0 +1,193 @@
+"""What holds for every analysis: command, JSON, options, hostile text, a stop."""
+
+import json
+import subprocess
+import sys
+from dataclasses import dataclass, fields, replace
+
+import click
+import pytest
+from click.testing import CliRunner
+
+from warpspace import load_scene
+from warpspace.analysis import Analysis, Column, Result, Table, option, register, unregister
+from warpspace.analysis.blocks import Bars, Histogram, Lines
+from warpspace.analysis.catalogue import TASKS, entries, first_line
+from warpspace.analysis.description import plain, silent
+from warpspace.analysis.options import options_of
+from warpspace.cli.analyses import build_command, print_blocks
+from warpspace.exceptions import OptionError, WarpspaceError
+
+SCENES = ("dvf5000_first", "teach_squareness", "machine_printer_3d")
+EVERY = pytest.mark.parametrize("entry", entries(), ids=lambda entry: entry.name)
+NEEDED = {
+    "convert": (
+        "dvf5000_first",
+        {"wishes": ("component_errors=before_motion",)},
+        ["--to", "component_errors=before_motion", "-o", "converted.toml"],
+    ),
+    "compensate": (
+        "dvf5000_first",
+        {"sweep": (3,), "formats": ("marlin",)},
+        ["--sweep", "3", "--format", "marlin"],
+    ),
+    "allocate": ("dvf5000_general", {"limit_um": 60.0}, ["--limit", "60"]),
+    "calibrate": ("fork_head_bc", {"data": ("tcp_on.csv",)}, ["--data", "tcp_on.csv"]),
+}
+"""Scene, options and what is typed, of analyses that answer nothing without."""
+HEAVY = ("scipy", "rich", "matplotlib", "viser", "pyvista")
+
+
+class StoppedError(Exception):
+    """What a page raises that nobody waits for any more."""
+
+
+def small(kind):
+    """Ask with few nodes."""
+    few = {one.name: 5 for one in options_of(kind) if one.name in ("nodes", "grid")}
+    return kind(**few, **(NEEDED[kind.name][1] if kind.name in NEEDED else {}))
+
+
+def scene_of(name, scene="dvf5000_first"):
+    """Load a scene, or the one that an analysis needs."""
+    return load_scene(NEEDED[name][0] if name in NEEDED else scene)
+
+
+@EVERY
+def test_the_list_says_what_the_analysis_says(entry):
+    kind = entry.load()
+    assert (kind.name, kind.task, first_line(kind)) == (entry.name, entry.task, entry.sentence)
+    assert entry.task in TASKS
+    assert entry.sentence.endswith(".")
+
+
+@EVERY
+def test_every_option_has_help_and_a_range_it_keeps(entry):
+    kind = entry.load()
+    others = {one.name for one in fields(kind)} - {one.name for one in options_of(kind)}
+    assert others <= ({"stem"} if kind.file_help else set())
+    for one in options_of(kind):
+        assert one.about.rstrip(".") == one.about != "", one.name
+        assert one.flag.startswith("--")
+        for beyond in (one.low, one.high):
+            if beyond is not None and one.kind in (int, float):
+                wrong = beyond - 1 if beyond == one.low else beyond + 1
+                with pytest.raises(OptionError, match=f"{one.name}.*expected"):
+                    kind(**{one.name: one.kind(wrong)})
+        if one.kind is float:
+            with pytest.raises(OptionError, match="expected"):
+                kind(**{one.name: float("nan")})
+
+
+@EVERY
+@pytest.mark.parametrize("scene", SCENES)
+def test_text_page_and_json_say_the_result(entry, scene, capsys):
+    kind = entry.load()
+    loaded = scene_of(entry.name, scene)
+    result = small(kind).run(loaded, silent)
+    spelled = result.as_json()
+    if type(result).as_json is Result.as_json:
+        own = [one.name for one in fields(result) if one.name != "second_order"]
+        keys = list(result.keys or own)
+        assert list(spelled) == keys + ["second_order_um"] * bool(result.second_order)
+    assert json.loads(json.dumps(spelled, allow_nan=False)) == plain(spelled)
+    print_blocks(result.blocks())
+    text = capsys.readouterr().out
+    assert max(map(len, text.splitlines())) <= 80
+    page = result._repr_html_()
+    for table in result.blocks_of(Table):
+        for cell in filter(None, table.cells()[0] if table.rows else ()):
+            assert cell.split()[0] in text
+            assert cell.split()[0] in page
+    assert kind.has_chart == any(map(result.blocks_of, (Bars, Lines, Histogram)))
+    assert kind.has_table == (result.file_table() is not None)
+    assert bool(kind.makes_scenes) >= bool(result.changes())
+
+
+@EVERY
+def test_the_command_prints_one_json_object(entry, tmp_path, monkeypatch):
+    kind = entry.load()
+    asked = small(kind)
+    few = [[one.flag, "5"] for one in options_of(kind) if one.name in ("nodes", "grid")]
+    scene, _, typed = NEEDED.get(entry.name, ("dvf5000_first", {}, []))
+    arguments = [scene, "--json", *typed, *(word for pair in few for word in pair)]
+    monkeypatch.chdir(tmp_path)
+    said = CliRunner().invoke(build_command(entry), arguments)
+    assert said.exit_code == 0, said.output
+    assert json.loads(said.output) == asked.run(load_scene(scene), silent).as_json()
+
+
+@EVERY
+def test_what_a_user_calls_a_scene_is_text(entry):
+    scene = scene_of(entry.name)
+    hostile = replace(scene, title="<script>alert(1)</script>")
+    page = small(entry.load()).run(hostile, silent)._repr_html_()
+    assert "<script" not in page
+
+
+@EVERY
+def test_a_stop_is_heeded(entry):
+    shares: list[float] = []
+
+    def stop(share):
+        shares.append(share)
+        raise StoppedError
+
+    try:
+        small(entry.load()).run(scene_of(entry.name), stop)
+    except StoppedError:
+        assert 0.0 <= shares[0] <= 1.0
+
+
+def test_importing_every_analysis_imports_nothing_heavy():
+    places = [entry.place.partition(":")[0] for entry in entries()]
+    code = f"import sys, {', '.join(places)}; print(*(m for m in {HEAVY} if m in sys.modules))"
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert said.stdout.split() == []
+
+
+@dataclass(frozen=True, kw_only=True)
+class EvenResult(Result):
+    """A number."""
+
+    keys = ("sum_mm",)
+    sum_mm: float
+    word: str
+
+    def blocks(self):
+        yield f"{self.word}: {self.sum_mm:g} mm"
+        yield Table((Column("sum", ".1f", "mm", key="sum_mm"),), [(self.sum_mm,)])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Even(Analysis):
+    """Add the travel of SCENE up."""
+
+    name = "even"
+    task = "machine"
+    has_table = True
+    height_mm: float | None = option(None, "What is added", unit="mm", unset="nothing", high=9.0)
+
+    def run(self, scene, _watch, /):
+        total = sum(high - low for low, high in (a.travel for a in scene.machine.axes.values()))
+        return EvenResult(sum_mm=total + (self.height_mm or 0.0), word=scene.title)
+
+
+def test_an_analysis_of_ones_own_is_a_command_like_any_other(tmp_path):
+    register(Even)
+    try:
+        with pytest.raises(ValueError, match="there already"):
+            register(Even)
+        (entry,) = (one for one in entries() if one.name == "even")
+        command = build_command(entry)
+        run = CliRunner().invoke
+        assert "--height FLOAT" in run(command, ["--help"]).output
+        target = tmp_path / "sum.csv"
+        said = run(command, ["teach_squareness", "--height", "2", "--csv", str(target)])
+        assert said.exit_code == 0, said.output
+        assert target.read_text("utf-8").splitlines()[0] == "sum_mm"
+        with pytest.raises(WarpspaceError, match=r"--height 10 mm; expected at most 9 mm"):
+            run(command, ["teach_squareness", "--height", "10"], catch_exceptions=False)
+        assert isinstance(command, click.Command)
+    finally:
+        unregister("even")

@@ -1,0 +1,225 @@
+"""Faces, isolines, arrows, marks and bodies of what has no area."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from warpspace.geometry.colour import build_scale
+from warpspace.geometry.surfaces import (
+    box_edges,
+    crease_lines,
+    cut_faces,
+    face_lines,
+    is_thin,
+    isoline_levels,
+    isolines,
+    outer_faces,
+    outer_surface,
+    pick_point,
+    pick_surface,
+    thicken,
+    triangulate,
+)
+from warpspace.picture.marks import build_arrows, corner_arrows, scale_bars, worst_point
+from warpspace.units import MM_PER_UM
+
+
+@pytest.fixture
+def box():
+    """Nodes of a 200 × 100 × 50 mm box about the origin."""
+    axes = [np.linspace(-half, half, count) for half, count in ((100, 5), (50, 3), (25, 4))]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), -1)
+
+
+def test_arrows_run_from_nominal_to_drawn_corner(box):
+    error = np.zeros_like(box)
+    error[-1, -1, -1] = (3.0, 4.0, 12.0)
+    arrows = corner_arrows(box.shape[:3], box, error, 1000.0)
+    assert arrows.start_mm.shape == (8, 3)
+    at = int(np.argmax(arrows.norm_um))
+    assert arrows.start_mm[at] == pytest.approx((100, 50, 25))
+    assert arrows.end_mm[at] == pytest.approx((103, 54, 37))
+    assert arrows.texts[at] == "13.0 µm"
+    assert sorted(arrows.texts)[:7] == ["0.0 µm"] * 7
+    for outwards in (-1.0, 1.0):  # numbers stand outside the volume
+        arrows = corner_arrows(box.shape[:3], box, outwards * box, 100.0)
+        assert (np.abs(arrows.label_mm) > np.abs(arrows.start_mm)).all()
+        assert (np.abs(arrows.label_mm) > np.abs(arrows.end_mm)).all()
+
+
+def test_worst_point_is_the_largest_magnitude(box):
+    values = np.zeros(box.shape[:3])
+    values[1, 2, 3], values[2, 0, 0] = -7.0, 6.0
+    found = worst_point(values, box, box + 1.0)
+    assert found.value == -7.0
+    assert found.nominal_mm == pytest.approx(box[1, 2, 3])
+    assert found.drawn_mm == pytest.approx(box[1, 2, 3] + 1.0)
+
+
+@pytest.mark.parametrize("factor", [1.0, 37.0, 1000.0, 1e6])
+def test_scale_bars_are_round_and_fit(factor):
+    geometry, error = scale_bars(550.0, factor)
+    assert geometry.length == geometry.drawn_mm == 100.0
+    assert error.drawn_mm == pytest.approx(error.length * MM_PER_UM * factor)
+    for bar in (geometry, error):
+        assert float(f"{bar.length:e}".split("e")[0]) in {1.0, 2.0, 5.0}
+        assert 550 / 4 / 2.5 <= bar.drawn_mm <= 550 / 4
+    assert error.text == {1.0: "100 mm", 37.0: "2000 µm", 1000.0: "100 µm", 1e6: "0.1 µm"}[factor]
+
+
+def volume(vertices, triangles):
+    a, b, c = (vertices[triangles[:, i]] for i in range(3))
+    return float(np.sum(a * np.cross(b, c)) / 6.0)
+
+
+@pytest.mark.parametrize("end", [(30, 0, 0), (0, -30, 0), (0, 0, 30), (10, 20, -5), (0.1, 0, 0)])
+def test_arrow_runs_from_start_to_end_right_side_out(end):
+    start = np.array([[1.0, 2.0, 3.0]])
+    tip = start + np.array([end], dtype=float)
+    vertices, triangles = build_arrows(start, tip, 1.0, 10.0)
+    along = (tip - start)[0] / np.linalg.norm(tip - start)
+    reach = (vertices - start) @ along
+    assert reach.min() == pytest.approx(0.0, abs=1e-12)
+    assert reach.max() == pytest.approx(np.linalg.norm(tip - start))
+    assert volume(vertices - start, triangles) > 0.0
+    directed = {(int(t[i]), int(t[(i + 1) % 3])) for t in triangles for i in range(3)}
+    assert len(directed) == 3 * len(triangles)
+    assert directed == {(b, a) for a, b in directed}  # closed
+    point, _ = build_arrows(start, start, 1.0, 10.0)
+    assert point == pytest.approx(np.tile(start, (len(point), 1)))
+
+
+SHAPE = (5, 7, 9)
+
+
+def grid_points(shape):
+    return np.stack(np.unravel_index(np.arange(np.prod(shape)), shape), -1).astype(float)
+
+
+def volume_of_faces(faces, shape):
+    """Volume inside a closed surface; positive where it faces outwards."""
+    surface = triangulate(faces)
+    a, b, c = (grid_points(shape)[surface.nodes[surface.triangles[:, k]]] for k in range(3))
+    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
+
+
+def segments(lines):
+    return [(min(a, b), max(a, b)) for line in lines for a, b in pairwise(line.tolist())]
+
+
+@pytest.mark.parametrize("corner", [(0, 0, 0), (1, 0, 1), (1, 1, 1), (0, 1, 0)])
+def test_a_cut_takes_an_eighth_away(corner):
+    assert volume_of_faces(cut_faces(SHAPE, corner), SHAPE) == pytest.approx(4 * 6 * 8 * 7 / 8)
+    whole = outer_faces(SHAPE)
+    assert volume_of_faces(whole, SHAPE) == pytest.approx(4 * 6 * 8)
+    edges = sorted(segments(box_edges(SHAPE)))
+    assert sorted(segments(crease_lines(whole, SHAPE))) == edges
+
+
+def test_lines_are_drawn_once_and_never_on_creases():
+    faces = cut_faces(SHAPE, (1, 0, 1))
+    lines = segments(face_lines(faces, SHAPE, (1, 2, 2)))
+    creases = segments(crease_lines(faces, SHAPE))
+    assert len(lines) == len(set(lines))
+    assert len(creases) == len(set(creases))
+    assert not set(lines) & set(creases)
+
+
+def test_the_seam_of_a_cut_face_is_no_crease():
+    shape = (5, 5, 5)
+    creases = segments(crease_lines(cut_faces(shape, (1, 0, 1)), shape))
+    points = grid_points(shape)
+    # the face y = 0 is cut at x = 2 and z = 2; below z = 2 the line x = 2 lies within it
+    inside = [
+        (a, b)
+        for a, b in creases
+        if (points[[a, b], 1] == 0).all()
+        and (points[[a, b], 0] == 2).all()
+        and points[[a, b], 2].max() <= 2
+    ]
+    assert inside == []
+
+
+@pytest.mark.parametrize(
+    ("shape", "faces", "creases"),
+    [
+        ((5, 5, 1), 1, 4),
+        ((5, 1, 5), 1, 4),
+        ((5, 1, 1), 0, 0),
+        ((1, 1, 1), 0, 0),
+        ((2, 2, 2), 6, 12),
+    ],
+)
+def test_flat_volumes(shape, faces, creases):
+    found = cut_faces(shape, (1, 0, 1))
+    assert len(found) == faces
+    assert len(crease_lines(found, shape)) == creases
+    assert is_thin(shape) == (faces == 0) == (len(outer_surface(shape).triangles) == 0)
+
+
+def plane(shape=SHAPE):
+    """Nodes of a unit-spaced grid and a value that rises linearly."""
+    nodes = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), -1).astype(float)
+    return nodes.reshape(-1, 3), nodes.reshape(-1, 3) @ (1.0, 0.5, 0.25)
+
+
+def test_levels_are_the_ticks_inside_the_scale():
+    scale = build_scale(47.0, "norm")
+    assert isoline_levels(scale) == scale.ticks[1:-1]
+    signed = isoline_levels(build_scale(7.0, "x"))
+    assert 0.0 in signed
+    assert signed == tuple(-value for value in reversed(signed))
+
+
+@pytest.mark.parametrize("faces", [outer_faces(SHAPE), cut_faces(SHAPE, (1, 0, 1))])
+def test_points_of_a_line_have_its_value(faces):
+    nodes, values = plane()
+    count = 0
+    for face in faces:
+        for level, line in isolines(face, nodes, values, (1.3, 3.0, 4.7)):
+            assert line @ (1.0, 0.5, 0.25) == pytest.approx(level, abs=1e-9)
+            count += len(line)
+    assert count > 20
+
+
+def line(axis, direction, count=5):
+    shape = [1, 1, 1]
+    shape[axis] = count
+    return (np.linspace(-10.0, 10.0, count)[:, None] * direction).reshape(*shape, 3)
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("along", [*np.eye(3), -np.eye(3)[1], np.array([0.6, -0.8, 0.0])])
+def test_a_bar_has_the_line_as_its_middle_and_volume(axis, along):
+    nodes = line(axis, along)
+    bar = thicken(nodes, 2.0)
+    assert bar.shape == (*(n if n > 1 else 2 for n in nodes.shape[:3]), 3)
+    still = tuple(other for other in range(3) if other != axis)
+    np.testing.assert_allclose(bar.mean(axis=still), nodes.reshape(-1, 3), atol=1e-12)
+    corner = bar[0, 0, 0]
+    edges = np.stack([bar[-1, 0, 0], bar[0, -1, 0], bar[0, 0, -1]]) - corner
+    assert abs(np.linalg.det(edges)) > 20.0 * 2.0 * 2.0 * 0.5
+
+
+def test_a_point_becomes_a_cube_around_it():
+    cube = thicken(np.full((1, 1, 1, 3), 7.0), 2.0)
+    assert cube.shape == (2, 2, 2, 3)
+    np.testing.assert_array_equal(np.ptp(cube.reshape(-1, 3), axis=0), (2.0, 2.0, 2.0))
+    np.testing.assert_array_equal(cube.reshape(-1, 3).mean(axis=0), (7.0, 7.0, 7.0))
+
+
+def test_a_ray_hits_the_near_face_of_a_box_or_the_nearest_point():
+    axes = [np.linspace(0.0, 1.0, 4)] * 3
+    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
+    surface, origin = outer_surface((4, 4, 4)), np.array([0.3, -5.0, 0.6])
+    vertices = nodes[surface.nodes]
+    hit = pick_surface(origin, np.array([0.0, 1.0, 0.0]), vertices, surface.triangles)
+    np.testing.assert_allclose(hit.weights @ vertices[hit.vertices], [0.3, 0.0, 0.6], atol=1e-12)
+    assert hit.distance == pytest.approx(5.0)
+    for beside in ([0.0, -1.0, 0.0], [1.0, 1.0, 0.0]):
+        assert pick_surface(origin, np.array(beside), vertices, surface.triangles) is None
+    points, ray = np.array([[0.0, 10.0, 0.0], [0.0, 10.0, 1.0]]), np.array([0.0, 1.0, 0.01])
+    assert pick_point(np.zeros(3), ray, points, 0.05) == (0, pytest.approx(10.0, rel=1e-3))
+    assert pick_point(np.zeros(3), ray, points, 0.005) is None
+    assert pick_point(np.zeros(3), -ray, points, 0.05) is None

@@ -1,0 +1,121 @@
+"""The one reader of tables: what scenes, imports, tests and calibrations understand alike."""
+
+import io
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from warpspace.bench.data import DataColumn
+from warpspace.bench.data import parse_table as parse_test
+from warpspace.calibration.readings import parse_table as parse_calibration
+from warpspace.exceptions import SceneError
+from warpspace.formats.kind import ReadOptions
+from warpspace.formats.registry import open_upload, read_errors
+from warpspace.scene.curves import read_csv_column
+from warpspace.scene.files import CsvRows, guard_cell, parse_number, unguard_cell
+
+Points = list[tuple[float, float]]
+Reader = Callable[[str, Path], Points]
+
+
+def _scene(text, folder):
+    path = folder / "t.csv"
+    path.write_text(text, encoding="utf-8")
+    return read_csv_column(path, CsvRows(io.StringIO(text), "", 1).header[1], 1e5, 100)
+
+
+def _import(text, folder):
+    del folder
+    found = read_errors([open_upload("t.csv", text.encode())], ReadOptions(), "csv").found
+    return list(zip(found.series[0].positions, found.series[0].values.tolist(), strict=True))
+
+
+def _test(text, folder):
+    del folder
+    table = parse_test(text, (DataColumn("X_mm", "number"), DataColumn("EXX_um")), "t.csv")
+    return list(zip(table["X_mm"].tolist(), table["EXX_um"].tolist(), strict=True))
+
+
+def _calibration(text, folder):
+    del folder
+    table = parse_calibration(text, "t.csv")
+    return [(x, y) for x, y in table.need(("x_mm", "exx_um")).tolist()]
+
+
+READERS: dict[str, Reader] = {
+    "scene": _scene,
+    "import": _import,
+    "test": _test,
+    "calibration": _calibration,
+}
+every_reader = pytest.mark.parametrize("read", READERS.values(), ids=READERS)
+UNDERSTOOD = {
+    "points": "X_mm,EXX_um\n-1.25,1.5\n2,3e-1\n",
+    "decimal commas": "X_mm;EXX_um\n-1,25;1,5\n2;3e-1\n",
+    "tabs": "X_mm\tEXX_um\n-1,25\t1,5\n2\t,3\n",
+    "sep=;": "sep=;\nX_mm;EXX_um\n-1.25;1.5\n2;.3\n",
+    "quoted sep": '"sep=;"\r\n"X_mm";"EXX_um"\r\n"-1,25";"1,5"\r\n2;0,3\r\n',
+    "separators behind the rows": "X_mm;EXX_um\n-1,25;1,5;\n2;0,3;;\n",
+    "separators behind all": "X_mm,EXX_um,\n-1.25,1.5,\n2,0.3,\n",
+    "empty rows and remarks": "# by hand\n;;\nX_mm;EXX_um\n\n-1,25;1,5\n;;\n# end\n2;0,3\n",
+    "units in brackets": "X [mm],EXX [um]\n-1.25,1.5\n2,0.3\n",
+    "units in parentheses": "X (mm);EXX (µm)\n-1,25;1,5\n2;0,3\n",
+}
+
+
+@every_reader
+@pytest.mark.parametrize("case", UNDERSTOOD)
+def test_every_reader_understands(case, read, tmp_path):
+    assert read(UNDERSTOOD[case], tmp_path) == [(-1.25, 1.5), (2.0, 0.3)]
+
+
+@every_reader
+def test_two_decimal_signs_are_refused_with_both_lines(read, tmp_path):
+    """-1.250;1,5 was read as -1.25 mm in silence by the import, and not at all by the others."""
+    with pytest.raises(SceneError) as caught:
+        read("X_mm;EXX_um\n-3;0,5\n-2;4\n-1.250;1\n", tmp_path)
+    for fragment in ('line 2 has "0,5"', 'line 4 has "-1.250"', "one decimal sign"):
+        assert fragment in str(caught.value)
+    assert len(caught.value.problems) == 1
+
+
+NO_NUMBERS = (
+    "0_8682",
+    "inf",
+    "-nan",
+    "Infinity",
+    "٣",
+    "0x1",
+    "1.250,5",
+    "1e999",
+    "1 000",
+    "1e",
+    "",
+)
+
+
+@every_reader
+@pytest.mark.parametrize("text", NO_NUMBERS)
+def test_what_no_reader_takes_for_a_number(text, read, tmp_path):
+    with pytest.raises(SceneError, match="line 2"):
+        read(f"X_mm;EXX_um\n{text};1\n3;4\n", tmp_path)
+    with pytest.raises(ValueError, match="is no number"):
+        parse_number(text)
+
+
+@every_reader
+def test_a_decimal_comma_between_commas_is_no_number(read, tmp_path):
+    with pytest.raises(SceneError, match="decimal comma"):
+        read('X_mm,EXX_um\n"1,250",2\n3,4\n', tmp_path)
+    with pytest.raises(SceneError, match="decimal commas"):
+        read("X_mm,EXX_um\n1,250,2\n3,4\n", tmp_path)
+
+
+@given(st.text(st.sampled_from("'=+-@\t\rrun1 "), max_size=6))
+def test_guarded_texts_are_no_formulas_and_stay_apart(text):
+    guarded = guard_cell(text)
+    assert not guarded.startswith(("=", "+", "-", "@", "\t", "\r"))
+    assert unguard_cell(guarded) == text

@@ -1,0 +1,348 @@
+"""What a plug-in adds is found everywhere: a curve, a convention, a test, a figure, a format."""
+
+import io
+import json
+import zipfile
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+from chains import central_differences
+from cli.conftest import warpspace
+from warpspace.analysis.blocks import Curve, Lines
+from warpspace.analysis.options import option
+from warpspace.app.documents.files import build_request
+from warpspace.app.documents.scene_file import open_text, state_to_toml
+from warpspace.app.evaluation.bench import BenchPicture
+from warpspace.app.evaluation.conventions import Effects, choices, chosen, with_choice
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.readouts.conventions import conventions_html
+from warpspace.app.state.app_state import start_state
+from warpspace.app.state.curve_text import convert_shape, kind_titles, parse_shape, spell_rows
+from warpspace.app.state.edits import with_curve
+from warpspace.bench.base import BenchTest, bench_names, register_test, unregister_test
+from warpspace.bench.data import DataColumn
+from warpspace.bench.plan import Outcome, Quantity, build_plan
+from warpspace.cli.services import build_services, write_export
+from warpspace.exceptions import OptionError, SceneError, UnknownNameError
+from warpspace.kinematics.chain import nominal_point
+from warpspace.kinematics.firstorder import jacobian
+from warpspace.kinematics.model import (
+    Convention,
+    Loop,
+    Model,
+    convention_names,
+    register_convention,
+    unregister_convention,
+)
+from warpspace.machine.curves.curve import ErrorFunction, single_value
+from warpspace.machine.curves.registry import register_curve, unregister_curve
+from warpspace.machine.errors import Constant, Poly, Table
+from warpspace.outputs.drawing.sheet import Drawing, metadata, parameter_words
+from warpspace.outputs.exports.formats import (
+    ExportFormat,
+    export_formats,
+    register_format,
+    unregister_format,
+)
+from warpspace.outputs.figures.catalogue import (
+    FigureKind,
+    draw_figure,
+    figure_names,
+    register_figure,
+    unregister_figure,
+)
+from warpspace.outputs.report import ReportSettings, build_report, sections
+from warpspace.outputs.worker import FigureWorker
+from warpspace.picture.scene_picture import evaluate_picture
+from warpspace.scene.library import load_scene, parse_scene
+from warpspace.scene.model import evaluate
+from warpspace.scene.save import scene_to_toml
+from warpspace.spelling import spell, spell_short
+
+__all__ = ["warpspace"]
+FIRST = load_scene("dvf5000_first")
+SPAN = (-275.0, 275.0)
+CURVED = 'machine = "dvf5000"\n[errors]\nEYX = { half_sine = 4.0 }\n'
+SPLIT = 'machine = "dvf5000"\n[convention]\ncomponent_errors = "split"\n[errors]\nEXC = 3.0\n'
+
+
+@dataclass(frozen=True)
+class HalfSine(ErrorFunction):
+    """Zero at both ends of the span, the value in the middle."""
+
+    name: ClassVar[str] = "half_sine"
+    title: ClassVar[str] = "half sine"
+    forms: ClassVar[tuple[tuple[str, ...], ...]] = (("half_sine",),)
+    row_words: ClassVar[str] = "one number: the value in the middle"
+    value: float = 0.0
+
+    def evaluate(self, position):
+        low, high = self.span
+        return self.value * np.sin(np.pi * (np.asarray(position, dtype=float) - low) / (high - low))
+
+    def scaled(self, factor):
+        return replace(self, value=factor * self.value)
+
+    @classmethod
+    def read(cls, raw, span, reader):
+        return cls(span, reader.number(raw["half_sine"], ("half_sine",), -1e5, 1e5))
+
+    def to_toml(self):
+        return {"half_sine": self.value}
+
+    def for_span(self, span):
+        return self if span == self.span else Table.from_curve(self, self.span)
+
+    def describe(self, unit, value, position):
+        return f"half sine of {value(self.value)} {unit} in the middle"
+
+    @classmethod
+    def from_rows(cls, span, rows):
+        return cls(span, single_value(rows))
+
+    def rows(self):
+        return [[self.value]]
+
+    @classmethod
+    def from_curve(cls, present, span):
+        return cls(span, present.amplitude)
+
+
+class Split(Convention):
+    """``Trans(δ) · Motion · Rot(ε)``: shifts in fixed directions, turns on the moving body."""
+
+    name: ClassVar[str] = "split"
+    title: ClassVar[str] = "shifts before, turns after motion"
+    place: ClassVar[str] = "on both sides of the motion"
+    meaning: ClassVar[str] = "shift in fixed directions and turn with the moving body"
+
+    def factors(self, constant, motion, component):
+        if component is None:
+            return constant, motion
+        shift, turn = component.copy(), component.copy()
+        shift[..., :3, :3] = np.eye(3)
+        turn[..., :3, 3] = 0.0
+        return constant, shift, motion, turn
+
+    def frame(self, frames, row):
+        after = row.is_rotation and not row.is_constant
+        return frames.after if after else frames.before
+
+
+@dataclass(frozen=True, kw_only=True)
+class Corner(BenchTest):
+    """A dial gauge along x in one place."""
+
+    name: ClassVar[str] = "corner"
+    title: ClassVar[str] = "Corner"
+    standard: ClassVar[str] = "our own"
+    words: ClassVar[str] = "A dial gauge looks along x."
+    columns: ClassVar[tuple[DataColumn, ...]] = (DataColumn("x_um"),)
+    repeats: int = option(2, "Readings")
+
+    def plan(self, scene):
+        stand = self.stand(scene)
+        point = nominal_point(self.model(scene), Loop.TOOL, stand)
+        points = np.broadcast_to(point, (self.repeats, 3))
+        return build_plan(stand, points, np.eye(3)[0], place="in the middle")
+
+    def plan_data(self, scene, table):
+        return self.plan(scene), table["x_um"]
+
+    def evaluate(self, plan, readings):
+        return Outcome((Quantity("x_um", "reading", float(readings.mean()), "µm"),))
+
+    def charts(self, runs):
+        curves = tuple(
+            Curve(run.named("x"), np.arange(len(run.readings)) * 1.0, run.readings) for run in runs
+        )
+        return (Lines("lines", "Readings", "number", "x [µm]", curves),)
+
+
+def draw_names(scenes, settings, *, exact):
+    title = f"Names of the errors: {scenes[0].title}"
+    figure = Figure(figsize=(4.0, 3.0))
+    figure.text(0.1, 0.5, " ".join(scenes[0].errors))
+    return Drawing(figure, title, metadata(title, scenes, settings, 1.0, "names"))
+
+
+def write_zip(picture, path, *, overwrite=True):
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("mean.txt", f"{picture.statistics.mean_um:.6f}")
+
+
+ADDED = {
+    "half_sine": (register_curve, unregister_curve, HalfSine),
+    "split": (register_convention, unregister_convention, Split()),
+    "corner": (register_test, unregister_test, Corner),
+    "names": (
+        register_figure,
+        unregister_figure,
+        FigureKind("names", "Names of the errors.", draw_names, evidence=True),
+    ),
+    ".zip": (
+        register_format,
+        unregister_format,
+        ExportFormat(".zip", "the mean, packed", write_zip),
+    ),
+}
+
+
+@pytest.fixture(autouse=True)
+def added():
+    """Add one of each, which can be added but once."""
+    for register, _, what in ADDED.values():
+        register(what)
+    yield
+    for name, (_, unregister, _) in ADDED.items():
+        unregister(name)
+
+
+@pytest.mark.parametrize("name", [name for name in ADDED if name not in ("names", ".zip")])
+def test_what_is_there_cannot_be_added_again(name):
+    register, _, what = ADDED[name]
+    with pytest.raises(OptionError, match=f"'{name}' is there already"):
+        register(what)
+
+
+@pytest.mark.parametrize("text", [CURVED, SPLIT])
+def test_a_scene_file_loads_evaluates_saves_and_reloads(text):
+    scene = parse_scene(text, "mine")
+    assert parse_scene(scene_to_toml(scene), "mine") == scene
+    at = {"X": 0.0, "Y": 0.0, "Z": -280.0, "C": 90.0}
+    for loop in Loop:
+        first, exact = (evaluate(scene, at=at, loop=loop, exact=exact) for exact in (False, True))
+        np.testing.assert_allclose(first.error_um, exact.error_um, atol=1e-6)
+    if text == CURVED:
+        assert evaluate(scene, at=at).error_um[1] == pytest.approx(4.0)
+        assert "EYX = { half_sine = 4.0 }" in scene_to_toml(scene)
+        # over another range it is saved as a curve with the same values
+        narrow = {**scene.workspace.ranges, "X": (-100.0, 100.0)}
+        moved = replace(scene, workspace=replace(scene.workspace, ranges=narrow))
+        saved = parse_scene(scene_to_toml(moved), "mine").errors
+        assert saved.evaluate("EYX", np.array([0.0])).tolist() == [4.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (CURVED.replace("4.0", '"a"'), r'errors\.EYX\.half_sine = "a": expected a number'),
+        (CURVED.replace("half_sine", "half"), r"\{ csv = , column = \}, .*\{ half_sine = \}"),
+        (CURVED.replace("EYX", "EC0Y"), r"EC0Y = .*is constant along its axis"),
+        (SPLIT.replace("split", "splt"), '"after_motion", "before_motion" or "split"'),
+    ],
+)
+def test_a_misspelt_curve_or_convention_is_refused_with_all_names(text, message):
+    with pytest.raises(SceneError, match=message):
+        parse_scene(text, "mine")
+    with pytest.raises(UnknownNameError, match="did you mean 'split'"):
+        Model(FIRST.machine, "splt").convention("X")
+
+
+@pytest.mark.parametrize("loop", Loop)
+def test_first_order_of_a_convention_is_the_derivative_of_the_exact_chain(loop):
+    model = replace(FIRST.model, component_errors="split")
+    at = {"X": 120.0, "Y": -80.0, "Z": -200.0, "B": -35.0, "C": 70.0}
+    coordinates = {axis: np.asarray(value) for axis, value in at.items()}
+    point = nominal_point(model, loop, coordinates)
+    keys = model.machine.allowed_keys
+    found = jacobian(model, loop, keys, coordinates, point)
+    expected = central_differences(model, loop, keys, coordinates, point)
+    for ours, theirs in zip(found, expected, strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-6)
+    # it is neither of the bundled ones: shifts as before the motion, turns as after it
+    gains = {
+        name: jacobian(replace(model, component_errors=name), Loop.WORKPIECE, ("EXC", "EAC"),
+                       coordinates, np.array([100.0, 50.0, 200.0]))[0].tolist()
+        for name in convention_names()
+    }  # fmt: skip
+    assert gains["split"][0] == gains["before_motion"][0] != gains["after_motion"][0]
+    assert gains["split"][1] == gains["after_motion"][1] != gains["before_motion"][1]
+
+
+def test_the_app_offers_a_curve_reads_converts_and_stores_it():
+    assert kind_titles()[-1] == "half sine"
+    curve = parse_shape("half sine", "2.5  # in the middle", SPAN)
+    assert curve == HalfSine(SPAN, 2.5)
+    assert spell_rows(curve) == "2.5"
+    with pytest.raises(OptionError, match="one number: the value in the middle"):
+        parse_shape("half sine", "", SPAN)
+    assert convert_shape(Constant(SPAN, 7.0), "half sine", SPAN) == HalfSine(SPAN, 7.0)
+    assert isinstance(convert_shape(curve, "polynomial", SPAN), Poly)
+    assert "half_sine along X" in curve.slider_words("X")
+    state = with_curve(start_state(FIRST, nodes=3), "EYX", curve)
+    back, _ = open_text(state_to_toml(state), "dvf5000_first", "x.toml")
+    assert back.scene.errors.functions["EYX"] == curve
+
+
+def test_the_app_offers_a_convention_says_what_it_changes_and_stores_it():
+    fixed = scene_to_toml(FIRST).replace("after_motion", "before_motion")
+    start = start_state(parse_scene(fixed, "dvf5000_first"), nodes=3)
+    assert "component_errors=split" in choices(start)
+    state = with_choice(start, "component_errors=split")
+    assert "component_errors=split" in chosen(state)
+    assert Effects().of(state)["component_errors=split"].max_um > 0.0
+    text = conventions_html(state, {}, lambda word, role: Markup())
+    assert 'data-choice="component_errors=split" aria-checked="true"' in text
+    assert "shifts before, turns after motion" in text
+    back, _ = open_text(state_to_toml(state), "dvf5000_first", "x.toml")
+    assert back.scene.model == state.scene.model
+
+
+def test_a_test_is_a_command_and_in_the_app(warpspace, tmp_path):
+    assert "corner" in bench_names()
+    assert "corner" in warpspace("test", "--list").out
+    found = json.loads(warpspace("test", "corner", FIRST.name, "--repeats", "3", "--json").out)
+    plot = tmp_path / "corner.svg"
+    warpspace("test", "corner", FIRST.name, "--plot", plot)
+    assert plot.stat().st_size > 1000
+    state = start_state(FIRST, nodes=3)
+    object.__setattr__(state, "bench", state.bench.with_test("corner"))
+    picture = LiveModel().evaluate(state).bench
+    assert isinstance(picture, BenchPicture)
+    assert picture.run.outcome["x_um"] == pytest.approx(found["x_um"], abs=0.01)
+
+
+def test_reports_and_figures_have_the_words_of_each(monkeypatch):
+    curved, split = parse_scene(CURVED, "mine"), parse_scene(SPLIT, "mine")
+    words = curved.errors.functions["EYX"].describe("µm", spell, spell_short)
+    assert words == "half sine of 4.00 µm in the middle"
+    assert parameter_words(curved) == ["EYX 4 µm half_sine"]
+    reviewed = SimpleNamespace(scene=split, linearisation_um=0.0, letter="")
+    settings = SimpleNamespace(loop="tool")
+    review = SimpleNamespace(scenes=(reviewed,), settings=settings, exaggeration=1000.0)
+    said = "Component errors shift in fixed directions and turn with the moving body (on both"
+    assert said in str(sections.conventions(review))
+    assert "names" in figure_names()
+    assert "EC0Y" in draw_figure("names", [FIRST]).figure.texts[0].get_text()
+    assert ("names", "Names of the errors.") in build_services().figures
+    drawn: list[str] = []
+
+    def begin(_self, name, *_):
+        drawn.append(name)
+        return lambda: b"<svg/>"
+
+    monkeypatch.setattr(FigureWorker, "begin", begin)
+    report = build_report([FIRST], ReportSettings(grid=3, samples=1000))
+    assert "names" in drawn
+    assert "Names of the errors." in [picture.caption for picture in report.pictures]
+
+
+def test_a_format_is_written_by_the_command_and_for_the_app(warpspace, tmp_path):
+    assert ".zip" in [form.ending for form in export_formats()]
+    assert (".zip", "the mean, packed") in build_services().exports
+    target = tmp_path / "out.zip"
+    result = warpspace("export", FIRST.name, "-o", target, "--grid", "3")
+    assert result.status == 0, result.err
+    wanted = f"{evaluate_picture(FIRST, grid=3).statistics.mean_um:.6f}"
+    assert zipfile.ZipFile(target).read("mean.txt").decode() == wanted
+    picture = LiveModel().evaluate(start_state(FIRST, nodes=3))
+    content = write_export(build_request(picture), ".zip")
+    found = float(zipfile.ZipFile(io.BytesIO(content)).read("mean.txt"))
+    assert found == pytest.approx(picture.statistics.mean_um, abs=1e-6)
