@@ -24,13 +24,13 @@ from warpspace.app.documents.view_settings import (
 )
 from warpspace.app.documents.view_settings import PREFIX as COMPARISON
 from warpspace.app.evaluation.resulting_scene import scene_of
+from warpspace.app.evaluation.scene_edits import same_shape
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.comparison import NOBODY, PRESENT
 from warpspace.app.viewport.camera import CameraMemory
 from warpspace.exceptions import OptionError
 from warpspace.machine.limits import MAX_PACKED_TEXT
 from warpspace.resources import __version__
-from warpspace.scene.editing import same_shape
 from warpspace.scene.library import load_scene, parse_scene, scene_names
 from warpspace.scene.machines import load_machine, machine_names
 from warpspace.scene.model import Scene

@@ -7,6 +7,8 @@ from typing import TypeVar
 
 import numpy as np
 
+from warpspace.app.evaluation import scene_edits
+from warpspace.app.evaluation.scene_edits import Edited
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.edits import curve_of
@@ -18,8 +20,6 @@ from warpspace.machine.curves.curve import OWN, ErrorFunction
 from warpspace.machine.description import Gantry
 from warpspace.machine.errors import ErrorSet, ToleranceSet
 from warpspace.machine.parameters import parameter
-from warpspace.scene import editing
-from warpspace.scene.editing import Edited
 from warpspace.scene.library import load_scene, scene_names
 from warpspace.scene.model import Scene
 from warpspace.units import MICROMETRE
@@ -129,11 +129,11 @@ Edit = Callable[[Scene], Edited]
 SHOWN = 30
 """Characters of what was typed that a message repeats."""
 NUMBERS: Mapping[str, Callable[[Scene, str, int, float], Edited]] = {
-    "offset": editing.change_offset,
-    "rotation": editing.change_rotation,
-    "travel": editing.change_travel,
-    "volume": editing.change_volume,
-    "span": lambda scene, axis, _, value: editing.change_span(scene, axis, value),
+    "offset": scene_edits.change_offset,
+    "rotation": scene_edits.change_rotation,
+    "travel": scene_edits.change_travel,
+    "volume": scene_edits.change_volume,
+    "span": lambda scene, axis, _, value: scene_edits.change_span(scene, axis, value),
 }
 """What is set by a frame, the number of an entry, and a value."""
 UNCHANGED = "the machine stays as it was"
@@ -252,7 +252,7 @@ def with_own_machine(state: AppState) -> AppState:
     if own.machine == state.scene.machine and own.workspace == state.scene.workspace:
         return state
     returned = own.machine.axes.keys() - state.scene.machine.axes.keys()
-    changed = with_edit(state, lambda _: editing.take_machine(_joined(state, returned), own))
+    changed = with_edit(state, lambda _: scene_edits.take_machine(_joined(state, returned), own))
     if changed.scene is state.scene:
         return changed
     tolerances = {**_of(own.tolerances.own, returned), **changed.tolerances.own}
@@ -302,29 +302,29 @@ def with_word(state: AppState, word: str) -> AppState:
     words = rest.split(" ", maxsplit=2)
     match what, words:
         case "chain", _:
-            return with_edit(state, lambda scene: editing.change_chain(scene, rest))
+            return with_edit(state, lambda scene: scene_edits.change_chain(scene, rest))
         case (("left" | "right"), [axis]):
-            return with_edit(state, lambda scene: editing.move_axis(scene, axis, what))
+            return with_edit(state, lambda scene: scene_edits.move_axis(scene, axis, what))
         case "side", [axis]:
-            return with_edit(state, lambda scene: editing.switch_side(scene, axis))
+            return with_edit(state, lambda scene: scene_edits.switch_side(scene, axis))
         case "remove", [axis]:
-            return with_edit(state, lambda scene: editing.remove_axis(scene, axis))
+            return with_edit(state, lambda scene: scene_edits.remove_axis(scene, axis))
         case "turn", [axis] if axis in state.scene.machine.axes:
             against = -state.scene.machine.axes[axis].direction
-            return with_edit(state, lambda s: editing.change_direction(s, axis, against))
+            return with_edit(state, lambda s: scene_edits.change_direction(s, axis, against))
         case "type", [name]:
             library = library_scene(name)
             return state if library is None else with_library_scene(state, library)
         case "gantry", [axis]:
-            return with_edit(state, lambda scene: editing.switch_gantry(scene, axis))
+            return with_edit(state, lambda scene: scene_edits.switch_gantry(scene, axis))
         case "across", [axis]:
-            return with_edit(state, lambda scene: editing.turn_gantry(scene, axis))
+            return with_edit(state, lambda scene: scene_edits.turn_gantry(scene, axis))
         case "mesh", [frame]:
-            return with_edit(state, lambda scene: editing.remove_mesh(scene, frame))
+            return with_edit(state, lambda scene: scene_edits.remove_mesh(scene, frame))
         case "guide", [axis, ("0" | "1") as guide, typed] if axis in state.scene.machine.gantries:
             return _with_guide(state, axis, int(guide), typed)
         case "sizes", [""]:
-            return with_edit(state, editing.take_sizes)
+            return with_edit(state, scene_edits.take_sizes)
         case "own", [""]:
             return with_own_machine(state)
         case _, [frame, entry, typed] if what in NUMBERS and entry in ("0", "1", "2"):

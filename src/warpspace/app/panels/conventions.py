@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from warpspace.analysis.wrong_conventions import ConventionCost
 from warpspace.app.browser.clicks import Clicks
 from warpspace.app.browser.handles import Input
 from warpspace.app.evaluation.cache import Identity
@@ -33,7 +32,7 @@ class ConventionsPanel:
         gui = context.gui
         self._context, self._effects = context, Effects()
         self._known: dict[str, Effect] = {}
-        self._costs: tuple[ConventionCost, ...] = ()
+        self._costs: tuple[Effect, ...] = ()
         self._asked: AppState | None = None
         self._clicks = Clicks(gui, lambda word: context.post(lambda s: with_choice(s, word)))
         self._text: Any = gui.add_html("")

@@ -5,7 +5,6 @@ from itertools import groupby
 
 from markupsafe import Markup
 
-from warpspace.analysis.wrong_conventions import ConventionCost
 from warpspace.app.evaluation.conventions import Effect, choices, chosen, own_state
 from warpspace.app.evaluation.machine import standing
 from warpspace.app.readouts.html import render
@@ -59,8 +58,8 @@ COST_WORDS = {
 }
 
 
-def _cost_group(cost: ConventionCost) -> str:
-    return cost.name.partition("=")[0]
+def _cost_group(cost: Effect) -> str:
+    return cost.choice.partition("=")[0]
 
 
 def _group(choice: str) -> str:
@@ -72,7 +71,7 @@ def conventions_html(
     state: AppState,
     effects: Mapping[str, Effect],
     attributes: Attributes,
-    costs: Sequence[ConventionCost] = (),
+    costs: Sequence[Effect] = (),
 ) -> str:
     """Spell the table of all choices."""
     ranges = state.scene.workspace.ranges

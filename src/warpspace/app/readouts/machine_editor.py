@@ -11,11 +11,11 @@ from markupsafe import Markup
 from PIL import Image
 
 from warpspace.app.evaluation.machine_edits import MachineType
+from warpspace.app.evaluation.scene_edits import own_bodies
 from warpspace.app.readouts.html import render
 from warpspace.app.state.typed_numbers import spell_typed
 from warpspace.machine.description import FIXED_FRAMES, ORIGIN, Axis, BodySource, Gantry, Machine
 from warpspace.machine.limits import MAX_TYPED_NUMBER
-from warpspace.scene.editing import own_bodies
 from warpspace.scene.machines import machine_picture
 from warpspace.scene.model import Scene
 

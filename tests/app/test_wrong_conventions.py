@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from warpspace.analysis.wrong_conventions import convention_costs
+from warpspace.app.evaluation.conventions import convention_costs
 from warpspace.field.evaluate import View, evaluate_first_order
 from warpspace.field.grid import Workspace, build_grid
 from warpspace.kinematics.conversion import move_measuring_line
@@ -19,7 +19,7 @@ VOLUME = Workspace({"X": SPAN, "Y": (0.0, 0.0), "Z": (0.0, 0.0)})
 def costs(errors, offset=0.0):
     machine = build_machine("wFXYZt", offset_mm={"t": (0.0, 0.0, offset)})
     found = convention_costs(Model(machine), errors, VOLUME)
-    return {cost.name: (cost.mean_um, cost.max_um) for cost in found}
+    return {cost.choice: (cost.mean_um, cost.max_um) for cost in found}
 
 
 def test_a_pitch_on_an_arm():
@@ -72,5 +72,5 @@ def test_it_is_the_difference_to_what_the_translation_gives():
         )
         largest = float(np.linalg.norm(b - a, axis=-1).max())
         found = convention_costs(model, scene.errors, scene.workspace, view, 5)
-        cost = next(cost for cost in found if cost.name == "measuring_line")
+        cost = next(cost for cost in found if cost.choice == "measuring_line")
         assert cost.max_um == pytest.approx(largest, abs=0.01)

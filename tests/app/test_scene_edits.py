@@ -8,11 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from warpspace.exceptions import ChainError, OptionError, SceneError, WarpspaceError
-from warpspace.kinematics.chain import nominal_point
-from warpspace.kinematics.model import Loop, complete_coordinates
-from warpspace.machine.errors import Poly
-from warpspace.scene.editing import (
+from warpspace.app.evaluation.scene_edits import (
     Edited,
     change_chain,
     change_direction,
@@ -25,6 +21,10 @@ from warpspace.scene.editing import (
     switch_side,
     take_machine,
 )
+from warpspace.exceptions import ChainError, OptionError, SceneError, WarpspaceError
+from warpspace.kinematics.chain import nominal_point
+from warpspace.kinematics.model import Loop, complete_coordinates
+from warpspace.machine.errors import Poly
 from warpspace.scene.library import load_scene, parse_scene, scene_names
 from warpspace.scene.save import scene_to_toml
 
