@@ -5,6 +5,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 SCENE ?= dvf5000_first
 ARGS ?=
+# where compiled modules may not be kept, each of some hundred processes of the tests compiles all anew
+unexport PYTHONDONTWRITEBYTECODE
 
 # pip puts the pinned versions of constraints.txt into .venv; the stamps let it run again only
 # when what is to be installed has changed.

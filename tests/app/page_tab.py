@@ -140,7 +140,7 @@ class Tab:
         if message.type == "error" and not any(word in message.text for word in HARMLESS):
             self.errors.append(message.text)
 
-    def until(self, fine: Callable[[], bool], seconds: float = 15.0) -> None:
+    def until(self, fine: Callable[[], bool], seconds: float = 60.0) -> None:
         """Wait until something holds."""
         for _ in range(int(seconds / 0.05)):
             if fine():
@@ -202,7 +202,7 @@ class Tab:
         """Whether the surface drawn is that of a state."""
         return self.shows(drawn_nodes(LIVE.evaluate(state)))
 
-    def until_shown(self, state: AppState, seconds: float = 15.0) -> None:
+    def until_shown(self, state: AppState, seconds: float = 60.0) -> None:
         """Wait until the surface drawn is that of a state."""
         wanted = drawn_nodes(LIVE.evaluate(state))
         self.until(lambda: self.shows(wanted), seconds)

@@ -88,7 +88,7 @@ def _cluster(address: str) -> Generator[Workers]:
         ) from None
     try:
         client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
-    except (OSError, ValueError, TypeError, ImportError) as error:
+    except (OSError, ValueError, TypeError, ImportError, AssertionError) as error:
         raise OptionError(
             f"--scheduler {address!r}: {error}; expected the address of a Dask scheduler, for"
             " instance tcp://127.0.0.1:8786"
