@@ -9,8 +9,8 @@ from timing import best
 
 from warpspace import evaluate, load_scene
 from warpspace.field.grid import build_grid
+from warpspace.machine.axes import parameter
 from warpspace.machine.errors import Constant, ErrorSet, Table
-from warpspace.machine.parameters import parameter
 from warpspace.scene.model import Scene
 
 NODES = 101

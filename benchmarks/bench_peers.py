@@ -17,9 +17,7 @@ from timing import best, in_turns
 
 from warpspace import load_scene
 from warpspace.kinematics import transforms
-from warpspace.kinematics.chain import nominal_point
-from warpspace.kinematics.deviation import loop_error
-from warpspace.kinematics.firstorder import jacobian
+from warpspace.kinematics.chain import jacobian, loop_error, nominal_point
 from warpspace.kinematics.model import Loop, Model
 from warpspace.machine.axes import DIRECTIONS
 from warpspace.machine.description import Axis

@@ -22,9 +22,7 @@ from numpy.typing import NDArray
 
 from warpspace import evaluate, load_scene
 from warpspace.field.grid import build_grid
-from warpspace.kinematics.chain import branch_frames, branch_pose
-from warpspace.kinematics.deviation import loop_error
-from warpspace.kinematics.firstorder import columns
+from warpspace.kinematics.chain import branch_frames, branch_pose, columns, loop_error
 from warpspace.kinematics.model import ComponentErrors, Loop, Model, complete_coordinates
 from warpspace.machine.description import build_machine
 

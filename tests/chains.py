@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from hypothesis import strategies as st
 
-from warpspace.kinematics.deviation import loop_error
+from warpspace.kinematics.chain import loop_error
 from warpspace.kinematics.model import Loop, Model, convention_names
 from warpspace.machine.axes import AXIS_NAMES, MAX_AXES, is_linear
 from warpspace.machine.description import FIXED_FRAMES, Chain, build_machine

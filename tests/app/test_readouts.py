@@ -15,7 +15,7 @@ from warpspace.app.readouts.curve_chart import chart_text
 from warpspace.app.readouts.help import about_scene
 from warpspace.app.readouts.html import message, style_sheet
 from warpspace.app.state.listing import find_parameters
-from warpspace.machine.parameters import parameter
+from warpspace.machine.axes import parameter
 
 ROOM = files("warpspace.app.readouts")
 TEMPLATES = sorted(

@@ -14,7 +14,7 @@ from warpspace.app.browser.arrivals import CARRIER
 from warpspace.app.browser.page import stage_script
 from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
-from warpspace.machine.parameters import PARAMETERS
+from warpspace.machine.axes import PARAMETERS
 from warpspace.scene.model import Scene
 
 OPEN = stage_script("open")

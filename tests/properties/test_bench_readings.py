@@ -7,8 +7,8 @@ import pytest
 
 from warpspace.bench.base import bench_names, find_test
 from warpspace.bench.readings import respond, simulate
+from warpspace.machine.axes import parameter
 from warpspace.machine.errors import ErrorSet
-from warpspace.machine.parameters import parameter
 from warpspace.scene.library import load_scene
 
 SCENES = ("dvf5000_first", "machine_head_head_ca", "machine_trunnion_on_cross_table")

@@ -20,13 +20,11 @@ from chains import (
 from warpspace.exceptions import ChainError
 from warpspace.field.evaluate import View, evaluate_exact, evaluate_first_order
 from warpspace.kinematics import transforms
-from warpspace.kinematics.chain import branch_pose, nominal_point
-from warpspace.kinematics.deviation import loop_error
-from warpspace.kinematics.firstorder import columns, jacobian
+from warpspace.kinematics.chain import branch_pose, columns, jacobian, loop_error, nominal_point
 from warpspace.kinematics.model import Loop, Model, convention_names
+from warpspace.machine.axes import parameter
 from warpspace.machine.description import parse_chain
 from warpspace.machine.errors import Constant, ErrorSet
-from warpspace.machine.parameters import parameter
 
 ANGLES = st.floats(-10.0, 10.0)
 SHAPES = hnp.array_shapes(min_dims=0, max_dims=2, max_side=3)

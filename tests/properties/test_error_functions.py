@@ -16,9 +16,8 @@ from warpspace.field.evaluate import (
     evaluate_first_order,
 )
 from warpspace.kinematics.model import Loop
-from warpspace.machine.axes import TravelDirection
+from warpspace.machine.axes import TravelDirection, axis_parameters
 from warpspace.machine.errors import Constant, Directional, ErrorSet, Ramp, Table, TwoArguments
-from warpspace.machine.parameters import axis_parameters
 
 SPAN = (-500.0, 500.0)
 STEP = 10.0

@@ -5,9 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from chains import central_differences
-from warpspace.kinematics.chain import nominal_point
-from warpspace.kinematics.deviation import loop_error
-from warpspace.kinematics.firstorder import jacobian
+from warpspace.kinematics.chain import jacobian, loop_error, nominal_point
 from warpspace.kinematics.model import Loop, Model
 from warpspace.machine.description import build_machine
 

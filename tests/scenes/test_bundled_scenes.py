@@ -9,8 +9,7 @@ from warpspace import evaluate, load_scene
 from warpspace.analysis.statistics import statistics
 from warpspace.field.evaluate import View, evaluate_exact
 from warpspace.kinematics import transforms
-from warpspace.kinematics.chain import branch_pose
-from warpspace.kinematics.firstorder import columns
+from warpspace.kinematics.chain import branch_pose, columns
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.scene.library import scene_names, scene_path
 from warpspace.scene.model import second_order

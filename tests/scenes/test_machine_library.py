@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from warpspace import evaluate, load_scene
 from warpspace.bodies.placed import load_bodies
-from warpspace.kinematics.firstorder import body_motions
+from warpspace.kinematics.chain import body_motions
 from warpspace.kinematics.model import Model, complete_coordinates
 from warpspace.machine.description import build_machine
 from warpspace.outputs.exports.glb import write_glb

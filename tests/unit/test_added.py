@@ -30,8 +30,7 @@ from warpspace.bench.data import DataColumn
 from warpspace.bench.plan import Outcome, Quantity, build_plan
 from warpspace.cli.services import build_services, write_export
 from warpspace.exceptions import OptionError, SceneError, UnknownNameError
-from warpspace.kinematics.chain import nominal_point
-from warpspace.kinematics.firstorder import jacobian
+from warpspace.kinematics.chain import jacobian, nominal_point
 from warpspace.kinematics.model import (
     Convention,
     Loop,

@@ -28,7 +28,7 @@ from warpspace.bodies.schematic import (
     cylinder,
     frame_of,
 )
-from warpspace.kinematics.firstorder import body_motions
+from warpspace.kinematics.chain import body_motions
 from warpspace.kinematics.model import Model
 from warpspace.kinematics.transforms import axis_rotation
 from warpspace.scene.machines import load_machine

@@ -31,8 +31,8 @@ from warpspace.analysis.sampled import KeptLimit
 from warpspace.analysis.typed import read_keys, read_numbers
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.field.evaluate import compare_orders
+from warpspace.machine.axes import parameter
 from warpspace.machine.limits import COST, LIMIT_UM, MAX_HALF_WIDTH, PROBABILITY
-from warpspace.machine.parameters import parameter
 from warpspace.units import Array
 
 if TYPE_CHECKING:

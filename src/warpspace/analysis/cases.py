@@ -16,8 +16,7 @@ from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import View, build_basis, reference_point
 from warpspace.field.grid import Workspace, build_grid, node_counts
 from warpspace.kinematics import transforms
-from warpspace.kinematics.chain import branch_pose, nominal_point
-from warpspace.kinematics.deviation import loop_error
+from warpspace.kinematics.chain import branch_pose, loop_error, nominal_point
 from warpspace.kinematics.model import Coordinates, Loop, Model, complete_coordinates
 from warpspace.machine.axes import TravelDirection, is_linear, is_rotary
 from warpspace.machine.errors import ErrorSet

@@ -22,9 +22,9 @@ from warpspace.exceptions import SceneError
 from warpspace.field.evaluate import ErrorField, build_basis
 from warpspace.field.grid import Grid
 from warpspace.kinematics.model import Loop
+from warpspace.machine.axes import parameter
 from warpspace.machine.errors import TOLERANCE_CLASSES, ErrorSet, ToleranceSet
 from warpspace.machine.limits import LIMIT_UM, MOST_CONCEPTS
-from warpspace.machine.parameters import parameter
 from warpspace.units import Array
 
 if TYPE_CHECKING:

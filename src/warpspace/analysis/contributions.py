@@ -22,7 +22,7 @@ from warpspace.analysis.options import option
 from warpspace.analysis.sampled import Sampled
 from warpspace.analysis.typed import error_words
 from warpspace.exceptions import OptionError
-from warpspace.machine.parameters import parameter
+from warpspace.machine.axes import parameter
 from warpspace.units import Array
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from warpspace.analysis.description import Analysis, Result, Watch
 from warpspace.analysis.options import Grammar, option
 from warpspace.analysis.typed import typed_word
 from warpspace.exceptions import OptionError, near_miss
+from warpspace.machine.axes import parameter
 from warpspace.machine.limits import MAX_LENGTH_MM
-from warpspace.machine.parameters import parameter
 from warpspace.scene.files import parse_number
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.kinematics.model import Loop, Model
+from warpspace.machine.axes import parameter
 from warpspace.machine.errors import ToleranceSet
-from warpspace.machine.parameters import parameter
 from warpspace.units import Array
 
 EXACT_SAMPLES = 1_000_000

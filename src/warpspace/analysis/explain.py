@@ -5,11 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpspace.field.evaluate import View, amplitudes_of, build_basis, error_values, evaluate_exact
-from warpspace.kinematics.chain import nominal_point
-from warpspace.kinematics.firstorder import columns
+from warpspace.kinematics.chain import columns, nominal_point
 from warpspace.kinematics.model import Coordinates, Model
+from warpspace.machine.axes import parameter
 from warpspace.machine.errors import ErrorSet
-from warpspace.machine.parameters import parameter
 from warpspace.units import Array
 
 

@@ -23,13 +23,12 @@ from warpspace.analysis.typed import (
 )
 from warpspace.exceptions import OptionError
 from warpspace.kinematics import transforms
+from warpspace.kinematics.chain import Column as Response
 from warpspace.kinematics.chain import branch_frames, nominal_point
-from warpspace.kinematics.firstorder import Column as Response
-from warpspace.kinematics.firstorder import columns as responses
+from warpspace.kinematics.chain import columns as responses
 from warpspace.kinematics.model import Loop, Model, complete_coordinates
-from warpspace.machine.axes import is_linear, is_rotary
+from warpspace.machine.axes import Parameter, is_linear, is_rotary, parameter
 from warpspace.machine.description import Machine
-from warpspace.machine.parameters import Parameter, parameter
 from warpspace.units import Array
 
 if TYPE_CHECKING:

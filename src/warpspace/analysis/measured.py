@@ -9,8 +9,8 @@ from warpspace.analysis.statistics import Statistics, statistics, volume_statist
 from warpspace.field.evaluate import ErrorField
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import Loop
+from warpspace.machine.axes import PARAMETERS, parameter
 from warpspace.machine.errors import ErrorSet, ToleranceSet
-from warpspace.machine.parameters import PARAMETERS, parameter
 from warpspace.scene.model import Scene, choose_view, evaluate_grid
 
 DEFAULT_NODES = 11

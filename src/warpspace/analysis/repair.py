@@ -16,6 +16,7 @@ from warpspace.analysis.typed import ALL, Keys, Limits
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorBasis, amplitudes_of, placed_words
 from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid
+from warpspace.machine.axes import Parameter, parameter
 from warpspace.machine.limits import (
     MAX_ERROR,
     MAX_TEXT,
@@ -23,7 +24,6 @@ from warpspace.machine.limits import (
     REPAIR_COUNT,
     REPAIR_NODES,
 )
-from warpspace.machine.parameters import Parameter, parameter
 from warpspace.spelling import spell, spell_short
 from warpspace.units import Array
 

@@ -5,8 +5,8 @@ from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 from warpspace.analysis.options import Grammar
+from warpspace.machine.axes import PARAMETERS, parameter
 from warpspace.machine.limits import MAX_LENGTH_MM
-from warpspace.machine.parameters import PARAMETERS, parameter
 from warpspace.scene.files import parse_number
 
 if TYPE_CHECKING:

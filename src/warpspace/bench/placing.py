@@ -11,9 +11,8 @@ from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_frames, branch_pose, nominal_point
 from warpspace.kinematics.model import Coordinates, Loop, Model
-from warpspace.machine.axes import direction_index
+from warpspace.machine.axes import direction_index, parameter
 from warpspace.machine.description import Machine
-from warpspace.machine.parameters import parameter
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 

@@ -8,10 +8,9 @@ import numpy as np
 from warpspace.bench.plan import NONE, Plan, Whole
 from warpspace.field.evaluate import View, build_basis, evaluate_exact
 from warpspace.kinematics.model import Loop, Model
-from warpspace.machine.axes import TravelDirection
+from warpspace.machine.axes import TravelDirection, parameter
 from warpspace.machine.curves.directional import Directional
 from warpspace.machine.errors import ErrorFunction, ErrorSet
-from warpspace.machine.parameters import parameter
 from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM, Array
 

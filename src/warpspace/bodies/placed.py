@@ -13,13 +13,11 @@ from warpspace.bodies.own_meshes import own_meshes
 from warpspace.bodies.schematic import BODY_FILE, read_bodies
 from warpspace.field.evaluate import View, find_placement, placement_effect
 from warpspace.kinematics import transforms
-from warpspace.kinematics.chain import branch_pose
-from warpspace.kinematics.firstorder import BASE, BodyMotion, body_motions
+from warpspace.kinematics.chain import BASE, BodyMotion, body_motions, branch_pose
 from warpspace.kinematics.model import Coordinates, Loop, Model, complete_coordinates
-from warpspace.machine.axes import TravelDirection
+from warpspace.machine.axes import TravelDirection, parameter
 from warpspace.machine.description import Machine
 from warpspace.machine.errors import ErrorSet
-from warpspace.machine.parameters import parameter
 from warpspace.scene.model import Scene
 from warpspace.units import MM_PER_UM, RAD_PER_URAD, Array
 

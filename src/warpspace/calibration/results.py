@@ -22,7 +22,7 @@ from warpspace.analysis.blocks import (
 from warpspace.analysis.description import Change, Result, plain
 from warpspace.calibration.readings import Circle, Readings
 from warpspace.calibration.solve import Rank, spell_rank
-from warpspace.machine.parameters import parameter
+from warpspace.machine.axes import parameter
 from warpspace.scene.model import Scene
 from warpspace.units import MICROMETRE, MICRORADIAN, UM_PER_MM, Array
 

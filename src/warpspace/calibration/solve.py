@@ -9,9 +9,8 @@ from warpspace.calibration.kinds.kind import Guess
 from warpspace.calibration.kinds.registry import find_kind
 from warpspace.calibration.readings import Readings
 from warpspace.exceptions import OptionError, UnknownNameError
-from warpspace.machine.axes import direction_index, is_linear
+from warpspace.machine.axes import PARAMETERS, Parameter, direction_index, is_linear, parameter
 from warpspace.machine.errors import Constant, ErrorSet, Ramp
-from warpspace.machine.parameters import PARAMETERS, Parameter, parameter
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 

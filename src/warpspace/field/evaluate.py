@@ -15,14 +15,19 @@ import numpy as np
 
 from warpspace.field.grid import Grid, Workspace, build_grid, cut, cut_all, is_small, pieces
 from warpspace.kinematics import transforms
-from warpspace.kinematics.chain import branch_pose, nominal_point, tool_axis
+from warpspace.kinematics.chain import (
+    LoopLinks,
+    branch_pose,
+    build_links,
+    jacobian,
+    nominal_point,
+    solve_links,
+    tool_axis,
+)
 from warpspace.kinematics.components import join, rotate, split, split_rows, subtract
-from warpspace.kinematics.deviation import LoopLinks, build_links, solve_links
-from warpspace.kinematics.firstorder import jacobian
 from warpspace.kinematics.model import Coordinates, Loop, Model, batch_shape
-from warpspace.machine.axes import TravelDirection, is_linear
+from warpspace.machine.axes import TravelDirection, is_linear, parameter
 from warpspace.machine.errors import ErrorSet
-from warpspace.machine.parameters import parameter
 from warpspace.spelling import spell
 from warpspace.units import UM_PER_MM_URAD, Array
 

@@ -10,14 +10,13 @@ from warpspace.exceptions import OptionError, SceneError
 from warpspace.formats.measured import BACKWARD, FORWARD, Imported, Plane, Series
 from warpspace.formats.registry import Reading
 from warpspace.kinematics.model import Model
-from warpspace.machine.axes import is_linear
+from warpspace.machine.axes import is_linear, parameter
 from warpspace.machine.curves.curve import ErrorFunction
 from warpspace.machine.curves.directional import Directional
 from warpspace.machine.curves.simple import Constant
 from warpspace.machine.curves.table import Table, TwoArguments
 from warpspace.machine.errors import ErrorSet, Measurement, Run
 from warpspace.machine.limits import MAX_POINTS, MAX_SCENE_BYTES, MAX_TEXT, MIN_SPAN
-from warpspace.machine.parameters import parameter
 from warpspace.scene.curves import CurveReader
 from warpspace.scene.files import radian_notes
 from warpspace.scene.library import load_scene, parse_scene

@@ -1,26 +1,30 @@
-"""The exact chain: every transformation in full, multiplied out.
+"""What errors do to a kinematic chain: every transformation in full, and to first order.
 
 Per axis ``T = Trans(offset) · Rot(fixed) · E0 · Motion(direction·q) · E(q)``, or what another
 convention makes of the last three; E0 and E(q) are ``Trans(δ) · Rot(ε)`` with the full rotation of
 the vector ε.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from warpspace.kinematics import components, transforms
-from warpspace.kinematics.components import Triple
+from warpspace.kinematics.components import Rows, Triple
 from warpspace.kinematics.model import (
     TOOL_AXIS,
     AxisFrames,
     Coordinates,
     Loop,
     Model,
+    batch_shape,
 )
-from warpspace.machine.axes import DIRECTIONS
+from warpspace.machine.axes import DIRECTIONS, Parameter, axis_parameters, parameter
 from warpspace.machine.description import Axis, Vector
-from warpspace.units import MM_PER_UM, RAD_PER_URAD, Array
+from warpspace.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM, UM_PER_MM_URAD, URAD_PER_RAD, Array
 
 ErrorValues = Mapping[str, Array]
 """Parameter key to values at the coordinates, [...], µm or µrad."""
@@ -122,3 +126,364 @@ def _nominal_step(axis: Axis, coordinates: Coordinates) -> Array:
     """Offset and motion of an axis, [..., 4, 4]."""
     place = transforms.placed(axis.offset_mm, axis.rotation_deg)
     return place @ motion(axis, coordinates[axis.name])
+
+
+# --- What errors do to a loop ---------------------------------------------------------------------
+# Both branches are walked from their outer ends to the frame of the machine. A branch moves from
+# its nominal to its actual pose by I + D. Behind an axis whose step is nominally N and actually A
+# the motion is I + D' in front of it, with D' = (A · N⁻¹ − I) + A · D · N⁻¹. To first order A is N
+# in the second term, and the first one is the sum of the errors of the axis.
+#
+# An axis knows its own position only, so over a grid the arrays grow by one direction an axis, and
+# only the last steps have the size of the batch. An error that depends on several axes is an array
+# over these. The large numbers of a pose never enter D, so that small errors keep their digits.
+
+
+class Link(NamedTuple):
+    """One step of a branch: the offset and the motion of an axis, and its errors."""
+
+    nominal: Rows  # rotation of N
+    position_mm: Triple  # position of N
+    actual: Rows  # rotation of A
+    shift_um: Triple  # what A · N⁻¹ − I does to the origin of the frame before the axis
+    turn_urad: Rows  # its rotation part
+
+
+class LoopLinks(NamedTuple):
+    """The steps of both branches of a machine."""
+
+    tool: tuple[Link, ...]  # from the frame of the machine outwards
+    workpiece: tuple[Link, ...]
+    tool_axis: Triple  # direction of the tool axis behind the last step of the tool branch
+
+
+class Deviation(NamedTuple):
+    """The motion D of a branch in R, as `Link` has it of an axis."""
+
+    shift_um: Triple
+    turn_urad: Rows
+
+    def move(self, point_mm: Triple) -> Triple:
+        """Give the displacement of points of R, µm."""
+        turned = components.rotate(self.turn_urad, point_mm)
+        return components.add(self.shift_um, components.scale(UM_PER_MM_URAD, turned))
+
+
+NO_DEVIATION = Deviation(components.ZERO, components.ZERO_ROWS)
+
+
+def build_links(
+    model: Model, coordinates: Coordinates, values: ErrorValues, *, exact: bool
+) -> LoopLinks:
+    """Work out the steps of both branches; errors at coordinates of one axis stay over that."""
+    make = _exact_link if exact else _first_order_link
+    tool, workpiece = (
+        tuple(make(model, axis, coordinates, values) for axis in model.machine.branch(side))
+        for side in ("tool", "workpiece")
+    )
+    direction = np.array(TOOL_AXIS)
+    for _, offset, rotation in reversed(model.machine.end_frames("tool")):
+        direction = transforms.placed(offset, rotation)[:3, :3] @ direction
+    return LoopLinks(tool, workpiece, components.split(direction))
+
+
+def _link(nominal: Array, actual: Array, shift_um: Array, turn_urad: Array) -> Link:
+    return Link(
+        components.split_rows(nominal[..., :3, :3]),
+        components.split(nominal[..., :3, 3]),
+        components.split_rows(actual[..., :3, :3]),
+        components.split(shift_um),
+        components.split_rows(turn_urad),
+    )
+
+
+def _exact_link(model: Model, axis: Axis, coordinates: Coordinates, values: ErrorValues) -> Link:
+    place = transforms.placed(axis.offset_mm, axis.rotation_deg)
+    move = motion(axis, coordinates[axis.name])
+    constant = error_transform(axis.name, values, constant=True)
+    component = error_transform(axis.name, values, constant=False)
+    nominal = place @ move
+    if constant is None and component is None:
+        return _link(nominal, nominal, np.zeros(3), np.zeros((3, 3)))
+    actual = place
+    for factor in model.convention(axis.name).factors(constant, move, component):
+        actual = actual if factor is None else actual @ factor
+    own = actual @ transforms.inverse(nominal) - np.eye(4)
+    return _link(nominal, actual, own[..., :3, 3] * UM_PER_MM, own[..., :3, :3] * URAD_PER_RAD)
+
+
+def _first_order_link(
+    model: Model, axis: Axis, coordinates: Coordinates, values: ErrorValues
+) -> Link:
+    place = transforms.placed(axis.offset_mm, axis.rotation_deg)
+    nominal = place @ motion(axis, coordinates[axis.name])
+    frames, convention = AxisFrames(axis, place, nominal), model.convention(axis.name)
+    shift, turn = np.zeros(3), np.zeros(3)
+    for key, value in values.items():
+        row = parameter(key)
+        if row.axis != axis.name or not np.any(value):
+            continue
+        pose = convention.frame(frames, row)
+        along = pose[..., :3, row.direction] * value[..., None]
+        if row.is_rotation:
+            turn = turn + along
+            along = np.cross(pose[..., :3, 3], along) * UM_PER_MM_URAD
+        shift = shift + along
+    return _link(nominal, nominal, shift, transforms.skew(turn))
+
+
+def solve_links(
+    links: LoopLinks, loop: Loop, point_mm: Triple, *, exact: bool
+) -> tuple[Triple, Triple]:
+    """Evaluate the error of a loop."""
+    axis = links.tool_axis
+    for link in reversed(links.tool):
+        axis = components.rotate(link.nominal, axis)
+    first = _walk(links.workpiece) if loop is not Loop.TOOL else NO_DEVIATION
+    last = _walk(links.tool) if loop is not Loop.WORKPIECE else NO_DEVIATION
+    if loop is Loop.WORKPIECE:  # the workpiece against the frame, not the frame against it
+        first, last = last, first
+    difference = Deviation(
+        components.subtract(last.shift_um, first.shift_um),
+        components.subtract_rows(last.turn_urad, first.turn_urad),
+    )
+    error = difference.move(point_mm)
+    if exact:
+        tilts = (components.rotate(each.turn_urad, axis) for each in (first, last))
+        start, end = (components.add(axis, components.scale(RAD_PER_URAD, tilt)) for tilt in tilts)
+        return error, _between(start, end)
+    (_, _, y), (z, _, _), (_, x, _) = difference.turn_urad
+    along = components.dot((x, y, z), axis)
+    return error, components.subtract((x, y, z), components.scale(along, axis))
+
+
+def loop_error(
+    model: Model,
+    loop: Loop,
+    coordinates: Coordinates,
+    values: ErrorValues,
+    point_mm: Array,
+    *,
+    exact: bool = True,
+) -> tuple[Array, Array]:
+    """Evaluate the error of a loop: with full rotations and all products, or to first order.
+
+    Parameters
+    ----------
+    model : Model
+    loop : Loop
+    coordinates : mapping of str to ndarray, [...], mm or degrees
+    values : mapping of str to ndarray, [...], µm or µrad
+        Errors at the coordinates.
+    point_mm : ndarray, [..., 3], mm
+        Nominal point in R, which the tool and the workpiece point share.
+    exact : bool, optional
+
+    Returns
+    -------
+    error_um : ndarray, [..., 3], µm
+        Position error in R, actual − nominal; for the relative loop tool minus workpiece.
+    orientation_urad : ndarray, [..., 3], µrad
+        Rotation vector that takes the nominal tool axis to the actual one; it has no part about
+        the tool axis itself.
+    """
+    links = build_links(model, coordinates, values, exact=exact)
+    found = solve_links(links, loop, components.split(point_mm), exact=exact)
+    arrays = [point_mm[..., 0], *coordinates.values(), *values.values()]
+    shape = np.broadcast_shapes(*(np.shape(array) for array in arrays))
+    error, orientation = np.empty((*shape, 3)), np.empty((*shape, 3))
+    components.join(found[0], error)
+    components.join(found[1], orientation)
+    return error, orientation
+
+
+def _walk(links: tuple[Link, ...]) -> Deviation:
+    shift, turn = NO_DEVIATION
+    for link in reversed(links):
+        inside = components.multiply(link.actual, turn)
+        carried = components.multiply(inside, components.transpose(link.nominal))
+        lever = components.rotate(carried, link.position_mm)
+        shift = components.add(
+            components.add(link.shift_um, components.rotate(link.actual, shift)),
+            components.scale(-UM_PER_MM_URAD, lever),
+        )
+        turn = components.add_rows(link.turn_urad, carried)
+    return Deviation(shift, turn)
+
+
+def _between(start: Triple, end: Triple) -> Triple:
+    """Rotation vector that takes one unit vector to another the short way, µrad."""
+    cross = components.cross(start, end)
+    sine = np.sqrt(components.dot(cross, cross))
+    angle = np.arctan2(sine, components.dot(start, end))
+    ratio = np.divide(angle, sine, out=np.ones_like(sine), where=sine > 0.0)
+    return components.scale(ratio * URAD_PER_RAD, cross)
+
+
+# --- The first-order model: one geometric Jacobian column per parameter ---------------------------
+# A translation error moves a point along its direction; a rotation error about direction d at frame
+# origin p moves point P by d × (P − p). The lever P − p is the explanation of every gain.
+
+_SIDES: dict[Loop, tuple[tuple[str, float], ...]] = {
+    Loop.TOOL: (("tool", 1.0),),
+    Loop.WORKPIECE: (("workpiece", 1.0),),
+    Loop.RELATIVE: (("tool", 1.0), ("workpiece", -1.0)),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One column of the geometric Jacobian."""
+
+    direction: Array  # [..., 3]; unit vector in R along or about which the error acts
+    lever_mm: Array  # [..., 3]; from the origin of the frame the error sits in to the point
+    position: Array  # [..., 3], µm/µm or µm/µrad; displacement of the point per unit of the error
+    sign: float  # +1, or −1 for the workpiece branch in the relative loop; already in `position`
+
+
+def rotation_gain(lever_mm: ArrayLike, direction: ArrayLike) -> Array:
+    """Displacement of a point per unit of a small rotation.
+
+    Parameters
+    ----------
+    lever_mm : array_like, [..., 3], mm
+        From the rotating frame's origin to the point.
+    direction : array_like, [..., 3]
+        Unit vector of the rotation axis.
+
+    Returns
+    -------
+    ndarray, [..., 3], µm/µrad
+        First order: direction × lever, a millimetre times a microradian being a nanometre.
+    """
+    x, y, z = np.moveaxis(np.asarray(lever_mm, dtype=float), -1, 0)
+    a, b, c = np.moveaxis(np.asarray(direction, dtype=float) * UM_PER_MM_URAD, -1, 0)
+    return np.stack([b * z - c * y, c * x - a * z, a * y - b * x], -1)
+
+
+def column(
+    model: Model, row: Parameter, frames: AxisFrames, point_mm: ArrayLike, sign: float = 1.0
+) -> Column:
+    """Build the Jacobian column of one parameter."""
+    pose = model.convention(row.axis).frame(frames, row)
+    direction = pose[..., :3, row.direction]
+    lever = np.asarray(point_mm, dtype=float) - pose[..., :3, 3]
+    gain = rotation_gain(lever, direction) if row.is_rotation else direction
+    return Column(direction, lever, sign * gain, sign)
+
+
+def columns(
+    model: Model,
+    loop: Loop,
+    keys: Sequence[str],
+    coordinates: Coordinates,
+    point_mm: ArrayLike,
+) -> dict[str, Column]:
+    """Build the Jacobian columns of parameters that act in a loop, at points, [..., 3], mm."""
+    rows = [parameter(key) for key in keys]
+    return {
+        row.key: column(model, row, frames, point_mm, sign)
+        for side, sign in _SIDES[loop]
+        for frames in branch_frames(model, side, coordinates)
+        for row in rows
+        if row.axis == frames.axis.name
+    }
+
+
+def jacobian(
+    model: Model,
+    loop: Loop,
+    keys: Sequence[str],
+    coordinates: Coordinates,
+    point_mm: ArrayLike,
+) -> tuple[Array, Array]:
+    """Build the Jacobian of position and tool-axis orientation.
+
+    Parameters
+    ----------
+    model : Model
+    loop : Loop
+    keys : sequence of str, (K,)
+        Parameter keys; one whose axis is not in the loop gives zeros.
+    coordinates : mapping of str to ndarray, [...], mm or degrees
+    point_mm : array_like, [..., 3], mm
+        Nominal point in R.
+
+    Returns
+    -------
+    position : ndarray, [K, ..., 3], µm/µm or µm/µrad
+        Displacement in R per unit.
+    orientation : ndarray, [K, ..., 3], µrad/µrad
+        Rotation vector of the tool axis per unit, without the part about the axis itself.
+
+    Notes
+    -----
+    First order in all errors; `warpspace.kinematics.chain.loop_error` has all of them.
+    """
+    point = np.asarray(point_mm, dtype=float)
+    shape = np.broadcast_shapes((*batch_shape(coordinates), 3), point.shape)
+    position = np.zeros((len(keys), *shape))
+    orientation = np.zeros((len(keys), *shape))
+    about = tool_axis(model, coordinates)
+    found = columns(model, loop, keys, coordinates, point)
+    for index, key in enumerate(keys):
+        if (col := found.get(key)) is None:
+            continue
+        position[index] = col.position
+        if parameter(key).is_rotation:
+            along = np.sum(col.direction * about, axis=-1, keepdims=True)
+            orientation[index] = col.sign * (col.direction - along * about)
+    return position, orientation
+
+
+# --- Where the bodies of a machine stand, and how each of them moves because of the errors --------
+# Every body takes the small motion of all errors between the frame and itself. To first order that
+# is one rotation vector and one displacement a body; drawn larger by a factor it is an affine map
+# that takes each point exactly where the deformed grid has it.
+
+BASE = "R"
+
+
+@dataclass(frozen=True, slots=True)
+class BodyMotion:
+    """Nominal place of a body and its small motion."""
+
+    nominal: Array  # [4, 4]; pose of the body's frame in R
+    rotation_rad: Array  # [3]; small rotation vector in R
+    displacement_mm: Array  # [3]; displacement of the point of the body at the origin of R
+
+    def drawn(self, exaggeration: float) -> Array:
+        """Give the affine map, [4, 4], from the body's frame to where it is drawn in R."""
+        bend = np.eye(4)
+        bend[:3, :3] += exaggeration * transforms.skew(self.rotation_rad)
+        bend[:3, 3] = exaggeration * self.displacement_mm
+        return bend @ self.nominal
+
+
+def body_motions(
+    model: Model, values: Mapping[str, Array | float], coordinates: Coordinates
+) -> dict[str, BodyMotion]:
+    """Find the place and the small motion of every body: R, every axis, S, t and w.
+
+    Values are errors at one position of every axis, µm or µrad; absent is zero. S and t ride on the
+    last axis of the tool.
+    """
+    still = np.zeros(3)
+    found = {BASE: BodyMotion(np.eye(4), still, still)}
+    for side in ("tool", "workpiece"):
+        pose, rotation, displacement = np.eye(4), still, still
+        for frames in branch_frames(model, side, coordinates):
+            pose = frames.after
+            for row in axis_parameters(frames.axis.name):
+                value = float(values.get(row.key, 0.0))
+                if value == 0.0:
+                    continue
+                col = column(model, row, frames, np.zeros(3))
+                displacement = displacement + col.position * value * MM_PER_UM
+                if row.is_rotation:
+                    rotation = rotation + col.direction * value * RAD_PER_URAD
+            found[frames.axis.name] = BodyMotion(pose, rotation, displacement)
+        for name, offset, turned in model.machine.end_frames(side):
+            pose = pose @ transforms.placed(offset, turned)
+            found[name] = BodyMotion(pose, rotation, displacement)
+    return found

@@ -14,16 +14,14 @@ import numpy as np
 from warpspace.exceptions import OptionError
 from warpspace.kinematics import transforms
 from warpspace.kinematics.axis_errors import Along, AxisErrors, SmallMotion
-from warpspace.kinematics.chain import nominal_point
-from warpspace.kinematics.deviation import loop_error
+from warpspace.kinematics.chain import loop_error, nominal_point
 from warpspace.kinematics.model import ComponentErrors, Coordinates, Loop, Model
-from warpspace.machine.axes import direction_index, is_linear
+from warpspace.machine.axes import direction_index, is_linear, parameter
 from warpspace.machine.curves.curve import Span
 from warpspace.machine.curves.pieces import SMALL
 from warpspace.machine.curves.simple import Constant
 from warpspace.machine.description import Machine, Vector
 from warpspace.machine.errors import ErrorSet
-from warpspace.machine.parameters import parameter
 from warpspace.units import MM_PER_UM, Array
 
 # --- Component errors before or after the motion --------------------------------------------------

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warpspace.exceptions import OptionError, UnknownNameError
-from warpspace.machine.axes import TravelDirection
+from warpspace.machine.axes import Parameter, TravelDirection
 from warpspace.machine.description import ORIGIN, Axis, Machine, Vector
-from warpspace.machine.parameters import Parameter
 from warpspace.plugins import load_plugins
 from warpspace.units import Array
 

@@ -1,14 +1,22 @@
-"""Names of axes: a letter of X Y Z U V W A B C and, where there is more than one, a digit.
+"""Names of axes, and the one table of the error parameters that they can have.
 
-X Y Z and U V W translate along x, y, z; A B C turn about them (ISO 841). ``C2`` is a second
-axis that turns about z.
+An axis is a letter and, where there is more than one, a digit: X Y Z and U V W translate along x,
+y, z; A B C turn about them (ISO 841); ``C2`` is a second axis that turns about z.
+
+Keys of parameters are ISO 230-1 names in ASCII: ``E`` + direction + axis for a component error that
+varies along the axis (``EAX``: rotation about x of the X axis), ``E`` + direction + ``0`` + axis
+for a constant (``EC0Y``: the squareness of Y to X). Directions X Y Z are translations, A B C
+rotations about them.
 """
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from enum import StrEnum
+from functools import cache, lru_cache
 
 from warpspace.exceptions import UnknownNameError
+from warpspace.units import MICROMETRE, MICRORADIAN
 
 DIRECTIONS = "XYZABC"
 """Letters of the six errors of a rigid body: along x, y, z and about x, y, z."""
@@ -82,3 +90,225 @@ DIRECTION_WORDS = {
     TravelDirection.DIFFERENCE: "reversal: forward − backward",
 }
 """How each is called on figures and pages."""
+
+
+# --- The one table of error parameters ------------------------------------------------------------
+
+_GREEK = {"X": "δ_x", "Y": "δ_y", "Z": "δ_z", "A": "ε_x", "B": "ε_y", "C": "ε_z"}
+_CONSTANT_GREEK = {"X": "δx", "Y": "δy", "Z": "δz", "A": "α", "B": "β", "C": "γ"}
+# Thesis symbols of the constants of the reference machine (table 4-2 and eqs. 4-18, 4-25).
+_THESIS_CONSTANTS = {
+    "EC0Y": "γ_XY",
+    "EA0Z": "α_YZ",
+    "EB0Z": "β_XZ",
+    "EA0B": "α_ZB",
+    "EC0B": "γ_XB",
+    "EX0B": "δx_YB",
+    "EZ0B": "δz_YB",
+    "EA0C": "α_YC",
+    "EB0C": "β_XC",
+    "EX0C": "δx_ZC",
+    "EY0C": "δy_ZC",
+}
+_LINEAR_ROTATIONS = {  # roll about the motion, pitch about the horizontal normal, yaw the rest
+    "AX": "roll",
+    "BX": "pitch",
+    "CX": "yaw",
+    "AY": "pitch",
+    "BY": "roll",
+    "CY": "yaw",
+    "AZ": "pitch",
+    "BZ": "yaw",
+    "CZ": "roll",
+}
+
+
+_THESIS_AXES = ("X", "Y", "Z", "B", "C")
+_KEY = re.compile(r"E([XYZABC])(0?)([XYZUVWABC][0-9]?)")
+
+
+class ErrorKind(StrEnum):
+    """What an error parameter describes, in the words of ISO 230-1."""
+
+    TRANSLATION = "component translation"
+    ROTATION = "component rotation"
+    SQUARENESS = "squareness"
+    ORIENTATION = "orientation error"
+    LOCATION = "location error"
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One error parameter."""
+
+    key: str  # ISO 230-1 name in ASCII
+    symbol: str  # the thesis's symbol, or one formed like it for axes the thesis does not have
+    name: str  # plain name, for instance "roll of X"
+    axis: str  # name of the axis it belongs to
+    kind: ErrorKind  # what it describes
+    source: str  # where it is defined
+
+    @property
+    def letter(self) -> str:
+        """Direction letter: X Y Z for translations, A B C for rotations about them."""
+        return self.key[1]
+
+    @property
+    def direction(self) -> int:
+        """Index 0, 1 or 2 of the frame axis along or about which the error acts."""
+        return direction_index(self.letter)
+
+    @property
+    def is_rotation(self) -> bool:
+        """Whether it is an angle."""
+        return self.letter in ROTARY_LETTERS
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether it is a property of the assembly that does not vary along the axis."""
+        return self.key[2] == "0"
+
+    @property
+    def unit(self) -> str:
+        """Unit of its values: µm or µrad."""
+        return MICRORADIAN if self.is_rotation else MICROMETRE
+
+    @property
+    def tolerance_class(self) -> str:
+        """The default tolerance it takes: translation, rotation or squareness.
+
+        The thesis (table 4-6) gives the orientation errors of rotary axes the tolerance of a
+        squareness.
+        """
+        if not self.is_rotation:
+            return "translation"
+        return "squareness" if self.is_constant else "rotation"
+
+    @property
+    def label(self) -> str:
+        """Label for a control: key, symbol, plain name and unit."""
+        return f"{self.key} · {self.symbol} · {self.name} [{self.unit}]"
+
+
+def _component(letter: str, axis: str) -> Parameter:
+    rotation = letter in ROTARY_LETTERS
+    about, own = direction_index(letter), direction_index(axis)
+    low = "xyz"[about]
+    if is_linear(axis):
+        if rotation:
+            name = f"{_LINEAR_ROTATIONS[letter + 'XYZ'[own]]} of {axis}"
+        else:
+            name = f"positioning of {axis}" if about == own else f"straightness of {axis} in {low}"
+    elif rotation:
+        name = f"angular positioning of {axis}" if about == own else f"tilt of {axis} about {low}"
+    else:
+        name = f"axial error of {axis}" if about == own else f"radial error of {axis} in {low}"
+    of_thesis = axis in _THESIS_AXES
+    source = "ISO 230-1; thesis table 4-2" if of_thesis else "ISO 230-1, 3.4 (not in the thesis)"
+    kind = ErrorKind.ROTATION if rotation else ErrorKind.TRANSLATION
+    return Parameter(f"E{letter}{axis}", f"{_GREEK[letter]}{axis}", name, axis, kind, source)
+
+
+def _constant(letter: str, axis: str) -> Parameter:
+    key = f"E{letter}0{axis}"
+    about, own = direction_index(letter), direction_index(axis)
+    low = "xyz"[about]
+    if letter not in ROTARY_LETTERS:
+        kind = ErrorKind.LOCATION
+        name = f"location of {axis} in {low}"
+    elif not is_linear(axis):
+        kind = ErrorKind.ORIENTATION
+        name = f"orientation of {axis} about {low}"
+    else:
+        kind = ErrorKind.SQUARENESS
+        if about == own:
+            name = f"rotation of {axis} about itself"
+        else:
+            name = f"squareness of {axis} to {'XYZ'[3 - about - own]}"
+    symbol = _THESIS_CONSTANTS.get(key, f"{_CONSTANT_GREEK[letter]}_0{axis}")
+    if kind is ErrorKind.LOCATION and key in _THESIS_CONSTANTS:
+        source = "ISO 230-1; thesis equations (left out of its table 4-2)"
+    elif key in _THESIS_CONSTANTS:
+        source = "ISO 230-1; thesis table 4-2"
+    else:
+        source = "ISO 230-1, 3.5 (not in the thesis)"
+    return Parameter(key, symbol, name, axis, kind, source)
+
+
+@cache
+def axis_parameters(axis: str) -> tuple[Parameter, ...]:
+    """List the six component and the six constant errors that an axis can have."""
+    return tuple(build(letter, axis) for build in (_component, _constant) for letter in DIRECTIONS)
+
+
+@lru_cache(maxsize=4096)
+def _row(key: str) -> Parameter | None:
+    """Give the parameter of a key; None where it is no key."""
+    matched = _KEY.fullmatch(key)
+    if matched is None:
+        return None
+    letter, constant, axis = matched.groups()
+    return axis_parameters(axis)[DIRECTIONS.index(letter) + (len(DIRECTIONS) if constant else 0)]
+
+
+class ParameterTable(Mapping[str, Parameter]):
+    """Key to parameter, for every axis that a machine may have. Rows are made when asked for."""
+
+    def __getitem__(self, key: str) -> Parameter:
+        """Look up one parameter."""
+        row = _row(key)
+        if row is None:
+            raise KeyError(key)
+        return row
+
+    def __iter__(self) -> Iterator[str]:
+        """List all keys, axis by axis."""
+        return (row.key for axis in AXIS_NAMES for row in axis_parameters(axis))
+
+    def __len__(self) -> int:
+        """Count the parameters of all axes there can be."""
+        return 2 * len(DIRECTIONS) * len(AXIS_NAMES)
+
+
+PARAMETERS = ParameterTable()
+"""The only table of parameters there is."""
+
+
+def parameter(key: str) -> Parameter:
+    """Look up one parameter."""
+    row = _row(key)
+    if row is None:
+        classic = [row.key for axis in "XYZABC" for row in axis_parameters(axis)]
+        raise UnknownNameError("error parameter", key, classic)
+    return row
+
+
+def default_keys(axes: Sequence[str]) -> tuple[str, ...]:
+    """List the parameters that a machine with these axes has by default.
+
+    Six component errors per axis; per rotary axis two orientation and two location errors; per
+    linear axis the squareness not absorbed by the reference axis and the reference plane.
+
+    Notes
+    -----
+    The reference axis is the first linear axis that the machine has in the order X Y Z U V W, the
+    reference plane that of the first two: the first has no squareness, the second one, the third
+    two. An axis parallel to an earlier one has the two angles between them.
+    """
+    keys: list[str] = []
+    earlier: list[int] = []
+    for axis in sort_axes(axes):
+        keys += [row.key for row in axis_parameters(axis) if not row.is_constant]
+        own = direction_index(axis)
+        if is_linear(axis):
+            letters = [letter for letter in "ABC" if _turns_away(letter, own, earlier)]
+            earlier.append(own)
+        else:
+            letters = [letter for letter in "ABCXYZ" if direction_index(letter) != own]
+        keys += [f"E{letter}0{axis}" for letter in letters]
+    return tuple(keys)
+
+
+def _turns_away(letter: str, own: int, earlier: Sequence[int]) -> bool:
+    about = direction_index(letter)
+    return about != own and (own in earlier or 3 - about - own in earlier)

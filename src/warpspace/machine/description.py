@@ -8,12 +8,13 @@ from warpspace.exceptions import ChainError, UnknownNameError
 from warpspace.machine.axes import (
     LINEAR_LETTERS,
     MAX_AXES,
+    axis_parameters,
+    default_keys,
     direction_index,
     is_axis_name,
     is_linear,
     sort_axes,
 )
-from warpspace.machine.parameters import axis_parameters, default_keys
 
 # --- The kinematic chain --------------------------------------------------------------------------
 

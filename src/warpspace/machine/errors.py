@@ -10,12 +10,11 @@ from functools import cached_property
 
 import numpy as np
 
-from warpspace.machine.axes import TravelDirection
+from warpspace.machine.axes import TravelDirection, parameter
 from warpspace.machine.curves.curve import OWN, ErrorFunction
 from warpspace.machine.curves.directional import Directional
 from warpspace.machine.curves.simple import Constant, Harmonics, Poly, Ramp
 from warpspace.machine.curves.table import Table, TwoArguments
-from warpspace.machine.parameters import parameter
 from warpspace.units import Array
 
 __all__ = [

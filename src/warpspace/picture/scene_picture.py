@@ -13,7 +13,7 @@ from warpspace.field.evaluate import View, placed_words, second_order_words
 from warpspace.field.grid import DEFAULT_NODES, build_grid
 from warpspace.geometry.colour import ColourScale
 from warpspace.kinematics.model import Loop
-from warpspace.machine.parameters import parameter
+from warpspace.machine.axes import parameter
 from warpspace.picture.model import (
     Exaggeration,
     Picture,

@@ -9,7 +9,7 @@ from warpspace.exceptions import OptionError, SceneError, near_miss
 from warpspace.field.grid import Workspace, find_volume_axes
 from warpspace.kinematics.model import ComponentErrors, Model
 from warpspace.machine import limits
-from warpspace.machine.axes import direction_index, is_linear, sort_axes
+from warpspace.machine.axes import PARAMETERS, direction_index, is_linear, sort_axes
 from warpspace.machine.curves.curve import MISSING, ErrorFunction, ValueReader
 from warpspace.machine.curves.simple import Constant
 from warpspace.machine.curves.table import MAX_COLUMN_NAME, MAX_FILE_NAME, Table
@@ -23,7 +23,6 @@ from warpspace.machine.errors import (
     Tolerance,
     ToleranceSet,
 )
-from warpspace.machine.parameters import PARAMETERS
 from warpspace.resources import scenes_dir
 from warpspace.scene import schema
 from warpspace.scene.curves import GUIDES, CurveReader, read_csv_runs

@@ -20,11 +20,18 @@ from warpspace.field.evaluate import (
 )
 from warpspace.field.grid import DEFAULT_NODES, Grid, Workspace, build_grid
 from warpspace.kinematics.model import Coordinates, Loop, Model, complete_coordinates
-from warpspace.machine.axes import TravelDirection, direction_index, is_linear
+from warpspace.machine.axes import (
+    PARAMETERS,
+    ErrorKind,
+    TravelDirection,
+    default_keys,
+    direction_index,
+    is_linear,
+    parameter,
+)
 from warpspace.machine.description import Machine, Vector
 from warpspace.machine.errors import ErrorFunction, ErrorSet, Harmonics, Measurement, ToleranceSet
 from warpspace.machine.limits import MAX_ERROR
-from warpspace.machine.parameters import PARAMETERS, ErrorKind, default_keys, parameter
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,12 +10,11 @@ from warpspace.exceptions import OptionError, SceneError
 from warpspace.field.grid import Workspace
 from warpspace.kinematics.conversion import SquarenessSign, convert_squareness, move_measuring_line
 from warpspace.kinematics.model import Model
-from warpspace.machine.axes import TravelDirection
+from warpspace.machine.axes import PARAMETERS, Parameter, TravelDirection, parameter
 from warpspace.machine.curves.curve import Span
 from warpspace.machine.description import ORIGIN, BodySource, Machine, Vector, default_travel
 from warpspace.machine.errors import ErrorSet
 from warpspace.machine.limits import MIN_NUMBER
-from warpspace.machine.parameters import PARAMETERS, Parameter, parameter
 from warpspace.scene.machines import load_machine, machine_names
 from warpspace.scene.model import Scene
 

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 import tomli_w
 
-from warpspace.machine.axes import direction_index, is_linear
+from warpspace.machine.axes import ErrorKind, default_keys, direction_index, is_linear, parameter
 from warpspace.machine.description import ORIGIN, Chain, Range, Vector, parse_chain
-from warpspace.machine.parameters import ErrorKind, default_keys, parameter
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import Scene
 

@@ -8,13 +8,14 @@ from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.field.evaluate import error_values
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import (
+    body_motions,
+    columns,
     error_transform,
+    loop_error,
     nominal_point,
     point_in_branch,
     tool_axis,
 )
-from warpspace.kinematics.deviation import loop_error
-from warpspace.kinematics.firstorder import body_motions, columns
 from warpspace.kinematics.model import (
     ComponentErrors,
     Loop,

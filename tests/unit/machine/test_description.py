@@ -3,9 +3,15 @@
 import pytest
 
 from warpspace.exceptions import ChainError, UnknownNameError
-from warpspace.machine.axes import DIRECTIONS, is_axis_name
+from warpspace.machine.axes import (
+    DIRECTIONS,
+    PARAMETERS,
+    ErrorKind,
+    default_keys,
+    is_axis_name,
+    parameter,
+)
 from warpspace.machine.description import Chain, build_machine, parse_chain
-from warpspace.machine.parameters import PARAMETERS, ErrorKind, default_keys, parameter
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,8 @@ from warpspace.analysis.measured import Check, Measured, check_errors, measured
 from warpspace.analysis.montecarlo import MonteCarlo, montecarlo
 from warpspace.field.evaluate import View
 from warpspace.kinematics.model import Loop, Model
+from warpspace.machine.axes import ErrorKind, parameter
 from warpspace.machine.errors import ToleranceSet
-from warpspace.machine.parameters import ErrorKind, parameter
 from warpspace.scene.library import load_scene
 from warpspace.scene.model import Scene
 

@@ -33,8 +33,8 @@ from warpspace.app.viewport.layers.traces import TracesLayer
 from warpspace.field.grid import MIN_NODES
 from warpspace.geometry.surfaces import is_thin
 from warpspace.kinematics.model import Loop
+from warpspace.machine.axes import parameter
 from warpspace.machine.errors import ErrorFunction
-from warpspace.machine.parameters import parameter
 from warpspace.picture.model import choose_scale
 from warpspace.picture.words import convention_words, own_axes, reference_words, spell_point
 from warpspace.resources import __version__

@@ -15,7 +15,7 @@ from warpspace.app.state.ranges import Span
 from warpspace.field.evaluate import View
 from warpspace.field.grid import Grid, Workspace, build_grid
 from warpspace.kinematics import transforms
-from warpspace.kinematics.chain import branch_frames, nominal_point
+from warpspace.kinematics.chain import branch_frames, jacobian, nominal_point
 from warpspace.kinematics.conversion import (
     ReferenceLine,
     SquarenessSign,
@@ -23,7 +23,6 @@ from warpspace.kinematics.conversion import (
     fit_line,
     squareness_keys,
 )
-from warpspace.kinematics.firstorder import jacobian
 from warpspace.kinematics.model import (
     ComponentErrors,
     Coordinates,
@@ -32,10 +31,9 @@ from warpspace.kinematics.model import (
     batch_shape,
     convention_names,
 )
-from warpspace.machine.axes import TravelDirection, is_linear
+from warpspace.machine.axes import TravelDirection, axis_parameters, is_linear, parameter
 from warpspace.machine.description import Axis
 from warpspace.machine.errors import ErrorSet, Table
-from warpspace.machine.parameters import axis_parameters, parameter
 from warpspace.scene.model import Scene, grid_basis
 from warpspace.units import Array
 

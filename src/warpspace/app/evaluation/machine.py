@@ -13,8 +13,7 @@ from warpspace.bodies.placed import PlacedBody, place_bodies, scene_motions
 from warpspace.field.evaluate import evaluate_first_order
 from warpspace.geometry.surfaces import deform
 from warpspace.kinematics import transforms
-from warpspace.kinematics.chain import nominal_point
-from warpspace.kinematics.firstorder import BodyMotion
+from warpspace.kinematics.chain import BodyMotion, nominal_point
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.picture.model import coloured_values
 from warpspace.units import Array

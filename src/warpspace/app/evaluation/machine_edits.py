@@ -16,10 +16,10 @@ from warpspace.app.state.look import linear_spans
 from warpspace.app.state.ranges import Span, amplitude_span, position_spans
 from warpspace.app.state.typed_numbers import read_typed
 from warpspace.exceptions import WarpspaceError
+from warpspace.machine.axes import parameter
 from warpspace.machine.curves.curve import OWN, ErrorFunction
 from warpspace.machine.description import Gantry
 from warpspace.machine.errors import ErrorSet, ToleranceSet
-from warpspace.machine.parameters import parameter
 from warpspace.scene.library import load_scene, scene_names
 from warpspace.scene.model import Scene
 from warpspace.units import MICROMETRE

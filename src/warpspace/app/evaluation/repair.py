@@ -15,7 +15,7 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.comparison import Side
 from warpspace.field.evaluate import View
 from warpspace.field.grid import build_grid
-from warpspace.machine.parameters import parameter
+from warpspace.machine.axes import parameter
 from warpspace.scene.model import Scene, grid_basis
 from warpspace.spelling import spell
 

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 from warpspace.exceptions import ChainError, OptionError, UnknownNameError
 from warpspace.field.grid import Workspace, find_volume_axes
 from warpspace.machine import limits
-from warpspace.machine.axes import direction_index, is_linear
+from warpspace.machine.axes import direction_index, is_linear, parameter
 from warpspace.machine.description import (
     ACROSS,
     FIXED_FRAMES,
@@ -24,7 +24,6 @@ from warpspace.machine.description import (
     parse_chain,
 )
 from warpspace.machine.errors import ErrorSet, ToleranceSet
-from warpspace.machine.parameters import parameter
 from warpspace.scene.library import parse_scene
 from warpspace.scene.machines import body_notes, load_machine, machine_names
 from warpspace.scene.model import Scene

@@ -7,10 +7,9 @@ import numpy as np
 
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.field.evaluate import ErrorBasis, build_basis
-from warpspace.kinematics.chain import nominal_point
-from warpspace.kinematics.firstorder import columns
+from warpspace.kinematics.chain import columns, nominal_point
 from warpspace.kinematics.model import Coordinates, Loop, Model
-from warpspace.machine.parameters import Parameter, parameter
+from warpspace.machine.axes import Parameter, parameter
 from warpspace.units import Array
 
 SHOWN_BARS = 10

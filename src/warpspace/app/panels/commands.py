@@ -12,7 +12,7 @@ from warpspace.app.panels import PanelContext, Update
 from warpspace.app.readouts.help import spell_help
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import TRUE_SCALE, AppState
-from warpspace.machine.parameters import PARAMETERS
+from warpspace.machine.axes import PARAMETERS
 from warpspace.picture.words import spell_factor
 
 # A S D Q E belong to viser's camera; W is taken from it, see browser/copying.py.

@@ -28,9 +28,9 @@ from warpspace.app.state.curve_text import (
     spell_rows,
 )
 from warpspace.exceptions import OptionError
+from warpspace.machine.axes import Parameter, parameter
 from warpspace.machine.curves.registry import curve_kind
 from warpspace.machine.errors import Constant, ErrorFunction, Measurement
-from warpspace.machine.parameters import Parameter, parameter
 
 CHART_HEIGHT = 128
 LABEL_WIDTH = 76

@@ -34,8 +34,7 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.listing import Listing, is_mostly_zero, listed_keys, used_keys
 from warpspace.app.state.ranges import Span
 from warpspace.app.state.typed_numbers import read_typed
-from warpspace.machine.axes import axis_order
-from warpspace.machine.parameters import PARAMETERS, Parameter, parameter
+from warpspace.machine.axes import PARAMETERS, Parameter, axis_order, parameter
 from warpspace.scene.model import grid_basis
 
 # --- How much each error does in the whole volume, taken alone ------------------------------------

@@ -36,8 +36,8 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.specification import LIMIT_UM, MAX, NORMAL, PERCENT, SAMPLED, UNIFORM
 from warpspace.exceptions import WarpspaceError
 from warpspace.kinematics.model import Loop
+from warpspace.machine.axes import Parameter, parameter
 from warpspace.machine.errors import ToleranceSet
-from warpspace.machine.parameters import Parameter, parameter
 
 if TYPE_CHECKING:
     from warpspace.analysis.allocating import Ensemble

@@ -8,7 +8,7 @@ from markupsafe import Markup
 from warpspace.analysis.explain import Contribution
 from warpspace.app.evaluation.budget import Answer
 from warpspace.app.readouts.html import message, render, signed, small
-from warpspace.machine.parameters import parameter
+from warpspace.machine.axes import parameter
 from warpspace.picture.words import spell_axes
 from warpspace.units import Array
 

@@ -9,9 +9,9 @@ from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.ranges import Exclusions
 from warpspace.app.state.typed_numbers import spell_typed
+from warpspace.machine.axes import Parameter
 from warpspace.machine.errors import Constant
 from warpspace.machine.limits import MAX_TYPED_NUMBER
-from warpspace.machine.parameters import Parameter
 
 ONLY, EXCLUDE, CURVE, VALUE = "only", "exclude", "curve", "value"
 Attributes = Callable[[str], Markup]

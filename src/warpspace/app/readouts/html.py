@@ -12,7 +12,7 @@ from typing import Any, SupportsFloat
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from warpspace.machine.parameters import parameter
+from warpspace.machine.axes import parameter
 from warpspace.picture.words import spell_at, spell_coordinate, spell_point
 from warpspace.spelling import MINUS, THIN_SPACE, spell_short
 from warpspace.units import Array

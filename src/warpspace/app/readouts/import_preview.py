@@ -8,8 +8,7 @@ import numpy as np
 from warpspace.app.readouts.html import render
 from warpspace.formats.measured import BACKWARD, BOTH, FORWARD, Series, summaries
 from warpspace.formats.registry import Reading
-from warpspace.machine.axes import is_linear
-from warpspace.machine.parameters import parameter
+from warpspace.machine.axes import is_linear, parameter
 from warpspace.spelling import spell_short
 from warpspace.units import Array
 

@@ -8,7 +8,7 @@ from markupsafe import Markup
 
 from warpspace.app.readouts.html import render, thousands
 from warpspace.app.state.specification import MAX
-from warpspace.machine.parameters import Parameter
+from warpspace.machine.axes import Parameter
 from warpspace.units import Array
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from warpspace.analysis.repair import AdjustedSet, RepairResult
 from warpspace.analysis.statistics import Summary
 from warpspace.analysis.typed import ALL
 from warpspace.app.readouts.html import message, render
-from warpspace.machine.parameters import parameter
+from warpspace.machine.axes import parameter
 from warpspace.spelling import spell, spell_short
 
 SEEN = "seen"

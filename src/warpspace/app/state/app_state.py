@@ -18,10 +18,10 @@ from warpspace.app.state.specification import Specification
 from warpspace.field.evaluate import View
 from warpspace.geometry.colour import COMPONENTS
 from warpspace.kinematics.model import Loop
+from warpspace.machine.axes import parameter
 from warpspace.machine.errors import ErrorFunction, ErrorSet, ToleranceSet
 from warpspace.machine.limits import EXAGGERATION as FACTORS
 from warpspace.machine.limits import LIVE_NODES
-from warpspace.machine.parameters import parameter
 from warpspace.scene.model import Scene
 
 if TYPE_CHECKING:

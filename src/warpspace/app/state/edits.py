@@ -8,9 +8,9 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.ranges import Span, amplitude_span, round_up
 from warpspace.app.state.specification import Specification
 from warpspace.app.state.spelling import Unreadable
+from warpspace.machine.axes import parameter
 from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet, Tolerance
 from warpspace.machine.limits import MAX_ERROR, MAX_HALF_WIDTH, MIN_HALF_WIDTH
-from warpspace.machine.parameters import parameter
 
 LEAST_HALF_WIDTH = 10.0
 FINE_UP_TO = 100.0

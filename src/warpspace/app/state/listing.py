@@ -7,7 +7,7 @@ from difflib import get_close_matches
 from functools import lru_cache
 
 from warpspace.app.state.app_state import AppState
-from warpspace.machine.parameters import Parameter, parameter
+from warpspace.machine.axes import Parameter, parameter
 
 # --- Finding error parameters by what people call them --------------------------------------------
 # Key, symbol, plain name, axis, kind.

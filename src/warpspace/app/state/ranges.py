@@ -4,9 +4,9 @@ import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
+from warpspace.machine.axes import parameter
 from warpspace.machine.errors import Tolerance
 from warpspace.machine.limits import MAX_ERROR, MIN_HALF_WIDTH, MIN_NUMBER
-from warpspace.machine.parameters import parameter
 from warpspace.scene.model import Scene
 
 LEAST_TRANSLATION_UM = 20.0

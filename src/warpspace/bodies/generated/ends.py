@@ -19,7 +19,7 @@ from warpspace.bodies.schematic import (
     rod,
     upright,
 )
-from warpspace.kinematics.firstorder import BASE
+from warpspace.kinematics.chain import BASE
 from warpspace.machine.description import Axis
 from warpspace.units import Array
 

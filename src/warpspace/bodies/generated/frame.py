@@ -24,7 +24,7 @@ from warpspace.bodies.schematic import (
     rod,
     upright,
 )
-from warpspace.kinematics.firstorder import BASE
+from warpspace.kinematics.chain import BASE
 from warpspace.machine.description import TOOL_SHAPES, Axis, Machine, Vector
 from warpspace.units import Array
 

@@ -12,7 +12,7 @@ from itertools import permutations, product
 
 import numpy as np
 
-from warpspace.kinematics.firstorder import body_motions
+from warpspace.kinematics.chain import body_motions
 from warpspace.kinematics.model import Model
 from warpspace.machine.description import Axis, Machine
 from warpspace.units import Array

@@ -40,9 +40,8 @@ from warpspace.formats.source import (
     source_of_text,
     spell,
 )
-from warpspace.machine.axes import is_axis_name, is_linear
+from warpspace.machine.axes import PARAMETERS, is_axis_name, is_linear, parameter
 from warpspace.machine.limits import MAX_POINTS, MAX_RUNS
-from warpspace.machine.parameters import PARAMETERS, parameter
 from warpspace.scene.files import CsvRows, unguard_cell
 from warpspace.units import Array
 

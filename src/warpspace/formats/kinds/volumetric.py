@@ -36,9 +36,8 @@ from warpspace.formats.measured import (
     zero_key,
 )
 from warpspace.formats.source import MM_TO_UM, RAD_TO_URAD, Place, Source, spell
-from warpspace.machine.axes import direction_index, is_linear
+from warpspace.machine.axes import PARAMETERS, direction_index, is_linear, parameter
 from warpspace.machine.limits import MAX_POINTS
-from warpspace.machine.parameters import PARAMETERS, parameter
 
 STANDARD, ALTERNATIVE = "standard", "alternative"
 ARGUMENTS = ("X", "Y", "Z", "A", "B", "C")

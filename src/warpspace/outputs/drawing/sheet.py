@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from warpspace.geometry.colour import ColourScale, colour_table
 from warpspace.geometry.surfaces import round_down
-from warpspace.machine.parameters import parameter
+from warpspace.machine.axes import parameter
 from warpspace.outputs.drawing.canvas import Canvas
 from warpspace.outputs.drawing.render import Projection, Raster, Rect
 from warpspace.outputs.drawing.settings import FigureSettings, spell_settings

@@ -10,7 +10,7 @@ from warpspace.analysis.concepts import LETTERS, Concept, compare_concepts
 from warpspace.bodies.placed import PlacedBody
 from warpspace.geometry.colour import ColourScale
 from warpspace.kinematics.model import Loop
-from warpspace.machine.parameters import parameter
+from warpspace.machine.axes import parameter
 from warpspace.outputs.drawing.canvas import Canvas
 from warpspace.outputs.drawing.map3d import draw_map
 from warpspace.outputs.drawing.render import Projection, Rect, fit_projection

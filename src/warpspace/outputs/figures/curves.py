@@ -6,10 +6,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from warpspace.analysis.blocks import Band, Bars, Curve, Lines, Panel, Series, Style
-from warpspace.machine.axes import axis_order
+from warpspace.machine.axes import axis_order, parameter
 from warpspace.machine.description import Axis
 from warpspace.machine.errors import BACKWARD, Tolerance
-from warpspace.machine.parameters import parameter
 from warpspace.outputs.charts.blocks import draw_beside, draw_lines
 from warpspace.outputs.charts.paper import on_ground, style
 from warpspace.outputs.drawing.canvas import POINTS_PER_PX

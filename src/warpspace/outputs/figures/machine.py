@@ -13,7 +13,7 @@ from warpspace.geometry.surfaces import (
     outer_faces,
     triangulate,
 )
-from warpspace.kinematics.firstorder import BASE
+from warpspace.kinematics.chain import BASE
 from warpspace.outputs.drawing.canvas import Canvas
 from warpspace.outputs.drawing.map3d import GHOST_DASHES, draw_lone_line, map_room_mm
 from warpspace.outputs.drawing.render import (

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 from warpspace.analysis.repair import Repair, RepairResult
 from warpspace.kinematics.model import Loop
+from warpspace.machine.axes import parameter
 from warpspace.machine.limits import REPAIR_NODES
-from warpspace.machine.parameters import parameter
 from warpspace.outputs.charts.blocks import draw_beside, legend_handles
 from warpspace.outputs.charts.paper import on_ground, style
 from warpspace.outputs.drawing.canvas import POINTS_PER_PX, Canvas

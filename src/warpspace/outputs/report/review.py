@@ -17,8 +17,8 @@ from warpspace.analysis.repair import Repair, RepairResult
 from warpspace.analysis.statistics import Statistics
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.kinematics.model import Loop
+from warpspace.machine.axes import parameter
 from warpspace.machine.limits import REPAIR_NODES
-from warpspace.machine.parameters import parameter
 from warpspace.outputs.report.render import Block, Cards, Text
 from warpspace.picture.comparison import STATISTICS, scene_change, share_exaggeration
 from warpspace.picture.model import DIFFERENCE_LENGTH, Exaggeration, same_nodes

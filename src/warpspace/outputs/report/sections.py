@@ -15,8 +15,8 @@ from warpspace.analysis.concepts import Concepts, ConceptsResult
 from warpspace.analysis.description import Result, silent
 from warpspace.analysis.distribution import choose_distribution
 from warpspace.exceptions import NoRendererError, OptionError, RenderError, WarpspaceError
+from warpspace.machine.axes import parameter
 from warpspace.machine.limits import MOST_CONCEPTS
-from warpspace.machine.parameters import parameter
 from warpspace.outputs.drawing.settings import FigureSettings
 from warpspace.outputs.figures.catalogue import figure_kinds
 from warpspace.outputs.files import check_target, write_atomically

@@ -11,7 +11,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.viewport.layers import NOTHING, SCENE_PER_MM
 from warpspace.app.viewport.layers.adding import add_lines
 from warpspace.app.viewport.layers.box import dashes
-from warpspace.machine.parameters import parameter
+from warpspace.machine.axes import parameter
 from warpspace.picture.words import spell_axes, spell_in_r
 from warpspace.units import Array
 
