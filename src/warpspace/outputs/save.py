@@ -1,5 +1,6 @@
 """Figures by name to bytes and files."""
 
+import gc
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -38,6 +39,7 @@ def render_figure(
     name: str, scenes: Sequence[Scene], settings: FigureSettings, form: str = "png"
 ) -> bytes:
     """Draw a figure and give it as a file's bytes; see `draw_figure` and `figure_bytes`."""
+    gc.collect()  # a figure refers to itself: 100 MB of those before would wait for the collector
     with mpl.rc_context(SAVE_RC):
         drawing = draw_figure(name, scenes, settings, exact=form == "png")
     return figure_bytes(drawing, form)
