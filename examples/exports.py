@@ -13,7 +13,7 @@ from pathlib import Path
 import warpspace
 from warpspace.outputs.exports.fields import write_csv, write_vts
 from warpspace.outputs.exports.glb import write_glb
-from warpspace.picture.scene_picture import evaluate_picture
+from warpspace.picture.model import evaluate_picture
 
 
 def main(folder: Path = Path()) -> None:

@@ -131,7 +131,7 @@ def _write_scene(script: Path, names: dict[str, Any]) -> str | None:
     """Write the first scene of an example as an offline page, once per scene."""
     from warpspace import load_scene
     from warpspace.cli.exports import write_export
-    from warpspace.picture.scene_picture import evaluate_picture
+    from warpspace.picture.model import evaluate_picture
 
     loaded = re.findall(r'load_scene\("(\w+)"\)|\("(dvf5000_\w+)"', script.read_text("utf-8"))
     if loaded:

@@ -1,9 +1,10 @@
-"""Units of the product and the factors between them.
+"""Units of the product, the factors between them, and how numbers are spelled.
 
 Lengths are millimetres, errors micrometres, small angles microradians. Rotary positions are degrees
 in files and on screen and radians inside. A millimetre times a microradian is a nanometre.
 """
 
+import math
 from typing import TypeAlias
 
 import numpy as np
@@ -21,3 +22,35 @@ UM_PER_MM_URAD = 1e-3
 
 MICROMETRE = "µm"
 MICRORADIAN = "µrad"
+
+# --- Numbers on the screen, in pictures and in files ----------------------------------------------
+
+MINUS = "\N{MINUS SIGN}"
+THIN_SPACE = "\N{NARROW NO-BREAK SPACE}"
+
+
+def spell(value: float, digits: int = 3) -> str:
+    """Spell a number with a few significant digits, without powers of ten where possible."""
+    if value == 0.0 or not math.isfinite(value):
+        return "0" if value == 0.0 else str(value)
+    size = int(f"{value:.{digits - 1}e}".rpartition("e")[2])  # of the rounded number
+    if size >= 7 or size < -5:
+        text = f"{value:.{digits - 1}e}"
+    else:
+        text = f"{value:.{max(0, digits - 1 - size)}f}"
+    return text.replace("-", MINUS)
+
+
+def spell_signed(value: float, digits: int = 3) -> str:
+    """Spell a change with its sign: ``+3.24``, ``−17.1``, ``0``."""
+    return ("+" if value > 0.0 else "") + spell(value, digits)
+
+
+def spell_short(value: float) -> str:
+    """Spell a number without trailing zeros, with a true minus sign."""
+    return f"{value:.6g}".replace("-", MINUS)
+
+
+def spell_count(number: int) -> str:
+    """Spell a whole number, its digits in groups of three from 10 000 up."""
+    return f"{number:,}".replace(",", THIN_SPACE) if abs(number) >= 10_000 else str(number)

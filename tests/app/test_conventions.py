@@ -29,7 +29,7 @@ from warpspace.app.readouts.summary import heading, summary
 from warpspace.app.state.app_state import start_state
 from warpspace.machine.axes import TravelDirection
 from warpspace.picture.mesh import edge_pieces
-from warpspace.picture.scene_picture import evaluate_picture
+from warpspace.picture.model import evaluate_picture
 from warpspace.scene.library import load_scene, parse_scene
 from warpspace.scene.model import evaluate
 from warpspace.scene.save import scene_to_toml

@@ -36,9 +36,7 @@ from warpspace.app.viewport.tone_map import inverse_tone_map, line_colour, tone_
 from warpspace.field.evaluate import evaluate_first_order
 from warpspace.geometry.colour import colour_table, linear_to_srgb, srgb_to_linear
 from warpspace.geometry.surfaces import isoline_levels
-from warpspace.picture.mesh import (
-    isoline_labels,
-)
+from warpspace.picture.mesh import isoline_labels
 from warpspace.scene.library import load_scene
 from warpspace.scene.model import evaluate
 

@@ -15,7 +15,7 @@ from warpspace.bodies.placed import load_bodies
 from warpspace.geometry.surfaces import deform, outer_surface
 from warpspace.outputs.exports.fields import write_csv, write_vts
 from warpspace.outputs.exports.glb import build_glb, write_glb
-from warpspace.picture.scene_picture import evaluate_picture
+from warpspace.picture.model import evaluate_picture
 from warpspace.picture.traces import trace_lines
 
 SCENES = ("dvf5000_first", "teach_wobbling_table", "dvf5000_nominal")

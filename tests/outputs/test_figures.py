@@ -15,10 +15,10 @@ from warpspace.exceptions import OptionError
 from warpspace.outputs.drawing.settings import FigureSettings
 from warpspace.outputs.figures.catalogue import draw_figure, figure_kinds
 from warpspace.outputs.save import figure_bytes, render_figure
-from warpspace.picture.scene_picture import evaluate_picture
+from warpspace.picture.model import evaluate_picture
 from warpspace.picture.traces import trace_lines
 from warpspace.scene.library import parse_scene
-from warpspace.spelling import spell
+from warpspace.units import spell
 
 FIGURES = tuple(kind.name for kind in figure_kinds())
 MAPS = tuple(n for n in FIGURES if n not in ("gains", "montecarlo", "ballbar", "rotary"))

@@ -11,7 +11,7 @@ import warpspace
 from warpspace.bodies.placed import load_bodies
 from warpspace.exceptions import OptionError
 from warpspace.geometry.surfaces import deform
-from warpspace.picture.scene_picture import evaluate_picture
+from warpspace.picture.model import evaluate_picture
 from warpspace.picture.traces import trace_lines
 
 ROOT = Path(__file__).parents[2]

@@ -15,7 +15,7 @@ from warpspace.exceptions import WarpspaceError
 from warpspace.outputs.exports.formats import write_export
 from warpspace.outputs.figures.catalogue import draw_figure, figure_names
 from warpspace.outputs.report import write_report
-from warpspace.picture.scene_picture import evaluate_picture
+from warpspace.picture.model import evaluate_picture
 
 REFUSED = {
     "slices": "does not extend along X, Y and Z; draw the error-map",

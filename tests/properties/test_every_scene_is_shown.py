@@ -38,7 +38,7 @@ from warpspace.machine.axes import is_linear
 from warpspace.outputs.exports.fields import build_vts
 from warpspace.outputs.exports.glb import build_glb
 from warpspace.picture.mesh import edge_pieces, grid_pieces, isoline_pieces, line_mesh, map_mesh
-from warpspace.picture.scene_picture import evaluate_picture
+from warpspace.picture.model import evaluate_picture
 
 LAYERS = (
     BoxLayer,

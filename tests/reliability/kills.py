@@ -24,7 +24,7 @@ def _writers() -> dict[str, Callable[[int, Path], None]]:
     from warpspace.outputs.exports.fields import write_rows
     from warpspace.outputs.exports.formats import write_export
     from warpspace.outputs.files import write_atomically
-    from warpspace.picture.scene_picture import evaluate_picture
+    from warpspace.picture.model import evaluate_picture
     from warpspace.scene.library import load_scene
     from warpspace.scene.save import scene_to_toml
 

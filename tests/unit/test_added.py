@@ -58,11 +58,11 @@ from warpspace.outputs.figures.catalogue import (
 )
 from warpspace.outputs.report import ReportSettings, build_report, sections
 from warpspace.outputs.worker import FigureWorker
-from warpspace.picture.scene_picture import evaluate_picture
+from warpspace.picture.model import evaluate_picture
 from warpspace.scene.library import load_scene, parse_scene
 from warpspace.scene.model import evaluate
 from warpspace.scene.save import scene_to_toml
-from warpspace.spelling import spell, spell_short
+from warpspace.units import spell, spell_short
 
 __all__ = ["warpspace"]
 FIRST = load_scene("dvf5000_first")

@@ -11,7 +11,7 @@ from warpspace import load_scene
 from warpspace.geometry.colour import component_values
 from warpspace.outputs.drawing.settings import FigureSettings
 from warpspace.outputs.figures.catalogue import draw_figure
-from warpspace.picture.scene_picture import evaluate_picture
+from warpspace.picture.model import evaluate_picture
 from warpspace.units import MM_PER_UM
 
 pytestmark = [pytest.mark.render, pytest.mark.usefixtures("renderer")]

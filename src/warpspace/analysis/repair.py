@@ -24,8 +24,7 @@ from warpspace.machine.limits import (
     REPAIR_COUNT,
     REPAIR_NODES,
 )
-from warpspace.spelling import spell, spell_short
-from warpspace.units import Array
+from warpspace.units import Array, spell, spell_short
 
 if TYPE_CHECKING:
     from warpspace.scene.model import Scene

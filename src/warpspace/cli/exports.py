@@ -17,7 +17,7 @@ BYTES_PER_RESPONSE = 48
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from warpspace.picture.scene_picture import ScenePicture
+    from warpspace.picture.model import ScenePicture
     from warpspace.scene.model import Scene
 
 

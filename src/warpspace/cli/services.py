@@ -144,7 +144,7 @@ def write_export(request: Request, ending: str) -> bytes:
     """Write an export of a request."""
     from warpspace.outputs.files import temporary_folder
     from warpspace.picture.comparison import scene_change
-    from warpspace.picture.scene_picture import evaluate_picture
+    from warpspace.picture.model import evaluate_picture
 
     scale = request.colours
     fixed = (

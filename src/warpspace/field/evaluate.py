@@ -28,8 +28,7 @@ from warpspace.kinematics.components import join, rotate, split, split_rows, sub
 from warpspace.kinematics.model import Coordinates, Loop, Model, batch_shape
 from warpspace.machine.axes import TravelDirection, is_linear, parameter
 from warpspace.machine.errors import ErrorSet
-from warpspace.spelling import spell
-from warpspace.units import UM_PER_MM_URAD, Array
+from warpspace.units import UM_PER_MM_URAD, Array, spell
 
 
 @dataclass(frozen=True)

@@ -25,13 +25,11 @@ from warpspace.outputs.figures.error_map import isoline_words, say_statistics
 from warpspace.outputs.figures.machine import bodies_of, draw_bodies
 from warpspace.outputs.files import check_target, write_atomically
 from warpspace.outputs.processes import ProcessPool
-from warpspace.picture.model import choose_exaggeration, choose_scale
-from warpspace.picture.scene_picture import evaluate_picture
+from warpspace.picture.model import choose_exaggeration, choose_scale, evaluate_picture
 from warpspace.picture.traces import TraceLine, evaluate_traces
 from warpspace.resources import __version__
 from warpspace.scene.model import Scene
-from warpspace.spelling import spell, spell_short
-from warpspace.units import Array
+from warpspace.units import Array, spell, spell_short
 
 MOTIONS = ("exaggeration", "rotation")
 MIN_FRAMES, MAX_FRAMES = ANIMATION_FRAMES

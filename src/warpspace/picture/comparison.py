@@ -17,12 +17,13 @@ from warpspace.picture.model import (
     Exaggeration,
     P,
     Picture,
+    ScenePicture,
     choose_exaggeration,
     same_nodes,
     subtract_fields,
+    subtract_traces,
 )
-from warpspace.picture.scene_picture import ScenePicture
-from warpspace.picture.traces import TraceLines, subtract_traces
+from warpspace.picture.traces import TraceLines
 from warpspace.picture.words import own_axes, spell_at, spell_point
 from warpspace.scene.model import Scene
 

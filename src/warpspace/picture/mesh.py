@@ -96,54 +96,37 @@ def outline_pieces(picture: Picture, nodes_mm: Array) -> Pieces:
 
 def map_mesh(picture: Picture) -> MapMesh:
     """Collect the triangles of a map."""
-    vertices: list[Array] = []
-    triangles: list[NDArray[np.intp]] = []
-    values: list[Array] = []
-    parts = map_parts(picture)
-    if len(parts) == 1:
-        surface = parts[0].drawn_of.surface
-        return MapMesh(
-            parts[0].drawn_mm.reshape(-1, 3).take(surface.nodes, axis=0),
-            surface.triangles,
-            parts[0].values.reshape(-1).take(surface.nodes),
-        )
-    count = 0
-    for part in parts:
-        surface = part.drawn_of.surface
-        vertices.append(part.drawn_mm.reshape(-1, 3)[surface.nodes])
-        values.append(part.values.reshape(-1)[surface.nodes])
-        triangles.append(surface.triangles + count)
-        count += len(surface.nodes)
-    return MapMesh(np.concatenate(vertices), np.concatenate(triangles), np.concatenate(values))
-
-
-def grid_pieces(picture: Picture) -> Pieces:
-    """Collect the grid lines on a map, [S, 2, 3], mm."""
-    return _joined(
-        [
-            pieces
-            for part in map_parts(picture)
-            for pieces in part.pieces(part.drawn_of.grid_segments, part.drawn_of.grid_outwards, 1.0)
-        ]
-    )
+    surfaces = [(part, part.drawn_of.surface) for part in map_parts(picture)]
+    return _collect([(part, surface.nodes, surface.triangles) for part, surface in surfaces])
 
 
 def line_mesh(picture: Picture) -> MapMesh:
     """Collect grid lines and edges of a map as pieces of line between nodes, [S, 2]."""
-    vertices: list[Array] = []
-    segments: list[NDArray[np.intp]] = []
-    values: list[Array] = []
-    count = 0
+    found: list[tuple[Part, Index, Index]] = []
     for part in map_parts(picture):
-        of = part.drawn_of
-        used, numbered = np.unique(
-            np.concatenate([of.grid_segments, of.edge_segments]), return_inverse=True
-        )
-        vertices.append(part.drawn_mm.reshape(-1, 3)[used])
-        values.append(part.values.reshape(-1)[used])
-        segments.append(numbered.reshape(-1, 2) + count)
-        count += len(used)
-    return MapMesh(np.concatenate(vertices), np.concatenate(segments), np.concatenate(values))
+        segments = np.concatenate([part.drawn_of.grid_segments, part.drawn_of.edge_segments])
+        used, numbered = np.unique(segments, return_inverse=True)
+        found.append((part, used, numbered.reshape(-1, 2)))
+    return _collect(found)
+
+
+def _collect(found: list[tuple[Part, Index, Index]]) -> MapMesh:
+    """Put the used nodes of all parts together; cells that need no new numbers stay the same."""
+    vertices = [part.drawn_mm.reshape(-1, 3).take(used, axis=0) for part, used, _ in found]
+    values = [part.values.reshape(-1).take(used) for part, used, _ in found]
+    if len(found) == 1:
+        return MapMesh(vertices[0], found[0][2], values[0])
+    first = np.cumsum([0, *map(len, vertices)])
+    cells = [cells + at for (_, _, cells), at in zip(found, first, strict=False)]
+    return MapMesh(np.concatenate(vertices), np.concatenate(cells), np.concatenate(values))
+
+
+def grid_pieces(picture: Picture) -> Pieces:
+    """Collect the grid lines on a map, [S, 2, 3], mm."""
+    found: list[Pieces] = []
+    for part in map_parts(picture):
+        found += part.pieces(part.drawn_of.grid_segments, part.drawn_of.grid_outwards, 1.0)
+    return _joined(found)
 
 
 def edge_pieces(picture: Picture) -> Pieces:

@@ -1,7 +1,7 @@
 """The traces of the rotary axes as they are drawn, and the error motion along one of them."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -12,10 +12,8 @@ from warpspace.field.evaluate import ErrorField, evaluate_first_order
 from warpspace.geometry.surfaces import deform
 from warpspace.geometry.traces import SAMPLES, Trace, TraceGroup, build_traces
 from warpspace.kinematics.model import Loop
-from warpspace.picture.model import same_nodes
 from warpspace.scene.model import Scene
-from warpspace.spelling import spell_short
-from warpspace.units import Array
+from warpspace.units import Array, spell_short
 
 
 @dataclass(frozen=True)
@@ -87,17 +85,6 @@ def trace_lines(groups: Sequence[TraceLines]) -> tuple[TraceLine, ...]:
     return tuple(line for group in groups for line in group.each())
 
 
-def subtract_traces(
-    one: Sequence[TraceLines], other: Sequence[TraceLines]
-) -> tuple[TraceLines, ...]:
-    """Subtract the errors of traces, one − other, where they are the same traces."""
-    return tuple(
-        replace(first, error_um=first.error_um - second.error_um)
-        for first, second in zip(one, other, strict=False)
-        if same_nodes(first.nominal_mm, second.nominal_mm)
-    )
-
-
 Evaluate = Callable[..., ErrorField]
 LEAST_RADIUS_MM = 1e-3
 """A point nearer to the axis is on it and has no direction from it."""
@@ -131,23 +118,11 @@ def evaluate_axis_motion(
         MOTION_SAMPLES,
         {name: (at,) for name, at in trace.at.items()},
     )
-    for group in found:
-        number = _number(group, line)
-        if number is not None:
-            return _of_group(scene, group, number, evaluate)
-    return None
-
-
-def _number(group: TraceGroup, line: TraceLine) -> int | None:
-    if group.loop is not line.loop or line.trace not in group.traces:
+    group = next((g for g in found if g.loop is line.loop and trace in g.traces), None)
+    if group is None:
         return None
-    return group.traces.index(line.trace)
-
-
-def _of_group(
-    scene: Scene, group: TraceGroup, number: int, evaluate: Evaluate
-) -> AxisMotion | None:
-    nominal, trace = group.nominal_mm[number], group.traces[number]
+    number = group.traces.index(trace)
+    nominal = group.nominal_mm[number]
     if np.ptp(nominal, axis=0).max() < LEAST_RADIUS_MM:
         return None
     coordinates = {

@@ -7,8 +7,7 @@ from warpspace.kinematics.model import Convention, Loop, Model
 from warpspace.machine.axes import DIRECTION_WORDS, TravelDirection, is_linear, is_rotary
 from warpspace.machine.errors import ToleranceSet
 from warpspace.scene.model import Scene
-from warpspace.spelling import MINUS, THIN_SPACE, spell_short
-from warpspace.units import Array
+from warpspace.units import MINUS, THIN_SPACE, Array, spell_short
 
 # --- A point in both of its coordinates -----------------------------------------------------------
 # Positions of the axes, and the point of R they lead to.

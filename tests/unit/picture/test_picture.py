@@ -8,7 +8,7 @@ import pytest
 from still_scenes import still_scene
 from warpspace.analysis.concepts import Concepts, compare_concepts
 from warpspace.field.evaluate import evaluate_exact
-from warpspace.picture.scene_picture import evaluate_picture, picture_concept
+from warpspace.picture.model import evaluate_picture, picture_concept
 from warpspace.picture.traces import (
     evaluate_axis_motion,
     evaluate_traces,

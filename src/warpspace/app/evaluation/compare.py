@@ -13,8 +13,13 @@ from warpspace.app.state.comparison import AFTER, BEFORE, PRESENT, Comparison, S
 from warpspace.app.state.look import RotaryLook
 from warpspace.app.state.table import table_words
 from warpspace.geometry.colour import ColourScale
-from warpspace.picture.model import choose_scale, same_nodes, subtract_pictures, subtract_slices
-from warpspace.picture.traces import subtract_traces
+from warpspace.picture.model import (
+    choose_scale,
+    same_nodes,
+    subtract_pictures,
+    subtract_slices,
+    subtract_traces,
+)
 from warpspace.scene.model import Scene
 
 REFUSED = "The working volumes are not the same, so there is no difference node by node."

@@ -84,8 +84,7 @@ def answer(
     """Compare machines."""
     # scipy's distributions take half a second to import: not before the first picture
     from warpspace.analysis.concepts import compare_concepts
-    from warpspace.picture.model import choose_scale
-    from warpspace.picture.scene_picture import picture_concept
+    from warpspace.picture.model import choose_scale, picture_concept
 
     plan, done = question.plan(), 0
     total = plan.samples * len(question.scenes)

@@ -17,7 +17,7 @@ from warpspace.field.evaluate import View
 from warpspace.field.grid import build_grid
 from warpspace.machine.axes import parameter
 from warpspace.scene.model import Scene, grid_basis
-from warpspace.spelling import spell
+from warpspace.units import spell
 
 BEFORE = "before repair"
 

@@ -18,8 +18,7 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.viewport.layers import SCENE_PER_MM
 from warpspace.picture.mesh import isoline_labels
 from warpspace.picture.words import spell_factor
-from warpspace.spelling import spell_short
-from warpspace.units import Array
+from warpspace.units import Array, spell_short
 
 MACHINE = "machine"
 """Word of the button that hides the ghost of the machine, or shows it."""

@@ -18,7 +18,7 @@ from warpspace.app.state.concept_choice import Chosen, ConceptChoice
 from warpspace.geometry.colour import ColourScale
 from warpspace.machine.limits import MOST_CONCEPTS
 from warpspace.picture.words import LOOP_WORDS, tolerance_words
-from warpspace.spelling import spell_short
+from warpspace.units import spell_short
 
 if TYPE_CHECKING:
     from warpspace.analysis.concepts import Concept

@@ -11,8 +11,7 @@ from warpspace.app.readouts.html import render
 from warpspace.app.state.curve_text import sample_curve
 from warpspace.machine.curves.curve import ErrorFunction
 from warpspace.machine.errors import BACKWARD, Measurement
-from warpspace.spelling import spell
-from warpspace.units import Array
+from warpspace.units import Array, spell
 
 CURVE_COLOUR = "#4a7ab5"
 ZERO_COLOUR = "#9aa3af"

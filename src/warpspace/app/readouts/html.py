@@ -14,8 +14,7 @@ from markupsafe import Markup, escape
 
 from warpspace.machine.axes import parameter
 from warpspace.picture.words import spell_at, spell_coordinate, spell_point
-from warpspace.spelling import MINUS, THIN_SPACE, spell_short
-from warpspace.units import Array
+from warpspace.units import MINUS, THIN_SPACE, Array, spell_short
 
 # --- Spelling of numbers with their sign, and of large counts -------------------------------------
 

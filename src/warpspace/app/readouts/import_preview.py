@@ -9,8 +9,7 @@ from warpspace.app.readouts.html import render
 from warpspace.formats.measured import BACKWARD, BOTH, FORWARD, Series, summaries
 from warpspace.formats.registry import Reading
 from warpspace.machine.axes import is_linear, parameter
-from warpspace.spelling import spell_short
-from warpspace.units import Array
+from warpspace.units import Array, spell_short
 
 MOST_CURVES, MOST_DOTS = 12, 400
 WIDTH, HEIGHT, EDGE = 400.0, 90.0, 6.0

@@ -10,7 +10,7 @@ from warpspace.analysis.statistics import Summary
 from warpspace.analysis.typed import ALL
 from warpspace.app.readouts.html import message, render
 from warpspace.machine.axes import parameter
-from warpspace.spelling import spell, spell_short
+from warpspace.units import spell, spell_short
 
 SEEN = "seen"
 """Word that the page sends once a reader sees where the answer will be."""

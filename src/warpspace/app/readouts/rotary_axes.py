@@ -16,8 +16,7 @@ from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.picture.traces import POSITIVE, TraceLine, motion_lines, trace_lines, turn_words
 from warpspace.picture.words import spell_point
-from warpspace.spelling import spell_short
-from warpspace.units import Array
+from warpspace.units import Array, spell_short
 
 # --- The traces of a picture as numbers: how each circle runs, as text for the page ---------------
 

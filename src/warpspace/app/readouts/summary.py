@@ -17,8 +17,7 @@ from warpspace.field.evaluate import ErrorField, placed_words
 from warpspace.geometry.colour import ColourScale, colour_table
 from warpspace.geometry.surfaces import round_down
 from warpspace.picture.words import direction_words, spell_factor, spell_point
-from warpspace.spelling import spell_short
-from warpspace.units import MICROMETRE, MM_PER_UM
+from warpspace.units import MICROMETRE, MM_PER_UM, spell_short
 
 BAR_PX = 190
 """Height of the colour bar, CSS pixels; the style sheet has it too."""

@@ -46,7 +46,7 @@ def compare(
     """
     from warpspace.analysis.statistics import statistics
     from warpspace.picture.comparison import scene_change, statistics_blocks, statistics_change
-    from warpspace.picture.scene_picture import evaluate_picture
+    from warpspace.picture.model import evaluate_picture
     from warpspace.scene.library import load_scene
     from warpspace.scene.model import in_direction, placed_in
 

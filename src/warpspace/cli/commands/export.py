@@ -53,7 +53,7 @@ def export(
     The ending of FILE chooses the format. Every format carries the scene, the settings, the display
     factor and the program's version.
     """
-    from warpspace.picture.scene_picture import evaluate_picture
+    from warpspace.picture.model import evaluate_picture
     from warpspace.scene.library import load_scene
     from warpspace.scene.model import in_direction
 

@@ -123,7 +123,7 @@ def field(
     files = [path for path in (csv_path, output) if path is not None]
     if files:
         from warpspace.outputs.exports.fields import FieldRecord, write_field
-        from warpspace.picture.scene_picture import field_remarks
+        from warpspace.picture.model import field_remarks
 
         about = {**field_remarks(loaded, view, exact=exact), "frame": frame}
         with progress("writing", silent=as_json):

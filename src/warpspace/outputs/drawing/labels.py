@@ -11,8 +11,7 @@ from warpspace.outputs.drawing.canvas import Canvas
 from warpspace.outputs.drawing.render import Projection, Raster, Rect
 from warpspace.outputs.drawing.style import SIZES
 from warpspace.picture.model import Picture
-from warpspace.spelling import spell, spell_short
-from warpspace.units import MICROMETRE, Array
+from warpspace.units import MICROMETRE, Array, spell, spell_short
 
 _ANGLES = tuple(2.0 * math.pi * turn / 24 for turn in range(24))
 _DISTANCES = (8.0, 14.0, 22.0, 34.0, 50.0, 70.0, 100.0, 140.0)

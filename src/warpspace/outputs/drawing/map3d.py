@@ -32,8 +32,7 @@ from warpspace.outputs.drawing.sheet import DrawnMap
 from warpspace.outputs.drawing.style import SIZES
 from warpspace.picture.marks import tick_values
 from warpspace.picture.model import Picture, map_faces
-from warpspace.spelling import spell_short
-from warpspace.units import Array
+from warpspace.units import Array, spell_short
 
 INSETS = (112.0, 92.0, 84.0, 46.0)
 """Room for axes and labels around the body: left, bottom, right, top."""

@@ -12,8 +12,15 @@ from warpspace.machine.limits import MAX_FIGURE_SIDE_PX as LARGEST_SIDE
 from warpspace.machine.limits import MIN_FIGURE_PX as SMALLEST_SIZE
 from warpspace.machine.limits import RANGE_TOP
 from warpspace.outputs.drawing.style import DARK, LIGHT, Theme
-from warpspace.picture.model import VIEWS, Exaggeration, Picture, choose_scale, given_exaggeration
-from warpspace.picture.scene_picture import ScenePicture, evaluate_picture
+from warpspace.picture.model import (
+    VIEWS,
+    Exaggeration,
+    Picture,
+    ScenePicture,
+    choose_scale,
+    evaluate_picture,
+    given_exaggeration,
+)
 from warpspace.picture.words import range_words
 from warpspace.scene.model import Scene
 

@@ -17,7 +17,7 @@ from warpspace.outputs.drawing.canvas import Canvas
 from warpspace.outputs.drawing.render import Projection, Raster, Rect
 from warpspace.outputs.drawing.settings import FigureSettings, spell_settings
 from warpspace.outputs.drawing.style import SIZES, Theme
-from warpspace.picture.scene_picture import ScenePicture
+from warpspace.picture.model import ScenePicture
 from warpspace.picture.words import (
     LOOP_WORDS,
     TIMES,
@@ -27,8 +27,7 @@ from warpspace.picture.words import (
 )
 from warpspace.resources import __version__
 from warpspace.scene.model import Scene
-from warpspace.spelling import spell_short
-from warpspace.units import MM_PER_UM, Array
+from warpspace.units import MM_PER_UM, Array, spell_short
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from warpspace.exceptions import OptionError
 from warpspace.plugins import load_plugins
 
 if TYPE_CHECKING:
-    from warpspace.picture.scene_picture import ScenePicture
+    from warpspace.picture.model import ScenePicture
 
 Write = Callable[..., None]
 """Takes a picture, a path and the keyword `overwrite`."""

@@ -19,7 +19,7 @@ from warpspace.geometry.surfaces import (
 )
 from warpspace.outputs.files import write_atomically
 from warpspace.picture.mesh import thick_nodes
-from warpspace.picture.scene_picture import ScenePicture
+from warpspace.picture.model import ScenePicture
 from warpspace.picture.traces import TraceLine, trace_lines
 from warpspace.units import MM_PER_UM, Array
 

@@ -9,8 +9,7 @@ from warpspace.bodies.placed import place_bodies, scene_motions
 from warpspace.field.grid import DEFAULT_NODES
 from warpspace.geometry.surfaces import is_thin, outer_surface
 from warpspace.kinematics.model import Loop
-from warpspace.picture.model import Exaggeration
-from warpspace.picture.scene_picture import ScenePicture, evaluate_picture
+from warpspace.picture.model import Exaggeration, ScenePicture, evaluate_picture
 from warpspace.picture.traces import TraceLine, trace_lines
 from warpspace.scene.model import Scene, grid_basis
 from warpspace.units import Array

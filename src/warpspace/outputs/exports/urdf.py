@@ -12,7 +12,7 @@ from warpspace.kinematics.transforms import placed
 from warpspace.machine.axes import direction_index
 from warpspace.machine.description import Axis, Machine
 from warpspace.outputs.files import mesh_files, write_atomically, write_meshes
-from warpspace.picture.scene_picture import ScenePicture
+from warpspace.picture.model import ScenePicture
 from warpspace.units import Array
 
 ROOT, LINKS = "frame", {"S": "spindle", "t": "tool", "w": "workpiece"}

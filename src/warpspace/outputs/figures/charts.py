@@ -31,7 +31,7 @@ from warpspace.picture.traces import (
 )
 from warpspace.resources import __version__
 from warpspace.scene.model import Scene, choose_view
-from warpspace.spelling import spell_count
+from warpspace.units import spell_count
 
 CIRCLE = Circular(plane="XY", radius_mm=150.0)
 

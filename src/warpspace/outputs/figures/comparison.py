@@ -28,10 +28,9 @@ from warpspace.picture.comparison import (
     share_exaggeration,
     statistics_change,
 )
-from warpspace.picture.model import view_words
-from warpspace.picture.scene_picture import ScenePicture
+from warpspace.picture.model import ScenePicture, view_words
 from warpspace.scene.model import Scene
-from warpspace.spelling import spell, spell_signed
+from warpspace.units import spell, spell_signed
 
 
 def draw_comparison(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:

@@ -27,12 +27,10 @@ from warpspace.outputs.drawing.sheet import (
 from warpspace.outputs.drawing.style import SIZES
 from warpspace.outputs.figures.error_map import isoline_words
 from warpspace.outputs.figures.machine import bodies_of, draw_bodies
-from warpspace.picture.model import view_words
-from warpspace.picture.scene_picture import ConceptPicture, picture_concept
+from warpspace.picture.model import ConceptPicture, picture_concept, view_words
 from warpspace.picture.words import LOOP_WORDS, tolerance_words
 from warpspace.scene.model import Scene
-from warpspace.spelling import spell, spell_count, spell_short
-from warpspace.units import Array
+from warpspace.units import Array, spell, spell_count, spell_short
 
 BODY_ALPHA = 0.55
 CELL_HEAD, CELL_FOOT, AXIS_LABELS = 30.0, 74.0, 50.0

@@ -18,8 +18,7 @@ from warpspace.outputs.drawing.sheet import (
 from warpspace.picture.model import Picture, view_words
 from warpspace.picture.words import list_axes, quantity_words, spell_coordinate
 from warpspace.scene.model import Scene
-from warpspace.spelling import spell, spell_short
-from warpspace.units import Array
+from warpspace.units import Array, spell, spell_short
 
 EVERY = "isolines every "
 

@@ -36,7 +36,7 @@ from warpspace.outputs.drawing.sheet import (
 )
 from warpspace.outputs.drawing.style import SIZES, Theme
 from warpspace.outputs.figures.error_map import say_statistics
-from warpspace.picture.scene_picture import ScenePicture
+from warpspace.picture.model import ScenePicture
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 

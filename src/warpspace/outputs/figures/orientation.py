@@ -24,12 +24,10 @@ from warpspace.outputs.drawing.sheet import (
 )
 from warpspace.outputs.drawing.style import SIZES
 from warpspace.outputs.figures.error_map import isoline_words, place_rows
-from warpspace.picture.model import Picture, map_faces, view_words
-from warpspace.picture.scene_picture import ScenePicture
+from warpspace.picture.model import Picture, ScenePicture, map_faces, view_words
 from warpspace.picture.words import spell_factor
 from warpspace.scene.model import Scene
-from warpspace.spelling import spell
-from warpspace.units import MICRORADIAN, RAD_PER_URAD, Array
+from warpspace.units import MICRORADIAN, RAD_PER_URAD, Array, spell
 
 LEAN_RAD = 0.45
 """Largest lean on screen that the factor aims at."""

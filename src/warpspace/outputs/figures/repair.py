@@ -24,10 +24,10 @@ from warpspace.outputs.drawing.sheet import (
 from warpspace.outputs.drawing.style import FONT, SIZES
 from warpspace.outputs.figures.error_map import isoline_words
 from warpspace.picture.comparison import share_exaggeration
-from warpspace.picture.scene_picture import ScenePicture
+from warpspace.picture.model import ScenePicture
 from warpspace.picture.words import quantity_words
 from warpspace.scene.model import Scene
-from warpspace.spelling import spell
+from warpspace.units import spell
 
 MAPS_SHARE = 0.5
 """Of the height of the content."""

@@ -28,11 +28,9 @@ from warpspace.outputs.drawing.sheet import (
 )
 from warpspace.outputs.drawing.style import SIZES
 from warpspace.outputs.figures.error_map import isoline_words, say_statistics
-from warpspace.picture.model import Slice
-from warpspace.picture.scene_picture import ScenePicture
+from warpspace.picture.model import ScenePicture, Slice
 from warpspace.scene.model import Scene
-from warpspace.spelling import spell_short
-from warpspace.units import Array
+from warpspace.units import Array, spell_short
 
 VIEW_OF = {"Z": "top", "Y": "front", "X": "right"}
 

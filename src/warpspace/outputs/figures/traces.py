@@ -22,13 +22,11 @@ from warpspace.outputs.drawing.sheet import (
 )
 from warpspace.outputs.drawing.style import SIZES
 from warpspace.outputs.figures.machine import bodies_of, draw_bodies
-from warpspace.picture.model import choose_exaggeration, choose_scale
-from warpspace.picture.scene_picture import evaluate_picture
+from warpspace.picture.model import choose_exaggeration, choose_scale, evaluate_picture
 from warpspace.picture.traces import TraceLine, evaluate_traces, trace_lines
 from warpspace.picture.words import quantity_words, spell_vector
 from warpspace.scene.model import Scene
-from warpspace.spelling import MINUS, spell
-from warpspace.units import MICROMETRE, Array
+from warpspace.units import MICROMETRE, MINUS, Array, spell
 
 PIECE = 2
 """Samples of a trace in one piece of one colour."""

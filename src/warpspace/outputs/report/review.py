@@ -21,11 +21,16 @@ from warpspace.machine.axes import parameter
 from warpspace.machine.limits import REPAIR_NODES
 from warpspace.outputs.report.render import Block, Cards, Text
 from warpspace.picture.comparison import STATISTICS, scene_change, share_exaggeration
-from warpspace.picture.model import DIFFERENCE_LENGTH, Exaggeration, same_nodes
-from warpspace.picture.scene_picture import ScenePicture, evaluate_picture
+from warpspace.picture.model import (
+    DIFFERENCE_LENGTH,
+    Exaggeration,
+    ScenePicture,
+    evaluate_picture,
+    same_nodes,
+)
 from warpspace.picture.words import TIMES, own_axes, spell_point
 from warpspace.scene.model import Scene, second_order
-from warpspace.spelling import MINUS, spell, spell_short
+from warpspace.units import MINUS, spell, spell_short
 
 SUBJECTS = {
     "tool": "the tool point",

@@ -43,7 +43,7 @@ from warpspace.outputs.report.review import (
 )
 from warpspace.outputs.worker import FigureWorker
 from warpspace.picture.comparison import statistics_blocks
-from warpspace.picture.scene_picture import ScenePicture
+from warpspace.picture.model import ScenePicture
 from warpspace.picture.traces import trace_lines
 from warpspace.picture.words import (
     convention_sentences,
@@ -54,7 +54,7 @@ from warpspace.picture.words import (
 from warpspace.resources import __version__
 from warpspace.scene.model import Scene
 from warpspace.scene.save import scene_to_toml
-from warpspace.spelling import spell, spell_short
+from warpspace.units import spell, spell_short
 
 PAPER_SHARE = 0.87
 """Width of a map among the evidence: two of them then stand on a page."""

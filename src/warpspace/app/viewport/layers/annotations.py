@@ -20,8 +20,7 @@ from warpspace.picture.marks import (
     spell_micrometres,
     worst_point,
 )
-from warpspace.spelling import spell_short
-from warpspace.units import MICROMETRE
+from warpspace.units import MICROMETRE, spell_short
 
 RADIUS, HEAD, BALL = 0.0032, 0.034, 0.009
 """Shaft and head of an arrow, and the marker of the worst point, as parts of the longest edge."""
