@@ -8,7 +8,7 @@
 import re
 from pathlib import Path
 from types import GenericAlias, UnionType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
@@ -22,7 +22,7 @@ PAGES = {
 }
 """Pages outside this folder, and where the site shows them."""
 
-ALIASES = (GenericAlias, UnionType)
+ALIASES = (GenericAlias, UnionType, type(Annotated[int, 0]))
 COMING = ("performance.md",)
 """Pages that a command writes (`make bench`): until it has, links to them are words."""
 OPTIONS = """
