@@ -41,7 +41,7 @@ def prepare(folder: Path) -> None:
 
 def __getattr__(name: str) -> object:
     """Give a command by its name, since most are made from analyses and stand in no module."""
-    from warpspace.cli.registry import COMMANDS
+    from warpspace.cli.main import COMMANDS
 
     command = COMMANDS.get(name.replace("_", "-"))
     if command is None:
@@ -63,7 +63,7 @@ def options_of(name: str) -> str:
     """
     from click import Group
 
-    from warpspace.cli.registry import COMMANDS
+    from warpspace.cli.main import COMMANDS
 
     command = COMMANDS[name]
     nested = "\n   :nested: full" if isinstance(command, Group) else ""
@@ -111,7 +111,7 @@ def plain_bars(lines: list[str]) -> None:
 
 def _short_titles() -> str:
     """Name every command in a table of contents by its name alone."""
-    from warpspace.cli.registry import COMMANDS
+    from warpspace.cli.main import COMMANDS
 
     return "\n".join(f"{name} <{name}>" for name in sorted(COMMANDS))
 

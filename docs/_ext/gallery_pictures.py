@@ -130,7 +130,7 @@ def add_pictures(
 def _write_scene(script: Path, names: dict[str, Any]) -> str | None:
     """Write the first scene of an example as an offline page, once per scene."""
     from warpspace import load_scene
-    from warpspace.cli.exports import write_export
+    from warpspace.cli.services import write_page
     from warpspace.picture.model import evaluate_picture
 
     loaded = re.findall(r'load_scene\("(\w+)"\)|\("(dvf5000_\w+)"', script.read_text("utf-8"))
@@ -145,7 +145,7 @@ def _write_scene(script: Path, names: dict[str, Any]) -> str | None:
     if not page.exists():
         page.parent.mkdir(parents=True, exist_ok=True)
         picture = evaluate_picture(scene, exaggeration="auto", grid=21, loop="tool")
-        write_export(picture, page, overwrite=True)
+        write_page(picture, page, overwrite=True)
     return name
 
 

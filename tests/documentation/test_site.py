@@ -12,7 +12,7 @@ import pytest
 import warpspace
 from doc_pages import DOCS, ROOT, anchors, blocks, entries, links, pages, section
 from warpspace.app.server.tabs import tabs
-from warpspace.cli.registry import COMMANDS
+from warpspace.cli.main import COMMANDS
 from warpspace.kinematics.model import convention_names
 from warpspace.machine.curves.registry import curve_kinds
 from warpspace.scene.library import load_scene

@@ -240,7 +240,7 @@ def test_a_figure_is_tried_twice_then_its_place_says_that_it_is_missing(
 
 @pytest.mark.render
 def test_page_opens_without_network_and_draws(browser, renderer, tmp_path):
-    from warpspace.cli.exports import embed_view
+    from warpspace.cli.services import embed_view
 
     path = tmp_path / "report.html"
     scene = replace(load_scene("dvf5000_first"), title=EVIL)

@@ -10,7 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from products import pairwise
 from still_scenes import TEXTS, still_scene
 from warpspace import to_pyvista
-from warpspace.cli.exports import write_page
+from warpspace.cli.services import write_page
 from warpspace.exceptions import WarpspaceError
 from warpspace.outputs.exports.formats import write_export
 from warpspace.outputs.figures.catalogue import draw_figure, figure_names

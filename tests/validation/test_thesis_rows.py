@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import warpspace
-from warpspace.cli.commands.thesis import thesis_markdown
+from warpspace.cli.commands.machine import thesis_markdown
 
 # What the print and the model cannot agree on; each has a sentence why.
 DISAGREE = {

@@ -1,16 +1,15 @@
 """Commands made from analyses: options from their fields, output from what their results say."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from importlib import import_module
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from warpspace.analysis.catalogue import Entry
 from warpspace.analysis.options import Option, options_of
-from warpspace.cli.guard import DataFile, check_files
+from warpspace.cli.guard import DataFile, check_files, flag_of
+from warpspace.cli.machines import MORE
 from warpspace.cli.options import (
     SCENES,
     RenamedOption,
@@ -21,8 +20,9 @@ from warpspace.cli.options import (
     plot_option,
     print_json,
     scene_argument,
+    write_text,
 )
-from warpspace.cli.tables import echo, progress
+from warpspace.cli.tables import echo, progress, warn
 from warpspace.exceptions import OptionError
 from warpspace.machine.limits import SWEEP_CASES
 
@@ -31,19 +31,11 @@ if TYPE_CHECKING:
     from warpspace.analysis.description import Analysis, Result
     from warpspace.scene.model import Scene
 
-MORE = {"concepts": "warpspace.cli.side_by_side", "montecarlo": "warpspace.cli.machines"}
-"""Analyses with options and files of the command line only: where these are."""
-
-
-def build_command(entry: Entry) -> click.Command:
-    """Build the command of an analysis."""
-    return command_of(entry.load())
-
 
 def command_of(kind: "type[Analysis]") -> click.Command:
     """Build the command of a kind of analysis."""
-    more = import_module(MORE[kind.name]) if kind.name in MORE else None
-    command: Callable[..., None] = _runner(kind, more)
+    options, run_it = MORE.get(kind.name, ((), None))
+    command: Callable[..., None] = _runner(kind, run_it)
     command.__doc__ = kind.explained()
     decorators = [_scenes(kind), *map(_click_option, kind.options())]
     if kind.has_table:
@@ -56,10 +48,9 @@ def command_of(kind: "type[Analysis]") -> click.Command:
         )
     if kind.has_chart:
         decorators.append(plot_option(kind.chart_help))
-    if kind.has_table or kind.makes_scenes or kind.file_help or kind.has_chart or more:
+    if kind.has_table or kind.makes_scenes or kind.file_help or kind.has_chart or options:
         decorators.append(force_option)
-    decorators += more.OPTIONS if more else ()
-    for decorate in reversed([*decorators, json_option]):
+    for decorate in reversed([*decorators, *options, json_option]):
         command = decorate(command)
     return click.command(name=kind.name)(command)
 
@@ -87,7 +78,7 @@ def _click_option(one: Option) -> Callable[..., Any]:
     return click.option(one.flag, one.name, **traits)
 
 
-def _runner(kind: "type[Analysis]", more: Any) -> Callable[..., None]:
+def _runner(kind: "type[Analysis]", run_it: Callable[..., Any] | None) -> Callable[..., None]:
     def run(
         *,
         as_json: bool,
@@ -101,28 +92,23 @@ def _runner(kind: "type[Analysis]", more: Any) -> Callable[..., None]:
     ) -> None:
         from warpspace.field.evaluate import second_order_words
 
-        flags = {one.name: one.flag.partition("/")[0] for one in options_of(kind)}
-        flags["output"] = "-o"
+        own = {one.name for one in options_of(kind)}
         names, loaded = load_scenes(scenes or (scene,), kind.scenes)
-        try:
-            asked = read_options(kind, values, loaded[0])
-            asked = asked.written(Path(output).stem if output else None)
-            for words in asked.warnings(loaded[0]):
-                warn(OptionError(words).said(lambda name: flags[name]))
-            with progress(kind.doing, total=1.0, silent=as_json) as bar:
-                if more is None:
-                    found = asked.run_all(loaded, bar.reach)
-                else:
-                    its_own = {key: values[key] for key in values if key not in flags}
-                    files = {"plot": plot, "output": output, "force": force}
-                    found = more.run(asked, loaded, bar.reach, names=names, **files, **its_own)
-            warn(*found.doubts())
-            if left_out := found.second_order:
-                warn(*second_order_words(left_out))
-            chart, file = plot if kind.has_chart else None, None if more else output
-            wrote = write_result(found, csv_path, chart, file, force=force)
-        except OptionError as error:
-            raise OptionError(error.said(lambda name: flags.get(name, name))) from None
+        asked = read_options(kind, values, loaded[0])
+        asked = asked.written(Path(output).stem if output else None)
+        warn(*(OptionError(words).said(flag_of) for words in asked.warnings(loaded[0])))
+        with progress(kind.doing, total=1.0, silent=as_json) as bar:
+            if run_it is None:
+                found = asked.run_all(loaded, bar.reach)
+            else:
+                its_own = {key: values[key] for key in values if key not in own}
+                files = {"plot": plot, "output": output, "force": force}
+                found = run_it(asked, loaded, bar.reach, names=names, **files, **its_own)
+        warn(*found.doubts())
+        if left_out := found.second_order:
+            warn(*second_order_words(left_out))
+        chart, file = plot if kind.has_chart else None, None if run_it else output
+        wrote = write_result(found, csv_path, chart, file, force=force)
         if as_json:
             spelled = found.as_json()
             print_json(spelled | ({"files": wrote} if "files" in spelled else {}))
@@ -150,12 +136,6 @@ def read_options(kind: "type[Analysis]", values: dict[str, Any], scene: "Scene")
             value = one.enum(value)
         given[one.name] = value
     return kind(**given)
-
-
-def warn(*sentences: str) -> None:
-    """Say on stderr what a reader should doubt."""
-    for words in sentences:
-        echo(f"warpspace: warning: {words}", err=True, fg="yellow")
 
 
 def print_blocks(blocks: "Iterable[Block]") -> None:
@@ -197,13 +177,10 @@ def write_result(
 
 def write_texts(texts: Mapping[str, str], path: Path, *, force: bool) -> list[str]:
     """Write the files of a result: one of this name, others beside it."""
-    from warpspace.outputs.files import write_atomically
-
     targets = {add: path.with_name(f"{path.stem}{add}") if add else path for add in texts}
     check_files(click.get_current_context(), [target for add, target in targets.items() if add])
     for add, target in targets.items():
-        with write_atomically(target, overwrite=force) as temporary:
-            temporary.write_text(texts[add], encoding="utf-8", newline="")
+        write_text(target, texts[add], force=force)
     return [str(target) for target in targets.values()]
 
 
@@ -223,15 +200,12 @@ def write_csv(found: "Result", path: str, *, force: bool) -> None:
 
 def write_scene(found: "Result", path: str, *, force: bool) -> None:
     """Write the last scene that a result proposes."""
-    from warpspace.outputs.files import write_atomically
     from warpspace.scene.save import scene_to_toml
 
     changes = found.changes()
     if not changes:
         raise OptionError(f"-o {path}: {found.no_change}, so no scene is written")
-    text = scene_to_toml(changes[-1].scene)
-    with write_atomically(path, overwrite=force) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_text(path, scene_to_toml(changes[-1].scene), force=force)
 
 
 # --- Scenes of a command -------------------------------------------------------------------------

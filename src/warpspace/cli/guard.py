@@ -4,7 +4,7 @@ The types of its parameters say which they are; they are looked at before a comm
 are read as those of every table are.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, MutableMapping
 from contextlib import suppress
 from copy import copy
 from functools import wraps
@@ -14,7 +14,7 @@ from typing import Any, cast
 import click
 from click.shell_completion import CompletionItem
 
-from warpspace.exceptions import OutputError, SceneError
+from warpspace.exceptions import OptionError, OutputError, SceneError
 from warpspace.resources import assets_dir, check_address_space
 from warpspace.scene.files import parse_number
 
@@ -98,7 +98,10 @@ class OutputFile(click.Path):
 
 
 def guarded(command: click.Command) -> click.Command:
-    """Have the files of a command looked at before it begins, and its numbers read strictly."""
+    """Have the files of a command looked at before it begins, and its numbers read strictly.
+
+    An error that names an option is told with the flag of that option.
+    """
     command.context_settings.setdefault("help_option_names", ["-h", "--help"])
     for param in command.params:
         if isinstance(param.type, NUMBERS):
@@ -110,10 +113,56 @@ def guarded(command: click.Command) -> click.Command:
         def check_and_run(**values: Any) -> Any:
             check_address_space(LEAST_MB, "warpspace")
             check_files(click.get_current_context())
-            return run(**values)
+            try:
+                return run(**values)
+            except OptionError as error:
+                raise OptionError(error.said(flag_of)) from None
 
         command.callback = check_and_run
     return command
+
+
+def flag_of(name: str) -> str:
+    """Give what an option of the command that runs is called on the command line."""
+    params = click.get_current_context().command.params
+    return {param.name: param.opts[0] for param in params}.get(name, name)
+
+
+class Commands(MutableMapping[str, click.Command]):
+    """Commands by name, each built when it is first asked for and guarded.
+
+    One command therefore does not pay for the imports of all others. What is built need not be
+    listed: former names are understood only.
+    """
+
+    def __init__(
+        self, names: Callable[[], Iterable[str]], build: Callable[[str], click.Command]
+    ) -> None:
+        self._names, self._build = names, build
+        self._built: dict[str, click.Command] = {}
+        self._added: dict[str, click.Command] = {}
+
+    def __getitem__(self, name: str) -> click.Command:
+        """Build the command if it is not there yet; a `KeyError` where there is none."""
+        if name not in self._added and name not in self._built:
+            self._built[name] = guarded(self._build(name))
+        return self._added.get(name) or self._built[name]
+
+    def __setitem__(self, name: str, command: click.Command) -> None:
+        """Add a command."""
+        self._added[name] = guarded(command)
+
+    def __delitem__(self, name: str) -> None:
+        """Take away a command that was added."""
+        del self._added[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Go through the listed names, built or not."""
+        return iter(dict.fromkeys((*self._names(), *self._added)))
+
+    def __len__(self) -> int:
+        """Count the listed commands."""
+        return sum(1 for _ in self)
 
 
 def _strict(kind: "click.ParamType[Any]") -> "click.ParamType[Any]":

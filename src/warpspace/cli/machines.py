@@ -1,27 +1,32 @@
-"""What `montecarlo` has on the command line only: who does the work, and tables of any length."""
+"""What `concepts` and `montecarlo` have on the command line only.
+
+Machines are drawn side by side, worked on by processes or a cluster, and written in tables of any
+length.
+"""
 
 import os
-from collections.abc import Generator, Sequence
-from concurrent.futures import Executor
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, cast
 
 import click
 
-from warpspace.cli.options import ROWS, output_option
+from warpspace.cli.options import ROWS, draw_figure_file, output_option, plot_option, read_size
 from warpspace.exceptions import OptionError, WorkersLostError
 from warpspace.machine.limits import LOCAL_WORKERS
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from warpspace.analysis.concepts import Concepts, ConceptsResult
     from warpspace.analysis.description import Watch
     from warpspace.analysis.machines import Machines, MachinesResult
     from warpspace.analysis.montecarlo import Take
     from warpspace.scene.model import Scene
     from warpspace.units import Array
 
-
-# --- Who does the work of a command ---------------------------------------------------------------
-# Threads, processes of this machine, or a Dask cluster.
+    Workers = tuple[Executor | None, int | None]
+    """Who does the work, none for threads, and how many tasks are worked on at a time."""
 
 WORTH_A_POOL = 2_000_000
 """Machines: what takes about 10 s. Below, starting processes costs more than it saves."""
@@ -30,97 +35,34 @@ LOSSES = 5
 RETRIES = 3
 """How often a cluster does a task again that has lost its worker."""
 CONNECT_S = 10
-
-workers_option = click.option(
-    "--workers",
-    type=int,
-    help="Processes, from 2 million machines on; below, threads. The numbers do not depend on it."
-    "  [one per core]",
-)
-scheduler_option = click.option(
-    "--scheduler",
-    metavar="ADDRESS",
-    help="Let the workers of a Dask cluster do the work, for instance tcp://host:8786. Needs the"
-    " extra `cluster`.",
-)
-
-
-Workers = tuple[Executor | None, int | None]
-"""Who does the work, none for threads, and how many tasks are worked on at a time."""
-
-
-@contextmanager
-def find_workers(scheduler: str | None, workers: int | None, machines: int) -> Generator[Workers]:
-    """Choose who does the work."""
-    if scheduler is not None:
-        if workers is not None:
-            raise OptionError(
-                "--workers and --scheduler exclude each other: a cluster has its own workers"
-            )
-        with _cluster(scheduler) as found:
-            yield found
-        return
-    if workers is not None and not LOCAL_WORKERS[0] <= workers <= LOCAL_WORKERS[1]:
-        low, high = LOCAL_WORKERS
-        raise OptionError(f"workers: {workers}; expected {low} to {high}")
-    number = workers or os.cpu_count() or 1
-    if number == 1 or machines < WORTH_A_POOL:
-        yield None, workers
-        return
-    from warpspace.outputs.processes import ProcessPool
-
-    pool = ProcessPool(number, losses=LOSSES)
-    try:
-        yield pool, number
-    except WorkersLostError as error:
-        raise WorkersLostError(f"{error}; run again with fewer --workers") from None
-    finally:
-        pool.kill()
-
-
-@contextmanager
-def _cluster(address: str) -> Generator[Workers]:
-    try:
-        import distributed
-    except ImportError:
-        raise OptionError(
-            "--scheduler needs dask and distributed: pip install 'warpspace[cluster]'"
-        ) from None
-    try:
-        client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
-    except (OSError, ValueError, TypeError, ImportError, AssertionError) as error:
-        raise OptionError(
-            f"--scheduler {address!r}: {error}; expected the address of a Dask scheduler, for"
-            " instance tcp://127.0.0.1:8786"
-        ) from None
-    try:
-        cores = cast("dict[str, int]", client.ncores())
-        threads = sum(cores.values())
-        if not threads:
-            raise OptionError(f"--scheduler {address!r}: the cluster has no worker")
-        # a task that has lost its worker runs again elsewhere; `pure` would hash its arguments
-        yield client.get_executor(pure=False, retries=RETRIES), threads
-    except distributed.KilledWorker as error:
-        raise WorkersLostError(f"--scheduler {address!r}: {error}") from None
-    finally:
-        client.close()
-
-
 MOST_CSV_ROWS = 10_000_000
-OPTIONS = (
-    workers_option,
-    scheduler_option,
-    output_option(
-        "|E| of every machine as a table, or the rows of all combinations: .parquet or .csv.",
-        *ROWS,
-        required=False,
-    ),
-)
 NAMED = ("scene", "title")
 COUNTED = ("samples", "seed")
 
 
-def run(
+def draw_beside(
+    asked: "Concepts",
+    scenes: "Sequence[Scene]",
+    watch: "Watch",
+    *,
+    size: tuple[int, int],
+    plot: str | None,
+    force: bool,
+    **_others: object,
+) -> "ConceptsResult":
+    """Compare the machines, and draw them where that is asked for."""
+    from warpspace.outputs.drawing.settings import FigureSettings
+
+    settings = FigureSettings(size=size, loop=str(asked.loop), concepts=asked)
+    if plot is not None and len(scenes) < 2:
+        raise OptionError("--plot sets machines side by side; expected two scenes or more")
+    found = asked.run_all(scenes, watch)
+    if plot is not None:
+        draw_figure_file("concepts", scenes, settings, plot, force=force, silent=True)
+    return found
+
+
+def sample(
     asked: "Machines",
     scenes: "Sequence[Scene]",
     watch: "Watch",
@@ -151,6 +93,63 @@ def run(
     if output is not None and asked.in_rows:
         _write_rows(output, result.rows, force=force)
     return result
+
+
+@contextmanager
+def find_workers(scheduler: str | None, workers: int | None, machines: int) -> "Generator[Workers]":
+    """Choose who does the work."""
+    if scheduler is not None:
+        if workers is not None:
+            raise OptionError(
+                "--workers and --scheduler exclude each other: a cluster has its own workers"
+            )
+        with _cluster(scheduler) as found:
+            yield found
+        return
+    if workers is not None and not LOCAL_WORKERS[0] <= workers <= LOCAL_WORKERS[1]:
+        low, high = LOCAL_WORKERS
+        raise OptionError(f"workers: {workers}; expected {low} to {high}")
+    number = workers or os.cpu_count() or 1
+    if number == 1 or machines < WORTH_A_POOL:
+        yield None, workers
+        return
+    from warpspace.outputs.processes import ProcessPool
+
+    pool = ProcessPool(number, losses=LOSSES)
+    try:
+        yield pool, number
+    except WorkersLostError as error:
+        raise WorkersLostError(f"{error}; run again with fewer --workers") from None
+    finally:
+        pool.kill()
+
+
+@contextmanager
+def _cluster(address: str) -> "Generator[Workers]":
+    try:
+        import distributed
+    except ImportError:
+        raise OptionError(
+            "--scheduler needs dask and distributed: pip install 'warpspace[cluster]'"
+        ) from None
+    try:
+        client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
+    except (OSError, ValueError, TypeError, ImportError, AssertionError) as error:
+        raise OptionError(
+            f"--scheduler {address!r}: {error}; expected the address of a Dask scheduler, for"
+            " instance tcp://127.0.0.1:8786"
+        ) from None
+    try:
+        cores = cast("dict[str, int]", client.ncores())
+        threads = sum(cores.values())
+        if not threads:
+            raise OptionError(f"--scheduler {address!r}: the cluster has no worker")
+        # a task that has lost its worker runs again elsewhere; `pure` would hash its arguments
+        yield client.get_executor(pure=False, retries=RETRIES), threads
+    except distributed.KilledWorker as error:
+        raise WorkersLostError(f"--scheduler {address!r}: {error}") from None
+    finally:
+        client.close()
 
 
 @contextmanager
@@ -190,3 +189,45 @@ def _write_rows(output: str, rows: Sequence[Any], *, force: bool) -> None:
     }
     with write_rows(output, kinds, overwrite=force) as append:
         append({name: [row[name] for row in rows] for name in kinds})
+
+
+MORE: dict[str, tuple[tuple[Callable[..., Any], ...], Callable[..., Any]]] = {
+    "concepts": (
+        (
+            plot_option("machines side by side"),
+            click.option(
+                "--size",
+                default="1600x1200",
+                show_default=True,
+                metavar="WxH",
+                callback=read_size,
+                help="Of the picture, px.",
+            ),
+        ),
+        draw_beside,
+    ),
+    "montecarlo": (
+        (
+            click.option(
+                "--workers",
+                type=int,
+                help="Processes, from 2 million machines on; below, threads. The numbers do not"
+                " depend on it.  [one per core]",
+            ),
+            click.option(
+                "--scheduler",
+                metavar="ADDRESS",
+                help="Let the workers of a Dask cluster do the work, for instance tcp://host:8786."
+                " Needs the extra `cluster`.",
+            ),
+            output_option(
+                "|E| of every machine as a table, or the rows of all combinations: .parquet or"
+                " .csv.",
+                *ROWS,
+                required=False,
+            ),
+        ),
+        sample,
+    ),
+}
+"""Options beside those of the analysis, and what runs it with them."""

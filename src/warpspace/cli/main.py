@@ -1,4 +1,4 @@
-"""The command `warpspace`: its group, and the one place where errors become messages."""
+"""The command `warpspace`: its group, its commands, and the place where errors become messages."""
 
 import io
 import os
@@ -6,19 +6,23 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 from types import FrameType
-from typing import NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
 from warpspace.analysis.catalogue import TASKS, entries
-from warpspace.cli.registry import COMMANDS, task_of
+from warpspace.cli.guard import Commands
 from warpspace.cli.tables import echo, plain
 from warpspace.exceptions import WarpspaceError
 from warpspace.resources import __version__
+
+if TYPE_CHECKING:
+    from warpspace.analysis.description import Task
 
 BAD_INPUT = 2
 NO_MEMORY = "not enough memory for this; try a smaller grid"
@@ -30,6 +34,100 @@ COMPLETION_HELP = """
 Shell completion (bash; zsh and fish likewise):
   eval "$(_WARPSPACE_COMPLETE=bash_source warpspace)"
 """
+
+
+BUNDLED: "dict[Task, str]" = {
+    "see": "view draw compare export report",
+    "understand": "field",
+    "measure": "test import",
+    "machine": "check list new-machine thesis",
+}
+"""Commands that are made from no analysis, by their task; `warpspace.cli.commands` has them."""
+FORMER: dict[str, tuple[str, tuple[str, ...]]] = {
+    "animate": ("draw", ()),
+    "ballbar": ("test", ("ballbar",)),
+    "formats": ("import", ("--formats",)),
+    "import-machine": ("import", ("--format", "urdf")),
+    "measured": ("check", ("--against", "own")),
+    "machines": ("list", ("machines",)),
+    "scenes": ("list", ("scenes",)),
+    "snapshot": ("draw", ()),
+    "sweep": ("montecarlo", ("--rows",)),
+    "template": ("import", ("--template",)),
+}
+"""Former name of a command: its present name, and the arguments it stands for."""
+
+
+class RenamedCommand(click.Command):
+    """A former command: the present one, with the arguments that it stands for put first."""
+
+    def __init__(self, name: str, now: click.Command, prefix: tuple[str, ...]) -> None:
+        super().__init__(name, help=f"Former name of {now.name}.", hidden=True)
+        self.now = now
+        self.prefix = prefix
+
+    def make_context(
+        self,
+        info_name: str | None,  # noqa: ARG002 - signature of click
+        args: list[str],
+        parent: click.Context | None = None,
+        **extra: Any,
+    ) -> click.Context:
+        """Read the arguments as the present command."""
+        return self.now.make_context(self.now.name, [*self.prefix, *args], parent, **extra)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the present command."""
+        return self.now.invoke(ctx)
+
+
+def task_of(name: str) -> "Task":
+    """Give the task that a command belongs to; those of plug-ins stand with scenes and machines."""
+    tasks: dict[str, Task] = {entry.name: entry.task for entry in entries()}
+    tasks |= {one: task for task, names in BUNDLED.items() for one in names.split()}
+    return tasks.get(name, "machine")
+
+
+def _names() -> Iterator[str]:
+    yield from " ".join(BUNDLED.values()).split()
+    yield from (entry.name for entry in entries())
+
+
+def _build(name: str) -> click.Command:
+    """Import the command, or make it from its analysis."""
+    for entry in entries():
+        if entry.name == name:
+            from warpspace.cli.analyses import command_of
+
+            return command_of(entry.load())
+    if name in FORMER:
+        now, prefix = FORMER[name]
+        return RenamedCommand(name, COMMANDS[now], prefix)
+    home = import_module(f"warpspace.cli.commands.{task_of(name)}")
+    found = [thing for thing in vars(home).values() if isinstance(thing, click.Command)]
+    return {command.name: command for command in found}[name]
+
+
+COMMANDS = Commands(_names, _build)
+"""The commands of `warpspace`."""
+
+
+def register_command(command: click.Command) -> None:
+    """Add a command of a plug-in; it appears in ``warpspace --help`` beside the bundled ones.
+
+    Parameters
+    ----------
+    command : click.Command
+        With a name that no other command has.
+
+    Raises
+    ------
+    ValueError
+        If it has no name, or one that is taken.
+    """
+    if not command.name or command.name in COMMANDS:
+        raise ValueError(f"a command {command.name!r} cannot be added: expected a name of its own")
+    COMMANDS[command.name] = command
 
 
 class TaskGroup(click.Group):

@@ -10,7 +10,7 @@ import click
 from click.core import ParameterSource
 
 from warpspace.cli.guard import OutputFile, SceneName
-from warpspace.cli.tables import echo, escape_json, progress
+from warpspace.cli.tables import escape_json, progress, warn
 from warpspace.exceptions import OptionError
 from warpspace.scene.files import parse_number, parse_whole
 
@@ -19,20 +19,6 @@ if TYPE_CHECKING:
     from warpspace.machine.description import Machine
     from warpspace.outputs.drawing.settings import FigureSettings
     from warpspace.scene.model import Scene
-
-FORMER: dict[str, tuple[str, tuple[str, ...]]] = {
-    "animate": ("draw", ()),
-    "ballbar": ("test", ("ballbar",)),
-    "formats": ("import", ("--formats",)),
-    "import-machine": ("import", ("--format", "urdf")),
-    "measured": ("check", ("--against", "own")),
-    "machines": ("list", ("machines",)),
-    "scenes": ("list", ("scenes",)),
-    "snapshot": ("draw", ()),
-    "sweep": ("montecarlo", ("--rows",)),
-    "template": ("import", ("--template",)),
-}
-"""Former name of a command: its present name, and the arguments it stands for."""
 
 
 class RenamedOption(click.Option):
@@ -50,29 +36,6 @@ class RenamedOption(click.Option):
             super().add_to_parser(parser, ctx)
         finally:
             self.opts = listed
-
-
-class RenamedCommand(click.Command):
-    """A former command: the present one, with the arguments that it stands for put first."""
-
-    def __init__(self, name: str, now: click.Command, prefix: tuple[str, ...]) -> None:
-        super().__init__(name, help=f"Former name of {now.name}.", hidden=True)
-        self.now = now
-        self.prefix = prefix
-
-    def make_context(
-        self,
-        info_name: str | None,  # noqa: ARG002 - signature of click
-        args: list[str],
-        parent: click.Context | None = None,
-        **extra: Any,
-    ) -> click.Context:
-        """Read the arguments as the present command."""
-        return self.now.make_context(self.now.name, [*self.prefix, *args], parent, **extra)
-
-    def invoke(self, ctx: click.Context) -> Any:
-        """Run the present command."""
-        return self.now.invoke(ctx)
 
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
@@ -127,9 +90,29 @@ component_option = click.option(
     show_default=True,
     help="What the colours show: the length |E| of the error, or one signed component, in µm.",
 )
+
+
+def read_exaggeration(
+    _ctx: click.Context, _param: click.Parameter, text: str | None
+) -> float | Literal["auto"] | None:
+    """Read a display factor as a user types it."""
+    if text is None:
+        return None
+    if text.strip().lower() == "auto":
+        return "auto"
+    try:
+        value = parse_number(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise OptionError(f"--exaggeration {text!r}; expected auto or a number above 0")
+    return value
+
+
 exaggeration_option = click.option(
     "--exaggeration",
     metavar="auto|N",
+    callback=read_exaggeration,
     help="Display factor of displacements: a number, or auto for a round one that suits the scene."
     "  [what the scene says]",
 )
@@ -169,23 +152,15 @@ def warn_outside_travel(machine: "Machine", point: Mapping[str, float]) -> None:
     """Say on stderr where a position lies outside the travel of its axis."""
     from warpspace.analysis.typed import outside_travel
 
-    for words in outside_travel(machine, point):
-        echo(f"warpspace: warning: --at {words}", err=True, fg="yellow")
+    warn(*(f"--at {words}" for words in outside_travel(machine, point)))
 
 
-def parse_exaggeration(text: str | None) -> float | Literal["auto"] | None:
-    """Read a display factor as a user types it."""
-    if text is None:
-        return None
-    if text.strip().lower() == "auto":
-        return "auto"
-    try:
-        value = parse_number(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise OptionError(f"--exaggeration {text!r}; expected auto or a number above 0")
-    return value
+def load_placed(name: str, direction: str | None, loop: str, *, placed: bool = False) -> "Scene":
+    """Load a scene as it is looked at: for a direction of travel, the workpiece placed or not."""
+    from warpspace.scene.library import load_scene
+    from warpspace.scene.model import in_direction, placed_in
+
+    return placed_in(in_direction(load_scene(name), direction), loop, placed=placed)
 
 
 def say_first_order(loop: str, *scenes: "Scene") -> None:
@@ -199,8 +174,7 @@ def say_second_order(*found: "SecondOrder") -> dict[str, float]:
     """Warn where first-order numbers are not enough; the JSON object carries it in any case."""
     from warpspace.field.evaluate import second_order_words
 
-    for words in second_order_words(*found):
-        echo(f"warpspace: warning: {words}", err=True, fg="yellow")
+    warn(*second_order_words(*found))
     said = click.get_current_context().meta[SECOND_ORDER] = {
         "second_order_um": max(one.um for one in found)
     }
@@ -250,16 +224,38 @@ def plot_option(what: str) -> Decorator:
     return click.option("--plot", type=OutputFile(*FIGURES), help=help_text)
 
 
+def write_text(path: str | Path, text: str, *, force: bool) -> None:
+    """Write a text whole or not at all; its ends of lines stay as they are."""
+    from warpspace.outputs.files import write_atomically
+
+    with write_atomically(path, overwrite=force) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="")
+
+
 def size_text(path: str) -> str:
     """Spell the size of a file."""
     return f"{Path(path).stat().st_size / 1e6:.2f} MB"
 
 
-SIZE = "1600x1200"
 VIEWS = ("iso", "front", "right", "top")
 
 
-def figure_options(size: str | None = SIZE, sizes: str = "") -> Decorator:
+def read_size(
+    _ctx: click.Context, _param: click.Parameter, text: str | None
+) -> tuple[int, int] | None:
+    """Read a size as a user types it, for instance ``1600x1200``."""
+    if text is None:
+        return None
+    width, _, height = text.lower().replace("×", "x").partition("x")
+    try:
+        return parse_whole(width), parse_whole(height)
+    except ValueError:
+        raise OptionError(
+            f"--size {text!r} cannot be read; expected WIDTHxHEIGHT in px, for instance 1600x1200"
+        ) from None
+
+
+def figure_options(size: str | None = "1600x1200", sizes: str = "") -> Decorator:
     """Add the options of a map; where its size in px depends, `sizes` says on what."""
     options = (
         component_option,
@@ -276,6 +272,7 @@ def figure_options(size: str | None = SIZE, sizes: str = "") -> Decorator:
             default=size,
             show_default=size is not None,
             metavar="WxH",
+            callback=read_size,
             help=f"Width and height of the picture in px.{sizes}",
         ),
         loop_option,
@@ -294,34 +291,13 @@ def figure_options(size: str | None = SIZE, sizes: str = "") -> Decorator:
     return decorate
 
 
-def parse_size(text: str) -> tuple[int, int]:
-    """Read a size as a user types it, for instance ``1600x1200``."""
-    width, _, height = text.lower().replace("×", "x").partition("x")
-    try:
-        return parse_whole(width), parse_whole(height)
-    except ValueError:
-        raise OptionError(
-            f"--size {text!r} cannot be read; expected WIDTHxHEIGHT in px, for instance 1600x1200"
-        ) from None
-
-
-def parse_settings(
-    *,
-    component: str,
-    exaggeration: str | None,
-    view: str,
-    size: str,
-    loop: str,
-    grid: int,
-    dark: bool,
-) -> "FigureSettings":
+def figure_settings(*, grid: int, **options: Any) -> "FigureSettings":
     """Check the options of a map."""
     from warpspace.field.grid import node_counts
     from warpspace.outputs.drawing.settings import FigureSettings
 
     node_counts(grid)
-    factor = parse_exaggeration(exaggeration)
-    return FigureSettings(component, factor, view, parse_size(size), dark, loop, grid)
+    return FigureSettings(grid=grid, **options)
 
 
 def draw_figure_file(

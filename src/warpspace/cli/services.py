@@ -1,27 +1,33 @@
-"""What the app has the outputs do: figures in a process of their own, exports in memory."""
+"""What the app and the outputs do for each other: figures and exports of a page, pages of scenes.
+
+Figures are drawn in a process of their own. All is imported when it is done, as for any command.
+"""
 
 import threading
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from warpspace.app.documents.services import (
-    CancelledError,
-    CompensationRequest,
-    ConceptRequest,
-    Request,
-    Services,
-)
+from warpspace.cli.options import write_text
 from warpspace.exceptions import OptionError, RenderError, WorkersLostError
-from warpspace.outputs.exports.formats import export_formats
+from warpspace.outputs.exports.formats import ExportFormat, export_formats, register_format
 from warpspace.outputs.exports.formats import write_export as write
 from warpspace.outputs.figures.catalogue import figure_kinds
-from warpspace.picture.words import range_words
-from warpspace.scene.model import Scene
 
 if TYPE_CHECKING:
+    from concurrent.futures import Future
+    from pathlib import Path
+
+    from warpspace.app.documents.services import (
+        CompensationRequest,
+        ConceptRequest,
+        Request,
+        Services,
+    )
     from warpspace.outputs.drawing.settings import FigureSettings
+    from warpspace.picture.model import ScenePicture
+    from warpspace.scene.model import Scene
 
 MOST_RENDERERS = 2
 """Figures drawn at the same time for all tabs together."""
@@ -29,8 +35,10 @@ POLL_S = 0.1
 _renderers = threading.Semaphore(MOST_RENDERERS)
 
 
-def build_services() -> Services:
+def build_services() -> "Services":
     """Give the app its figures and exports."""
+    from warpspace.app.documents.services import Services
+
     return Services(
         draw_figure,
         write_export,
@@ -41,7 +49,7 @@ def build_services() -> Services:
     )
 
 
-def draw_figure(request: Request, cancelled: threading.Event) -> bytes:
+def draw_figure(request: "Request", cancelled: threading.Event) -> bytes:
     """Draw the map of a request as a PNG; of a comparison both sides and the difference.
 
     Where tilts are coloured it is the orientation map; a comparison is always of position errors.
@@ -80,7 +88,7 @@ def draw_figure(request: Request, cancelled: threading.Event) -> bytes:
     return _render(name, scenes, settings, cancelled)
 
 
-def draw_concepts(request: ConceptRequest, cancelled: threading.Event) -> bytes:
+def draw_concepts(request: "ConceptRequest", cancelled: threading.Event) -> bytes:
     """Draw machines side by side as a PNG; otherwise as `draw_figure`."""
     from warpspace.outputs.drawing.settings import FigureSettings
 
@@ -92,59 +100,72 @@ def draw_concepts(request: ConceptRequest, cancelled: threading.Event) -> bytes:
     return _render("concepts", request.scenes, settings, cancelled)
 
 
-def draw_compensation(request: CompensationRequest, cancelled: threading.Event) -> bytes:
+def draw_compensation(request: "CompensationRequest", cancelled: threading.Event) -> bytes:
     """Draw the maps of a compensation as a PNG."""
     from warpspace.outputs.charts.results import draw_maps
     from warpspace.outputs.processes import ProcessPool
 
-    _take_turn(cancelled)
-    pool = ProcessPool(1)
-    try:
-        drawn = pool.submit(draw_maps, request.found, dark=request.dark, narrow=request.narrow)
-        while not wait([drawn], POLL_S).done:
-            if cancelled.is_set():
-                raise CancelledError("the maps were cancelled")
-        return drawn.result()
-    except WorkersLostError:
-        raise RenderError("the maps could not be drawn: their process has ended") from None
-    finally:
-        pool.kill()
-        _renderers.release()
-
-
-def _take_turn(cancelled: threading.Event) -> None:
-    while not _renderers.acquire(timeout=POLL_S):
-        if cancelled.is_set():
-            raise CancelledError("cancelled while waiting for a renderer")
+    with _turn(cancelled):
+        pool = ProcessPool(1)
+        try:
+            drawn = pool.submit(draw_maps, request.found, dark=request.dark, narrow=request.narrow)
+            return _wait(drawn, cancelled, pool.kill, "maps were")
+        except WorkersLostError:
+            raise RenderError("the maps could not be drawn: their process has ended") from None
+        finally:
+            pool.kill()
 
 
 def _render(
     name: str,
-    scenes: Sequence[Scene],
+    scenes: "Sequence[Scene]",
     settings: "FigureSettings",
     cancelled: threading.Event,
 ) -> bytes:
+    from concurrent.futures import ThreadPoolExecutor
+
     from warpspace.outputs.worker import FigureWorker
 
-    _take_turn(cancelled)
+    with _turn(cancelled), FigureWorker() as worker, ThreadPoolExecutor(1) as caller:
+        drawn = caller.submit(worker.render, name, scenes, settings, "png")
+        return _wait(drawn, cancelled, lambda: worker.close(wait=False), "figure was")
+
+
+@contextmanager
+def _turn(cancelled: threading.Event) -> Generator[None]:
+    from warpspace.app.documents.services import CancelledError
+
+    while not _renderers.acquire(timeout=POLL_S):
+        if cancelled.is_set():
+            raise CancelledError("cancelled while waiting for a renderer")
     try:
-        with FigureWorker() as worker, ThreadPoolExecutor(1) as caller:
-            drawn = caller.submit(worker.render, name, scenes, settings, "png")
-            while not wait([drawn], POLL_S).done:
-                if cancelled.is_set():
-                    worker.close(wait=False)
-                    wait([drawn])
-                    raise CancelledError("the figure was cancelled")
-            return drawn.result()
+        yield
     finally:
         _renderers.release()
 
 
-def write_export(request: Request, ending: str) -> bytes:
+def _wait(
+    drawn: "Future[bytes]", cancelled: threading.Event, end: Callable[[], None], what: str
+) -> bytes:
+    """Wait for a drawing; where it is cancelled, end what draws it."""
+    from concurrent.futures import wait
+
+    from warpspace.app.documents.services import CancelledError
+
+    while not wait([drawn], POLL_S).done:
+        if cancelled.is_set():
+            end()
+            wait([drawn])
+            raise CancelledError(f"the {what} cancelled")
+    return drawn.result()
+
+
+def write_export(request: "Request", ending: str) -> bytes:
     """Write an export of a request."""
     from warpspace.outputs.files import temporary_folder
     from warpspace.picture.comparison import scene_change
     from warpspace.picture.model import evaluate_picture
+    from warpspace.picture.words import range_words
 
     scale = request.colours
     fixed = (
@@ -172,3 +193,59 @@ def write_export(request: Request, ending: str) -> bytes:
         target = folder / f"export{ending}"
         write(picture, target, overwrite=False)
         return target.read_bytes()
+
+
+# --- The offline page, which the app writes: outputs know nothing of the app ----------------------
+
+BYTES_PER_RESPONSE = 48
+"""Position and orientation error of one node to one parameter: six numbers."""
+
+
+def write_page(picture: "ScenePicture", target: "Path", *, overwrite: bool) -> None:
+    """Write the interactive scene as one page that needs no network."""
+    from warpspace.app.documents.offline_page import build_offline_html, offline_picture
+
+    _check_size(picture)
+    live = offline_picture(
+        picture.scene,
+        exaggeration=picture.exaggeration,
+        nodes=max(picture.grid.shape),
+        loop=picture.view.loop,
+        component=picture.component,
+    )
+    write_text(target, build_offline_html(live, picture.provenance), force=overwrite)
+
+
+def _check_size(picture: "ScenePicture") -> None:
+    from warpspace.machine.limits import MAX_PAGE_BYTES
+
+    nodes, keys = picture.values.size, len(picture.scene.parameter_keys)
+    needed = nodes * keys * BYTES_PER_RESPONSE
+    if needed > MAX_PAGE_BYTES:
+        per_axis = max(picture.grid.shape)
+        fits = int(per_axis * (MAX_PAGE_BYTES / needed) ** (1.0 / 3.0))
+        raise OptionError(
+            f"grid {per_axis}: the page needs about {needed / 1e9:.1f} GB of memory for"
+            f" {keys} parameters at {nodes:,} nodes; expected at most {MAX_PAGE_BYTES / 1e9:.1f} GB"
+            f" (--grid {fits}, or a .vts or .csv file, which hold any grid)"
+        )
+
+
+register_format(
+    ExportFormat(
+        ".html", "the interactive scene, one file that needs no network", write_page, in_app=False
+    )
+)
+
+
+def embed_view(
+    scene: "Scene", *, exaggeration: float, nodes: int, loop: str, largest: float
+) -> str:
+    """Build the page with the interactive scene."""
+    from warpspace.app.documents.offline_page import build_offline_html, offline_picture
+    from warpspace.kinematics.model import Loop
+
+    live = offline_picture(
+        scene, exaggeration=exaggeration, nodes=nodes, loop=Loop(loop), largest=largest
+    )
+    return build_offline_html(live)

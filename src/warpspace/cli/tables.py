@@ -178,6 +178,12 @@ def echo(text: str = "", *, err: bool = False, breaks: bool = True, **style: Any
     click.secho(plain(text, breaks=breaks), err=err, **style)
 
 
+def warn(*sentences: str) -> None:
+    """Say on stderr what a reader should doubt."""
+    for words in sentences:
+        echo(f"warpspace: warning: {words}", err=True, fg="yellow")
+
+
 def _spell(character: str) -> str:
     code = ord(character)
     if 0xDC80 <= code <= 0xDCFF:

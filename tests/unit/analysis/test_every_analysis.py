@@ -15,7 +15,7 @@ from warpspace.analysis.blocks import Bars, Histogram, Lines
 from warpspace.analysis.catalogue import TASKS, entries, first_line
 from warpspace.analysis.description import plain, silent
 from warpspace.analysis.options import options_of
-from warpspace.cli.analyses import build_command, print_blocks
+from warpspace.cli.analyses import command_of, print_blocks
 from warpspace.exceptions import OptionError, WarpspaceError
 
 SCENES = ("dvf5000_first", "teach_squareness", "machine_printer_3d")
@@ -112,7 +112,7 @@ def test_the_command_prints_one_json_object(entry, tmp_path, monkeypatch):
     scene, _, typed = NEEDED.get(entry.name, ("dvf5000_first", {}, []))
     arguments = [scene, "--json", *typed, *(word for pair in few for word in pair)]
     monkeypatch.chdir(tmp_path)
-    said = CliRunner().invoke(build_command(entry), arguments)
+    said = CliRunner().invoke(command_of(entry.load()), arguments)
     assert said.exit_code == 0, said.output
     assert json.loads(said.output) == asked.run(load_scene(scene), silent).as_json()
 
@@ -179,7 +179,7 @@ def test_an_analysis_of_ones_own_is_a_command_like_any_other(tmp_path):
         with pytest.raises(ValueError, match="there already"):
             register(Even)
         (entry,) = (one for one in entries() if one.name == "even")
-        command = build_command(entry)
+        command = command_of(entry.load())
         run = CliRunner().invoke
         assert "--height FLOAT" in run(command, ["--help"]).output
         target = tmp_path / "sum.csv"

@@ -1,5 +1,4 @@
-"""The commands, one module each: module and function carry the name of the command.
+"""The commands that are made from no analysis, one module a task; `warpspace.cli.main` lists them.
 
-`warpspace.cli.registry` finds them here; a new command is one new file. A command imports what it
-needs when it runs, so that help is instant.
+A command imports what it needs when it runs, so that help is instant.
 """

@@ -1,4 +1,4 @@
-"""Command `field`: errors at points, or over the grid of the working volume."""
+"""Commands by which errors are understood: the field, at points or over the working volume."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -14,6 +14,7 @@ from warpspace.cli.options import (
     force_option,
     grid_option,
     json_option,
+    load_placed,
     loop_option,
     output_option,
     parse_point,
@@ -97,8 +98,7 @@ def field(
     from warpspace.analysis.statistics import statistics, volume_statistics
     from warpspace.field.evaluate import placed_words
     from warpspace.picture.words import direction_words, own_axes, spell_at, spell_point
-    from warpspace.scene.library import load_scene
-    from warpspace.scene.model import choose_view, in_direction, placed_in, second_order
+    from warpspace.scene.model import choose_view, second_order
 
     if points and grid is not None:
         raise OptionError("--at and --grid exclude each other; give one of them")
@@ -107,7 +107,7 @@ def field(
         raise OptionError(
             f"{output}: a .vts file holds a grid, --at gives points; expected {others}"
         )
-    loaded = placed_in(in_direction(load_scene(scene), direction), loop, placed=placed)
+    loaded = load_placed(scene, direction, loop, placed=placed)
     view = choose_view(loaded, loop, frame)
     spread = None
     with progress("evaluating", silent=as_json):

@@ -1,4 +1,4 @@
-"""Command `import`: measured errors, tables of controllers and robots into a scene."""
+"""Commands about measurements: standard tests, and measured errors into a scene."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -8,15 +8,72 @@ from typing import TYPE_CHECKING
 import click
 
 from warpspace.analysis.blocks import Column, Table, number_columns
-from warpspace.cli.analyses import print_blocks
-from warpspace.cli.guard import InputFile, SceneName, check_files
-from warpspace.cli.options import SCENES, force_option, json_option, output_option, print_json
+from warpspace.cli.analyses import command_of, print_blocks
+from warpspace.cli.guard import Commands, InputFile, SceneName, check_files
+from warpspace.cli.options import (
+    SCENES,
+    force_option,
+    json_option,
+    output_option,
+    print_json,
+    write_text,
+)
 from warpspace.cli.tables import echo, print_table, print_text, progress
 from warpspace.exceptions import OptionError
 from warpspace.scene.files import parse_number
 
 if TYPE_CHECKING:
     from warpspace.formats.registry import Reading
+
+
+def _test_names() -> tuple[str, ...]:
+    from warpspace.bench.base import bench_names
+
+    return bench_names()
+
+
+def _build_test(name: str) -> click.Command:
+    """Build the command of a test from the options that it declares."""
+    from warpspace.bench.base import FORMER, find_test
+
+    if name not in _test_names() and name not in FORMER:
+        raise KeyError(name)
+    test = find_test(name)
+    command = command_of(test)
+    command.short_help = test.title
+    return command
+
+
+@click.group(name="test", commands=Commands(_test_names, _build_test), invoke_without_command=True)
+@click.option("--list", "listing", is_flag=True, help="List the tests: name, standard, what it is.")
+@click.pass_context
+def test_(context: click.Context, *, listing: bool) -> None:
+    """Run a standard test of machine tools on SCENE.
+
+    Each test prints its standard's numbers and draws its customary figure; with --data measured
+    readings are evaluated by the same formulas and drawn over the model's. Readings come from the
+    exact chain, along the path that the test has on the machine. `warpspace test NAME --help` has
+    the options of a test.
+    """
+    if context.invoked_subcommand is None:
+        if not listing:
+            raise click.UsageError(
+                "Missing argument 'NAME'; `warpspace test --list` has the names."
+            )
+        _list()
+
+
+def _list() -> None:
+    from warpspace.bench.base import find_test
+
+    columns = (
+        Column("name", leads=True),
+        Column("standard", wraps=True),
+        Column("what", wraps=True),
+    )
+    tests = [find_test(name) for name in _test_names()]
+    print_table(columns, [(test.name, test.standard, test.title) for test in tests], indent=0)
+
 
 ROBOT = "urdf"
 SHOWN = 30
@@ -149,7 +206,6 @@ def import_(
     from warpspace.formats.kind import ReadOptions, parse_axis_options
     from warpspace.formats.registry import open_files, read_errors
     from warpspace.formats.to_scene import base_scene, into_scene
-    from warpspace.outputs.files import write_atomically
     from warpspace.scene.machines import machine_names
 
     scenes = [machine] if machine and machine not in machine_names() else []
@@ -167,8 +223,7 @@ def import_(
     kind = reading.format
     how = "recognised" if reading.recognised else "as told"
     echo(f"warpspace: {kind.name}, {kind.title} ({how})", err=True)
-    with write_atomically(output, overwrite=force) as temporary:
-        temporary.write_text(made.text, encoding="utf-8")
+    write_text(output, made.text, force=force)
     notes = [*reading.found.notes, *made.notes]
     if as_json:
         print_json(
@@ -243,7 +298,7 @@ def _import_robot(
     force: bool,
 ) -> None:
     from warpspace.bodies.own_meshes import frame_meshes
-    from warpspace.outputs.files import mesh_files, write_atomically, write_meshes
+    from warpspace.outputs.files import mesh_files, write_meshes
     from warpspace.scene.library import parse_scene
     from warpspace.scene.urdf import imported_text, left_out, place_robot, read_robot
 
@@ -260,8 +315,7 @@ def _import_robot(
     text = imported_text(found.machine, robot.name, notes, names)
     scene = parse_scene(text, target.stem, output)
     write_meshes(written, meshes, overwrite=force)
-    with write_atomically(target, overwrite=force) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_text(target, text, force=force)
     axes = len(scene.machine.axes)
     print_text(f"{output}: {scene.machine.chain}, {axes} {'axis' if axes == 1 else 'axes'}")
     if written:
@@ -283,7 +337,6 @@ def _write_template(
     from warpspace.formats.kinds.csv_own import surface_template, usual_places
     from warpspace.formats.kinds.csv_own import template as spelled
     from warpspace.machine.axes import is_axis_name
-    from warpspace.outputs.files import write_atomically
 
     axis = str(files[0])
     name = axis.strip().upper()
@@ -310,8 +363,7 @@ def _write_template(
     if output is None:
         click.echo(text, nl=False)
         return
-    with write_atomically(output, overwrite=force) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_text(output, text, force=force)
     echo(f"wrote {output}")
 
 

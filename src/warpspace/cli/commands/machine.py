@@ -1,0 +1,359 @@
+"""Commands about scenes and machines: what there is, what is right, what the thesis prints."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import click
+
+from warpspace.analysis.blocks import Block, Column, Table
+from warpspace.cli.analyses import print_blocks
+from warpspace.cli.guard import OutputFile, SceneName
+from warpspace.cli.options import (
+    SCENES,
+    RenamedOption,
+    force_option,
+    grid_option,
+    json_option,
+    loop_option,
+    output_option,
+    print_json,
+    say_first_order,
+    say_second_order,
+    scene_argument,
+    write_text,
+)
+from warpspace.cli.tables import print_table, print_text, progress
+from warpspace.exceptions import OptionError
+
+if TYPE_CHECKING:
+    from warpspace.analysis.measured import Check, Measured
+    from warpspace.analysis.thesis.table import Row
+    from warpspace.scene.model import Scene
+
+OWN = "own"
+Kind = Literal["scenes", "machines"]
+
+
+@click.command("list")
+@click.argument("kind", type=click.Choice(("scenes", "machines")), required=False)
+@json_option
+def list_(kind: Kind | None, *, as_json: bool) -> None:
+    """List the bundled scenes and machines, or one of both.
+
+    A scene takes a machine by its name, machine = "scara"; machine_NAME is the scene that shows it.
+    """
+    found = {one: _found(one) for one in ("scenes", "machines") if kind in (None, one)}
+    if as_json:
+        print_json(found)
+        return
+    for one, rows in found.items():
+        if kind is None:
+            print_text(one)
+        lines = [line for row in rows for line in _lines(row)]
+        print_table((Column(leads=True), Column(), Column(wraps=True)), lines, indent=0)
+
+
+def _found(kind: Kind) -> list[dict[str, str | None]]:
+    from warpspace.scene.library import load_scene, scene_names
+    from warpspace.scene.machines import load_machine, machine_names, machine_picture
+
+    if kind == "scenes":
+        return [{"name": name, "title": load_scene(name).title} for name in scene_names()]
+    pictures = {name: machine_picture(name) for name in machine_names()}
+    return [
+        {
+            "name": machine.name,
+            "title": machine.title,
+            "chain": str(machine.chain),
+            "source": machine.source,
+            "picture": str(picture) if picture else None,
+        }
+        for machine, picture in ((load_machine(name), at) for name, at in pictures.items())
+    ]
+
+
+def _lines(row: dict[str, str | None]) -> list[tuple[str, str, str]]:
+    first = (row["name"] or "", row.get("chain") or "", row["title"] or "")
+    more = [text for text in (row.get("source"), row.get("picture")) if text]
+    return [first, *(("", "", text) for text in more)]
+
+
+@click.command("new-machine")
+@click.argument("chain")
+@output_option("Scene file to write: .toml.", *SCENES)
+@click.option("--title", default="", help="Of the machine and the scene.  [the chain]")
+@force_option
+def new_machine(chain: str, output: str, title: str, *, force: bool) -> None:
+    """Write a scene for a machine with the axes of CHAIN.
+
+    CHAIN runs from the workpiece w over the frame F to the tool t, for instance wBCFXYZt: B and C
+    carry the workpiece, X Y Z the tool. Axes are letters of X Y Z U V W A B C with an optional
+    digit, up to eight. Offsets, travels, working volume, tolerances and a few example errors are
+    chosen so that the scene opens at once, with a remark on each line.
+    """
+    from warpspace.scene.library import parse_scene
+    from warpspace.scene.starter import starter_text
+
+    text = starter_text(chain, title)
+    scene = parse_scene(text, Path(output).stem, output)
+    write_text(output, text, force=force)
+    print_text(
+        f"{output}: {scene.machine.chain}, {len(scene.parameter_keys)} errors;"
+        f" warpspace view {output} opens it"
+    )
+
+
+@click.command()
+@scene_argument("scenes", nargs=-1, required=True)
+@click.option(
+    "--against",
+    cls=RenamedOption,
+    former=("--tolerances",),
+    type=SceneName(),
+    metavar="SCENE|own",
+    help="Set each error against the tolerances of this scene, for instance dvf5000_proposed, or of"
+    " its own, and say what the model predicts. Then several SCENES may be named.",
+)
+@loop_option
+@grid_option(11, "of the predicted map, with --against")
+@json_option
+def check(
+    scenes: tuple[str, ...], against: str | None, loop: str, grid: int, *, as_json: bool
+) -> None:
+    """Validate SCENE and say what it holds.
+
+    All problems of a file are reported at once, each with its key, its value and what was expected.
+
+    With --against each error lies within its tolerance or outside it. Beside the predicted error
+    stands what the LaserTRACER gave, for the machines of the thesis. The shear is that of the best
+    affine fit to the predicted map: which plane became a rhombus.
+    """
+    from warpspace.analysis.measured import measured
+    from warpspace.scene.library import load_scene
+
+    loaded = [load_scene(name) for name in scenes]
+    if against is None:
+        if len(scenes) > 1:
+            raise OptionError(f"{len(scenes)} scenes; expected one, or --against")
+        _check(*loaded, as_json=as_json)
+        return
+    limits = None if against == OWN else load_scene(against).tolerances
+    found = [measured(scene, tolerances=limits, loop=loop, grid=grid) for scene in loaded]
+    say_first_order(loop, *loaded)
+    pairs = list(zip(loaded, found, strict=True))
+    if as_json:
+        print_json({"machines": [_json(scene, result) for scene, result in pairs]})
+        return
+    for scene, result in pairs:
+        print_blocks(_against(scene, result))
+
+
+def _check(scene: "Scene", *, as_json: bool) -> None:
+    from warpspace.bodies.own_meshes import check_meshes
+    from warpspace.scene.model import second_order
+
+    notes = (*scene.notes, *check_meshes(scene.machine))
+    found = second_order(scene)
+    say_second_order(found)
+    non_zero = [key for key in scene.errors if scene.errors.amplitude(key) != 0.0]
+    if as_json:
+        print_json(
+            {
+                "scene": scene.name,
+                "title": scene.title,
+                "machine": scene.machine.name,
+                "chain": str(scene.machine.chain),
+                "parameters": len(scene.parameter_keys),
+                "non_zero": non_zero,
+                "linearisation_error_um": found.um,
+                "notes": list(notes),
+            }
+        )
+        return
+    facts = [("machine", f"{scene.machine.title}, chain {scene.machine.chain}")]
+    for name, (low, high) in scene.workspace.ranges.items():
+        span = f"{low:g}" if low == high else f"{low:g} … {high:g}"
+        facts.append((name, f"{span} {scene.machine.axes[name].unit}"))
+    count = f"{len(non_zero)} of {len(scene.parameter_keys)} parameters not zero"
+    facts.append(("errors", count + (f": {', '.join(non_zero)}" if non_zero else "")))
+    facts.append(("first order", f"differs from the exact chain by at most {found.um:.2g} µm"))
+    facts.extend(("note", note) for note in notes)
+    columns = (Column(leads=True), Column(wraps=True))
+    print_blocks((f"{scene.name}: valid. {scene.title}", Table(columns, facts)))
+
+
+def laser_tracer_um(scene: "Scene") -> float | None:
+    """Give the volumetric error measured on a machine of the thesis, µm; None for any other."""
+    from warpspace.analysis.thesis.table import MACHINES, printed_tables
+
+    names = [f"dvf5000_{name}" for name in MACHINES]
+    if scene.name not in names:
+        return None
+    return float(printed_tables()["table_5_5"]["volumetric_um"][names.index(scene.name)])
+
+
+def _json(scene: "Scene", result: "Measured") -> dict[str, object]:
+    from dataclasses import asdict
+
+    return {
+        "scene": scene.name,
+        "checks": [{**asdict(check), "passes": check.passes} for check in result.checks],
+        "predicted": asdict(result.predicted),
+        "statistics_nodes": asdict(result.predicted_nodes),
+        "measured_um": laser_tracer_um(scene),
+        "shear_urad": result.shear_urad,
+    }
+
+
+def _against(scene: "Scene", result: "Measured") -> Iterator[Block]:
+    yield scene.title
+    columns = (
+        Column("limit"),
+        Column("key"),
+        Column("value", ".1f"),
+        Column("unit"),
+        Column("tolerance", _limits),
+    )
+    verdicts = {True: "within", False: "outside", None: "none"}
+    rows = [(verdicts[one.passes], one.key, one.value, one.unit, one) for one in result.checks]
+    yield Table(columns, rows)
+    measured_um = laser_tracer_um(scene)
+    beside = "" if measured_um is None else f"; LaserTRACER {measured_um:g} µm"
+    yield (
+        f"  predicted |E|: mean {result.predicted.mean_um:.2f}, RMS {result.predicted.rms_um:.2f},"
+        f" max {result.predicted.max_um:.2f} µm over the volume;"
+        f" mean of the nodes {result.predicted_nodes.mean_um:.2f} µm{beside}"
+    )
+    shears = ", ".join(f"{plane} {value:+.1f}" for plane, value in result.shear_urad.items())
+    yield f"  shear of the volume: {shears} µrad"
+
+
+def _limits(check: "Check") -> str:
+    if check.centre is None or check.half_width is None:
+        return "no tolerance"
+    return f"{check.centre:g} ± {check.half_width:g}"
+
+
+@click.command()
+@click.option("--markdown", type=OutputFile(".md"), help="Write the comparison to this .md file.")
+@force_option
+@json_option
+def thesis(markdown: str | None, *, force: bool, as_json: bool) -> None:
+    """Recompute every number that the thesis prints.
+
+    That is its tables 4-1 to 4-8 and 5-3 to 5-5; each number comes with its unit.
+    A number agrees where it lies within half of the last printed digit. Rows that do not agree say
+    why. Nothing is tuned to agree.
+    """
+    from warpspace.analysis.thesis.table import thesis as compare
+
+    with progress("computing", silent=as_json):
+        rows = compare()
+    if markdown is not None:
+        write_text(markdown, thesis_markdown(rows), force=force)
+    if as_json:
+        keys = ("source", "key", "printed", "computed", "agrees")
+        noted = [{"note": row.note} if row.note else {} for row in rows]
+        told = [{key: getattr(row, key) for key in keys} for row in rows]
+        print_json({"rows": [one | note for one, note in zip(told, noted, strict=True)]})
+        return
+    _print(rows)
+
+
+def _print(rows: "tuple[Row, ...]") -> None:
+    """Print a table of each source, then the rows that do not agree with their reasons."""
+    columns = (
+        Column(leads=True),
+        Column("quantity", wraps=True, leads=True),
+        Column("printed", "s", wraps=True),
+        Column("ours", "s", wraps=True, joins=True),
+        Column("unit"),
+    )
+    for source in dict.fromkeys(row.source for row in rows):
+        here = [row for row in rows if row.source == source]
+        print_text(f"{source}: {sum(row.agrees for row in here)} of {len(here)} agree")
+        cells = [
+            (
+                *("" if row.agrees else "≠", row.key),
+                *(spell(row, row.printed), spell(row, row.computed, more=1), row.unit),
+            )
+            for row in here
+        ]
+        print_table(columns, cells)
+        click.echo()
+    different = [row for row in rows if not row.agrees]
+    print_text(f"{len(rows) - len(different)} of {len(rows)} agree. The others:")
+    for row in different:
+        printed, computed = spell(row, row.printed), spell(row, row.computed, more=1)
+        print_text(f"  {row.source}: {row.key}: printed {printed}, ours {computed} {row.unit}")
+        print_text(f"      {row.note}")
+
+
+# --- The page of documentation -------------------------------------------------------------------
+
+INTRODUCTION = """\
+# The thesis, number by number
+
+Generated by `warpspace thesis --markdown docs/thesis_rows.md --force`; do not edit.
+Every number printed in
+tables 4-1 to 4-8 and 5-3 to 5-5 of the thesis on the volumetric error of the DVF5000 stands beside
+what warpspace computes from its model and its bundled scenes. A number agrees where it lies within
+half of the last printed digit; one exactly half way agrees, whichever way it was rounded. Nothing
+is tuned to agree. Parameters have their ISO 230-1 names.
+"""
+
+
+def spell(row: "Row", value: float | str, more: int = 0) -> str:
+    """Spell a value of a row."""
+    if isinstance(value, str):
+        return value
+    if value == int(value) and row.digits == 0:
+        return f"{value:.0f}"
+    return f"{value:.{row.digits + more}f}"
+
+
+def thesis_markdown(rows: "Sequence[Row]") -> str:
+    """Write the page."""
+    groups = {source: list(own) for source, own in groupby(rows, lambda row: row.source)}
+    parts = [
+        INTRODUCTION,
+        f"**{sum(row.agrees for row in rows)} of {len(rows)} agree.**\n",
+        *_table(
+            ("where", "rows:", "agree:"),
+            ((name, len(own), sum(row.agrees for row in own)) for name, own in groups.items()),
+        ),
+        "## What does not agree, and why\n",
+        *_table(
+            ("where", "what", "printed:", "ours:", "why"),
+            ((row.source, row.key, *_cells(row), row.note) for row in rows if not row.agrees),
+        ),
+        "## All rows\n",
+    ]
+    for source, own in groups.items():
+        parts.append(f"### {source[0].upper()}{source[1:]}\n")
+        parts += _table(
+            ("what", "printed:", "ours:", ":agrees:", "note"),
+            ((row.key, *_cells(row), *_verdict(row)) for row in own),
+        )
+    return "\n".join(parts).rstrip() + "\n"
+
+
+def _table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
+    """Spell a table; colons in its headings say how their columns are aligned."""
+    rules = ["---".join((":" * head.startswith(":"), ":" * head.endswith(":"))) for head in heads]
+    lines = [[head.strip(":") for head in heads], *rows]
+    spelt = [f"| {' | '.join(map(str, cells))} |" for cells in lines]
+    return [spelt[0], f"|{'|'.join(rules)}|", *spelt[1:], ""]
+
+
+def _cells(row: "Row") -> tuple[str, str]:
+    unit = f" {row.unit}" if row.unit else ""
+    return spell(row, row.printed), f"{spell(row, row.computed, more=1)}{unit}"
+
+
+def _verdict(row: "Row") -> tuple[str, str]:
+    if row.agrees:
+        return "yes", row.note
+    return "**no**", "see above" if row.note else ""
