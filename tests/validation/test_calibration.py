@@ -8,11 +8,11 @@ import pytest
 from warpspace.bench.base import find_test
 from warpspace.bench.readings import simulate
 from warpspace.calibration import Calibrate, calibrate, read_readings
-from warpspace.calibration.kinds.kind import VIEW
-from warpspace.calibration.kinds.spheres import circles_of
+from warpspace.calibration.kinds import VIEW
 from warpspace.calibration.next_best import Candidate, candidates, map_weights, next_best
 from warpspace.calibration.readings import Readings, find_data, nominal_tip, read_table
 from warpspace.calibration.solve import build_terms, spell_rank
+from warpspace.calibration.spheres import circles_of
 from warpspace.field.evaluate import evaluate_exact
 from warpspace.machine.errors import Constant, ErrorSet, Ramp
 from warpspace.scene.library import load_scene

@@ -12,7 +12,7 @@ from warpspace.analysis.description import Analysis
 from warpspace.analysis.description import Watch as Share
 from warpspace.analysis.options import Grammar, option
 from warpspace.analysis.typed import Files, typed_word
-from warpspace.calibration.kinds.points import in_other_frame
+from warpspace.calibration.kinds import in_other_frame
 from warpspace.calibration.readings import Readings, read_readings
 from warpspace.calibration.results import Calibration, Combination, Found, Residuals
 from warpspace.calibration.solve import (

@@ -8,9 +8,8 @@ from itertools import product
 import numpy as np
 
 from warpspace.bench.placing import PLANES
-from warpspace.calibration.kinds.bench import TestReadings
-from warpspace.calibration.kinds.spheres import solve_linear
 from warpspace.calibration.readings import Readings, nominal_tip
+from warpspace.calibration.registry import TestReadings
 from warpspace.calibration.results import Calibration, Candidate, Step
 from warpspace.calibration.solve import (
     Stack,
@@ -22,6 +21,7 @@ from warpspace.calibration.solve import (
     unwatched,
     without,
 )
+from warpspace.calibration.spheres import solve_linear
 from warpspace.exceptions import OptionError, SceneError, UnknownNameError
 from warpspace.field.grid import build_grid
 from warpspace.scene.model import Scene, grid_basis
@@ -181,10 +181,11 @@ def next_best(
     candidate has one of its own. First order, at the errors found.
     """
     keys = tuple(one.key for one in found.parameters)
-    terms = build_terms(replace(found.scene), keys)
+    terms = build_terms(found.scene, keys)
     noise = max(noise_mm or found.sigma_mm, LEAST_NOISE_MM)
-    if Stack.of(scene, sets).has_uncertainties and noise_mm is None:
-        noise = float(np.median(np.concatenate([_sigma(one, noise) for one in sets])))
+    stated = [one.sigma_mm for one in sets if one.sigma_mm is not None]
+    if len(stated) == len(sets) and noise_mm is None:
+        noise = float(np.median(np.concatenate(stated)))
     known = _information(Stack.of(scene, sets, watch), terms, noise) + _prior(scene, keys)
     weigh = map_weights(found.scene, terms)
     rows = [
@@ -228,19 +229,10 @@ def separating(
     return {group: told[group] for group in found.rank.confounded if group in told}
 
 
-def _sigma(readings: Readings, noise_mm: float) -> Array:
-    """Give the standard uncertainty of each reading, [n], mm."""
-    if readings.sigma_mm is None:
-        return np.full(len(readings), noise_mm)
-    return readings.sigma_mm
-
-
 def _information(stack: Stack, terms: Terms, noise_mm: float) -> Array:
     """Give the information on the parameters that does not go into the set-ups, [K, K]."""
     by_parameter, by_unknown = map(np.vstack, stack.derivatives(terms, terms.start, stack.start()))
-    weights = np.concatenate(
-        [np.repeat(1.0 / _sigma(one, noise_mm), one.observed_mm.shape[1]) for one in stack.sets]
-    )[:, None]
+    weights = np.concatenate(stack.weights(noise_mm))[:, None]
     rows = without(weights * by_parameter, orthonormal(weights * by_unknown))
     return rows.T @ rows
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from warpspace.bench.plan import Plan
 from warpspace.exceptions import OptionError, SceneError, near_miss
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, nominal_point
@@ -163,6 +164,7 @@ class Readings:
     circles: tuple[Circle, ...] = ()  # about rotary axes, where the readings are such
     # "machine" or "workpiece": what vectors were read in; they are kept in the latter
     frame: str = ""
+    plan: Plan | None = None  # of the test they were taken with, along its path
 
     def __len__(self) -> int:
         """Count the readings."""
@@ -195,7 +197,7 @@ def parse_readings(
     text: str, source: str, scene: Scene, kind: str | None = None, frame: str | None = None
 ) -> Readings:
     """Read the text of a file of readings; see `read_readings`."""
-    from warpspace.calibration.kinds.registry import find_kind, recognise
+    from warpspace.calibration.registry import find_kind, recognise
 
     found = None if kind is None else find_kind(kind)
     if found is not None and found.own_columns:

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from warpspace.calibration.kinds.kind import Guess
-from warpspace.calibration.kinds.registry import find_kind
+from warpspace.calibration.kinds import Guess
 from warpspace.calibration.readings import Readings
+from warpspace.calibration.registry import find_kind
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.machine.axes import PARAMETERS, Parameter, direction_index, is_linear, parameter
 from warpspace.machine.errors import Constant, ErrorSet, Ramp
@@ -222,7 +222,7 @@ def automatic(scene: Scene, together: Sequence[Readings]) -> tuple[str, ...]:
     Slopes of straightness come last: a straightness is told from a line of its own, and its slope
     belongs to the squareness.
     """
-    from warpspace.calibration.kinds.registry import find_kind
+    from warpspace.calibration.registry import find_kind
 
     keys: dict[str, None] = {}
     for readings in together:
@@ -307,10 +307,10 @@ class Stack:
             by_unknown.append(own.reshape(one.observed_mm.size, len(self.unknowns)))
         return by_parameter, by_unknown
 
-    def weights(self) -> list[Array]:
-        """Give the weight of each component of each reading, [n·d], 1/mm; 1 where none is known."""
+    def weights(self, otherwise_mm: float = 1.0) -> list[Array]:
+        """Give the weight of each component of each reading, [n·d], 1/mm."""
         return [
-            np.ones(one.observed_mm.size)
+            np.full(one.observed_mm.size, 1.0 / otherwise_mm)
             if one.sigma_mm is None
             else np.repeat(1.0 / one.sigma_mm, one.observed_mm.shape[1])
             for one in self.sets

@@ -115,20 +115,11 @@ LEAST = 1e-12
 
 
 def fit_placement(model: Model, grid: Grid, error_um: Array) -> Array:
-    """Fit the placement of the workpiece to relative errors over the nodes of a volume.
+    """Fit the placement of the workpiece, [..., 6], µm and µrad, to relative errors over a volume.
 
-    Parameters
-    ----------
-    model : Model
-    grid : Grid
-    error_um : ndarray, [..., nx, ny, nz, 3], µm
-        In R, absolute; leading axes are fits of their own.
-
-    Returns
-    -------
-    ndarray, [..., 6], µm and µrad
-        Least squares, each node weighing its share of the volume; the smallest numbers where a
-        volume along a line or a point does not tell them all.
+    Errors, [..., nx, ny, nz, 3], µm, are absolute, in R; leading axes are fits of their own. Least
+    squares, each node weighing its share of the volume; the smallest numbers where a volume along a
+    line or a point does not tell them all.
     """
     columns = _columns(model, grid.coordinates, grid.point_mm)
     weighted = (grid.weights[..., None, None] * columns).reshape(-1, 6)

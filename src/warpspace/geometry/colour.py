@@ -39,18 +39,7 @@ class ColourScale:
         return DIVERGING if self.diverging else SEQUENTIAL
 
     def colours(self, values: Array) -> Bytes:
-        """Map values to colours.
-
-        Parameters
-        ----------
-        values : ndarray, [...]
-            Values beyond the ends take the colour of the end.
-
-        Returns
-        -------
-        ndarray of uint8, [..., 3]
-            sRGB.
-        """
+        """Map values, [...], to sRGB, [..., 3]; those beyond take the colour of the end."""
         table = _table(self.name)
         return table[np.rint(self.fraction(values) * (LEVELS - 1)).astype(np.intp)]
 
@@ -84,23 +73,7 @@ def nice_step(span: float) -> float:
 
 
 def component_values(error: Array, component: str) -> Array:
-    """Pick what a map shows of an error.
-
-    Parameters
-    ----------
-    error : ndarray, [..., 3], µm or µrad
-    component : str
-        "norm", "x", "y" or "z".
-
-    Returns
-    -------
-    ndarray, [...]
-
-    Raises
-    ------
-    OptionError
-        If there is no such component.
-    """
+    """Pick what a map shows of errors, [..., 3]: "norm", "x", "y" or "z", [...]."""
     if component not in COMPONENTS:
         raise OptionError(f"component {component!r}; expected one of {', '.join(COMPONENTS)}")
     if component == "norm":

@@ -134,19 +134,7 @@ def is_thin(shape: Shape) -> bool:
 
 
 def thicken(points_mm: Array, thickness_mm: float) -> Array:
-    """Give a line or a point of nodes a thickness.
-
-    Parameters
-    ----------
-    points_mm : ndarray, [nx, ny, nz, 3], mm
-        At most one of the counts is above 1.
-    thickness_mm : float, mm
-
-    Returns
-    -------
-    ndarray, [mx, my, mz, 3], mm
-        Two nodes wherever there was one.
-    """
+    """Give a line or a point of nodes, [nx, ny, nz, 3], mm, a thickness: two where one was."""
     shape = points_mm.shape[:3]
     still = [axis for axis in range(3) if shape[axis] == 1]
     run = np.abs(points_mm[-1, -1, -1] - points_mm[0, 0, 0])
@@ -189,20 +177,7 @@ _ROUND = (1.0, 2.0, 5.0, 10.0)
 
 
 def deform(nominal_mm: Array, error_um: Array, exaggeration: float) -> Array:
-    """Displace points by their exaggerated error.
-
-    Parameters
-    ----------
-    nominal_mm : ndarray, [..., 3], mm
-    error_um : ndarray, [..., 3], µm
-    exaggeration : float
-        Display factor; 1 is true scale.
-
-    Returns
-    -------
-    ndarray, [..., 3], mm
-        Where the points are drawn.
-    """
+    """Displace points, [..., 3], mm, by their exaggerated error, [..., 3], µm."""
     return nominal_mm + (exaggeration * MM_PER_UM) * error_um
 
 
@@ -241,20 +216,9 @@ class Hit:
 def pick_surface(
     origin: Array, direction: Array, vertices: Array, triangles: NDArray[np.intp]
 ) -> Hit | None:
-    """Find the first triangle that a ray meets (Möller and Trumbore, all triangles at once).
+    """Find the first triangle, [T, 3], that a ray meets (Möller and Trumbore, all at once).
 
-    Parameters
-    ----------
-    origin, direction : ndarray, [3]
-        The ray, in the units of the vertices.
-    vertices : ndarray, [M, 3]
-    triangles : ndarray, [T, 3]
-        Vertex numbers.
-
-    Returns
-    -------
-    Hit or None
-        None where the ray misses.
+    Origin and direction, [3], are in the units of the vertices, [M, 3]; None where the ray misses.
     """
     a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
     first, second = b - a, c - a
@@ -277,20 +241,9 @@ def pick_surface(
 def pick_point(
     origin: Array, direction: Array, points: Array, tolerance: float
 ) -> tuple[int, float] | None:
-    """Find the point that a ray passes most closely, seen from its origin.
+    """Find the point, [M, 3], that a ray passes most closely, as seen from its origin.
 
-    Parameters
-    ----------
-    origin, direction : ndarray, [3]
-        The ray.
-    points : ndarray, [M, 3]
-    tolerance : float
-        Largest angle between the ray and the line of sight to the point, rad.
-
-    Returns
-    -------
-    tuple of (int, float) or None
-        Number of the point and its distance along the ray; None where none is near.
+    Its number, and its distance along the ray; None where none lies within a tolerance, rad.
     """
     if len(points) == 0:
         return None
@@ -411,26 +364,9 @@ def isoline_levels(scale: ColourScale) -> tuple[float, ...]:
 def isolines(
     face: Index, nodes_mm: Array, values: Array, levels: Sequence[float]
 ) -> list[tuple[float, Array]]:
-    """Find the lines of equal value on a patch of the surface.
+    """Find the lines of equal value on a patch, [a, b]: level and polyline, [n, 3], mm, of each.
 
-    Parameters
-    ----------
-    face : ndarray of int, [a, b]
-        Flat grid indices.
-    nodes_mm : ndarray, [N, 3], mm
-        All nodes where they are drawn.
-    values : ndarray, [N]
-    levels : sequence of float
-        In the unit of the values.
-
-    Returns
-    -------
-    list of (float, ndarray), [n, 3], mm
-        Level and polyline.
-
-    Notes
-    -----
-    Marching squares on the values at the nodes, straight within a cell.
+    Marching squares on the values, [N], at all nodes, [N, 3], mm, straight within a cell.
     """
     at_nodes = values[face]
     low, high = float(at_nodes.min()), float(at_nodes.max())
@@ -457,20 +393,9 @@ def isoline_segments(
     levels: Sequence[float],
     lift_mm: Array | None = None,
 ) -> Array:
-    """Find the lines of equal value on all faces, as pieces of line.
+    """Find the lines of equal value on all faces as pieces of line, [S, 2, 3], mm.
 
-    Parameters
-    ----------
-    faces : sequence of ndarray of int, [a, b]
-    nodes_mm : ndarray, [N, 3], mm
-    values : ndarray, [N]
-    levels : sequence of float
-    lift_mm : ndarray, [F, 3], mm, optional
-        Per face, how far its lines are moved off it.
-
-    Returns
-    -------
-    ndarray, [S, 2, 3], mm
+    Faces are moved off the surface by a vector each, [F, 3], mm.
     """
     pieces: list[Array] = []
     for number, face in enumerate(faces):

@@ -32,8 +32,6 @@ def convert_order(
 ) -> tuple[Model, ErrorSet]:
     """Write component errors in another order of motion and errors.
 
-    Notes
-    -----
     Exact: ``E_before = M · E_after · M⁻¹`` with the nominal motion M of the axis. A linear axis
     changes its shifts by the arm of its position, −q × ε to first order; a rotary one turns the
     directions of its errors by its angle.
@@ -65,10 +63,7 @@ def _across(own: AxisErrors, *, forward: bool) -> Along:
 def without(
     own: AxisErrors, taken: SmallMotion, position: Array, present: SmallMotion
 ) -> SmallMotion:
-    """Give the component errors, [n], that are left where a motion went to the constants.
-
-    The motion is one in the frame before that of the axis.
-    """
+    """Give the component errors, [n], left where a motion before the axis went to the constants."""
     back = taken.inverse
     if own.order == ComponentErrors.AFTER_MOTION:
         back = back.seen_from(transforms.inverse(own.pose(position)))
@@ -78,8 +73,6 @@ def without(
 def moved_to_constants(own: AxisErrors, taken: SmallMotion) -> ErrorSet:
     """Move a motion from the component errors of an axis to its constants; the field stays.
 
-    Notes
-    -----
     ``E0 · M · E = (E0 · G) · M · (M⁻¹ · G⁻¹ · M · E)``, exactly; before the motion ``E0 · E · M =
     (E0 · G) · (G⁻¹ · E) · M``.
     """
@@ -173,22 +166,11 @@ class ReferenceLine(StrEnum):
 
 
 def fit_line(position: Array, value: Array, line: ReferenceLine | str) -> tuple[float, float]:
-    """Lay a reference line through a straightness curve.
+    """Lay a reference line through a straightness curve: offset at zero, µm, and slope, µm/mm.
 
-    Parameters
-    ----------
-    position : ndarray, [n], mm
-        Ascending.
-    value : ndarray, [n], µm
-    line : ReferenceLine or str
-        Through the first and the last point; with the least sum of squares; or the middle of the
-        narrowest band, measured across the position, that holds all points.
-
-    Returns
-    -------
-    offset : float, µm
-        Of the line at position zero.
-    slope : float, µm/mm
+    Positions, [n], mm, ascend; values, [n], are in µm. The line goes through the first and the last
+    point, has the least sum of squares, or is the middle of the narrowest band, measured across the
+    position, that holds all points.
     """
     match ReferenceLine(line):
         case ReferenceLine.END_POINT:
@@ -232,8 +214,6 @@ def convert_reference_line(
 ) -> ErrorSet:
     """Take the reference line out of the straightness of linear axes; the field stays.
 
-    Notes
-    -----
     The line of a table is laid through its points within the range, as measured, and that of a
     curve that was converted from one likewise; any other through 101 evenly spread positions.
     """
@@ -288,8 +268,6 @@ def move_measuring_line(
 ) -> ErrorSet:
     """Move translations between the origin of an axis and a line beside it.
 
-    Notes
-    -----
     The point at p moves by δ + (R(ε) − 1)·p, to first order by δ + ε × p: 10 µrad of pitch on an
     arm of 100 mm are 1 µm. Exact, with the full rotation. Before the motion the arm is the place of
     the same point there, ``M(q) · p``.
@@ -328,8 +306,6 @@ class SquarenessSign(StrEnum):
 def angle_sign(key: str) -> int:
     """Tell what a positive squareness by the right-hand rule does to the angle between the axes.
 
-    Notes
-    -----
     The axis along eᵢ turned about eₖ moves by eₖ × eᵢ, which is +eⱼ where k, i, j follow each other
     like x, y, z: towards the other axis.
     """

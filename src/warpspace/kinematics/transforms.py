@@ -13,16 +13,7 @@ _SMALL = 1e-9
 
 
 def translation(vector: ArrayLike) -> Array:
-    """Build pure translations.
-
-    Parameters
-    ----------
-    vector : array_like, [..., 3], mm
-
-    Returns
-    -------
-    ndarray, [..., 4, 4]
-    """
+    """Build pure translations, [..., 4, 4], by vectors, [..., 3], mm."""
     values = np.asarray(vector, dtype=float)
     out = np.zeros((*values.shape[:-1], 4, 4))
     out[..., range(4), range(4)] = 1.0
@@ -31,18 +22,7 @@ def translation(vector: ArrayLike) -> Array:
 
 
 def axis_rotation(index: int, angle_rad: ArrayLike) -> Array:
-    """Build rotations about a coordinate axis, right-hand rule.
-
-    Parameters
-    ----------
-    index : int
-        0, 1 or 2 for x, y or z.
-    angle_rad : array_like, [...], rad
-
-    Returns
-    -------
-    ndarray, [..., 3, 3]
-    """
+    """Build right-handed rotations about x, y or z (0 to 2), [..., 3, 3], by angles [...], rad."""
     angle = np.asarray(angle_rad, dtype=float)
     j, k = (index + 1) % 3, (index + 2) % 3
     out = np.zeros((*angle.shape, 3, 3))
@@ -56,16 +36,7 @@ def axis_rotation(index: int, angle_rad: ArrayLike) -> Array:
 
 
 def skew(vector: ArrayLike) -> Array:
-    """Build the cross-product matrices, so that ``skew(a) @ b == a × b``.
-
-    Parameters
-    ----------
-    vector : array_like, [..., 3]
-
-    Returns
-    -------
-    ndarray, [..., 3, 3]
-    """
+    """Build the cross-product matrices of vectors, [..., 3, 3]: ``skew(a) @ b == a × b``."""
     x, y, z = np.moveaxis(np.asarray(vector, dtype=float), -1, 0)
     zero = np.zeros_like(x)
     rows = [np.stack(row, -1) for row in ((zero, -z, y), (z, zero, -x), (-y, x, zero))]
@@ -73,17 +44,7 @@ def skew(vector: ArrayLike) -> Array:
 
 
 def vector_rotation(rotation_rad: ArrayLike) -> Array:
-    """Build full rotations from rotation vectors (Rodrigues' formula).
-
-    Parameters
-    ----------
-    rotation_rad : array_like, [..., 3], rad
-        Direction is the axis of rotation, length the angle.
-
-    Returns
-    -------
-    ndarray, [..., 3, 3]
-    """
+    """Build full rotations, [..., 3, 3], from rotation vectors, [..., 3], rad (Rodrigues)."""
     values = np.asarray(rotation_rad, dtype=float)
     angle = np.linalg.norm(values, axis=-1)[..., None, None]
     safe = np.where(angle < _SMALL, 1.0, angle)
@@ -94,17 +55,7 @@ def vector_rotation(rotation_rad: ArrayLike) -> Array:
 
 
 def rigid(rotation: Array, position_mm: ArrayLike) -> Array:
-    """Join rotations and positions.
-
-    Parameters
-    ----------
-    rotation : ndarray, [..., 3, 3]
-    position_mm : array_like, [..., 3], mm
-
-    Returns
-    -------
-    ndarray, [..., 4, 4]
-    """
+    """Join rotations, [..., 3, 3], and positions, [..., 3], mm, to transformations."""
     position = np.asarray(position_mm, dtype=float)
     batch = np.broadcast_shapes(rotation.shape[:-2], position.shape[:-1])
     out = np.zeros((*batch, 4, 4))
@@ -115,17 +66,10 @@ def rigid(rotation: Array, position_mm: ArrayLike) -> Array:
 
 
 def placed(offset_mm: ArrayLike, rotation_deg: ArrayLike) -> Array:
-    """Build the fixed placement of a frame: ``Trans(offset) · Rz · Ry · Rx``.
+    """Build the fixed placement of a frame, [4, 4]: ``Trans(offset) · Rz · Ry · Rx``.
 
-    Parameters
-    ----------
-    offset_mm : array_like, [3], mm
-    rotation_deg : array_like, [3], degrees
-        About the fixed x, y and z axes in that order, as the roll, pitch and yaw of URDF.
-
-    Returns
-    -------
-    ndarray, [4, 4]
+    The offset, [3], is in mm; the rotation, [3], in degrees, is about the fixed x, y and z axes in
+    that order, as the roll, pitch and yaw of URDF.
     """
     x, y, z = np.deg2rad(np.asarray(rotation_deg, dtype=float))
     if x == y == z == 0.0:
@@ -141,30 +85,10 @@ def inverse(transform: Array) -> Array:
 
 
 def apply(transform: Array, point_mm: ArrayLike) -> Array:
-    """Take points from child to parent coordinates.
-
-    Parameters
-    ----------
-    transform : ndarray, [..., 4, 4]
-    point_mm : array_like, [..., 3], mm
-
-    Returns
-    -------
-    ndarray, [..., 3], mm
-    """
+    """Take points, [..., 3], mm, from child to parent coordinates by transformations."""
     return rotate(transform[..., :3, :3], point_mm) + transform[..., :3, 3]
 
 
 def rotate(rotation: Array, vector: ArrayLike) -> Array:
-    """Rotate vectors.
-
-    Parameters
-    ----------
-    rotation : ndarray, [..., 3, 3]
-    vector : array_like, [..., 3]
-
-    Returns
-    -------
-    ndarray, [..., 3]
-    """
+    """Rotate vectors, [..., 3], by matrices, [..., 3, 3]."""
     return np.einsum("...ij,...j->...i", rotation, np.asarray(vector, dtype=float))

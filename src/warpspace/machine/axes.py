@@ -287,13 +287,10 @@ def default_keys(axes: Sequence[str]) -> tuple[str, ...]:
     """List the parameters that a machine with these axes has by default.
 
     Six component errors per axis; per rotary axis two orientation and two location errors; per
-    linear axis the squareness not absorbed by the reference axis and the reference plane.
-
-    Notes
-    -----
-    The reference axis is the first linear axis that the machine has in the order X Y Z U V W, the
-    reference plane that of the first two: the first has no squareness, the second one, the third
-    two. An axis parallel to an earlier one has the two angles between them.
+    linear axis the squareness not absorbed by the reference axis, the first that the machine has in
+    the order X Y Z U V W, and the reference plane, that of the first two: the first has no
+    squareness, the second one, the third two. An axis parallel to an earlier one has the two angles
+    between them.
     """
     keys: list[str] = []
     earlier: list[int] = []

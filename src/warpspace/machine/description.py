@@ -98,8 +98,6 @@ class Gantry:
     def rotation_weight(self) -> float:
         """Rotation for each micrometre that the second guide is ahead of the first, µrad/µm.
 
-        Notes
-        -----
         A rotation c about the third direction moves a point at p of the direction across by
         c·p·(third × across) along the axis. That is −c·p for X across y, and where the axis, the
         direction across and the third one follow each other like x, y, z; +c·p otherwise.

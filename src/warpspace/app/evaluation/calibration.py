@@ -11,8 +11,8 @@ from warpspace.app.evaluation.resulting_scene import scene_of
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.comparison import Side
 from warpspace.calibration.calibrate import Calibrate
-from warpspace.calibration.kinds.registry import KINDS
 from warpspace.calibration.readings import bundled_data, find_data, parse_readings, parse_table
+from warpspace.calibration.registry import KINDS
 from warpspace.calibration.results import Calibration
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.machine.limits import MAX_CSV_BYTES

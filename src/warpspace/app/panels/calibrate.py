@@ -32,9 +32,8 @@ from warpspace.app.readouts.calibration import arrows_of, calibration_html, file
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.viewport.layers.residuals import ResidualsLayer
-from warpspace.calibration.kinds.bench import test_kinds
-from warpspace.calibration.kinds.registry import KINDS
 from warpspace.calibration.readings import bundled_data
+from warpspace.calibration.registry import KINDS, test_kinds
 from warpspace.calibration.solve import AUTO
 from warpspace.exceptions import WarpspaceError
 

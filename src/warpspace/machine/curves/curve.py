@@ -310,13 +310,7 @@ class ErrorFunction(ABC):
         return (("", self),)
 
     def without_axes(self, positions: Mapping[str, float]) -> "ErrorFunction":
-        """Give the curve that is left where axes stand still for good.
-
-        Parameters
-        ----------
-        positions : mapping of str to float, mm or degrees
-            Where each of the axes stands that are gone; the axis of the error is not among them.
-        """
+        """Give the curve that is left where other axes stand still for good, mm or degrees."""
         del positions
         return self
 
@@ -351,16 +345,9 @@ class ErrorFunction(ABC):
         return ()
 
     def with_amplitude(self, amplitude: float) -> Self:
-        """Give the same curve with another amplitude; a zero one takes the shape of `grown`.
+        """Give the same curve with another amplitude, µm or µrad, of the same kind.
 
-        Parameters
-        ----------
-        amplitude : float, µm or µrad
-
-        Returns
-        -------
-        ErrorFunction
-            Of the same kind. Zero where it was zero and stays so, and where `grown` is.
+        A zero one takes the shape of `grown`; it stays zero where that is zero too.
         """
         present = self.amplitude
         if abs(present) >= NEGLIGIBLE:
@@ -380,16 +367,7 @@ class ErrorFunction(ABC):
         return self
 
     def shape(self, position: Array) -> Array:
-        """Give the curve for an amplitude of one; of a zero curve that of the `grown` one.
-
-        Parameters
-        ----------
-        position : ndarray, [...], mm or degrees
-
-        Returns
-        -------
-        ndarray, [...]
-        """
+        """Give the curve at positions, [...], for an amplitude of one; of a zero one `grown`."""
         return self.with_amplitude(1.0).evaluate(position)
 
     # --- in scene files ---------------------------------------------------------------------------
@@ -428,19 +406,7 @@ class ErrorFunction(ABC):
     # --- in words ---------------------------------------------------------------------------------
 
     def describe(self, unit: str, value: Spell, position: Spell) -> str:
-        """Describe the curve along its axis, for a report.
-
-        Parameters
-        ----------
-        unit : str
-            µm or µrad.
-        value, position : callable
-            Spell a value and an axis position.
-
-        Returns
-        -------
-        str
-        """
+        """Describe the curve along its axis for a report; values and positions are spelled."""
         del unit, value, position
         return self.title
 
@@ -452,25 +418,12 @@ class ErrorFunction(ABC):
 
     @classmethod
     def tidied(cls, rows: Rows) -> tuple[Rows, tuple[str, ...]]:
-        """Put rows as a user has them into the order that `from_rows` expects.
-
-        Returns
-        -------
-        rows : sequence of sequence of float
-        remarks : tuple of str
-            What was changed, a sentence each.
-        """
+        """Put rows into the order that `from_rows` expects, and say each change."""
         return rows, ()
 
     @classmethod
     def from_rows(cls, span: Span, rows: Rows) -> Self:
-        """Build a curve from the rows a user has edited, at least one; a kind that is not refuses.
-
-        Raises
-        ------
-        OptionError
-            Naming the row, what it holds and what was expected.
-        """
+        """Build a curve from rows that a user edited; OptionError names a row that is wrong."""
         del span, rows
         raise OptionError(cls.row_words)
 

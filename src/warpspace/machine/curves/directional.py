@@ -26,8 +26,6 @@ NOTHING = Constant((0.0, 1.0))
 class Directional(ErrorFunction):
     """An error whose value depends on the way that its axis has come.
 
-    Notes
-    -----
     `evaluate` gives the mean of both; `evaluate_at` takes a direction. The amplitude is the larger
     one of the two curves' and scales both, so that their ratio stays.
     """

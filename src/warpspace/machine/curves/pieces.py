@@ -128,28 +128,11 @@ class Pieces(ErrorFunction):
 def fit_curves(
     evaluate: Callable[[Array], Array], span: Span, kinks: Array
 ) -> list[ErrorFunction | None]:
-    """Fit curves to functions of one position that are smooth between kinks.
+    """Fit curves to functions of one position, values [n, K] at [n], smooth between kinks, [m].
 
-    Parameters
-    ----------
-    evaluate : callable
-        Gives values, [n, K], µm or µrad, at positions, [n].
-    span : tuple of float, (2,), mm or degrees
-        Where the fit holds.
-    kinks : ndarray, [m], mm or degrees
-        Positions at which a slope may jump; those within the range count.
-
-    Returns
-    -------
-    list of (ErrorFunction or None), (K,)
-        A constant or a polynomial where one piece is enough, else pieces; None where the function
-        is nothing anywhere. Off by no more than 10⁻¹² µm or µrad, as far as numbers of this size
-        can be told apart.
-
-    Raises
-    ------
-    OptionError
-        If more than 4096 pieces would be needed besides those between kinks.
+    A constant or a polynomial where one piece is enough, else pieces; None where the function is
+    nothing anywhere. Off by no more than 10⁻¹² µm or µrad, as far as numbers of this size can be
+    told apart.
     """
     low, high = span
     inner = kinks[(kinks > low) & (kinks < high)]

@@ -1,7 +1,8 @@
-"""Readings of a standard test, evaluated as the test's own path and sensors have them."""
+"""The kinds of measurement there are. A new one is a module beside this and a line below."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -11,9 +12,10 @@ from warpspace.bench.base import BenchTest, bench_names, find_test
 from warpspace.bench.data import parse_table
 from warpspace.bench.plan import Plan
 from warpspace.bench.readings import respond, simulate
-from warpspace.calibration.kinds.kind import Guess, Kind
+from warpspace.calibration.kinds import Guess, Kind, Lengths, Points, Tracker
 from warpspace.calibration.readings import Readings, ReadingTable, check_spread
-from warpspace.exceptions import OptionError, UnknownNameError
+from warpspace.calibration.spheres import Sphere, SphereTcp
+from warpspace.exceptions import OptionError, SceneError, UnknownNameError
 from warpspace.machine.limits import MAX_ERROR
 from warpspace.scene.files import parse_number
 from warpspace.scene.model import Scene
@@ -22,13 +24,6 @@ from warpspace.units import MM_PER_UM, Array
 RENAMED = {"r-test": "sphere"}
 """The test `sphere` reads deviations at sphere poses; the kind of that name reads centres."""
 NAMES = {RENAMED[name]: name for name in RENAMED}
-
-
-@dataclass(frozen=True, slots=True)
-class PlannedReadings(Readings):
-    """Readings along the path of a test."""
-
-    plan: Plan | None = None  # always there
 
 
 def test_kinds() -> tuple[str, ...]:
@@ -74,7 +69,7 @@ class TestReadings(Kind):
         found = self._readings(plan, measured, own.source, tuple(int(line) for line in lines))
         return replace(found, notes=(*found.notes, *own.notes, *self.test.data_notes(own)))
 
-    def planned(self, scene: Scene) -> PlannedReadings:
+    def planned(self, scene: Scene) -> Readings:
         """Lay the path of the test as it would be run; nothing is read yet."""
         plan = self.test.plan(scene)
         lines = tuple(range(1, plan.readings + 1))
@@ -82,8 +77,8 @@ class TestReadings(Kind):
 
     def _readings(
         self, plan: Plan, read_um: Array, source: str, lines: tuple[int, ...]
-    ) -> PlannedReadings:
-        return PlannedReadings(
+    ) -> Readings:
+        return Readings(
             self._text,
             {name: values[plan.site] for name, values in plan.coordinates.items()},
             plan.point_mm[plan.site],
@@ -121,10 +116,9 @@ class TestReadings(Kind):
 
 
 def _plan(readings: Readings) -> Plan:
-    plan = getattr(readings, "plan", None)
-    if not isinstance(plan, Plan):
+    if readings.plan is None:
         raise OptionError(f"{readings.source}: expected readings of a test")
-    return plan
+    return readings.plan
 
 
 def _set_up(readings: Readings, unknowns: tuple[str, ...]) -> Array:
@@ -148,3 +142,34 @@ def _value(option: Option, text: str, given: str) -> Any:
     except OptionError as error:
         said = error.said(lambda _: option.flag)
         raise OptionError(f"{{kinds}} {given!r}: {said}") from None
+
+
+KINDS: Mapping[str, Kind] = {
+    kind.name: kind for kind in (Points(), Tracker(), Sphere(), SphereTcp(), Lengths())
+}
+"""By name."""
+
+
+def find_kind(name: str) -> Kind:
+    """Look up a kind: one of this table, or a test with its options (``circular:plane=XZ``)."""
+    if name in KINDS:
+        return KINDS[name]
+    tests = test_kinds()
+    if name.partition(":")[0] not in tests:
+        raise UnknownNameError("kind of measurement", name, (*KINDS, *tests))
+    return _test_kind(name)
+
+
+@lru_cache(maxsize=256)
+def _test_kind(text: str) -> Kind:
+    return TestReadings(text)
+
+
+def recognise(table: ReadingTable, scene: Scene) -> Kind:
+    """Tell the kind of a file by its columns."""
+    found = next((kind for kind in KINDS.values() if kind.fits(table, scene)), None)
+    if found is None:
+        there = ", ".join((*table.labels, *table.columns))
+        kinds = "; ".join(f"{kind.name}: {kind.columns}" for kind in KINDS.values())
+        raise SceneError(table.source, [f"has columns {there}; expected those of a kind: {kinds}"])
+    return found

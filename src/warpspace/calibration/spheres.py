@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from warpspace.analysis.axis_motion import fit_flat_circle
-from warpspace.calibration.kinds.kind import Placed, head_keys
+from warpspace.calibration.kinds import Placed
 from warpspace.calibration.readings import (
     Circle,
     Readings,
@@ -21,7 +21,7 @@ from warpspace.calibration.readings import (
     take_readings,
 )
 from warpspace.exceptions import SceneError
-from warpspace.machine.axes import direction_index
+from warpspace.machine.axes import direction_index, sort_axes
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
@@ -33,7 +33,34 @@ TCP_SPREAD_MM = 20.0
 """Centres that wander further than this were not measured with TCP correction."""
 
 
-class SphereTcp(Placed):
+class Centres(Placed):
+    """Centres of one sphere, wherever its stand is."""
+
+    place = "sphere"
+    sign = -1.0
+
+    def automatic_keys(self, readings: Readings, scene: Scene) -> tuple[str, ...]:
+        """List location, orientation and zero errors of the rotary axes that move.
+
+        The last rotary axis on the side of the tool has the offset of the tool point as well:
+        constant component translations, which turn with it. Its length comes before the zero
+        positions, what leads sideways last.
+        """
+        moving = [
+            name
+            for name in sort_axes(rotary_axes(scene))
+            if np.ptp(readings.coordinates[name]) > 1e-9
+        ]
+        constants = [f"E{letter}0{axis}" for letter in "XYZABC" for axis in moving]
+        usual = [key for key in constants if key in scene.parameter_keys]
+        others = [key for key in constants if key not in usual]
+        last = [axis.name for axis in scene.machine.branch("tool") if axis.name in moving][-1:]
+        length = [f"EZ{axis}" for axis in last]
+        sideways = [f"E{letter}{axis}" for letter in "XY" for axis in last]
+        return (*usual, *length, *others, *sideways)
+
+
+class SphereTcp(Centres):
     """The tool point that the controller believes in, each time it stands at the sphere.
 
     The controller moves the linear axes so that its nominal tool point stays; the errors of the
@@ -43,8 +70,6 @@ class SphereTcp(Placed):
     name = "sphere-tcp"
     words = "centres of one sphere, TCP correction on (R-test, ISO 10791-6)"
     columns = "rotary positions (b_deg, c_deg), x_mm, y_mm, z_mm; u_um, session"
-    place = "sphere"
-    sign = -1.0
 
     def fits(self, table: ReadingTable, scene: Scene) -> bool:
         """Look for centres that stay within a few millimetres."""
@@ -61,12 +86,8 @@ class SphereTcp(Placed):
         coordinates = solve_linear(scene, coordinates, places(observed, table), table.source)
         return take_readings(self.name, scene, table, coordinates, observed, notes)
 
-    def automatic_keys(self, readings: Readings, scene: Scene) -> tuple[str, ...]:
-        """Look for rigid errors of the rotary axes that move."""
-        return head_keys(readings, scene)
 
-
-class Sphere(Placed):
+class Sphere(Centres):
     """Positions of the linear axes, each time the tool point stands at the sphere."""
 
     name = "sphere"
@@ -74,8 +95,6 @@ class Sphere(Placed):
     columns = (
         "rotary positions (b_deg, c_deg), linear positions x_mm, y_mm, z_mm; u_um, session or run"
     )
-    place = "sphere"
-    sign = -1.0
 
     def fits(self, table: ReadingTable, scene: Scene) -> bool:
         """Look for centres that wander."""
@@ -113,10 +132,6 @@ class Sphere(Placed):
         hint = "Are they in mm, and are the offsets of the scene those of the machine?"
         check_spread(float(np.abs(about).max()), SPREAD_MM, table.source, hint)
         return readings
-
-    def automatic_keys(self, readings: Readings, scene: Scene) -> tuple[str, ...]:
-        """Look for rigid errors of the rotary axes that move."""
-        return head_keys(readings, scene)
 
 
 def rotary_axes(scene: Scene) -> tuple[str, ...]:
@@ -179,10 +194,8 @@ def solve_linear(
 def circles_of(table: ReadingTable, scene: Scene) -> tuple[Circle, ...]:
     """Fit a circle per run in which one rotary axis turns, and one per axis to all such runs.
 
-    Notes
-    -----
-    As `warpspace.analysis.axis_motion.fit_flat_circle` has it, in the plane of the two linear axes
-    across the rotary one.
+    In the plane of the two linear axes across it, as
+    `warpspace.analysis.axis_motion.fit_flat_circle`.
     """
     read = table.need(("x_mm", "y_mm", "z_mm"))
     labels = np.array(table.session or ("",) * len(table))

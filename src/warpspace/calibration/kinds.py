@@ -1,0 +1,389 @@
+"""What every kind of measurement is and can: columns, readings, and what the model predicts."""
+
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpspace.calibration.readings import (
+    FRAMES,
+    Readings,
+    ReadingTable,
+    axis_columns,
+    check_poses,
+    check_spread,
+    take_readings,
+)
+from warpspace.exceptions import SceneError
+from warpspace.field.evaluate import View, build_basis, evaluate_exact
+from warpspace.kinematics import transforms
+from warpspace.kinematics.chain import branch_pose
+from warpspace.kinematics.model import Loop
+from warpspace.machine.errors import ErrorSet
+from warpspace.machine.limits import MAX_ERROR
+from warpspace.scene.model import Scene
+from warpspace.units import MM_PER_UM, Array
+
+VIEW = View(Loop.RELATIVE, "workpiece")
+"""How errors are looked at: the tool point relative to the workpiece, in its nominal frame."""
+
+
+@dataclass(frozen=True, slots=True)
+class Guess:
+    """What readings are predicted from: errors, and what the set-ups leave unknown."""
+
+    errors: ErrorSet
+    unknowns: tuple[str, ...]  # (m,)
+    values: Array  # [m], mm
+
+
+class Kind(ABC):
+    """A kind of measurement.
+
+    A reading is a function of the errors of the machine and of a few numbers that nobody knows:
+    where a sphere or a station stands, by how much a session is shifted.
+    """
+
+    name: ClassVar[str]  # as an option takes it
+    words: ClassVar[str]  # what it is, for lists and help
+    columns: ClassVar[str]  # of its file
+    # whether it takes the text of the file, columns of words among them, rather than its table
+    own_columns: ClassVar[bool] = False
+
+    @abstractmethod
+    def fits(self, table: ReadingTable, scene: Scene) -> bool:
+        """Tell whether a file has the columns of this kind, and of no other."""
+
+    @abstractmethod
+    def read(self, table: ReadingTable, scene: Scene) -> Readings:
+        """Give the readings of a file; refuse one that lacks a column or holds what cannot be."""
+
+    @abstractmethod
+    def unknowns(self, readings: Readings) -> tuple[str, ...]:
+        """Name what the set-up leaves unknown, each in mm, for instance ``sphere x``."""
+
+    @abstractmethod
+    def start(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:
+        """Give values of the unknowns to begin with, [m], mm."""
+
+    @abstractmethod
+    def observe(self, scene: Scene, readings: Readings, guess: Guess) -> Array:
+        """Give the readings that errors would lead to, with the exact model, [n, d], mm."""
+
+    @abstractmethod
+    def slopes(
+        self, scene: Scene, readings: Readings, guess: Guess, keys: tuple[str, ...]
+    ) -> tuple[Array, Array]:
+        """Differentiate the readings, [n, d, K], mm per µm or µrad, and by unknowns, [n, d, m].
+
+        To first order in the errors.
+        """
+
+    def automatic_keys(self, readings: Readings, scene: Scene) -> tuple[str, ...]:
+        """List the parameters that are looked for where none are named, the likelier first."""
+        del readings
+        return scene.parameter_keys
+
+
+class FromVectors(Kind):
+    """A kind whose readings follow from the error vectors at its poses."""
+
+    @abstractmethod
+    def predict(self, readings: Readings, error_mm: Array, guess: Guess) -> Array:
+        """Give the readings, [n, d], mm, that errors, [n, 3], mm, would lead to."""
+
+    @abstractmethod
+    def derivatives(self, readings: Readings, error_mm: Array, guess: Guess) -> tuple[Array, Array]:
+        """Differentiate the prediction: by the error, [n, d, 3], and by unknowns, [n, d, m]."""
+
+    def observe(self, scene: Scene, readings: Readings, guess: Guess) -> Array:
+        """Evaluate the errors, and predict."""
+        return self.predict(readings, _error_mm(scene, readings, guess), guess)
+
+    def slopes(
+        self, scene: Scene, readings: Readings, guess: Guess, keys: tuple[str, ...]
+    ) -> tuple[Array, Array]:
+        """Put what an error does to a reading behind what a parameter does to the error."""
+        error_mm = _error_mm(scene, readings, guess)
+        by_error, by_unknown = self.derivatives(readings, error_mm, guess)
+        basis = build_basis(scene.model, guess.errors, keys, readings.coordinates, VIEW)
+        gains = np.einsum("ndx,knx->ndk", by_error, basis.position) * MM_PER_UM
+        return gains, by_unknown
+
+
+def _error_mm(scene: Scene, readings: Readings, guess: Guess) -> Array:
+    """Evaluate the error at the poses of readings, exactly, [n, 3], mm."""
+    field = evaluate_exact(scene.model, guess.errors, readings.coordinates, VIEW)
+    return field.error_um * MM_PER_UM
+
+
+class Placed(FromVectors):
+    """A kind whose readings are ± the error plus the place of something, one place per session."""
+
+    place: ClassVar[str]
+    sign: ClassVar[float]
+
+    def unknowns(self, readings: Readings) -> tuple[str, ...]:
+        """Name three coordinates per session."""
+        return tuple(
+            f"{self._head(session)} {letter}"
+            for session in dict.fromkeys(readings.session)
+            for letter in "xyz"
+        )
+
+    def start(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:
+        """Begin with the means of the sessions."""
+        member = self._members(readings, unknowns)
+        total = np.einsum("ndm,nd->m", member, readings.observed_mm)
+        return total / np.maximum(member.sum(axis=(0, 1)), 1.0)
+
+    def predict(self, readings: Readings, error_mm: Array, guess: Guess) -> Array:
+        """Add ± the error to the place."""
+        return self.sign * error_mm + self._members(readings, guess.unknowns) @ guess.values
+
+    def derivatives(self, readings: Readings, error_mm: Array, guess: Guess) -> tuple[Array, Array]:
+        """Give ± one, and which place a reading belongs to."""
+        by_error = np.broadcast_to(self.sign * np.eye(3), (*error_mm.shape, 3))
+        return by_error, self._members(readings, guess.unknowns)
+
+    def _head(self, session: str) -> str:
+        return f"{self.place} {session}".strip()
+
+    def _members(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:
+        """Tell which unknown each component of each reading has, [n, 3, m]."""
+        member = np.zeros((len(readings), 3, len(unknowns)))
+        index = {name: at for at, name in enumerate(unknowns)}
+        for row, session in enumerate(readings.session):
+            for component, letter in enumerate("xyz"):
+                at = index.get(f"{self._head(session)} {letter}")
+                if at is not None:
+                    member[row, component, at] = 1.0
+        return member
+
+
+_COLUMN = re.compile(
+    r"(?:e(?P<short>[xyz])|error_(?P<loop>(?:tool|workpiece|relative)(?:_placed|_referenced)?))"
+    r"(?:_(?P<frame>[rw]))?(?:_(?P<long>[xyz]))?_(?P<unit>um|mm)"
+)
+
+
+class Points(Placed):
+    """Errors actual − nominal at axis positions; a session that is named has its own shift.
+
+    Readings are kept in the workpiece frame, whichever they were taken in.
+    """
+
+    name = "points"
+    words = "error vectors at points, tool relative to workpiece"
+    columns = (
+        "an axis position each (x_mm, b_deg, …), ex_um, ey_um, ez_um (or _mm; ex_R_um in the"
+        " machine frame R, ex_w_um in that of the workpiece); u_um, session"
+    )
+    loops: ClassVar[tuple[str, ...]] = ("relative",)
+    place = "shift"
+    sign = 1.0
+
+    def fits(self, table: ReadingTable, scene: Scene) -> bool:
+        """Look for the error vectors."""
+        del scene
+        return _vectors(table) is not None
+
+    def read(self, table: ReadingTable, scene: Scene) -> Readings:
+        """Take positions of any axes, and the three components of the error."""
+        columns, loop, told = _vectors(table) or (("ex_um", "ey_um", "ez_um"), None, None)
+        observed = table.need(columns) * (1.0 if columns[0].endswith("_mm") else 1e-3)
+        if loop not in (None, *self.loops) and (
+            loop != "tool" or scene.machine.branch("workpiece")
+        ):
+            found = (
+                f"has column {columns[0]}; expected errors of field --loop relative, no reference"
+            )
+            raise SceneError(table.source, [f"{found} held (with --placed: --kind tracker)"])
+        if told and table.frame and told != table.frame:
+            found = f"has column {columns[0]}, so its vectors are in the {told} frame"
+            raise SceneError(table.source, [f"{found}; expected no --frame {table.frame}"])
+        axes = tuple(scene.machine.axes)
+        coordinates, notes = axis_columns(table, scene, axes)
+        frame = told or table.frame or "workpiece"
+        if frame == "machine":
+            observed = transforms.rotate(_from_machine(scene, coordinates), observed)
+        check_poses(coordinates, table.source)
+        hint = "Are the errors in the unit that their columns name?"
+        check_spread(float(np.abs(observed).max()), MAX_ERROR * 1e-3, table.source, hint)
+        readings = take_readings(self.name, scene, table, coordinates, observed, notes)
+        readings = replace(readings, frame=frame)
+        if told or table.frame or in_other_frame(scene, readings) is None:
+            return readings
+        note = f"{Path(table.source).name}: vectors are taken in the workpiece frame"
+        return replace(readings, notes=(*notes, note))
+
+    def unknowns(self, readings: Readings) -> tuple[str, ...]:
+        """Name a shift per session where the file names sessions."""
+        return super().unknowns(readings) if any(readings.session) else ()
+
+
+class Tracker(Points):
+    """Error vectors in the coordinates of an instrument whose place nobody knows: six numbers."""
+
+    name = "tracker"
+    words = (
+        "error vectors of a tracker whose place and turn are unknown in each session; turns in mrad"
+    )
+    loops = ("relative", "relative_placed")
+    place = "tracker"
+
+    def fits(self, table: ReadingTable, scene: Scene) -> bool:
+        """Say no: its columns are those of points."""
+        del table, scene
+        return False
+
+    def unknowns(self, readings: Readings) -> tuple[str, ...]:
+        """Name a shift and a turn per session."""
+        names = dict.fromkeys(name[:-2] for name in Placed.unknowns(self, readings))
+        return tuple(f"{name} {at}{x}" for name in names for at in ("", "turn ") for x in "xyz")
+
+    def start(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:
+        """Begin with none."""
+        del readings
+        return np.zeros(len(unknowns))
+
+    def _members(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:
+        """Tell what a unit of each unknown adds to each component, [n, 3, m]."""
+        member = super()._members(readings, unknowns)
+        heads = np.array([self._head(session) for session in readings.session])
+        for at, name in enumerate(unknowns):
+            head, turn, letter = name.partition(" turn ")
+            if turn:
+                lever_m = readings.nominal_mm * MM_PER_UM
+                turned = np.cross(np.eye(3)["xyz".index(letter)], lever_m)
+                member[:, :, at] = np.where((heads == head)[:, None], turned, 0.0)
+        return member
+
+
+def _vectors(table: ReadingTable) -> tuple[tuple[str, ...], str | None, str | None] | None:
+    found: dict[tuple[str | None, ...], dict[str, str]] = {}
+    for column in table.columns:
+        told = _COLUMN.fullmatch(column)
+        if told and bool(told["short"]) != bool(told["long"]):
+            group = told["loop"], told["frame"], told["unit"]
+            found.setdefault(group, {})[told["short"] or told["long"]] = column
+    for (loop, frame, _), columns in found.items():
+        if len(columns) == 3:
+            names = tuple(columns[letter] for letter in "xyz")
+            return names, loop, next((word for word in FRAMES if FRAMES[word] == frame), None)
+    return None
+
+
+def _from_machine(scene: Scene, coordinates: Mapping[str, Array]) -> Array:
+    """Give the rotations that turn vectors from R into the workpiece frame, [n, 3, 3]."""
+    return np.swapaxes(branch_pose(scene.model, "workpiece", coordinates)[..., :3, :3], -1, -2)
+
+
+def in_other_frame(scene: Scene, readings: Readings) -> Readings | None:
+    """Take vectors as if they were read in the other frame; None where that is the same."""
+    turn, was_machine = _from_machine(scene, readings.coordinates), readings.frame == "machine"
+    if not readings.frame or np.abs(turn - np.eye(3)).max() < 1e-9:
+        return None
+    turn = np.swapaxes(turn, -1, -2) if was_machine else turn
+    observed = transforms.rotate(turn, readings.observed_mm)
+    return replace(readings, observed_mm=observed, frame="workpiece" if was_machine else "machine")
+
+
+Indices = NDArray[np.intp]
+LEAST = 5
+"""Readings that a station needs: its place, its dead path, and one to check."""
+
+
+class Lengths(FromVectors):
+    """Distances between the tool point and stations, each with an unknown place and dead path."""
+
+    name = "lengths"
+    words = "lengths from unknown stations to the tool point (tracking laser)"
+    columns = "an axis position each (x_mm, b_deg, …), length_mm; session names the station; u_um"
+
+    def fits(self, table: ReadingTable, scene: Scene) -> bool:
+        """Look for lengths."""
+        del scene
+        return "length_mm" in table.columns
+
+    def read(self, table: ReadingTable, scene: Scene) -> Readings:
+        """Take positions of any axes, and one length."""
+        observed = table.need(("length_mm",))
+        coordinates, notes = axis_columns(table, scene, tuple(scene.machine.axes))
+        check_poses(coordinates, table.source)
+        labels = table.session or ("1",) * len(table)
+        for name in dict.fromkeys(labels):
+            count = labels.count(name)
+            if count < LEAST:
+                found = f"station {name!r} has {count} lengths"
+                raise SceneError(table.source, [f"{found}; expected at least {LEAST}"])
+        found = take_readings(self.name, scene, table, coordinates, observed, notes)
+        return replace(found, session=labels)
+
+    def unknowns(self, readings: Readings) -> tuple[str, ...]:
+        """Name place and dead path of each station."""
+        return tuple(
+            f"station {name} {what}"
+            for name in dict.fromkeys(readings.session)
+            for what in ("x", "y", "z", "dead path")
+        )
+
+    def start(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:
+        """Find each station from the nominal points, from several beginnings."""
+        values = np.zeros(len(unknowns))
+        stations = self._stations(readings, unknowns)
+        for name in dict.fromkeys(readings.session):
+            at = unknowns.index(f"station {name} x")
+            mine = stations == at
+            values[at : at + 4] = _locate(readings.nominal_mm[mine], readings.observed_mm[mine, 0])
+        return values
+
+    def predict(self, readings: Readings, error_mm: Array, guess: Guess) -> Array:
+        """Take the distance, less the dead path."""
+        at, away = self._beams(readings, error_mm, guess)
+        return (np.linalg.norm(away, axis=-1) - guess.values[at + 3])[:, None]
+
+    def derivatives(self, readings: Readings, error_mm: Array, guess: Guess) -> tuple[Array, Array]:
+        """Give the direction of the beam."""
+        at, away = self._beams(readings, error_mm, guess)
+        beam = away / np.linalg.norm(away, axis=-1, keepdims=True)
+        by_unknown = np.zeros((len(readings), 1, len(guess.unknowns)))
+        rows = np.arange(len(readings))
+        for component in range(3):
+            by_unknown[rows, 0, at + component] = -beam[:, component]
+        by_unknown[rows, 0, at + 3] = -1.0
+        return beam[:, None, :], by_unknown
+
+    def _beams(self, readings: Readings, error_mm: Array, guess: Guess) -> tuple[Indices, Array]:
+        """Give where the unknowns of stations begin, [n], and the way from there, [n, 3], mm."""
+        at = self._stations(readings, guess.unknowns)
+        places = np.stack([guess.values[at + component] for component in range(3)], -1)
+        return at, readings.nominal_mm + error_mm - places
+
+    def _stations(self, readings: Readings, unknowns: tuple[str, ...]) -> Indices:
+        """Give where the unknowns of each reading's station begin, [n]."""
+        index = {name: at for at, name in enumerate(unknowns)}
+        return np.array([index[f"station {name} x"] for name in readings.session], np.intp)
+
+
+def _locate(points_mm: Array, length_mm: Array) -> Array:
+    """Find a station that has given lengths to points: place and dead path, [4], mm."""
+    from scipy.optimize import least_squares
+
+    middle = points_mm.mean(axis=0)
+    reach = max(float(np.ptp(points_mm, axis=0).max()), float(np.ptp(length_mm)), 1.0)
+
+    def missed(values: Array) -> Array:
+        return np.linalg.norm(points_mm - values[:3], axis=-1) - values[3] - length_mm
+
+    corners = np.stack(np.meshgrid(*[(-1.0, 1.0)] * 3), -1).reshape(-1, 3)
+    found = (
+        least_squares(missed, [*(middle + reach * corner), 0.0], x_scale=reach)
+        for corner in corners
+    )
+    return min(found, key=lambda one: one.cost).x

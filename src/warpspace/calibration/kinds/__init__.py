@@ -1,1 +1,0 @@
-"""The kinds of measurement a calibration takes, one module each."""
