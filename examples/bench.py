@@ -18,7 +18,7 @@ import numpy as np
 from warpspace import load_scene, run_test
 from warpspace.bench.base import bench_names, find_test
 from warpspace.bench.kinds.positioning import Positioning
-from warpspace.machine.curves.directional import Directional
+from warpspace.machine.curves.simple import Directional
 from warpspace.machine.errors import ErrorSet, Poly, Ramp
 from warpspace.outputs.charts.paper import write_chart
 from warpspace.outputs.charts.results import bench_chart

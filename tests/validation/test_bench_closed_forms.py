@@ -15,7 +15,7 @@ from warpspace.bench.kinds.sphere import Sphere
 from warpspace.bench.kinds.squareness import Squareness
 from warpspace.bench.kinds.straightness import Straightness
 from warpspace.bench.readings import simulate
-from warpspace.machine.curves.directional import Directional
+from warpspace.machine.curves.simple import Directional
 from warpspace.machine.errors import Constant, Harmonics, Poly, Table
 
 EXACT = {"rel": 1e-6, "abs": 1e-9}

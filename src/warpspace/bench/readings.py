@@ -9,7 +9,7 @@ from warpspace.bench.plan import NONE, Plan, Whole
 from warpspace.field.evaluate import View, build_basis, evaluate_exact
 from warpspace.kinematics.model import Loop, Model
 from warpspace.machine.axes import TravelDirection, parameter
-from warpspace.machine.curves.directional import Directional
+from warpspace.machine.curves.simple import Directional
 from warpspace.machine.errors import ErrorFunction, ErrorSet
 from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM, Array

@@ -12,7 +12,7 @@ from warpspace.formats.compensation.wanted import Wanted
 from warpspace.formats.source import Place, Source
 from warpspace.machine.axes import TravelDirection, direction_index, is_linear, parameter
 from warpspace.machine.curves.curve import ErrorFunction
-from warpspace.machine.curves.directional import Directional
+from warpspace.machine.curves.simple import Directional
 from warpspace.machine.curves.table import Table, TwoArguments
 from warpspace.scene.model import Scene
 from warpspace.units import Array

@@ -12,8 +12,7 @@ from warpspace.formats.registry import Reading
 from warpspace.kinematics.model import Model
 from warpspace.machine.axes import is_linear, parameter
 from warpspace.machine.curves.curve import ErrorFunction
-from warpspace.machine.curves.directional import Directional
-from warpspace.machine.curves.simple import Constant
+from warpspace.machine.curves.simple import Constant, Directional
 from warpspace.machine.curves.table import Table, TwoArguments
 from warpspace.machine.errors import ErrorSet, Measurement, Run
 from warpspace.machine.limits import MAX_POINTS, MAX_SCENE_BYTES, MAX_TEXT, MIN_SPAN

@@ -16,9 +16,8 @@ from warpspace.machine.curves.curve import (
     ValueReader,
     is_number,
 )
-from warpspace.machine.curves.directional import Directional
 from warpspace.machine.curves.registry import find_form, spell_forms
-from warpspace.machine.curves.simple import Constant, Harmonics, Poly, Ramp
+from warpspace.machine.curves.simple import Constant, Directional, Harmonics, Poly, Ramp
 from warpspace.machine.curves.table import Table, TwoArguments
 from warpspace.machine.description import Gantry, default_across
 from warpspace.machine.errors import RUN_DIRECTIONS, UNKNOWN, Run

@@ -19,7 +19,7 @@ from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, error_transform, point_in_branch
 from warpspace.kinematics.model import complete_coordinates
 from warpspace.machine.axes import TravelDirection
-from warpspace.machine.curves.directional import Directional
+from warpspace.machine.curves.simple import Directional
 from warpspace.machine.errors import ErrorSet, Harmonics, Poly, Table, TwoArguments
 from warpspace.scene.library import load_scene, parse_scene
 from warpspace.scene.model import evaluate

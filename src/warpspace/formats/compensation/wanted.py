@@ -12,7 +12,7 @@ from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, nominal_point, tool_axis
 from warpspace.kinematics.model import Coordinates, Loop, Model, batch_shape
 from warpspace.machine.axes import TravelDirection, direction_index, is_linear, parameter
-from warpspace.machine.curves.directional import Directional
+from warpspace.machine.curves.simple import Directional
 from warpspace.machine.errors import ErrorSet
 from warpspace.scene.model import Scene
 from warpspace.units import MM_PER_UM, RAD_PER_URAD, Array

@@ -4,9 +4,8 @@ from collections.abc import Mapping
 
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.machine.curves.curve import ErrorFunction
-from warpspace.machine.curves.directional import Directional
 from warpspace.machine.curves.pieces import Pieces
-from warpspace.machine.curves.simple import Constant, Harmonics, Poly, Ramp
+from warpspace.machine.curves.simple import Constant, Directional, Harmonics, Poly, Ramp
 from warpspace.machine.curves.table import Table, TwoArguments
 from warpspace.plugins import load_plugins
 

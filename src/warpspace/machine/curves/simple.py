@@ -1,5 +1,7 @@
-"""The plain kinds of curve: constant, polynomial, ramp and harmonics."""
+"""The plain kinds of curve: constant, ramp, polynomial and harmonics; one each way of travel."""
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -7,6 +9,7 @@ import numpy as np
 
 from warpspace.exceptions import OptionError
 from warpspace.machine import limits
+from warpspace.machine.axes import TravelDirection
 from warpspace.machine.curves.curve import (
     SPAN_SAMPLES,
     ErrorFunction,
@@ -22,7 +25,52 @@ from warpspace.units import Array
 
 
 @dataclass(frozen=True)
-class Constant(ErrorFunction):
+class OneNumber(ErrorFunction):
+    """A curve of one number, which is its amplitude."""
+
+    value: float = 0.0
+
+    def scaled(self, factor: float) -> Self:
+        """Multiply the number."""
+        return replace(self, value=self.value * factor)
+
+    @property
+    def amplitude(self) -> float:
+        """The number itself."""
+        return self.value
+
+    def with_amplitude(self, amplitude: float) -> Self:
+        """Give the same curve with another number; at zero it keeps its kind."""
+        return replace(self, value=amplitude)
+
+    @classmethod
+    def read(cls, raw: Any, span: Span, reader: ValueReader) -> Self:
+        """Read the number, bare or as the only entry of its table."""
+        place = cls.forms[0] if cls.forms else ()
+        number = raw[place[0]] if place else raw
+        return cls(span, reader.number(number, place, -limits.MAX_ERROR, limits.MAX_ERROR))
+
+    def to_toml(self) -> object:
+        """Spell it as `read` takes it."""
+        return {self.forms[0][0]: self.value} if self.forms else self.value
+
+    @classmethod
+    def from_rows(cls, span: Span, rows: Rows) -> Self:
+        """Read one number."""
+        return cls(span, single_value(rows))
+
+    def rows(self) -> Rows:
+        """Give the number."""
+        return [[self.value]]
+
+    @classmethod
+    def from_curve(cls, present: ErrorFunction, span: Span) -> Self:
+        """Keep the amplitude."""
+        return cls(span, present.amplitude)
+
+
+@dataclass(frozen=True)
+class Constant(OneNumber):
     """The same value everywhere."""
 
     name = "constant"
@@ -30,7 +78,6 @@ class Constant(ErrorFunction):
     forms = ()
     row_words = "one number: the same everywhere"
     slider = "the same everywhere"
-    value: float = 0.0
 
     def evaluate(self, position: Array) -> Array:
         """Give the value at every position."""
@@ -40,42 +87,6 @@ class Constant(ErrorFunction):
     def arguments(self) -> tuple[str, ...]:
         """No axis: it does not vary."""
         return ()
-
-    def scaled(self, factor: float) -> Self:
-        """Give the constant times a factor."""
-        return replace(self, value=self.value * factor)
-
-    @property
-    def amplitude(self) -> float:
-        """The value itself."""
-        return self.value
-
-    def with_amplitude(self, amplitude: float) -> Self:
-        """Give another constant."""
-        return replace(self, value=amplitude)
-
-    @classmethod
-    def read(cls, raw: Any, span: Span, reader: ValueReader) -> Self:
-        """Read a number."""
-        return cls(span, reader.number(raw, (), -limits.MAX_ERROR, limits.MAX_ERROR))
-
-    def to_toml(self) -> object:
-        """Spell it as a number."""
-        return self.value
-
-    @classmethod
-    def from_rows(cls, span: Span, rows: Rows) -> Self:
-        """Read one number."""
-        return cls(span, single_value(rows))
-
-    def rows(self) -> Rows:
-        """Give the value."""
-        return [[self.value]]
-
-    @classmethod
-    def from_curve(cls, present: ErrorFunction, span: Span) -> Self:
-        """Keep the amplitude."""
-        return cls(span, present.amplitude)
 
 
 @dataclass(frozen=True)
@@ -147,7 +158,7 @@ class Poly(ErrorFunction):
 
 
 @dataclass(frozen=True)
-class Ramp(ErrorFunction):
+class Ramp(OneNumber):
     """Zero at the lower end of the span, the value at the upper one, linear between and beyond."""
 
     name = "ramp"
@@ -155,34 +166,11 @@ class Ramp(ErrorFunction):
     forms = (("ramp",),)
     row_words = "one number: the value at the upper end, from zero at the lower"
     slider = "rises along {axis}; this is the value at its upper end"
-    value: float = 0.0
 
     def evaluate(self, position: Array) -> Array:
         """Give the point of the line at each position."""
         lower, upper = self.span
         return self.value * (np.asarray(position, dtype=float) - lower) / (upper - lower)
-
-    def scaled(self, factor: float) -> Self:
-        """Give the ramp to a multiple of the value."""
-        return replace(self, value=self.value * factor)
-
-    @property
-    def amplitude(self) -> float:
-        """The value at the upper end."""
-        return self.value
-
-    def with_amplitude(self, amplitude: float) -> Self:
-        """Give the ramp to that value; a ramp of zero stays a ramp."""
-        return replace(self, value=amplitude)
-
-    @classmethod
-    def read(cls, raw: Any, span: Span, reader: ValueReader) -> Self:
-        """Read ``{ ramp = value }``."""
-        return cls(span, reader.number(raw["ramp"], ("ramp",), -limits.MAX_ERROR, limits.MAX_ERROR))
-
-    def to_toml(self) -> object:
-        """Spell it as ``{ ramp = value }``."""
-        return {"ramp": self.value}
 
     def for_span(self, span: Span) -> ErrorFunction:
         """Give the polynomial it is where the range is another one."""
@@ -197,20 +185,6 @@ class Ramp(ErrorFunction):
         del unit, value
         low, high = map(position, self.span)
         return f"ramp, 0 at {low} to the value at {high}"
-
-    @classmethod
-    def from_rows(cls, span: Span, rows: Rows) -> Self:
-        """Read one number."""
-        return cls(span, single_value(rows))
-
-    def rows(self) -> Rows:
-        """Give the value at the upper end."""
-        return [[self.value]]
-
-    @classmethod
-    def from_curve(cls, present: ErrorFunction, span: Span) -> Self:
-        """Keep the amplitude."""
-        return cls(span, present.amplitude)
 
 
 MAX_SAMPLES = 200_001
@@ -330,3 +304,147 @@ class Harmonics(ErrorFunction):
 
 def _one_wave(span: Span) -> float:
     return float(f"{360.0 / (span[1] - span[0]):.6g}")
+
+
+SHARES = {
+    TravelDirection.MEAN: (0.5, 0.5),
+    TravelDirection.FORWARD: (1.0, 0.0),
+    TravelDirection.BACKWARD: (0.0, 1.0),
+    TravelDirection.DIFFERENCE: (1.0, -1.0),
+}
+"""Of the curve forward and of that backward."""
+NOTHING = Constant((0.0, 1.0))
+
+
+@dataclass(frozen=True)
+class Directional(ErrorFunction):
+    """An error whose value depends on the way that its axis has come.
+
+    `evaluate` gives the mean of both; `evaluate_at` takes a direction. The amplitude is the larger
+    one of the two curves' and scales both, so that their ratio stays.
+    """
+
+    name = "directional"
+    title = "by direction of travel"
+    forms = (("forward", "backward"),)
+    row_words = "curves by direction come from a scene file or an import"
+    slider = "differs by direction of travel of {axis}; this is the larger one's amplitude"
+    edited_as_rows = False
+    # reached towards growing positions, and towards falling ones; of any other kind
+    forward: ErrorFunction = NOTHING
+    backward: ErrorFunction = NOTHING
+
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        """Axes that either curve depends on."""
+        return tuple(dict.fromkeys((*self.forward.arguments, *self.backward.arguments)))
+
+    def evaluate(self, position: Array) -> Array:
+        """Give the mean of both directions."""
+        return 0.5 * (self.forward.evaluate(position) + self.backward.evaluate(position))
+
+    def evaluate_at(
+        self,
+        axis: str,
+        coordinates: Mapping[str, Array],
+        direction: str = TravelDirection.MEAN,
+    ) -> Array:
+        """Give the mean, one of the directions, or forward − backward, [...]."""
+        there, back = SHARES[TravelDirection(direction)]
+        ways = ((there, self.forward), (back, self.backward))
+        return np.asarray(
+            sum(share * curve.evaluate_at(axis, coordinates) for share, curve in ways if share)
+        )
+
+    @property
+    def has_directions(self) -> bool:
+        """It does."""
+        return True
+
+    @property
+    def lines(self) -> tuple[tuple[str, ErrorFunction], ...]:
+        """The curves of both directions."""
+        pairs = (("forward", self.forward), ("backward", self.backward))
+        return tuple(
+            (f"{way} {words}".rstrip(), line) for way, one in pairs for words, line in one.lines
+        )
+
+    @property
+    def parts(self) -> tuple[ErrorFunction, ...]:
+        """The curves of both directions."""
+        return (*self.forward.parts, *self.backward.parts)
+
+    def scaled(self, factor: float) -> Self:
+        """Multiply both curves."""
+        return replace(
+            self, forward=self.forward.scaled(factor), backward=self.backward.scaled(factor)
+        )
+
+    @property
+    def amplitude(self) -> float:
+        """The amplitude of the curve whose one is larger, forward where they are alike."""
+        there, back = self.forward.amplitude, self.backward.amplitude
+        return back if math.isnan(back) or abs(back) > abs(there) else there
+
+    def without_axes(self, positions: Mapping[str, float]) -> ErrorFunction:
+        """Give both curves without the axes."""
+        there, back = (one.without_axes(positions) for one in (self.forward, self.backward))
+        return replace(self, forward=there, backward=back)
+
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """The kinks of both curves."""
+        return tuple(sorted({*self.forward.kinks, *self.backward.kinks}))
+
+    @property
+    def samples(self) -> int:
+        """As many as the curve needs that needs more."""
+        return max(self.forward.samples, self.backward.samples)
+
+    def grown(self) -> Self:
+        """Give both directions the same amplitude, each in its kind."""
+        return replace(
+            self,
+            forward=self.forward.with_amplitude(1.0),
+            backward=self.backward.with_amplitude(1.0),
+        )
+
+    @classmethod
+    def read(cls, raw: Any, span: Span, reader: ValueReader) -> Self:
+        """Read ``{ forward = CURVE, backward = CURVE }``."""
+        found: list[ErrorFunction] = []
+        for way in ("forward", "backward"):
+            curve = reader.curve(raw[way], (way,))
+            if isinstance(curve, Directional):
+                reader.note((way,), "expected a curve that has no directions of its own")
+            found.append(curve or Constant(span))
+        return cls(span, *found)
+
+    def to_toml(self) -> object:
+        """Spell both curves."""
+        return {"forward": self.forward.to_toml(), "backward": self.backward.to_toml()}
+
+    def for_span(self, span: Span) -> ErrorFunction:
+        """Give both curves for another range."""
+        there, back = (
+            replace(curve.for_span(span), span=span) for curve in (self.forward, self.backward)
+        )
+        return replace(self, span=span, forward=there, backward=back)
+
+    def describe(self, unit: str, value: Spell, position: Spell) -> str:
+        """Describe both curves."""
+        there, back = (
+            curve.describe(unit, value, position) for curve in (self.forward, self.backward)
+        )
+        return f"forward {there}, backward {back}"
+
+    def rows(self) -> Rows:
+        """Give the rows of the curve forward, then those backward."""
+        return [*self.forward.rows(), *self.backward.rows()]
+
+    @classmethod
+    def from_curve(cls, present: ErrorFunction, span: Span) -> Self:
+        """Give both directions the present curve."""
+        if isinstance(present, cls):
+            return replace(present, span=span)
+        return cls(span, present, present)
