@@ -40,7 +40,7 @@ from warpspace.field.grid import build_grid
 from warpspace.formats.compensation.compensate import compensate
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import TravelDirection
-from warpspace.outputs.charts.results import draw_maps
+from warpspace.outputs.save import draw_maps
 from warpspace.scene.library import load_scene
 
 SCENE = load_scene("dvf5000_first")

@@ -101,8 +101,8 @@ def test_the_figure_is_a_sheet_of_both_and_the_difference_as_the_app_takes_it(re
     settings = FigureSettings(grid=5, exaggeration=request.exaggeration)
     drawing = draw("comparison", list(request.pair), settings)
     difference = picture_of("difference")
-    np.testing.assert_allclose(drawing.maps[2].values, difference.values, atol=1e-6)
-    np.testing.assert_allclose(drawing.maps[2].drawn_mm, difference.drawn_mm, atol=1e-6)
+    np.testing.assert_allclose(drawing.maps[2].picture.values, difference.values, atol=1e-6)
+    np.testing.assert_allclose(drawing.maps[2].picture.drawn_mm, difference.drawn_mm, atol=1e-6)
 
 
 def tilted(top=None):

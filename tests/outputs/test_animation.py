@@ -54,9 +54,9 @@ def test_a_turn_covers_the_circle_of_every_point():
 def test_camera_and_scale_stand_still(renderer):
     scene = load_scene("dvf5000_first")
     first, middle = (draw_frame(scene, SMALL, number).maps[0] for number in (0, 2))
-    assert first.exaggeration == 1.0
-    assert middle.exaggeration == 1000.0
-    assert first.scale == middle.scale
+    assert first.picture.exaggeration == 1.0
+    assert middle.picture.exaggeration == 1000.0
+    assert first.picture.scale == middle.picture.scale
     corners = scene.workspace.ranges["X"]
     point = np.array([corners[0], 0.0, 0.0])
     np.testing.assert_allclose(first.projection.project(point), middle.projection.project(point))

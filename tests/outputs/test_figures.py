@@ -150,9 +150,9 @@ def test_auto_overrides_the_exaggeration_of_a_scene():
     text = f"title='s'\n{MACHINES['tiny']}\n[view]\nexaggeration = 500\n"
     scene = parse_scene(text.replace("0.00012", "12"), "s")
     settings = FigureSettings(size=(500, 400), grid=3)
-    assert draw_figure("error-map", [scene], settings).maps[0].exaggeration == 500.0
+    assert draw_figure("error-map", [scene], settings).maps[0].picture.exaggeration == 500.0
     settings = FigureSettings(size=(500, 400), grid=3, exaggeration="auto")
-    assert draw_figure("error-map", [scene], settings).maps[0].exaggeration == 5000.0
+    assert draw_figure("error-map", [scene], settings).maps[0].picture.exaggeration == 5000.0
 
 
 @pytest.mark.parametrize(
@@ -167,7 +167,8 @@ def test_a_range_that_is_given_is_that_of_every_map(name, component):
         component=component, size=size, grid=5, range_top=7.0, range_fixed=fixed
     )
     drawing = draw_figure(name, pair(name), settings)
-    assert {(part.scale.low, part.scale.high) for part in drawing.maps} == {(low, 7.0)}
+    scales = [part.picture.scale for part in drawing.maps]
+    assert {(scale.low, scale.high) for scale in scales} == {(low, 7.0)}
     inside(drawing, size)
     assert ", range=7" in drawing.facts["settings"]
     # a value beyond the bar is marked as such, no other

@@ -62,7 +62,7 @@ def test_a_comparison_with_itself(name, renderer):
 @pytest.mark.parametrize(("name", "figure"), pairwise(FEW, ["error-map", "machine"]))
 def test_maps_have_their_colours(name, figure, renderer):
     drawing = draw_figure(figure, [still_scene(name)])
-    (drawn,) = drawing.maps
+    (drawn,) = (part.picture for part in drawing.maps)
     canvas = FigureCanvasAgg(drawing.figure)
     canvas.draw()
     pixels = np.asarray(canvas.buffer_rgba())[..., :3]

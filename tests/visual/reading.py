@@ -87,7 +87,7 @@ def read_map(
     row = np.floor((top - spots[:, 1]) * raster.sampling).astype(int)
     rgb = raster.rgba[row, column, :3].astype(float)
     return Reading(
-        invert_colours(rgb, drawn.scale, diverging),
+        invert_colours(rgb, drawn.picture.scale, diverging),
         known.reshape(-1)[nodes],
         raster.depth_at(spots) - depth,
     )

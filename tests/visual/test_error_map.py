@@ -32,7 +32,7 @@ def read(picture, settings, *, exaggeration=None, **options):
     scene = options.pop("drawn_scene", picture.scene)
     drawn = draw_figure("error-map", [scene], settings).maps[0]
     known = component_values(picture.field.error_um, settings.component)
-    factor = drawn.exaggeration if exaggeration is None else exaggeration
+    factor = drawn.picture.exaggeration if exaggeration is None else exaggeration
     return read_map(drawn, expected(picture, factor), known, settings.view, **options)
 
 
@@ -112,8 +112,9 @@ def test_a_wrong_colour_map_is_noticed(truth, component):
 
 def test_a_wrong_scale_is_noticed(truth):
     drawn = draw_figure("error-map", [truth.scene], FigureSettings()).maps[0]
-    wrong = replace(drawn, scale=replace(drawn.scale, high=drawn.scale.high * 1.02))
-    reading = read_map(wrong, expected(truth, drawn.exaggeration), truth.field.norm_um)
+    colours = replace(drawn.picture.scale, high=drawn.picture.scale.high * 1.02)
+    wrong = replace(drawn, picture=replace(drawn.picture, colours=colours))
+    reading = read_map(wrong, expected(truth, drawn.picture.exaggeration), truth.field.norm_um)
     assert not reading.agrees()
 
 

@@ -23,14 +23,13 @@ def test_slices_show_the_middle_planes():
         grid = np.meshgrid(at[first], at[second], indexing="ij")
         middle = float(np.mean(scene.workspace.ranges[held]))
         field = evaluate(scene, at={first: grid[0], second: grid[1], held: middle})
-        shape = drawn.values.shape
-        known = field.norm_um.reshape(shape)
-        nodes = field.nominal_mm + drawn.exaggeration * MM_PER_UM * field.error_um
-        reading = read_map(drawn, nodes.reshape(*shape, 3), known, view)
+        known = field.norm_um.reshape(drawn.picture.values.shape)
+        nodes = field.nominal_mm + drawn.picture.exaggeration * MM_PER_UM * field.error_um
+        nodes = nodes.reshape(*known.shape, 3)
+        reading = read_map(drawn, nodes, known, view)
         assert len(reading.known) > 250
         assert reading.agrees(), (held, reading.slope)
-        wrong = read_map(drawn, nodes.reshape(*shape, 3), 1.02 * known, view)
-        assert not wrong.agrees()
+        assert not read_map(drawn, nodes, 1.02 * known, view).agrees()
 
 
 def test_slices_share_one_scale_of_length():
@@ -46,7 +45,7 @@ def test_orientation_map_shows_the_tilt(component):
     settings = FigureSettings(component=component)
     drawn = draw_figure("orientation-map", [picture.scene], settings).maps[0]
     reading = read_map(drawn, picture.grid.nominal_mm, known)
-    assert drawn.scale.unit == "µrad"
+    assert drawn.picture.scale.unit == "µrad"
     assert reading.agrees(), reading.slope
     assert not read_map(drawn, picture.grid.nominal_mm, np.flip(known, axis=2)).agrees()
 
@@ -56,9 +55,9 @@ def test_comparison_shares_scale_exaggeration_and_projection():
     # large enough that a pixel of the three small maps is finer than the tolerance on the depth
     settings = FigureSettings(size=(2400, 1800))
     first, second, difference = draw_figure("comparison", scenes, settings).maps
-    assert first.scale == second.scale
-    assert (difference.scale.high, difference.scale.label) == (50.0, "|E_B − E_A|")
-    assert first.exaggeration == second.exaggeration == difference.exaggeration
+    assert first.picture.scale == second.picture.scale
+    assert (difference.picture.scale.high, difference.picture.scale.label) == (50.0, "|E_B − E_A|")
+    assert len({drawn.picture.exaggeration for drawn in (first, second, difference)}) == 1
     assert first.projection.px_per_mm == difference.projection.px_per_mm
     a, b = (evaluate_picture(scene) for scene in scenes)
     for drawn, error in (
@@ -66,19 +65,18 @@ def test_comparison_shares_scale_exaggeration_and_projection():
         (second, b.field.error_um),
         (difference, b.field.error_um - a.field.error_um),
     ):
-        nodes = a.grid.nominal_mm + drawn.exaggeration * MM_PER_UM * error
+        nodes = a.grid.nominal_mm + drawn.picture.exaggeration * MM_PER_UM * error
         reading = read_map(drawn, nodes, np.linalg.norm(error, axis=-1))
         assert abs(reading.slope - 1.0) < 0.01
         assert np.abs(reading.depth_mm).max() < 1.5
     wrong = a.field.error_um - b.field.error_um
-    nodes = a.grid.nominal_mm + difference.exaggeration * MM_PER_UM * wrong
+    nodes = a.grid.nominal_mm + difference.picture.exaggeration * MM_PER_UM * wrong
     assert not read_map(difference, nodes, np.linalg.norm(wrong, axis=-1)).agrees()
 
 
 def test_machine_figure_shows_the_same_volume_as_the_error_map():
     scene = load_scene("dvf5000_first")
-    machine = draw_figure("machine", [scene]).maps[0]
-    volume = draw_figure("error-map", [scene]).maps[0]
+    machine, volume = (draw_figure(n, [scene]).maps[0].picture for n in ("machine", "error-map"))
     assert np.array_equal(machine.values, volume.values)
     assert np.allclose(machine.drawn_mm, volume.drawn_mm)
     assert machine.scale == volume.scale

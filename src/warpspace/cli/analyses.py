@@ -167,8 +167,8 @@ def write_result(
     if csv_path is not None:
         write_csv(found, csv_path, force=force)
     if plot is not None:
-        from warpspace.outputs.charts.paper import write_chart
         from warpspace.outputs.charts.results import result_chart
+        from warpspace.outputs.save import write_chart
 
         draw = resolve_name(found.drawn_by) if found.drawn_by else result_chart
         write_chart(draw(found), plot, overwrite=force)

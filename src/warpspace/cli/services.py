@@ -102,8 +102,8 @@ def draw_concepts(request: "ConceptRequest", cancelled: threading.Event) -> byte
 
 def draw_compensation(request: "CompensationRequest", cancelled: threading.Event) -> bytes:
     """Draw the maps of a compensation as a PNG."""
-    from warpspace.outputs.charts.results import draw_maps
     from warpspace.outputs.processes import ProcessPool
+    from warpspace.outputs.save import draw_maps
 
     with _turn(cancelled):
         pool = ProcessPool(1)

@@ -18,11 +18,10 @@ from warpspace.kinematics.model import Loop
 from warpspace.machine.limits import ANIMATION_FRAMES
 from warpspace.outputs.drawing.map3d import draw_map, fit_map
 from warpspace.outputs.drawing.render import fit_projection
-from warpspace.outputs.drawing.settings import FigureSettings, evaluate_for
+from warpspace.outputs.drawing.settings import SIZES, FigureSettings, evaluate_for
 from warpspace.outputs.drawing.sheet import Drawing, map_legend, scene_facts, start_sheet
-from warpspace.outputs.drawing.style import SIZES
-from warpspace.outputs.figures.error_map import isoline_words, say_statistics
 from warpspace.outputs.figures.machine import bodies_of, draw_bodies
+from warpspace.outputs.figures.maps import isoline_words, say_statistics
 from warpspace.outputs.files import check_target, write_atomically
 from warpspace.outputs.processes import ProcessPool
 from warpspace.picture.model import choose_exaggeration, choose_scale, evaluate_picture
@@ -223,7 +222,7 @@ def _pictures(
 def _draw(scene: Scene, settings: AnimationSettings, number: int) -> bytes:
     import matplotlib as mpl
 
-    from warpspace.outputs.drawing.style import SAVE_RC
+    from warpspace.outputs.drawing.settings import SAVE_RC
     from warpspace.outputs.save import figure_bytes
 
     with mpl.rc_context(dict(SAVE_RC)):

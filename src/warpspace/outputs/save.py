@@ -1,21 +1,37 @@
-"""Figures by name to bytes and files."""
+"""Figures and charts to bytes and files; the same figure gives the same bytes."""
 
 import gc
-from collections.abc import Sequence
+import io
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Final
 
 import matplotlib as mpl
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
-from warpspace.outputs.charts.paper import encode_figure
-from warpspace.outputs.drawing.settings import FigureSettings
-from warpspace.outputs.drawing.sheet import Drawing
-from warpspace.outputs.drawing.style import FIGURE_ENDINGS, SAVE_RC
+from warpspace.outputs.charts.blocks import on_ground
+from warpspace.outputs.charts.results import compensation_chart, compensation_column
+from warpspace.outputs.drawing.settings import (
+    DARK,
+    FIGURE_ENDINGS,
+    LIGHT,
+    SAVE_RC,
+    FigureSettings,
+)
 from warpspace.outputs.figures.catalogue import draw_figure
 from warpspace.outputs.files import check_target, write_atomically
 from warpspace.scene.model import Scene
 
+if TYPE_CHECKING:
+    from warpspace.formats.compensation.compensate import Compensation
+    from warpspace.outputs.drawing.sheet import Drawing
 
-def figure_bytes(drawing: Drawing, form: str) -> bytes:
+
+def figure_bytes(drawing: "Drawing", form: str) -> bytes:
     """Write a drawn figure into memory."""
     facts = drawing.facts
     about = f"{facts['settings']}; scene={facts['scene']}"
@@ -59,3 +75,48 @@ def write_figure(
     with write_atomically(path, overwrite=force) as temporary:
         temporary.write_bytes(content)
     return Path(path)
+
+
+def draw_maps(found: "Compensation", *, dark: bool, narrow: bool) -> bytes:
+    """Draw the maps of a compensation as a PNG: the column, or the sheet of the command."""
+    with on_ground(DARK if dark else LIGHT):
+        return encode_figure((compensation_column if narrow else compensation_chart)(found), "png")
+
+
+def write_chart(figure: Figure, path: str | Path, *, overwrite: bool = True) -> Path:
+    """Write a chart; the ending chooses the format, the same chart gives the same bytes."""
+    target = check_target(path, FIGURE_ENDINGS, overwrite=overwrite)
+    content = encode_figure(figure, target.suffix.lower().lstrip("."))
+    with write_atomically(target, overwrite=overwrite) as temporary:
+        temporary.write_bytes(content)
+    return target
+
+
+_UNDATED: Final[dict[str, dict[str, str | None]]] = {
+    "svg": {"Date": None, "Creator": None},
+    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+}
+"""What matplotlib would write of its own accord: dates and versions, which differ between runs."""
+
+
+def encode_figure(figure: Figure, form: str, facts: Mapping[str, str] | None = None) -> bytes:
+    """Write a figure into memory."""
+    buffer = io.BytesIO()
+    with mpl.rc_context(SAVE_RC):
+        if form == "png":
+            text = PngInfo()
+            for key, value in (facts or {}).items():
+                text.add_itxt(key, value)
+            canvas = FigureCanvasAgg(figure)
+            canvas.draw()
+            # the paper is opaque: without the transparency files are a quarter smaller
+            pixels = np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3])
+            Image.fromarray(pixels).save(
+                buffer, format="png", pnginfo=text, dpi=(figure.dpi, figure.dpi)
+            )
+        else:
+            figure.savefig(
+                buffer, format=form, dpi="figure", metadata={**_UNDATED[form], **(facts or {})},
+                facecolor=figure.get_facecolor(),
+            )  # fmt: skip
+    return buffer.getvalue()

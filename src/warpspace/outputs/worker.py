@@ -36,7 +36,7 @@ def _draw(name: str, scenes: Sequence[Scene], settings: FigureSettings, form: st
 
 
 def _draw_chart(draw: str, form: str, *arguments: Any) -> bytes:
-    from warpspace.outputs.charts.paper import encode_figure
+    from warpspace.outputs.save import encode_figure
 
     return encode_figure(resolve_name(draw)(*arguments), form)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from warpspace.outputs.drawing.labels import Occupancy, place_label
+from warpspace.outputs.drawing.canvas import Occupancy, place_label
 from warpspace.outputs.drawing.render import (
     Projection,
     Raster,
@@ -67,14 +67,14 @@ def wall(from_column, depth):
 
 def test_without_bodies_all_is_visible():
     line = np.array([[-50.0, 0.0, 0.0], [50.0, 0.0, 0.0]])
-    seen, hidden = split_visible(line, FRONT, None)
+    seen, hidden = split_visible([line], FRONT, None)
     assert np.allclose(seen[0], [[50.0, 100.0], [150.0, 100.0]])
     assert hidden == []
 
 
 def test_a_wall_hides_what_is_behind_it():
     line = np.array([[-50.0, 20.0, 0.0], [50.0, 20.0, 0.0]])
-    seen, hidden = split_visible(line, FRONT, wall(100, 0.0))
+    seen, hidden = split_visible([line], FRONT, wall(100, 0.0))
     assert len(seen) == 1
     assert len(hidden) == 1
     assert seen[0][-1, 0] == pytest.approx(100.0, abs=2.0)
@@ -84,7 +84,7 @@ def test_a_wall_hides_what_is_behind_it():
 def test_a_wall_hides_nothing_in_front_of_it_or_on_it():
     for y in (-20.0, 0.0):
         line = np.array([[-50.0, y, 0.0], [50.0, y, 0.0]])
-        seen, hidden = split_visible(line, FRONT, wall(100, 0.0))
+        seen, hidden = split_visible([line], FRONT, wall(100, 0.0))
         assert len(seen) == 1
         assert hidden == []
         assert len(seen[0]) == 2

@@ -15,23 +15,18 @@ from warpspace.analysis.blocks import Bars, Histogram, Lines
 from warpspace.analysis.description import Result
 from warpspace.outputs.charts.blocks import (
     CHART_IN,
+    DPI,
     GAP_IN,
     ROW_IN,
-    bars_chart,
-    charts_sheet,
-    histogram_chart,
-)
-from warpspace.outputs.charts.paper import (
-    DPI,
     SMALL,
     TEXT,
-    encode_figure,
+    bars_chart,
+    charts_sheet,
     ground,
-    on_ground,
+    histogram_chart,
     sheet,
     style,
 )
-from warpspace.outputs.drawing.style import DARK, LIGHT
 from warpspace.units import Array
 
 if TYPE_CHECKING:
@@ -180,12 +175,6 @@ def compensation_column(found: "Compensation") -> Figure:
                     bar.ax.tick_params(labelsize=WORDS - 2.0)
                     bar.ax.set_title("|E| [µm]", fontsize=WORDS - 1.5, pad=6.0)
         return figure
-
-
-def draw_maps(found: "Compensation", *, dark: bool, narrow: bool) -> bytes:
-    """Draw the maps of a compensation as a PNG: the column, or the sheet of the command."""
-    with on_ground(DARK if dark else LIGHT):
-        return encode_figure((compensation_column if narrow else compensation_chart)(found), "png")
 
 
 def _planes(found: "Compensation") -> list[tuple[int, int]]:

@@ -1,4 +1,6 @@
-"""A sheet to draw on in pixels: matplotlib draws text and lines, at any size and in any format.
+"""A sheet to draw on in pixels, and free places for labels on it.
+
+matplotlib draws text and lines, at any size and in any format.
 
 Labels are measured before they are drawn, at sizes still to be chosen, and placed by the box of
 their ink: matplotlib's text paths give both, while `Text.get_window_extent` measures only drawn
@@ -6,7 +8,8 @@ text and gives the height of a whole line, up to 8 px more.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Literal
 
@@ -14,14 +17,16 @@ import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
-from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Polygon, Rectangle
 from matplotlib.patheffects import Normal, Stroke
 from matplotlib.textpath import text_to_path
 
-from warpspace.outputs.drawing.style import FONT, SIZES, Theme, factor
+from warpspace.outputs.drawing.render import Rect, resample
+from warpspace.outputs.drawing.settings import FONT, SIZES, Theme, factor
 from warpspace.units import Array
 
+Points = Array | Sequence[tuple[float, float]] | Sequence[Array]
+"""[n, 2], px."""
 _REPLACEMENT = "\N{WHITE VERTICAL RECTANGLE}"
 
 
@@ -59,6 +64,7 @@ class Canvas:
     def __init__(self, width: int, height: int, theme: Theme, *, exact: bool = True) -> None:
         self.width, self.height, self.theme, self.exact = width, height, theme, exact
         self.factor = factor(width, height)
+        self.margin = self.px(SIZES.margin) * min(1.0, width / self.px(1000.0))
         self.figure = Figure(
             figsize=(width / DPI, height / DPI), dpi=DPI, facecolor=theme.paper, layout=None
         )
@@ -67,7 +73,7 @@ class Canvas:
         self.axes.set_xlim(0.0, width)
         self.axes.set_ylim(0.0, height)
         self.axes.set_autoscale_on(False)
-        self.rects: list[tuple[float, float, float, float]] = []
+        self.rects: list[Rect] = []
 
     def px(self, size: float) -> float:
         """Scale a length given for a 1600 × 1200 figure."""
@@ -112,9 +118,10 @@ class Canvas:
         rotation: float = 0.0,
         halo: str | None = None,
         zorder: float = 6.0,
-    ) -> tuple[float, float, float, float]:
-        """Write a line of text."""
-        text = clean(text)
+        room: float = math.inf,
+    ) -> Rect:
+        """Write a line of text, fitted into a width where one is given."""
+        text, size = self.fit(text, room, size, weight)
         drawn = self.axes.text(
             x, y, text, ha=ha, va=va, rotation=rotation, zorder=zorder, parse_math=False,
             color=colour or self.theme.ink, fontsize=self.px(size) * POINTS_PER_PX,
@@ -124,61 +131,21 @@ class Canvas:
             stroke = Stroke(linewidth=self.px(0.25 * size) * POINTS_PER_PX, foreground=halo)
             drawn.set_path_effects([stroke, Normal()])
         extent = self.text_size(text, size, weight)
-        rect = self._text_rect(x, y, extent, ha, va, rotation)
-        self.rects += [rect] if rotation % 90.0 == 0.0 else self._pieces(rect, extent, rotation)
+        rect = _text_rect(x, y, extent, ha, va, rotation)
+        self.rects += [rect] if rotation % 90.0 == 0.0 else _pieces(rect, extent, rotation)
         return rect
-
-    @staticmethod
-    def _pieces(
-        rect: tuple[float, float, float, float], extent: tuple[float, float], rotation: float
-    ) -> list[tuple[float, float, float, float]]:
-        width, height = extent
-        count = max(1, math.ceil(width / height))
-        c, s = math.cos(math.radians(rotation)), math.sin(math.radians(rotation))
-        across, up = 0.5 * width / count * abs(c), 0.5 * width / count * abs(s)
-        if abs(c) >= abs(s):
-            up += 0.5 * height * abs(c)
-        else:
-            across += 0.5 * height * abs(s)
-        middle = ((rect[0] + rect[2]) / 2.0, (rect[1] + rect[3]) / 2.0)
-        along = [width * ((index + 0.5) / count - 0.5) for index in range(count)]
-        places = [(middle[0] + step * c, middle[1] + step * s) for step in along]
-        return [(x - across, y - up, x + across, y + up) for x, y in places]
-
-    @staticmethod
-    def _text_rect(
-        x: float, y: float, extent: tuple[float, float], ha: str, va: str, rotation: float
-    ) -> tuple[float, float, float, float]:
-        width, height = extent
-        left = {"left": 0.0, "center": -width / 2, "right": -width}[ha]
-        low = {"baseline": 0.0, "bottom": 0.0, "top": -height}.get(va, -height / 2)
-        c, s = math.cos(math.radians(rotation)), math.sin(math.radians(rotation))
-        ends = [(a, b) for a in (left, left + width) for b in (low, low + height)]
-        xs = [x + a * c - b * s for a, b in ends]
-        ys = [y + a * s + b * c for a, b in ends]
-        return min(xs), min(ys), max(xs), max(ys)
 
     def line(
         self,
-        points: Array | Sequence[tuple[float, float]],
+        points: Points,
         *,
         width: float = SIZES.line,
-        colour: str | None = None,
-        alpha: float = 1.0,
-        dashes: tuple[float, float] | None = None,
         zorder: float = 3.0,
-        cap: Literal["butt", "round"] = "round",
+        **style: Any,
     ) -> None:
-        """Draw a polyline; width and dashes are for a 1600 × 1200 figure."""
-        xy = np.asarray(points, dtype=float)
-        line = Line2D(
-            xy[:, 0], xy[:, 1], linewidth=self.px(width) * POINTS_PER_PX, zorder=zorder,
-            color=colour or self.theme.ink, alpha=alpha, solid_capstyle=cap,
-            solid_joinstyle="round", dash_capstyle="butt", clip_on=False,
-        )  # fmt: skip
-        if dashes is not None:
-            line.set_linestyle((0.0, (dashes[0] / width, dashes[1] / width)))
-        self.axes.add_line(line)
+        """Draw a polyline; styles as for `lines`."""
+        spots = [np.asarray(points, dtype=float)]
+        self.lines(spots, width=width, zorder=zorder, **style)
 
     def lines(
         self,
@@ -189,8 +156,9 @@ class Canvas:
         alpha: float = 1.0,
         dashes: tuple[float, float] | None = None,
         zorder: float = 2.0,
+        cap: Literal["butt", "round"] = "round",
     ) -> None:
-        """Draw many polylines at once, in one colour or one each; sizes as for `line`."""
+        """Draw polylines in one colour or one each; sizes are for a 1600 × 1200 figure."""
         if not lines:
             return
         points = self.px(width) * POINTS_PER_PX
@@ -199,14 +167,14 @@ class Canvas:
             LineCollection(
                 lines, linewidths=points, colors=self.theme.ink if colour is None else colour,
                 alpha=alpha, linestyles=[style], zorder=zorder, clip_on=False,
-                capstyle="butt" if dashes else "round", joinstyle="round",
+                capstyle="butt" if dashes else cap, joinstyle="round",
             ),
             autolim=False,
         )  # fmt: skip
 
     def polygon(
         self,
-        points: Array | Sequence[tuple[float, float]] | Sequence[Array],
+        points: Points,
         colour: str,
         *,
         alpha: float = 1.0,
@@ -241,12 +209,7 @@ class Canvas:
         """Draw a rectangle; styles as in matplotlib."""
         self.axes.add_patch(Rectangle((left, bottom), width, height, clip_on=False, **patch))
 
-    def image(
-        self,
-        rgba: np.ndarray[Any, Any],
-        rect: tuple[float, float, float, float],
-        zorder: float = 1.0,
-    ) -> None:
+    def image(self, rgba: np.ndarray[Any, Any], rect: Rect, zorder: float = 1.0) -> None:
         """Place an image (first row at the top) into a box: left, bottom, right, top, px."""
         left, bottom, right, top = rect
         self.axes.imshow(
@@ -256,30 +219,192 @@ class Canvas:
         self.axes.set_xlim(0.0, self.width)
         self.axes.set_ylim(0.0, self.height)
 
-    def arrow(
-        self,
-        start: Array,
-        end: Array,
-        *,
-        colour: str | None = None,
-        width: float = SIZES.bold,
-        alpha: float = 1.0,
-        zorder: float = 4.0,
-    ) -> None:
-        """Draw an arrow; short ones get a head that fits."""
-        vector = np.asarray(end, dtype=float) - np.asarray(start, dtype=float)
+    def arrow(self, start: Array, end: Array, *, alpha: float = 1.0, zorder: float = 4.0) -> None:
+        """Draw a displacement; a short one gets a head that fits."""
+        vector = end - start
         length = float(np.hypot(*vector))
         if length < 1e-6:
             return
         along = vector / length
         across = np.array([-along[1], along[0]])
         head = min(self.px(16.0), 0.75 * length)
-        neck = np.asarray(end) - head * along
-        colour = colour or self.theme.accent
+        neck = end - head * along
         if length > head * 1.01:
+            shaft = [start, neck + 0.2 * head * along]
             self.line(
-                [tuple(start), tuple(neck + 0.2 * head * along)],
-                width=width, colour=colour, alpha=alpha, zorder=zorder, cap="butt",
+                shaft, width=SIZES.bold, colour=self.theme.accent, alpha=alpha, zorder=zorder,
+                cap="butt",
             )  # fmt: skip
         side = 0.34 * head * across
-        self.polygon([neck + side, end, neck - side], colour, alpha=alpha, zorder=zorder)
+        tip = [neck + side, end, neck - side]
+        self.polygon(tip, self.theme.accent, alpha=alpha, zorder=zorder)
+
+
+def _pieces(rect: Rect, extent: tuple[float, float], rotation: float) -> list[Rect]:
+    width, height = extent
+    count = max(1, math.ceil(width / height))
+    c, s = math.cos(math.radians(rotation)), math.sin(math.radians(rotation))
+    across, up = 0.5 * width / count * abs(c), 0.5 * width / count * abs(s)
+    if abs(c) >= abs(s):
+        up += 0.5 * height * abs(c)
+    else:
+        across += 0.5 * height * abs(s)
+    middle = ((rect[0] + rect[2]) / 2.0, (rect[1] + rect[3]) / 2.0)
+    along = [width * ((index + 0.5) / count - 0.5) for index in range(count)]
+    places = [(middle[0] + step * c, middle[1] + step * s) for step in along]
+    return [(x - across, y - up, x + across, y + up) for x, y in places]
+
+
+def _text_rect(
+    x: float, y: float, extent: tuple[float, float], ha: str, va: str, rotation: float
+) -> Rect:
+    width, height = extent
+    left = {"left": 0.0, "center": -width / 2, "right": -width}[ha]
+    low = {"baseline": 0.0, "bottom": 0.0, "top": -height}.get(va, -height / 2)
+    c, s = math.cos(math.radians(rotation)), math.sin(math.radians(rotation))
+    ends = [(a, b) for a in (left, left + width) for b in (low, low + height)]
+    xs = [x + a * c - b * s for a, b in ends]
+    ys = [y + a * s + b * c for a, b in ends]
+    return min(xs), min(ys), max(xs), max(ys)
+
+
+# --- Where labels go: next to what they name, off the lines, inside the figure --------------------
+
+_ANGLES = tuple(2.0 * math.pi * turn / 24 for turn in range(24))
+_DISTANCES = (8.0, 14.0, 22.0, 34.0, 50.0, 70.0, 100.0, 140.0)
+LEADER_FROM = 20.0
+"""Labels farther than this from what they name, px of a 1600 × 1200 figure, get a leader."""
+TEXT_COST, LINE_COST, BODY_COST = 40.0, 6.0, 1.2
+
+
+class Occupancy:
+    """A coarse picture of what is drawn already."""
+
+    def __init__(self, width: float, height: float, cell: float) -> None:
+        self.cell = max(cell, 1.0)
+        shape = math.ceil(height / self.cell) + 1, math.ceil(width / self.cell) + 1
+        self.cost = np.zeros(shape)
+
+    def _window(self, rect: Rect) -> tuple[slice, slice]:
+        left, bottom, right, top = (value / self.cell for value in rect)
+        rows = slice(max(0, math.floor(bottom)), max(0, math.ceil(top)))
+        return rows, slice(max(0, math.floor(left)), max(0, math.ceil(right)))
+
+    def add_rects(self, rects: Iterable[Rect], weight: float = TEXT_COST) -> None:
+        """Mark boxes."""
+        for rect in rects:
+            self.cost[self._window(rect)] += weight
+
+    def add_lines(self, lines: Iterable[Array], weight: float = LINE_COST) -> None:
+        """Mark polylines, [n, 2], px."""
+        for line in lines:
+            columns, rows = (resample(line, self.cell) / self.cell).astype(int).T
+            inside = (rows >= 0) & (rows < self.cost.shape[0])
+            inside &= (columns >= 0) & (columns < self.cost.shape[1])
+            self.cost[rows[inside], columns[inside]] += weight
+
+    def add_mask(self, mask: np.ndarray, rect: Rect, weight: float = BODY_COST) -> None:
+        """Mark where a raster (first row at the top) is not empty."""
+        rows, columns = self._window(rect)
+        y = (np.arange(rows.start, min(rows.stop, self.cost.shape[0])) + 0.5) * self.cell
+        x = (np.arange(columns.start, min(columns.stop, self.cost.shape[1])) + 0.5) * self.cell
+        height, width = mask.shape
+        i = np.clip((rect[3] - y) / (rect[3] - rect[1]) * height, 0, height - 1).astype(int)
+        j = np.clip((x - rect[0]) / (rect[2] - rect[0]) * width, 0, width - 1).astype(int)
+        self.cost[rows.start : rows.start + len(y), columns.start : columns.start + len(x)] += (
+            weight * mask[np.ix_(i, j)]
+        )
+
+    def between(self, start: tuple[float, float], end: tuple[float, float]) -> float:
+        """Cost of a leader: high where it runs over text."""
+        steps = np.linspace(0.0, 1.0, 24)
+        rows = ((start[1] + (end[1] - start[1]) * steps) / self.cell).astype(int)
+        columns = ((start[0] + (end[0] - start[0]) * steps) / self.cell).astype(int)
+        rows = np.clip(rows, 0, self.cost.shape[0] - 1)
+        columns = np.clip(columns, 0, self.cost.shape[1] - 1)
+        return 2.0 if float(self.cost[rows, columns].max()) >= TEXT_COST else 0.0
+
+    def at(self, rect: Rect) -> float:
+        """Cost of covering a box, per cell of it."""
+        window = self.cost[self._window(rect)]
+        return float(window.mean() + 0.4 * window.max()) if window.size else math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """A placed label."""
+
+    centre: tuple[float, float]  # px
+    rect: Rect  # px
+    anchor: tuple[float, float]  # px; the point it names
+    distance: float  # px; from the anchor to the nearest point of the box
+    cost: float  # what it covers; 0 where it covers nothing
+
+
+def place_label(
+    anchors: Points,
+    size: tuple[float, float],
+    frame: Rect,
+    taken: Occupancy,
+    unit: float,
+) -> Placed | None:
+    """Find the free place nearest to one of several points."""
+    best: Placed | None = None
+    best_score = math.inf
+    half_w, half_h = size[0] / 2.0 + 3.0 * unit, size[1] / 2.0 + 3.0 * unit
+    for anchor in ((float(x), float(y)) for x, y in anchors):
+        for distance in _DISTANCES:
+            if 0.012 * distance >= best_score:
+                break
+            for angle in _ANGLES:
+                c, s = math.cos(angle), math.sin(angle)
+                # as far out as puts the box's edge at the distance
+                reach = min(
+                    half_w / abs(c) if abs(c) > 1e-9 else math.inf,
+                    half_h / abs(s) if abs(s) > 1e-9 else math.inf,
+                )
+                x = anchor[0] + c * (distance * unit + reach)
+                y = anchor[1] + s * (distance * unit + reach)
+                rect = (x - half_w, y - half_h, x + half_w, y + half_h)
+                outside = rect[0] < frame[0] or rect[1] < frame[1]
+                if outside or rect[2] > frame[2] or rect[3] > frame[3]:
+                    continue
+                cost = taken.at(rect)
+                score = cost + 0.012 * distance
+                if score < best_score and distance > LEADER_FROM:
+                    score += taken.between(anchor, (x - c * reach, y - s * reach))
+                if score < best_score:
+                    best_score = score
+                    best = Placed((x, y), rect, anchor, distance * unit, cost)
+    if best is not None:
+        taken.add_rects([best.rect])
+    return best
+
+
+def write_label(
+    canvas: Canvas,
+    text: str,
+    anchors: Points,
+    frame: Rect,
+    taken: Occupancy,
+    *,
+    size: float = SIZES.text,
+    weight: str = "normal",
+    colour: str | None = None,
+) -> Placed | None:
+    """Write a label where there is room beside one of several points; none where there is none."""
+    extent = canvas.text_size(text, size, weight)
+    placed = place_label(anchors, extent, frame, taken, canvas.factor)
+    if placed is not None:
+        canvas.text(
+            *placed.centre, text, size=size, weight=weight, colour=colour, ha="center",
+            va="center_baseline", halo=canvas.theme.paper,
+        )  # fmt: skip
+    return placed
+
+
+def draw_leader(canvas: Canvas, placed: Placed, colour: str, zorder: float = 3.0) -> None:
+    """Draw a line from a label to what it names."""
+    x = min(max(placed.anchor[0], placed.rect[0]), placed.rect[2])
+    y = min(max(placed.anchor[1], placed.rect[1]), placed.rect[3])
+    canvas.line([(x, y), placed.anchor], width=SIZES.hair, colour=colour, zorder=zorder)

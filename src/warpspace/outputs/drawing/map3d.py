@@ -1,13 +1,14 @@
-"""A bent volume drawn into a box of a figure: surface, lines, ghost, arrows, axes."""
+"""A bent volume drawn into a box of a figure: surface, lines, ghost, arrows, axes, labels."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
 from warpspace.geometry.surfaces import (
     Index,
     box_edges,
+    corners,
     crease_lines,
     face_lines,
     is_thin,
@@ -17,8 +18,14 @@ from warpspace.geometry.surfaces import (
     triangulate,
 )
 from warpspace.machine.axes import is_linear
-from warpspace.outputs.drawing.canvas import Canvas
-from warpspace.outputs.drawing.labels import LINE_COST, Occupancy, draw_corners, label_isolines
+from warpspace.outputs.drawing.canvas import (
+    LEADER_FROM,
+    LINE_COST,
+    Canvas,
+    Occupancy,
+    draw_leader,
+    write_label,
+)
 from warpspace.outputs.drawing.render import (
     Body,
     Projection,
@@ -28,11 +35,118 @@ from warpspace.outputs.drawing.render import (
     render_bodies,
     split_visible,
 )
+from warpspace.outputs.drawing.settings import SIZES
 from warpspace.outputs.drawing.sheet import DrawnMap
-from warpspace.outputs.drawing.style import SIZES
 from warpspace.picture.marks import tick_values
 from warpspace.picture.model import Picture, map_faces
-from warpspace.units import Array, spell_short
+from warpspace.units import MICROMETRE, Array, spell, spell_short
+
+# --- Labels of isolines and corners ---------------------------------------------------------------
+
+ARROW_COST = 12.0
+_SHARES = (0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8)
+_CANDIDATE_LINES = 3
+
+
+def label_isolines(
+    canvas: Canvas,
+    by_level: Mapping[float, Sequence[Array]],
+    colour: str,
+    halo: str,
+    taken: Occupancy,
+) -> None:
+    """Write each level once, along a long visible piece of its line."""
+    for level, lines in by_level.items():
+        text = spell_short(level)
+        size = canvas.text_size(text, SIZES.small)
+        found: tuple[float, float, float, float] | None = None
+        for line in sorted(lines, key=_length, reverse=True)[:_CANDIDATE_LINES]:
+            if _length(line) < 4.0 * size[0]:
+                continue
+            for share in _SHARES:
+                x, y, angle = _beside(line, share, size)
+                box = (x - size[0] / 2, y - size[1] / 2, x + size[0] / 2, y + size[1] / 2)
+                cost = taken.at(box)
+                if found is None or cost < found[0] - 0.05:
+                    found = (cost, x, y, angle)
+        if found is None:
+            continue
+        rect = canvas.text(
+            found[1], found[2], text, size=SIZES.small, colour=colour, halo=halo, ha="center",
+            va="center_baseline", rotation=found[3], zorder=3.1,
+        )  # fmt: skip
+        taken.add_rects([rect])
+
+
+def _length(line: Array) -> float:
+    return float(np.hypot(*np.diff(line, axis=0).T).sum())
+
+
+def _beside(line: Array, share: float, size: tuple[float, float]) -> tuple[float, float, float]:
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    spots = share * along[-1] + np.array([-0.5, 0.0, 0.5]) * size[0]
+    x, y = (np.interp(spots, along, line[:, axis]) for axis in range(2))
+    angle = (float(np.degrees(np.arctan2(y[2] - y[0], x[2] - x[0]))) + 90.0) % 180.0 - 90.0
+    lift = 0.85 * size[1]
+    tilt = np.radians(angle)
+    return float(x[1] - lift * np.sin(tilt)), float(y[1] + lift * np.cos(tilt)), angle
+
+
+def draw_corners(
+    canvas: Canvas,
+    picture: Picture,
+    projection: Projection,
+    raster: Raster | None,
+    taken: Occupancy,
+    frame: Rect | None,
+) -> None:
+    """Draw the displacement of the corners and label those that can be seen."""
+    nominal, drawn = picture.grid.nominal_mm.reshape(-1, 3), picture.drawn_mm.reshape(-1, 3)
+    length = np.linalg.norm(picture.field.error_um.reshape(-1, 3), axis=-1)
+    worst = int(np.argmax(length))
+    found = corners(picture.shape).tolist()
+    depth = projection.depth_mm(nominal[found])
+    front = float(depth.min()) + 0.02 * float(np.ptp(depth)) + 1.0
+    wanted: list[tuple[str, Array, Array]] = []
+    for corner, deep in zip(found, depth, strict=True):
+        tail, tip = projection.project(nominal[corner]), projection.project(drawn[corner])
+        ends = np.stack([nominal[corner], drawn[corner]])
+        near = bool(deep <= front) or _is_seen(projection, ends, raster)
+        opacity = 1.0 if near else 0.4
+        canvas.arrow(tail, tip, alpha=opacity, zorder=4.0 if near else 3.4)
+        if np.hypot(*(tip - tail)) > 0.1:
+            canvas.disc(tail, 4.0, canvas.theme.accent, alpha=opacity)
+            taken.add_lines([np.stack([tail, tip])], ARROW_COST)
+        if near:
+            wanted.append((_amount(length[corner], largest=corner == worst), tail, tip))
+    if worst not in found and _is_seen(projection, drawn[worst][None], raster):
+        spot = projection.project(drawn[worst])
+        canvas.ring(spot, 7.0)
+        wanted.append((_amount(length[worst], largest=True), spot, spot))
+    colour = canvas.theme.accent
+    if frame is None:
+        return
+    for text, tail, tip in wanted:
+        anchors = [tip, tail, (tip + tail) / 2.0]
+        placed = write_label(canvas, text, anchors, frame, taken, weight="bold", colour=colour)
+        if placed is not None and placed.distance > canvas.px(LEADER_FROM):
+            draw_leader(canvas, placed, colour, 3.9)
+
+
+def _amount(length_um: float, *, largest: bool) -> str:
+    tail = " max" if largest and length_um > 0.0 else ""
+    return f"{spell(float(length_um))} {MICROMETRE}{tail}"
+
+
+def _is_seen(projection: Projection, points_mm: Array, raster: Raster | None) -> bool:
+    """Tell whether any of some points can be seen: not behind the body."""
+    if raster is None:
+        return True
+    surface = raster.depth_at(projection.project(points_mm), spread=True)
+    return bool(np.any(projection.depth_mm(points_mm) <= surface + 2.0 / projection.px_per_mm))
+
+
+# --- The map --------------------------------------------------------------------------------------
 
 INSETS = (112.0, 92.0, 84.0, 46.0)
 """Room for axes and labels around the body: left, bottom, right, top."""
@@ -57,18 +171,13 @@ def draw_map(
 ) -> DrawnMap:
     """Draw a bent volume."""
     nodes = picture.drawn_mm.reshape(-1, 3)
-    values = picture.values.reshape(-1)
     projection = projection or fit_map(canvas, [picture], rect, view, labels=labels)
     faces = map_faces(picture.shape, cut=view == "iso")
-    surface = triangulate(faces)
-    raster: Raster | None = None
-    if len(surface.triangles):
-        body = Body(nodes[surface.nodes], surface.triangles, values[surface.nodes], picture.scale)
-        raster = render_bodies([body], projection)
-        canvas.image(raster.reduced() if canvas.exact else raster.rgba, raster.rect, zorder=1.0)
+    raster = render_bodies(surface_bodies(picture, faces), projection)
     start = len(canvas.rects)
     taken = Occupancy(canvas.width, canvas.height, 2.0 * canvas.factor)
     if raster is not None:
+        draw_raster(canvas, raster)
         taken.add_mask(raster.rgba[..., 3] > 0, raster.rect)
     _draw_surface_lines(canvas, picture, faces, projection, raster, taken)
     draw_lone_line(canvas, picture, projection, taken)
@@ -79,10 +188,23 @@ def draw_map(
     taken.add_rects(canvas.rects[start:])
     if annotate is not None:
         annotate(canvas, picture, projection, raster, taken, rect if labels else None)
-    return DrawnMap(
-        projection, picture.scale, picture.values, picture.drawn_mm, picture.exaggeration,
-        raster, tuple(canvas.rects[start:]),
-    )  # fmt: skip
+    return DrawnMap(projection, picture, raster)
+
+
+def surface_bodies(picture: Picture, faces: list[Index]) -> list[Body]:
+    """Give the coloured surface where it is drawn; nothing where a volume has none."""
+    surface = triangulate(faces)
+    if not len(surface.triangles):
+        return []
+    nodes, values = picture.drawn_mm.reshape(-1, 3), picture.values.reshape(-1)
+    return [Body(nodes[surface.nodes], surface.triangles, values[surface.nodes], picture.scale)]
+
+
+def draw_raster(canvas: Canvas, raster: Raster, opacity: float = 1.0, zorder: float = 1.0) -> None:
+    """Place drawn bodies; in vector formats with all their pixels."""
+    rgba = (raster.reduced() if canvas.exact else raster.rgba).copy()
+    rgba[..., 3] = (rgba[..., 3] * opacity).astype(np.uint8)
+    canvas.image(rgba, raster.rect, zorder)
 
 
 def fit_map(
@@ -121,9 +243,10 @@ def draw_maps_alike(
     for picture, name, room in zip(pictures, names, rooms, strict=True):
         projection = shared.moved(np.array(room[:2]) - np.array(rooms[0][:2]))
         maps.append(draw_map(canvas, picture, room, view, projection=projection))
-        text, size = canvas.fit(name, room[2] - room[0] - 2.0 * head, SIZES.heading, "bold")
-        high = room[3] + head - canvas.px(4.0)
-        canvas.text(room[0] + head, high, text, size=size, weight="bold", va="top")
+        canvas.text(
+            room[0] + head, room[3] + head - canvas.px(4.0), name, size=SIZES.heading,
+            weight="bold", va="top", room=room[2] - room[0] - 2.0 * head,
+        )  # fmt: skip
     return tuple(maps)
 
 
@@ -158,9 +281,13 @@ def _draw_surface_lines(
     theme, shape = canvas.theme, picture.shape
     nodes, values = picture.drawn_mm.reshape(-1, 3), picture.values.reshape(-1)
     nx, ny, nz = (line_spacing(count) for count in shape)
-    grid = _visible(face_lines(faces, shape, (nx, ny, nz)), nodes, projection, raster)
+
+    def visible(lines: Iterable[Index]) -> list[Array]:
+        return split_visible((nodes[line] for line in lines), projection, raster)[0]
+
+    grid = visible(face_lines(faces, shape, (nx, ny, nz)))
     canvas.lines(grid, width=SIZES.hair, colour=theme.grid, alpha=0.42, zorder=2.0)
-    creases = _visible(crease_lines(faces, shape), nodes, projection, raster)
+    creases = visible(crease_lines(faces, shape))
     canvas.lines(creases, width=SIZES.line, colour=theme.grid, zorder=3.0)
     taken.add_lines(creases, LINE_COST)
     diverging = picture.scale.diverging
@@ -168,7 +295,7 @@ def _draw_surface_lines(
     by_level: dict[float, list[Array]] = {}
     for face in faces:
         for level, line in isolines(face, nodes, values, levels):
-            seen = split_visible(line, projection, raster)[0]
+            seen = split_visible([line], projection, raster)[0]
             by_level.setdefault(level, []).extend(seen)
     colour = theme.grid if diverging else theme.isoline
     for level, lines in by_level.items():
@@ -176,12 +303,6 @@ def _draw_surface_lines(
         canvas.lines(lines, width=width, colour=colour, alpha=0.95, zorder=2.5)
     taken.add_lines([line for lines in by_level.values() for line in lines], 0.5)
     label_isolines(canvas, by_level, colour, theme.isoline if diverging else theme.grid, taken)
-
-
-def _visible(
-    lines: list[Index], nodes: Array, projection: Projection, raster: Raster | None
-) -> list[Array]:
-    return [part for line in lines for part in split_visible(nodes[line], projection, raster)[0]]
 
 
 def draw_lone_line(
@@ -213,12 +334,8 @@ def _draw_ghost(
     taken: Occupancy,
 ) -> None:
     nodes = picture.grid.nominal_mm.reshape(-1, 3)
-    seen: list[Array] = []
-    hidden: list[Array] = []
-    for edge in box_edges(picture.shape):
-        visible, behind = split_visible(nodes[edge], projection, raster)
-        seen += visible
-        hidden += behind
+    edges = (nodes[edge] for edge in box_edges(picture.shape))
+    seen, hidden = split_visible(edges, projection, raster)
     theme = canvas.theme
     canvas.lines(
         hidden, width=SIZES.hair, colour=theme.ghost, alpha=0.6, dashes=GHOST_DASHES, zorder=3.2
@@ -320,27 +437,17 @@ def _draw_axis(
         centre = at + away * normal
         reach = max(reach, away + _half_extent(size, normal))
         canvas.text(
-            float(centre[0]),
-            float(centre[1]),
-            text,
-            size=SIZES.small,
-            colour=theme.muted,
-            ha="center",
+            centre[0], centre[1], text, size=SIZES.small, colour=theme.muted, ha="center",
             va="center_baseline",
-        )
+        )  # fmt: skip
     if titles:
         angle = math.degrees(math.atan2(along[1], along[0]))
         angle = (angle + 90.0) % 180.0 - 90.0 if abs(abs(angle) - 90.0) > 1e-6 else 90.0
         height = canvas.text_size("X", SIZES.text)[1]
         middle = (start + end) / 2.0 + base + (reach + canvas.px(6.0) + 0.7 * height) * normal
-        canvas.text(
-            float(middle[0]),
-            float(middle[1]),
-            f"{'XYZ'[axis]} [mm]",
-            ha="center",
-            va="center_baseline",
-            rotation=angle,
-        )
+        name = f"{'XYZ'[axis]} [mm]"
+        x, y = middle
+        canvas.text(x, y, name, ha="center", va="center_baseline", rotation=angle)
 
 
 def _half_extent(size: tuple[float, float], normal: Array) -> float:

@@ -5,7 +5,7 @@ Colours are exact, the background is transparent, depths are in millimetres.
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import import_module
@@ -67,8 +67,10 @@ def view_axes(view: str) -> tuple[Array, Array, Array]:
     return right, np.cross(towards, right), towards
 
 
-def fit_projection(view: str, points_mm: Array, rect: Rect) -> Projection:
-    """Choose the projection that makes points fill a box of the figure."""
+def fit_projection(
+    view: str, points_mm: Array, rect: Rect, px_per_mm: float | None = None
+) -> Projection:
+    """Choose the projection that makes points fill a box of the figure, or puts them amid it."""
     right, up, towards = view_axes(view)
     flat = points_mm.reshape(-1, 3)
     centre = (flat.min(axis=0) + flat.max(axis=0)) / 2.0
@@ -76,7 +78,8 @@ def fit_projection(view: str, points_mm: Array, rect: Rect) -> Projection:
     low, high = plane.min(axis=0), plane.max(axis=0)
     room = np.array([rect[2] - rect[0], rect[3] - rect[1]])
     spans = np.maximum(high - low, 1e-9)
-    px_per_mm = float(np.min(room / spans)) if (high - low).max() > 1e-9 else 1.0
+    if px_per_mm is None:
+        px_per_mm = float(np.min(room / spans)) if (high - low).max() > 1e-9 else 1.0
     middle = np.array([(rect[0] + rect[2]) / 2.0, (rect[1] + rect[3]) / 2.0])
     return Projection(
         right, up, towards, px_per_mm, centre, middle - px_per_mm * (low + high) / 2.0
@@ -86,7 +89,7 @@ def fit_projection(view: str, points_mm: Array, rect: Rect) -> Projection:
 Bytes = NDArray[np.uint8]
 _LARGEST_SIDE_PX = 8192
 _LARGEST_AREA_PX = 24_000_000
-SUPERSAMPLING = 2
+SUPERSAMPLING, MARGIN_PX = 2, 4
 PACKAGES = "libegl1 libgl1-mesa-dri"
 WINDOW_VARIABLE = "VTK_DEFAULT_OPENGL_WINDOW"
 FALLBACK = "vtkOSOpenGLRenderWindow"
@@ -123,7 +126,7 @@ class Raster:
     depth_mm: NDArray[np.float32]  # [h, w]; as `Projection.depth_mm`; infinite where nothing is
     # [h, w]; the largest depth within a pixel of the figure around each
     farthest_mm: NDArray[np.float32]
-    rect: tuple[float, float, float, float]  # px; box of the figure it covers
+    rect: Rect  # px; box of the figure it covers
 
     @property
     def sampling(self) -> float:
@@ -151,33 +154,24 @@ class Raster:
         return np.where(inside, depth[np.where(inside, i, 0), np.where(inside, j, 0)], np.inf)
 
 
-def render_bodies(bodies: Sequence[Body], projection: Projection, margin_px: int = 4) -> Raster:
-    """Draw bodies."""
+def render_bodies(bodies: Sequence[Body], projection: Projection) -> Raster | None:
+    """Draw bodies; none where there are none."""
+    if not bodies:
+        return None
+    from scipy.ndimage import maximum_filter
+
     points = np.concatenate([body.vertices_mm for body in bodies])
     spots = projection.project(points)
-    left, bottom = (np.floor(spots.min(axis=0)) - margin_px).astype(int)
-    right, top = (np.ceil(spots.max(axis=0)) + margin_px).astype(int)
+    left, bottom = (np.floor(spots.min(axis=0)) - MARGIN_PX).astype(int)
+    right, top = (np.ceil(spots.max(axis=0)) + MARGIN_PX).astype(int)
     width, height = int(right - left), int(top - bottom)
     small = max(width, height) * SUPERSAMPLING <= _LARGEST_SIDE_PX
     small = small and width * height * SUPERSAMPLING**2 <= _LARGEST_AREA_PX
     step = SUPERSAMPLING if small else 1
     middle = np.array([(left + right) / 2.0, (bottom + top) / 2.0])
     rgba, depth = _draw(bodies, projection, middle, (width * step, height * step), step)
-    return Raster(
-        rgba, depth, _farthest(depth, step), (float(left), float(bottom), float(right), float(top))
-    )
-
-
-def _farthest(depth: NDArray[np.float32], reach: int) -> NDArray[np.float32]:
-    """Give the largest depth within so many pixels of each, [h, w]."""
-    for axis in (0, 1):
-        near = np.moveaxis(depth, axis, 0)
-        found = near.copy()
-        for shift in range(1, reach + 1):
-            np.maximum(found[shift:], near[:-shift], out=found[shift:])
-            np.maximum(found[:-shift], near[shift:], out=found[:-shift])
-        depth = np.moveaxis(found, 0, axis)
-    return depth
+    farthest = np.asarray(maximum_filter(depth, 2 * step + 1, mode="nearest"), np.float32)
+    return Raster(rgba, depth, farthest, (float(left), float(bottom), float(right), float(top)))
 
 
 def _draw(
@@ -287,35 +281,35 @@ SHORTEST_PX = 4.0
 
 
 def split_visible(
-    line_mm: Array, projection: Projection, raster: Raster | None
+    lines_mm: Iterable[Array], projection: Projection, raster: Raster | None
 ) -> tuple[list[Array], list[Array]]:
-    """Split a polyline into its visible and its hidden parts."""
-    spots = projection.project(line_mm)
-    if raster is None:
-        return [spots], []
-    fine_px, fine_depth = _resample(spots, projection.depth_mm(line_mm), STEP_PX)
-    surface = raster.depth_at(fine_px, spread=True)
-    tolerance = 1.5 / projection.px_per_mm
-    visible = _steady(fine_depth <= surface + tolerance, round(SHORTEST_PX / STEP_PX))
-    changes = np.flatnonzero(np.diff(visible)) + 1
+    """Split polylines into their visible and their hidden parts, px."""
     seen: list[Array] = []
     hidden: list[Array] = []
-    bounds = [0, *changes.tolist(), len(visible)]
-    for start, end in pairwise(bounds):
-        part = fine_px[start : min(end + 1, len(visible))]
-        if len(part) > 1:
-            (seen if visible[start] else hidden).append(_thin(part))
+    for line_mm in lines_mm:
+        spots = projection.project(line_mm)
+        if raster is None:
+            seen.append(spots)
+            continue
+        deep = np.column_stack([spots, projection.depth_mm(line_mm)])
+        fine_px, fine_depth = np.split(resample(deep, STEP_PX), [2], axis=1)
+        surface = raster.depth_at(fine_px, spread=True) + 1.5 / projection.px_per_mm
+        visible = _steady(fine_depth[:, 0] <= surface, round(SHORTEST_PX / STEP_PX))
+        for start, end in pairwise(_bounds(visible)):
+            part = fine_px[start : min(end + 1, len(visible))]
+            if len(part) > 1:
+                (seen if visible[start] else hidden).append(_thin(part))
     return seen, hidden
 
 
-def _resample(spots: Array, depth: Array, step: float) -> tuple[Array, Array]:
-    lengths = np.hypot(*np.diff(spots, axis=0).T)
+def resample(line: Array, step: float) -> Array:
+    """Put points into a polyline, so far apart at most in its first two columns, [n, 2 or more]."""
+    lengths = np.hypot(*np.diff(line[:, :2], axis=0).T)
     pieces = np.maximum(1, np.ceil(lengths / step)).astype(int)
     # position along the polyline, in numbers of its points
     along = np.concatenate([[0.0], np.cumsum(np.repeat(1.0 / pieces, pieces))])
-    known = np.arange(len(spots))
-    fine = np.stack([np.interp(along, known, spots[:, axis]) for axis in range(2)], -1)
-    return fine, np.interp(along, known, depth)
+    known = np.arange(len(line))
+    return np.stack([np.interp(along, known, values) for values in line.T], -1)
 
 
 def _thin(spots: Array) -> Array:
@@ -329,9 +323,12 @@ def _thin(spots: Array) -> Array:
 
 def _steady(visible: np.ndarray, shortest: int) -> np.ndarray:
     result = visible.copy()
-    edges = [0, *(np.flatnonzero(np.diff(visible)) + 1).tolist(), len(visible)]
-    for start, end in pairwise(edges):
+    for start, end in pairwise(_bounds(visible)):
         inner = start > 0 and end < len(visible)
         if inner and end - start < shortest:
             result[start:end] = not visible[start]
     return result
+
+
+def _bounds(visible: np.ndarray) -> list[int]:
+    return [0, *(np.flatnonzero(np.diff(visible)) + 1).tolist(), len(visible)]

@@ -15,9 +15,8 @@ from warpspace.geometry.surfaces import round_down
 from warpspace.machine.axes import parameter
 from warpspace.outputs.drawing.canvas import Canvas
 from warpspace.outputs.drawing.render import Projection, Raster, Rect
-from warpspace.outputs.drawing.settings import FigureSettings, spell_settings
-from warpspace.outputs.drawing.style import SIZES, Theme
-from warpspace.picture.model import ScenePicture
+from warpspace.outputs.drawing.settings import SIZES, FigureSettings, Theme
+from warpspace.picture.model import Picture, ScenePicture
 from warpspace.picture.words import (
     LOOP_WORDS,
     TIMES,
@@ -27,7 +26,7 @@ from warpspace.picture.words import (
 )
 from warpspace.resources import __version__
 from warpspace.scene.model import Scene
-from warpspace.units import MM_PER_UM, Array, spell_short
+from warpspace.units import MM_PER_UM, spell_short
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,12 +34,8 @@ class DrawnMap:
     """A map as it stands in a figure: enough to read it back."""
 
     projection: Projection
-    scale: ColourScale
-    values: Array  # [nx, ny, nz]; what the colour shows at the nodes
-    drawn_mm: Array  # [nx, ny, nz, 3]; where the nodes are drawn
-    exaggeration: float
+    picture: Picture
     raster: Raster | None  # the drawn body; None where there is no surface
-    rects: tuple[Rect, ...] = ()  # (n, 4), px; boxes of its labels
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,18 +96,17 @@ def draw_legend(
         x += width + canvas.px(34.0)
 
 
-def dark_isoline_symbol(canvas: Canvas, x: float, y: float, width: float) -> None:
-    """Show a dark line on a light ground."""
-    height = canvas.px(14.0)
-    canvas.rectangle(x, y - height / 2, width, height, facecolor="#d9a98c", edgecolor="none")
-    canvas.line([(x, y), (x + width, y)], width=SIZES.thin, colour=canvas.theme.grid, zorder=3.5)
+def isoline_entries(text: str, *, diverging: bool = False) -> list[LegendEntry]:
+    """Give the entry of isolines, a white line or a dark one on a coloured ground, if any."""
 
+    def symbol(canvas: Canvas, x: float, y: float, width: float) -> None:
+        height, theme = canvas.px(14.0), canvas.theme
+        ground = "#d9a98c" if diverging else "#2f6b8e"
+        canvas.rectangle(x, y - height / 2, width, height, facecolor=ground, edgecolor="none")
+        thick, ink = (SIZES.thin, theme.grid) if diverging else (SIZES.line, theme.isoline)
+        canvas.line([(x, y), (x + width, y)], width=thick, colour=ink, zorder=3.5)
 
-def isoline_symbol(canvas: Canvas, x: float, y: float, width: float) -> None:
-    """Show a white line on a coloured ground."""
-    height = canvas.px(14.0)
-    canvas.rectangle(x, y - height / 2, width, height, facecolor="#2f6b8e", edgecolor="none")
-    canvas.line([(x, y), (x + width, y)], width=SIZES.line, colour=canvas.theme.isoline, zorder=3.5)
+    return [LegendEntry(symbol, text)] if text else []
 
 
 Row = tuple[str, str]
@@ -191,22 +185,23 @@ def draw_scale_bars(
     if exaggeration is not None:
         px_per_um = px_per_mm * MM_PER_UM * exaggeration
         length = round_down(room / px_per_um)
-        _draw_bar(canvas, left, y, length * px_per_um, theme.accent)
         name = f"{spell_short(length)} µm displacement ({spell_factor(exaggeration)})"
-        text, size = canvas.fit(name, right - left, SIZES.small)
-        canvas.text(left, y + canvas.px(13.0), text, size=size, colour=theme.accent)
+        _draw_bar(canvas, left, y, length * px_per_um, theme.accent, name, right)
         y += canvas.px(52.0)
     length = round_down(room / px_per_mm)
-    _draw_bar(canvas, left, y, length * px_per_mm, theme.ink)
-    text, size = canvas.fit(f"{spell_short(length)} mm geometry", right - left, SIZES.small)
-    canvas.text(left, y + canvas.px(13.0), text, size=size)
+    name = f"{spell_short(length)} mm geometry"
+    _draw_bar(canvas, left, y, length * px_per_mm, theme.ink, name, right)
     return y + canvas.px(34.0)
 
 
-def _draw_bar(canvas: Canvas, x: float, y: float, length: float, colour: str) -> None:
+def _draw_bar(
+    canvas: Canvas, x: float, y: float, length: float, colour: str, name: str, end: float
+) -> None:
     foot = canvas.px(6.0)
     points = [(x, y - foot), (x, y), (x + length, y), (x + length, y - foot)]
-    canvas.line(points, width=SIZES.line, colour=colour, cap="butt")
+    canvas.line(points, colour=colour, cap="butt")
+    y += canvas.px(13.0)
+    canvas.text(x, y, name, size=SIZES.small, colour=colour, room=end - x)
 
 
 HINTED = 0.92
@@ -215,15 +210,14 @@ HINTED = 0.92
 
 def draw_heading(canvas: Canvas, title: str, facts: Sequence[str]) -> float:
     """Write title and subtitle with a rule below."""
-    margin = _margin(canvas)
+    margin = canvas.margin
     room = canvas.width - 2.0 * margin
     y = canvas.height - canvas.px(54.0)
-    text, size = canvas.fit(title, room, SIZES.title, "bold")
-    canvas.text(margin, y, text, size=size, weight="bold")
+    canvas.text(margin, y, title, size=SIZES.title, weight="bold", room=room)
     y -= canvas.px(14.0)
-    for line in wrap(canvas, facts, room, SIZES.subtitle, lines=2):
+    for line in _wrap(canvas, facts, room):
         y -= canvas.px(24.0)
-        canvas.text(margin, y, line[0], size=line[1], colour=canvas.theme.muted)
+        canvas.text(margin, y, line, size=SIZES.subtitle, colour=canvas.theme.muted, room=room)
     y -= canvas.px(18.0)
     canvas.line(
         [(margin, y), (canvas.width - margin, y)], width=SIZES.hair, colour=canvas.theme.faint
@@ -231,19 +225,17 @@ def draw_heading(canvas: Canvas, title: str, facts: Sequence[str]) -> float:
     return y
 
 
-def wrap(
-    canvas: Canvas, facts: Sequence[str], room: float, size: float, lines: int
-) -> list[tuple[str, float]]:
-    """Spread facts over lines; what is left over is shrunk into the last one."""
+def _wrap(canvas: Canvas, facts: Sequence[str], room: float) -> list[str]:
+    """Spread facts over two lines; what is left over goes into the last one."""
     rows: list[str] = []
     for fact in facts:
         joined = f"{rows[-1]} · {fact}" if rows else fact
-        fits = canvas.text_size(joined, size)[0] <= room
-        if rows and (fits or len(rows) == lines):
+        fits = canvas.text_size(joined, SIZES.subtitle)[0] <= room
+        if rows and (fits or len(rows) == 2):
             rows[-1] = joined
         else:
             rows.append(fact)
-    return [canvas.fit(row, room, size) for row in rows]
+    return rows
 
 
 def scene_facts(picture: ScenePicture, exaggeration: float | None) -> list[str]:
@@ -294,70 +286,81 @@ def draw_footer(
     errors: bool,
 ) -> float:
     """Draw legend, parameters (where `errors` is true), convention and provenance at the bottom."""
-    margin = _margin(canvas)
+    margin = canvas.margin
     room = canvas.width - 2.0 * margin
     theme = canvas.theme
     y = canvas.px(26.0)
     source = f"warpspace {__version__} · scene {' · '.join(scene.name for scene in scenes)}"
-    source, size = canvas.fit(source, 0.45 * room, SIZES.small)
-    canvas.text(canvas.width - margin, y, source, size=size, colour=theme.muted, ha="right")
-    left = HINTED * (room - canvas.text_size(source, size)[0]) - canvas.px(24.0)
+    taken = canvas.text(
+        canvas.width - margin, y, source, size=SIZES.small, colour=theme.muted, ha="right",
+        room=0.45 * room,
+    )  # fmt: skip
+    left = HINTED * (room - (taken[2] - taken[0])) - canvas.px(24.0)
     words = [
         " / ".join(dict.fromkeys(map(convention_words, scenes))),
         "error = actual − nominal",
         "coordinates in the machine frame R",
     ]
-    text, size = canvas.fit(" · ".join(words), left, SIZES.small)
-    canvas.text(margin, y, text, size=size, colour=theme.muted)
+    canvas.text(margin, y, " · ".join(words), size=SIZES.small, colour=theme.muted, room=left)
     for scene in reversed(scenes if errors else ()):
         y += canvas.px(25.0)
         head = "errors: " if len(scenes) == 1 else f"errors of {scene.name}: "
-        shown = _as_many(canvas, head, parameter_words(scene), room)
-        canvas.text(margin, y, shown[0], size=shown[1], colour=theme.muted)
+        words = _as_many(canvas, head, parameter_words(scene), room)
+        canvas.text(margin, y, words, size=SIZES.small, colour=theme.muted, room=room)
     if legend:
         y += canvas.px(36.0)
         draw_legend(canvas, legend, margin, y, room)
     return y + canvas.px(30.0)
 
 
-def _as_many(canvas: Canvas, head: str, items: Sequence[str], room: float) -> tuple[str, float]:
+def _as_many(canvas: Canvas, head: str, items: Sequence[str], room: float) -> str:
     if not items:
-        return head + "all zero", SIZES.small
+        return head + "all zero"
     for count in range(len(items), 0, -1):
         rest = len(items) - count
         text = head + " · ".join(items[:count]) + (f" · and {rest} more" if rest else "")
         if canvas.text_size(text, SIZES.small)[0] <= room:
-            return text, SIZES.small
-    return canvas.fit(head + items[0], room, SIZES.small)
+            return text
+    return head + items[0]
 
 
 def map_legend(
     isolines: str, *, surface: str = "deformed grid", diverging: bool = False
 ) -> list[LegendEntry]:
     """Build the legend of a map; `isolines` is empty where there are none."""
-    entries = [
+    return [
         line_entry("nominal volume", lambda theme: theme.ghost, dashes=(11.0, 7.0)),
         line_entry(surface, lambda theme: theme.ink),
         LegendEntry(
             lambda c, x, y, w: c.arrow(np.array([x, y]), np.array([x + w, y])),
             "displacement of corners, |E|",
         ),
+        *isoline_entries(isolines, diverging=diverging),
     ]
-    if isolines:
-        entries.append(LegendEntry(dark_isoline_symbol if diverging else isoline_symbol, isolines))
-    return entries
 
 
 def metadata(
     title: str, scenes: Sequence[Scene], settings: FigureSettings, exaggeration: float, figure: str
 ) -> dict[str, str]:
     """Collect what the file says about itself; no dates, so that it can be repeated."""
+    top, factor = settings.range_top, f"{exaggeration:.10g}"
+    chosen = {
+        "component": settings.component,
+        "view": settings.view,
+        "loop": settings.loop,
+        "grid": settings.grid,
+        "exaggeration": factor,
+        "size": f"{settings.size[0]}x{settings.size[1]}",
+        "theme": settings.theme.name,
+        **({} if top is None else {"range": f"{top:.10g}"}),
+        "figure": figure,
+    }
     return {
         "title": title,
         "scene": ", ".join(scene.name for scene in scenes),
         "version": f"warpspace {__version__}",
-        "exaggeration": f"{exaggeration:.10g}",
-        "settings": spell_settings(settings, exaggeration, figure=figure),
+        "exaggeration": factor,
+        "settings": ", ".join(f"{key}={value}" for key, value in chosen.items()),
     }
 
 
@@ -391,14 +394,14 @@ class Sheet:
         for index, (name, value) in enumerate(reversed(shown)):
             weight = "bold" if index == len(shown) - 1 else "normal"
             height = y + index * step
-            text, size = canvas.fit(value, 0.8 * (right - left), SIZES.text, weight)
-            canvas.text(right, height, text, size=size, weight=weight, ha="right")
-            space = right - left - canvas.text_size(text, size, weight)[0] - canvas.px(8.0)
-            label, small = canvas.fit(name, space)
-            canvas.text(left, height, label, size=small, colour=canvas.theme.muted)
+            room = 0.8 * (right - left)
+            start = canvas.text(right, height, value, weight=weight, ha="right", room=room)[0]
+            room = start - left - canvas.px(8.0)
+            canvas.text(left, height, name, colour=canvas.theme.muted, room=room)
         y += len(shown) * step + canvas.px(26.0)
-        text, size = canvas.fit(heading, right - left, SIZES.heading, "bold")
-        canvas.text(left, top, text, size=size, weight="bold", va="top")
+        canvas.text(
+            left, top, heading, size=SIZES.heading, weight="bold", va="top", room=right - left
+        )
         high = top - canvas.px(40.0)
         low = max(y, high - canvas.px(560.0))
         draw_colour_bar(
@@ -429,13 +432,9 @@ def start_sheet(
     facts = [*facts, *(words for words in settings.conditions if words not in said)]
     top = draw_heading(canvas, title, facts)
     bottom = draw_footer(canvas, scenes, legend, errors=errors)
-    margin = _margin(canvas)
+    margin = canvas.margin
     right, width = canvas.width - margin, canvas.px(SIZES.panel)
     edge = right - width - canvas.px(12.0) if panel else right
     content = (0.6 * margin, bottom, edge, top - canvas.px(6.0))
     column = (right - width, bottom, right, top - canvas.px(18.0))
     return Sheet(name, canvas, title, content, column, scenes, settings)
-
-
-def _margin(canvas: Canvas) -> float:
-    return canvas.px(SIZES.margin) * min(1.0, canvas.width / canvas.px(1000.0))

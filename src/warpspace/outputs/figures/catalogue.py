@@ -40,22 +40,22 @@ _KINDS = {
     kind.name: replace(kind, draw=f"{_HERE}{kind.draw}")
     for kind in (
         FigureKind(
-            "error-map", "The deformed working volume, coloured.", "error_map:draw_error_map"
+            "error-map", "The deformed working volume, coloured.", "maps:draw_error_map"
         ),
         FigureKind(
-            "slices", "Three slices through the working volume.", "slices:draw_slices",
+            "slices", "Three slices through the working volume.", "maps:draw_slices",
             evidence=True,
         ),
         FigureKind(
             "orientation-map", "Orientation error of the tool axis.",
-            "orientation:draw_orientation", evidence=True,
+            "maps:draw_orientation", evidence=True,
         ),
         FigureKind(
             "error-curves", "Errors along each axis, with their tolerance bands.",
             "curves:draw_curves", evidence=True,
         ),
         FigureKind(
-            "traces", "Traces of the rotary table, nominal and actual.", "traces:draw_traces",
+            "traces", "Traces of the rotary table, nominal and actual.", "machine:draw_traces",
             evidence=True,
         ),
         FigureKind(
@@ -73,16 +73,16 @@ _KINDS = {
         FigureKind(
             "repair",
             "Before and after the best repair, and what each error does to the whole volume.",
-            "repair:draw_repair",
+            "side_by_side:draw_repair",
         ),
         FigureKind("ballbar", "Circular test, ISO 230-4.", "charts:draw_ballbar"),
         FigureKind(
-            "comparison", "Two scenes and their difference.", "comparison:draw_comparison",
+            "comparison", "Two scenes and their difference.", "side_by_side:draw_comparison",
             scenes=2, command="compare A B -o FILE",
         ),
         FigureKind(
             "concepts", "Machines side by side within the same tolerances.",
-            "concepts:draw_concepts", scenes=2, most_scenes=MOST_CONCEPTS,
+            "side_by_side:draw_concepts", scenes=2, most_scenes=MOST_CONCEPTS,
             command="concepts SCENE… --plot FILE",
         ),
     )

@@ -15,12 +15,10 @@ from warpspace.bench.kinds.circular import Circular
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import placed_words
 from warpspace.kinematics.model import Loop
-from warpspace.outputs.charts.blocks import bars_chart, charts_sheet, histogram_chart
-from warpspace.outputs.charts.paper import on_ground
+from warpspace.outputs.charts.blocks import bars_chart, charts_sheet, histogram_chart, on_ground
 from warpspace.outputs.charts.results import bench_chart
-from warpspace.outputs.drawing.settings import FigureSettings
+from warpspace.outputs.drawing.settings import FONT, FigureSettings
 from warpspace.outputs.drawing.sheet import LOOP_WORDS, Drawing, metadata
-from warpspace.outputs.drawing.style import FONT
 from warpspace.picture.traces import (
     TraceLine,
     evaluate_axis_motion,

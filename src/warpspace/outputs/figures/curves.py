@@ -9,12 +9,10 @@ from warpspace.analysis.blocks import Band, Bars, Curve, Lines, Panel, Series, S
 from warpspace.machine.axes import axis_order, parameter
 from warpspace.machine.description import Axis
 from warpspace.machine.errors import BACKWARD, Tolerance
-from warpspace.outputs.charts.blocks import draw_beside, draw_lines
-from warpspace.outputs.charts.paper import on_ground, style
+from warpspace.outputs.charts.blocks import draw_beside, draw_lines, on_ground, style
 from warpspace.outputs.drawing.canvas import POINTS_PER_PX
-from warpspace.outputs.drawing.settings import FigureSettings
+from warpspace.outputs.drawing.settings import SIZES, FigureSettings
 from warpspace.outputs.drawing.sheet import Drawing, reference_words, start_sheet
-from warpspace.outputs.drawing.style import SIZES
 from warpspace.scene.model import Scene
 from warpspace.units import MICROMETRE, MICRORADIAN, Array
 

@@ -1,21 +1,30 @@
 """Figures with the machine: its bent bodies around the bent volume, and the traces of its table."""
 
 from collections.abc import Collection, Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from warpspace.bodies.placed import PlacedBody, place_bodies, scene_motions
+from warpspace.exceptions import OptionError
+from warpspace.geometry.colour import ColourScale, component_values
 from warpspace.geometry.surfaces import (
     box_edges,
     crease_lines,
     face_lines,
     line_spacing,
     outer_faces,
-    triangulate,
 )
 from warpspace.kinematics.chain import BASE
-from warpspace.outputs.drawing.canvas import Canvas
-from warpspace.outputs.drawing.map3d import GHOST_DASHES, draw_lone_line, map_room_mm
+from warpspace.machine.description import Vector
+from warpspace.outputs.drawing.canvas import Canvas, Occupancy, draw_leader, write_label
+from warpspace.outputs.drawing.map3d import (
+    GHOST_DASHES,
+    draw_lone_line,
+    draw_raster,
+    map_room_mm,
+    surface_bodies,
+)
 from warpspace.outputs.drawing.render import (
     Body,
     Projection,
@@ -25,27 +34,34 @@ from warpspace.outputs.drawing.render import (
     render_bodies,
     split_visible,
 )
-from warpspace.outputs.drawing.settings import FigureSettings, evaluate_for
+from warpspace.outputs.drawing.settings import SIZES, FigureSettings, Theme, evaluate_for
 from warpspace.outputs.drawing.sheet import (
     Drawing,
     DrawnMap,
     LegendEntry,
+    Row,
     line_entry,
     scene_facts,
     start_sheet,
 )
-from warpspace.outputs.drawing.style import SIZES, Theme
-from warpspace.outputs.figures.error_map import say_statistics
-from warpspace.picture.model import ScenePicture
+from warpspace.outputs.figures.maps import say_statistics
+from warpspace.picture.model import (
+    ScenePicture,
+    choose_exaggeration,
+    choose_scale,
+    evaluate_picture,
+)
+from warpspace.picture.traces import TraceLine, evaluate_traces, trace_lines
+from warpspace.picture.words import quantity_words, spell_vector
 from warpspace.scene.model import Scene
-from warpspace.units import Array
+from warpspace.units import MICROMETRE, MINUS, Array, spell
 
 VOLUME_ALPHA, BEHIND_ALPHA = 0.72, 0.22
 """Opacity of the coloured volume before bodies, and behind them."""
 DARKER = 0.62
 
 
-def drawn_body(part: PlacedBody, theme: Theme) -> Body:
+def _drawn_body(part: PlacedBody, theme: Theme) -> Body:
     """Give what is drawn of a placed body on the ground of a theme."""
     shade = 1.0 if theme.name == "light" else DARKER
     red, green, blue = (shade * channel / 255.0 for channel in part.body.colour)
@@ -64,33 +80,33 @@ def bodies_of(
 def draw_machine(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
     """Draw a machine with its bent bodies and its bent working volume."""
     picture = evaluate_for(settings, scenes[0])
-    exaggeration, scale, values = picture.exaggeration, picture.scale, picture.values
     title = f"Machine and working volume: {picture.scene.title}"
-    placed = bodies_of(picture, exaggeration)
+    placed = bodies_of(picture, picture.exaggeration)
     facts = [
-        *scene_facts(picture, exaggeration),
+        *scene_facts(picture, picture.exaggeration),
         "bodies schematic, deformed and tilted like their frames",
     ]
-    sheet = start_sheet("machine", settings, title, facts, scenes, _legend(), exact=exact)
-    canvas = sheet.canvas
-    drawn_mm = picture.drawn_mm
+    legend = [
+        line_entry("nominal volume", lambda theme: theme.ink, SIZES.thin, GHOST_DASHES, 0.6),
+        line_entry("deformed volume", lambda theme: theme.ink),
+        line_entry("nominal bodies", lambda theme: theme.ghost, SIZES.thin, alpha=0.6),
+    ]
+    sheet = start_sheet("machine", settings, title, facts, scenes, legend, exact=exact)
+    canvas, (left, bottom, right, top) = sheet.canvas, sheet.content
     points = [map_room_mm(picture), *(part.vertices_mm for part in placed)]
-    projection = fit_projection(settings.view, np.concatenate(points), _room(canvas, sheet.content))
+    side = canvas.px(20.0)
+    room = (left + side, bottom + side, right - canvas.px(150.0), top - side)
+    projection = fit_projection(settings.view, np.concatenate(points), room)
     machine = draw_bodies(canvas, placed, projection)
-    faces = outer_faces(picture.grid.shape)
-    surface = triangulate(faces)
-    volume: Raster | None = None
-    if len(surface.triangles):
-        nodes = drawn_mm.reshape(-1, 3)[surface.nodes]
-        body = Body(nodes, surface.triangles, values.reshape(-1)[surface.nodes], scale)
-        volume = render_bodies([body], projection)
+    volume = render_bodies(surface_bodies(picture, outer_faces(picture.shape)), projection)
+    if volume is not None:
         _overlay(canvas, volume, machine)
-    _draw_volume_lines(canvas, picture, drawn_mm, projection, volume, machine)
+    _draw_volume_lines(canvas, picture, projection, volume, machine)
     draw_lone_line(canvas, picture, projection)
-    label_bodies(canvas, placed, projection, machine, sheet.content)
+    if machine is not None:
+        _label_bodies(canvas, placed, projection, machine, right)
     say_statistics(sheet, picture, projection.px_per_mm)
-    drawn = DrawnMap(projection, scale, values, drawn_mm, exaggeration, volume)
-    return sheet.finish(exaggeration, [drawn])
+    return sheet.finish(picture.exaggeration, [DrawnMap(projection, picture, volume)])
 
 
 def draw_bodies(
@@ -106,30 +122,21 @@ def draw_bodies(
 
     None where there is no body.
     """
-    if not placed:
-        return None
     theme = canvas.theme
-    raster = render_bodies([drawn_body(part, theme) for part in placed], projection)
-    rgba = (raster.reduced() if canvas.exact else raster.rgba).copy()
-    rgba[..., 3] = (rgba[..., 3] * opacity).astype(np.uint8)
-    canvas.image(rgba, raster.rect, zorder)
+    raster = render_bodies([_drawn_body(part, theme) for part in placed], projection)
+    if raster is None:
+        return None
+    draw_raster(canvas, raster, opacity, zorder)
 
-    def seen(edges: Iterable[Array]) -> list[Array]:
-        return [line for edge in edges for line in split_visible(edge, projection, raster)[0]]
+    def draw(edges: Iterable[Array], colour: str, alpha: float, height: float) -> None:
+        seen, _ = split_visible(edges, projection, raster)
+        canvas.lines(seen, width=SIZES.hair, colour=colour, alpha=alpha, zorder=zorder + height)
 
-    edges = seen(edge for part in placed for edge in part.edges_mm)
-    canvas.lines(edges, width=SIZES.hair, colour=theme.grid, alpha=0.75, zorder=zorder + 0.1)
+    draw((edge for part in placed for edge in part.edges_mm), theme.grid, 0.75, 0.1)
     if nominal:
         moving = [part for part in placed if part.body.frame != BASE]
-        edges = seen(edge for part in moving for edge in part.nominal_edges_mm)
-        canvas.lines(edges, width=SIZES.hair, colour=theme.ghost, alpha=0.8, zorder=zorder + 0.05)
+        draw((edge for part in moving for edge in part.nominal_edges_mm), theme.ghost, 0.8, 0.05)
     return raster
-
-
-def _room(canvas: Canvas, rect: Rect) -> Rect:
-    left, bottom, right, top = rect
-    side = canvas.px(20.0)
-    return (left + side, bottom + side, right - canvas.px(150.0), top - side)
 
 
 def _overlay(canvas: Canvas, volume: Raster, machine: Raster | None) -> None:
@@ -149,55 +156,41 @@ def _overlay(canvas: Canvas, volume: Raster, machine: Raster | None) -> None:
 def _draw_volume_lines(
     canvas: Canvas,
     picture: ScenePicture,
-    drawn_mm: Array,
     projection: Projection,
     volume: Raster | None,
     machine: Raster | None,
 ) -> None:
-    theme, shape = canvas.theme, picture.grid.shape
-    nodes = drawn_mm.reshape(-1, 3)
+    theme, shape = canvas.theme, picture.shape
+    nodes, nominal = picture.drawn_mm.reshape(-1, 3), picture.grid.nominal_mm.reshape(-1, 3)
     faces = outer_faces(shape)
     nx, ny, nz = (2 * line_spacing(count) for count in shape)
     for lines, width, alpha in (
         (face_lines(faces, shape, (nx, ny, nz)), SIZES.hair, 0.35),
         (crease_lines(faces, shape) or box_edges(shape), SIZES.line, 0.95),
     ):
-        seen = [
-            part for line in lines for part in split_visible(nodes[line], projection, volume)[0]
-        ]
+        seen, _ = split_visible((nodes[line] for line in lines), projection, volume)
         canvas.lines(seen, width=width, colour=theme.grid, alpha=alpha, zorder=2.0)
-    nominal = picture.grid.nominal_mm.reshape(-1, 3)
-    for edge in box_edges(shape):
-        seen, hidden = split_visible(nominal[edge], projection, machine)
+    parts = split_visible((nominal[edge] for edge in box_edges(shape)), projection, machine)
+    for lines, width, alpha in zip(parts, (SIZES.thin, SIZES.hair), (0.6, 0.3), strict=True):
         canvas.lines(
-            seen, width=SIZES.thin, colour=theme.ink, alpha=0.6, dashes=GHOST_DASHES, zorder=2.2
-        )
-        canvas.lines(
-            hidden, width=SIZES.hair, colour=theme.ink, alpha=0.3, dashes=GHOST_DASHES, zorder=2.2
+            lines, width=width, colour=theme.ink, alpha=alpha, dashes=GHOST_DASHES, zorder=2.2
         )
 
 
-def label_bodies(
+def _label_bodies(
     canvas: Canvas,
     placed: Sequence[PlacedBody],
     projection: Projection,
-    raster: Raster | None,
-    frame: Rect,
+    raster: Raster,
+    right: float,
 ) -> None:
     """Name bodies in a column at the right, with leaders to a spot of each that can be seen."""
-    if raster is None:
-        return
-    wanted: list[tuple[float, str, tuple[float, float]]] = []
-    for part in placed:
-        spot = _visible_spot(part, projection, raster)
-        if spot is not None:
-            wanted.append((spot[1], part.label, spot))
-    wanted.sort()
-    column = frame[2] - canvas.px(120.0)
-    step = canvas.px(30.0)
+    spots = [(_visible_spot(part, projection, raster), part.label) for part in placed]
+    wanted = sorted((spot[1], name, spot) for spot, name in spots if spot is not None)
+    column = right - canvas.px(120.0)
     y = -np.inf
     for spot_y, name, spot in wanted:
-        y = max(spot_y, y + step)
+        y = max(spot_y, y + canvas.px(30.0))
         canvas.line(
             [spot, (column - canvas.px(26.0), y), (column - canvas.px(8.0), y)],
             width=SIZES.hair, colour=canvas.theme.muted, zorder=5.0,
@@ -223,9 +216,126 @@ def _visible_spot(
     return float(best[0]), float(best[1])
 
 
-def _legend() -> list[LegendEntry]:
-    return [
-        line_entry("nominal volume", lambda theme: theme.ink, SIZES.thin, GHOST_DASHES, 0.6),
-        line_entry("deformed volume", lambda theme: theme.ink),
-        line_entry("nominal bodies", lambda theme: theme.ghost, SIZES.thin, alpha=0.6),
+# --- Traces of the rotary axes: the circles that points should and do run through -----------------
+
+PIECE = 2
+"""Samples of a trace in one piece of one colour."""
+TRACE_DASHES, FADED = (7.0, 5.0), 0.55
+
+
+def draw_traces(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
+    """Draw the nominal and the actual traces of a scene's rotary axes."""
+    scene = scenes[0]
+    groups = evaluate_traces(scene, 1.0)
+    lines = trace_lines(groups)
+    if not lines:
+        raise OptionError(
+            f"figure 'traces': {scene.name} has no traces; expected a machine with a rotary axis"
+            " and points in [points_mm] traces"
+        )
+    largest = max(line.largest_um for line in lines)
+    nominal = np.concatenate([line.nominal_mm for line in lines])
+    reach = float(np.ptp(nominal, axis=0).max())
+    # twice: traces are seen edge-on, a tenth of their reach is plenty
+    factor = choose_exaggeration(settings.exaggeration, scene.exaggeration, 2.0 * largest, reach)
+    traces = trace_lines([replace(group, exaggeration=factor) for group in groups])
+    coloured = [component_values(line.error_um, settings.component) for line in traces]
+    values = np.concatenate(coloured)
+    scale = choose_scale([values], settings.component, end=settings.range_top)
+    picture = evaluate_picture(scene, grid=2, loop="workpiece", exaggeration=factor)
+    turning = [axis.name for axis in scene.machine.axes.values() if not axis.is_linear]
+    placed = bodies_of(picture, factor, only=(*turning, "w"))  # others would hide the traces
+    title = f"Traces of the rotary axes: {scene.title}"
+    facts = [
+        fact for fact in scene_facts(picture, factor) if not fact.startswith(("working", "2 "))
     ]
+    if largest == 0.0:
+        facts.append("nothing moves these points: no error of a rotary axis")
+    legend = [
+        line_entry("nominal trace", lambda theme: theme.muted, SIZES.thin, TRACE_DASHES),
+        LegendEntry(_trace_symbol, "actual trace, exaggerated, coloured by its error"),
+    ]
+    sheet = start_sheet("traces", settings, title, facts, scenes, legend, exact=exact)
+    canvas = sheet.canvas
+    points = [nominal, *(line.actual_mm for line in traces)]
+    points += [part.vertices_mm for part in placed]
+    inset = canvas.px(70.0)
+    left, bottom, right, top = sheet.content
+    room = (left + inset, bottom + inset / 2, right - inset, top - inset / 2)
+    projection = fit_projection(settings.view, np.concatenate(points), room)
+    raster = draw_bodies(canvas, placed, projection, opacity=FADED)
+    _draw_lines(canvas, traces, coloured, scale, projection, raster)
+    _label_traces(canvas, traces, projection, sheet.content)
+    norms = np.concatenate([np.linalg.norm(trace.error_um, axis=-1) for trace in traces])
+    rows: list[Row] = [
+        ("max |E|", f"{spell(largest)} {MICROMETRE}"),
+        ("mean |E|", f"{spell(float(norms.mean()))} {MICROMETRE}"),
+        ("max at", f"{spell_vector(nominal[int(np.argmax(norms))])} mm"),
+        *((name, f"{spell_vector(point)} mm") for point, name in _points(traces).items()),
+    ]
+    marks = [("max", float(values.max())), ("mean", float(values.mean()))]
+    heading, bars = quantity_words(settings.component), (projection.px_per_mm, factor)
+    sheet.draw_panel(scale, heading, marks, rows, bars)
+    return sheet.finish(factor)
+
+
+def _draw_lines(
+    canvas: Canvas,
+    traces: Sequence[TraceLine],
+    coloured: Sequence[Array],
+    scale: ColourScale,
+    projection: Projection,
+    raster: Raster | None,
+) -> None:
+    theme = canvas.theme
+    parts = split_visible((trace.nominal_mm for trace in traces), projection, raster)
+    for lines, width, alpha in zip(parts, (SIZES.thin, SIZES.hair), (1.0, 0.5), strict=True):
+        canvas.lines(
+            lines, width=width, colour=theme.muted, alpha=alpha, dashes=TRACE_DASHES, zorder=3.0
+        )
+    seen: list[Array] = []
+    hidden: list[Array] = []
+    seen_colours: list[Array] = []
+    hidden_colours: list[Array] = []
+    for trace, values in zip(traces, coloured, strict=True):
+        for start in range(0, len(values) - 1, PIECE):
+            piece = slice(start, start + PIECE + 1)
+            colour = scale.colours(values[piece].mean()) / 255.0
+            before, behind = split_visible([trace.actual_mm[piece]], projection, raster)
+            seen += before
+            hidden += behind
+            seen_colours += [colour] * len(before)
+            hidden_colours += [colour] * len(behind)
+    canvas.lines(hidden, width=3.4, colour=np.array(hidden_colours), alpha=0.45, zorder=3.3)
+    canvas.lines(seen, width=4.6, colour=theme.ink, zorder=3.4)
+    canvas.lines(seen, width=3.4, colour=np.array(seen_colours), zorder=3.5)
+
+
+def _label_traces(
+    canvas: Canvas, traces: Sequence[TraceLine], projection: Projection, frame: Rect
+) -> None:
+    taken = Occupancy(canvas.width, canvas.height, 2.0 * canvas.factor)
+    taken.add_rects(canvas.rects)
+    spots = [projection.project(trace.actual_mm) for trace in traces]
+    taken.add_lines(spots)
+    taken.add_lines([projection.project(trace.nominal_mm) for trace in traces])
+    middle = np.concatenate(spots).mean(axis=0)
+    names = _points(traces)
+    for trace, line in zip(traces, spots, strict=True):
+        away = np.argsort(-np.hypot(*(line - middle).T))
+        name = f"{names[trace.trace.point_mm]} " if len(names) > 1 else ""
+        text = f"{name}{trace.trace.label}: {spell(trace.largest_um)} {MICROMETRE}"
+        text = text.replace("-", MINUS)
+        placed = write_label(canvas, text, line[away[:24:4]], frame, taken, size=SIZES.small)
+        if placed is not None:
+            draw_leader(canvas, placed, canvas.theme.muted)
+
+
+def _points(traces: Sequence[TraceLine]) -> dict[Vector, str]:
+    points = dict.fromkeys(trace.trace.point_mm for trace in traces)
+    return {point: f"P{number}" for number, point in enumerate(points, 1)}
+
+
+def _trace_symbol(canvas: Canvas, x: float, y: float, width: float) -> None:
+    canvas.line([(x, y), (x + width, y)], width=4.6)
+    canvas.line([(x, y), (x + width, y)], width=3.4, colour="#2f8f8e", zorder=3.1)

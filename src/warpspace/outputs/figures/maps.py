@@ -1,0 +1,367 @@
+"""Maps of one scene: the bent working volume, slices of it, how far the tool axis leans."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from warpspace.exceptions import OptionError
+from warpspace.field.evaluate import evaluate_first_order
+from warpspace.field.grid import PLANES, build_slice, slice_ranges
+from warpspace.geometry.colour import ColourScale
+from warpspace.geometry.surfaces import (
+    Index,
+    box_edges,
+    corners,
+    crease_lines,
+    isoline_levels,
+    outer_faces,
+    round_down,
+    triangulate,
+)
+from warpspace.kinematics.chain import branch_pose
+from warpspace.kinematics.model import TOOL_AXIS
+from warpspace.machine.axes import is_linear
+from warpspace.outputs.drawing.canvas import Canvas, Occupancy, write_label
+from warpspace.outputs.drawing.map3d import (
+    GHOST_DASHES,
+    draw_map,
+    draw_raster,
+    fit_map,
+    surface_bodies,
+)
+from warpspace.outputs.drawing.render import (
+    Body,
+    Projection,
+    Raster,
+    Rect,
+    fit_projection,
+    render_bodies,
+    split_visible,
+)
+from warpspace.outputs.drawing.settings import SIZES, FigureSettings, evaluate_for
+from warpspace.outputs.drawing.sheet import (
+    Drawing,
+    DrawnMap,
+    Row,
+    Sheet,
+    isoline_entries,
+    line_entry,
+    map_legend,
+    scene_facts,
+    start_sheet,
+)
+from warpspace.picture.model import Picture, ScenePicture, Slice, map_faces, view_words
+from warpspace.picture.words import list_axes, quantity_words, spell_coordinate, spell_factor
+from warpspace.scene.model import Scene
+from warpspace.units import MICRORADIAN, RAD_PER_URAD, Array, spell, spell_short
+
+EVERY = "isolines every "
+
+
+def draw_error_map(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
+    """Draw the error map of a scene."""
+    picture = evaluate_for(settings, scenes[0])
+    component = settings.component
+    what = "Volumetric error map" if component == "norm" else f"Error map, {component} component"
+    title = f"{what}: {picture.scene.title}"
+    facts = [*scene_facts(picture, picture.exaggeration), view_words(settings.view, picture.shape)]
+    words = isoline_words(picture.scale, picture.values)
+    legend = map_legend(words, diverging=picture.scale.diverging)
+    sheet = start_sheet("error-map", settings, title, facts, scenes, legend, exact=exact)
+    drawn = draw_map(sheet.canvas, picture, sheet.content, settings.view)
+    say_statistics(sheet, picture, drawn.projection.px_per_mm)
+    return sheet.finish(picture.exaggeration, [drawn])
+
+
+def say_statistics(
+    sheet: Sheet, picture: Picture, px_per_mm: float, *, above: Sequence[Row] = ()
+) -> None:
+    """Draw colours, statistics and scale bars of a picture beside it."""
+    found, values = picture.statistics, picture.values
+    rows: list[Row] = [
+        ("max |E|", f"{spell(found.max_um)} µm"),
+        ("mean |E|", f"{spell(found.mean_um)} µm"),
+        ("P95", f"{spell(found.p95_um)} µm"),
+        ("RMS", f"{spell(found.rms_um)} µm"),
+        *(_place_rows(found.max_at_axes, found.max_at_mm) if found.max_um > 0.0 else ()),
+    ]
+    marks = [("mean", found.mean_um), ("P95", found.p95_um), ("max", found.max_um)]
+    if picture.component != "norm":
+        low, high = float(values.min()), float(values.max())
+        words = f"{spell(low)} … {spell(high)} µm"
+        rows.insert(0, (f"{picture.component} component", words))
+        marks = [("min", low), ("mean", float(values.mean())), ("max", high)]
+    heading, bars = quantity_words(picture.component), (px_per_mm, picture.exaggeration)
+    sheet.draw_panel(picture.scale, heading, marks, [*above, *rows], bars)
+
+
+def isoline_words(scale: ColourScale, values: Array | None = None) -> str:
+    """Say how far apart isolines are; empty where there are none among the values."""
+    levels = isoline_levels(scale)
+    if values is not None:
+        volume = sum(count > 1 for count in values.shape) > 1
+        low, high = float(values.min()), float(values.max())
+        levels = tuple(level for level in levels if volume and low < level < high)
+    if not levels:
+        return ""
+    step = scale.ticks[1] - scale.ticks[0]
+    return f"{EVERY}{spell_short(step)} {scale.unit}"
+
+
+def _place_rows(at: Mapping[str, float], point_mm: Sequence[float]) -> list[Row]:
+    """Spell a point in both ways, one row each: axis positions, and a point of R."""
+    linear = {name: value for name, value in at.items() if is_linear(name)}
+    point = " ".join(
+        f"{name} {spell_coordinate(value)}" for name, value in zip("xyz", point_mm, strict=True)
+    )
+    axes: list[Row] = [("max, axes", list_axes(linear))] if linear else []
+    return [*axes, ("max, in R", point)]
+
+
+# --- Slices through the middle, laid out like an engineering drawing ------------------------------
+
+VIEW_OF = {"Z": "top", "Y": "front", "X": "right"}
+
+
+def draw_slices(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
+    """Draw three slices through the middle of a scene's working volume."""
+    picture = evaluate_for(settings, scenes[0])
+    exaggeration, scale = picture.exaggeration, picture.scale
+    slices = _evaluate_slices(picture, settings.grid)
+    title = f"Slices through the working volume: {picture.scene.title}"
+    words = isoline_words(scale, picture.values)
+    legend = map_legend(words, surface="deformed slice", diverging=scale.diverging)
+    facts = scene_facts(picture, exaggeration)
+    sheet = start_sheet("slices", settings, title, facts, scenes, legend, exact=exact)
+    canvas = sheet.canvas
+    cells = _cells(canvas, sheet.content, slices)
+    fitted = [fit_map(canvas, [part], cells[part.axis], VIEW_OF[part.axis]) for part in slices]
+    px_per_mm = min(one.px_per_mm for one in fitted)
+    maps: list[DrawnMap] = []
+    for part, own in zip(slices, fitted, strict=True):
+        cell, view = cells[part.axis], VIEW_OF[part.axis]
+        middle = np.array([cell[0] + cell[2], cell[1] + cell[3]]) / 2.0
+        nominal = part.grid.nominal_mm.reshape(-1, 3)
+        centre = (nominal.min(axis=0) + nominal.max(axis=0)) / 2.0
+        projection = replace(own, px_per_mm=px_per_mm, centre_mm=centre, centre_px=middle)
+        maps.append(draw_map(canvas, part, cell, view, projection=projection))
+        name = f"{PLANES[part.axis]} plane at axis {part.axis} = {spell_short(part.position_mm)} mm"
+        high = cell[3] - canvas.px(12.0)
+        canvas.text(middle[0], high, name, weight="bold", ha="center", va="top")
+    _draw_key(canvas, picture, slices, cells["key"])
+    say_statistics(sheet, picture, px_per_mm, above=[("whole volume", "")])
+    return sheet.finish(exaggeration, maps)
+
+
+def _evaluate_slices(picture: ScenePicture, nodes: int) -> list[Slice]:
+    scene = picture.scene
+    ranges = slice_ranges(scene.model, scene.workspace)
+    if not ranges:
+        raise OptionError(
+            f"figure 'slices': the working volume of {scene.name} does not extend along X, Y and Z;"
+            " draw the error-map"
+        )
+    found: list[Slice] = []
+    for axis in ("Z", "Y", "X"):
+        low, high = ranges[axis]
+        at = (low + high) / 2.0
+        grid = build_slice(scene.model, scene.workspace, axis, at, nodes)
+        found.append(
+            Slice(
+                view=picture.view,
+                grid=grid,
+                field=evaluate_first_order(
+                    scene.model, scene.errors, grid.coordinates, picture.view, grid.point_mm
+                ),
+                exaggeration=picture.exaggeration,
+                component=picture.component,
+                colours=picture.scale,
+                axis=axis,
+                position_mm=at,
+            )
+        )
+    return found
+
+
+def _cells(canvas: Canvas, rect: Rect, slices: Sequence[Slice]) -> dict[str, Rect]:
+    spans = {part.axis: np.ptp(part.grid.nominal_mm.reshape(-1, 3), axis=0) for part in slices}
+    x, y, z = float(spans["Z"][0]), float(spans["Z"][1]), float(spans["Y"][2])
+    left, bottom, right, top = rect
+    # axes and labels take the same room in every cell, the rest follows the lengths
+    fixed = min(canvas.px(230.0), 0.3 * (right - left), 0.3 * (top - bottom))
+    column = left + fixed + (right - left - 2.0 * fixed) * x / (x + y)
+    row = bottom + fixed + (top - bottom - 2.0 * fixed) * z / (z + y)
+    return {
+        "Z": (left, row, column, top),
+        "Y": (left, bottom, column, row),
+        "X": (column, bottom, right, row),
+        "key": (column, row, right, top),
+    }
+
+
+def _draw_key(canvas: Canvas, picture: ScenePicture, slices: Sequence[Slice], rect: Rect) -> None:
+    inset = canvas.px(46.0)
+    room = (rect[0] + inset, rect[1] + inset, rect[2] - inset, rect[3] - inset)
+    nodes = picture.grid.nominal_mm.reshape(-1, 3)
+    projection = fit_projection("iso", nodes, room)
+    bodies: list[Body] = []
+    creases: list[Array] = []
+    for part in slices:
+        faces = outer_faces(part.shape)
+        bodies += surface_bodies(replace(part, exaggeration=0.0), faces)
+        points = part.grid.nominal_mm.reshape(-1, 3)
+        creases += [points[line] for line in crease_lines(faces, part.shape)]
+    raster = render_bodies(bodies, projection)
+    if raster is not None:
+        draw_raster(canvas, raster)
+    theme = canvas.theme
+    seen, _ = split_visible(creases, projection, raster)
+    canvas.lines(seen, width=SIZES.thin, colour=theme.grid, zorder=2.0)
+    edges = (nodes[edge] for edge in box_edges(picture.grid.shape))
+    seen, hidden = split_visible(edges, projection, raster)
+    canvas.lines(seen, width=SIZES.thin, colour=theme.ghost, dashes=GHOST_DASHES)
+    canvas.lines(hidden, width=SIZES.hair, colour=theme.ghost, alpha=0.5, dashes=GHOST_DASHES)
+    canvas.text(
+        (rect[0] + rect[2]) / 2.0, rect[3] - canvas.px(12.0), "where they lie (not exaggerated)",
+        weight="bold", ha="center", va="top",
+    )  # fmt: skip
+
+
+# --- Orientation error of the tool axis -----------------------------------------------------------
+
+LEAN_RAD = 0.45
+"""Largest lean on screen that the factor aims at."""
+NEEDLE_SHARE = 0.13
+"""Length of a needle, as a share of the longest edge."""
+NEEDLES = 5
+"""Needles along each edge, about."""
+NEEDLE_DASHES = (6.0, 4.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Needles:
+    """Tool axes to draw at the nodes."""
+
+    axis: Array  # [N, 3]; nominal tool axis, unit vectors
+    lean: Array  # [N, 3]; exaggerated lean of its end, per length of the needle
+    length_mm: float
+    tilt_urad: Array  # [N]
+    feet: Index  # [n]; nodes where they stand
+
+    def ends_mm(self, nodes_mm: Array, at: Index) -> tuple[Array, Array]:
+        """Give nominal and drawn ends of needles, [n, 2, 3] each, mm."""
+        foot = nodes_mm[at]
+        nominal = np.stack([foot, foot + self.length_mm * self.axis[at]], 1)
+        drawn = np.stack([foot, foot + self.length_mm * (self.axis[at] + self.lean[at])], 1)
+        return nominal, drawn
+
+
+def draw_orientation(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
+    """Draw the orientation-error map of a scene."""
+    picture = evaluate_for(settings, scenes[0], quantity="orientation")
+    values, scale, view = picture.values, picture.scale, settings.view
+    tilt = np.linalg.norm(picture.field.orientation_urad, axis=-1)
+    given, nodes = settings.exaggeration, picture.grid.nominal_mm.reshape(-1, 3)
+    factor = _lean_factor(float(tilt.max())) if given is None or given == "auto" else given
+    title = f"Orientation error of the tool axis: {picture.scene.title}"
+    facts = [
+        *scene_facts(picture, None),
+        f"lean of the tool axis drawn {spell_factor(factor)}",
+        "volume undeformed",
+        "orthographic",
+        view_words(view, picture.grid.shape),
+    ]
+    legend = [
+        line_entry("nominal tool axis", lambda theme: theme.ghost, SIZES.thin, NEEDLE_DASHES),
+        line_entry("actual tool axis, lean exaggerated", lambda theme: theme.accent, SIZES.bold),
+        *isoline_entries(isoline_words(scale, values)),
+    ]
+    sheet = start_sheet("orientation-map", settings, title, facts, scenes, legend, exact=exact)
+    needles = _needles(picture, factor, view)
+    content = replace(picture, exaggeration=0.0)  # the volume itself is drawn undeformed
+    ends = np.concatenate(needles.ends_mm(nodes, needles.feet)).reshape(-1, 3)
+    projection = fit_map(sheet.canvas, [content], sheet.content, view, beside_mm=ends)
+    drawn = draw_map(
+        sheet.canvas, content, sheet.content, view, projection=projection,
+        annotate=partial(_draw_needles, needles), ghost=False,
+    )  # fmt: skip
+    heading = "tilt" if settings.component == "norm" else f"rotation about {settings.component}"
+    worst = int(np.argmax(tilt))
+    at = {
+        name: float(np.broadcast_to(positions, picture.grid.shape).reshape(-1)[worst])
+        for name, positions in picture.grid.coordinates.items()
+    }
+    shown = math.radians(1.0) / RAD_PER_URAD / factor
+    rows = [
+        ("max tilt", f"{spell(float(tilt.max()))} {MICRORADIAN}"),
+        ("mean tilt", f"{spell(float(tilt.mean()))} {MICRORADIAN}"),
+        ("P95", f"{spell(float(np.percentile(tilt, 95.0)))} {MICRORADIAN}"),
+        *_place_rows(at, nodes[worst].tolist()),
+        ("1° of lean shown", f"{spell(shown)} {MICRORADIAN}"),
+    ]
+    marks = [("mean", float(values.mean())), ("max", float(values.max()))]
+    if settings.component != "norm":
+        marks.insert(0, ("min", float(values.min())))
+    bars = (projection.px_per_mm, None)
+    sheet.draw_panel(scale, f"{heading}  [{MICRORADIAN}]", marks, rows, bars)
+    return sheet.finish(factor, [drawn])
+
+
+def _lean_factor(largest_urad: float) -> float:
+    """Choose a round factor that makes the largest lean easy to see; 1000 where there is none."""
+    if not largest_urad > 0.0:
+        return 1000.0
+    return round_down(max(LEAN_RAD / (largest_urad * RAD_PER_URAD), 1.0))
+
+
+def _needles(picture: ScenePicture, factor: float, view: str) -> Needles:
+    pose = branch_pose(picture.scene.model, "tool", picture.grid.coordinates)
+    axis = pose[..., :3, :3] @ np.array(TOOL_AXIS)
+    axis = np.broadcast_to(axis, picture.grid.nominal_mm.shape).reshape(-1, 3)
+    turn = picture.field.orientation_urad.reshape(-1, 3)
+    lean = factor * RAD_PER_URAD * np.cross(turn, axis)
+    tilt, length = np.linalg.norm(turn, axis=-1), NEEDLE_SHARE * picture.size_mm
+    return Needles(axis, lean, length, tilt, _feet(picture, view))
+
+
+def _draw_needles(
+    needles: Needles,
+    canvas: Canvas,
+    content: Picture,
+    projection: Projection,
+    raster: Raster | None,
+    taken: Occupancy,
+    frame: Rect | None,
+) -> None:
+    nodes, theme = content.grid.nominal_mm.reshape(-1, 3), canvas.theme
+    nominal, drawn = needles.ends_mm(nodes, needles.feet)
+    for ends, colour, width, dashes in (
+        (nominal, theme.ghost, SIZES.thin, NEEDLE_DASHES),
+        (drawn, theme.accent, SIZES.bold, None),
+    ):
+        lines, _ = split_visible(ends, projection, raster)
+        canvas.lines(lines, width=width, colour=colour, dashes=dashes, zorder=4.0)
+        taken.add_lines(lines)
+    if frame is None:
+        return
+    found = corners(content.shape)
+    for corner, ends in zip(found, needles.ends_mm(nodes, found)[1], strict=True):
+        if split_visible([ends], projection, raster)[0]:
+            text = f"{spell(float(needles.tilt_urad[corner]))} {MICRORADIAN}"
+            tip = [projection.project(ends[1])]
+            write_label(canvas, text, tip, frame, taken, weight="bold", colour=theme.accent)
+
+
+def _feet(content: Picture, view: str) -> Index:
+    shape = content.shape
+    surface = triangulate(map_faces(shape, cut=view == "iso")).nodes
+    surface = surface if len(surface) else np.arange(np.prod(shape))
+    at = np.stack(np.unravel_index(surface, shape), -1)
+    step = [max(1, (count - 1) // (NEEDLES - 1)) for count in shape]
+    chosen = np.ones(len(surface), dtype=bool)
+    for axis in range(3):
+        chosen &= (at[:, axis] % step[axis] == 0) | (at[:, axis] == shape[axis] - 1)
+    return surface[chosen]

@@ -1,0 +1,340 @@
+"""Volumes side by side: two scenes and their change, a repair, machines within tolerances."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from warpspace.analysis.concepts import LETTERS, Concept, compare_concepts
+from warpspace.analysis.repair import Repair, RepairResult
+from warpspace.bodies.placed import PlacedBody
+from warpspace.kinematics.model import Loop
+from warpspace.machine.axes import parameter
+from warpspace.machine.limits import REPAIR_NODES
+from warpspace.outputs.charts.blocks import draw_beside, legend_handles, on_ground, style
+from warpspace.outputs.drawing.canvas import POINTS_PER_PX, Canvas
+from warpspace.outputs.drawing.map3d import draw_map, draw_maps_alike
+from warpspace.outputs.drawing.render import Rect, fit_projection
+from warpspace.outputs.drawing.settings import (
+    FONT,
+    SIZES,
+    FigureSettings,
+    evaluate_for,
+    shared_colours,
+)
+from warpspace.outputs.drawing.sheet import (
+    Drawing,
+    DrawnMap,
+    draw_colour_bar,
+    draw_scale_bars,
+    isoline_entries,
+    line_entry,
+    map_legend,
+    metadata,
+    scene_facts,
+    start_sheet,
+)
+from warpspace.outputs.figures.machine import bodies_of, draw_bodies
+from warpspace.outputs.figures.maps import EVERY, isoline_words
+from warpspace.picture.comparison import (
+    CHANGE,
+    DIFFERENCE_LENGTH,
+    STATISTICS,
+    scene_change,
+    share_exaggeration,
+    statistics_change,
+)
+from warpspace.picture.model import ConceptPicture, ScenePicture, picture_concept, view_words
+from warpspace.picture.words import LOOP_WORDS, quantity_words, tolerance_words
+from warpspace.scene.model import Scene
+from warpspace.units import Array, spell, spell_count, spell_short, spell_signed
+
+
+def _evaluate_pair(settings: FigureSettings, scenes: Sequence[Scene]) -> list[ScenePicture]:
+    """Evaluate two scenes with one exaggeration and one scale of colours."""
+    pictures = share_exaggeration(
+        [evaluate_for(settings, scene) for scene in scenes],
+        settings.exaggeration,
+        scenes[0].exaggeration,
+    )
+    scale = shared_colours(settings, pictures)
+    return [replace(picture, colours=scale) for picture in pictures]
+
+
+# --- Two scenes and their change: one projection; the change in its own colours -------------------
+
+
+def draw_comparison(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
+    """Draw two scenes and their difference side by side."""
+    first, second = _evaluate_pair(settings, scenes)
+    scale, exaggeration, component = first.scale, first.exaggeration, settings.component
+    change = scene_change(first, second)
+    if settings.range_fixed:
+        change = replace(change, colours=replace(change.scale, low=scale.low, high=scale.high))
+    title = f"Comparison: A {scenes[0].title}, B {scenes[1].title}"
+    facts = [*scene_facts(first, exaggeration), view_words(settings.view, first.grid.shape)]
+    words = [isoline_words(one.scale, one.values) for one in (first, change)]
+    if all(words) and words[0] != words[1]:
+        words = [f"{words[0]}, of {CHANGE} {words[1].removeprefix(EVERY)}"]
+    legend = map_legend(next(filter(None, words), ""), diverging=scale.diverging)
+    sheet = start_sheet(
+        "comparison", settings, title, facts, scenes, legend, exact=exact, panel=False
+    )
+    canvas = sheet.canvas
+    left, bottom, right, top = sheet.content
+    middle = ((left + right) / 2.0, (bottom + top) / 2.0)
+    cells = [
+        (left, middle[1], middle[0], top),
+        (middle[0], middle[1], right, top),
+        (left, bottom, middle[0], middle[1]),
+    ]
+    changed = DIFFERENCE_LENGTH if component == "norm" else f"change of the {component} component"
+    names = [f"A  {scenes[0].title}", f"B  {scenes[1].title}", f"{CHANGE}:  {changed}"]
+    maps = draw_maps_alike(canvas, [first, second, change], names, cells, settings.view)
+    corner = (middle[0] + canvas.px(24.0), bottom, right, middle[1] - canvas.px(6.0))
+    _draw_corner(canvas, corner, maps)
+    return sheet.finish(exaggeration, maps)
+
+
+def _draw_corner(canvas: Canvas, rect: Rect, maps: Sequence[DrawnMap]) -> None:
+    left, bottom, right, top = rect
+    bar, step = canvas.px(28.0), canvas.px(112.0)
+    for name, drawn in (("A and B", maps[0]), (CHANGE, maps[2])):
+        room, scale = 0.9 * step, drawn.picture.scale
+        canvas.text(left, top, name, size=SIZES.heading, weight="bold", va="top", room=room)
+        what, high = f"{scale.label}  [{scale.unit}]", top - canvas.px(26.0)
+        canvas.text(left, high, what, size=SIZES.small, va="top", room=room)
+        box = (left, bottom + canvas.px(20.0), left + bar, top - canvas.px(62.0))
+        draw_colour_bar(canvas, box, scale)
+        left += step
+    start = left + canvas.px(6.0)
+    columns = [start + (right - start) * share for share in (0.29, 0.45, 0.63, 0.99)]
+    y = top - canvas.px(62.0)
+    canvas.text(start, y, "µm", colour=canvas.theme.muted)
+    for x, name in zip(columns, ("A", "B", CHANGE, DIFFERENCE_LENGTH), strict=True):
+        canvas.text(x, y, name, weight="bold", ha="right")
+    found = [drawn.picture.statistics for drawn in maps]
+    change = statistics_change(found[0], found[1])
+    for name, key in STATISTICS.items():
+        y -= canvas.px(28.0)
+        canvas.text(start, y, name, colour=canvas.theme.muted)
+        a, b, difference = (getattr(part, key) for part in found)
+        texts = (spell(a), spell(b), spell_signed(change[key]), spell(difference))
+        for x, text in zip(columns, texts, strict=True):
+            canvas.text(x, y, text, ha="right")
+    box, drawn = (start, bottom + canvas.px(10.0), right, y), maps[0]
+    draw_scale_bars(canvas, box, drawn.projection.px_per_mm, drawn.picture.exaggeration)
+
+
+# --- A repair: before and after the best set of adjustments, bars of every effect -----------------
+
+MAPS_SHARE = 0.5
+"""Of the height of the content."""
+TEXT_PX = 12.0
+
+
+def draw_repair(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
+    """Draw the volume before and after the best repair, with what each error does to it."""
+    scene = scenes[0]
+    found = Repair(loop=Loop(settings.loop), grid=min(settings.grid, REPAIR_NODES[1])).run(scene)
+    after = found.changes()[-1].scene if found.repairs else scene
+    pictures = _evaluate_pair(settings, (scene, after))
+    before, scale = pictures[0], pictures[0].scale
+    title = f"Repair: {scene.title}"
+    facts = [*scene_facts(before, before.exaggeration), _adjusted(found)]
+    legend = map_legend(isoline_words(scale, before.values), diverging=scale.diverging)
+    sheet = start_sheet("repair", settings, title, facts, [scene], legend, exact=exact, panel=False)
+    canvas = sheet.canvas
+    left, bottom, right, top = sheet.content
+    split = bottom + (1.0 - MAPS_SHARE) * (top - bottom)
+    maps = _draw_repaired(canvas, (left, split, right, top), pictures, settings)
+    with on_ground(settings.theme), style():
+        size, legend = canvas.px(TEXT_PX) * POINTS_PER_PX, canvas.px(30.0)
+        width, height = canvas.width, canvas.height
+        box = (left / width, bottom / height, (right - left) / width)
+        bars = found.bars()
+        draw_beside(canvas.figure, bars, (*box, (split - legend - bottom) / height), size)
+        canvas.figure.legend(
+            handles=legend_handles(bars), loc="upper left", ncols=4, frameon=False,
+            bbox_to_anchor=(left / width, split / height), prop={"family": [FONT], "size": size},
+        )  # fmt: skip
+    return sheet.finish(before.exaggeration, maps)
+
+
+def _adjusted(found: RepairResult) -> str:
+    if not found.repairs:
+        return "nothing to adjust"
+    parts = ", ".join(
+        f"{key} {found.present[key]:.3g} → {value:.3g} {parameter(key).unit}"
+        for key, value in found.repairs[-1].adjust.items()
+    )
+    return f"adjusted for the smallest {found.objective.upper()}: {parts}"
+
+
+def _draw_repaired(
+    canvas: Canvas, rect: Rect, pictures: Sequence[ScenePicture], settings: FigureSettings
+) -> tuple[DrawnMap, ...]:
+    left, bottom, right, top = rect
+    bar = canvas.px(200.0)
+    half = (right - left - bar) / 2.0
+    cells = [(left + half * i, bottom, left + half * (i + 1), top) for i in range(2)]
+    found = [picture.statistics for picture in pictures]
+    names = [
+        f"{name}: mean {spell(one.mean_um)} · RMS {spell(one.rms_um)} · max {spell(one.max_um)} µm"
+        for name, one in zip(("Before", "After"), found, strict=True)
+    ]
+    maps = draw_maps_alike(canvas, pictures, names, cells, settings.view)
+    start, words = right - bar + canvas.px(50.0), quantity_words(settings.component)
+    canvas.text(start, top - canvas.px(4.0), words, va="top", room=bar - canvas.px(50.0))
+    box = (start, bottom + canvas.px(40.0), start + canvas.px(30.0), top - canvas.px(60.0))
+    draw_colour_bar(canvas, box, maps[0].picture.scale)
+    return maps
+
+
+# --- Machines within the same tolerances: one scale of length, one of colours ---------------------
+
+BODY_ALPHA = 0.55
+CELL_HEAD, CELL_FOOT, AXIS_LABELS = 30.0, 74.0, 50.0
+"""Room in px above a picture for its title, below it for its numbers, and for labels of axes."""
+STRIP_MARGIN = 0.05
+"""Room around a picture that stands alone, by the shorter side of its cell."""
+
+
+def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
+    """Draw machines within the same tolerances side by side."""
+    if settings.strip:
+        return _draw_strip(scenes, settings, exact=exact)
+    plan = replace(settings.concepts, loop=Loop(settings.loop))
+    concepts = compare_concepts(scenes, plan)
+    pictures = _evaluate_concepts(concepts, settings)
+    scale, first = pictures[0].scale, concepts[0]
+    title = f"Concepts within {'their own' if plan.own_tolerances else 'the same'} tolerances"
+    facts = [
+        *([] if plan.own_tolerances else [tolerance_words(first.scene.tolerances)]),
+        f"{spell_count(plan.samples)} sampled machines each, {plan.drawn}",
+        "largest |E| of each" if plan.over == "max" else "|E| at a random point of each",
+        LOOP_WORDS[first.sampled.view.loop],
+        view_words(settings.view, (2, 2, 2)),
+    ]
+    legend = [
+        line_entry("working volume, RMS of |E|", lambda theme: theme.ink),
+        *isoline_entries(isoline_words(scale)),
+    ]
+    drawn = [concept.scene for concept in concepts]
+    sheet = start_sheet(
+        "concepts", settings, title, facts, drawn, legend, exact=exact, errors=False
+    )
+    canvas = sheet.canvas
+    cells = _cells(sheet.content, len(concepts))
+    rooms = [_room(canvas, cell) for cell in cells]
+    maps, px_per_mm = _draw_machines(canvas, pictures, rooms, settings)
+    for letter, cell, concept in zip(LETTERS, cells, concepts, strict=False):
+        _draw_words(canvas, cell, letter, concept)
+    rows = [
+        (f"mean {letter}", f"{spell(one.sampled.mean_um)} µm")
+        for letter, one in zip(LETTERS, concepts, strict=False)
+    ]
+    sheet.draw_panel(scale, "RMS |E|  [µm]", [], rows, (px_per_mm, None))
+    return sheet.finish(1.0, maps)
+
+
+def _draw_strip(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
+    plan = replace(settings.concepts, samples=1, loop=Loop(settings.loop))
+    pictures = _evaluate_concepts(compare_concepts(scenes, plan), settings)
+    canvas = Canvas(*settings.size, settings.theme, exact=exact)
+    width, height = float(canvas.width), canvas.height / len(pictures)
+    margin = STRIP_MARGIN * min(width, height)
+    rooms = [
+        (margin, top - height + margin, width - margin, top - margin)
+        for top in (canvas.height - height * index for index in range(len(pictures)))
+    ]
+    maps, _ = _draw_machines(canvas, pictures, rooms, settings)
+    title = "Concepts"
+    about = metadata(title, scenes, settings, 1.0, "concepts")
+    return Drawing(canvas.figure, title, about, maps, tuple(canvas.rects))
+
+
+def _evaluate_concepts(
+    concepts: Sequence[Concept], settings: FigureSettings
+) -> list[ConceptPicture]:
+    pictures = [picture_concept(concept, settings.grid) for concept in concepts]
+    scale = shared_colours(replace(settings, component="norm"), pictures)
+    return [replace(picture, colours=scale) for picture in pictures]
+
+
+def _draw_machines(
+    canvas: Canvas,
+    pictures: Sequence[ConceptPicture],
+    rooms: Sequence[Rect],
+    settings: FigureSettings,
+) -> tuple[tuple[DrawnMap, ...], float]:
+    """Draw machines into their rooms in one scale; give the maps and the px of a mm."""
+    view = settings.view
+    bodies = [bodies_of(picture, 1.0) for picture in pictures]
+    seen = [_points_mm(picture, own) for picture, own in zip(pictures, bodies, strict=True)]
+    px_per_mm = min(
+        fit_projection(view, points, room).px_per_mm
+        for points, room in zip(seen, rooms, strict=True)
+    )
+    maps: list[DrawnMap] = []
+    for picture, own, points, room in zip(pictures, bodies, seen, rooms, strict=True):
+        projection = fit_projection(view, points, room, px_per_mm)
+        draw_bodies(canvas, own, projection, opacity=BODY_ALPHA, nominal=False, zorder=0.8)
+        maps.append(
+            draw_map(
+                canvas, picture, room, view, labels=False, projection=projection, annotate=None,
+                ghost=False, axes=not settings.strip,
+            )
+        )  # fmt: skip
+    return tuple(maps), px_per_mm
+
+
+def _cells(rect: Rect, count: int) -> list[Rect]:
+    left, bottom, right, top = rect
+    columns = min(count, max(1, round(math.sqrt(count * (right - left) / (top - bottom)))))
+    rows = math.ceil(count / columns)
+    width, height = (right - left) / columns, (top - bottom) / rows
+    return [
+        (left + c * width, top - (r + 1) * height, left + (c + 1) * width, top - r * height)
+        for r, c in (divmod(index, columns) for index in range(count))
+    ]
+
+
+def _room(canvas: Canvas, cell: Rect) -> Rect:
+    left, bottom, right, top = cell
+    side = min(canvas.px(AXIS_LABELS), 0.15 * (right - left))
+    foot = min(canvas.px(CELL_FOOT + AXIS_LABELS), 0.45 * (top - bottom))
+    head = min(canvas.px(CELL_HEAD), 0.15 * (top - bottom))
+    return (left + side, bottom + foot, right - side, top - head)
+
+
+def _points_mm(picture: ConceptPicture, placed: Sequence[PlacedBody]) -> Array:
+    parts = [picture.grid.nominal_mm.reshape(-1, 3), *(part.vertices_mm for part in placed)]
+    if not picture.grid.longest_edge_mm > 0.0:
+        parts.append(picture.grid.bounds_mm + 0.5 * picture.size_mm * np.array([[-1.0], [1.0]]))
+    return np.concatenate(parts)
+
+
+def _draw_words(canvas: Canvas, cell: Rect, letter: str, concept: Concept) -> None:
+    left, bottom, right, top = cell
+    room = right - left - canvas.px(16.0)
+    x, scene, found = left + canvas.px(8.0), concept.scene, concept.sampled
+    head, high = f"{letter}  {scene.title}", top - canvas.px(4.0)
+    canvas.text(x, high, head, size=SIZES.heading, weight="bold", va="top", room=room)
+    numbers = [
+        f"mean {spell(found.mean_um)} µm",
+        f"P95 {spell(found.p95_um)} µm",
+        f"max {spell(found.max_um)} µm",
+    ]
+    if found.probability is not None:
+        kept = 100.0 * found.probability.probability
+        numbers.append(f"{kept:.1f} % within {spell_short(found.probability.spec_um)} µm")
+    shares = (
+        f"{row.key} {100.0 * row.share:.0f} % ({parameter(row.key).name})"
+        for row in concept.leading
+    )
+    lines = (" · ".join(shares), " · ".join(numbers), f"chain {scene.machine.chain}")
+    for index, line in enumerate(lines):
+        y = bottom + canvas.px(10.0 + 21.0 * index)
+        canvas.text(x, y, line, size=SIZES.small, colour=canvas.theme.muted, room=room)
