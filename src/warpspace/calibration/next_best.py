@@ -208,7 +208,6 @@ def separating(
     scene: Scene,
     sets: Sequence[Readings],
     found: Calibration,
-    choice: Sequence[Candidate] | None = None,
     watch: Watch = unwatched,
 ) -> dict[tuple[str, ...], str]:
     """Name for each group of parameters that look alike a measurement that tells them apart."""
@@ -216,7 +215,7 @@ def separating(
     terms = build_terms(scene, keys)
     missing = set(found.rank.confounded)
     told: dict[tuple[str, ...], str] = {}
-    for one in choice or candidates(scene):
+    for one in candidates(scene):
         if not missing:
             break
         stack = Stack.of(scene, [*sets, one.readings], watch)
