@@ -220,7 +220,7 @@ from warpspace.scene.library import load_scene
 serve = viewer.run_viewer
 def run(scene, scenes, *, services, **options):
     def draw():
-        from warpspace.outputs.worker import FigureWorker
+        from warpspace.outputs.processes import FigureWorker
         try:
             with FigureWorker() as worker:
                 while True:

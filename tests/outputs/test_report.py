@@ -208,7 +208,7 @@ def test_without_a_renderer_nothing_is_written(tmp_path, monkeypatch):
     def crash(*_):
         raise NoRendererError("VTK cannot draw off screen here. Install libegl1 libgl1-mesa-dri.")
 
-    monkeypatch.setattr("warpspace.outputs.worker.FigureWorker.begin", crash)
+    monkeypatch.setattr("warpspace.outputs.processes.FigureWorker.begin", crash)
     with pytest.raises(RenderError, match="libegl1"):
         write_report([load_scene("dvf5000_first")], tmp_path / "a.html", FAST)
     assert list(tmp_path.iterdir()) == []
@@ -227,7 +227,7 @@ def test_a_figure_is_tried_twice_then_its_place_says_that_it_is_missing(
         return b"<svg xmlns='http://www.w3.org/2000/svg'/>"
 
     monkeypatch.setattr(
-        "warpspace.outputs.worker.FigureWorker.begin", lambda _, name, *__: partial(draw, name)
+        "warpspace.outputs.processes.FigureWorker.begin", lambda _, name, *__: partial(draw, name)
     )
     line = "report dvf5000_first --samples 500 --grid 3 -o a.html"
     status, _, said = run_refused(line, tmp_path)

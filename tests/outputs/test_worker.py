@@ -12,7 +12,7 @@ import pytest
 from warpspace import load_scene
 from warpspace.exceptions import OptionError, RenderError
 from warpspace.outputs.drawing.settings import FigureSettings
-from warpspace.outputs.worker import FigureWorker
+from warpspace.outputs.processes import FigureWorker
 from warpspace.scene.library import parse_scene
 
 pytestmark = [pytest.mark.render, pytest.mark.usefixtures("renderer")]

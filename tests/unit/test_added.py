@@ -56,8 +56,8 @@ from warpspace.outputs.figures.catalogue import (
     register_figure,
     unregister_figure,
 )
+from warpspace.outputs.processes import FigureWorker
 from warpspace.outputs.report import ReportSettings, build_report, sections
-from warpspace.outputs.worker import FigureWorker
 from warpspace.picture.model import evaluate_picture
 from warpspace.scene.library import load_scene, parse_scene
 from warpspace.scene.model import evaluate

@@ -310,8 +310,8 @@ def draw_figure_file(
     silent: bool = False,
 ) -> None:
     """Draw a figure and write it; the ending chooses the format."""
+    from warpspace.outputs.processes import LEAST_MB
     from warpspace.outputs.save import write_figure
-    from warpspace.outputs.worker import LEAST_MB
     from warpspace.resources import check_address_space
 
     check_address_space(LEAST_MB, "drawing")

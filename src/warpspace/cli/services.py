@@ -124,7 +124,7 @@ def _render(
 ) -> bytes:
     from concurrent.futures import ThreadPoolExecutor
 
-    from warpspace.outputs.worker import FigureWorker
+    from warpspace.outputs.processes import FigureWorker
 
     with _turn(cancelled), FigureWorker() as worker, ThreadPoolExecutor(1) as caller:
         drawn = caller.submit(worker.render, name, scenes, settings, "png")

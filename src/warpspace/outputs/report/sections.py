@@ -20,6 +20,7 @@ from warpspace.machine.limits import MOST_CONCEPTS
 from warpspace.outputs.drawing.settings import FigureSettings
 from warpspace.outputs.figures.catalogue import figure_kinds
 from warpspace.outputs.files import check_target, write_atomically
+from warpspace.outputs.processes import FigureWorker
 from warpspace.outputs.report.render import (
     Block,
     Code,
@@ -41,7 +42,6 @@ from warpspace.outputs.report.review import (
     share_pictures,
     signed,
 )
-from warpspace.outputs.worker import FigureWorker
 from warpspace.picture.comparison import statistics_blocks
 from warpspace.picture.model import ScenePicture
 from warpspace.picture.traces import trace_lines
