@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from warpspace.bench.base import bench_names, find_test
-from warpspace.bench.readings import respond, simulate
+from warpspace.bench.plan import respond, simulate
 from warpspace.machine.axes import parameter
 from warpspace.machine.errors import ErrorSet
 from warpspace.scene.library import load_scene

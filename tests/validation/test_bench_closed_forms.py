@@ -10,11 +10,9 @@ from warpspace.bench.kinds.circular import Circular
 from warpspace.bench.kinds.cone_frustum import ConeFrustum
 from warpspace.bench.kinds.diagonals import Diagonals
 from warpspace.bench.kinds.positioning import Positioning
-from warpspace.bench.kinds.rotary_axis import RotaryAxis
-from warpspace.bench.kinds.sphere import Sphere
-from warpspace.bench.kinds.squareness import Squareness
-from warpspace.bench.kinds.straightness import Straightness
-from warpspace.bench.readings import simulate
+from warpspace.bench.kinds.rotary_axis import RotaryAxis, Sphere
+from warpspace.bench.kinds.straightness import Squareness, Straightness
+from warpspace.bench.plan import simulate
 from warpspace.machine.curves.simple import Directional
 from warpspace.machine.errors import Constant, Harmonics, Poly, Table
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from warpspace.bench.base import find_test
-from warpspace.bench.readings import simulate
+from warpspace.bench.plan import simulate
 from warpspace.calibration import Calibrate, calibrate, read_readings
 from warpspace.calibration.kinds import VIEW
 from warpspace.calibration.next_best import Candidate, candidates, map_weights, next_best

@@ -11,19 +11,19 @@ import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table
 from warpspace.analysis.description import Analysis, Result, Watch
+from warpspace.analysis.distribution import round_width
 from warpspace.analysis.options import Option, option, options_of
 from warpspace.analysis.typed import File, Place
 from warpspace.bench.data import DataColumn, read_table, unit_notes
 from warpspace.bench.data import Table as DataTable
-from warpspace.bench.plan import Outcome, Plan
-from warpspace.bench.readings import simulate
+from warpspace.bench.plan import Outcome, Plan, fit_setup, simulate
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.kinematics.model import Model, complete_coordinates
 from warpspace.plugins import load_plugins
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
-LEAST = 5e-4
+PRINTED = 5e-4
 """Numbers below it are printed as zero."""
 SHARED = 3
 """Options that every test has, the first fields of the base class."""
@@ -203,10 +203,7 @@ class BenchResult(Result):
         if self.measured is None:
             return None
         difference = self.measured.readings - self.model.readings
-        if self.model.plan.setup:
-            design = np.stack(list(self.model.plan.setup.values()), -1)
-            difference = difference - design @ np.linalg.lstsq(design, difference, rcond=None)[0]
-        return float(np.sqrt(np.mean(difference**2)))
+        return float(np.sqrt(np.mean(fit_setup(self.model.plan, difference)[1] ** 2)))
 
     @property
     def charts(self) -> tuple[Lines, ...]:
@@ -241,7 +238,7 @@ class BenchResult(Result):
         for index, run in enumerate(self.runs):
             for one in run.outcome.quantities:
                 row = rows.setdefault(one.key, [one.name, *[None] * len(self.runs), one.unit])
-                row[1 + index] = 0.0 if abs(one.value) < LEAST else one.value
+                row[1 + index] = 0.0 if abs(one.value) < PRINTED else one.value
         numbers = (Column(run.who, ".3f") for run in self.runs)
         columns = (Column("", leads=True, wraps=True), *numbers, Column("unit"))
         yield Table(columns, list(rows.values()))
@@ -276,7 +273,7 @@ def run_test(
     Examples
     --------
     >>> import warpspace
-    >>> from warpspace.bench.kinds.sphere import Sphere
+    >>> from warpspace.bench.kinds.rotary_axis import Sphere
     >>> scene = warpspace.load_scene("dvf5000_first")
     >>> result = warpspace.run_test(scene, Sphere(axis="C", ball=(100.0, 0.0, 60.0)))
     >>> round(result.model.outcome["z_um"], 1)
@@ -298,6 +295,44 @@ def run_test(
     )
 
 
+# --- Polar charts laid out: the same for the app and for figures ---------------------------------
+
+BASE = 0.62
+"""Radius of the circle of no deviation; the plot reaches to 1."""
+RINGS = 2
+"""Rings of round deviations on either side of it."""
+REACH = 0.36
+"""Room that these take on either side."""
+LEAST = 1e-3
+"""A nanometre: charts draw smaller deviations, µm or µrad, as none."""
+
+
+@dataclass(frozen=True, slots=True)
+class PolarLayout:
+    """A polar chart: 0° to the right, counter-clockwise."""
+
+    ring: float  # µm or µrad; deviation from one ring to the next
+    unit: str
+    # deviation and radius of every ring, outwards; zero is the circle of no deviation
+    rings: tuple[tuple[float, float], ...]
+    curves: tuple[Array, ...]  # [n, 2]; in the order of the chart's
+
+
+def lay_polar(chart: Lines) -> PolarLayout:
+    """Lay out a polar chart."""
+    largest = max((float(np.abs(curve.y).max()) for curve in chart.curves), default=0.0)
+    ring = round_width(largest / RINGS * (1.0 - 1e-6)) if largest > LEAST else 1.0
+    per_unit = REACH / (RINGS * ring)
+    curves: list[Array] = []
+    for curve in chart.curves:
+        theta = np.deg2rad(curve.x)
+        radius = BASE + per_unit * curve.y
+        curves.append(np.stack([radius * np.cos(theta), radius * np.sin(theta)], axis=-1))
+    unit = "µrad" if "µrad" in chart.y_label else "µm"
+    rings = tuple((step * ring, BASE + per_unit * step * ring) for step in range(-RINGS, RINGS + 1))
+    return PolarLayout(ring, unit, rings, tuple(curves))
+
+
 # --- The tests there are -------------------------------------------------------------------------
 
 
@@ -307,9 +342,9 @@ _TESTS: dict[str, type[BenchTest] | str] = {
     "circular": f"{_HERE}.circular:Circular",
     "diagonals": f"{_HERE}.diagonals:Diagonals",
     "straightness": f"{_HERE}.straightness:Straightness",
-    "squareness": f"{_HERE}.squareness:Squareness",
+    "squareness": f"{_HERE}.straightness:Squareness",
     "rotary-axis": f"{_HERE}.rotary_axis:RotaryAxis",
-    "sphere": f"{_HERE}.sphere:Sphere",
+    "sphere": f"{_HERE}.rotary_axis:Sphere",
     "ball-plate": f"{_HERE}.ball_plate:BallPlate",
     "cone-frustum": f"{_HERE}.cone_frustum:ConeFrustum",
 }

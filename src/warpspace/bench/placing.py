@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from warpspace.bench.plan import Plan, build_plan
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.kinematics import transforms
-from warpspace.kinematics.chain import branch_frames, branch_pose, nominal_point
+from warpspace.kinematics.chain import AxisFrames, branch_frames, branch_pose, nominal_point
 from warpspace.kinematics.model import Coordinates, Loop, Model
 from warpspace.machine.axes import direction_index, parameter
 from warpspace.machine.description import Machine
@@ -80,19 +80,18 @@ def motion_direction(model: Model, coordinates: Coordinates, axis: str) -> Array
 
 def axis_line(model: Model, coordinates: Coordinates, axis: str) -> AxisLine:
     """Find where a rotary axis lies nominally."""
+    frames, sign = _frames_of(model, coordinates, axis)
+    before, index = np.asarray(frames.before), frames.axis.index
+    along, across, upright = (before[..., :3, (index + step) % 3] for step in range(3))
+    return AxisLine(before[..., :3, 3], along, across, upright, sign)
+
+
+def _frames_of(model: Model, coordinates: Coordinates, axis: str) -> tuple[AxisFrames, float]:
+    """Find the frames of an axis, and +1 where it carries the tool, −1 where the workpiece."""
     for side, sign in (("tool", 1.0), ("workpiece", -1.0)):
         for frames in branch_frames(model, side, coordinates):
             if frames.axis.name == axis:
-                index = frames.axis.index
-                before = np.asarray(frames.before)
-                first, second = (index + 1) % 3, (index + 2) % 3
-                return AxisLine(
-                    before[..., :3, 3],
-                    before[..., :3, index],
-                    before[..., :3, first],
-                    before[..., :3, second],
-                    sign,
-                )
+                return frames, sign
     raise UnknownNameError("axis", axis, model.machine.axes)
 
 
@@ -201,12 +200,9 @@ class Plane:
 
 def axis_vector(model: Model, coordinates: Coordinates, axis: str, letter: str = "") -> Array:
     """Give the direction of the frame of an axis in R, [..., 3]."""
-    index = "XYZABC".index(letter) % 3 if letter else model.machine.axes[axis].index
-    for side in ("tool", "workpiece"):
-        for frames in branch_frames(model, side, coordinates):
-            if frames.axis.name == axis:
-                return np.asarray(frames.before)[..., :3, index]
-    raise OptionError(f"the machine {model.machine.chain} has no axis {axis}")
+    frames, _ = _frames_of(model, coordinates, axis)
+    index = "XYZABC".index(letter) % 3 if letter else frames.axis.index
+    return np.asarray(frames.before)[..., :3, index]
 
 
 def plane_axes(machine: Machine, plane: str) -> tuple[str, str, str]:
@@ -384,22 +380,24 @@ def lay_followed(
         length_mm=BAR_MM,
         travel=travels(coordinates, sense),
         setup={
-            **{f"ball_{name}_um": np.sum(column * direction, axis=-1)
-               for name, column in ball_columns(model, coordinates).items()},
-            "bar_um": np.ones(count),
+            **ball_columns(model, coordinates, direction), "bar_um": np.ones(count),
         },
     )  # fmt: skip
 
 
-def ball_columns(model: Model, coordinates: Mapping[str, Array]) -> dict[str, Array]:
-    """Give how a reading moves with the ball's place along x, y, z of the workpiece, [n, 3] each.
+def ball_columns(
+    model: Model, coordinates: Mapping[str, Array], direction: Array
+) -> dict[str, Array]:
+    """Give how readings move with the ball's place along x, y, z of the workpiece, [m] each.
 
-    A ball that stands further along x is missed by as much: the tool against it moves along −x.
+    A ball that stands further along x is missed by as much: the tool against it moves along −x. The
+    directions are those of all poses, [n, 3], once or several times over.
     """
-    pose = np.asarray(branch_pose(model, "workpiece", coordinates))
     count = np.broadcast_shapes(*(np.shape(values) for values in coordinates.values()))
-    pose = np.broadcast_to(pose, (*count, 4, 4))
-    return {name: -pose[..., :3, index] for index, name in enumerate("xyz")}
+    pose = np.broadcast_to(branch_pose(model, "workpiece", coordinates), (*count, 4, 4))
+    pose = np.tile(pose, (len(direction) // len(pose), 1, 1))
+    moved = -np.sum(pose[:, :3, :3] * direction[:, :, None], axis=1)
+    return {f"ball_{name}_um": moved[:, index] for index, name in enumerate("xyz")}
 
 
 def travels(coordinates: Mapping[str, Array], sense: Array) -> dict[str, Array]:

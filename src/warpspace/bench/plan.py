@@ -1,12 +1,18 @@
-"""What a test runs through, and what it comes to: poses, what is sensed there, its numbers."""
+"""What a test runs through and comes to: poses, what is sensed there, readings on the model."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.units import Array
+from warpspace.field.evaluate import View, build_basis, evaluate_exact
+from warpspace.kinematics.model import Loop, Model
+from warpspace.machine.axes import TravelDirection, parameter
+from warpspace.machine.curves.simple import Directional
+from warpspace.machine.errors import ErrorFunction, ErrorSet
+from warpspace.scene.model import Scene
+from warpspace.units import UM_PER_MM, Array
 
 Whole = NDArray[np.intp]
 NONE = -1
@@ -121,3 +127,141 @@ class Outcome:
     def __getitem__(self, key: str) -> float:
         """Give a number by its key."""
         return next(quantity.value for quantity in self.quantities if quantity.key == key)
+
+
+# --- Readings that a test would take on the model: exactly, and linear in the errors -------------
+
+RELATIVE = View(Loop.RELATIVE)
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """Readings as a linear function of the errors: ``readings = matrix @ amplitudes``."""
+
+    keys: tuple[str, ...]  # (K,)
+    amplitudes: Array  # [K], µm or µrad; those of the scene
+    # [m, K]; reading in µm (angles: µrad) per µm or µrad of amplitude; the curve of each parameter
+    # along its axis is folded in, as in an `ErrorBasis`
+    matrix: Array
+
+    @property
+    def readings(self) -> Array:
+        """Readings for the amplitudes of the scene, [m]."""
+        return self.matrix @ self.amplitudes
+
+
+def simulate(scene: Scene, plan: Plan, *, exact: bool = True) -> Array:
+    """Take the readings of a plan on the model of a scene, [m], µm (angles: µrad).
+
+    Exactly: full rotations, all products, and the true length of a bar; else to first order.
+    """
+    if not exact:
+        return respond(scene, plan).readings
+    return sense(plan, site_errors(scene, plan))
+
+
+def site_errors(scene: Scene, plan: Plan) -> Array:
+    """Evaluate the error of the tool against the workpiece at every site, exactly, [n, 3], µm."""
+    found = np.zeros((len(plan.point_mm), 3))
+    model = _both_ways(scene)
+    for rows, errors in _by_travel(scene.errors, plan):
+        coordinates = {name: values[rows] for name, values in plan.coordinates.items()}
+        field = evaluate_exact(model, errors, coordinates, RELATIVE, plan.point_mm[rows])
+        found[rows] = field.error_um
+    return found
+
+
+def sense(plan: Plan, error_um: Array) -> Array:
+    """Give what the sensors of a plan read, [m], of the errors of its sites, [n, 3], µm."""
+    shift = _differences(plan, error_um)
+    along = np.sum(shift * plan.direction, axis=-1)
+    bars = np.isfinite(plan.length_mm)
+    if bars.any():
+        length = plan.length_mm[bars] * UM_PER_MM
+        squared = np.sum(shift[bars] ** 2, axis=-1)
+        actual = np.sqrt(length**2 + 2.0 * length * along[bars] + squared)
+        along[bars] = (2.0 * length * along[bars] + squared) / (actual + length)
+    return plan.gain * along
+
+
+def respond(scene: Scene, plan: Plan, keys: Sequence[str] | None = None) -> Response:
+    """Give the readings of a plan as a linear function of the errors of a scene."""
+    chosen = tuple(scene.parameter_keys if keys is None else keys)
+    position = respond_sites(scene, plan, chosen)
+    along = np.sum(_differences(plan, position) * plan.direction, axis=-1)
+    amplitudes = np.array([scene.errors.amplitude(key) for key in chosen], dtype=float)
+    return Response(chosen, amplitudes, (along * plan.gain).T)
+
+
+def respond_sites(scene: Scene, plan: Plan, keys: Sequence[str]) -> Array:
+    """Give the errors of all sites as a linear function of errors, [K, n, 3], µm per unit."""
+    position = np.zeros((len(keys), len(plan.point_mm), 3))
+    model = _both_ways(scene)
+    for rows, errors in _by_travel(scene.errors, plan):
+        coordinates = {name: values[rows] for name, values in plan.coordinates.items()}
+        basis = build_basis(model, errors, keys, coordinates, RELATIVE, plan.point_mm[rows])
+        share = np.array([_share(scene.errors, errors, key) for key in keys])
+        position[:, rows] = basis.position * share[:, None, None]
+    return position
+
+
+def fit_setup(plan: Plan, readings: Array) -> tuple[Array, Array]:
+    """Fit the unknowns of the set-up; give them and what is left of the readings, [m]."""
+    if not plan.setup:
+        return np.zeros(0), readings
+    design = np.stack(list(plan.setup.values()), -1)
+    found: Array = np.asarray(np.linalg.lstsq(design, readings, rcond=None)[0], dtype=float)
+    return found, readings - design @ found
+
+
+def _differences(plan: Plan, values: Array) -> Array:
+    """Take the values of sites against each other, [..., n, 3] to [..., m, 3]."""
+    shift = values[..., plan.site, :].copy()
+    held = plan.against != NONE
+    shift[..., held, :] -= values[..., plan.against[held], :]
+    return shift
+
+
+def _by_travel(errors: ErrorSet, plan: Plan) -> Iterator[tuple[Whole, ErrorSet]]:
+    every = np.arange(len(plan.point_mm))
+    axes = [axis for axis in plan.travel if _depends_on_travel(errors, axis)]
+    if not axes:
+        yield every, errors
+        return
+    ways = np.stack([np.sign(plan.travel[axis]) for axis in axes], axis=-1)
+    found, number = np.unique(ways, axis=0, return_inverse=True)
+    for index, way in enumerate(found):
+        yield (
+            every[number.reshape(-1) == index],
+            _travelling(errors, dict(zip(axes, way, strict=True))),
+        )
+
+
+def _both_ways(scene: Scene) -> Model:
+    return replace(scene.model, direction=TravelDirection.MEAN)
+
+
+def _depends_on_travel(errors: ErrorSet, axis: str) -> bool:
+    return any(
+        parameter(key).axis == axis and isinstance(function, Directional)
+        for key, function in errors.functions.items()
+    )
+
+
+def _travelling(errors: ErrorSet, way: Mapping[str, float]) -> ErrorSet:
+    def chosen(key: str, function: ErrorFunction) -> ErrorFunction:
+        sign = way.get(parameter(key).axis, 0.0)
+        if not sign or not isinstance(function, Directional):
+            return function
+        return function.forward if sign > 0.0 else function.backward
+
+    return ErrorSet({key: chosen(key, function) for key, function in errors.functions.items()})
+
+
+def _share(errors: ErrorSet, acting: ErrorSet, key: str) -> float:
+    """Amplitude of the curve that acts, by that of the whole: 1 unless the direction matters."""
+    whole, part = errors.functions.get(key), acting.functions.get(key)
+    if whole is None or part is None or whole is part:
+        return 1.0
+    amplitude = whole.amplitude
+    return part.amplitude / amplitude if amplitude else 1.0

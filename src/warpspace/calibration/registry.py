@@ -10,8 +10,7 @@ import numpy as np
 from warpspace.analysis.options import Option
 from warpspace.bench.base import BenchTest, bench_names, find_test
 from warpspace.bench.data import parse_table
-from warpspace.bench.plan import Plan
-from warpspace.bench.readings import respond, simulate
+from warpspace.bench.plan import Plan, respond, simulate
 from warpspace.calibration.kinds import Guess, Kind, Lengths, Points, Tracker
 from warpspace.calibration.readings import Readings, ReadingTable, check_spread
 from warpspace.calibration.spheres import Sphere, SphereTcp

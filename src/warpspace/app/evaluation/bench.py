@@ -8,8 +8,7 @@ from warpspace.analysis.blocks import Lines
 from warpspace.app.evaluation.cache import Cache, Identity
 from warpspace.app.state.app_state import AppState
 from warpspace.bench.base import BenchTest, Run, find_test
-from warpspace.bench.plan import Plan
-from warpspace.bench.readings import respond_sites, sense
+from warpspace.bench.plan import Plan, respond_sites, sense
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.field.grid import Workspace, seen_from_workpiece
 from warpspace.units import MM_PER_UM, Array

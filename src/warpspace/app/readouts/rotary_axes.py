@@ -9,7 +9,7 @@ from warpspace.analysis.axis_motion import AxisMotion, CircleDeviation, circle_d
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import standing
 from warpspace.app.readouts.html import message, render
-from warpspace.bench.evaluation import LEAST, lay_polar
+from warpspace.bench.base import LEAST, lay_polar
 from warpspace.geometry.traces import Trace
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose

@@ -10,7 +10,6 @@ from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.options import option
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import DataColumn, Table
-from warpspace.bench.evaluation import round_factor
 from warpspace.bench.placing import (
     PLANES,
     axis_vector,
@@ -20,8 +19,9 @@ from warpspace.bench.placing import (
     relative_point,
     tool_points,
 )
-from warpspace.bench.plan import Outcome, Plan, Quantity, build_plan
+from warpspace.bench.plan import Outcome, Plan, Quantity, build_plan, fit_setup
 from warpspace.exceptions import OptionError
+from warpspace.geometry.surfaces import round_down
 from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM, Array
 
@@ -198,7 +198,8 @@ class BallPlate(BenchTest):
         count = runs[0].plan.readings // 3
         seen = np.stack([marks[f"seen_{axis}_mm"] for axis in "xyz"], -1)[:count][:, columns]
         pitch = float(np.ptp(seen, axis=0).min()) / max(self.balls - 1, 1)
-        factor = round_factor(SHOWN * pitch * UM_PER_MM / largest) if largest > 1e-6 else 1.0
+        wanted = SHOWN * pitch * UM_PER_MM / largest if largest > 1e-6 else 1.0
+        factor = round_down(wanted) if wanted > 0.0 else 1.0
         charts: list[Lines] = []
         for index in np.unique(marks["position"]):
             chosen = marks["position"][:count] == index
@@ -222,9 +223,7 @@ class BallPlate(BenchTest):
 
 def left_over(plan: Plan, readings: Array) -> Array:
     """Give the deviations of the balls once the place of the plate is fitted, [b, 3], µm."""
-    design = np.stack(list(plan.setup.values()), -1)
-    rest = readings - design @ np.linalg.lstsq(design, readings, rcond=None)[0]
-    return rest.reshape(3, -1).T
+    return fit_setup(plan, readings)[1].reshape(3, -1).T
 
 
 def _lying(number: Array, seen: Array) -> dict[str, Array]:

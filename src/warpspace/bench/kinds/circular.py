@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.description import Watch
@@ -12,7 +13,6 @@ from warpspace.analysis.options import option
 from warpspace.analysis.typed import Axis
 from warpspace.bench.base import BenchResult, BenchTest, Run, run_test
 from warpspace.bench.data import DataColumn, Table
-from warpspace.bench.evaluation import CircleFit, fit_circle_readings, is_full
 from warpspace.bench.placing import (
     PLANES,
     find_plane,
@@ -21,8 +21,7 @@ from warpspace.bench.placing import (
     relative_point,
     tool_points,
 )
-from warpspace.bench.plan import Outcome, Plan, Quantity, build_plan
-from warpspace.bench.readings import RELATIVE, simulate
+from warpspace.bench.plan import RELATIVE, Outcome, Plan, Quantity, build_plan, simulate
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import evaluate_first_order
 from warpspace.field.grid import Workspace
@@ -37,6 +36,106 @@ LEEWAY_DEG = 5.0
 ALIKE_UM = 1e-6
 """Runs that differ by less are drawn as one."""
 SENSES = {1.0: "counter-clockwise", -1.0: "clockwise"}
+
+
+# --- What a circle of radial readings comes to ----------------------------------------------------
+# Centre, radius, ellipse, hysteresis (ISO 230-4).
+
+FULL_DEG = 314.0
+"""Arcs that reach so far round count as full circles: eight points have gaps of 45°."""
+HALF_DEG = 180.0
+"""An ellipse is told from a displaced centre from half a circle upwards."""
+
+
+@dataclass(frozen=True)
+class CircleFit:
+    """Parts of a trace of radial readings."""
+
+    radial_um: Array  # [m]; readings about the least-squares centre
+    centre_um: tuple[float, float]
+    radius_um: float  # mean radius minus nominal radius
+    # largest minus smallest radial deviation of all readings about the one centre: G(b), or G where
+    # one sense was run
+    deviation_um: float
+    # µm; G, the same of each sense about its own centre: +1 counter-clockwise, −1 clockwise
+    by_sense: Mapping[float, float]
+    # D, radius of the least-squares circle of both senses minus nominal radius
+    mean_radial_um: float | None
+    # H, largest difference between the senses at one angle. Both None where one sense was run.
+    hysteresis_um: float | None
+    # out of the sin 2φ and cos 2φ parts; None on arcs that are too short
+    squareness_urad: float | None
+    scale_difference_um: float
+
+
+def covered_deg(angle_deg: Array) -> float:
+    """Tell how far round angles reach: the turn less the largest gap, degrees."""
+    sorted_deg = np.unique(np.round(np.mod(angle_deg, 360.0), 6))
+    gaps = np.diff(np.append(sorted_deg, sorted_deg[0] + 360.0))
+    return 360.0 - float(gaps.max())
+
+
+def is_full(angle_deg: Array) -> bool:
+    """Tell whether angles go all the way round."""
+    return covered_deg(angle_deg) >= FULL_DEG
+
+
+def fit_circle_readings(plan: Plan, readings: Array) -> CircleFit:
+    """Fit centre, radius and ellipse to the readings, [m], µm, of a circular plan.
+
+    Its marks are angle_deg, sense, along, up (the direction of the bar along the two axes of the
+    plane), radius_mm and gain_sign. With the mark as_read the centre is an error of the machine,
+    not of the set-up, and stays in: the ball beside a rotary axis turns with it.
+
+    Notes
+    -----
+    Least squares of ``1, cos φ, sin φ, cos 2φ, sin 2φ``; of the first three where the arc is
+    shorter than half a circle. A squareness γ gives ∓γ·R/2·sin 2φ. G and G(b) are ranges about the
+    least-squares centre, never less than the width of the narrowest ring about the path; which of
+    the two ISO 230-4 means could not be seen.
+    """
+    marks = plan.marks
+    along, up, sense = marks["along"], marks["up"], marks["sense"]
+    design = np.stack([np.ones(len(along)), along, up, along**2 - up**2, 2.0 * along * up], -1)
+    as_read = "as_read" in marks
+
+    def centred(rows: NDArray[np.bool_]) -> tuple[Array, Array]:
+        elliptic = covered_deg(marks["angle_deg"][rows]) >= HALF_DEG - 1e-6
+        part = design[rows, : 5 if elliptic else 3]
+        fit = np.asarray(np.linalg.lstsq(part, readings[rows], rcond=None)[0], dtype=np.float64)
+        kept = readings[rows]
+        return fit, kept if as_read else kept - part[:, 1:3] @ fit[1:3]
+
+    fit, radial = centred(np.ones(len(readings), dtype=bool))
+    elliptic = len(fit) == 5
+    squareness = None
+    if elliptic:
+        gain = marks["gain_sign"][0] * marks["radius_mm"][0] * UM_PER_MM_URAD
+        squareness = float(2.0 * fit[4] / gain)
+    senses = [sign for sign in (1.0, -1.0) if (sense == sign).any()]
+    both = len(senses) == 2
+    return CircleFit(
+        radial,
+        (float(fit[1]), float(fit[2])),
+        float(fit[0]),
+        float(np.ptp(radial)),
+        {sign: float(np.ptp(centred(sense == sign)[1])) for sign in senses},
+        float(np.linalg.lstsq(design[:, :3], readings, rcond=None)[0][0]) if both else None,
+        _hysteresis(marks["angle_deg"], sense, radial) if both else None,
+        squareness,
+        float(fit[3]) if elliptic else 0.0,
+    )
+
+
+def _hysteresis(angle_deg: Array, sense: Array, radial: Array) -> float:
+    turned = np.mod(angle_deg, 360.0)
+    one, other = sense > 0.0, sense < 0.0
+    order = np.argsort(turned[other], kind="stable")
+    there = np.interp(turned[one], turned[other][order], radial[other][order], period=360.0)
+    return float(np.abs(radial[one] - there).max())
+
+
+# --- The test -------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -211,12 +310,8 @@ class Circular(BenchTest):
                     continue
                 order = np.argsort(angle[chosen], kind="stable")
                 x, y = angle[chosen][order], fit.radial_um[chosen][order]
-                if is_full(angle[chosen]) and not run.is_measured:
-                    x, y = np.append(x, x[0] + TURN), np.append(y, y[0])
-                style = "dots" if run.is_measured else "line"
-                curves.append(
-                    Curve(run.named("both ways round" if alike else word), x, y, row, style)
-                )
+                words, full = "both ways round" if alike else word, is_full(x)
+                curves.append(run.curve(words, x, y, row, once_round=full))
         fit = fit_circle_readings(runs[0].plan, runs[0].readings)
         if fit.squareness_urad is not None and not self.rotary:
             curves.append(self._squareness(fit, runs[0].plan))

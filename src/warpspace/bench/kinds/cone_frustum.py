@@ -10,7 +10,7 @@ from warpspace.analysis.options import option
 from warpspace.analysis.typed import Vector
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import DataColumn, Table
-from warpspace.bench.evaluation import fit_circle_readings
+from warpspace.bench.kinds.circular import fit_circle_readings
 from warpspace.bench.placing import (
     ball_columns,
     ball_point,
@@ -191,7 +191,6 @@ class ConeFrustum(BenchTest):
         direction = transforms.rotate(
             np.broadcast_to(pose, (len(theta), 4, 4))[..., :3, :3], outward
         )
-        columns = ball_columns(model, coordinates)
         spelled = ", ".join(f"{value:.4g}" for value in middle)
         return build_plan(
             coordinates,
@@ -208,9 +207,7 @@ class ConeFrustum(BenchTest):
             length_mm=self.radius_mm,
             travel=travels(coordinates, np.ones(len(theta))),
             setup={
-                **{f"ball_{name}_um": np.sum(column * direction, axis=-1)
-                   for name, column in columns.items()},
-                "bar_um": np.ones(len(theta)),
+                **ball_columns(model, coordinates, direction), "bar_um": np.ones(len(theta)),
             },
         )  # fmt: skip
 

@@ -10,6 +10,7 @@ from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.options import option
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import DataColumn, Table
+from warpspace.bench.kinds.positioning import target_statistics
 from warpspace.bench.placing import PLANES, find_plane, following_axes, relative_point, tool_points
 from warpspace.bench.plan import Outcome, Plan, Quantity, Whole, build_plan
 from warpspace.exceptions import OptionError
@@ -43,16 +44,12 @@ def diagonal_signs(name: str) -> Array:
 
 def means_along(position: Array, way: Array, readings: Array) -> dict[str, Array]:
     """Take the mean at each position: of each direction, of both, and their difference."""
-    places, index = np.unique(np.round(position, 3), return_inverse=True)
-    sums = np.zeros((2, len(places)))
-    counts = np.zeros((2, len(places)))
-    for row, sign in enumerate((1.0, -1.0)):
-        np.add.at(sums[row], index.reshape(-1)[way == sign], readings[way == sign])
-        np.add.at(counts[row], index.reshape(-1)[way == sign], 1.0)
-    ways = [sums[row] / counts[row] for row in (0, 1) if (counts[row] > 0.0).all()]
-    if not ways:
-        ways = [sums.sum(axis=0) / counts.sum(axis=0)]
-    found = {"all": np.concatenate(ways), "mean": np.mean(ways, axis=0)}
+    position = np.round(position, 3)
+    both = target_statistics(position, way, readings).mean
+    ways = both[np.isfinite(both).all(axis=1)]
+    if not len(ways):
+        ways = target_statistics(position, np.ones(len(way)), readings).mean[:1]
+    found = {"all": ways, "mean": ways.mean(axis=0)}
     if len(ways) == 2:
         found["reversal"] = ways[0] - ways[1]
     return found
@@ -197,13 +194,12 @@ class Diagonals(BenchTest):
         share = np.cumsum(done, axis=0) / steps
         index = np.repeat(np.arange(len(names)), len(share))
         positions = (start[:, None] + share * (end - start)[:, None]).reshape(-1, 3)
-        moved = np.concatenate([[0.0], np.tile([0.0, 1.0, 2.0], steps)])
-        moved[0] = np.nan  # the start is reached by none
+        moved = np.concatenate([[-1.0], np.tile([0.0, 1.0, 2.0], steps)])  # the start by none
         signs = np.array([diagonal_signs(name) for name in names])[index]
         marks = {
             "diagonal": index.astype(float),
             "way": np.ones(len(index)),
-            "axis": np.tile(np.nan_to_num(moved, nan=-1.0), len(names)),
+            "axis": np.tile(moved, len(names)),
         }
         return self._plan(scene, positions, signs, index, marks)
 

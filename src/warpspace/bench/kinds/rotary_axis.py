@@ -1,18 +1,29 @@
-"""Error motions of a rotary axis: radial, axial, tilt, angular (ISO 230-7)."""
+"""A rotary axis that turns: its error motions (ISO 230-7), and the R-test (ISO 10791-6)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.options import option
-from warpspace.analysis.typed import Axis
+from warpspace.analysis.typed import Axis, Vector
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import DataColumn, Table
-from warpspace.bench.evaluation import is_full
-from warpspace.bench.placing import axis_line, ball_point, rotary_axis
-from warpspace.bench.plan import Outcome, Plan, Quantity, build_plan
+from warpspace.bench.kinds.circular import is_full
+from warpspace.bench.placing import (
+    axis_line,
+    ball_columns,
+    ball_point,
+    default_ball,
+    followed,
+    reachable,
+    rotary_axis,
+    tool_points,
+    travels,
+)
+from warpspace.bench.plan import Outcome, Plan, Quantity, build_plan, fit_setup
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose
 from warpspace.scene.model import Scene
@@ -22,7 +33,6 @@ LEVER_MM = 1000.0
 """Between the places where the axis is sensed: 1 µm there is 1 µrad."""
 CHANNELS = ("x_um", "y_um", "z_um", "a_urad", "b_urad", "c_urad")
 """Across, across, along the axis; about the same three: E_XC, E_YC, E_ZC, E_AC, E_BC, E_CC of C."""
-LETTERS = ("X", "Y", "Z", "A", "B", "C")
 
 
 @dataclass(frozen=True)
@@ -39,7 +49,7 @@ class Motions:
     angular: Array
     # location in µm along the two directions across the axis, orientation in µrad about them: the
     # axis average line
-    average_line: tuple[float, float, float, float]
+    average_line: Sequence[float]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,16 +156,12 @@ class RotaryAxis(BenchTest):
             Quantity("tilt_urad", "tilt error motion", float(np.ptp(found.tilt)), "µrad"),
             Quantity("angular_urad", "angular positioning", float(np.ptp(found.angular)), "µrad"),
         ]
-        words = ("location in x", "location in y", "orientation about x", "orientation about y")
-        frame = {"A": "yzx", "B": "zxy", "C": "xyz"}[axis[0]]
-        keys = (f"E{frame[0].upper()}0{axis}", f"E{frame[1].upper()}0{axis}")
-        turns = tuple("ABC"["XYZ".index(key[1])] for key in keys)
-        names = (*keys, *(f"E{turn}0{axis}" for turn in turns))
-        units = ("µm", "µm", "µrad", "µrad")
-        for name, word, value, unit in zip(names, words, found.average_line, units, strict=True):
-            spelled = word.replace("x", "#").replace("y", frame[1]).replace("#", frame[0])
-            suffix = "um" if unit == "µm" else "urad"
-            quantities.append(Quantity(f"{name}_{suffix}", f"{spelled} ({name})", value, unit))
+        across = {"A": "yz", "B": "zx", "C": "xy"}[axis[0]]
+        parts = [(letter.upper(), f"location in {letter}", "µm") for letter in across]
+        parts += [("abc"["xyz".index(a)].upper(), f"orientation about {a}", "µrad") for a in across]
+        for (letter, word, unit), value in zip(parts, found.average_line, strict=True):
+            key, suffix = f"E{letter}0{axis}", "um" if unit == "µm" else "urad"
+            quantities.append(Quantity(f"{key}_{suffix}", f"{word} ({key})", value, unit))
         details: dict[str, object] = {"angle_deg": found.angle_deg.tolist()}
         for name in ("radial", "axial", "tilt", "angular"):
             details[f"{name}_motion"] = getattr(found, name).tolist()
@@ -191,8 +197,11 @@ def motions(plan: Plan, readings: Array) -> Motions:
     once = np.stack([np.ones_like(theta), cosine, sine], -1)
     x, y, z, a, b, c = channels
 
+    def once_round(values: Array) -> Array:
+        return np.asarray(np.linalg.lstsq(once, values, rcond=None)[0], dtype=float)
+
     def about_centre(values: Array) -> Array:
-        return values - once @ np.linalg.lstsq(once, values, rcond=None)[0]
+        return values - once @ once_round(values)
 
     # The axis leans towards +across by a turn about upright, towards +upright by one about −across.
     leaning = b * cosine - a * sine
@@ -202,14 +211,9 @@ def motions(plan: Plan, readings: Array) -> Motions:
         about_centre(leaning),
         z - z.mean(),
         c - c.mean(),
-        (once_mean(x, theta), once_mean(y, theta), once_mean(a, theta), once_mean(b, theta)),
+        # means over the turn, what comes once a turn (an eccentric artefact) set aside
+        [float(once_round(values)[0]) for values in (x, y, a, b)],
     )
-
-
-def once_mean(values: Array, theta: Array) -> float:
-    """Mean of a reading over the turn, what comes once a turn (an eccentric artefact) set aside."""
-    design = np.stack([np.ones_like(theta), np.cos(theta), np.sin(theta)], -1)
-    return float(np.linalg.lstsq(design, values, rcond=None)[0][0])
 
 
 def _eccentricity(theta: Array) -> dict[str, Array]:
@@ -223,3 +227,136 @@ def _eccentricity(theta: Array) -> dict[str, Array]:
         "height_um": np.concatenate([zero, zero, one, zero, zero, zero]),
         "zero_urad": np.concatenate([zero, zero, zero, zero, zero, one]),
     }
+
+
+# --- R-test: a ball on the table, the tool held on it while the axis turns -----------------------
+
+AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sphere(BenchTest):
+    """R-test with the controller's compensation of the tool centre point on."""
+
+    name = "sphere"
+    title = "R-test with a ball"
+    standard = "ISO 10791-6, tests AK, BK, CK"
+    words = (
+        "A ball stands on the table, three sensors on the tool (or the other way round) read"
+        " where it is along x, y and z. A rotary axis turns; the linear axes follow, so that"
+        " nominally the tool stays on the ball. Readings are tool minus ball, in R or, with"
+        " --frame workpiece, in directions that turn with the table. The range of each is what the"
+        " standard asks for; with the ball's place fitted (it is never known as well) the ranges"
+        " that are left are given too."
+    )
+    columns = (
+        DataColumn("angle_deg", "number"),
+        DataColumn("x_um"),
+        DataColumn("y_um"),
+        DataColumn("z_um"),
+    )
+    axis: Axis = option("", "Rotary axis that turns", unset="the last one")
+    ball: Vector = option(
+        None,
+        "Centre of the ball in the workpiece frame",
+        unit="mm",
+        unset="one that can be reached",
+    )
+    start: float | None = option(
+        None, "First position of the axis; as far as the others can follow", unit="°"
+    )
+    end: float | None = option(None, "Last position, likewise", unit="°")
+    points: int = option(73, "Positions along the way", low=4, high=3_600)
+    frame: Literal["machine", "workpiece"] = option("machine", "Directions of the readings")
+
+    def plan(self, scene: Scene) -> Plan:
+        """Turn the axis as far as the linear axes can follow."""
+        axis, ball = self._set_up(scene)
+        where = scene, self.model(scene), axis, ball, self.stand(scene)
+        return self._lay(scene, reachable(*where, self.start, self.end, self.points))
+
+    def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
+        """Turn the axis to the positions of a file."""
+        if len(table) < 4:
+            raise table.refuse(f"has {len(table)} positions; expected at least 4")
+        if np.ptp(table["angle_deg"]) < 1.0:
+            raise table.refuse("all readings are at one angle; expected angles along the way")
+        readings = np.concatenate([table[f"{name}_um"] for name in AXES])
+        return self._lay(scene, table["angle_deg"]), readings
+
+    def _set_up(self, scene: Scene) -> tuple[str, Array]:
+        axis = rotary_axis(scene.machine, self.axis)
+        if self.ball is not None:
+            return axis, np.asarray(self.ball, dtype=float)
+        return axis, default_ball(scene, self.model(scene), axis, self.stand(scene), None)
+
+    def _lay(self, scene: Scene, angle_deg: Array) -> Plan:
+        axis, ball = self._set_up(scene)
+        model = self.model(scene)
+        coordinates = followed(scene, model, axis, angle_deg, ball, self.stand(scene))
+        count = len(angle_deg)
+        turned = np.broadcast_to(np.eye(3), (count, 3, 3))
+        if self.frame == "workpiece":
+            pose = np.asarray(branch_pose(model, "workpiece", coordinates))
+            turned = np.broadcast_to(pose[..., :3, :3], (count, 3, 3))
+        direction = np.concatenate([turned[:, :, index] for index in range(3)])
+        spelled = ", ".join(f"{value:.4g}" for value in ball)
+        return build_plan(
+            coordinates,
+            tool_points(model, coordinates, count),
+            direction,
+            place=f"{axis} turns · ball at ({spelled}) mm of the workpiece · readings in"
+            f" {'R' if self.frame == 'machine' else 'the workpiece frame'}",
+            marks={
+                "angle_deg": np.tile(angle_deg, 3),
+                "channel": np.repeat(np.arange(3.0), count),
+            },
+            site=np.tile(np.arange(count), 3),
+            travel=travels(coordinates, np.ones(count)),
+            setup=ball_columns(model, coordinates, direction),
+        )
+
+    def evaluate(self, plan: Plan, readings: Array) -> Outcome:
+        """Take the range of each direction, as read and with the ball's place fitted."""
+        place, rest = fit_setup(plan, readings)
+        raw, left = readings.reshape(3, -1), rest.reshape(3, -1)
+        quantities = [
+            Quantity(f"{name}_um", f"range in {name}", float(np.ptp(raw[index])), "µm")
+            for index, name in enumerate(AXES)
+        ]
+        quantities += [
+            Quantity(
+                f"{name}_fitted_um", f"range in {name}, ball's place fitted",
+                float(np.ptp(left[index])), "µm",
+            )
+            for index, name in enumerate(AXES)
+        ]  # fmt: skip
+        norm = np.linalg.norm(left, axis=0)
+        rms = float(np.sqrt(np.mean(norm**2)))
+        quantities.append(Quantity("rms_fitted_um", "RMS distance, place fitted", rms, "µm"))
+        details: dict[str, object] = {
+            "ball_um": place.tolist(),
+            "angle_deg": plan.marks["angle_deg"][: raw.shape[1]].tolist(),
+        }
+        for index, name in enumerate(AXES):
+            details[f"{name}_readings_um"] = raw[index].tolist()
+        return Outcome(tuple(quantities), details)
+
+    def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
+        """Draw x, y and z against the angle."""
+        curves: list[Curve] = []
+        for run in runs:
+            rows = run.readings.reshape(3, -1)
+            angle = run.plan.marks["angle_deg"][: rows.shape[1]]
+            order = np.argsort(angle, kind="stable")
+            curves += [
+                run.curve(name, angle[order], rows[index][order], index)
+                for index, name in enumerate(AXES)
+            ]
+        axis = runs[0].plan.place.partition(" ")[0]
+        return (
+            Lines(
+                "lines", f"Tool minus ball while {axis} turns", f"{axis} [°]", "reading [µm]",
+                tuple(curves),
+            ),
+        )  # fmt: skip

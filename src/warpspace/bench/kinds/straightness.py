@@ -1,7 +1,7 @@
-"""Straightness of the motion of an axis against three reference lines (ISO 230-1)."""
+"""Straightness of an axis, and squareness of two, by three reference lines (ISO 230-1)."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal
 
@@ -12,7 +12,15 @@ from warpspace.analysis.options import option
 from warpspace.analysis.typed import Axis
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import DataColumn, Table
-from warpspace.bench.placing import axis_vector, linear_axis, motion_direction, tool_points
+from warpspace.bench.placing import (
+    PLANES,
+    axis_vector,
+    find_plane,
+    linear_axis,
+    motion_direction,
+    plane_axes,
+    tool_points,
+)
 from warpspace.bench.plan import Outcome, Plan, Quantity, build_plan
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
@@ -106,28 +114,47 @@ def _hull_slopes(x: Array, y: Array, sign: float = 1.0) -> list[float]:
     return [sign * (by - ay) / (bx - ax) for (ax, ay), (bx, by) in pairwise(hull)]
 
 
-def line_plan(
-    test: BenchTest, scene: Scene, axis: str, across: Array, position: Array, way: Array
+def lay_lines(
+    test: BenchTest,
+    scene: Scene,
+    lines: Mapping[str, Array],
+    which: Array,
+    position: Array,
+    way: Array,
+    unknowns: Sequence[str],
 ) -> Plan:
-    """Lay the plan of an axis along a straight edge that a probe senses across, [3] in R.
+    """Lay the plan of axes that run along straight edges, a probe sensing across them.
 
-    The way is the direction of travel at each position, +1 or −1.
+    Lines are axes with the direction across each, [3] in R; of each site is given on which line it
+    lies, the position along it and the way of travel, +1 or −1. Unknown are the zero of each line
+    and how the edges lie, in the names given.
     """
-    model = test.model(scene)
-    coordinates = {**test.stand(scene), axis: position}
-    count = len(position)
-    point = tool_points(model, coordinates, count)
-    stand = test.stand(scene)
-    forth = motion_direction(model, stand, axis) @ axis_vector(model, stand, axis)
-    along = float(np.sign(forth)) * position
+    model, stand = test.model(scene), test.stand(scene)
+    coordinates, travel = dict(stand), dict[str, Array]()
+    along, across = np.zeros(len(position)), np.zeros((len(position), 3))
+    for number, (axis, direction) in enumerate(lines.items()):
+        forth = motion_direction(model, stand, axis)
+        if np.sort(np.abs(forth))[-2] > 1e-6:
+            spelled = ", ".join(f"{value:.3f}" for value in np.abs(forth))
+            raise OptionError(
+                f"{axis} runs along ({spelled}) where the machine stands; expected x, y or z"
+            )
+        own = which == number
+        coordinates[axis] = np.where(own, position, stand[axis])
+        travel[axis] = np.where(own, way, 0.0)
+        sign = np.sign(forth @ axis_vector(model, stand, axis))
+        along[own], across[own] = sign * position[own], direction
+    zeros = [(which == number).astype(float) for number in range(len(lines))]
+    first = next(iter(lines))
     return build_plan(
         coordinates,
-        point,
+        tool_points(model, coordinates, len(position)),
         across,
-        place=f"{axis} · {test.place_words(scene, [axis])}",
+        place=f"{first} · {test.place_words(scene, [first])}",
         marks={"position_mm": position, "along_mm": along, "way": way},
-        travel={axis: way},
-        setup={"zero_um": np.ones(count), "tilt_urad": along * 1e-3},
+        travel=travel,
+        setup=dict(zip(unknowns, (*zeros, (1.0 - 2.0 * which) * along * 1e-3), strict=True)),
+        path=tuple(np.flatnonzero(zero) for zero in zeros),
     )
 
 
@@ -193,8 +220,8 @@ class Straightness(BenchTest):
 
     def _lay(self, scene: Scene, position: Array, way: Array) -> Plan:
         axis, across = self.directions(scene)
-        check_across(self, scene, axis)
-        return line_plan(self, scene, axis, np.eye(3)[across], position, way)
+        lines, which = {axis: np.eye(3)[across]}, np.zeros(len(position))
+        return lay_lines(self, scene, lines, which, position, way, ("zero_um", "tilt_urad"))
 
     def evaluate(self, plan: Plan, readings: Array) -> Outcome:
         """Take straightness against the three reference lines."""
@@ -221,9 +248,7 @@ class Straightness(BenchTest):
             level = lines["least_squares"].at(position)
             curves.append(run.curve("deviation", position, mean - level))
             if run is runs[-1]:
-                for colour, name in ((1, "end_points"), (2, "minimum_zone")):
-                    y = lines[name].at(position) - level
-                    curves.append(Curve(WORDS[name], position, y, colour, "dashed"))
+                curves += _lines_drawn(lines, ("end_points", "minimum_zone"), position, level)
         axis = runs[0].plan.place.partition(" ")[0]
         across = "xyz"[int(np.argmax(np.abs(runs[0].plan.direction[0])))]
         return (
@@ -235,11 +260,124 @@ class Straightness(BenchTest):
         )  # fmt: skip
 
 
-def check_across(test: BenchTest, scene: Scene, axis: str) -> None:
-    """Refuse an axis that does not run along x, y or z in R where it stands."""
-    way = np.abs(np.asarray(motion_direction(test.model(scene), test.stand(scene), axis)))
-    if np.sort(way)[-2] > 1e-6:
-        spelled = ", ".join(f"{value:.3f}" for value in way)
-        raise OptionError(
-            f"{axis} runs along ({spelled}) where the machine stands; expected x, y or z"
+def _lines_drawn(
+    lines: Mapping[str, ReferenceLine], names: Sequence[str], position: Array, level: Array | float
+) -> list[Curve]:
+    return [
+        Curve(WORDS[name], position, lines[name].at(position) - level, colour, "dashed")
+        for colour, name in enumerate(names, start=1)
+    ]
+
+
+# --- Squareness: straightness along two axes, and the angle between their lines -------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class Squareness(BenchTest):
+    """Squareness of two axes with a square or two straightness runs."""
+
+    name = "squareness"
+    title = "Squareness"
+    standard = "ISO 230-1"
+    words = (
+        "A probe runs along both arms of a square (or a laser along two lines made square by a"
+        " pentaprism): each axis moves, the deviation across it is read. The angle between the"
+        " reference lines of both is the squareness error, in the sign of EC0Y, EB0Z or EA0Z:"
+        " positive where the second axis is turned by the right-hand rule against the first."
+        " End-point, least-squares and minimum-zone lines may differ. The square itself is taken"
+        " as perfect."
+    )
+    columns = (
+        DataColumn("line", "name"),
+        DataColumn("direction", "sign", default="+"),
+        DataColumn("position_mm", "number"),
+        DataColumn("deviation_um"),
+    )
+    plane: Literal["XY", "XZ", "YZ"] = option("XY", "Plane of the two axes")
+    points: int = option(21, "Positions along each axis", low=3, high=2_000)
+
+    def plan(self, scene: Scene) -> Plan:
+        """Run the first axis there and back, then the second."""
+        axes = plane_axes(scene.machine, self.plane)[:2]
+        positions = [np.linspace(*scene.axis_span(axis), self.points) for axis in axes]
+        return self._lay(
+            scene,
+            np.repeat([0.0, 1.0], 2 * self.points),
+            np.concatenate([part for one in positions for part in (one, one[::-1])]),
+            np.tile(np.repeat([1.0, -1.0], self.points), 2),
         )
+
+    def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
+        """Run the positions of a file; ``line`` names the axis."""
+        axes = plane_axes(scene.machine, self.plane)[:2]
+        problems = [
+            f"line {int(line)}, line: {word!r}; expected {axes[0]} or {axes[1]} (--plane"
+            f" {self.plane})"
+            for line, word in zip(table.lines, table.words["line"], strict=True)
+            if word not in axes
+        ]
+        which = np.array([float(word == axes[1]) for word in table.words["line"]])
+        for index, axis in enumerate(axes):
+            count = len(np.unique(np.round(table["position_mm"][which == index], 6)))
+            if count < 3 and not problems:
+                problems.append(f"line {axis} has {count} positions; expected at least 3")
+        if problems:
+            raise table.refuse(*problems)
+        order = np.argsort(which, kind="stable")
+        plan = self._lay(
+            scene, which[order], table["position_mm"][order], table["direction"][order]
+        )
+        return plan, table["deviation_um"][order]
+
+    def _lay(self, scene: Scene, which: Array, position: Array, way: Array) -> Plan:
+        plane = find_plane(self.model(scene), self.stand(scene), self.plane)
+        lines = {plane.first: plane.up, plane.second: plane.along}
+        unknowns = (*(f"zero_{axis}_um" for axis in lines), "turned_urad")
+        plan = lay_lines(self, scene, lines, which, position, way, unknowns)
+        marks = {**plan.marks, "gain_sign": np.full(len(which), plane.sign), "line": which}
+        return replace(plan, place=f"{self.plane} · {plan.place}", marks=marks)
+
+    def evaluate(self, plan: Plan, readings: Array) -> Outcome:
+        """Take the angle between the reference lines of both axes."""
+        key, sign = PLANES[self.plane][2], float(plan.marks["gain_sign"][0])
+        lines = [found for _, _, found in _arms(plan, readings)]
+        quantities: list[Quantity] = []
+        for name in REFERENCES:
+            angle = sign * (lines[0][name].slope + lines[1][name].slope)
+            quantities.append(
+                Quantity(f"{name}_urad", f"squareness {key}, {WORDS[name]}", angle, "µrad")
+            )
+        for index, axis in enumerate(self.plane):
+            height = lines[index]["least_squares"].deviation_um
+            quantities.append(
+                Quantity(f"straightness_{axis}_um", f"straightness of {axis}", height, "µm")
+            )
+        return Outcome(tuple(quantities), {"squareness_key": key})
+
+    def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
+        """Draw the deviations along both axes with their least-squares lines."""
+        charts: list[Lines] = []
+        for index, axis in enumerate(self.plane):
+            curves: list[Curve] = []
+            for run in runs:
+                position, mean, lines = _arms(run.plan, run.readings)[index]
+                level = mean.mean()
+                curves.append(run.curve("deviation", position, mean - level))
+                if run is runs[-1]:
+                    curves += _lines_drawn(lines, REFERENCES, position, level)
+            other = self.plane[1 - index]
+            charts.append(
+                Lines(
+                    "lines", f"{axis} runs, deviation along {other}", f"along {axis} [mm]",
+                    "deviation [µm]", tuple(curves),
+                )
+            )  # fmt: skip
+        return tuple(charts)
+
+
+def _arms(plan: Plan, readings: Array) -> list[tuple[Array, Array, dict[str, ReferenceLine]]]:
+    """Give the positions along each axis, the mean deviations there, and their lines."""
+    arms = [plan.marks["line"] == index for index in (0.0, 1.0)]
+    along = plan.marks["along_mm"]
+    means = [mean_by_position(along[chosen], readings[chosen]) for chosen in arms]
+    return [(position, mean, reference_lines(position, mean)) for position, mean in means]

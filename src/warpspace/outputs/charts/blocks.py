@@ -16,7 +16,7 @@ from matplotlib.patheffects import Normal, Stroke
 from matplotlib.transforms import Bbox
 
 from warpspace.analysis.blocks import Bars, Curve, Histogram, Lines, Panel, Series
-from warpspace.bench.evaluation import LEAST, lay_polar
+from warpspace.bench.base import LEAST, lay_polar
 from warpspace.outputs.drawing.settings import FONT, LIGHT, SAVE_RC, Theme
 
 DPI = 160.0
