@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from warpspace.analysis.gains import GainsResult
     from warpspace.analysis.machines import MachinesResult, sweep
     from warpspace.analysis.measured import measured
-    from warpspace.analysis.thesis.table import thesis
+    from warpspace.analysis.thesis import thesis
     from warpspace.bench.base import run_test
     from warpspace.bench.kinds.circular import ballbar
     from warpspace.calibration.calibrate import calibrate
@@ -41,7 +41,7 @@ _HOME = {
     "measured": "warpspace.analysis.measured",
     "run_test": "warpspace.bench.base",
     "sweep": "warpspace.analysis.machines",
-    "thesis": "warpspace.analysis.thesis.table",
+    "thesis": "warpspace.analysis.thesis",
     "to_pyvista": "warpspace.outputs.exports.multiblock",
     "load_scene": "warpspace.scene.library",
     "scene_names": "warpspace.scene.library",

@@ -12,8 +12,8 @@ from contextlib import contextmanager
 import pytest
 
 from products import first
+from warpspace.analysis import thesis
 from warpspace.analysis.blocks import Column, number_columns
-from warpspace.analysis.thesis import table
 from warpspace.cli import tables as module
 from warpspace.cli.tables import print_table, print_text, progress
 
@@ -57,7 +57,7 @@ def once(function):
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_output_fits_and_has_every_number(warpspace, monkeypatch, name):
-    monkeypatch.setattr(table, "thesis", once(table.thesis))
+    monkeypatch.setattr(thesis, "thesis", once(thesis.thesis))
     monkeypatch.setenv("COLUMNS", "1000")
     whole = warpspace(*COMMANDS[name]).out
     for width in (60, 80):

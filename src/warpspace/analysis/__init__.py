@@ -11,16 +11,9 @@ if TYPE_CHECKING:
     from warpspace.analysis.blocks import Bars, Column, Curve, Lines, Panel, Series, Table
     from warpspace.analysis.catalogue import find_analysis, register, unregister
     from warpspace.analysis.description import Analysis, Change, Quantity, Result, Watch, silent
-    from warpspace.analysis.options import Grammar, option
-    from warpspace.analysis.typed import Keys, Limits, Place
+    from warpspace.analysis.options import Grammar, Keys, Limits, Place, option
 
-_HOME = {
-    "blocks": ("Bars", "Column", "Curve", "Lines", "Panel", "Series", "Table"),
-    "catalogue": ("find_analysis", "register", "unregister"),
-    "description": ("Analysis", "Change", "Quantity", "Result", "Watch", "silent"),
-    "options": ("Grammar", "option"),
-    "typed": ("Keys", "Limits", "Place"),
-}
+_HOMES = ("blocks", "catalogue", "description", "options")
 
 __all__ = [
     "Analysis",
@@ -49,7 +42,8 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Load a name from its module when it is first used."""
-    for home, names in _HOME.items():
-        if name in names:
-            return getattr(import_module(f"{__name__}.{home}"), name)
+    for home in _HOMES if name in __all__ else ():
+        module = import_module(f"{__name__}.{home}")
+        if hasattr(module, name):
+            return getattr(module, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

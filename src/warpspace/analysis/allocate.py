@@ -26,9 +26,8 @@ from warpspace.analysis.cases import Case, Over, both_orders
 from warpspace.analysis.description import Change, Result, Watch
 from warpspace.analysis.distribution import Draws, Probability, machines_needed
 from warpspace.analysis.montecarlo import montecarlo, sample_chunks
-from warpspace.analysis.options import Grammar, option
+from warpspace.analysis.options import Grammar, option, read_keys, read_numbers
 from warpspace.analysis.sampled import KeptLimit
-from warpspace.analysis.typed import read_keys, read_numbers
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.field.evaluate import compare_orders
 from warpspace.machine.axes import parameter
@@ -175,9 +174,9 @@ class AllocateResult(Result):
         """Parameters that got the largest half width there is."""
         return tuple(key for key, width in self.tolerances.items() if width >= self.widest)
 
-    def as_json(self) -> dict[str, Any]:
+    def as_plain(self) -> dict[str, Any]:
         """Give the half widths, those that were allocated, and what they keep at what cost."""
-        asked, left_out = self.asked, self.second_order
+        asked = self.asked
         return {
             "limit_um": asked.limit_um,
             "wanted": asked.probability,
@@ -195,7 +194,6 @@ class AllocateResult(Result):
             "samples": self.samples,
             "seed": self.seed,
             "exact": self.exact._asdict(),
-            **({"second_order_um": left_out.um} if left_out else {}),
         }
 
     def changes(self) -> Sequence[Change]:

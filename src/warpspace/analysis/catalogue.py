@@ -23,7 +23,6 @@ TASKS: "dict[Task, str]" = {
     "machine": "Scenes and machines",
 }
 """What the commands of a task are listed under."""
-_HERE = "warpspace.analysis"
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,62 +67,36 @@ class Verb(Protocol[R_co]):
 
 
 _ADDED: "dict[str, type[Analysis]]" = {}
-_ENTRIES: dict[str, Entry] = {
-    entry.name: entry
-    for entry in (
-        Entry(
-            "gains", "understand", "Rank the error parameters of SCENE by their gain.",
-            f"{_HERE}.gains:Gains",
-        ),
-        Entry(
-            "line", "understand",
-            "Follow the error of SCENE along a straight line.",
-            f"{_HERE}.line:Line",
-        ),
-        Entry(
-            "reach", "understand", "Say which part of the volume of SCENE keeps a limit.",
-            f"{_HERE}.reach:Reach",
-        ),
-        Entry(
-            "certify", "understand",
-            "Certify flatness, straightness, squareness of SCENE.",
-            f"{_HERE}.certify:Certify",
-        ),
-        Entry(
-            "repair", "improve", "Find which errors of SCENE to adjust, and to what.",
-            f"{_HERE}.repair:Repair",
-        ),
-        Entry(
-            "convert", "measure", "Write the errors of SCENE in another convention.",
-            f"{_HERE}.convert:Convert",
-        ),
-        Entry(
-            "calibrate", "measure", "Find the errors of the machine of SCENE in measured data.",
-            "warpspace.calibration.calibrate:Calibrate",
-        ),
-        Entry(
-            "compensate", "improve", "Write a table of compensation, and say what it leaves.",
-            "warpspace.formats.compensation.compensate:Compensate",
-        ),
-        Entry(
-            "montecarlo", "design", "Show how large |E| gets on machines within tolerance.",
-            f"{_HERE}.machines:Machines",
-        ),
-        Entry(
-            "allocate", "design", "Find the widest tolerances that keep a limit of |E|.",
-            f"{_HERE}.allocate:Allocate",
-        ),
-        Entry(
-            "concepts", "design", "Compare machines before one of them is built.",
-            f"{_HERE}.concepts:Concepts",
-        ),
-        Entry(
-            "contributions", "design",
-            "Show which tolerances the volumetric error comes from.",
-            f"{_HERE}.contributions:Shares",
-        ),
-    )
-}  # fmt: skip
+_BUNDLED: "tuple[tuple[str, Task, str, str], ...]" = (
+    ("gains", "understand", "analysis.gains:Gains",
+     "Rank the error parameters of SCENE by their gain."),
+    ("line", "understand", "analysis.line:Line",
+     "Follow the error of SCENE along a straight line."),
+    ("reach", "understand", "analysis.reach:Reach",
+     "Say which part of the volume of SCENE keeps a limit."),
+    ("certify", "understand", "analysis.certify:Certify",
+     "Certify flatness, straightness, squareness of SCENE."),
+    ("repair", "improve", "analysis.repair:Repair",
+     "Find which errors of SCENE to adjust, and to what."),
+    ("convert", "measure", "analysis.convert:Convert",
+     "Write the errors of SCENE in another convention."),
+    ("calibrate", "measure", "calibration.calibrate:Calibrate",
+     "Find the errors of the machine of SCENE in measured data."),
+    ("compensate", "improve", "formats.compensation.compensate:Compensate",
+     "Write a table of compensation, and say what it leaves."),
+    ("montecarlo", "design", "analysis.machines:Machines",
+     "Show how large |E| gets on machines within tolerance."),
+    ("allocate", "design", "analysis.allocate:Allocate",
+     "Find the widest tolerances that keep a limit of |E|."),
+    ("concepts", "design", "analysis.concepts:Concepts",
+     "Compare machines before one of them is built."),
+    ("contributions", "design", "analysis.contributions:Shares",
+     "Show which tolerances the volumetric error comes from."),
+)  # fmt: skip
+_ENTRIES = {
+    name: Entry(name, task, sentence, f"warpspace.{place}")
+    for name, task, place, sentence in _BUNDLED
+}
 
 
 def register(kind: "type[Analysis]") -> None:

@@ -9,8 +9,7 @@ import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table
 from warpspace.analysis.description import Analysis, Result, Watch
-from warpspace.analysis.options import option
-from warpspace.analysis.typed import LOOP_HELP
+from warpspace.analysis.options import LOOP_HELP, option
 from warpspace.exceptions import OptionError
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import Loop

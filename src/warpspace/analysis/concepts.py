@@ -137,9 +137,9 @@ class ConceptsResult(Result):
     asked: Concepts
     concepts: tuple[Concept, ...]
 
-    def as_json(self) -> dict[str, Any]:
+    def as_plain(self) -> dict[str, Any]:
         """Give how they were sampled, and the numbers of each."""
-        asked, left_out = self.asked, self.second_order
+        asked = self.asked
         default = dict(self.concepts[0].scene.tolerances.default)
         return {
             "loop": str(asked.loop),
@@ -151,7 +151,6 @@ class ConceptsResult(Result):
             "own_tolerances": asked.own_tolerances,
             "tolerances": None if asked.own_tolerances else default,
             "concepts": [concept.said for concept in self.concepts],
-            **({"second_order_um": left_out.um} if left_out else {}),
         }
 
     def blocks(self) -> Iterator[Block]:

@@ -18,9 +18,8 @@ from warpspace.analysis.blocks import (
 )
 from warpspace.analysis.cases import Case, Over, Plan, reduce_nodes
 from warpspace.analysis.description import Result, Watch
-from warpspace.analysis.options import option
+from warpspace.analysis.options import error_words, option
 from warpspace.analysis.sampled import Sampled
-from warpspace.analysis.typed import error_words
 from warpspace.exceptions import OptionError
 from warpspace.machine.axes import parameter
 from warpspace.units import Array

@@ -1,21 +1,31 @@
-"""The errors of a scene in another convention, with the same field."""
+"""The errors of a scene in another convention: the same field from other numbers."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any
+
+import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.description import Analysis, Result, Watch
-from warpspace.analysis.options import Grammar, option
-from warpspace.analysis.typed import typed_word
+from warpspace.analysis.options import Grammar, option, typed_word
 from warpspace.exceptions import OptionError, near_miss
+from warpspace.kinematics.conversion import (
+    ReferenceLine,
+    SquarenessSign,
+    convert_order,
+    convert_reference_line,
+    held_by_constants,
+    held_by_view,
+    zero_at,
+)
+from warpspace.kinematics.model import ComponentErrors, complete_coordinates
 from warpspace.machine.axes import parameter
 from warpspace.machine.limits import MAX_LENGTH_MM
 from warpspace.scene.files import parse_number
-
-if TYPE_CHECKING:
-    from warpspace.scene.conversion import Converted, Target
-    from warpspace.scene.model import Scene
+from warpspace.scene.library import parse_scene
+from warpspace.scene.model import Scene, evaluate
+from warpspace.scene.save import Notation, covered_spans, over_ranges, scene_to_toml, write_errors
 
 FORMS = {
     "component_errors": "after_motion or before_motion, or by axis: rotary:before_motion,X:…",
@@ -27,6 +37,8 @@ FORMS = {
 }
 """What each convention takes."""
 MAX_SHOWN = 40
+SEED, PROOFS = 0, 500
+"""Of the positions at which both fields are compared, and their number."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,88 +60,187 @@ class Convert(Analysis):
         (), "; ".join(f"{name}={form}" for name, form in FORMS.items()), flag="--to", required=True
     )
 
-    def run(self, scene: "Scene", _watch: Watch, /) -> "ConvertResult":
+    def run(self, scene: Scene, _watch: Watch, /) -> "ConvertResult":
         """Convert and compare."""
-        from warpspace.scene.conversion import convert_scene
+        return convert_scene(scene, self.target(scene), self.wishes)
 
-        found = convert_scene(scene, _target(scene, self.wishes))
-        return ConvertResult(asked=self, scene=scene, found=found)
+    def target(self, scene: Scene) -> "Target":
+        """Read what is asked for."""
+        target = Target()
+        for wish in self.wishes:
+            name, equals, text = (part.strip() for part in wish.partition("="))
+            if not equals or name not in FORMS:
+                hint = near_miss(name, FORMS) or f"; expected one of {', '.join(FORMS)}"
+                raise OptionError(f"{{wishes}} {wish!r}: unknown convention {name!r}{hint}")
+            try:
+                target = _with(target, scene, name, text)
+            except ValueError:
+                expected = f"expected {FORMS[name]}"
+                raise OptionError(f"{{wishes}} {wish!r} cannot be read; {expected}") from None
+        return target
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """Conventions to write a scene in; what is left out stays as it is."""
+
+    # axis to "after_motion" or "before_motion"
+    component_errors: Mapping[str, str] = field(default_factory=dict[str, str])
+    # linear axis to "end_point", "least_squares" or "minimum_zone"
+    straightness: Mapping[str, str] = field(default_factory=dict[str, str])
+    # mm or degrees; axis to the position at which its component errors are zero
+    zero_at: Mapping[str, float] = field(default_factory=dict[str, float])
+    # or "constants", or None; the point whose error is zero: held by the view at these axis
+    # positions, or by location constants in place of the scene's view
+    reference: Mapping[str, float] | str | None = None
+    # sign of squareness and measuring lines that the numbers are written with
+    notation: Notation = field(default_factory=Notation)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ConvertResult(Result):
     """A scene in another convention."""
 
-    asked: Convert
-    scene: "Scene"
-    found: "Converted"
+    keys = ("largest_um", "largest_urad", "changed", "notes")
+    wishes: tuple[str, ...]
+    before: Scene
+    scene: Scene  # equal to what a reader of the text gets
+    text: str  # the scene file
+    # largest difference of the exact fields, position in µm and orientation in µrad
+    largest_um: float
+    largest_urad: float
+    # µm or µrad; amplitude of each error as it was and as it is written, by key; zero where it is
+    # not there
+    changed: Mapping[str, tuple[float, float]]
+    notes: tuple[str, ...]  # what could not be taken along
 
     def texts(self) -> Mapping[str, str]:
         """Give the scene file."""
-        wishes = "; ".join(self.asked.wishes)
-        head = f"# Converted from {self.scene.name} by warpspace convert: {wishes}\n"
-        return {"": head + self.found.text}
+        wishes = "; ".join(self.wishes)
+        head = f"# Converted from {self.before.name} by warpspace convert: {wishes}\n"
+        return {"": head + self.text}
 
-    def as_json(self) -> dict[str, Any]:
+    def as_plain(self) -> dict[str, Any]:
         """Spell it."""
-        changed = self.found.changed
         return {
-            "largest_um": self.found.largest_um,
-            "largest_urad": self.found.largest_urad,
-            "changed": {key: {"from": a, "to": b} for key, (a, b) in changed.items()},
-            "notes": list(self.found.notes),
+            "largest_um": self.largest_um,
+            "largest_urad": self.largest_urad,
+            "changed": {key: {"from": a, "to": b} for key, (a, b) in self.changed.items()},
+            "notes": list(self.notes),
         }
 
     def blocks(self) -> Iterator[Block]:
         """Say what has changed, and that the field has not."""
-        found, count = self.found, len(self.found.changed)
-        yield f"{self.scene.title}: {count} error{'' if count == 1 else 's'} written otherwise"
+        count = len(self.changed)
+        yield f"{self.before.title}: {count} error{'' if count == 1 else 's'} written otherwise"
         columns = (
             Column("error", leads=True),
             Column("unit"),
             *number_columns(("was", "is written"), ".4g", "largest"),
         )
-        shown = list(found.changed.items())[:MAX_SHOWN]
+        shown = list(self.changed.items())[:MAX_SHOWN]
         yield Table(columns, [(key, parameter(key).unit, a, b) for key, (a, b) in shown])
         if count > MAX_SHOWN:
             yield f"  and {count - MAX_SHOWN} more; --json lists them all"
-        yield from (f"  {note}" for note in found.notes)
+        yield from (f"  {note}" for note in self.notes)
         yield (
-            f"  exact fields differ by at most {found.largest_um:.1e} µm and"
-            f" {found.largest_urad:.1e} µrad (500 places of the travel, read again from the file)"
+            f"  exact fields differ by at most {self.largest_um:.1e} µm and"
+            f" {self.largest_urad:.1e} µrad (500 places of the travel, read again from the file)"
         )
 
 
-def _target(scene: "Scene", wishes: Sequence[str]) -> "Target":
-    """Read what is asked for."""
-    from warpspace.scene.conversion import Target
+def convert_scene(scene: Scene, target: Target, wishes: tuple[str, ...] = ()) -> ConvertResult:
+    """Write the errors of a scene in other conventions, in the order of the fields of `Target`.
 
-    target = Target()
-    for wish in wishes:
-        name, equals, text = (part.strip() for part in wish.partition("="))
-        if not equals or name not in FORMS:
-            hint = near_miss(name, FORMS) or f"; expected one of {', '.join(FORMS)}"
-            raise OptionError(f"{{wishes}} {wish!r}: unknown convention {name!r}{hint}")
-        try:
-            target = _with(target, scene, name, text)
-        except ValueError:
-            expected = f"expected {FORMS[name]}"
-            raise OptionError(f"{{wishes}} {wish!r} cannot be read; {expected}") from None
-    return target
+    Notes
+    -----
+    The numbers hold within the travel and the working volume of the scene. The fields are compared
+    with the exact chain at 500 random places of them, through all loops.
+    """
+    named = (target.component_errors, target.straightness, target.zero_at)
+    for table in (*named, target.notation.measuring_line_mm):
+        for axis in table:
+            scene.machine.axis(axis)
+    spans = covered_spans(scene.model, scene.workspace)
+    model, errors = convert_order(scene.model, scene.errors, spans, target.component_errors)
+    errors = convert_reference_line(model, errors, spans, target.straightness)
+    errors = zero_at(model, errors, spans, target.zero_at)
+    other = replace(scene, model=model, errors=over_ranges(errors, model, scene.workspace))
+    if target.reference is not None:
+        other = _with_reference(other, target.reference)
+    left = tuple(
+        key
+        for key in scene.measured
+        if scene.errors.functions.get(key) != other.errors.functions.get(key)
+    )
+    measured = {key: one for key, one in scene.measured.items() if key not in left}
+    other = replace(other, measured=measured)
+    text = scene_to_toml(other, target.notation)
+    read = parse_scene(text, scene.name, "the converted scene")
+    gone = f"readings of {', '.join(left)} are left out: they are of other curves"
+    notes = (gone,) if left else ()
+    written = write_errors(other, target.notation)
+    amplitudes = {
+        key: (scene.errors.amplitude(key), written.amplitude(key))
+        for key in dict.fromkeys((*scene.errors, *written))
+        if scene.errors.functions.get(key) != written.functions.get(key)
+    }
+    largest_um, largest_urad = field_difference(scene, read)
+    return ConvertResult(
+        wishes=wishes,
+        before=scene,
+        scene=read,
+        text=text,
+        largest_um=largest_um,
+        largest_urad=largest_urad,
+        changed=amplitudes,
+        notes=notes,
+    )
 
 
-def _with(target: "Target", scene: "Scene", name: str, text: str) -> "Target":
+def _with_reference(scene: Scene, reference: Mapping[str, float] | str) -> Scene:
+    if not isinstance(reference, str):
+        at = {**scene.workspace.positions, **reference}
+        place = complete_coordinates(scene.machine, at)
+        return replace(
+            scene, errors=held_by_view(scene.model, scene.errors, place), reference=dict(reference)
+        )
+    if reference != "constants":
+        raise OptionError(f"reference {reference!r}; expected constants, or axis positions")
+    if scene.reference is None:
+        raise OptionError("the scene holds no point still; expected a reference in its [view]")
+    place = complete_coordinates(scene.machine, {**scene.workspace.positions, **scene.reference})
+    held = held_by_constants(scene.model, scene.errors, place)
+    return replace(scene, errors=over_ranges(held, scene.model, scene.workspace), reference=None)
+
+
+def field_difference(one: Scene, other: Scene) -> tuple[float, float]:
+    """Compare the exact fields of two scenes of one machine."""
+    random = np.random.default_rng(SEED)
+    spans = covered_spans(one.model, one.workspace)
+    at = {axis: random.uniform(*span, PROOFS) for axis, span in spans.items()}
+    loops = ("tool", "workpiece", "relative") if one.reference == other.reference else ("tool",)
+    position, tilt = 0.0, 0.0
+    for loop in loops:
+        here, there = (evaluate(scene, at=at, loop=loop, exact=True) for scene in (one, other))
+        position = max(position, float(np.abs(here.error_um - there.error_um).max()))
+        difference = here.orientation_urad - there.orientation_urad
+        tilt = max(tilt, float(np.abs(difference).max()))
+    return position, tilt
+
+
+# --- What is asked for, as it is typed ------------------------------------------------------------
+
+
+def _with(target: Target, scene: Scene, name: str, text: str) -> Target:
     """Add one wish; a `ValueError` where it cannot be read."""
-    from warpspace.kinematics.conversion import ReferenceLine, SquarenessSign
-    from warpspace.kinematics.model import ComponentErrors
-    from warpspace.scene.conversion import choose_axes
 
     def by_axis(read: Callable[[str], object], kinds: str = "all") -> dict[str, Any]:
         """Read values by axis, or one for all."""
         found: dict[str, object] = {}
         for part in text.split(","):
             axis, colon, value = (word.strip() for word in part.rpartition(":"))
-            found |= choose_axes(scene, axis if colon else "all", read(value), kinds)
+            found |= _choose_axes(scene, axis if colon else "all", read(value), kinds)
         return found
 
     if name == "component_errors":
@@ -155,3 +266,17 @@ def _numbers(text: str, count: int) -> tuple[float, ...]:
     if len(found) != count or not all(abs(value) <= MAX_LENGTH_MM for value in found):
         raise ValueError(text)
     return found
+
+
+def _choose_axes(scene: Scene, text: str, value: object, kinds: str) -> dict[str, object]:
+    """Give a value to one axis, to "linear" or "rotary" ones, or to "all"."""
+    axes = scene.machine.axes
+    groups = {
+        "all": [name for name in axes if kinds == "all" or axes[name].is_linear],
+        "linear": [name for name in axes if axes[name].is_linear],
+        "rotary": [name for name in axes if not axes[name].is_linear],
+    }
+    if text not in groups and text not in axes:
+        known = ", ".join((*axes, *groups))
+        raise OptionError(f"--to {text!r}: no such axis; expected one of {known}")
+    return dict.fromkeys(groups.get(text, [text]), value)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, TypeAlias, TypeV
 
 import numpy as np
 
-from warpspace.analysis.blocks import Block, Table
+from warpspace.analysis.blocks import Block, Table, blocks_html
 from warpspace.analysis.options import Option, options_of
 
 if TYPE_CHECKING:
@@ -70,9 +70,14 @@ class Result(ABC):
 
     def as_json(self) -> dict[str, Any]:
         """Give what ``--json`` prints."""
-        said, left_out = plain(self), self.second_order
+        left_out = {"second_order_um": self.second_order.um} if self.second_order else {}
+        return self.as_plain() | left_out
+
+    def as_plain(self) -> dict[str, Any]:
+        """Give that, but for what the first order leaves out."""
+        said = plain(self)
         said.pop("second_order", None)
-        return said | ({"second_order_um": left_out.um} if left_out else {})
+        return said
 
     def blocks_of(self, kind: type[Any]) -> list[Any]:
         """Give its tables, or its charts."""
@@ -84,8 +89,6 @@ class Result(ABC):
         return next((one for one in tables if any(c.key for c in one.columns)), None)
 
     def _repr_html_(self) -> str:
-        from warpspace.analysis.html import blocks_html
-
         return blocks_html(self.blocks())
 
 

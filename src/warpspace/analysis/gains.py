@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike
 from warpspace.analysis.blocks import Bars, Block, Column, Panel, Series, Table, number_columns
 from warpspace.analysis.description import Analysis, Result, Watch
 from warpspace.analysis.distribution import loop_keys
-from warpspace.analysis.options import option
-from warpspace.analysis.typed import (
+from warpspace.analysis.options import (
     AT_HELP,
     LOOP_HELP,
     Place,
     error_words,
+    option,
     outside_travel,
     place_words,
 )
@@ -419,7 +419,7 @@ def gain_bars(
 
 def thesis_keys(machine: str) -> tuple[str, ...]:
     """Give the key errors of the thesis (table 4-7) for its machine, none for any other."""
-    from warpspace.analysis.thesis.table import printed_tables
+    from warpspace.analysis.thesis import printed_tables
 
     if machine != "dvf5000":
         return ()

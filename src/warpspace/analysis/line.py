@@ -8,8 +8,7 @@ import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table, number_columns
 from warpspace.analysis.description import Analysis, Result, Watch
-from warpspace.analysis.options import option
-from warpspace.analysis.typed import LOOP_HELP, Place, outside_travel, place_words
+from warpspace.analysis.options import LOOP_HELP, Place, option, outside_travel, place_words
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.machine.axes import is_linear

@@ -296,20 +296,19 @@ class MachinesResult(Result):
             raise AttributeError(name)
         return getattr(self.points[0].sampled, name)
 
-    def as_json(self) -> dict[str, Any]:
+    def as_plain(self) -> dict[str, Any]:
         """Give the numbers of one scene, of each, or rows."""
         asked = self.asked
-        left_out = {"second_order_um": self.second_order.um} if self.second_order else {}
         if asked.in_rows:
-            return {"tolerances": plain(dict(asked.tolerance)), "rows": [*self.rows], **left_out}
+            return {"tolerances": plain(dict(asked.tolerance)), "rows": [*self.rows]}
         if len(self.points) == 1:
             source = {} if asked.source is Source.TOLERANCES else {"from": str(asked.source)}
-            return _numbers(self.points[0].sampled) | source | left_out
+            return _numbers(self.points[0].sampled) | source
         each = [
             {"scene": one.scene.name, "title": one.scene.title, **_numbers(one.sampled)}
             for one in self.points
         ]
-        return {"scenes": each, "from": str(asked.source), **left_out}
+        return {"scenes": each, "from": str(asked.source)}
 
     def blocks(self) -> Iterator[Block]:
         """Say the numbers; of one scene with a histogram, else as a table."""
@@ -442,7 +441,7 @@ def sampled_histogram(
 
 def printed_um(scene: "Scene", found: MonteCarlo) -> float | None:
     """Give what the thesis prints for this distribution; None where it has none."""
-    from warpspace.analysis.thesis.table import printed_tables
+    from warpspace.analysis.thesis import printed_tables
 
     name = f"{found.view.loop}_{scene.name.removeprefix('dvf5000_')}"
     printed = printed_tables()["table_4_8"]["predicted"].get(name)

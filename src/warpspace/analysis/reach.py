@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.description import Analysis, Result, Watch
-from warpspace.analysis.options import option
+from warpspace.analysis.options import LOOP_HELP, option
 from warpspace.analysis.statistics import share_below, share_within
-from warpspace.analysis.typed import LOOP_HELP
 from warpspace.exceptions import OptionError
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import Loop

@@ -9,10 +9,9 @@ import numpy as np
 from warpspace.analysis.adjusting import Objective, Search, Volume
 from warpspace.analysis.blocks import Bars, Block, Column, Panel, Series, Table, number_columns
 from warpspace.analysis.description import Change, Result, Watch, silent
-from warpspace.analysis.options import option
+from warpspace.analysis.options import ALL, Keys, Limits, option
 from warpspace.analysis.sampled import Looked
 from warpspace.analysis.statistics import Statistics, Summary, volume_statistics
-from warpspace.analysis.typed import ALL, Keys, Limits
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorBasis, amplitudes_of, placed_words
 from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from warpspace.analysis.cases import DEFAULT_NODES, DEFAULT_SAMPLES, Case, Cylinder, Over, Plan
 from warpspace.analysis.description import Analysis
 from warpspace.analysis.distribution import Distribution, Draws, build_draws, loop_keys
-from warpspace.analysis.options import Grammar, option
-from warpspace.analysis.typed import LOOP_HELP
+from warpspace.analysis.options import LOOP_HELP, Grammar, option
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop
 from warpspace.machine.limits import LOCAL_WORKERS, SAMPLES

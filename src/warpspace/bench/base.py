@@ -12,8 +12,7 @@ import numpy as np
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table
 from warpspace.analysis.description import Analysis, Result, Watch
 from warpspace.analysis.distribution import round_width
-from warpspace.analysis.options import Option, option, options_of
-from warpspace.analysis.typed import File, Place
+from warpspace.analysis.options import File, Option, Place, option, options_of
 from warpspace.bench.data import DataColumn, read_table, unit_notes
 from warpspace.bench.data import Table as DataTable
 from warpspace.bench.plan import Outcome, Plan, fit_setup, simulate

@@ -10,8 +10,7 @@ import numpy as np
 
 from warpspace.analysis.description import Analysis
 from warpspace.analysis.description import Watch as Share
-from warpspace.analysis.options import Grammar, option
-from warpspace.analysis.typed import Files, typed_word
+from warpspace.analysis.options import Files, Grammar, option, typed_word
 from warpspace.calibration.kinds import in_other_frame
 from warpspace.calibration.readings import Readings, read_readings
 from warpspace.calibration.results import Calibration, Combination, Found, Residuals

@@ -140,7 +140,7 @@ def grid_option(default: int | None = 21, of: str = "of the working volume") -> 
 
 def parse_point(text: str, axes: Collection[str], option: str = "--at") -> dict[str, float]:
     """Read axis positions as a user types them."""
-    from warpspace.analysis.typed import read_place
+    from warpspace.analysis.options import read_place
 
     try:
         return read_place(text, axes)
@@ -150,7 +150,7 @@ def parse_point(text: str, axes: Collection[str], option: str = "--at") -> dict[
 
 def warn_outside_travel(machine: "Machine", point: Mapping[str, float]) -> None:
     """Say on stderr where a position lies outside the travel of its axis."""
-    from warpspace.analysis.typed import outside_travel
+    from warpspace.analysis.options import outside_travel
 
     warn(*(f"--at {words}" for words in outside_travel(machine, point)))
 

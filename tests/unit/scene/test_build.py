@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from warpspace.analysis.convert import Target, convert_scene, field_difference
 from warpspace.exceptions import SceneError, WarpspaceError
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import ComponentErrors
@@ -18,7 +19,6 @@ from warpspace.machine.errors import (
     Table,
     Tolerance,
 )
-from warpspace.scene.conversion import Target, convert_scene, field_difference
 from warpspace.scene.library import load_scene, parse_scene
 from warpspace.scene.model import evaluate
 from warpspace.scene.save import Notation, scene_to_toml

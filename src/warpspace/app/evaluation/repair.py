@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpspace.analysis.adjusting import Objective
+from warpspace.analysis.options import ALL
 from warpspace.analysis.repair import Repair, RepairResult, find_repairs
-from warpspace.analysis.typed import ALL
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.compare import plain_state, with_before
 from warpspace.app.state import edits

@@ -5,9 +5,9 @@ from collections.abc import Callable
 from markupsafe import Markup
 
 from warpspace.analysis.adjusting import Objective
+from warpspace.analysis.options import ALL
 from warpspace.analysis.repair import AdjustedSet, RepairResult
 from warpspace.analysis.statistics import Summary
-from warpspace.analysis.typed import ALL
 from warpspace.app.readouts.html import message, render
 from warpspace.machine.axes import parameter
 from warpspace.units import spell, spell_short

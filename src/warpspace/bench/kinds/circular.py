@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.description import Watch
-from warpspace.analysis.options import option
-from warpspace.analysis.typed import Axis
+from warpspace.analysis.options import Axis, option
 from warpspace.bench.base import BenchResult, BenchTest, Run, run_test
 from warpspace.bench.data import DataColumn, Table
 from warpspace.bench.placing import (

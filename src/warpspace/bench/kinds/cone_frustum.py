@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpspace.analysis.blocks import Curve, Lines
-from warpspace.analysis.options import option
-from warpspace.analysis.typed import Vector
+from warpspace.analysis.options import Vector, option
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import DataColumn, Table
 from warpspace.bench.kinds.circular import fit_circle_readings

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpspace.analysis.blocks import Band, Curve, Lines
-from warpspace.analysis.options import option
-from warpspace.analysis.typed import Axis
+from warpspace.analysis.options import Axis, option
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import DataColumn, Table
 from warpspace.bench.placing import axis_line, motion_direction, tool_points

@@ -8,8 +8,7 @@ from typing import Literal
 import numpy as np
 
 from warpspace.analysis.blocks import Curve, Lines
-from warpspace.analysis.options import option
-from warpspace.analysis.typed import Axis
+from warpspace.analysis.options import Axis, option
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import DataColumn, Table
 from warpspace.bench.placing import (

@@ -29,7 +29,7 @@ from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
     from warpspace.analysis.measured import Check, Measured
-    from warpspace.analysis.thesis.table import Row
+    from warpspace.analysis.thesis import Row
     from warpspace.scene.model import Scene
 
 OWN = "own"
@@ -186,7 +186,7 @@ def _check(scene: "Scene", *, as_json: bool) -> None:
 
 def laser_tracer_um(scene: "Scene") -> float | None:
     """Give the volumetric error measured on a machine of the thesis, µm; None for any other."""
-    from warpspace.analysis.thesis.table import MACHINES, printed_tables
+    from warpspace.analysis.thesis import MACHINES, printed_tables
 
     names = [f"dvf5000_{name}" for name in MACHINES]
     if scene.name not in names:
@@ -247,7 +247,7 @@ def thesis(markdown: str | None, *, force: bool, as_json: bool) -> None:
     A number agrees where it lies within half of the last printed digit. Rows that do not agree say
     why. Nothing is tuned to agree.
     """
-    from warpspace.analysis.thesis.table import thesis as compare
+    from warpspace.analysis.thesis import thesis as compare
 
     with progress("computing", silent=as_json):
         rows = compare()

@@ -15,8 +15,7 @@ from urllib.parse import quote
 
 from markupsafe import Markup
 
-from warpspace.analysis.blocks import Table
-from warpspace.analysis.html import table_html
+from warpspace.analysis.blocks import Table, table_html
 from warpspace.exceptions import OutputError, RenderError
 from warpspace.outputs.files import temporary_folder
 from warpspace.resources import __version__
