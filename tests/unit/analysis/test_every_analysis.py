@@ -16,6 +16,7 @@ from warpspace.analysis.catalogue import TASKS, entries, first_line
 from warpspace.analysis.description import plain, silent
 from warpspace.analysis.options import options_of
 from warpspace.cli.analyses import command_of, print_blocks
+from warpspace.cli.guard import guarded
 from warpspace.exceptions import OptionError, WarpspaceError
 
 SCENES = ("dvf5000_first", "teach_squareness", "machine_printer_3d")
@@ -179,7 +180,7 @@ def test_an_analysis_of_ones_own_is_a_command_like_any_other(tmp_path):
         with pytest.raises(ValueError, match="there already"):
             register(Even)
         (entry,) = (one for one in entries() if one.name == "even")
-        command = command_of(entry.load())
+        command = guarded(command_of(entry.load()))
         run = CliRunner().invoke
         assert "--height FLOAT" in run(command, ["--help"]).output
         target = tmp_path / "sum.csv"
