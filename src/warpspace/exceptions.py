@@ -8,8 +8,7 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
 
-SHOWN_PROBLEMS = 40
-"""Problems of a file that a message lists; it counts the others."""
+SHOWN_PROBLEMS = 40  # problems of a file that a message lists; it counts the others
 
 
 class WarpspaceError(Exception):

@@ -17,8 +17,7 @@ UM_PER_MM = 1e3
 MM_PER_UM = 1e-3
 RAD_PER_URAD = 1e-6
 URAD_PER_RAD = 1e6
-UM_PER_MM_URAD = 1e-3
-"""Displacement in µm of a lever of 1 mm turned by 1 µrad."""
+UM_PER_MM_URAD = 1e-3  # displacement in µm of a lever of 1 mm turned by 1 µrad
 
 MICROMETRE = "µm"
 MICRORADIAN = "µrad"

@@ -20,14 +20,10 @@ from warpspace.field.evaluate import ErrorBasis
 from warpspace.field.grid import Grid
 from warpspace.units import Array
 
-NODES_REDUCED = 1000
-"""Nodes whose rows are reduced at a time, so that memory stays small."""
-SILENT = 1e-12
-"""µm per µm or µrad: a response below it everywhere is none."""
-CLOSE_UM = 1e-4
-"""The largest error is found to within this of the least there can be, µm."""
-NODES_AT_ONCE = 40
-"""Worst nodes for which planes are added in one step."""
+NODES_REDUCED = 1000  # nodes whose rows are reduced at a time, so that memory stays small
+SILENT = 1e-12  # µm per µm or µrad: a response below it everywhere is none
+CLOSE_UM = 1e-4  # the largest error is found to within this of the least there can be, µm
+NODES_AT_ONCE = 40  # worst nodes for which planes are added in one step
 MOST_STEPS = 300
 
 

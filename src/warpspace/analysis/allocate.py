@@ -39,12 +39,10 @@ if TYPE_CHECKING:
 
 DIGITS = 3
 """Significant digits of an allocated half width; it is rounded down, so that the limit is kept."""
-NO_EFFECT = 1e-18
-"""Mean squared gain, µm² per µm² or µrad², below which a parameter moves no point."""
+NO_EFFECT = 1e-18  # mean squared gain, µm² per µm² or µrad², below which a parameter moves no point
 TRIES, NARROWER = 5, 0.99
 """Rounding changes the proportions a little: should the limit then fail, all are narrowed again."""
-EXACT_MACHINES = 2000
-"""Machines of which the answer is verified with the exact chain."""
+EXACT_MACHINES = 2000  # machines of which the answer is verified with the exact chain
 SEARCHED, WIDENED, CHECKED = 0.4, 0.2, 0.4
 """Shares of the work: the search, the scale on new machines, the checks before and after."""
 Progress = Callable[[float], object]

@@ -127,11 +127,9 @@ def refuse_many_points(loop: Loop) -> None:
 
 SMOOTH = 0.1
 """Width of the smoothed limit by the limit: a machine counts by degrees within about this."""
-NARROWEST = 1e-4
-"""Least half width by that of the variance rule."""
+NARROWEST = 1e-4  # least half width by that of the variance rule
 MOST_STEPS = 60
-ENOUGH = 1e-6
-"""Relative change of the cost at which the search ends."""
+ENOUGH = 1e-6  # relative change of the cost at which the search ends
 ScaleOf = Callable[[Array, NDArray[np.bool_]], float | None]
 
 

@@ -8,10 +8,8 @@ from warpspace.units import MM_PER_UM, URAD_PER_RAD, Array
 
 LEVER_MM = 1000.0
 """Distance along the axis of the second point that the tilt is taken from: 1 µm there is 1 µrad."""
-MOST_A_TURN = 36
-"""Highest harmonic that is looked for; at most half the samples."""
-LEAST = 1e-6
-"""Deviations below it, µm or µrad, are none."""
+MOST_A_TURN = 36  # highest harmonic that is looked for; at most half the samples
+LEAST = 1e-6  # deviations below it, µm or µrad, are none
 
 
 @dataclass(frozen=True, slots=True)

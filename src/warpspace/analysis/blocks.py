@@ -193,8 +193,7 @@ Block: TypeAlias = str | Table | Bars | Lines | Histogram
 
 # --- As escaped HTML: for pages, reports and notebooks --------------------------------------------
 
-MOST_ROWS = 200
-"""Rows of a table that a page shows; it counts the others."""
+MOST_ROWS = 200  # rows of a table that a page shows; it counts the others
 
 
 def blocks_html(blocks: Iterable[Block]) -> str:

@@ -201,14 +201,12 @@ def _rotary_nodes(low: float, high: float, nodes: int) -> Array:
 
 
 DEFAULT_SAMPLES, DEFAULT_NODES = 100_000, 11
-BLOCK = 8192
-"""Machines per random stream; part of what a seed means, so not to be changed lightly."""
+BLOCK = 8192  # machines per random stream; part of what a seed means, so not to be changed lightly
 LEAST_BLOCKS, MOST_BLOCKS = 16, 4096
 """Blocks in one task of an executor: 131,072 machines at least, 33,554,432 at most."""
 EXACT_MACHINES, EXACT_POINTS = 256, 100_000
 """Machines that the exact chain is evaluated of, and how many points of all of them at most."""
-TASKS_ASKED = 4096
-"""Tasks that a large run is cut into before they grow."""
+TASKS_ASKED = 4096  # tasks that a large run is cut into before they grow
 BLOCK_MULTIPLICATIONS = 900_000
 """Size of one matrix product: its result stays in the cache, and BLAS leaves it to one core."""
 

@@ -31,10 +31,8 @@ if TYPE_CHECKING:
     from warpspace.scene.model import Scene
 
 THREE = ("mean", "P95", "max")
-NAMED = 3
-"""Errors that are named of each machine."""
-LETTERS = ascii_uppercase[:MOST_CONCEPTS]
-"""What the machines are called, in their order."""
+NAMED = 3  # errors that are named of each machine
+LETTERS = ascii_uppercase[:MOST_CONCEPTS]  # what the machines are called, in their order
 
 
 @dataclass(frozen=True, slots=True)

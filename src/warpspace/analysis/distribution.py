@@ -14,11 +14,9 @@ from warpspace.machine.axes import parameter
 from warpspace.machine.errors import ToleranceSet
 from warpspace.units import Array
 
-EXACT_SAMPLES = 1_000_000
-"""Up to so many samples every value is kept and quantiles are exact."""
+EXACT_SAMPLES = 1_000_000  # up to so many samples every value is kept and quantiles are exact
 LOWEST_UM, HIGHEST_UM = 1e-3, 1e6
-RELATIVE_STEP = 2e-5
-"""Width of a bin of the fine histogram beyond that, relative to the value."""
+RELATIVE_STEP = 2e-5  # width of a bin of the fine histogram beyond that, relative to the value
 _BINS = math.ceil(math.log(HIGHEST_UM / LOWEST_UM) / math.log1p(RELATIVE_STEP))
 _SMOOTH_BINS = 2048
 CONFIDENCE = 0.95

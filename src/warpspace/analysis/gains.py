@@ -38,8 +38,7 @@ if TYPE_CHECKING:
 # --- Levers taken apart ---------------------------------------------------------------------------
 # The motions and offsets between an error and the functional point.
 
-Part = tuple[str, tuple[float, float, float]]
-"""Name and vector in R, mm."""
+Part = tuple[str, tuple[float, float, float]]  # name and vector in R, mm
 
 
 def lever_parts(model: Model, loop: Loop, key: str, at: Mapping[str, float]) -> tuple[Part, ...]:

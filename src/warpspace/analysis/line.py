@@ -17,8 +17,7 @@ from warpspace.units import Array
 if TYPE_CHECKING:
     from warpspace.scene.model import Scene
 
-SHOWN = 21
-"""Points that the table of a longer line shows; the file has all."""
+SHOWN = 21  # points that the table of a longer line shows; the file has all
 
 
 @dataclass(frozen=True, kw_only=True)

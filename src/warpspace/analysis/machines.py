@@ -33,8 +33,7 @@ NUMBERS = {
     "max": "max_um",
 }  # fmt: skip
 """Of a row, by heading."""
-PRINTED = 200
-"""Rows that are printed."""
+PRINTED = 200  # rows that are printed
 WHERE = {Over.SAMPLED: "at one random point", Over.MAX: "everywhere", Over.MEAN: "in the mean"}
 """Where a machine keeps a limit."""
 WHAT = {

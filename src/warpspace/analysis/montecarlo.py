@@ -28,8 +28,7 @@ MOST_THREADS = 8
 EXECUTOR_WORKERS = 32
 """Tasks at a time that an executor is taken for, where nobody says how many workers it has."""
 
-Progress = Callable[[int], object]
-"""Called with the number of machines done since the last call."""
+Progress = Callable[[int], object]  # called with the number of machines done since the last call
 Take = Callable[[int, Array], object]
 """Called with the number of a case and |E| of its next machines, [n], µm."""
 Given = TypeVarTuple("Given")

@@ -20,8 +20,7 @@ from warpspace.machine.limits import MAX_ERROR
 if TYPE_CHECKING:
     from warpspace.scene.model import Scene
 
-SHARES = (0.25, 0.5, 0.75, 1.0)
-"""Parts of the volume whose limit the table says."""
+SHARES = (0.25, 0.5, 0.75, 1.0)  # parts of the volume whose limit the table says
 
 
 @dataclass(frozen=True, kw_only=True)

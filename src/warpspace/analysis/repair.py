@@ -28,8 +28,7 @@ from warpspace.units import Array, spell, spell_short
 if TYPE_CHECKING:
     from warpspace.scene.model import Scene
 
-DEFAULT_LIMIT = 200.0
-"""µm or µrad by which an error may be changed, unless somebody says otherwise."""
+DEFAULT_LIMIT = 200.0  # µm or µrad by which an error may be changed, unless somebody says otherwise
 MOST_BARS, MOST_VALUES = 14, 3
 """Errors in a chart, and values beside a bar."""
 FOUR = ("mean_um", "rms_um", "p95_um", "max_um")

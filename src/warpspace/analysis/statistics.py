@@ -13,8 +13,7 @@ from warpspace.field.grid import Grid
 from warpspace.units import Array
 
 P95 = 0.95
-CELLS = 40
-"""About as many cells per axis a percentile is read from; a coarse grid is subdivided."""
+CELLS = 40  # about as many cells per axis a percentile is read from; a coarse grid is subdivided
 
 
 @dataclass(frozen=True, slots=True)

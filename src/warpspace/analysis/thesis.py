@@ -108,8 +108,7 @@ def _own_tolerance(tolerances: ToleranceSet, key: str) -> str:
 
 # --- Tables 4-1 to 4-5: dimensions, parameters, gains ---------------------------------------------
 
-COLUMNS = {"|E|": "norm", "x": "x", "y": "y", "z": "z"}
-"""Of a gain, by heading."""
+COLUMNS = {"|E|": "norm", "x": "x", "y": "y", "z": "z"}  # of a gain, by heading
 STEPPED = {("EBB", "x"), ("EBB", "z"), ("EA0B", "y"), ("EC0B", "y")}
 
 

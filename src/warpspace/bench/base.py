@@ -22,10 +22,8 @@ from warpspace.plugins import load_plugins
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
-PRINTED = 5e-4
-"""Numbers below it are printed as zero."""
-SHARED = 3
-"""Options that every test has, the first fields of the base class."""
+PRINTED = 5e-4  # numbers below it are printed as zero
+SHARED = 3  # options that every test has, the first fields of the base class
 
 
 @dataclass(frozen=True, slots=True)
@@ -296,14 +294,10 @@ def run_test(
 
 # --- Polar charts laid out: the same for the app and for figures ---------------------------------
 
-BASE = 0.62
-"""Radius of the circle of no deviation; the plot reaches to 1."""
-RINGS = 2
-"""Rings of round deviations on either side of it."""
-REACH = 0.36
-"""Room that these take on either side."""
-LEAST = 1e-3
-"""A nanometre: charts draw smaller deviations, µm or µrad, as none."""
+BASE = 0.62  # radius of the circle of no deviation; the plot reaches to 1
+RINGS = 2  # rings of round deviations on either side of it
+REACH = 0.36  # room that these take on either side
+LEAST = 1e-3  # A nanometre: charts draw smaller deviations, µm or µrad, as none
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,8 +25,7 @@ ColumnKind = Literal["number", "reading", "sign", "name"]
 SIGNS = {"+": 1.0, "+1": 1.0, "1": 1.0, "-": -1.0, "−": -1.0, "-1": -1.0}
 FACTOR = 300.0
 """Readings this much larger or smaller than expected are likely to be in another unit."""
-LEAST_UM = 0.05
-"""Readings that are all below it are likely to be in millimetres."""
+LEAST_UM = 0.05  # readings that are all below it are likely to be in millimetres
 
 
 @dataclass(frozen=True, slots=True)

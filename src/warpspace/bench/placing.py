@@ -16,10 +16,8 @@ from warpspace.machine.description import Machine
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
-FLAT = 1e-9
-"""Determinant of three directions of motion below which they lie in a plane."""
-SLACK = 1e-6
-"""mm or degrees by which a path may seem to leave a range: rounding."""
+FLAT = 1e-9  # determinant of three directions of motion below which they lie in a plane
+SLACK = 1e-6  # mm or degrees by which a path may seem to leave a range: rounding
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,10 +229,8 @@ def find_plane(model: Model, stand: Coordinates, plane: str) -> Plane:
 # --- Circles about a rotary axis that the linear axes follow -------------------------------------
 
 
-BAR_MM = 100.0
-"""Length of a bar beside a rotary axis: what across it does is of second order."""
-SHARE = 0.3
-"""Radius that is chosen: share of the shortest edge of the working volume."""
+BAR_MM = 100.0  # length of a bar beside a rotary axis: what across it does is of second order
+SHARE = 0.3  # radius that is chosen: share of the shortest edge of the working volume
 
 
 def default_ball(

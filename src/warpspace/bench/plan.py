@@ -15,8 +15,7 @@ from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM, Array
 
 Whole = NDArray[np.intp]
-NONE = -1
-"""In place of the site that a reading is taken against: none."""
+NONE = -1  # in place of the site that a reading is taken against: none
 DEPENDENT = 1e-9
 """Share of a column of the set-up that others do not give, below which it is left out."""
 

@@ -177,8 +177,7 @@ def _material(material: Material) -> Json:
 # trimesh lays the file out once, which takes it a millisecond or two; a slider move then replaces
 # positions, colours and bounds in it.
 
-_HEAD = 20
-"""Bytes before the document: header of the file, and of the first chunk."""
+_HEAD = 20  # bytes before the document: header of the file, and of the first chunk
 
 
 class GltfTemplate:

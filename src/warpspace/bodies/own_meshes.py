@@ -149,8 +149,7 @@ def check_meshes(machine: Machine) -> tuple[str, ...]:
 
 ENDINGS = (".stl", ".obj", ".ply", ".glb", ".dae")
 MM_PER_M = 1000.0
-LARGEST_M = 1e6
-"""Of a shape, its place and its scale; also keeps NaN out."""
+LARGEST_M = 1e6  # of a shape, its place and its scale; also keeps NaN out
 
 
 def frame_meshes(

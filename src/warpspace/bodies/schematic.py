@@ -54,11 +54,9 @@ def _colour(mesh: Any) -> tuple[int, int, int]:
     return red, green, blue
 
 
-SIDES = 40
-"""Flat sides by which a circle is drawn."""
+SIDES = 40  # flat sides by which a circle is drawn
 Range = tuple[float, float]
-Shape = Any
-"""A closed mesh of trimesh."""
+Shape = Any  # A closed mesh of trimesh
 
 
 def box(x: Range, y: Range, z: Range) -> Shape:

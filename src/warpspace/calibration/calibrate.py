@@ -36,10 +36,8 @@ from warpspace.machine.limits import MAX_ERROR, MAX_TEXT
 from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM, Array
 
-CALIBRATED = ", calibrated"
-"""Behind the title of a calibrated scene."""
-OUTLIER = 4.0
-"""Robust standard deviations beyond which a reading is named."""
+CALIBRATED = ", calibrated"  # behind the title of a calibrated scene
+OUTLIER = 4.0  # robust standard deviations beyond which a reading is named
 MOST_NEXT = 10
 
 

@@ -295,8 +295,7 @@ def in_other_frame(scene: Scene, readings: Readings) -> Readings | None:
 
 
 Indices = NDArray[np.intp]
-LEAST = 5
-"""Readings that a station needs: its place, its dead path, and one to check."""
+LEAST = 5  # readings that a station needs: its place, its dead path, and one to check
 
 
 class Lengths(FromVectors):

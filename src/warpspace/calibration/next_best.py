@@ -30,12 +30,10 @@ from warpspace.units import Array
 # --- Measurements that could be made next ---------------------------------------------------------
 # Poses and small tests on the machine of a scene.
 
-PLACES = (0.0, 0.5, 1.0)
-"""Shares of the working volume, the ends at the ends."""
+PLACES = (0.0, 0.5, 1.0)  # shares of the working volume, the ends at the ends
 TURNS_DEG = (-90.0, -60.0, -30.0, 0.0, 30.0, 60.0, 90.0, 180.0, 270.0)
 ON_CIRCLE = 36
-SESSION = "next"
-"""The set-up of a measurement not made yet: a sphere put somewhere anew."""
+SESSION = "next"  # the set-up of a measurement not made yet: a sphere put somewhere anew
 
 
 def candidates(scene: Scene) -> tuple[Candidate, ...]:
@@ -156,10 +154,8 @@ def _list(values: Array) -> str:
     return ", ".join(f"{value:g}" for value in values)
 
 
-NODES = 5
-"""Nodes per axis of the map whose uncertainty counts."""
-WIDE = 1000.0
-"""Standard uncertainty in µm or µrad of a parameter of which nothing is known."""
+NODES = 5  # nodes per axis of the map whose uncertainty counts
+WIDE = 1000.0  # standard uncertainty in µm or µrad of a parameter of which nothing is known
 LEAST_NOISE_MM = 1e-4
 
 

@@ -20,16 +20,14 @@ from warpspace.scene.files import CsvRows, plain_heading, radian_notes, read_tex
 from warpspace.scene.model import Scene, coverage_notes
 from warpspace.units import Array
 
-MAX_READINGS = 20_000
-"""Rows that a file of readings may have."""
+MAX_READINGS = 20_000  # rows that a file of readings may have
 LABELS = ("session", "run")
 """Columns that hold a name; the first that is there tells sessions apart."""
 MAX_NUMBER = 1e9
 FRAMES = {"machine": "r", "workpiece": "w"}
 """How names of columns spell the frame of vectors, in small letters."""
 MAX_LABEL = 60
-MAX_SESSIONS = 100
-"""Set-ups in one file: each has unknowns of its own."""
+MAX_SESSIONS = 100  # set-ups in one file: each has unknowns of its own
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,8 +26,7 @@ from warpspace.machine.axes import parameter
 from warpspace.scene.model import Scene
 from warpspace.units import MICROMETRE, MICRORADIAN, UM_PER_MM, Array
 
-MOST_BARS = 22
-"""Parameters of one unit that are drawn; the largest by their uncertainty."""
+MOST_BARS = 22  # parameters of one unit that are drawn; the largest by their uncertainty
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,8 +19,7 @@ BLIND = 2e-4
 
 With less, noise of a thousandth makes values that no machine has.
 """
-SHARE = 1e-3
-"""Of a combination, below which a parameter is not named as part of it."""
+SHARE = 1e-3  # of a combination, below which a parameter is not named as part of it
 
 
 @dataclass(frozen=True, slots=True)
@@ -338,12 +337,9 @@ def named(unknowns: Sequence[str], values: Array) -> Mapping[str, float]:
     return {name: float(value) for name, value in zip(unknowns, values, strict=True)}
 
 
-ROBUST_SCALE = 1.345
-"""Standard deviations at which the soft L1 loss begins to trust a reading less."""
-MAD = 1.4826
-"""Standard deviation of a normal distribution per median absolute deviation."""
-MOST_ROUNDS = 20
-"""Times that a robust fit weighs its readings anew."""
+ROBUST_SCALE = 1.345  # standard deviations at which the soft L1 loss begins to trust a reading less
+MAD = 1.4826  # standard deviation of a normal distribution per median absolute deviation
+MOST_ROUNDS = 20  # times that a robust fit weighs its readings anew
 
 
 @dataclass(frozen=True, slots=True)

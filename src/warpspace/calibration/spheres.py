@@ -29,8 +29,7 @@ PLANES = {0: (1, 2), 1: (0, 2), 2: (0, 1)}
 LEAST = 3
 SPREAD_MM = 100.0
 READ = ("x_mm", "y_mm", "z_mm")
-TCP_SPREAD_MM = 20.0
-"""Centres that wander further than this were not measured with TCP correction."""
+TCP_SPREAD_MM = 20.0  # centres that wander further than this were not measured with TCP correction
 
 
 class Centres(Placed):

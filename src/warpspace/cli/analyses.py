@@ -211,8 +211,7 @@ def write_scene(found: "Result", path: str, *, force: bool) -> None:
 # --- Scenes of a command -------------------------------------------------------------------------
 
 
-FEW = 32
-"""Scenes that are held in memory together."""
+FEW = 32  # scenes that are held in memory together
 
 
 class Fleet(Sequence["Scene"]):

@@ -18,8 +18,7 @@ from warpspace.exceptions import OptionError, OutputError, SceneError
 from warpspace.resources import assets_dir, check_address_space
 from warpspace.scene.files import parse_number
 
-LEAST_MB = 800
-"""Address space below which imported libraries abort."""
+LEAST_MB = 800  # address space below which imported libraries abort
 NUMBERS = (click.types.IntParamType, click.types.FloatParamType)
 
 

@@ -30,10 +30,8 @@ if TYPE_CHECKING:
 
 WORTH_A_POOL = 2_000_000
 """Machines: what takes about 10 s. Below, starting processes costs more than it saves."""
-LOSSES = 5
-"""How many worker processes a command may lose: each is replaced and its task done again."""
-RETRIES = 3
-"""How often a cluster does a task again that has lost its worker."""
+LOSSES = 5  # how many worker processes a command may lose: each is replaced and its task done again
+RETRIES = 3  # how often a cluster does a task again that has lost its worker
 CONNECT_S = 10
 MOST_CSV_ROWS = 10_000_000
 NAMED = ("scene", "title")

@@ -108,8 +108,7 @@ def _build(name: str) -> click.Command:
     return {command.name: command for command in found}[name]
 
 
-COMMANDS = Commands(_names, _build)
-"""The commands of `warpspace`."""
+COMMANDS = Commands(_names, _build)  # the commands of `warpspace`
 
 
 def register_command(command: click.Command) -> None:
@@ -233,8 +232,7 @@ def _is_nowhere() -> bool:
 _SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
 _PATIENCE_S = 1.0
 """A signal that comes again sooner is taken for the same one: some programs send it twice."""
-_LONGEST_IMPORT_S = 5.0
-"""How long a signal waits for the end of an import."""
+_LONGEST_IMPORT_S = 5.0  # how long a signal waits for the end of an import
 
 
 class Ended(KeyboardInterrupt):

@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     from warpspace.picture.model import ScenePicture
     from warpspace.scene.model import Scene
 
-MOST_RENDERERS = 2
-"""Figures drawn at the same time for all tabs together."""
+MOST_RENDERERS = 2  # figures drawn at the same time for all tabs together
 POLL_S = 0.1
 _renderers = threading.Semaphore(MOST_RENDERERS)
 
@@ -197,8 +196,7 @@ def write_export(request: "Request", ending: str) -> bytes:
 
 # --- The offline page, which the app writes: outputs know nothing of the app ----------------------
 
-BYTES_PER_RESPONSE = 48
-"""Position and orientation error of one node to one parameter: six numbers."""
+BYTES_PER_RESPONSE = 48  # position and orientation error of one node to one parameter: six numbers
 
 
 def write_page(picture: "ScenePicture", target: "Path", *, overwrite: bool) -> None:

@@ -22,12 +22,9 @@ if TYPE_CHECKING:
 
     from warpspace.analysis.blocks import Column
 
-WIDTH_ELSEWHERE = 80
-"""Characters in a line where the output is no terminal."""
-READABLE = 20
-"""Characters in a line that a column of words has before others go on below."""
-REPEATED = 40
-"""Rows after which a long table has its headings again."""
+WIDTH_ELSEWHERE = 80  # characters in a line where the output is no terminal
+READABLE = 20  # characters in a line that a column of words has before others go on below
+REPEATED = 40  # rows after which a long table has its headings again
 Row = Sequence[str]
 _TOGETHER = re.compile(r"(?<=\d) (?=[µm°%])|(?<= [A-Z]) (?=[-+\d])")
 """Blanks that no line ends with: between a number and its unit, an axis and its position."""
@@ -191,8 +188,7 @@ def _spell(character: str) -> str:
     return f"\\x{code:02x}" if code <= 0xFF else f"\\u{code:04x}"
 
 
-DELAY_S = 1.0
-"""What is done sooner shows nothing."""
+DELAY_S = 1.0  # what is done sooner shows nothing
 
 
 class ProgressBar:

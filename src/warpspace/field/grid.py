@@ -20,8 +20,7 @@ from warpspace.units import Array
 
 # --- A large batch in pieces that stay in the processor's cache -----------------------------------
 
-NODES = 32_768
-"""Points that are evaluated at a time: a number of each of them takes 256 kB."""
+NODES = 32_768  # points that are evaluated at a time: a number of each of them takes 256 kB
 
 Piece: TypeAlias = tuple[slice, ...]
 """One slice for each dimension of a batch."""

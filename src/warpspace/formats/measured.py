@@ -19,8 +19,7 @@ from warpspace.units import Array
 
 FORWARD, BACKWARD, BOTH = 1, -1, 0
 """Direction of travel in which a value was taken; both where a file does not tell."""
-REPEATABILITY = 4.0
-"""ISO 230-2, 3.17: unidirectional repeatability in standard deviations."""
+REPEATABILITY = 4.0  # ISO 230-2, 3.17: unidirectional repeatability in standard deviations
 Matrix = tuple[tuple[float, ...], ...]
 
 
@@ -260,10 +259,8 @@ def _of_series(one: Series) -> Summary:
 
 
 WAYS = {TravelDirection.FORWARD: FORWARD, TravelDirection.BACKWARD: BACKWARD}
-SAME = 1e-9
-"""mm or degrees: positions nearer than this are one."""
-Point = tuple[Place, float, float, float]
-"""Line, position of both axes, value."""
+SAME = 1e-9  # mm or degrees: positions nearer than this are one
+Point = tuple[Place, float, float, float]  # line, position of both axes, value
 
 
 @dataclass(frozen=True)

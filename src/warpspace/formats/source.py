@@ -60,12 +60,9 @@ def spell(value: float, digits: int) -> str:
 
 MAX_BYTES = 64 * 1024 * 1024
 MAX_LINES = 2_000_000
-MAX_LINE = 16_384
-"""Characters of one line."""
-HEAD_LINES = 60
-"""Lines by which a format is recognised."""
-SHOWN = 60
-"""Characters of a line that a message shows."""
+MAX_LINE = 16_384  # characters of one line
+HEAD_LINES = 60  # lines by which a format is recognised
+SHOWN = 60  # characters of a line that a message shows
 _UTF16_SHARE = 0.3
 """Share of zero bytes at every other place from which bytes without a mark count as UTF-16."""
 _LINE_ENDS = re.compile(r"\r\n|\n|\r")

@@ -221,8 +221,7 @@ class Tables:
 SQUARENESS = {("X", "Y"): ("EC0Y", -1.0), ("X", "Z"): ("EB0Z", 1.0), ("Y", "Z"): ("EA0Z", -1.0)}
 """Squareness that an error of the first axis in proportion to the second one is, and its sign."""
 WAYS: tuple[int, ...] = (FORWARD, BACKWARD)
-NEGLIGIBLE = 1e-9
-"""µm or µrad."""
+NEGLIGIBLE = 1e-9  # µm or µrad
 
 
 def errors_of(

@@ -24,8 +24,7 @@ from warpspace.scene.model import Scene, coverage_notes
 from warpspace.scene.save import scene_to_toml
 from warpspace.scene.schema import Problems
 
-LEEWAY = 1e-6
-"""mm or degrees by which a position may lie beyond the travel."""
+LEEWAY = 1e-6  # mm or degrees by which a position may lie beyond the travel
 LARGE = {False: 1000.0, True: 5000.0}
 """µm of a translation and µrad of a rotation above which the unit of a file is asked about."""
 T = TypeVar("T")

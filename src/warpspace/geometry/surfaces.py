@@ -124,8 +124,7 @@ def corners(shape: Shape) -> Index:
 # The axes that stand still get two nodes instead of one, half a thickness to either side; a bar
 # then has surface, grid lines and edges like any other volume.
 
-THICKNESS = 0.016
-"""Of a bar or a cube, as a part of the length that the picture is sized by."""
+THICKNESS = 0.016  # of a bar or a cube, as a part of the length that the picture is sized by
 
 
 def is_thin(shape: Shape) -> bool:
@@ -171,8 +170,7 @@ def spread_nodes(shape: Shape) -> NDArray[np.intp]:
 
 TARGET_FRACTION = 0.1
 """Largest displacement on screen, as a fraction of the volume's longest edge, that auto aims at."""
-NEUTRAL_EXAGGERATION = 1000.0
-"""What auto chooses where nothing is displaced."""
+NEUTRAL_EXAGGERATION = 1000.0  # what auto chooses where nothing is displaced
 _ROUND = (1.0, 2.0, 5.0, 10.0)
 
 
@@ -256,8 +254,7 @@ def pick_point(
     return (nearest, float(along[nearest])) if angle[nearest] <= tolerance else None
 
 
-MIN_CUT_NODES = 3
-"""Nodes an axis needs for an octant to be cut away."""
+MIN_CUT_NODES = 3  # nodes an axis needs for an octant to be cut away
 
 
 def cut_faces(shape: Shape, corner: tuple[int, int, int]) -> list[Index]:

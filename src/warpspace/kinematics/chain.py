@@ -26,8 +26,7 @@ from warpspace.machine.axes import DIRECTIONS, Parameter, axis_parameters, param
 from warpspace.machine.description import Axis, Vector
 from warpspace.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM, UM_PER_MM_URAD, URAD_PER_RAD, Array
 
-ErrorValues = Mapping[str, Array]
-"""Parameter key to values at the coordinates, [...], µm or µrad."""
+ErrorValues = Mapping[str, Array]  # parameter key to values at the coordinates, [...], µm or µrad
 
 
 def motion(axis: Axis, position: Array) -> Array:

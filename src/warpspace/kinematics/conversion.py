@@ -102,8 +102,7 @@ def zero_at(
 
 # --- The reference point of zero ------------------------------------------------------------------
 
-AT_REST_UM = 1e-6
-"""µm: a point whose error is smaller is held still by the errors themselves."""
+AT_REST_UM = 1e-6  # µm: a point whose error is smaller is held still by the errors themselves
 
 
 def error_at(model: Model, errors: ErrorSet, at: Coordinates) -> Array:
@@ -151,10 +150,8 @@ def held_by_view(model: Model, errors: ErrorSet, at: Coordinates) -> ErrorSet:
 
 # --- The reference line of straightness -----------------------------------------------------------
 
-EVENLY = 101
-"""Positions that a line is laid through where a curve has no points of its own."""
-STEPS = 8
-"""Steps to the line of the exact motion; each leaves a millionth of the one before."""
+EVENLY = 101  # positions that a line is laid through where a curve has no points of its own
+STEPS = 8  # steps to the line of the exact motion; each leaves a millionth of the one before
 
 
 class ReferenceLine(StrEnum):

@@ -182,8 +182,7 @@ class ComponentErrors(StrEnum):
     BEFORE_MOTION = "before_motion"
 
 
-TOOL_AXIS: Vector = (0.0, 0.0, 1.0)
-"""Direction of the tool axis in the tool frame."""
+TOOL_AXIS: Vector = (0.0, 0.0, 1.0)  # direction of the tool axis in the tool frame
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,13 +18,11 @@ from functools import cache, lru_cache
 from warpspace.exceptions import UnknownNameError
 from warpspace.units import MICROMETRE, MICRORADIAN
 
-DIRECTIONS = "XYZABC"
-"""Letters of the six errors of a rigid body: along x, y, z and about x, y, z."""
+DIRECTIONS = "XYZABC"  # letters of the six errors of a rigid body: along x, y, z and about x, y, z
 LINEAR_LETTERS = "XYZUVW"
 ROTARY_LETTERS = "ABC"
 AXIS_LETTERS = LINEAR_LETTERS + ROTARY_LETTERS
-MAX_AXES = 8
-"""Of a chain."""
+MAX_AXES = 8  # of a chain
 AXIS_NAMES = tuple(letter + digit for letter in AXIS_LETTERS for digit in ("", *"0123456789"))
 """Every name that an axis can have, in the order that axes are listed in."""
 
@@ -270,8 +268,7 @@ class ParameterTable(Mapping[str, Parameter]):
         return 2 * len(DIRECTIONS) * len(AXIS_NAMES)
 
 
-PARAMETERS = ParameterTable()
-"""The only table of parameters there is."""
+PARAMETERS = ParameterTable()  # the only table of parameters there is
 
 
 def parameter(key: str) -> Parameter:

@@ -65,11 +65,9 @@ def parse_chain(text: str) -> Chain:
 
 # --- A gantry: one linear axis on two parallel guides, each with a positioning error of its own ---
 
-ACROSS = "xyz"
-"""Directions in which the guides of a gantry may lie apart."""
+ACROSS = "xyz"  # directions in which the guides of a gantry may lie apart
 _DEFAULT_ACROSS = {"x": "y", "y": "x", "z": "x"}
-URAD_PER_UM_OVER_MM = 1000.0
-"""A micrometre over a millimetre is a milliradian."""
+URAD_PER_UM_OVER_MM = 1000.0  # A micrometre over a millimetre is a milliradian
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,12 +112,10 @@ def default_across(axis: str) -> str:
 # --- What a frame of a machine looks like where a description says so -----------------------------
 
 Vector = tuple[float, float, float]
-BODY_FRAMES = ("R", "S", "t", "w")
-"""Frames beside the axes that a body can ride on."""
+BODY_FRAMES = ("R", "S", "t", "w")  # frames beside the axes that a body can ride on
 MESH_ENDINGS = (".stl", ".obj", ".ply", ".glb")
 MESH_UNITS = ("mm", "cm", "m", "in")
-TOOL_SHAPES = ("cutter", "probe", "nozzle", "wheel", "gripper")
-"""What a tool can be drawn as."""
+TOOL_SHAPES = ("cutter", "probe", "nozzle", "wheel", "gripper")  # what a tool can be drawn as
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,8 +32,7 @@ from warpspace.units import Array, spell, spell_short
 
 MOTIONS = ("exaggeration", "rotation")
 MIN_FRAMES, MAX_FRAMES = ANIMATION_FRAMES
-MAX_PIXELS = 1_500_000_000
-"""Of all pictures together."""
+MAX_PIXELS = 1_500_000_000  # of all pictures together
 _TRACE_SAMPLES = 241
 
 

@@ -31,14 +31,11 @@ if TYPE_CHECKING:
     from warpspace.outputs.drawing.settings import FigureSettings
     from warpspace.scene.model import Scene
 
-END_S = 5.0
-"""How long a process that has nothing more to do may take to end by itself."""
+END_S = 5.0  # how long a process that has nothing more to do may take to end by itself
 
 _spawn = get_context("spawn")
-_pools: "set[ProcessPool]" = set()
-"""The pools that are in use."""
-_ending = threading.Event()
-"""Set once this program has been told to end."""
+_pools: "set[ProcessPool]" = set()  # the pools that are in use
+_ending = threading.Event()  # set once this program has been told to end
 _Task = tuple[Callable[..., Any], tuple[Any, ...], Mapping[str, Any]]
 
 
@@ -230,11 +227,9 @@ def _end_with_parent() -> None:
 
 # --- Figures drawn in a process of their own ------------------------------------------------------
 
-PICTURES_PER_PROCESS = 100
-"""A process is replaced after so many figures."""
+PICTURES_PER_PROCESS = 100  # A process is replaced after so many figures
 TIMEOUT_S = 300.0
-LEAST_MB = 1600
-"""Address space that the renderer takes for a picture."""
+LEAST_MB = 1600  # address space that the renderer takes for a picture
 
 
 def _draw(name: str, scenes: "Sequence[Scene]", settings: "FigureSettings", form: str) -> bytes:

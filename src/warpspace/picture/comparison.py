@@ -27,8 +27,7 @@ from warpspace.picture.traces import TraceLines
 from warpspace.picture.words import own_axes, spell_at, spell_point
 from warpspace.scene.model import Scene
 
-CHANGE = "B − A"
-"""How a change is called, and its sign."""
+CHANGE = "B − A"  # how a change is called, and its sign
 STATISTICS = {"mean": "mean_um", "RMS": "rms_um", "P95": "p95_um", "max": "max_um"}
 """Name of a statistic, and its attribute of `Statistics`."""
 

@@ -10,10 +10,8 @@ from warpspace.geometry.colour import nice_step
 from warpspace.geometry.surfaces import Shape, corners, deform, round_down
 from warpspace.units import MM_PER_UM, Array
 
-LABEL_GAP = 0.035
-"""How far outside its arrow a number stands, as a part of the longest edge."""
-BAR_FRACTION = 0.25
-"""Longest scale bar, as a part of the longest edge."""
+LABEL_GAP = 0.035  # how far outside its arrow a number stands, as a part of the longest edge
+BAR_FRACTION = 0.25  # longest scale bar, as a part of the longest edge
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,8 +108,7 @@ def scale_bars(longest_mm: float, exaggeration: float) -> tuple[ScaleBar, ScaleB
 
 # --- Round values along an axis -------------------------------------------------------------------
 
-NO_SPAN = 1e-12
-"""A range below this part of its ends is rounding, mm a part of 1 mm."""
+NO_SPAN = 1e-12  # A range below this part of its ends is rounding, mm a part of 1 mm
 
 
 def tick_values(low: float, high: float, most: float) -> list[float]:
@@ -127,8 +124,7 @@ def tick_values(low: float, high: float, most: float) -> list[float]:
 
 
 SIDES = 10
-_HEAD_PART = 0.7
-"""Longest head, as a part of the arrow."""
+_HEAD_PART = 0.7  # longest head, as a part of the arrow
 
 
 def _across(direction: Array) -> tuple[Array, Array]:

@@ -19,8 +19,7 @@ from warpspace.geometry.surfaces import (
 from warpspace.picture.model import Picture, Topology, topology
 from warpspace.units import Array
 
-LIFT = 0.0012
-"""How far grid lines are lifted off the surface, as a part of the longest edge."""
+LIFT = 0.0012  # how far grid lines are lifted off the surface, as a part of the longest edge
 EDGE_LIFT, ISOLINE_LIFT = 1.5, 1.25
 """Edges and isolines, in multiples of that."""
 Pieces = NDArray[np.float32]
@@ -166,8 +165,7 @@ def _joined(parts: list[Pieces]) -> Pieces:
 # --- Values written on isolines -------------------------------------------------------------------
 # Where they stand, so that few of them say what each line means.
 
-LEAST_LENGTH = 0.2
-"""Shortest line that carries its value, as a part of the longest edge."""
+LEAST_LENGTH = 0.2  # shortest line that carries its value, as a part of the longest edge
 ALONG_SLICE = 0.3
 """Where along its line the value stands on a slice: in the middle another slice crosses it."""
 MOST_LABELS = 60

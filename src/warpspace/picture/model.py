@@ -104,8 +104,7 @@ def _normal(face: surfaces.Index, shape: surfaces.Shape) -> Array:
 
 DIFFERENCE_LENGTH = "|E_B − E_A|"
 """What the statistics of a change are of: the length of the change of the error vector."""
-SAME_PLACE_MM = 1e-6
-"""Nodes nearer to each other than this are the same."""
+SAME_PLACE_MM = 1e-6  # nodes nearer to each other than this are the same
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -319,8 +318,7 @@ def choose_exaggeration(
 
 # --- The length that a picture is sized by: labels, markers, axes, the display factor -------------
 
-LEAST_SIZE_MM = 100.0
-"""Of a single point without traces, on a machine without linear axes."""
+LEAST_SIZE_MM = 100.0  # of a single point without traces, on a machine without linear axes
 
 
 def picture_size_mm(scene: Scene, grid: Grid) -> float:

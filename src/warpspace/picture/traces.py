@@ -86,12 +86,9 @@ def trace_lines(groups: Sequence[TraceLines]) -> tuple[TraceLine, ...]:
 
 
 Evaluate = Callable[..., ErrorField]
-LEAST_RADIUS_MM = 1e-3
-"""A point nearer to the axis is on it and has no direction from it."""
-LEAST_UM = 1e-6
-"""Traces with smaller errors are moved by none."""
-MOTION_SAMPLES = 181
-"""Places of a turn: every two degrees."""
+LEAST_RADIUS_MM = 1e-3  # A point nearer to the axis is on it and has no direction from it
+LEAST_UM = 1e-6  # traces with smaller errors are moved by none
+MOTION_SAMPLES = 181  # places of a turn: every two degrees
 
 
 def is_moved(line: TraceLine) -> bool:

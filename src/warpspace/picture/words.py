@@ -12,11 +12,9 @@ from warpspace.units import MINUS, THIN_SPACE, Array, spell_short
 # --- A point in both of its coordinates -----------------------------------------------------------
 # Positions of the axes, and the point of R they lead to.
 
-IN_R = "in R"
-"""What a point of the machine frame is introduced by."""
+IN_R = "in R"  # what a point of the machine frame is introduced by
 SEPARATOR = " · "
-_DIGITS = 6
-"""Decimals of a position in a command: a nanometre."""
+_DIGITS = 6  # decimals of a position in a command: a nanometre
 
 
 def spell_coordinate(value: SupportsFloat) -> str:

@@ -36,8 +36,7 @@ from warpspace.units import Array
 
 Weights = tuple[float, float]
 MOST_SAMPLES = 20_001
-CLOSE = 1e-5
-"""Largest deviation of a sampled sum half way between its points, by its largest value."""
+CLOSE = 1e-5  # largest deviation of a sampled sum half way between its points, by its largest value
 
 
 def combine_curves(first: ErrorFunction, second: ErrorFunction, weights: Weights) -> ErrorFunction:
@@ -155,8 +154,7 @@ def _sampled(first: ErrorFunction, second: ErrorFunction, weights: Weights) -> T
 
 # --- Reading columns of a CSV file beside a scene -------------------------------------------------
 
-GUIDES = "guides"
-"""Key of the positioning errors of the two guides of a gantry."""
+GUIDES = "guides"  # key of the positioning errors of the two guides of a gantry
 RUN, DIRECTION = "run", "direction"
 """Columns that a file of runs may have."""
 T = TypeVar("T")

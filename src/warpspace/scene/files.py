@@ -138,8 +138,7 @@ def parse_toml(text: str, source: str) -> dict[str, object]:
 
 # --- Spelling what stands in a scene file ---------------------------------------------------------
 
-SHOWN = 60
-"""Characters of a value or a key that a message shows."""
+SHOWN = 60  # characters of a value or a key that a message shows
 _DEPTH = 6
 _ENTRIES = 8
 _HUGE_BITS = 512
@@ -213,15 +212,13 @@ def _spell(value: object, depth: int) -> str:
 # behind the last column count for nothing. A file has one decimal sign: the point, or where
 # semicolons or tabs part the columns the comma.
 
-MARKS = (";", "\t", ",")
-"""What may part columns, the most telling first."""
+MARKS = (";", "\t", ",")  # what may part columns, the most telling first
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """What a text must not begin with, or a spreadsheet would take it for a formula."""
 _MOST_PROBLEMS = 10_000
 _TURN_RAD = 1.001 * math.tau
 _WHOLE_DEG = 0.02
-_MAX_LINES_OF_ROW = 20
-"""Lines that one row may take, where its texts hold line breaks."""
+_MAX_LINES_OF_ROW = 20  # lines that one row may take, where its texts hold line breaks
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _SEP = re.compile(r'"?sep=(.)"?\s*', re.IGNORECASE)
 _HEADING = re.compile(r"(.*?\S)\s*(?:\[\s*([^\[\]()]+?)\s*\]|\(\s*([^\[\]()]+?)\s*\))")

@@ -106,8 +106,7 @@ class Scene:
 
 
 FRAMES = ("machine", "workpiece")
-CHECK_NODES = 5
-"""Nodes per axis at which the first order is compared with the exact chain."""
+CHECK_NODES = 5  # nodes per axis at which the first order is compared with the exact chain
 
 
 def evaluate(
@@ -251,8 +250,7 @@ def second_order(
     return compare_orders(first, exact)
 
 
-LEAST_SHARE = 0.5
-"""Of its range that data of an axis cover, unsaid."""
+LEAST_SHARE = 0.5  # of its range that data of an axis cover, unsaid
 MANY_COSINES = 10_000_000
 """Cosines that the curves of a scene take before it is said: about a second of computing."""
 

@@ -87,8 +87,7 @@ def write_errors(scene: Scene, notation: Notation) -> ErrorSet:
     return convert_squareness(scene.machine, errors, notation.squareness)
 
 
-_WRAP = 8
-"""Entries of a list that stand on one line."""
+_WRAP = 8  # entries of a list that stand on one line
 
 
 def scene_to_toml(scene: Scene, notation: Notation | None = None) -> str:

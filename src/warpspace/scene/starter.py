@@ -18,21 +18,16 @@ LEVEL_TRAVEL: Mapping[int, Range] = {0: (-300.0, 300.0), 1: (-250.0, 250.0), 2: 
 """Of the first linear axis along a level direction x, y or z, mm."""
 UP_TRAVEL: Mapping[int, Range] = {1: (0.0, 400.0), 2: (-400.0, 0.0)}
 """Of the first one that is upright, y or z, mm: the tool touches the table at its lower end."""
-SECOND_TRAVEL = (-100.0, 100.0)
-"""Of a further linear axis along a direction, mm."""
+SECOND_TRAVEL = (-100.0, 100.0)  # of a further linear axis along a direction, mm
 TILT_TRAVEL, TURN_TRAVEL, ARM_TRAVEL = (-90.0, 90.0), (0.0, 360.0), (-150.0, 150.0)
 """Of axes that tilt, of the upright one, and of arms that turn about z in series, degrees."""
-ARM_RANGES = ((-60.0, 60.0), (20.0, 140.0))
-"""Where such arms reach the working volume, degrees."""
+ARM_RANGES = ((-60.0, 60.0), (20.0, 140.0))  # where such arms reach the working volume, degrees
 ARMS_AT = ((-350.0, -200.0), (-50.0, -200.0))
-ARM_END = (200.0, -200.0)
-"""In a plan view with all arms at zero, mm."""
+ARM_END = (200.0, -200.0)  # in a plan view with all arms at zero, mm
 TOOL_LENGTH, PIVOT, TURNING_HEAD = 150.0, 250.0, 400.0
 """From the tool point along the spindle to its nose, to a tilting and to a turning head, mm."""
-ABOVE_TABLE = 100.0
-"""Height of the tool point where no linear axis is upright, mm."""
-TILTS_AT = 50.0
-"""Height of a tilting axis above the table, mm."""
+ABOVE_TABLE = 100.0  # height of the tool point where no linear axis is upright, mm
+TILTS_AT = 50.0  # height of a tilting axis above the table, mm
 WORKPIECE_HEIGHT, WORKPIECE_SHARE = 200.0, 0.8
 
 
@@ -162,8 +157,7 @@ def _turned(vector: Vector) -> Vector:
 
 # --- The text of a scene to start from ------------------------------------------------------------
 
-_COLUMN = 40
-"""Where remarks begin."""
+_COLUMN = 40  # where remarks begin
 EXAMPLES = {
     "positioning": ("{ ramp = 12 }", "0 at the lower end of the axis, 12 at the upper"),
     "pitch": ("{ ramp = 30 }", "turns more and more along the axis"),

@@ -166,8 +166,7 @@ def path_to(robot: Any, link: str) -> list[Any]:
 
 # --- Frames of axes in R, and the places of frames in the ones before them ------------------------
 
-PARALLEL = 1e-9
-"""Deviation of a direction from x, y or z below which the frame is not turned."""
+PARALLEL = 1e-9  # deviation of a direction from x, y or z below which the frame is not turned
 
 
 def axis_frame(origin_mm: Array, direction: Array) -> tuple[Array, int]:
@@ -219,10 +218,8 @@ def roll_pitch_yaw_deg(rotation: Array) -> Array:
 
 # --- From the joints of a robot to the axes of a machine ------------------------------------------
 
-MOST_DEG = 720.0
-"""Of a limit: an axis that turns further, ±4π, is likely to be in degrees."""
-LARGEST = 1e9
-"""Metres, or the length of a direction: beyond, products overflow."""
+MOST_DEG = 720.0  # of a limit: an axis that turns further, ±4π, is likely to be in degrees
+LARGEST = 1e9  # metres, or the length of a direction: beyond, products overflow
 
 MM_PER_M = 1000.0
 TOOL_NAMES = ("tool", "tcp", "tool0", "tool_tip", "t", "ee_link", "flange")
@@ -449,8 +446,7 @@ def _frames_of_links(
 
 
 TOLERANCES = {"translation": 10.0, "rotation": 20.0, "squareness": 25.0}
-ARM_RANGE = 30.0
-"""Half of the range that a rotary axis spans the volume with, degrees."""
+ARM_RANGE = 30.0  # half of the range that a rotary axis spans the volume with, degrees
 LONGEST_NOTE = 300
 
 
@@ -505,8 +501,7 @@ def _ranges(machine: Machine) -> dict[str, Range]:
 
 # --- What of a robot has no place in a machine: named, so that nothing is lost unsaid -------------
 
-SHOWN = 6
-"""Names that a remark lists."""
+SHOWN = 6  # names that a remark lists
 
 _OF_LINKS: tuple[tuple[str, Callable[[Any], object]], ...] = (
     ("masses and inertias", lambda link: link.inertial is not None),

@@ -20,12 +20,9 @@ from warpspace.app.browser.viser_private import check_messages, check_updates, l
 logger = logging.getLogger(__name__)
 LARGEST_NUMBER = 1e9
 LONGEST_NAME = 1_000
-LONGEST_TEXT = 1_000_000
-"""Of the value of a text field, characters."""
-MOST_NUMBERS = 16
-"""In the value of a widget that shows several."""
-LARGEST_SIDE_PX = 16_384
-"""Of the page's picture, and of a picture that it renders."""
+LONGEST_TEXT = 1_000_000  # of the value of a text field, characters
+MOST_NUMBERS = 16  # in the value of a widget that shows several
+LARGEST_SIDE_PX = 16_384  # of the page's picture, and of a picture that it renders
 PNG_START = b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR"
 
 Number = Annotated[float, Meta(ge=-LARGEST_NUMBER, le=LARGEST_NUMBER)]  # NaN is neither

@@ -11,16 +11,14 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-PHONE_PX = 576
-"""Width up to which viser puts all panels into one sheet at the bottom of the page."""
+PHONE_PX = 576  # width up to which viser puts all panels into one sheet at the bottom of the page
 NARROW_PX, WIDE_PX = 1200, 2400
 MOST_PX = 16_384
 LEAST_PX = 120
 LONGEST_WORD = 100
 HEADING_PX, FOOT_PX = 84, 52
 """Heights of heading and scale bars, taken until the page has said how high they are."""
-SIDE_PX = 16
-"""Kept free at either side, for words at the ends of axes."""
+SIDE_PX = 16  # kept free at either side, for words at the ends of axes
 MOST_SHARE, LEAST_SHARE = 0.4, 0.2
 """Parts of the height: what the heading keeps free at most, what the drawing has at least."""
 

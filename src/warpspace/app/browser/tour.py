@@ -6,8 +6,7 @@ from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.resources import files
 
-STORAGE_KEY = "warpspace-visited"
-"""What a browser remembers once the tour was shown."""
+STORAGE_KEY = "warpspace-visited"  # what a browser remembers once the tour was shown
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,8 +22,7 @@ from warpspace.scene.model import Scene
 # It consists of letters and digits only, since viser's client writes the address anew when it
 # starts (which drops what stands behind a #, and would unpack an encoded value).
 
-MAX_WORD = 8_000
-"""Characters of a packed link: servers take request lines of 8 kB."""
+MAX_WORD = 8_000  # characters of a packed link: servers take request lines of 8 kB
 
 
 def pack(link: str) -> str:

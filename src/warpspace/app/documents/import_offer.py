@@ -12,10 +12,8 @@ from warpspace.formats.source import Source
 from warpspace.formats.to_scene import ImportedScene, into_scene
 from warpspace.scene.model import Scene
 
-LONGEST_AXES = 200
-"""Characters of what is said of axes."""
-LONGEST_PROBLEM = 1500
-"""Characters of a message in the window."""
+LONGEST_AXES = 200  # characters of what is said of axes
+LONGEST_PROBLEM = 1500  # characters of a message in the window
 
 
 @dataclass(frozen=True)

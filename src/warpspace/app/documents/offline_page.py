@@ -47,8 +47,7 @@ POLICY = (
 )
 """What the browser may load: what is in the file, and nothing else."""
 ASPECT = 1.5
-MARGIN = 1.3
-"""Room around the box, for the axes beside it."""
+MARGIN = 1.3  # room around the box, for the axes beside it
 
 
 def offline_picture(

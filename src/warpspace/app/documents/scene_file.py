@@ -38,10 +38,8 @@ from warpspace.scene.save import scene_to_toml
 
 MARK = "# warpspace-view: "
 COMPARED = "# warpspace-compare: "
-MAX_LINK = 5_500
-"""Characters of a link before it is packed: servers take request lines of 8 kB."""
-MAX_COMPARED = 400_000
-"""Characters of a comparison in a file."""
+MAX_LINK = 5_500  # characters of a link before it is packed: servers take request lines of 8 kB
+MAX_COMPARED = 400_000  # characters of a comparison in a file
 SCENE, PACKED, NAME = "scene", "file", "name"
 _HEAD = re.compile(r"(?:[ \t]*+(?:#[^\n]*+)?\n)*+")
 _VIEW, _COMPARISON = (

@@ -36,8 +36,7 @@ MAX_LENGTH = 16_000
 MAX_FIELDS = 400
 CAMERA = "camera"
 CAMERA_NUMBERS = 10
-FARTHEST = 1000.0
-"""Farthest place of a camera, in units of the drawing."""
+FARTHEST = 1000.0  # farthest place of a camera, in units of the drawing
 FOV_RAD = (0.01, 2.5)
 LOOK_NAMES = ("surface", "quantity", "range_mode")
 LOOK_SWITCHES = ("isolines", "arrows", "worst", "bars", "follow")
@@ -275,8 +274,7 @@ def _indices(state: AppState, text: str) -> Iterator[int]:
 
 PREFIX = "compare."
 PINNED = "pinned"
-NOW = "now"
-"""What is steered, in files and links."""
+NOW = "now"  # what is steered, in files and links
 TITLE, OLD_TITLE = f"{BEFORE}: ", "snapshot: "
 """What the title of a pinned state begins with, now and in older files and links."""
 LONGEST_TITLE = 200

@@ -14,8 +14,7 @@ from warpspace.field.grid import Workspace, seen_from_workpiece
 from warpspace.units import MM_PER_UM, Array
 
 CACHE_BYTES = 60_000_000
-MOST_SITES = 20_000
-"""Responses of so many places are held."""
+MOST_SITES = 20_000  # responses of so many places are held
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,12 +29,9 @@ from warpspace.picture.mesh import thick_map
 from warpspace.picture.traces import is_moved
 from warpspace.units import Array
 
-TOLERANCE_RAD = 0.0032
-"""How far a click may pass a trace: about seven pixels of the usual view."""
-BETWEEN = 5
-"""Places looked at between two samples of a trace: one degree apart."""
-REACH_MM = 1e7
-"""Rays from farther away than this come from no camera."""
+TOLERANCE_RAD = 0.0032  # how far a click may pass a trace: about seven pixels of the usual view
+BETWEEN = 5  # places looked at between two samples of a trace: one degree apart
+REACH_MM = 1e7  # rays from farther away than this come from no camera
 
 
 @dataclass(frozen=True, slots=True)

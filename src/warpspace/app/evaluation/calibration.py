@@ -24,8 +24,7 @@ MOST_FILES, MOST_READINGS = 6, 5_000
 """Files of a page, and readings in all of them: what a fit needs of memory goes with it."""
 MOST_NEXT = 3
 LONGEST_KEYS = 500
-Tell = Callable[[str], None]
-"""Takes what is being done, in words."""
+Tell = Callable[[str], None]  # takes what is being done, in words
 
 
 class StoppedError(WarpspaceError):

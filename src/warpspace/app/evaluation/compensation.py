@@ -16,8 +16,7 @@ from warpspace.formats.compensation.controller import Controller
 from warpspace.scene.model import Scene
 
 MACHINE, BOTH, LEFT = "the machine", "before and after", "what is left"
-BOXES = (MACHINE, BOTH, LEFT)
-"""What the box can show."""
+BOXES = (MACHINE, BOTH, LEFT)  # what the box can show
 
 
 class StoppedError(WarpspaceError):

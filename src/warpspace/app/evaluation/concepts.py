@@ -16,8 +16,7 @@ from warpspace.scene.model import Scene
 if TYPE_CHECKING:
     from warpspace.analysis.concepts import Concept, Concepts
 
-NODES = 21
-"""Nodes per axis that colours are chosen from; the pictures have the same."""
+NODES = 21  # nodes per axis that colours are chosen from; the pictures have the same
 
 
 @dataclass(frozen=True, slots=True)

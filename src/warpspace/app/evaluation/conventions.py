@@ -37,8 +37,7 @@ from warpspace.machine.errors import ErrorSet, Table
 from warpspace.scene.model import Scene, grid_basis
 from warpspace.units import Array
 
-OWN = "own"
-"""The scene's own conventions, among the choices that are compared with them."""
+OWN = "own"  # the scene's own conventions, among the choices that are compared with them
 Reference = Mapping[str, float] | None
 
 

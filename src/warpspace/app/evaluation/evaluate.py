@@ -31,8 +31,7 @@ from warpspace.scene.model import grid_basis
 from warpspace.units import Array
 
 CACHE_BYTES = 400_000_000
-TRACE_SAMPLES = 73
-"""Points along a trace: every five degrees of a turn."""
+TRACE_SAMPLES = 73  # points along a trace: every five degrees of a turn
 
 
 @dataclass(frozen=True, slots=True)

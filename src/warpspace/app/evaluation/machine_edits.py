@@ -27,8 +27,7 @@ from warpspace.units import MICROMETRE
 # --- The two guides of a gantry: their errors, which the axis has as mean and rotation ------------
 
 SAMPLES = 65
-ALIKE = 1e-9
-"""By how much two curves of amplitude 1 may differ that count as one."""
+ALIKE = 1e-9  # by how much two curves of amplitude 1 may differ that count as one
 
 
 def guide_errors(state: AppState, axis: str) -> tuple[float, float] | None:
@@ -126,8 +125,7 @@ def library_scene(name: str) -> Scene | None:
 
 T = TypeVar("T")
 Edit = Callable[[Scene], Edited]
-SHOWN = 30
-"""Characters of what was typed that a message repeats."""
+SHOWN = 30  # characters of what was typed that a message repeats
 NUMBERS: Mapping[str, Callable[[Scene, str, int, float], Edited]] = {
     "offset": scene_edits.change_offset,
     "rotation": scene_edits.change_rotation,

@@ -291,8 +291,7 @@ def _clamped(what: str, value: float, limit: float, unit: str) -> tuple[float, t
 
 # --- What belongs to frames beside their places: two guides of a gantry, meshes of a user ---------
 
-START_SPAN_MM = 1000.0
-"""Of guides where no travel across says how far apart they are."""
+START_SPAN_MM = 1000.0  # of guides where no travel across says how far apart they are
 
 
 def switch_gantry(scene: Scene, axis: str) -> Edited:
@@ -364,8 +363,7 @@ def _with_gantry(
 
 # --- Another chain, another order, the other side, another machine of the library -----------------
 
-MOST_CHAIN_TEXT = 100
-"""Characters of a chain, as in a file."""
+MOST_CHAIN_TEXT = 100  # characters of a chain, as in a file
 FRAME = "F"
 STEPS = {"left": -1, "right": 1}
 """Ways in which an axis moves along the written chain: towards the workpiece, towards the tool."""

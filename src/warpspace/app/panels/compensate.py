@@ -40,8 +40,7 @@ from warpspace.formats.compensation.compensate import Compensation
 # --- The files of a compensation as one download --------------------------------------------------
 
 STEM = "compensation"
-DATE = (1980, 1, 1, 0, 0, 0)
-"""The same table gives the same bytes."""
+DATE = (1980, 1, 1, 0, 0, 0)  # the same table gives the same bytes
 
 
 def packed(found: Compensation) -> tuple[str, bytes]:

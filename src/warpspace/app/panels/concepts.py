@@ -34,8 +34,7 @@ if TYPE_CHECKING:
 # --- Comparing and drawing beside the session: a progress bar and a way to cancel -----------------
 
 COMPARING, SHEET = "Comparing machines", "Sheet of all machines"
-SAMPLED = 45.0
-"""Per cent of the bar when all machines are sampled; the rest are pictures."""
+SAMPLED = 45.0  # per cent of the bar when all machines are sampled; the rest are pictures
 STRIP_PX = (480, 340)
 """Size of each picture; it is shown about half as large, sharp on fine screens too."""
 DRAWING_S, SHEET_S = 6.0, 8.0
@@ -123,8 +122,7 @@ def _request(
 # The library, the present machine, scenes of the page.
 
 VERB = "choose"
-MOST_OFFERS = 200
-"""Scenes that are offered."""
+MOST_OFFERS = 200  # scenes that are offered
 
 
 class ConceptWindow:

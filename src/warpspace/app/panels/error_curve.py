@@ -33,8 +33,7 @@ from warpspace.machine.curves.registry import curve_kind
 from warpspace.machine.errors import Constant, ErrorFunction, Measurement
 
 CHART_HEIGHT = 128
-LABEL_WIDTH = 76
-"""Room for the labels, which stand beside their controls here, CSS pixels."""
+LABEL_WIDTH = 76  # room for the labels, which stand beside their controls here, CSS pixels
 
 
 Drawn = tuple[ErrorFunction, ErrorFunction | None, Measurement | None]

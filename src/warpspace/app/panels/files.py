@@ -30,11 +30,9 @@ from warpspace.machine.limits import MAX_SCENE_BYTES
 FIGURE_S, VIEW_S, PAGE_S, EXPORT_S = 5.0, 1.5, 1.0, 1.0
 RENDER_TIMEOUT_S = 30.0
 LARGEST_VIEW_PX = 4096
-AS_COLOURED = "what is coloured"
-"""The figure that suits the picture on the screen."""
+AS_COLOURED = "what is coloured"  # the figure that suits the picture on the screen
 Make = Callable[[threading.Event], tuple[str, bytes]]
-WITHOUT_TABLES = LiveModel()
-"""Evaluates what files show, for all tabs and beside their sessions."""
+WITHOUT_TABLES = LiveModel()  # evaluates what files show, for all tabs and beside their sessions
 
 
 class FilesPanel:

@@ -111,8 +111,7 @@ def _variant_words(kind: Format | None) -> dict[str, str]:
 
 # --- The window that shows what files of measured data would bring, to apply or to cancel ---------
 
-MOST_FILES = 16
-"""Files that are read together."""
+MOST_FILES = 16  # files that are read together
 
 
 def accepted_endings() -> str:

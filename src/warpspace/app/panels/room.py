@@ -20,8 +20,7 @@ from warpspace.picture.mesh import isoline_labels
 from warpspace.picture.words import spell_factor
 from warpspace.units import Array, spell_short
 
-MACHINE = "machine"
-"""Word of the button that hides the ghost of the machine, or shows it."""
+MACHINE = "machine"  # word of the button that hides the ghost of the machine, or shows it
 
 
 class RoomPanel:

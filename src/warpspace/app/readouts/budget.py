@@ -20,8 +20,7 @@ REFUSED = message(
     "A difference of two machines has no causes of its own. Show A or B in the tab Compare for its"
     " error budget."
 )
-SHOWN = 14
-"""Contributions listed one by one; the smaller ones are summed up in one row."""
+SHOWN = 14  # contributions listed one by one; the smaller ones are summed up in one row
 AT, EDIT, EXCLUDE, INCLUDE, LEVER = "at", "edit", "exclude", "include", "lever"
 """First words of what a click sends; a point as typed, or the key of an error, follows."""
 Attributes = Callable[[str], Markup]

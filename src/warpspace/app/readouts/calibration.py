@@ -14,12 +14,9 @@ from warpspace.units import UM_PER_MM, Array
 
 Button = Callable[[str], Markup]
 WIDTH, HEIGHT, EDGE = 400.0, 110.0, 6.0
-MOST_BARS = 200
-"""Readings that have a bar each; more share one, which shows the longest."""
-WIDE = 100.0
-"""Ends of intervals that need no decimals, µm or µrad."""
-MOST_WORDS = 12
-"""Notes and readings far off that are listed."""
+MOST_BARS = 200  # readings that have a bar each; more share one, which shows the longest
+WIDE = 100.0  # ends of intervals that need no decimals, µm or µrad
+MOST_WORDS = 12  # notes and readings far off that are listed
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,8 +12,7 @@ WHAT = (
 )
 ROWS = {"mean": "mean_um", "RMS": "rms_um", "P95": "p95_um", "max": "max_um"}
 """Word on a row to field of `Statistics`."""
-MOST_WORDS = 12
-"""Assumptions and notes that are listed."""
+MOST_WORDS = 12  # assumptions and notes that are listed
 
 
 def note_html(problem: str, *, known: bool) -> str:

@@ -27,8 +27,7 @@ if TYPE_CHECKING:
 Button = Callable[[str], Markup]
 NUMBERS = {"mean": "mean_um", "P95": "p95_um", "max": "max_um"}
 """Word on a column to field of `MonteCarlo`."""
-MARGIN_PX = 6
-"""Paper that is kept above and below a picture."""
+MARGIN_PX = 6  # paper that is kept above and below a picture
 
 
 @dataclass(frozen=True, slots=True)

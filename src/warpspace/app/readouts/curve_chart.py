@@ -15,10 +15,8 @@ from warpspace.units import Array, spell
 
 CURVE_COLOUR = "#4a7ab5"
 ZERO_COLOUR = "#9aa3af"
-ROOM = 0.06
-"""Share of the range of the values that is left free above and below."""
-FEW_READINGS = 2000
-"""Readings that are drawn at most, evenly picked from all."""
+ROOM = 0.06  # share of the range of the values that is left free above and below
+FEW_READINGS = 2000  # readings that are drawn at most, evenly picked from all
 
 
 def _readings(label: str, fill: str) -> uplot.Series:

@@ -164,8 +164,7 @@ def _ends(label: str, what: str, name: str, ends: tuple[float, float], unit: str
 
 # --- The machines to start from as HTML: a small picture, a title and a chain each ----------------
 
-WIDTH_PX = 240
-"""Of a small picture: it is shown smaller, sharp on fine screens too."""
+WIDTH_PX = 240  # of a small picture: it is shown smaller, sharp on fine screens too
 QUALITY = 80
 DRAWING = (0.02, 0.16, 0.6, 0.875)
 """Part of a picture in which the machine is: left, upper, right and lower end."""

@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from warpspace.app.evaluation.probability import Estimate
 
 FIXED = "fixed"
-MARGIN = 1.02
-"""Length of the chart's axis by the largest value on it."""
+MARGIN = 1.02  # length of the chart's axis by the largest value on it
 
 
 def spell_probability(estimated: "Estimate") -> str:

@@ -12,11 +12,9 @@ from warpspace.app.readouts.html import message, render
 from warpspace.machine.axes import parameter
 from warpspace.units import spell, spell_short
 
-SEEN = "seen"
-"""Word that the page sends once a reader sees where the answer will be."""
+SEEN = "seen"  # word that the page sends once a reader sees where the answer will be
 NOTHING = message("No point is off in this loop: there is nothing to repair.", "repair none")
-NO_GAIN_UM = 0.01
-"""A repair that gains less is not offered, µm."""
+NO_GAIN_UM = 0.01  # A repair that gains less is not offered, µm
 COLUMNS = {"mean": "mean_um", "RMS": "rms_um", "P95": "p95_um", "max": "max_um"}
 Button = Callable[[str], Markup]
 

@@ -19,10 +19,8 @@ from warpspace.geometry.surfaces import round_down
 from warpspace.picture.words import direction_words, spell_factor, spell_point
 from warpspace.units import MICROMETRE, MM_PER_UM, spell_short
 
-BAR_PX = 190
-"""Height of the colour bar, CSS pixels; the style sheet has it too."""
-LINE_PX = 12
-"""Least distance of two names beside the colour bar."""
+BAR_PX = 190  # height of the colour bar, CSS pixels; the style sheet has it too
+LINE_PX = 12  # least distance of two names beside the colour bar
 _BAR_MM = 100.0
 _PX_PER_MM = 0.9
 _STOPS = 32
@@ -171,8 +169,7 @@ NOTHING = message(
     "Choose a scene for B, or pin the present errors as before and go on changing them: both are"
     " drawn with the same colours, exaggeration and camera."
 )
-MARK = "▸ "
-"""Before the name of what is drawn."""
+MARK = "▸ "  # before the name of what is drawn
 ROWS = {"mean": "mean_um", "RMS": "rms_um", "P95": "p95_um", "max": "max_um"}
 """Word on a row to field of `Statistics`."""
 

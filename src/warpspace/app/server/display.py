@@ -12,10 +12,8 @@ from warpspace.app.viewport.layers import Layer
 
 SETTLE_S = 0.1
 """Pause in the changes after which charts follow: longer than between two moves of a drag."""
-LONGEST_SETTLE_S = 0.4
-"""Charts lag no longer than this behind while a slider is being dragged."""
-REST_S = 0.5
-"""Pause after which the slowest panels follow; a drag does not pay for them."""
+LONGEST_SETTLE_S = 0.4  # charts lag no longer than this behind while a slider is being dragged
+REST_S = 0.5  # pause after which the slowest panels follow; a drag does not pay for them
 
 
 class Display:

@@ -77,8 +77,7 @@ class Pointing:
 
 # --- What a page consists of, in the order it is built: what matters most first -------------------
 
-ERROR_CURVE = "Error curve"
-"""The tab below the sliders."""
+ERROR_CURVE = "Error curve"  # the tab below the sliders
 
 Built: TypeAlias = tuple[Sequence[Layer], Sequence[Panel]]
 Build: TypeAlias = Callable[[LivePicture], Built]

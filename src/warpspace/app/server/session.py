@@ -39,10 +39,8 @@ from warpspace.app.state.store import StateStore, apply_each
 from warpspace.app.viewport.tab_camera import focus
 
 logger = logging.getLogger(__name__)
-TOKEN_WAIT_S = 0.25
-"""How long the first picture waits for a tab that may have been here before."""
-USE_FADES_S = 2.0
-"""How long a tab that has kept the server busy stands back behind the others."""
+TOKEN_WAIT_S = 0.25  # how long the first picture waits for a tab that may have been here before
+USE_FADES_S = 2.0  # how long a tab that has kept the server busy stands back behind the others
 
 
 class Turns:

@@ -28,8 +28,7 @@ JOINED = (
     "The server was restarted, and somebody has changed the review since. What this tab had kept"
     " was not brought back."
 )
-CAMERA_PAUSE_S = 1.0
-"""How long after a move the camera is kept: not with each of its steps."""
+CAMERA_PAUSE_S = 1.0  # how long after a move the camera is kept: not with each of its steps
 
 
 class TabKeeper:

@@ -41,8 +41,7 @@ from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 
 logger = logging.getLogger(__name__)
-WATCH_S = 2.0
-"""How often sessions are looked for whose connection is gone."""
+WATCH_S = 2.0  # how often sessions are looked for whose connection is gone
 FAREWELL_S = 0.5
 """How long the end waits for pages to close their connection; some read nothing any more."""
 

@@ -27,8 +27,7 @@ from warpspace.scene.model import Scene
 if TYPE_CHECKING:
     from warpspace.formats.compensation.controller import Controller
 
-NODES = Span(*LIVE_NODES, 2.0)
-"""Grid nodes per axis: odd numbers."""
+NODES = Span(*LIVE_NODES, 2.0)  # grid nodes per axis: odd numbers
 EXAGGERATION = Span(*FACTORS, 1.0)
 TRUE_SCALE = 1.0
 START_NODES = 21

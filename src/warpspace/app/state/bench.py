@@ -5,8 +5,7 @@ from dataclasses import dataclass, field, replace
 
 from warpspace.bench.base import bench_names, find_test
 
-LONGEST = 80
-"""Characters of one option."""
+LONGEST = 80  # characters of one option
 
 
 @dataclass(frozen=True, slots=True)

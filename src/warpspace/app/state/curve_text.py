@@ -13,8 +13,7 @@ from warpspace.machine.limits import MAX_CURVE_ROWS, MAX_CURVE_TEXT, MAX_ERROR
 from warpspace.units import Array
 
 CHART_SAMPLES = 181
-MAX_KINKS = 500
-"""Kinks of a curve that are drawn where they are."""
+MAX_KINKS = 500  # kinks of a curve that are drawn where they are
 
 
 @dataclass(frozen=True, slots=True)

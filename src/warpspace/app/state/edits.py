@@ -13,8 +13,7 @@ from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet, Toleranc
 from warpspace.machine.limits import MAX_ERROR, MAX_HALF_WIDTH, MIN_HALF_WIDTH
 
 LEAST_HALF_WIDTH = 10.0
-FINE_UP_TO = 100.0
-"""µm or µrad: sliders of tolerances that end below have a step of 0.01."""
+FINE_UP_TO = 100.0  # µm or µrad: sliders of tolerances that end below have a step of 0.01
 
 
 def axis_span(state: AppState, key: str) -> tuple[float, float]:

@@ -29,8 +29,7 @@ RANGE_TOP = Span(*limits.RANGE_TOP, 0.001)
 START_TOP = 50.0
 POINT_MM = Span(-2000.0, 2000.0, 1.0)
 MOST_TYPED = 200
-MOST_HELD = 8
-"""Positions that one axis can be held at while another one is turned."""
+MOST_HELD = 8  # positions that one axis can be held at while another one is turned
 
 
 @dataclass(frozen=True, slots=True)

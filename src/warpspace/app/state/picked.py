@@ -7,8 +7,7 @@ from warpspace.app.state.spelling import read_point, refuse, spell_numbers
 from warpspace.kinematics.model import Loop
 from warpspace.machine.description import Vector
 
-FARTHEST_MM = 1e5
-"""Farthest point of a workpiece that a link may ask about."""
+FARTHEST_MM = 1e5  # farthest point of a workpiece that a link may ask about
 
 
 @dataclass(frozen=True, slots=True)

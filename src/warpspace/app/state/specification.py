@@ -14,8 +14,7 @@ START_UM = 50.0
 SAMPLED, MAX = "sampled", "max"
 """One random point of each machine (as in the thesis), or its worst point, which is the rule."""
 UNIFORM, NORMAL = "uniform", "normal"
-MOST_COSTS_TEXT = 2000
-"""Characters of a list of costs."""
+MOST_COSTS_TEXT = 2000  # characters of a list of costs
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,10 +18,8 @@ from warpspace.app.state.app_state import AppState
 
 S = TypeVar("S")
 
-STEPS = 100
-"""Steps that can be undone; the oldest are forgotten."""
-SAME_STEP_S = 0.8
-"""Changes of one thing that follow each other faster than this are one step."""
+STEPS = 100  # steps that can be undone; the oldest are forgotten
+SAME_STEP_S = 0.8  # changes of one thing that follow each other faster than this are one step
 
 
 @dataclass(frozen=True, slots=True)

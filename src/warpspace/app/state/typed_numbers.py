@@ -16,8 +16,7 @@ from warpspace.picture.words import IN_R
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)(e[+-]?\d+)?", re.IGNORECASE | re.ASCII)
 _SIGNS = str.maketrans({"−": "-", "–": "-", "\u00a0": " ", "\u202f": " "})
 """Signs and blanks that programs write in place of the plain ones."""
-_SHOWN = 40
-"""Characters of a line that a message shows."""
+_SHOWN = 40  # characters of a line that a message shows
 
 
 def read_typed(text: str, unit: str = "") -> float | None:
@@ -88,8 +87,7 @@ def _numbers(number: int, line: str) -> tuple[float, ...]:
 
 # --- A point that somebody types as positions of the axes -----------------------------------------
 
-LONGEST = 200
-"""Characters that are read."""
+LONGEST = 200  # characters that are read
 EXAMPLE = "X 275 Y -225 Z -480"
 _POINT_NUMBER = r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:e[-+]?\d+)?"
 # a digit belongs to the name where a number follows apart: C1 30, C1=30, but C30

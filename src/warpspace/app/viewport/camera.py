@@ -7,8 +7,7 @@ import numpy as np
 from warpspace.picture.model import VIEWS, Direction
 from warpspace.units import Array
 
-FOV_DEG = 22.0
-"""Vertical field of view: long enough that parallel edges look parallel."""
+FOV_DEG = 22.0  # vertical field of view: long enough that parallel edges look parallel
 MARGIN = 1.06
 _ROUNDS = 8
 Vector = tuple[float, float, float]

@@ -21,8 +21,7 @@ from warpspace.app.viewport.named_views import (
 )
 from warpspace.units import Array
 
-LEAST_SIZE = 120
-"""CSS pixels of a picture that is taken to be one."""
+LEAST_SIZE = 120  # CSS pixels of a picture that is taken to be one
 MOVED = 1e-3
 """How far from where it was put, as a part of its distance, a camera has been moved by hand."""
 

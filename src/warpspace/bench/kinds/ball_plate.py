@@ -25,8 +25,7 @@ from warpspace.geometry.surfaces import round_down
 from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM, Array
 
-SHOWN = 0.35
-"""Share of the pitch that the largest deviation is drawn with, at most."""
+SHOWN = 0.35  # share of the pitch that the largest deviation is drawn with, at most
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -30,10 +30,8 @@ from warpspace.units import UM_PER_MM_URAD, Array
 
 DEFAULT_POINTS, MIN_POINTS, MAX_POINTS = 360, 8, 100_000
 TURN = 360.0
-LEEWAY_DEG = 5.0
-"""By which the ends of an arc may differ, unsaid."""
-ALIKE_UM = 1e-6
-"""Runs that differ by less are drawn as one."""
+LEEWAY_DEG = 5.0  # by which the ends of an arc may differ, unsaid
+ALIKE_UM = 1e-6  # runs that differ by less are drawn as one
 SENSES = {1.0: "counter-clockwise", -1.0: "clockwise"}
 
 
@@ -42,8 +40,7 @@ SENSES = {1.0: "counter-clockwise", -1.0: "clockwise"}
 
 FULL_DEG = 314.0
 """Arcs that reach so far round count as full circles: eight points have gaps of 45°."""
-HALF_DEG = 180.0
-"""An ellipse is told from a displaced centre from half a circle upwards."""
+HALF_DEG = 180.0  # an ellipse is told from a displaced centre from half a circle upwards
 
 
 @dataclass(frozen=True)

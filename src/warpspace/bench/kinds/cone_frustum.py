@@ -29,13 +29,10 @@ from warpspace.units import Array
 
 # --- Rotary axes that turn the tool axis where it is wanted on the workpiece ----------------------
 
-SEEDS = 73
-"""Positions of each rotary axis at which a start is looked for."""
+SEEDS = 73  # positions of each rotary axis at which a start is looked for
 STEPS = 30
-CLOSE = 1e-9
-"""Length of what is left of the direction: a thousandth of a microradian."""
-PENALTY = 0.02
-"""Of a way of one radian from the position before, where several positions fit."""
+CLOSE = 1e-9  # length of what is left of the direction: a thousandth of a microradian
+PENALTY = 0.02  # of a way of one radian from the position before, where several positions fit
 
 
 def orient(
@@ -115,8 +112,7 @@ def _newton(direction: Callable[[Array], Array], start: Array, target: Array) ->
     return angles
 
 
-MOST = 3_600
-"""Readings of one file: the rotary axes are found for one after the other."""
+MOST = 3_600  # readings of one file: the rotary axes are found for one after the other
 
 
 @dataclass(frozen=True, kw_only=True)

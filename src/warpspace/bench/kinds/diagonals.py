@@ -19,8 +19,7 @@ from warpspace.units import Array
 
 # --- Diagonals of a volume: their names, what readings along them come to (ISO 230-6) -------------
 
-BODY = ("PPP", "NPP", "PNP", "PPN")
-"""Which way x, y and z run: P upwards, N downwards."""
+BODY = ("PPP", "NPP", "PNP", "PPN")  # which way x, y and z run: P upwards, N downwards
 KINDS = ("body", "face", "step")
 
 

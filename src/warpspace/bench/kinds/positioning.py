@@ -16,13 +16,10 @@ from warpspace.machine.axes import is_linear
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
-LEVER_MM = 1000.0
-"""Between the two points that an angle is read at: 1 µm there is 1 µrad."""
-COVERAGE = 2.0
-"""k of ISO 230-2."""
+LEVER_MM = 1000.0  # between the two points that an angle is read at: 1 µm there is 1 µrad
+COVERAGE = 2.0  # k of ISO 230-2
 FORWARD, BACKWARD = 1.0, -1.0
-ALIKE = 1e-6
-"""Means that differ by less, µm or µrad, are drawn as one."""
+ALIKE = 1e-6  # means that differ by less, µm or µrad, are drawn as one
 
 
 @dataclass(frozen=True)

@@ -28,8 +28,7 @@ from warpspace.kinematics.chain import branch_pose
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
-LEVER_MM = 1000.0
-"""Between the places where the axis is sensed: 1 µm there is 1 µrad."""
+LEVER_MM = 1000.0  # between the places where the axis is sensed: 1 µm there is 1 µrad
 CHANNELS = ("x_um", "y_um", "z_um", "a_urad", "b_urad", "c_urad")
 """Across, across, along the axis; about the same three: E_XC, E_YC, E_ZC, E_AC, E_BC, E_CC of C."""
 

@@ -28,8 +28,7 @@ from warpspace.units import Array
 # --- Reference lines of straightness and squareness -----------------------------------------------
 # End points, least squares, minimum zone.
 
-REFERENCES = ("end_points", "least_squares", "minimum_zone")
-"""ISO 230-1, 3.4.10 to 3.4.12."""
+REFERENCES = ("end_points", "least_squares", "minimum_zone")  # ISO 230-1, 3.4.10 to 3.4.12
 WORDS = {
     "end_points": "end-point line",
     "least_squares": "least-squares line",

@@ -30,8 +30,7 @@ from warpspace.units import Array
 
 _LYING = 0.7
 """Upward part of a tool axis below which the machine is built as one with a horizontal spindle."""
-_ARM = 0.9
-"""Thickness of an arm, in walls."""
+_ARM = 0.9  # thickness of an arm, in walls
 _LONG = 1.5
 """Ratio of travels from which a machine is a gantry on rails instead of a saddle on a wall."""
 

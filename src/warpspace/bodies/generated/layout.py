@@ -19,12 +19,9 @@ from warpspace.units import Array
 
 UP = np.array([0.0, 0.0, 1.0])
 _SHARE_OF_VOLUME, _SMALLEST_MM = 0.2, 12.0
-_FLAT = 0.3
-"""Of the longest half edge: what a volume is taken to have where no axis moves."""
-_ARMS = 0.4
-"""Of the length of all arms: half edge of the place before a robot without level axes."""
-_STEEP = 0.75
-"""Cosine of an angle to a direction below which an axis counts as pointing along it."""
+_FLAT = 0.3  # of the longest half edge: what a volume is taken to have where no axis moves
+_ARMS = 0.4  # of the length of all arms: half edge of the place before a robot without level axes
+_STEEP = 0.75  # cosine of an angle to a direction below which an axis counts as pointing along it
 _ALIGNED, _SQUARE = 0.9994, 0.02
 """Cosines of two angles: 2 degrees to an axis of R, and one degree off a right angle."""
 

@@ -76,10 +76,8 @@ def _list() -> None:
 
 
 ROBOT = "urdf"
-SHOWN = 30
-"""Remarks on a robot that are printed; all of them stand in the file."""
-MOST_ROWS = 100_000
-"""Rows of a table to fill in."""
+SHOWN = 30  # remarks on a robot that are printed; all of them stand in the file
+MOST_ROWS = 100_000  # rows of a table to fill in
 
 
 @click.command("import")

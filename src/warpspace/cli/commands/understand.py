@@ -36,8 +36,7 @@ if TYPE_CHECKING:
     from warpspace.units import Array
 
 MAX_LISTED = 20
-POINTS_AT_ONCE = 5000
-"""Points that are turned into JSON at a time."""
+POINTS_AT_ONCE = 5000  # points that are turned into JSON at a time
 
 
 FIELDS = (".parquet", ".npz", ".csv", ".vts")

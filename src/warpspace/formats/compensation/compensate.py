@@ -29,29 +29,22 @@ from warpspace.scene.files import parse_whole
 from warpspace.scene.model import Scene, placed_in
 from warpspace.units import Array
 
-NODES = 28
-"""Nodes per axis that what is left is evaluated at: between the points of usual tables."""
-SMALL_NODES = 7
-"""Nodes and points per axis that the placement of a workpiece is fitted with."""
-STEP = 100.0
-"""µm and µrad by which a placement is changed to see what a table makes of it."""
-MOVABLE = 0.05
-"""A table that leaves less than this share of a displaced part can move it."""
+NODES = 28  # nodes per axis that what is left is evaluated at: between the points of usual tables
+SMALL_NODES = 7  # nodes and points per axis that the placement of a workpiece is fitted with
+STEP = 100.0  # µm and µrad by which a placement is changed to see what a table makes of it
+MOVABLE = 0.05  # A table that leaves less than this share of a displaced part can move it
 PLACED = (
     "a part is judged by its shape: where it lies (three shifts, three small rotations) is fitted"
     " out of the errors before and after"
 )
 NO_OFFSETS = ", since the format has no place for it"
-RESOLUTION = (0.0, 0.1)
-"""mm or degrees."""
+RESOLUTION = (0.0, 0.1)  # mm or degrees
 SIZES = (3, 5, 9, 17)
-MOST = 32
-"""Compensations of one sweep."""
+MOST = 32  # compensations of one sweep
 FEW = ("linuxcnc-matrix", "marlin")
 """Formats without a grid that a sweep shows where none are named; Klipper's skew is Marlin's."""
 TABLES = ("sinumerik-enc", "sinumerik-cec", "heidenhain", "fanuc-3d", "isg-csv")
-LEAST_UM = 1e-3
-"""Lower end of the chart of a sweep, where nothing is left."""
+LEAST_UM = 1e-3  # lower end of the chart of a sweep, where nothing is left
 Points: TypeAlias = int | tuple[tuple[str, int], ...]
 """Points of a table along every axis, or along each."""
 

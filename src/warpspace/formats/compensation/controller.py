@@ -210,8 +210,7 @@ def read_back(kind: Format, files: Files, wanted: Wanted, label: str) -> Control
 
 HELD = 0.05
 """Share of the reversal that may be left where a format holds it: the steps of its table."""
-LEAST_UM = 0.01
-"""A reversal below it is none."""
+LEAST_UM = 0.01  # A reversal below it is none
 
 
 @dataclass(frozen=True)

@@ -19,12 +19,10 @@ from warpspace.units import MM_PER_UM, RAD_PER_URAD, Array
 
 # --- By how much the axes of a machine are moved so that no error is left -------------------------
 
-STEPS = 2
-"""Newton steps: an error grows by a ten-thousandth of the correction at most."""
+STEPS = 2  # newton steps: an error grows by a ten-thousandth of the correction at most
 SMALL_MM, SMALL_DEG = 1e-2, 1e-3
 """Moves by which the response of the tool to an axis is measured."""
-CUT = 1e-3
-"""Moves that act less than this share of the best one are not used."""
+CUT = 1e-3  # moves that act less than this share of the best one are not used
 LOOPS = (Loop.TOOL, Loop.RELATIVE)
 
 
@@ -221,8 +219,7 @@ def _independent(linear: Sequence[str], scene: Scene) -> tuple[str, ...]:
 
 
 AXES = ("X", "Y", "Z")
-OTHER_NODES = 9
-"""Positions of the other axes that a table of one axis is averaged over."""
+OTHER_NODES = 9  # positions of the other axes that a table of one axis is averaged over
 
 
 @dataclass(frozen=True)

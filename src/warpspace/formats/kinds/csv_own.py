@@ -47,8 +47,7 @@ from warpspace.units import Array
 
 RUN, DIRECTION = "run", "direction"
 SIGNS = {FORWARD: "+", BACKWARD: "-", BOTH: ""}
-DIGITS = 6
-"""Behind the point of a value, µm or µrad."""
+DIGITS = 6  # behind the point of a value, µm or µrad
 UNITS = "# Units stand in brackets and may be changed: um mm nm in, urad mrad rad arcsec deg."
 
 

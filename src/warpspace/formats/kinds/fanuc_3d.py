@@ -17,10 +17,8 @@ from warpspace.formats.source import MM_PER, Source
 from warpspace.formats.terms import Grid3, Tables
 
 MARK = "# three-dimensional error compensation"
-DETECTION_MM = 1e-3
-"""Detection unit where none is asked for: a micrometre (IS-B)."""
-MOST_COUNT = 127
-"""Of a correction in detection units, times the magnification."""
+DETECTION_MM = 1e-3  # detection unit where none is asked for: a micrometre (IS-B)
+MOST_COUNT = 127  # of a correction in detection units, times the magnification
 MOST_MAGNIFICATION = 100
 MOST_POINTS = 25
 STEP_SHARE = 1e-4

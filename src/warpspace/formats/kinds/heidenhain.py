@@ -17,10 +17,8 @@ from warpspace.formats.terms import HELD, Line, Tables
 from warpspace.machine.axes import TravelDirection
 from warpspace.units import Array
 
-MOST_POINTS = 256
-"""Entries of one table (TNC 407 Technical Manual, module 9095, error 3)."""
-RESOLUTION = 1e-4
-"""mm or degrees, as the tables are printed."""
+MOST_POINTS = 256  # entries of one table (TNC 407 Technical Manual, module 9095, error 3)
+RESOLUTION = 1e-4  # mm or degrees, as the tables are printed
 STEP_SHARE = 1e-3
 SIGN = (
     "values are errors, which the control takes back (TNC 360 Technical Manual, page 4-24: the"

@@ -31,8 +31,7 @@ ENC, CEC = "AA_ENC_COMP", "AN_CEC"
 AXES = ("INPUT_AXIS", "OUTPUT_AXIS")
 RANGE = ("STEP", "MIN", "MAX")
 DIRECTION, FACTOR, IS_MODULO = "DIRECTION", "MULT_BY_TABLE", "IS_MODULO"
-MOST_TABLES = 62
-"""Twice the axes of an NC (manual, "Compensation table index")."""
+MOST_TABLES = 62  # twice the axes of an NC (manual, "Compensation table index")
 SIGN = "a positive value makes the axis move in the negative direction (manual, page 238)"
 CEC_SIGN = (
     "a positive value makes the corrected axis move in the negative direction, as page 238 of the"
@@ -40,15 +39,11 @@ CEC_SIGN = (
     " --sign correction"
 )
 UNITS = "lengths mm, angles degrees (metric system)"
-DIGITS = 7
-"""Digits behind the point of a value: a tenth of a nanometre."""
-STEP_SHARE = 1e-4
-"""Share of a step by which start, end and step may disagree."""
+DIGITS = 7  # digits behind the point of a value: a tenth of a nanometre
+STEP_SHARE = 1e-4  # share of a step by which start, end and step may disagree
 MOST_INDEX = 100_000
-MOST_PRODUCTS = 3
-"""Pairs of tables for one axis over two others."""
-LEAST_MM = 1e-5
-"""A product of tables below it is not worth two tables."""
+MOST_PRODUCTS = 3  # pairs of tables for one axis over two others
+LEAST_MM = 1e-5  # A product of tables below it is not worth two tables
 SWITCHES = {DIRECTION: (-1, 1), FACTOR: (0, MOST_TABLES), IS_MODULO: (0, 1)}
 """Whole numbers of a table, each between limits."""
 Needed = Mapping[tuple[str, ...], Array]

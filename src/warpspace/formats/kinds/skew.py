@@ -25,12 +25,10 @@ from warpspace.formats.source import RAD_TO_URAD, Place, Source, spell
 from warpspace.formats.terms import Affine, Tables, errors_of
 
 PLANES = ("XY", "XZ", "YZ")
-MOST = 1.0
-"""Of a factor (Marlin, SKEW_FACTOR_MAX)."""
+MOST = 1.0  # of a factor (Marlin, SKEW_FACTOR_MAX)
 OPEN = 0.02
 """Share by which the side that two diagonals and a side give may differ from that side, unsaid."""
-SIDE_MM = 100.0
-"""Side of the part that a factor is spelled by."""
+SIDE_MM = 100.0  # side of the part that a factor is spelled by
 
 
 def skew_factor(ac: float, bd: float, ad: float) -> float:
@@ -91,8 +89,7 @@ def fitted_factors(wanted: Wanted) -> dict[str, float]:
 
 # --- Klipper ------------------------------------------------------------------------------------
 
-LEAST_OFFSET_MM = 1.0
-"""Between probe and nozzle: below it a twist cannot be told from the height."""
+LEAST_OFFSET_MM = 1.0  # between probe and nozzle: below it a twist cannot be told from the height
 PROBES = ("probe", "bltouch", "beacon", "cartographer", "smart_effector")
 _SET = re.compile(r"\b(XY|XZ|YZ)=([^\s]+)")
 _PROFILE = re.compile(r"\[skew_correction\s+([^\]]+?)\s*\]")
@@ -229,8 +226,7 @@ def _write_klipper(wanted: Wanted) -> Files:
 
 # --- Marlin -------------------------------------------------------------------------------------
 
-DIGITS = 6
-"""Behind the point of a factor, as the firmware reports it."""
+DIGITS = 6  # behind the point of a factor, as the firmware reports it
 LETTERS = {"I": "XY", "S": "XY", "J": "XZ", "K": "YZ"}
 _WORD = re.compile(r"([A-Z])\s*([^A-Z\s]*)")
 _DEFINE = re.compile(r"#\s*define\s+(XY|XZ|YZ)_(DIAG_AC|DIAG_BD|SIDE_AD|SKEW_FACTOR)\s+(\S+)")

@@ -51,8 +51,7 @@ ASSUMED = (
 )
 OTHER = re.compile(r"P0[XYZ]|N0[XYZ]|P[XYZ][ABC]|V[XYZ][XYZABC]|ID[XYZ]|LN[XYZABC]")
 """Parameters of the kinematics, which are no errors."""
-FINE_DEG = 1.0
-"""Steps of a table that a wave is added to."""
+FINE_DEG = 1.0  # steps of a table that a wave is added to
 
 
 def error_name(name: str) -> str:

@@ -22,15 +22,13 @@ from warpspace.units import Array
 
 # --- Checks of the raw values that a scene file spells, each problem with its place ---------------
 
-Path = tuple[int | str, ...]
-"""Keys and indices below the error, for instance ``("table", 3, 0)``."""
+Path = tuple[int | str, ...]  # keys and indices below the error, for instance ``("table", 3, 0)``
 Points = Sequence[tuple[float, float]]
 CsvColumn = Callable[[str, str], Points]
 """Reads axis positions and one column, by file and name of the column; may raise SceneError."""
 ReadCurve = Callable[[object, Path], "ErrorFunction | None"]
 """Reads a curve within a curve, by its raw value and its place; None where problems were noted."""
-MISSING = object()
-"""Stands where a table has not all keys of its form."""
+MISSING = object()  # stands where a table has not all keys of its form
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,12 +205,9 @@ NEGLIGIBLE = 1e-12
 OWN = "own"
 """Stands for the axis of the error among the arguments of a curve that does not know its name."""
 
-Span = tuple[float, float]
-"""Lower and upper end of an axis range, mm or degrees."""
-Rows = Sequence[Sequence[float]]
-"""Numbers as a user edits them, one row a line."""
-Spell = Callable[[float], str]
-"""Writes one number for people."""
+Span = tuple[float, float]  # lower and upper end of an axis range, mm or degrees
+Rows = Sequence[Sequence[float]]  # numbers as a user edits them, one row a line
+Spell = Callable[[float], str]  # writes one number for people
 
 
 @dataclass(frozen=True)

@@ -22,10 +22,8 @@ from warpspace.units import Array
 
 DEGREE = 5
 MOST_PIECES = 4096
-SMALL = 1e-12
-"""µm or µrad: what is smaller everywhere counts as nothing, and fits are no worse."""
-PER_PIECE = 8
-"""Positions of each piece at which the peak is looked for."""
+SMALL = 1e-12  # µm or µrad: what is smaller everywhere counts as nothing, and fits are no worse
+PER_PIECE = 8  # positions of each piece at which the peak is looked for
 
 
 @dataclass(frozen=True)

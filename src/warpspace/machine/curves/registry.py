@@ -10,8 +10,7 @@ from warpspace.machine.curves.table import Table, TwoArguments
 from warpspace.plugins import load_plugins
 
 CurveKind = type[ErrorFunction]
-Form = tuple[str, ...]
-"""Keys of the table that spells a curve in a scene file."""
+Form = tuple[str, ...]  # keys of the table that spells a curve in a scene file
 
 _KINDS: dict[str, CurveKind] = {
     kind.name: kind

@@ -188,8 +188,7 @@ class Ramp(OneNumber):
 
 
 MAX_SAMPLES = 200_001
-MAX_COSINES = 2_000_000
-"""Cosines that the peak of a curve may take: terms × positions."""
+MAX_COSINES = 2_000_000  # cosines that the peak of a curve may take: terms × positions
 SAMPLES_PER_WAVE = 16
 SHOWN_TERMS = 3
 LEAST_PEAK = 1e-6

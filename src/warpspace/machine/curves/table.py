@@ -30,14 +30,10 @@ FIRST_POINTS = 5
 """Points that a straight curve of another kind is turned into; a bent one takes more."""
 KEPT = 0.002
 """Largest distance of the table from the curve it was made of, as a share of its largest value."""
-BETWEEN = 8
-"""Places between two points at which that distance is looked for."""
-DIGITS = 6
-"""Digits behind the point of the share of the amplitude that a first value is rounded to."""
-LIMITS = ((-MAX_LENGTH_MM, MAX_LENGTH_MM), (-MAX_ERROR, MAX_ERROR))
-"""Of position and value."""
-SHOWN_POSITIONS = 3
-"""Positions that a remark names."""
+BETWEEN = 8  # places between two points at which that distance is looked for
+DIGITS = 6  # digits behind the point of the share of the amplitude that a first value is rounded to
+LIMITS = ((-MAX_LENGTH_MM, MAX_LENGTH_MM), (-MAX_ERROR, MAX_ERROR))  # of position and value
+SHOWN_POSITIONS = 3  # positions that a remark names
 Point = tuple[float, float]
 
 

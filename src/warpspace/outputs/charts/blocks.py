@@ -21,8 +21,7 @@ from warpspace.outputs.drawing.settings import FONT, LIGHT, SAVE_RC, Theme
 
 DPI = 160.0
 TITLE, SUBTITLE, TEXT, SMALL = 13.0, 9.5, 9.5, 8.5
-LEAST_SHARE = 0.6
-"""Of its size, what a title is drawn with at the least."""
+LEAST_SHARE = 0.6  # of its size, what a title is drawn with at the least
 _THEME: ContextVar[Theme] = ContextVar("theme of the charts", default=LIGHT)
 
 
@@ -105,12 +104,9 @@ def quiet(axes: Axes, grid: str = "x") -> None:
 CHART_IN, ROW_IN, GAP_IN = 4.9, 4.6, 0.25
 """Width, height and distance of charts that stand side by side."""
 WIDTH_IN = 11.0
-BAR_IN = 0.235
-"""Height of one bar; rows of two are wider."""
-FEW = 8
-"""Rows below which bars beside other charts grow no wider."""
-ROOM = 1.14
-"""Of the longest bar: room for the number beside it."""
+BAR_IN = 0.235  # height of one bar; rows of two are wider
+FEW = 8  # rows below which bars beside other charts grow no wider
+ROOM = 1.14  # of the longest bar: room for the number beside it
 LEGEND_IN = 0.19
 DASHES: dict[str, Any] = {"line": "-", "dashed": (0, (4, 3)), "thin": "-", "dots": "none"}
 Box = tuple[float, float, float, float]
@@ -430,8 +426,7 @@ def _handles(chart: Lines) -> list[Line2D | Patch]:
 # --- Distributions, like figures 4-8 and 4-9 of the thesis ----------------------------------------
 
 HISTOGRAM_IN = 9.0, 5.4
-LABEL_ROWS = 4
-"""Rows of labels above the bars, at most."""
+LABEL_ROWS = 4  # rows of labels above the bars, at most
 
 
 def histogram_chart(found: Histogram) -> Figure:

@@ -113,13 +113,10 @@ def _numbers(
 # --- A compensation: |E| before and after in slices -----------------------------------------------
 
 WIDTH_IN, PLANE_IN = 11.0, 3.2
-COLUMN_IN = 4.3, 5.0
-"""Of the maps in a column of the app."""
+COLUMN_IN = 4.3, 5.0  # of the maps in a column of the app
 WORDS = 9.0
-LEAST_UM = 1e-3
-"""Upper end of a colour scale where nothing is left."""
-PLANES = ((0, 1), (0, 2), (1, 2))
-"""Axes across and up of each slice."""
+LEAST_UM = 1e-3  # upper end of a colour scale where nothing is left
+PLANES = ((0, 1), (0, 2), (1, 2))  # axes across and up of each slice
 
 
 def compensation_chart(found: "Compensation") -> Figure:

@@ -25,8 +25,7 @@ from warpspace.outputs.drawing.render import Rect, resample
 from warpspace.outputs.drawing.settings import FONT, SIZES, Theme, factor
 from warpspace.units import Array
 
-Points = Array | Sequence[tuple[float, float]] | Sequence[Array]
-"""[n, 2], px."""
+Points = Array | Sequence[tuple[float, float]] | Sequence[Array]  # [n, 2], px
 _REPLACEMENT = "\N{WHITE VERTICAL RECTANGLE}"
 
 

@@ -152,8 +152,7 @@ INSETS = (112.0, 92.0, 84.0, 46.0)
 """Room for axes and labels around the body: left, bottom, right, top."""
 SMALL_INSETS = (70.0, 74.0, 40.0, 40.0)
 GHOST_DASHES = (11.0, 7.0)
-LONE_LINE_COST = 8.0
-"""Labels keep off the line that is all there is of a volume."""
+LONE_LINE_COST = 8.0  # labels keep off the line that is all there is of a volume
 Annotate = Callable[[Canvas, Picture, Projection, Raster | None, Occupancy, Rect | None], None]
 
 
@@ -345,11 +344,9 @@ def _draw_ghost(
     taken.add_lines(hidden, 0.5 * LINE_COST)
 
 
-GAP = 16.0
-"""Between the body and an axis line."""
+GAP = 16.0  # between the body and an axis line
 TICK = 7.0
-SHORTEST = 40.0
-"""Axes seen nearly end-on, shorter than this in the picture, are left out."""
+SHORTEST = 40.0  # axes seen nearly end-on, shorter than this in the picture, are left out
 
 
 def draw_axes(

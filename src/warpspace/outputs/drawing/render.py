@@ -26,8 +26,7 @@ if TYPE_CHECKING:
     import pyvista as pv
 
 
-Rect = tuple[float, float, float, float]
-"""Left, bottom, right, top, px."""
+Rect = tuple[float, float, float, float]  # left, bottom, right, top, px
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,10 +23,8 @@ from warpspace.units import MICROMETRE, MICRORADIAN, MM_PER_UM, Array
 if TYPE_CHECKING:
     from warpspace.analysis.uncertain import FieldUncertainty
 
-ABOUT = "about_json"
-"""Name under which NPZ and VTS files say what they hold."""
-DECIMALS = 9
-"""Of numbers in text: a billionth of a micrometre."""
+ABOUT = "about_json"  # name under which NPZ and VTS files say what they hold
+DECIMALS = 9  # of numbers in text: a billionth of a micrometre
 _UNITS = {"mm": "mm", "deg": "°", "um": MICROMETRE, "urad": MICRORADIAN}
 
 
@@ -210,8 +208,7 @@ _WRITERS: dict[str, Callable[[FieldRecord, Path], None]] = {
     ".vts": _write_vts,
 }
 FIELD_ENDINGS = tuple(_WRITERS)
-GRID_ENDINGS = (".vts",)
-"""Formats that hold grids only."""
+GRID_ENDINGS = (".vts",)  # formats that hold grids only
 
 
 def write_csv(picture: ScenePicture, path: str | Path, *, overwrite: bool = True) -> None:

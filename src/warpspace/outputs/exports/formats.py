@@ -12,8 +12,7 @@ from warpspace.plugins import load_plugins
 if TYPE_CHECKING:
     from warpspace.picture.model import ScenePicture
 
-Write = Callable[..., None]
-"""Takes a picture, a path and the keyword `overwrite`."""
+Write = Callable[..., None]  # takes a picture, a path and the keyword `overwrite`
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     from warpspace.outputs.drawing.sheet import Drawing
     from warpspace.scene.model import Scene
 
-Draw = Callable[..., "Drawing"]
-"""Takes scenes, settings and the keyword `exact`; gives the drawing."""
+Draw = Callable[..., "Drawing"]  # takes scenes, settings and the keyword `exact`; gives the drawing
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,8 +17,7 @@ from warpspace.scene.model import Scene
 from warpspace.units import MICROMETRE, MICRORADIAN, Array
 
 SAMPLES = 361
-FEW_READINGS = 5000
-"""Readings that are drawn at most, evenly picked from all."""
+FEW_READINGS = 5000  # readings that are drawn at most, evenly picked from all
 BAND = 5
 """Colour of a tolerance that several errors of a chart share; one of its own has its error's."""
 TEXT_PX = 14.0

@@ -218,8 +218,7 @@ def _visible_spot(
 
 # --- Traces of the rotary axes: the circles that points should and do run through -----------------
 
-PIECE = 2
-"""Samples of a trace in one piece of one colour."""
+PIECE = 2  # samples of a trace in one piece of one colour
 TRACE_DASHES, FADED = (7.0, 5.0), 0.55
 
 

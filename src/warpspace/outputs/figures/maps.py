@@ -232,12 +232,9 @@ def _draw_key(canvas: Canvas, picture: ScenePicture, slices: Sequence[Slice], re
 
 # --- Orientation error of the tool axis -----------------------------------------------------------
 
-LEAN_RAD = 0.45
-"""Largest lean on screen that the factor aims at."""
-NEEDLE_SHARE = 0.13
-"""Length of a needle, as a share of the longest edge."""
-NEEDLES = 5
-"""Needles along each edge, about."""
+LEAN_RAD = 0.45  # largest lean on screen that the factor aims at
+NEEDLE_SHARE = 0.13  # length of a needle, as a share of the longest edge
+NEEDLES = 5  # needles along each edge, about
 NEEDLE_DASHES = (6.0, 4.0)
 
 

@@ -129,8 +129,7 @@ def _draw_corner(canvas: Canvas, rect: Rect, maps: Sequence[DrawnMap]) -> None:
 
 # --- A repair: before and after the best set of adjustments, bars of every effect -----------------
 
-MAPS_SHARE = 0.5
-"""Of the height of the content."""
+MAPS_SHARE = 0.5  # of the height of the content
 TEXT_PX = 12.0
 
 
@@ -197,8 +196,7 @@ def _draw_repaired(
 BODY_ALPHA = 0.55
 CELL_HEAD, CELL_FOOT, AXIS_LABELS = 30.0, 74.0, 50.0
 """Room in px above a picture for its title, below it for its numbers, and for labels of axes."""
-STRIP_MARGIN = 0.05
-"""Room around a picture that stands alone, by the shorter side of its cell."""
+STRIP_MARGIN = 0.05  # room around a picture that stands alone, by the shorter side of its cell
 
 
 def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:

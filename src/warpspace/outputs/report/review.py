@@ -38,8 +38,7 @@ SUBJECTS = {
     "relative": "the tool, relative to the workpiece,",
 }
 UM = "\N{NO-BREAK SPACE}µm"
-_WORTH = 0.01
-"""Share of the RMS that an adjustment must gain to be named."""
+_WORTH = 0.01  # share of the RMS that an adjustment must gain to be named
 
 
 @dataclass(frozen=True, slots=True)

@@ -56,8 +56,7 @@ from warpspace.scene.model import Scene
 from warpspace.scene.save import scene_to_toml
 from warpspace.units import spell, spell_short
 
-PAPER_SHARE = 0.87
-"""Width of a map among the evidence: two of them then stand on a page."""
+PAPER_SHARE = 0.87  # width of a map among the evidence: two of them then stand on a page
 CHART = "warpspace.outputs.charts.blocks:chart_figure"
 Chart = Bars | Lines | Histogram
 Drawn = Callable[[], Block]

@@ -15,12 +15,9 @@ from warpspace.machine.axes import parameter
 from warpspace.picture.words import spell_axes, spell_in_r
 from warpspace.units import Array
 
-ACCENT = (194, 24, 91)
-"""Colour of everything that answers "why?"; it is in no colour map."""
-RADIUS = 0.011
-"""Of the marker, as a part of the longest edge."""
-AXIS_HALF = 0.32
-"""Half the length of the drawn axis, as a part of the longest edge."""
+ACCENT = (194, 24, 91)  # colour of everything that answers "why?"; it is in no colour map
+RADIUS = 0.011  # of the marker, as a part of the longest edge
+AXIS_HALF = 0.32  # half the length of the drawn axis, as a part of the longest edge
 DASH = 0.02
 LABEL_AT = 0.25
 """Place of the lever's label between point and frame: it is seen where the picture is not."""

@@ -94,8 +94,7 @@ class BodyMeshes:
 
 EDGE: Rgb = (70, 78, 90)
 DARK_EDGE: Rgb = (150, 158, 170)
-BALL = 0.010
-"""Marker of the tool point, as a part of the longest edge."""
+BALL = 0.010  # marker of the tool point, as a part of the longest edge
 
 
 class MachineLayer:

@@ -25,8 +25,7 @@ from warpspace.units import Array
 
 APART = 0.002
 """Distance from which nominal and actual are both drawn, as a part of the longest edge."""
-NAME_AWAY = 0.03
-"""Distance of the name from the trace, likewise."""
+NAME_AWAY = 0.03  # distance of the name from the trace, likewise
 
 
 def apart(nominal_mm: Array, actual_mm: Array, distance_mm: float) -> NDArray[np.float32]:
@@ -97,8 +96,7 @@ class TracesLayer:
 # --- The traced points while the table turns ------------------------------------------------------
 # Nominal light, actual dark, on their circles.
 
-SIZE = 0.014
-"""Diameter of a point, as a part of the longest edge."""
+SIZE = 0.014  # diameter of a point, as a part of the longest edge
 
 
 class RotationLayer:
@@ -159,8 +157,7 @@ class RotationLayer:
 
 # --- Play and pause of a rotation: a clock of its own that stops with its session -----------------
 
-RATE_HZ = 8.0
-"""Pictures a second: modest, since each is sent to the page."""
+RATE_HZ = 8.0  # pictures a second: modest, since each is sent to the page
 SPEED_DEG_S = 30.0
 FULL_TURN_DEG = 360.0
 
