@@ -12,7 +12,7 @@ from pathlib import Path
 
 import warpspace
 from warpspace.outputs.exports.fields import write_csv, write_vts
-from warpspace.outputs.exports.glb import write_glb
+from warpspace.outputs.exports.meshes import write_glb
 from warpspace.picture.model import evaluate_picture
 
 

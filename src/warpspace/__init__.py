@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from warpspace.calibration.calibrate import calibrate
     from warpspace.exceptions import SceneError, WarpspaceError
     from warpspace.field.evaluate import ErrorField
-    from warpspace.outputs.exports.multiblock import to_pyvista
+    from warpspace.outputs.exports.meshes import to_pyvista
     from warpspace.resources import __version__
     from warpspace.scene.library import load_scene, scene_names
     from warpspace.scene.model import Scene, evaluate
@@ -42,7 +42,7 @@ _HOME = {
     "run_test": "warpspace.bench.base",
     "sweep": "warpspace.analysis.machines",
     "thesis": "warpspace.analysis.thesis",
-    "to_pyvista": "warpspace.outputs.exports.multiblock",
+    "to_pyvista": "warpspace.outputs.exports.meshes",
     "load_scene": "warpspace.scene.library",
     "scene_names": "warpspace.scene.library",
 }

@@ -14,7 +14,7 @@ from warpspace import evaluate, load_scene
 from warpspace.bodies.placed import load_bodies
 from warpspace.geometry.surfaces import deform, outer_surface
 from warpspace.outputs.exports.fields import write_csv, write_vts
-from warpspace.outputs.exports.glb import build_glb, write_glb
+from warpspace.outputs.exports.meshes import build_glb, write_glb
 from warpspace.picture.model import evaluate_picture
 from warpspace.picture.traces import trace_lines
 

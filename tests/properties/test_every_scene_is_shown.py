@@ -36,7 +36,7 @@ from warpspace.app.viewport.named_views import VIEWS, CameraSetup, view_pose
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
 from warpspace.outputs.exports.fields import build_vts
-from warpspace.outputs.exports.glb import build_glb
+from warpspace.outputs.exports.meshes import build_glb
 from warpspace.picture.mesh import edge_pieces, grid_pieces, isoline_pieces, line_mesh, map_mesh
 from warpspace.picture.model import evaluate_picture
 

@@ -10,7 +10,7 @@ from warpspace.bodies.placed import load_bodies
 from warpspace.kinematics.chain import body_motions
 from warpspace.kinematics.model import Model, complete_coordinates
 from warpspace.machine.description import build_machine
-from warpspace.outputs.exports.glb import write_glb
+from warpspace.outputs.exports.meshes import write_glb
 from warpspace.picture.model import evaluate_picture
 from warpspace.scene.library import scene_names
 from warpspace.scene.machines import load_machine, machine_names, machine_picture

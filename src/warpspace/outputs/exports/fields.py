@@ -21,6 +21,8 @@ from warpspace.scene.files import guard_cell, spell_row
 from warpspace.units import MICROMETRE, MICRORADIAN, MM_PER_UM, Array
 
 if TYPE_CHECKING:
+    import pyvista as pv
+
     from warpspace.analysis.uncertain import FieldUncertainty
 
 ABOUT = "about_json"  # name under which NPZ and VTS files say what they hold
@@ -138,20 +140,11 @@ def write_numbers_csv(
 
 
 def _write_parquet(record: FieldRecord, path: Path) -> None:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    names = list(record.columns)
-    schema = pa.schema(
-        [pa.field(name, pa.float64(), metadata={"unit": column_unit(name)}) for name in names],
-        metadata={"warpspace": json.dumps(dict(record.about), ensure_ascii=False)},
-    )
-    # positions repeat; pyarrow's stubs know a flag only
-    repeated: Any = [name for name in names if name.startswith("axis_")]
-    with pq.ParquetWriter(path, schema, use_dictionary=repeated, compression="zstd") as writer:
+    about = json.dumps(dict(record.about), ensure_ascii=False)
+    kinds = dict.fromkeys(record.columns, "number")
+    with _parquet(path, kinds, about, of_points=True) as append:
         for block in record.blocks():
-            arrays = [pa.array(values) for values in block.values()]
-            writer.write_batch(pa.RecordBatch.from_arrays(arrays, schema=schema))
+            append(block)
 
 
 def _arrays(record: FieldRecord) -> dict[str, Array]:
@@ -177,8 +170,6 @@ def _write_npz(record: FieldRecord, path: Path) -> None:
 
 
 def _write_vts(record: FieldRecord, path: Path) -> None:
-    from warpspace.outputs.exports.multiblock import structured_grid
-
     arrays = _arrays(record)
     mesh = structured_grid(arrays.pop("nominal_mm"), arrays)
     writer = _vts_writer(mesh, ABOUT, record.about)
@@ -189,6 +180,25 @@ def _write_vts(record: FieldRecord, path: Path) -> None:
     writer.SetFileName(str(path))
     if not writer.Write():
         raise OSError(f"VTK could not write {path}")
+
+
+def structured_grid(points_mm: Array, arrays: Mapping[str, Array]) -> "pv.StructuredGrid":
+    """Build a structured grid from nodes and what is known at them."""
+    import pyvista as pv
+
+    mesh = pv.StructuredGrid()
+    mesh.points = _in_order_of_vtk(points_mm)
+    mesh.dimensions = points_mm.shape[:3]
+    for name, values in arrays.items():
+        mesh.point_data[name] = _in_order_of_vtk(values)
+    mesh.point_data.active_scalars_name = "norm_um"
+    return mesh
+
+
+def _in_order_of_vtk(values: Array) -> Array:
+    """Order node values as VTK does, the first axis fastest: [n] or [n, 3]."""
+    tail = values.shape[3:]
+    return np.ascontiguousarray(np.swapaxes(values, 0, 2)).reshape(-1, *tail)
 
 
 def _vts_writer(mesh: Any, name: str, about: Mapping[str, Any]) -> Any:
@@ -237,8 +247,6 @@ def write_vts(picture: ScenePicture, path: str | Path, *, overwrite: bool = True
 
 def build_vts(picture: ScenePicture) -> bytes:
     """Build the field as a VTK structured grid."""
-    from warpspace.outputs.exports.multiblock import structured_grid
-
     field = picture.field
     arrays = {
         "error_um": field.error_um,
@@ -281,7 +289,10 @@ def write_rows(
 
 
 @contextmanager
-def _parquet(path: Path, kinds: Mapping[str, Kind]) -> Generator[Append]:
+def _parquet(
+    path: Path, kinds: Mapping[str, Kind], about: str = __version__, *, of_points: bool = False
+) -> Generator[Append]:
+    """Open a table; the columns of points say their unit, and of them only positions repeat."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -290,13 +301,18 @@ def _parquet(path: Path, kinds: Mapping[str, Kind]) -> Generator[Append]:
         "integer": pa.int64(),
         "number": pa.float64(),
     }
-    fields = [(name, types[kind]) for name, kind in kinds.items()]
-    schema = pa.schema(fields, metadata={"warpspace": __version__})
-    with pq.ParquetWriter(path, schema, compression="zstd") as writer:
+    fields = [
+        pa.field(name, types[kind], metadata={"unit": column_unit(name)} if of_points else None)
+        for name, kind in kinds.items()
+    ]
+    schema = pa.schema(fields, metadata={"warpspace": about})
+    # pyarrow's stubs know a flag only
+    repeated: Any = [name for name in kinds if name.startswith("axis_")] if of_points else True
+    with pq.ParquetWriter(path, schema, use_dictionary=repeated, compression="zstd") as writer:
 
         def append(columns: Columns) -> None:
-            arrays = [pa.array(columns[name], kind) for name, kind in fields]
-            writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
+            arrays = [pa.array(columns[field.name], field.type) for field in fields]
+            writer.write_batch(pa.RecordBatch.from_arrays(arrays, schema=schema))
 
         yield append
 

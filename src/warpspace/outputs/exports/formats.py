@@ -53,7 +53,7 @@ def export_formats() -> tuple[ExportFormat, ...]:
 
 _HERE = "warpspace.outputs.exports"
 for _form in (
-    ExportFormat(".glb", "3-D viewers, CAD", f"{_HERE}.glb:write_glb"),
+    ExportFormat(".glb", "3-D viewers, CAD", f"{_HERE}.meshes:write_glb"),
     ExportFormat(".vts", "ParaView", f"{_HERE}.fields:write_vts"),
     ExportFormat(".csv", "the field", f"{_HERE}.fields:write_csv"),
     ExportFormat(

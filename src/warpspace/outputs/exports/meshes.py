@@ -1,0 +1,279 @@
+"""The deformed scene as meshes: binary glTF for viewers and CAD systems, PyVista blocks."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from warpspace.bodies.gltf import Material, Part, build_gltf, to_gltf
+from warpspace.bodies.placed import PlacedBody, place_bodies, scene_motions
+from warpspace.field.grid import DEFAULT_NODES
+from warpspace.geometry.colour import srgb_to_linear
+from warpspace.geometry.surfaces import (
+    box_edges,
+    deform,
+    grid_lines,
+    is_thin,
+    line_spacing,
+    outer_surface,
+    segments,
+    spread_nodes,
+)
+from warpspace.kinematics.model import Loop
+from warpspace.outputs.exports.fields import structured_grid
+from warpspace.outputs.files import write_atomically
+from warpspace.picture.mesh import thick_nodes
+from warpspace.picture.model import Exaggeration, ScenePicture, evaluate_picture
+from warpspace.picture.traces import TraceLine, trace_lines
+from warpspace.scene.model import Scene, grid_basis
+from warpspace.units import MM_PER_UM, Array
+
+if TYPE_CHECKING:
+    import pyvista as pv
+
+INK, GHOST, NOMINAL = (30, 36, 48), (140, 147, 160), (150, 158, 172)
+TRACE = (200, 60, 70)
+BODY_OPACITY = 0.3
+_ATTRIBUTES = {
+    "_ERROR_UM": "position error x, y, z in the machine frame (Z up), µm",
+    "_ORIENTATION_URAD": "orientation error of the tool axis in the machine frame (Z up), µrad",
+}
+
+
+def write_glb(picture: ScenePicture, path: str | Path, *, overwrite: bool = True) -> None:
+    """Write the deformed scene as binary glTF."""
+    data = build_glb(picture)
+    with write_atomically(path, overwrite=overwrite) as temporary:
+        temporary.write_bytes(data)
+
+
+def build_glb(picture: ScenePicture) -> bytes:
+    """Build the deformed scene as binary glTF."""
+    parts = [
+        *_surface(picture),
+        *_lines(picture),
+        *_traces(picture),
+        *_bodies(picture),
+    ]
+    scale = picture.scale
+    colours = {"map": scale.name} | {
+        name: getattr(scale, name) for name in ("low", "high", "label", "unit")
+    }
+    return build_gltf(
+        parts,
+        root=f"warpspace {picture.scene.name} ×{picture.exaggeration:g}",
+        generator=picture.provenance["program"],
+        extras={**picture.provenance, "attributes": _ATTRIBUTES, "colours": colours},
+    )
+
+
+def _placed(
+    nominal_mm: Array, error_um: Array, exaggeration: float
+) -> tuple[Array, dict[str, Array]]:
+    position = to_gltf(deform(nominal_mm, error_um, exaggeration))
+    return position, {"nominal": to_gltf(error_um * (-exaggeration * MM_PER_UM))}
+
+
+def _surface(picture: ScenePicture) -> list[Part]:
+    """Build the outside of the deformed grid, with its errors as attributes.
+
+    A line or a point of a grid is given a thickness, so that viewers show it.
+    """
+    field = picture.field
+    nominal = thick_nodes(picture, picture.grid.nominal_mm)
+    surface = outer_surface(nominal.shape[:3])
+    thin = is_thin(picture.shape)
+    at = spread_nodes(picture.shape)[surface.nodes] if thin else surface.nodes
+    error = field.error_um.reshape(-1, 3)[at]
+    position, back = _placed(nominal.reshape(-1, 3)[surface.nodes], error, picture.exaggeration)
+    colours = picture.scale.colours(picture.values.reshape(-1)[at])
+    return [
+        Part(
+            "deformed_surface",
+            position,
+            surface.triangles,
+            Material("error"),
+            colours=srgb_to_linear(colours / 255.0),
+            attributes={
+                "_ERROR_UM": error,
+                "_ORIENTATION_URAD": field.orientation_urad.reshape(-1, 3)[at],
+            },
+            targets=back,
+        )
+    ]
+
+
+def _lines(picture: ScenePicture) -> list[Part]:
+    grid = picture.grid
+    nominal = grid.nominal_mm.reshape(-1, 3)
+    error = picture.field.error_um.reshape(-1, 3)
+    x, y, z = (line_spacing(count) for count in grid.shape)
+    edges = segments(box_edges(grid.shape))
+    ink, ghost = Material("line", INK), Material("ghost", GHOST)
+    found: list[Part] = []
+    for name, pairs, material, displaced in (
+        ("deformed_grid", segments(grid_lines(grid.shape, (x, y, z))), ink, error),
+        ("deformed_edges", edges, ink, error),
+        ("ghost", edges, ghost, None),
+    ):
+        if not len(pairs):
+            continue
+        used, numbered = np.unique(pairs, return_inverse=True)
+        shift = np.zeros((len(used), 3)) if displaced is None else displaced[used]
+        position, back = _placed(nominal[used], shift, picture.exaggeration)
+        targets = {} if displaced is None else back
+        found.append(Part(name, position, numbered.reshape(-1, 2), material, targets=targets))
+    return found
+
+
+def _named_traces(picture: ScenePicture) -> Iterator[tuple[str, TraceLine]]:
+    for drawn in trace_lines(picture.traces):
+        point = ", ".join(f"{value:g}" for value in drawn.trace.point_mm)
+        yield f"({point}) {drawn.trace.label}", drawn
+
+
+def _traces(picture: ScenePicture) -> list[Part]:
+    nominal, actual = Material("trace nominal", NOMINAL), Material("trace actual", TRACE)
+    found: list[Part] = []
+    for label, drawn in _named_traces(picture):
+        count = len(drawn.nominal_mm)
+        pairs = np.stack([np.arange(count - 1), np.arange(1, count)], -1)
+        still = to_gltf(drawn.nominal_mm)
+        moved, back = _placed(drawn.nominal_mm, drawn.error_um, picture.exaggeration)
+        found += [
+            Part(f"trace nominal {label}", still, pairs, nominal, group="traces"),
+            Part(f"trace actual {label}", moved, pairs, actual, targets=back, group="traces"),
+        ]
+    return found
+
+
+def _placed_bodies(picture: ScenePicture) -> tuple[PlacedBody, ...]:
+    motions = scene_motions(picture.scene, picture.view)
+    return place_bodies(picture.scene, motions, picture.exaggeration)
+
+
+def _bodies(picture: ScenePicture) -> list[Part]:
+    return [
+        Part(
+            part.body.name,
+            to_gltf(part.vertices_mm),
+            part.body.triangles,
+            Material(f"body {part.body.name}", part.body.colour, BODY_OPACITY),
+            targets={"nominal": to_gltf(part.nominal_mm - part.vertices_mm)},
+            group="bodies",
+        )
+        for part in _placed_bodies(picture)
+    ]
+
+
+# --- PyVista blocks, for a plotter, a filter or a file of the user's own ------------------------
+
+
+def to_pyvista(
+    scene: Scene,
+    *,
+    grid: int = DEFAULT_NODES,
+    loop: Loop | str = Loop.TOOL,
+    exaggeration: Exaggeration = "auto",
+    parts: bool = False,
+) -> "pv.MultiBlock":
+    """Give an evaluated scene as PyVista meshes.
+
+    Parameters
+    ----------
+    scene : Scene
+    grid : int, optional
+        Nodes per axis.
+    loop : Loop or str, optional
+        "tool", "workpiece" or "relative".
+    exaggeration : float, "auto" or None, optional
+        Display factor of what is drawn displaced: a number, "auto" for a round one that suits the
+        scene, None for what the scene says.
+    parts : bool, optional
+        Whether the part of each parameter in the error is wanted too.
+
+    Returns
+    -------
+    pyvista.MultiBlock
+        All points in the machine frame R, mm. Blocks:
+
+        ``deformed``, ``nominal``
+            StructuredGrid of the working volume, with the point arrays ``error_um`` [n, 3],
+            ``norm_um`` [n], ``orientation_urad`` [n, 3] and ``tilt_urad`` [n]; with `parts` also
+            one array [n, 3] for each parameter that is not zero, for instance ``part_EAX_um``,
+            which add up to ``error_um``.
+        ``surface``
+            PolyData: the outside of the deformed volume, with the same arrays; a line or a vertex
+            where no more than one linear axis moves.
+        ``traces``
+            MultiBlock of polylines, two for each trace of a rotary axis, named
+            ``nominal (275, 0, 0) over C`` and ``actual (275, 0, 0) over C``; the actual ones carry
+            ``error_um`` and ``norm_um``.
+        ``bodies``
+            MultiBlock of PolyData, one for each schematic body of the machine, drawn displaced
+            like the volume; the cell array ``colour`` holds its sRGB colour, 0 to 255.
+
+        Errors are never exaggerated, only points are. The field data say so: ``exaggeration``,
+        ``scene``, ``program``.
+
+    Raises
+    ------
+    OptionError
+        If one of the choices does not exist or is out of range.
+    """
+    import pyvista as pv
+
+    picture = evaluate_picture(scene, exaggeration=exaggeration, grid=grid, loop=loop)
+    field = picture.field
+    arrays = {
+        "error_um": field.error_um,
+        "norm_um": field.norm_um,
+        "orientation_urad": field.orientation_urad,
+        "tilt_urad": np.linalg.norm(field.orientation_urad, axis=-1),
+    }
+    if parts:
+        basis = grid_basis(scene, picture.grid, picture.view)
+        for key, response in zip(basis.keys, basis.position, strict=True):
+            if amplitude := scene.errors.amplitude(key):
+                arrays[f"part_{key}_um"] = amplitude * response
+    traces, bodies = pv.MultiBlock(), pv.MultiBlock()
+    for label, drawn in _named_traces(picture):
+        actual = pv.MultipleLines(drawn.actual_mm)
+        actual.point_data["error_um"] = drawn.error_um
+        actual.point_data["norm_um"] = np.linalg.norm(drawn.error_um, axis=-1)
+        traces.append(pv.MultipleLines(drawn.nominal_mm), f"nominal {label}")
+        traces.append(actual, f"actual {label}")
+    for part in _placed_bodies(picture):
+        mesh = pv.PolyData.from_regular_faces(part.vertices_mm, part.body.triangles)
+        colour = np.array(part.body.colour, dtype=np.uint8)
+        mesh.cell_data["colour"] = np.tile(colour, (len(part.body.triangles), 1))
+        bodies.append(mesh, part.body.name)
+    blocks = pv.MultiBlock()
+    blocks.append(structured_grid(picture.drawn_mm, arrays), "deformed")
+    blocks.append(structured_grid(picture.grid.nominal_mm, arrays), "nominal")
+    blocks.append(_surface_block(picture, arrays), "surface")
+    blocks.append(traces, "traces")
+    blocks.append(bodies, "bodies")
+    blocks.field_data["exaggeration"] = np.array([picture.exaggeration])
+    blocks.field_data["scene"] = [scene.name]
+    blocks.field_data["program"] = [picture.provenance["program"]]
+    return blocks
+
+
+def _surface_block(picture: ScenePicture, arrays: Mapping[str, Array]) -> "pv.PolyData":
+    import pyvista as pv
+
+    drawn = picture.drawn_mm.reshape(-1, 3)
+    if is_thin(picture.shape):
+        nodes = np.arange(len(drawn))
+        # PyVista makes one vertex of a single point
+        mesh = pv.PolyData(drawn) if len(nodes) == 1 else pv.MultipleLines(drawn)
+    else:
+        surface = outer_surface(picture.grid.shape)
+        nodes = surface.nodes
+        mesh = pv.PolyData.from_regular_faces(drawn[nodes], surface.triangles)
+    for name, values in arrays.items():
+        mesh.point_data[name] = values.reshape(-1, *values.shape[3:])[nodes]
+    mesh.point_data.active_scalars_name = "norm_um"
+    return mesh
