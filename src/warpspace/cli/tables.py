@@ -12,13 +12,13 @@ import re
 import sys
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
-from threading import Lock, Timer
+from threading import Timer
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
 if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
+    from rich.progress import Progress
 
     from warpspace.analysis.blocks import Column
 
@@ -192,76 +192,58 @@ DELAY_S = 1.0  # what is done sooner shows nothing
 
 
 class ProgressBar:
-    """A bar that appears once the work has taken a while."""
+    """What is done, counted in the bar that is shown, if one is."""
 
-    def __init__(self, doing: str, total: float | None, unit: str) -> None:
-        self._doing = doing
-        self._total = total
-        self._unit = unit
-        self._done = 0.0
-        self._lock = Lock()
-        self._closed = False
-        self._shown: tuple[Progress, TaskID] | None = None
+    def __init__(self, shown: "Progress | None" = None) -> None:
+        self._shown = shown
 
     def advance(self, steps: float) -> None:
         """Count steps that are done."""
-        with self._lock:
-            self._done += steps
-            if self._shown is not None:
-                bar, task = self._shown
-                bar.update(task, completed=self._done)
+        if self._shown is not None:
+            self._shown.advance(self._shown.task_ids[0], steps)
 
     def reach(self, share: float) -> None:
         """Say how much of the work is done, as an analysis counts it: 0 to 1."""
-        self.advance(share - self._done)
-
-    def show(self) -> None:
-        """Draw the bar from now on, unless the work is done."""
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-        counted = "{task.completed:,.0f} of {task.total:,.0f} " + self._unit
-        counts = (
-            [] if self._total is None or not self._unit else [TextColumn(counted, markup=False)]
-        )
-        with self._lock:
-            if self._closed:
-                return
-            bar = Progress(
-                TextColumn("{task.description}", markup=False),
-                BarColumn(bar_width=None),
-                *counts,
-                TimeElapsedColumn(),
-                console=Console(file=sys.stderr),
-                transient=True,
-                expand=True,
-                redirect_stdout=False,
-                redirect_stderr=False,
-            )
-            task = bar.add_task(self._doing, total=self._total, completed=int(self._done))
-            self._shown = bar, task
-            bar.start()
-
-    def close(self) -> None:
-        """Wipe the bar away."""
-        with self._lock:
-            self._closed = True
-            if self._shown is not None:
-                self._shown[0].stop()
+        if self._shown is not None:
+            self._shown.update(self._shown.task_ids[0], completed=share)
 
 
 @contextmanager
 def progress(
     doing: str, total: float | None = None, unit: str = "", *, silent: bool = False
 ) -> Generator[ProgressBar]:
-    """Show how far some work is."""
-    bar = ProgressBar(doing, total, unit)
-    timer = Timer(DELAY_S, bar.show)
+    """Show how far some work is, in a bar that appears once it has taken a while."""
+    if silent or not sys.stderr.isatty():
+        yield ProgressBar()
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    counted = "{task.completed:,.0f} of {task.total:,.0f} " + unit
+    shown = Progress(
+        TextColumn("{task.description}", markup=False),
+        BarColumn(bar_width=None),
+        *([TextColumn(counted, markup=False)] if total is not None and unit else []),
+        TimeElapsedColumn(),
+        console=Console(file=sys.stderr),
+        transient=True,
+        expand=True,
+        redirect_stdout=False,
+        redirect_stderr=False,
+    )
+    task = shown.add_task(doing, total=total, start=False)
+
+    def show() -> None:
+        shown.start_task(task)
+        shown.start()
+
+    timer = Timer(DELAY_S, show)
     timer.daemon = True
-    if not silent and sys.stderr.isatty():
-        timer.start()
+    timer.start()
     try:
-        yield bar
+        yield ProgressBar(shown)
     finally:
         timer.cancel()
-        bar.close()
+        timer.join()
+        if shown.live.is_started:
+            shown.stop()
