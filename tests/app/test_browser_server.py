@@ -24,14 +24,14 @@ SOCKET = """([url, version]) => new Promise(done => {
   const end = word => { socket.close(); done(word); };
   socket.onopen = () => end("open");
   socket.onerror = () => end("refused");
-  setTimeout(() => end("no answer"), 10000);
+  setTimeout(() => end("no answer"), 60000);
 })"""
 FRAME = """url => new Promise(done => {
   const frame = document.createElement("iframe");
   frame.src = url;
   frame.onload = () => done(frame.contentDocument === null ? "loaded" : "empty");
   document.body.append(frame);
-  setTimeout(() => done("no answer"), 10000);
+  setTimeout(() => done("no answer"), 60000);
 })"""
 WORKER = """([url, version]) => new Promise(done => {
   const worker = new Worker(URL.createObjectURL(new Blob([`
