@@ -102,7 +102,7 @@ def test_the_machine_moves_bends_carries_the_tool_point_and_stays_hidden(tab):
     page = tab.page.context.new_page()
     page.goto(f"{tab.viewer.url}/?fixedDpr=1")
     wait_until_open(page)
-    page.get_by_role("button", name="Show machine", exact=True).wait_for(timeout=15_000)
+    page.get_by_role("button", name="Show machine", exact=True).wait_for()
     page.close()
     tab.button("Show machine")
     tab.until(lambda: tab.drawn("/ghost_machine/R_bed") is not None)
