@@ -1,7 +1,8 @@
 """A scene to start from: any chain, with sizes that fit together and a remark on every line."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import tomli_w
 
@@ -175,124 +176,38 @@ def starter_scene(chain: str | Chain, title: str = "", name: str = "") -> Scene:
 
 def starter_text(chain: str | Chain, title: str = "") -> str:
     """Spell a scene to start from: sizes that fit together, and a remark on what each line says."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
     parsed = parse_chain(chain) if isinstance(chain, str) else chain
     sizes = layout(parsed)
     count = len(parsed.axes)
     name = title or f"{parsed}, {count} {'axis' if count == 1 else 'axes'}"
-    spelled = tomli_w.dumps({"title": name}).strip()
-    along = "carries the workpiece: the tool moves with the name over it"
-    parts = [
-        [
-            "# A machine to start from. Lengths in mm, errors in µm, small angles in µrad, rotary",
-            "# positions in degrees.",
-            "# Change what is not yours; `warpspace check FILE` names whatever does not fit.",
-            spelled,
-        ],
-        ["[machine]", spelled, _line(f'chain = "{parsed}"', "workpiece → frame F → tool")],
-        _table(
-            "[machine.offset_mm]",
-            "origin of each frame in the frame before it",
-            _offsets(parsed, sizes),
-        ),
-        _table(
-            "[machine.rotation_deg]",
-            "spindle horizontal: y points up, z to the rear",
-            ((frame, _list(angles), "") for frame, angles in sizes.rotation_deg.items()),
-        ),
-        _table(
-            "[machine.travel]",
-            "",
-            (
-                (axis, _list(ends), "mm" if is_linear(axis) else "degrees")
-                for axis, ends in sizes.travel.items()
-            ),
-        ),
-        _table(
-            "[machine.direction]",
-            "1 if left out",
-            ((axis, str(value), along) for axis, value in sizes.direction.items()),
-        ),
-        _choices(parsed, sizes),
-        _table(
-            "[workspace]",
-            "a range spans the volume, a number stands",
-            (
-                (axis, f"{low:.10g}" if low == high else _list((low, high)), "")
-                for axis, (low, high) in sizes.workspace.items()
-            ),
-        ),
-        _table("[points_mm]", "", _points(parsed, sizes)),
-        error_lines(parsed, sizes.travel),
-        [
-            _line("[tolerances]", "half widths about 0, of each class"),
-            "default = { translation = 10, rotation = 20, squareness = 25 }  # µm, µrad, µrad",
-        ],
-    ]
-    return "\n\n".join("\n".join(lines) for lines in parts if lines) + "\n"
+    templates = Environment(
+        loader=PackageLoader("warpspace.scene"),
+        autoescape=False,  # noqa: S701 - TOML
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    return templates.get_template("starter.toml.j2").render(
+        chain=parsed,
+        linear=[axis for axis in parsed.axes if is_linear(axis)],
+        sizes=sizes,
+        title=tomli_w.dumps({"title": name}).strip(),
+        errors=error_lines(parsed, sizes.travel),
+        line=_line,
+        row=lambda key, value, why="": _line(f"{key} = {_spell(value)}", why),
+    )
 
 
 def _line(text: str, remark: str = "") -> str:
     return f"{text:<{_COLUMN - 1}} # {remark}" if remark else text
 
 
-def _table(head: str, remark: str, rows: Iterable[tuple[str, str, str]]) -> list[str]:
-    """Spell a table of key, value and remark a line; nothing where there are none."""
-    lines = [_line(f"{key} = {value}", why) for key, value, why in rows]
-    return [_line(head, remark), *lines] if lines else []
-
-
-def _list(values: Sequence[float]) -> str:
-    """Spell numbers, without decimals where they have none."""
-    return "[" + ", ".join(f"{value:.10g}" for value in values) + "]"
-
-
-def _offsets(chain: Chain, sizes: Layout) -> Iterator[tuple[str, str, str]]:
-    remarks = {
-        "S": "spindle nose, in the last frame of the tool side",
-        "t": "tool point, before the spindle nose: the tool's length",
-        "w": "workpiece: middle of the table",
-    }
-    before = dict(
-        zip(
-            (*chain.tool[1:], *chain.workpiece[1:]),
-            (*chain.tool[:-1], *chain.workpiece[:-1]),
-            strict=True,
-        )
-    )
-    for frame, offset in sizes.offset_mm.items():
-        if frame in remarks:
-            yield frame, _list(offset), remarks[frame]
-        elif offset != ORIGIN:
-            yield frame, _list(offset), f"in {before.get(frame, 'R, R in the middle of the table')}"
-
-
-def _choices(chain: Chain, sizes: Layout) -> list[str]:
-    lines = ["# What else a machine may say (docs/scenes.md):"]
-    linear = [axis for axis in chain.axes if is_linear(axis)]
-    rotary = [axis for axis in chain.axes if not is_linear(axis)]
-    if not sizes.rotation_deg:
-        tilted = (rotary or linear)[0]
-        lines.append(
-            f"# [machine.rotation_deg]\n# {tilted} = [45, 0, 0]"
-            "   a frame that is turned about x, y, z: a nutating head, a slant bed"
-        )
-    if linear:
-        lines.append(
-            f"# [machine.gantry]\n# {linear[0]} = {{ span_mm = 1800 }}   two guides, each with"
-            " errors of its own"
-        )
-    lines.append(
-        '# [convention]\n# component_errors = { linear = "after_motion", rotary = "before_motion" }'
-    )
-    return lines
-
-
-def _points(chain: Chain, sizes: Layout) -> Iterator[tuple[str, str, str]]:
-    low, rim = map(_list, sizes.traces_mm)
-    yield "tool", "[0, 0, 0]", "the point whose error counts, in the tool frame"
-    yield "workpiece", rim, "on the top rim of the largest workpiece, from w"
-    if any(not is_linear(axis) for axis in chain.workpiece):
-        yield "traces", f"[{low}, {rim}]", "points whose way over a turn is drawn, from w"
+def _spell(value: Any) -> str:
+    """Spell a number, or numbers in a list; without decimals where there are none."""
+    return f"[{', '.join(map(_spell, value))}]" if isinstance(value, tuple) else f"{value:.10g}"
 
 
 def error_lines(chain: Chain, travel: Mapping[str, Range]) -> list[str]:
