@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpspace.units import MM_PER_UM, URAD_PER_RAD, Array
+from warpspace.units import Array
 
 LEVER_MM = 1000.0
 """Distance along the axis of the second point that the tilt is taken from: 1 µm there is 1 µrad."""
@@ -75,20 +75,13 @@ def axis_motion(
     outwards = (nominal_mm - centre_mm) / radius
     radial = np.sum(on_axis_um * outwards, axis=-1)
     tilt = np.sum((above_um - on_axis_um) * outwards, axis=-1) * (1000.0 / LEVER_MM)
-    return _assemble(angle_deg, radius, (radial, on_axis_um @ normal, tilt), closed=closed)
+    return assemble_motion(angle_deg, radius, (radial, on_axis_um @ normal, tilt), closed=closed)
 
 
-def subtract_motions(one: AxisMotion, other: AxisMotion) -> AxisMotion:
-    """Subtract the deviations of two axes that carry the same point, one − other."""
-    radial, axial, tilt = (
-        a.values - b.values for a, b in zip(one.motions, other.motions, strict=True)
-    )
-    return _assemble(one.angle_deg, one.radius_mm, (radial, axial, tilt), closed=one.closed)
-
-
-def _assemble(
+def assemble_motion(
     angle_deg: Array, radius_mm: float, deviations: tuple[Array, Array, Array], *, closed: bool
 ) -> AxisMotion:
+    """Give the motions of radial, axial and tilt deviations, [n] each."""
     theta = np.deg2rad(angle_deg)
     kept = slice(None, -1 if closed else None)  # the last place of a turn is the first one
     once = np.stack([np.ones_like(theta), np.cos(theta), np.sin(theta)], -1)
@@ -128,48 +121,6 @@ def times_a_turn(values: Array) -> int | None:
 
 
 # --- Circles through traced points ---------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True)
-class CircleDeviation:
-    """How the trace of a point differs from its nominal circle or arc."""
-
-    radius_mm: float  # nominal radius
-    centre_um: float  # displacement of the centre in the plane of the circle
-    radial_um: float  # peak to valley of the radial error once centre and radius are fitted
-    axial_um: float  # peak to valley of the axial error once offset and tilt are fitted
-    axial_offset_um: float  # mean displacement along the axis
-    tilt_urad: float  # tilt of the plane of the trace
-
-
-def circle_deviation(nominal_mm: Array, error_um: Array) -> CircleDeviation:
-    """Take the error of a trace, [n, 3], µm, apart into displacement, tilt and what remains.
-
-    The nominal points, [n, 3], mm, lie on a circle or arc in order, at least five and not all in
-    one line.
-
-    Notes
-    -----
-    Least squares of ``1, cos θ, sin θ`` to the radial and to the axial error; first order in
-    error/radius.
-    """
-    centre_mm, radius, normal = fit_circle(nominal_mm)
-    outwards = (nominal_mm - centre_mm) / radius
-    first = outwards[0]
-    angle = np.arctan2(outwards @ np.cross(normal, first), outwards @ first)
-    harmonic = np.stack([np.ones_like(angle), np.cos(angle), np.sin(angle)], -1)
-    radial = np.sum(error_um * outwards, axis=-1)
-    axial = error_um @ normal
-    around, *_ = np.linalg.lstsq(harmonic, radial, rcond=None)
-    along, *_ = np.linalg.lstsq(harmonic, axial, rcond=None)
-    return CircleDeviation(
-        radius,
-        float(np.hypot(*around[1:])),
-        float(np.ptp(radial - harmonic @ around)),
-        float(np.ptp(axial - harmonic @ along)),
-        float(along[0]),
-        float(np.hypot(*along[1:]) * MM_PER_UM / radius * URAD_PER_RAD),
-    )
 
 
 def fit_circle(points_mm: Array) -> tuple[Array, float, Array]:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpspace.analysis.axis_motion import AxisMotion, subtract_motions
+from warpspace.analysis.axis_motion import AxisMotion, assemble_motion
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.state.app_state import AppState
@@ -93,7 +93,13 @@ def motion_of(picture: LivePicture, line: TraceLine) -> AxisMotion | None:
     if picture.compared is None or not picture.is_difference:
         return _of_state(picture.drawn_state, line)
     one, other = (_of_state(side, line) for side in picture.compared.sides)
-    return None if one is None or other is None else subtract_motions(other, one)
+    if one is None or other is None:
+        return None
+    radial, axial, tilt = (
+        a.values - b.values for a, b in zip(other.motions, one.motions, strict=True)
+    )
+    turn = other.angle_deg, other.radius_mm
+    return assemble_motion(*turn, (radial, axial, tilt), closed=other.closed)
 
 
 def _of_state(state: AppState, line: TraceLine) -> AxisMotion | None:

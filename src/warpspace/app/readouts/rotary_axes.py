@@ -5,7 +5,7 @@ from itertools import groupby
 
 import numpy as np
 
-from warpspace.analysis.axis_motion import AxisMotion, CircleDeviation, circle_deviation
+from warpspace.analysis.axis_motion import AxisMotion, fit_circle
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import standing
 from warpspace.app.readouts.html import message, render
@@ -16,12 +16,54 @@ from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.picture.traces import POSITIVE, TraceLine, motion_lines, trace_lines, turn_words
 from warpspace.picture.words import spell_point
-from warpspace.units import Array, spell_short
+from warpspace.units import MM_PER_UM, URAD_PER_RAD, Array, spell_short
 
 # --- The traces of a picture as numbers: how each circle runs, as text for the page ---------------
 
 MOST_ROWS = 40
 _SMALLEST_MM = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class CircleDeviation:
+    """How the trace of a point differs from its nominal circle or arc."""
+
+    radius_mm: float  # nominal radius
+    centre_um: float  # displacement of the centre in the plane of the circle
+    radial_um: float  # peak to valley of the radial error once centre and radius are fitted
+    axial_um: float  # peak to valley of the axial error once offset and tilt are fitted
+    axial_offset_um: float  # mean displacement along the axis
+    tilt_urad: float  # tilt of the plane of the trace
+
+
+def circle_deviation(nominal_mm: Array, error_um: Array) -> CircleDeviation:
+    """Take the error of a trace, [n, 3], µm, apart into displacement, tilt and what remains.
+
+    The nominal points, [n, 3], mm, lie on a circle or arc in order, at least five and not all in
+    one line.
+
+    Notes
+    -----
+    Least squares of ``1, cos θ, sin θ`` to the radial and to the axial error; first order in
+    error/radius.
+    """
+    centre_mm, radius, normal = fit_circle(nominal_mm)
+    outwards = (nominal_mm - centre_mm) / radius
+    first = outwards[0]
+    angle = np.arctan2(outwards @ np.cross(normal, first), outwards @ first)
+    harmonic = np.stack([np.ones_like(angle), np.cos(angle), np.sin(angle)], -1)
+    radial = np.sum(error_um * outwards, axis=-1)
+    axial = error_um @ normal
+    around, *_ = np.linalg.lstsq(harmonic, radial, rcond=None)
+    along, *_ = np.linalg.lstsq(harmonic, axial, rcond=None)
+    return CircleDeviation(
+        radius,
+        float(np.hypot(*around[1:])),
+        float(np.ptp(radial - harmonic @ around)),
+        float(np.ptp(axial - harmonic @ along)),
+        float(along[0]),
+        float(np.hypot(*along[1:]) * MM_PER_UM / radius * URAD_PER_RAD),
+    )
 
 
 @dataclass(frozen=True, slots=True)
