@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from warpspace.bodies.generated.frame import generate_bodies
+from warpspace.bodies.frame import generate_bodies
 from warpspace.bodies.mesh import Body
 from warpspace.bodies.own_meshes import own_meshes
 from warpspace.bodies.schematic import BODY_FILE, read_bodies

@@ -4,9 +4,10 @@ All sizes are mm. A body is described where it stands with every axis at zero, i
 into the frame it rides on.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
+from itertools import permutations, product
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,9 @@ import numpy as np
 
 from warpspace.bodies.mesh import DARK, LIGHT, METAL, MIDDLE, Body, build_body, open_meshes
 from warpspace.geometry.colour import linear_to_srgb
+from warpspace.kinematics.chain import body_motions
+from warpspace.kinematics.model import Model
+from warpspace.machine.description import Axis, Machine
 from warpspace.units import Array
 
 BODY_FILE = "bodies.glb"
@@ -54,7 +58,7 @@ def _colour(mesh: Any) -> tuple[int, int, int]:
     return red, green, blue
 
 
-SIDES = 40  # flat sides by which a circle is drawn
+SIDES, ROD_SIDES = 40, 32  # flat sides by which a circle is drawn
 Range = tuple[float, float]
 Shape = Any  # A closed mesh of trimesh
 
@@ -70,9 +74,13 @@ def box(x: Range, y: Range, z: Range) -> Shape:
 
 
 def cylinder(
-    radius: float, ends: Range, at: Range = (0.0, 0.0), axis: str = "z", inner: float = 0.0
+    radius: float,
+    ends: Range,
+    at: Sequence[float] | Array = (0.0, 0.0),
+    axis: str = "z",
+    inner: float = 0.0,
 ) -> Shape:
-    """Build a cylinder, or a ring, about a line parallel to an axis."""
+    """Build a cylinder, or a ring, about a line parallel to an axis; at names the other two."""
     from trimesh import creation, transformations
 
     height = ends[1] - ends[0]
@@ -84,7 +92,8 @@ def cylinder(
     if axis != "z":
         about, angle = ([0, 1, 0], np.pi / 2) if axis == "x" else ([1, 0, 0], np.pi / 2)
         mesh.apply_transform(transformations.rotation_matrix(angle, about))
-    mesh.apply_translation(np.insert(np.asarray(at, dtype=float), "xyz".index(axis), sum(ends) / 2))
+    place = np.insert(np.asarray(at, dtype=float)[:2], "xyz".index(axis), sum(ends) / 2)
+    mesh.apply_translation(place)
     return mesh
 
 
@@ -94,83 +103,6 @@ def cone(lower: float, upper: float, ends: Range) -> Shape:
 
     outline = np.array([(0.0, ends[0]), (lower, ends[0]), (upper, ends[1]), (0.0, ends[1])])
     return creation.revolve(outline, sections=SIDES)
-
-
-ROD_SIDES = 32
-Colour = tuple[int, int, int]
-_BODIES = {
-    LIGHT: "arm bridge column fork headstock portal wedge",
-    MIDDLE: "bed head neck pedestal ram sides towers",
-    DARK: "base beam carriage cradle gripper hub lift nozzle nutator probe rotor saddle swivel tool"
-    " turntable wheel",
-    METAL: "chuck quill rails spindle table",
-}
-COLOURS = {body: colour for colour, bodies in _BODIES.items() for body in bodies.split()}
-
-
-@dataclass
-class _Part:
-    frame: str
-    colour: Colour
-    shapes: list[Shape] = field(default_factory=list[Shape])
-    lines_mm: list[Array] = field(default_factory=list[Array])  # [E, 2, 3], in R at home
-
-
-@dataclass
-class Parts:
-    """Shapes in R at home, by the body they belong to."""
-
-    poses: dict[str, Array]  # [4, 4]; frames in R at home
-    # [2, 2], mm; rectangles, lower and upper corner, that the bed has to carry
-    floor: list[Array] = field(default_factory=list[Array])
-    _parts: dict[str, _Part] = field(default_factory=dict[str, _Part])
-
-    def _part(self, frame: str, what: str, colour: Colour | None = None) -> _Part:
-        """Give a body of a frame; what it is called says its colour, unless the first call does."""
-        return self._parts.setdefault(f"{frame}_{what}", _Part(frame, colour or COLOURS[what]))
-
-    def add(self, frame: str, what: str, *shapes: Shape) -> None:
-        """Add shapes to the body of a frame."""
-        self._part(frame, what).shapes.extend(shapes)
-
-    def box(
-        self,
-        frame: str,
-        what: str,
-        i: Range,
-        j: Range,
-        z: Range,
-        *,
-        along: int = 0,
-        colour: Colour | None = None,
-    ) -> None:
-        """Add a box: range i is along axis 0 (x) or 1 (y) of R, j along the other, in mm."""
-        x, y = (j, i) if along else (i, j)
-        self._part(frame, what, colour).shapes.append(box(x, y, z))
-
-    def add_lines(self, frame: str, what: str, lines_mm: Array) -> None:
-        """Add lines to a body, [E, 2, 3], mm in R at home."""
-        self._part(frame, what).lines_mm.append(lines_mm)
-
-    def stand(self, i: Range, j: Range, *, along: int = 0) -> None:
-        """Note a rectangle that the bed has to carry, its ranges as those of a box."""
-        corners = np.array([i, j]).T
-        self.floor.append(corners[:, ::-1] if along else corners)
-
-    def bodies(self) -> tuple[Body, ...]:
-        """Join the shapes of each body, in its own frame."""
-        from trimesh import util
-
-        found: list[Body] = []
-        for name, part in self._parts.items():
-            mesh = util.concatenate(part.shapes)
-            inverse = np.linalg.inv(self.poses[part.frame])
-            mesh.apply_transform(inverse)
-            own = None
-            if part.lines_mm:
-                own = np.concatenate(part.lines_mm) @ inverse[:3, :3].T + inverse[:3, 3]
-            found.append(build_body(mesh, name, part.frame, part.colour, own))
-        return tuple(found)
 
 
 # --- ranges -------------------------------------------------------------------------------------
@@ -189,9 +121,6 @@ def pair(middle: float, apart: float, half: float) -> tuple[Range, Range]:
 def beside(middle: float, inner: float, thick: float) -> tuple[Range, Range]:
     """Give two mirrored ranges, such as two walls, by the inner faces."""
     return pair(middle, inner + thick / 2.0, thick / 2.0)
-
-
-# --- shapes -------------------------------------------------------------------------------------
 
 
 def block(centre: Sequence[float] | Array, half: Sequence[float] | Array) -> Shape:
@@ -215,11 +144,6 @@ def rod(start: Array, end: Array, radius: float, end_radius: float | None = None
     return mesh
 
 
-def upright(radius: float, ends: Range, at: Array, inner: float = 0.0) -> Shape:
-    """Build a vertical cylinder, or a ring, mm."""
-    return cylinder(radius, ends, (float(at[0]), float(at[1])), inner=inner)
-
-
 def bar(start: Array, end: Array, half_width: float, half_height: float) -> Shape:
     """Build a level bar between two points of R, mm."""
     from trimesh import creation, transformations
@@ -231,3 +155,231 @@ def bar(start: Array, end: Array, half_width: float, half_height: float) -> Shap
     mesh.apply_transform(transformations.rotation_matrix(turn, [0, 0, 1]))
     mesh.apply_translation((start + end) / 2.0)
     return mesh
+
+
+# --- what generated bodies are laid out around ---------------------------------------------------
+# Everything is built where the machine stands at home, in R: linear axes in the middle of their
+# travel, rotary axes at zero or as near as their travel allows. A machine whose slides are turned
+# against R, as on the slant bed of a lathe, is built upright along its own slides, turned as they
+# are, and stands on a wedge.
+
+_SHARE_OF_VOLUME, _SMALLEST_MM = 0.2, 12.0
+_FLAT = 0.3  # of the longest half edge: what a volume is taken to have where no axis moves
+_ARMS = 0.4  # of the length of all arms: half edge of the place before a robot without level axes
+_STEEP = 0.75  # cosine of an angle to a direction below which an axis counts as pointing along it
+_ALIGNED, _SQUARE = 0.9994, 0.02
+"""Cosines of two angles: 2 degrees to an axis of R, and one degree off a right angle."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """How an axis moves at home, in R."""
+
+    name: str
+    is_linear: bool
+    direction: Array  # [3]; unit vector along or about which it moves
+    origin_mm: Array  # [3]; of its frame
+    k: int  # index of the axis of R nearest to it: 2 where it points up or down
+    reach_mm: float  # half its travel; 0 for a rotary axis
+
+    @property
+    def slides_level(self) -> bool:
+        """Tell whether it is linear and level."""
+        return self.is_linear and self.k != 2
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A machine at home."""
+
+    poses: dict[str, Array]  # [4, 4]; every frame in R
+    tool: tuple[Way, ...]  # axes of each branch, from the frame outwards
+    workpiece: tuple[Way, ...]
+    tip_mm: Array  # [3]; tool point: the middle of the working volume
+    # [3]; half edges of the working volume along the axes of R, its lower and its upper corner
+    half_mm: Array
+    low_mm: Array
+    high_mm: Array
+    unit_mm: float  # thickness of a wall; every other size of a body is a multiple of it
+    gap_mm: float  # clear space kept around the working volume
+    length_mm: float  # of the tool, down from the spindle nose
+    # [3, 3]; what everything above is turned by in R: the unit matrix, but for a slanted machine
+    slant: Array
+
+
+def build_layout(machine: Machine) -> Layout:
+    """Place every frame of a machine at home and find its sizes."""
+    axes = tuple(machine.axes.values())
+    home = {
+        axis.name: np.asarray(
+            sum(axis.travel) / 2.0
+            if axis.is_linear
+            else min(max(0.0, axis.travel[0]), axis.travel[1])
+        )
+        for axis in axes
+    }
+    motions = body_motions(Model(machine), {}, home)
+    slant = _find_slant(machine, {name: motion.nominal for name, motion in motions.items()})
+    upright = np.eye(4)
+    upright[:3, :3] = slant.T
+    poses = {name: upright @ motion.nominal for name, motion in motions.items()}
+    ways = {axis.name: _way(axis, poses[axis.name]) for axis in axes}
+    half = np.zeros(3)
+    first = {axis.index: axis for axis in reversed(axes) if axis.is_linear}
+    for axis in first.values():
+        half += ways[axis.name].reach_mm * np.abs(ways[axis.name].direction)
+    lengths = [np.linalg.norm(offset) for offset in machine.fixed_mm.values()]
+    lengths += [np.linalg.norm(axis.offset_mm) for axis in axes]
+    arms = [np.hypot(*axis.offset_mm[:2]) for axis in axes if not axis.is_linear]
+    reach = max(half.max(), 0.8 * sum(arms) if np.count_nonzero(half > 1.0) < 3 else 0.0)
+    if reach < 1.0:
+        reach = max(200.0, 0.3 * float(max(lengths, default=0.0)))
+    filled = np.maximum(half, _FLAT * reach)
+    unit = max(_SHARE_OF_VOLUME * 2.0 * float(filled.mean()), _SMALLEST_MM)
+    flat = [k for k in (0, 1) if half[k] < 1.0]
+    if flat and any(not way.is_linear and way.k == 2 for way in ways.values()):
+        around = _ARMS * sum(float(np.hypot(*axis.offset_mm[:2])) for axis in axes)
+        filled[flat] = half[:2].max() if len(flat) == 1 else max(around, filled[:2].max())
+    tip = poses["t"][:3, 3]
+    tool, workpiece = (
+        tuple(ways[axis.name] for axis in machine.branch(side)) for side in ("tool", "workpiece")
+    )
+    low, high = tip - filled, tip + filled
+    length = -float(machine.fixed_mm.get("t", (0.0, 0.0, 0.0))[2])
+    return Layout(poses, tool, workpiece, tip, filled, low, high, unit, 0.2 * unit, length, slant)
+
+
+def _way(axis: Axis, pose: Array) -> Way:
+    direction = pose[:3, axis.index]
+    k = 2 if abs(direction[2]) > _STEEP else int(np.argmax(np.abs(direction[:2])))
+    reach = (axis.travel[1] - axis.travel[0]) / 2.0 if axis.is_linear else 0.0
+    return Way(axis.name, axis.is_linear, direction, pose[:3, 3], k, reach)
+
+
+# --- slides turned against R ------------------------------------------------------------------
+
+
+def _find_slant(machine: Machine, poses: Mapping[str, Array]) -> Array:
+    """Find how the slides of a machine are turned against the axes of R."""
+    linear = [poses[axis.name][:3, axis.index] for axis in machine.axes.values() if axis.is_linear]
+    if all(np.abs(way).max() > _ALIGNED for way in linear):
+        return np.eye(3)
+    triad: list[Array] = []
+    for way in linear:
+        cosines = [abs(float(way @ known)) for known in triad]
+        if any(_SQUARE < cosine < 1.0 - _SQUARE for cosine in cosines):
+            return np.eye(3)
+        if not any(cosine > 0.5 for cosine in cosines):
+            triad.append(way)
+    turned = _nearest(_completed(triad), np.array(linear))
+    turning = [axis for axis in machine.branch("workpiece") if not axis.is_linear]
+    about = [turned.T @ poses[axis.name][:3, axis.index] for axis in turning]
+    return turned if all(np.abs(way).max() > _ALIGNED for way in about) else np.eye(3)
+
+
+def _completed(triad: list[Array]) -> Array:
+    found = list(triad)
+    for axis in np.eye(3)[np.argsort(np.abs(np.sum(np.square(triad), axis=0)))]:
+        if len(found) < 3:
+            rest = axis - sum((float(axis @ known) * known for known in found), np.zeros(3))
+            if np.linalg.norm(rest) > 0.5:
+                found.append(rest / np.linalg.norm(rest))
+    left, _, right = np.linalg.svd(np.array(found).T)
+    return left @ right
+
+
+def _nearest(triad: Array, linear: Array) -> Array:
+    """Order and point three directions so that they are turned least, [3, 3], as columns."""
+
+    def rank(turned: Array) -> tuple[float, float]:
+        level = np.abs(linear @ turned[:, 2]) < 0.5
+        return round(float(np.trace(turned)), 6), float(level.sum())
+
+    every = (
+        triad[:, order] * signs
+        for order in permutations(range(3))
+        for signs in product((1.0, -1.0), repeat=3)
+    )
+    return max((turned for turned in every if np.linalg.det(turned) > 0.0), key=rank)
+
+
+# --- shapes by the body they belong to ------------------------------------------------------------
+
+Colour = tuple[int, int, int]
+_BODIES = {
+    LIGHT: "arm bridge column fork headstock portal wedge",
+    MIDDLE: "bed head neck pedestal ram sides towers",
+    DARK: "base beam carriage cradle gripper hub lift nozzle nutator probe rotor saddle swivel tool"
+    " turntable wheel",
+    METAL: "chuck quill rails spindle table",
+}
+COLOURS = {body: colour for colour, bodies in _BODIES.items() for body in bodies.split()}
+
+
+@dataclass
+class _Part:
+    frame: str
+    colour: Colour
+    shapes: list[Shape] = field(default_factory=list[Shape])
+    lines_mm: list[Array] = field(default_factory=list[Array])  # [2, 3] each, in R at home
+
+
+@dataclass
+class Parts:
+    """Shapes in R at home, by the body they belong to."""
+
+    layout: Layout
+    # [2, 2], mm; rectangles, lower and upper corner, that the bed has to carry
+    floor: list[Array] = field(default_factory=list[Array])
+    _parts: dict[str, _Part] = field(default_factory=dict[str, _Part])
+
+    def add(
+        self,
+        frame: str,
+        what: str,
+        *shapes: Shape,
+        lines_mm: Iterable[Array] = (),
+        colour: Colour | None = None,
+    ) -> None:
+        """Add shapes and lines, [2, 3], to the body of a frame.
+
+        What it is called says its colour, unless the first call does.
+        """
+        part = self._parts.setdefault(f"{frame}_{what}", _Part(frame, colour or COLOURS[what]))
+        part.shapes.extend(shapes)
+        part.lines_mm.extend(lines_mm)
+
+    def box(
+        self,
+        frame: str,
+        what: str,
+        i: Range,
+        j: Range,
+        z: Range,
+        *,
+        along: int = 0,
+        colour: Colour | None = None,
+    ) -> None:
+        """Add a box: range i is along axis 0 (x) or 1 (y) of R, j along the other, in mm."""
+        x, y = (j, i) if along else (i, j)
+        self.add(frame, what, box(x, y, z), colour=colour)
+
+    def stand(self, i: Range, j: Range, *, along: int = 0) -> None:
+        """Note a rectangle that the bed has to carry, its ranges as those of a box."""
+        corners = np.array([i, j]).T
+        self.floor.append(corners[:, ::-1] if along else corners)
+
+    def bodies(self) -> tuple[Body, ...]:
+        """Join the shapes of each body, in its own frame."""
+        from trimesh import util
+
+        found: list[Body] = []
+        for name, part in self._parts.items():
+            mesh = util.concatenate(part.shapes)
+            inverse = np.linalg.inv(self.layout.poses[part.frame])
+            mesh.apply_transform(inverse)
+            own = None
+            if part.lines_mm:
+                own = np.array(part.lines_mm) @ inverse[:3, :3].T + inverse[:3, 3]
+            found.append(build_body(mesh, name, part.frame, part.colour, own))
+        return tuple(found)

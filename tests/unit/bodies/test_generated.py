@@ -7,8 +7,7 @@ import pytest
 from trimesh import Trimesh
 
 import warpspace
-from warpspace.bodies.generated.frame import generate_bodies
-from warpspace.bodies.generated.layout import build_layout
+from warpspace.bodies.frame import generate_bodies
 from warpspace.bodies.mesh import DARK, METAL, Body
 from warpspace.bodies.placed import (
     load_bodies,
@@ -17,7 +16,7 @@ from warpspace.bodies.placed import (
     scene_motions,
     view_motions,
 )
-from warpspace.bodies.schematic import BODY_FILE, box, cylinder, read_bodies
+from warpspace.bodies.schematic import BODY_FILE, box, build_layout, cylinder, read_bodies
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import View, build_basis
 from warpspace.field.grid import build_grid

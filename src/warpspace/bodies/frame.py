@@ -9,23 +9,23 @@ from functools import lru_cache
 
 import numpy as np
 
-from warpspace.bodies.generated.ends import Mount, Stack, build_head
-from warpspace.bodies.generated.layout import UP, Layout, build_layout, half_travel
+from warpspace.bodies.ends import Head, Mount, Stack
 from warpspace.bodies.mesh import LIGHT, MIDDLE, Body
 from warpspace.bodies.schematic import (
     Colour,
     Parts,
     Range,
-    Shape,
+    Way,
     about,
     bar,
     beside,
+    build_layout,
+    cylinder,
     pair,
     rod,
-    upright,
 )
 from warpspace.kinematics.chain import BASE
-from warpspace.machine.description import TOOL_SHAPES, Axis, Machine, Vector
+from warpspace.machine.description import TOOL_SHAPES, Axis, Machine, Vector, parse_chain
 from warpspace.units import Array
 
 _LYING = 0.7
@@ -35,12 +35,6 @@ _LONG = 1.5
 """Ratio of travels from which a machine is a gantry on rails instead of a saddle on a wall."""
 
 
-def build_frame(layout: Layout, parts: Parts, mount: Mount, stack: Stack) -> None:
-    """Build what carries the head, down to what stands on the bed."""
-    lying = abs(float(layout.tool_axis @ UP)) < _LYING
-    (_Behind if lying else _Overhead)(layout, parts, mount, stack).build()
-
-
 class _Frame:
     """The tool side while it is built: what all of its bodies are placed by."""
 
@@ -48,9 +42,9 @@ class _Frame:
     sign: float  # of the depth along the other one in R
     zero_mm: float  # where depths count from
 
-    def __init__(self, layout: Layout, parts: Parts, mount: Mount, stack: Stack) -> None:
-        self.layout, self.parts, self.mount, self.stack = layout, parts, mount, stack
-        self.u, self.spine = layout.unit_mm, mount.point_mm
+    def __init__(self, parts: Parts, mount: Mount, stack: Stack) -> None:
+        self.layout, self.parts, self.mount, self.stack = parts.layout, parts, mount, stack
+        self.u, self.spine = parts.layout.unit_mm, mount.point_mm
         self.axes = list(reversed(mount.inner))
 
     @property
@@ -96,11 +90,11 @@ class _Frame:
 class _Behind(_Frame):
     """What carries a level head from behind: headstock, ram, and a column that may travel."""
 
-    def __init__(self, layout: Layout, parts: Parts, mount: Mount, stack: Stack) -> None:
-        super().__init__(layout, parts, mount, stack)
-        level = layout.tool_axis[:2]
+    def __init__(self, parts: Parts, mount: Mount, stack: Stack) -> None:
+        super().__init__(parts, mount, stack)
+        level = self.layout.poses["t"][:2, 2]
         self.i = int(np.argmin(np.abs(level)))
-        self.sign, self.zero_mm = float(np.sign(level[self.j])), float(layout.tip_mm[self.j])
+        self.sign, self.zero_mm = float(np.sign(level[self.j])), float(self.layout.tip_mm[self.j])
 
     def build(self) -> None:
         u, w, middle = self.u, self.mount.half_mm, float(self.spine[2])
@@ -108,15 +102,15 @@ class _Behind(_Frame):
         hangs = True  # the head, so far, on nothing that slides upwards
         axes = self.axes.copy()  # those that are not built yet
         while axes and axes[0].is_linear:
-            axis, reach = axes[0], half_travel(axes[0])
-            if self.layout.is_vertical(axis):
+            axis, reach = axes[0], axes[0].reach_mm
+            if axis.k == 2:
                 z, flange = about(middle, 1.3 * w), about(middle, 1.9 * w)
                 i, deep = self.around(half), (start + 0.5 * u, start + 0.8 * u)
                 self.box(axis.name, "headstock", i, (start, start + 3.6 * u), z, MIDDLE)
                 self.box(axis.name, "headstock", self.around(half + 0.35 * u), deep, flange)
                 half, high, column_at = half + 0.1 * u, middle + reach + 2.6 * w, start + 0.8 * u
                 hangs = False
-            elif self.layout.along(axis) == self.j and hangs:
+            elif axis.k == self.j and hangs:
                 j = (start, start + 2.0 * reach + 3.0 * u)
                 self.box(axis.name, "ram", self.around(w), j, about(middle, w), LIGHT)
                 start += 0.8 * u
@@ -129,7 +123,7 @@ class _Behind(_Frame):
             self.box(BASE, "headstock", self.around(wide), j, about(middle, wide), MIDDLE)
         self._add_column(axes, half, column_at, high)
 
-    def _add_column(self, axes: list[Axis], half: float, at: float, high: float) -> None:
+    def _add_column(self, axes: list[Way], half: float, at: float, high: float) -> None:
         """Add a column, and below it a foot upon rails for each axis that it rides on."""
         u, frames = self.u, [*(axis.name for axis in axes), BASE]
         top = self.stack.bed_mm + 0.75 * u * len(axes)
@@ -139,12 +133,12 @@ class _Behind(_Frame):
             what, below = "base" if number else "column", frames[number + 1]
             self.box(axis.name, what, self.around(span), (near, far), (top - 0.55 * u, top))
             rails = (top - 0.75 * u, top - 0.55 * u)
-            if axis.is_linear and self.layout.along(axis) == self.i:
-                span += half_travel(axis)
+            if axis.is_linear and axis.k == self.i:
+                span += axis.reach_mm
                 for line in ((at + 0.1 * u, at + 0.5 * u), (far - 0.7 * u, far - 0.3 * u)):
                     self.box(below, "rails", self.around(span), line, rails)
             else:
-                far += half_travel(axis)
+                far += axis.reach_mm
                 for line in pair(self.middle, 0.7 * span, 0.2 * u):
                     self.box(below, "rails", line, (near, far), rails)
             top -= 0.75 * u
@@ -167,18 +161,18 @@ class _Rear:
 class _Overhead(_Frame):
     """What carries a head from above."""
 
-    def __init__(self, layout: Layout, parts: Parts, mount: Mount, stack: Stack) -> None:
-        super().__init__(layout, parts, mount, stack)
-        level = [axis for axis in mount.inner if layout.slides_level(axis)]
+    def __init__(self, parts: Parts, mount: Mount, stack: Stack) -> None:
+        super().__init__(parts, mount, stack)
+        level = [axis for axis in mount.inner if axis.slides_level]
         self.i, self.sign, self.zero_mm = self._across(level), 1.0, 0.0
         self.arm_step = _ARM * self.u
         self.front = self.depth(self.spine)
 
-    def _across(self, level: list[Axis]) -> int:
-        ways = [self.layout.along(axis) for axis in level]
+    def _across(self, level: list[Way]) -> int:
+        ways = [axis.k for axis in level]
         if len(level) < 2 or ways[0] == ways[1]:
             return 0
-        lengths = [half_travel(axis) for axis in level[:2]]
+        lengths = [axis.reach_mm for axis in level[:2]]
         if ways[0] == 0:
             return 1 if lengths[0] >= _LONG * lengths[1] else 0
         return ways[1]
@@ -192,7 +186,7 @@ class _Overhead(_Frame):
                 if rear is not None:
                     at[self.j], top, rear = rear.plane, rear.high, None
                 at, top = self._add_turning(axis, at, top)
-            elif self.layout.is_vertical(axis):
+            elif axis.k == 2:
                 rear, top = self._add_vertical(axis, rear, self.axes[place + 1 :], at, top)
             else:
                 rear = self._add_level(axis, rear, top)
@@ -217,17 +211,17 @@ class _Overhead(_Frame):
     # --- axes -----------------------------------------------------------------------------------
 
     def _add_vertical(
-        self, axis: Axis, rear: _Rear | None, rest: list[Axis], at: Array, top: float
+        self, axis: Way, rear: _Rear | None, rest: list[Way], at: Array, top: float
     ) -> tuple[_Rear | None, float]:
-        u, w, reach = self.u, self.mount.half_mm, half_travel(axis)
+        u, w, reach = self.u, self.mount.half_mm, axis.reach_mm
         if rear is None and rest and not rest[0].is_linear:
             arms = sum(not turning.is_linear for turning in rest)
             first = top + reach + 0.2 * u + (arms - 1) * _ARM * u
             self.arm_step = -_ARM * u
-            quill = upright(0.4 * u, (top, first + reach + 1.6 * u), at)
+            quill = cylinder(0.4 * u, (top, first + reach + 1.6 * u), at)
             self.parts.add(axis.name, "quill", quill)
             return None, first
-        if rear is None and any(map(self.layout.slides_level, rest)):
+        if rear is None and any(axis.slides_level for axis in rest):
             high = top + 1.7 * reach + 1.5 * u
             z = (top, high + 0.5 * reach + 0.6 * u)
             self.box(axis.name, "ram", self.around(w), about(self.front, w), z)
@@ -247,12 +241,12 @@ class _Overhead(_Frame):
         low, plate = top - 0.2 * u, (column - 0.35 * u, column - 0.12 * u)
         self.box(name, "headstock", self.around(w), (self.front - w, plate[0]), (top, high))
         self.box(name, "headstock", self.around(1.25 * w), plate, (low, high + 0.8 * u))
-        self.parts.add(name, "headstock", upright(0.62 * w, (high, high + 1.3 * u), self.spine))
+        self.parts.add(name, "headstock", cylinder(0.62 * w, (high, high + 1.3 * u), self.spine))
         return _Rear(column, low - reach, high + 0.8 * u + reach, 1.45 * w, "column")
 
-    def _add_level(self, axis: Axis, rear: _Rear | None, top: float) -> _Rear:
-        u, reach, name = self.u, half_travel(axis), axis.name
-        across = self.layout.along(axis) == self.i
+    def _add_level(self, axis: Way, rear: _Rear | None, top: float) -> _Rear:
+        u, reach, name = self.u, axis.reach_mm, axis.name
+        across = axis.k == self.i
         if rear is None:
             w, z = 1.2 * self.mount.half_mm, (top, top + 1.6 * u)
             self.box(name, "carriage", self.around(w), about(self.front, w), z)
@@ -382,20 +376,20 @@ class _Overhead(_Frame):
 
     # --- rotary axes before linear ones ---------------------------------------------------------
 
-    def _add_turning(self, axis: Axis, at: Array, top: float) -> tuple[Array, float]:
-        u, line = self.u, self.layout.origin(axis)
-        if not self.layout.is_vertical(axis):
-            out, hub = self.layout.direction(axis), np.array([*at[:2], top + 1.2 * u])
+    def _add_turning(self, axis: Way, at: Array, top: float) -> tuple[Array, float]:
+        u, line = self.u, axis.origin_mm
+        if axis.k != 2:
+            out, hub = axis.direction, np.array([*at[:2], top + 1.2 * u])
             self.parts.add(axis.name, "hub", rod(hub - 1.4 * u * out, hub + 1.4 * u * out, 1.2 * u))
             return at, top + 2.4 * u
         low, high, wide = top + 0.06 * u, top + _ARM * u, 0.95 * u
         for radius, end in ((wide, at), (1.15 * wide, line)):
-            self.parts.add(axis.name, "arm", upright(radius, (low, high), end))
+            self.parts.add(axis.name, "arm", cylinder(radius, (low, high), end))
         if float(np.hypot(*(line[:2] - at[:2]))) > 0.5 * u:
             start, end = (np.array([*p[:2], top + _ARM * u / 2.0]) for p in (line, at))
             self.parts.add(axis.name, "arm", bar(start, end, wide, 0.42 * _ARM * u))
         # the arm before this one lies below it
-        self.parts.add(axis.name, "arm", upright(0.75 * wide, (top, low), line))
+        self.parts.add(axis.name, "arm", cylinder(0.75 * wide, (top, low), line))
         return line.copy(), top + self.arm_step
 
     def _add_pedestal(self, at: Array, top: float) -> None:
@@ -410,67 +404,57 @@ class _Overhead(_Frame):
             over = under + lift + 0.35 * u
             raised = np.array([0.0, 0.0, lift])
             self.parts.add(BASE, "pedestal", bar(front + raised, at + raised, 1.0 * u, 0.35 * u))
-            self.parts.add(BASE, "pedestal", upright(1.0 * u, (under, over), front))
+            self.parts.add(BASE, "pedestal", cylinder(1.0 * u, (under, over), front))
             under = over
         foot = bed + 0.4 * u
-        self.parts.add(BASE, "pedestal", upright(1.15 * u, (foot, max(under, foot + 1.0)), at))
+        self.parts.add(BASE, "pedestal", cylinder(1.15 * u, (foot, max(under, foot + 1.0)), at))
         x, y = (about(place, 1.7 * u) for place in at[:2])
         self.parts.box(BASE, "pedestal", x, y, (bed, foot))
         self.parts.stand(x, y)
 
 
-_Key = tuple[str, tuple[Axis, ...], tuple[tuple[str, Vector], ...], tuple[tuple[str, Vector], ...]]
+_Fixed = tuple[tuple[str, Vector], ...]
 
 
 def generate_bodies(machine: Machine) -> tuple[Body, ...]:
     """Generate the schematic bodies of a machine from its chain, offsets and travels."""
-    key = (
-        str(machine.chain),
-        tuple(machine.axes.values()),
-        tuple(sorted(machine.fixed_mm.items())),
-        tuple(sorted(machine.fixed_deg.items())),
-    )
-    source = machine.bodies.get("t")
-    return _generate(key, (source.shape if source else "") or TOOL_SHAPES[0])
+    axes, source = tuple(machine.axes.values()), machine.bodies.get("t")
+    fixed = (tuple(sorted(each.items())) for each in (machine.fixed_mm, machine.fixed_deg))
+    shape = (source.shape if source else "") or TOOL_SHAPES[0]
+    return _generate(str(machine.chain), axes, *fixed, shape)
 
 
 @lru_cache(maxsize=32)
-def _generate(key: _Key, tool: str) -> tuple[Body, ...]:
-    from warpspace.machine.description import parse_chain
-
-    chain, axes, fixed_mm, fixed_deg = key
-    machine = Machine(
-        parse_chain(chain),
-        {axis.name: axis for axis in axes},
-        dict(fixed_mm),
-        fixed_deg=dict(fixed_deg),
-    )
-    layout = build_layout(machine)
-    parts = Parts(layout.poses)
-    stack = Stack(layout, parts)
+def _generate(
+    chain: str, axes: tuple[Axis, ...], fixed_mm: _Fixed, fixed_deg: _Fixed, tool: str
+) -> tuple[Body, ...]:
+    by_name = {axis.name: axis for axis in axes}
+    machine = Machine(parse_chain(chain), by_name, dict(fixed_mm), fixed_deg=dict(fixed_deg))
+    parts = Parts(build_layout(machine))
+    stack = Stack(parts)
     stack.build()
-    build_frame(layout, parts, build_head(layout, parts, tool), stack)
-    _add_bed(layout, parts, stack.bed_mm)
+    mount = Head(parts, tool).build()
+    lying = abs(parts.layout.poses["t"][2, 2]) < _LYING
+    (_Behind if lying else _Overhead)(parts, mount, stack).build()
+    _add_bed(parts, stack.bed_mm)
     return parts.bodies()
 
 
-def _add_bed(layout: Layout, parts: Parts, top: float) -> None:
-    """Add a slab under everything that stands on the bed, and a plinth a little smaller."""
-    u = layout.unit_mm
+def _add_bed(parts: Parts, top: float) -> None:
+    """Add a slab under everything that stands on the bed, and a plinth a little smaller.
+
+    Where the slides are turned against R, a wedge leads down to a level floor.
+    """
+    from trimesh import convex
+
+    u, slant = parts.layout.unit_mm, parts.layout.slant
     corners = np.concatenate(parts.floor)
     x, y = np.array([corners.min(axis=0) - 0.25 * u, corners.max(axis=0) + 0.25 * u]).T
     low, foot, inset = top - 1.1 * u, top - 1.45 * u, np.array([0.35 * u, -0.35 * u])
     parts.box(BASE, "bed", x, y, (low, top))
     parts.box(BASE, "bed", x + inset, y + inset, (foot, low))
-    if not np.allclose(layout.slant, np.eye(3)):
-        under = np.array([(at_x, at_y, foot) for at_x in x for at_y in y])
-        parts.add(BASE, "bed", _wedge(under, layout.slant, u))
-
-
-def _wedge(corners_mm: Array, slant: Array, unit_mm: float) -> Shape:
-    from trimesh import convex
-
-    lower = corners_mm @ slant.T  # in R
-    floor = lower.copy()
-    floor[:, 2] = lower[:, 2].min() - 0.5 * unit_mm
-    return convex.convex_hull(np.concatenate([lower, floor]) @ slant)
+    if not np.allclose(slant, np.eye(3)):
+        lower = np.array([(at_x, at_y, foot) for at_x in x for at_y in y]) @ slant.T  # in R
+        floor = lower.copy()
+        floor[:, 2] = lower[:, 2].min() - 0.5 * u
+        parts.add(BASE, "bed", convex.convex_hull(np.concatenate([lower, floor]) @ slant))

@@ -5,11 +5,11 @@ from itertools import takewhile
 
 import numpy as np
 
-from warpspace.bodies.generated.layout import Layout, half_travel
 from warpspace.bodies.schematic import (
     Parts,
     Range,
     Shape,
+    Way,
     about,
     beside,
     block,
@@ -17,10 +17,8 @@ from warpspace.bodies.schematic import (
     cylinder,
     pair,
     rod,
-    upright,
 )
 from warpspace.kinematics.chain import BASE
-from warpspace.machine.description import Axis
 from warpspace.units import Array
 
 _LIGHT_TOOLS = ("probe", "nozzle", "gripper")
@@ -42,7 +40,7 @@ class Mount:
 
     point_mm: Array  # [3]; middle of its upper face, in R at home
     half_mm: float  # half width of what should carry it there, mm
-    inner: tuple[Axis, ...]  # axes that carry it, the bed's first
+    inner: tuple[Way, ...]  # axes that carry it, the bed's first
 
     @property
     def carrier(self) -> str:
@@ -50,25 +48,25 @@ class Mount:
         return self.inner[-1].name if self.inner else BASE
 
 
-class _Head:
+class Head:
     """A head while it is built, in the tool frame at home: z leads from the tool to the spindle."""
 
-    def __init__(self, layout: Layout, parts: Parts, tool: str) -> None:
+    def __init__(self, parts: Parts, tool: str) -> None:
+        layout = parts.layout
         self.layout, self.parts, self.tool = layout, parts, tool
-        self.u = layout.unit_mm
-        self.place = layout.poses["t"]
+        self.u, self.place = layout.unit_mm, layout.poses["t"]
         self.turn = self.place[:3, :3]
         self.volume_top = float(np.abs(self.turn.T) @ layout.half_mm @ (0, 0, 1)) + layout.gap_mm
         self.centre = np.zeros(2)
 
-    def add(self, frame: str, what: str, *shapes: Shape) -> None:
+    def _add(self, frame: str, what: str, *shapes: Shape) -> None:
         for shape in shapes:
             shape.apply_transform(self.place)
         self.parts.add(frame, what, *shapes)
 
-    def line(self, axis: Axis) -> tuple[Array, Array]:
-        direction = self.turn.T @ self.layout.direction(axis)
-        origin = self.turn.T @ (self.layout.origin(axis) - self.layout.tip_mm)
+    def _line(self, axis: Way) -> tuple[Array, Array]:
+        direction = self.turn.T @ axis.direction
+        origin = self.turn.T @ (axis.origin_mm - self.layout.tip_mm)
         across = direction[:2]
         size = float(across @ across)
         if size < 1e-9:
@@ -77,25 +75,26 @@ class _Head:
         return direction, origin + shift * direction
 
     def build(self) -> Mount:
-        branch = self.layout.machine.branch("tool")
+        """Build tool, spindle and rotary head."""
+        branch = self.layout.tool
         axes = list(takewhile(lambda axis: not axis.is_linear, reversed(branch)))
         inner = branch[: len(branch) - len(axes)]
-        u, length = self.u, -float(self.layout.machine.fixed_mm.get("t", (0.0, 0.0, 0.0))[2])
+        u, length = self.u, self.layout.length_mm
         if length <= 0.4 * u:
             length = 1.4 * u  # from the tool point to the spindle nose
         self._add_tool(length)
         top = length + 1.65 * u
-        if all(abs(self.line(axis)[0][2]) >= _COAXIAL for axis in axes):
+        if all(abs(self._line(axis)[0][2]) >= _COAXIAL for axis in axes):
             top = max(top, self.volume_top)
             self._add_spindle(length, top)
             for axis in axes:
-                self.add(axis.name, "rotor", upright(1.25 * u, (top, top + 1.0 * u), self.centre))
+                self._add(axis.name, "rotor", cylinder(1.25 * u, (top, top + 1.0 * u), self.centre))
                 top += 1.0 * u
             return self._mount(top, (0.8 if self.tool in _LIGHT_TOOLS else 1.15) * u, inner)
         nose: float | None = length  # where the spindle starts, until it is there
         carriers = [*(axis.name for axis in axes[1:]), inner[-1].name if inner else BASE]
         for axis, carrier in zip(axes, carriers, strict=True):
-            share = abs(float(self.line(axis)[0][2]))
+            share = abs(float(self._line(axis)[0][2]))
             if share > _COAXIAL:
                 if nose is not None:
                     self._add_spindle(nose, top)
@@ -106,12 +105,12 @@ class _Head:
             nose = None
         return self._mount(top, 1.3 * u, inner)
 
-    def _mount(self, top: float, width: float, inner: tuple[Axis, ...]) -> Mount:
+    def _mount(self, top: float, width: float, inner: tuple[Way, ...]) -> Mount:
         over = max(top, self.volume_top)
         mount = Mount(self.turn @ np.array([*self.centre, over]) + self.place[:3, 3], width, inner)
         if top < over:
             half = [0.8 * width, 0.8 * width, (over - top) / 2.0 + 1.0]
-            self.add(mount.carrier, "neck", block([*self.centre, (top + over) / 2.0], half))
+            self._add(mount.carrier, "neck", block([*self.centre, (top + over) / 2.0], half))
         return mount
 
     def _add_tool(self, length: float) -> None:
@@ -121,39 +120,39 @@ class _Head:
 
             ball = creation.icosphere(subdivisions=2, radius=0.12 * u)
             ball.apply_translation([0.0, 0.0, 0.12 * u])
-            self.add("t", what, ball, cylinder(0.05 * u, (0.12 * u, 0.6 * length)))
+            self._add("t", what, ball, cylinder(0.05 * u, (0.12 * u, 0.6 * length)))
         elif self.tool == "nozzle":
-            self.add("t", what, block([0, 0, 0.55 * length], [0.4 * u, 0.4 * u, 0.2 * length]))
+            self._add("t", what, block([0, 0, 0.55 * length], [0.4 * u, 0.4 * u, 0.2 * length]))
         elif self.tool == "wheel":
             radius = max(1.8 * u, 0.8 * length)
-            self.add("t", what, cylinder(radius, (0.0, 0.45 * length), inner=0.72 * radius))
-            self.add("t", what, cylinder(radius, (0.45 * length, 0.6 * length)))
+            self._add("t", what, cylinder(radius, (0.0, 0.45 * length), inner=0.72 * radius))
+            self._add("t", what, cylinder(radius, (0.45 * length, 0.6 * length)))
         elif self.tool == "gripper":
             for x in (-0.3 * u, 0.3 * u):
-                self.add("t", what, block([x, 0, 0.3 * length], [0.08 * u, 0.2 * u, 0.3 * length]))
-            self.add("t", what, block([0, 0, 0.75 * length], [0.55 * u, 0.3 * u, 0.15 * length]))
+                self._add("t", what, block([x, 0, 0.3 * length], [0.08 * u, 0.2 * u, 0.3 * length]))
+            self._add("t", what, block([0, 0, 0.75 * length], [0.55 * u, 0.3 * u, 0.15 * length]))
         for low, high, radius, upper in _TOOLS[self.tool]:
-            self.add("t", what, cone(radius * u, upper * u, (low * length, high * length)))
+            self._add("t", what, cone(radius * u, upper * u, (low * length, high * length)))
 
     def _add_spindle(self, nose: float, top: float) -> None:
         cut = min(nose + 0.75 * self.u, (nose + top) / 2.0)
         wide = (0.5 if self.tool in _LIGHT_TOOLS else 1.0) * self.u
         nose_cone = cone(0.52 * wide, 0.78 * wide, (nose, cut))
         nose_cone.apply_translation([*self.centre, 0.0])
-        self.add("S", "spindle", nose_cone, upright(wide, (cut, top), self.centre))
+        self._add("S", "spindle", nose_cone, cylinder(wide, (cut, top), self.centre))
 
-    def _add_swivel(self, axis: Axis, top: float) -> float:
-        u, point = self.u, self.line(axis)[1][:2]
-        self.add(axis.name, "swivel", upright(1.45 * u, (top, top + 0.9 * u), point))
+    def _add_swivel(self, axis: Way, top: float) -> float:
+        u, point = self.u, self._line(axis)[1][:2]
+        self._add(axis.name, "swivel", cylinder(1.45 * u, (top, top + 0.9 * u), point))
         if not np.allclose(point, self.centre, atol=0.2 * u):
             middle, reach = (point + self.centre) / 2.0, np.abs(point - self.centre) / 2.0
             half = [*(reach + 1.0 * u), 0.25 * u]
-            self.add(axis.name, "swivel", block([*middle, top + 0.25 * u], half))
+            self._add(axis.name, "swivel", block([*middle, top + 0.25 * u], half))
             self.centre = point.copy()
         return top + 0.9 * u
 
-    def _add_fork(self, axis: Axis, parent: str, nose: float) -> float:
-        u, (direction, point) = self.u, self.line(axis)
+    def _add_fork(self, axis: Way, parent: str, nose: float) -> float:
+        u, (direction, point) = self.u, self._line(axis)
         k = int(np.argmax(np.abs(direction[:2])))
         out = np.eye(3)[k]
 
@@ -169,25 +168,25 @@ class _Head:
         height = (pivot + 0.9 * u - foot) / 2.0
         body = block([*self.centre, foot + height], half(0.95 * u, 0.9 * u, height))
         across = rod(hub - 1.35 * u * out, hub + 1.35 * u * out, 0.75 * u)
-        self.add(axis.name, "head", body, across)
+        self._add(axis.name, "head", body, across)
         roof, rise = pivot + 1.15 * u, 1.15 * u / 2.0
         for side in (-1.65 * u, 1.65 * u):
             arm = hub + side * out
             body = block(arm + np.array([0, 0, rise]), half(0.27 * u, 0.75 * u, rise))
-            self.add(
+            self._add(
                 parent, "fork", body, rod(arm - 0.27 * u * out, arm + 0.27 * u * out, 0.75 * u)
             )
         body = block([*self.centre, roof + 0.3 * u], half(1.92 * u, 0.85 * u, 0.3 * u))
-        self.add(parent, "fork", body)
+        self._add(parent, "fork", body)
         return roof + 0.6 * u
 
-    def _add_nutator(self, axis: Axis, parent: str, nose: float) -> float:
-        u, (direction, point) = self.u, self.line(axis)
+    def _add_nutator(self, axis: Way, parent: str, nose: float) -> float:
+        u, (direction, point) = self.u, self._line(axis)
         line = direction * np.sign(direction[2])
         pivot = np.array([*self.centre, max(float(point[2]), nose + 1.8 * u)])
         low = pivot - np.array([0.0, 0.0, 0.9 * u])
         self._add_spindle(nose, float(low[2]))
-        self.add(
+        self._add(
             axis.name,
             "head",
             rod(low, pivot, 1.15 * u),
@@ -195,16 +194,11 @@ class _Head:
             rod(pivot - 0.6 * u * line, pivot, 0.75 * u, 1.15 * u),
         )
         far = pivot + 2.0 * u * line
-        self.add(parent, "wedge", rod(pivot + 1.1 * u * line, far, 1.5 * u))
+        self._add(parent, "wedge", rod(pivot + 1.1 * u * line, far, 1.5 * u))
         middle = [*((far[:2] + self.centre) / 2.0), far[2] + 0.85 * u]
         half = [*(np.abs(far[:2] - self.centre) / 2.0 + 1.05 * u), 0.65 * u]
-        self.add(parent, "wedge", block(middle, half))
+        self._add(parent, "wedge", block(middle, half))
         return float(far[2]) + 1.5 * u
-
-
-def build_head(layout: Layout, parts: Parts, tool: str) -> Mount:
-    """Build tool, spindle and rotary head."""
-    return _Head(layout, parts, tool).build()
 
 
 _SLOTS, _ABOVE_MM = 8, 0.3
@@ -214,13 +208,14 @@ _STEEP = 0.9
 class Stack:
     """The stack of bodies under the workpiece, built from the top downwards."""
 
-    def __init__(self, layout: Layout, parts: Parts) -> None:
-        self.layout, self.parts, self.u = layout, parts, layout.unit_mm
-        self.branch = list(reversed(layout.machine.branch("workpiece")))
+    def __init__(self, parts: Parts) -> None:
+        layout = parts.layout
+        self.layout, self.parts = layout, parts
+        self.u, self.branch = layout.unit_mm, layout.workpiece[::-1]
         below = float(layout.low_mm[2]) - layout.gap_mm
         origin = float(layout.poses["w"][2, 3])
-        turning = [a for a in self.branch if not a.is_linear and layout.is_vertical(a)]
-        middle = layout.origin(turning[0]) if turning else layout.tip_mm
+        turning = [a for a in self.branch if not a.is_linear and a.k == 2]
+        middle = turning[0].origin_mm if turning else layout.tip_mm
         self.centre_mm = middle[:2].copy()  # [2]; its middle in plan view
         self.half_mm = 1.08 * layout.half_mm[:2]  # [2]; half edges of its lowest body so far
         # height of its lower side so far, mm; in the end the top of the bed
@@ -233,14 +228,13 @@ class Stack:
 
     def build(self) -> None:
         """Build the workpiece side from its outermost axis down to the bed."""
-        layout = self.layout
         for place, axis in enumerate(self.branch):
             parent = self.branch[place + 1].name if place + 1 < len(self.branch) else BASE
             if axis.is_linear:
                 self._add_slide(axis, outermost=place == 0)
-            elif layout.is_vertical(axis):
+            elif axis.k == 2:
                 self._add_turntable(axis, outermost=place == 0)
-            elif abs(layout.direction(axis)).max() < _STEEP:
+            elif abs(axis.direction).max() < _STEEP:
                 self._add_oblique_table(axis)
             elif place == 0:
                 self._add_headstock(axis, parent)
@@ -248,11 +242,11 @@ class Stack:
                 self._add_cradle(axis, parent)
         if not self.branch:
             self._add_plate(BASE, 0.5)
-        for axis in filter(layout.slides_level, self.branch):
-            self.swept_mm[layout.along(axis)] += half_travel(axis)
-        if self.branch and layout.slides_level(self.branch[-1]):
-            k = layout.along(self.branch[-1])
-            self.half_mm[k] += 0.4 * half_travel(self.branch[-1])
+        for axis in (axis for axis in self.branch if axis.slides_level):
+            self.swept_mm[axis.k] += axis.reach_mm
+        if self.branch and self.branch[-1].slides_level:
+            k = self.branch[-1].k
+            self.half_mm[k] += 0.4 * self.branch[-1].reach_mm
             self._add_rails(BASE, "rails", k, half_width=0.14, height=0.2)
         self.parts.stand(self.range(0), self.range(1))
 
@@ -271,7 +265,8 @@ class Stack:
         width = (y[1] - y[0]) / 60.0
         rows = [row + s for row in np.linspace(*y, 6)[1:-1] for s in (-width, width)]
         self._add_layer(frame, "table", height)
-        self.parts.add_lines(frame, "table", np.array([[(end, r, z) for end in x] for r in rows]))
+        lines = [np.array([(end, r, z) for end in x]) for r in rows]
+        self.parts.add(frame, "table", lines_mm=lines)
 
     def _add_rails(
         self, frame: str, what: str, k: int, *, half_width: float, height: float
@@ -281,15 +276,17 @@ class Stack:
         for rail in pair(self.centre_mm[1 - k], apart, half_width * self.u):
             self.parts.box(frame, what, self.range(k), rail, z, along=k)
 
-    def _add_slide(self, axis: Axis, *, outermost: bool) -> None:
-        u, k, reach = self.u, self.layout.along(axis), half_travel(axis)
+    def _add_slide(self, axis: Way, *, outermost: bool) -> None:
+        u, k, reach = self.u, axis.k, axis.reach_mm
         if outermost:
             self._add_plate(axis.name, 0.55)
             self.half_mm = 0.86 * self.half_mm
         if k == 2:
             self._add_layer(axis.name, "lift", 1.2, 0.8)
             radius, z = 0.45 * float(self.half_mm.min()), self.bed_mm
-            self.parts.add(axis.name, "lift", upright(radius, (z - 2.0 * reach, z), self.centre_mm))
+            self.parts.add(
+                axis.name, "lift", cylinder(radius, (z - 2.0 * reach, z), self.centre_mm)
+            )
             # room for the way down, and for the column to end within the bed
             self.bed_mm -= max(0.1 * u + reach, 2.0 * reach - 1.4 * u)
             self.half_mm = 0.75 * self.half_mm
@@ -300,16 +297,16 @@ class Stack:
         self._add_rails(axis.name, what, k, half_width=0.22, height=0.25)
         self.half_mm[k] += 0.6 * reach
 
-    def _add_turntable(self, axis: Axis, *, outermost: bool) -> None:
-        u, z, at = self.u, self.bed_mm, self.layout.origin(axis)
+    def _add_turntable(self, axis: Way, *, outermost: bool) -> None:
+        u, z, at = self.u, self.bed_mm, axis.origin_mm
         if not outermost:
             radius = 0.85 * float(self.half_mm.max())
-            self.parts.add(axis.name, "turntable", upright(radius, self._lower(0.6 * u), at))
+            self.parts.add(axis.name, "turntable", cylinder(radius, self._lower(0.6 * u), at))
             self.half_mm = np.full(2, radius)
             return
         radius = max(0.92 * float(self.layout.half_mm[:2].min()), 1.3 * u)
         for share, height in ((1.0, 0.45), (0.82, 0.3)):
-            ring = upright(share * radius, self._lower(height * u), at, inner=0.12 * radius)
+            ring = cylinder(share * radius, self._lower(height * u), at, inner=0.12 * radius)
             self.parts.add(axis.name, "table", ring)
         slots: list[Array] = []
         for turn in np.arange(_SLOTS) * 2.0 * np.pi / _SLOTS:
@@ -318,28 +315,28 @@ class Stack:
             for side in (-0.025, 0.025):
                 ends = [at[:2] + radius * (r * out + side * across) for r in (0.2, 0.995)]
                 slots.append(np.array([[*end, z + _ABOVE_MM] for end in ends]))
-        self.parts.add_lines(axis.name, "table", np.array(slots))
+        self.parts.add(axis.name, "table", lines_mm=slots)
         self.half_mm, self.swept_mm = np.full(2, radius), np.full(2, radius)
 
     # --- lines that are not upright -------------------------------------------------------------
 
-    def _add_oblique_table(self, axis: Axis) -> None:
+    def _add_oblique_table(self, axis: Way) -> None:
         """Add a table that turns about a line neither level nor upright: a disc square to it."""
-        line = self.layout.direction(axis) * np.sign(self.layout.direction(axis)[2] or 1.0)
+        line = axis.direction * np.sign(axis.direction[2] or 1.0)
         radius = float(self.half_mm.min())
         middle = np.append(self.centre_mm, self.bed_mm - 0.75 * radius)
         self.parts.add(
             axis.name,
             "nutator",
             rod(middle - 0.3 * self.u * line, middle, radius),
-            upright(0.5 * radius, (middle[2], self.bed_mm), middle),
+            cylinder(0.5 * radius, (middle[2], self.bed_mm), middle),
         )
         self.bed_mm = float(middle[2]) - 0.8 * radius - 0.4 * self.u
 
-    def _add_headstock(self, axis: Axis, parent: str) -> None:
+    def _add_headstock(self, axis: Way, parent: str) -> None:
         """Add a chuck at one end of the volume, and on the frame before it the headstock."""
-        layout, parts, u, k = self.layout, self.parts, self.u, self.layout.along(axis)
-        m, line, tip, half = 1 - k, layout.origin(axis), layout.tip_mm[k], layout.half_mm[k]
+        layout, parts, u, k = self.layout, self.parts, self.u, axis.k
+        m, line, tip, half = 1 - k, axis.origin_mm, layout.tip_mm[k], layout.half_mm[k]
         side = 1.0 if line[k] > tip + 0.5 * half else -1.0
         face = tip + side * (half + layout.gap_mm)
 
@@ -365,10 +362,10 @@ class Stack:
         self.half_mm[k], self.half_mm[m] = abs(near - far) / 2.0, 1.9 * u
         self.swept_mm, self.bed_mm = self.half_mm.copy(), low
 
-    def _add_cradle(self, axis: Axis, parent: str) -> None:
+    def _add_cradle(self, axis: Way, parent: str) -> None:
         """Add a cradle that tilts what is above, and on the frame before it two towers."""
-        layout, u, k = self.layout, self.u, self.layout.along(axis)
-        m, z, line = 1 - k, self.bed_mm, self.layout.origin(axis)
+        layout, u, k = self.layout, self.u, axis.k
+        m, z, line = 1 - k, self.bed_mm, axis.origin_mm
         middle, pivot, plate = float(self.centre_mm[k]), float(line[2]), z - 0.65 * u
         away = abs(float(layout.tip_mm[k]) - middle) + float(layout.half_mm[k]) + layout.gap_mm
         inner = max(float(self.half_mm[k]) + 0.3 * u, away)

@@ -1,1 +1,0 @@
-"""Bodies of any machine, generated from its description alone."""
