@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from warpspace.bodies.mesh import MIDDLE, Body, build_body, count_mesh, open_meshes
-from warpspace.exceptions import OptionError
+from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.kinematics.transforms import apply, placed
 from warpspace.machine.description import BodySource, Machine
 from warpspace.machine.limits import MAX_MESH_MB, MAX_URDF_TRIANGLES
@@ -167,19 +167,12 @@ def frame_meshes(
             continue
         frame, pose = frame_of[link.name]
         for visual in link.visuals:
-            where = f"link {link.name!r}"
-            placed = np.eye(4) if visual.origin is None else np.array(visual.origin, dtype=float)
-            if not (np.abs(placed) < LARGEST_M).all():
-                notes.append(f"{where}: the place of its shape is no finite number; left out")
+            try:
+                mesh = _shape(visual, pose, (folder, root or folder), read)
+            except WarpspaceError as error:
+                notes.append(f"link {link.name!r}: {error}")
                 continue
-            mesh = _shape(visual.geometry, where, (folder, root or folder), notes, read)
             if mesh is None:
-                continue
-            mesh.apply_transform(placed)
-            mesh.apply_scale(MM_PER_M)
-            mesh.apply_transform(pose)
-            if not np.isfinite(mesh.vertices).all():
-                notes.append(f"{where}: its shape holds numbers that are not finite; left out")
                 continue
             triangles += len(mesh.faces)
             if triangles > MAX_URDF_TRIANGLES:
@@ -191,74 +184,69 @@ def frame_meshes(
     return {frame: util.concatenate(own) for frame, own in parts.items()}, notes, list(read)
 
 
-def _shape(
-    geometry: Any,
-    where: str,
-    folders: tuple[Path, Path],
-    notes: list[str],
-    read: dict[Path, Any],
-) -> Any:
-    """Build one shape, metres; None where it cannot be, which is noted."""
+def _shape(visual: Any, pose: Array, folders: tuple[Path, Path], read: dict[Path, Any]) -> Any:
+    """Build one shape in its frame, mm; None where there is none, an error where it cannot be."""
     from trimesh import creation
 
+    placed = np.eye(4) if visual.origin is None else np.array(visual.origin, dtype=float)
+    if not (np.abs(placed) < LARGEST_M).all():
+        raise WarpspaceError("the place of its shape is no finite number; left out")
+    geometry = visual.geometry
     if geometry is None:
         return None
     if geometry.box is not None:
-        sizes = _sizes(geometry.box.size, 3, f"{where}: its box", notes)
-        return None if sizes is None else creation.box(extents=sizes)
-    if geometry.cylinder is not None:
+        mesh = creation.box(extents=_sizes(geometry.box.size, 3, "box"))
+    elif geometry.cylinder is not None:
         given = (geometry.cylinder.radius, geometry.cylinder.length)
-        sizes = _sizes(given, 2, f"{where}: its cylinder", notes)
-        if sizes is None:
-            return None
-        return creation.cylinder(radius=sizes[0], height=sizes[1], sections=48)
-    if geometry.sphere is not None:
-        sizes = _sizes([geometry.sphere.radius], 1, f"{where}: its sphere", notes)
-        return None if sizes is None else creation.icosphere(subdivisions=2, radius=sizes[0])
-    if geometry.mesh is None:
+        radius, height = _sizes(given, 2, "cylinder")
+        mesh = creation.cylinder(radius=radius, height=height, sections=48)
+    elif geometry.sphere is not None:
+        (radius,) = _sizes([geometry.sphere.radius], 1, "sphere")
+        mesh = creation.icosphere(subdivisions=2, radius=radius)
+    elif geometry.mesh is not None:
+        mesh = _mesh(geometry.mesh, folders, read)
+    else:
         return None
-    return _mesh(geometry.mesh, where, folders, notes, read)
+    mesh.apply_transform(placed)
+    mesh.apply_scale(MM_PER_M)
+    mesh.apply_transform(pose)
+    if not np.isfinite(mesh.vertices).all():
+        raise WarpspaceError("its shape holds numbers that are not finite; left out")
+    return mesh
 
 
-def _sizes(given: Any, count: int, what: str, notes: list[str]) -> Array | None:
-    """Read the sizes of a shape, [count], metres; None where they are none, which is noted."""
+def _sizes(given: Any, count: int, what: str) -> Array:
+    """Read the sizes of a shape, [count], metres."""
     try:
         sizes = np.abs(np.asarray(given, dtype=float))
     except (TypeError, ValueError):
         sizes = np.empty(0)
-    if sizes.shape == (count,) and (sizes < LARGEST_M).all():
-        return sizes
-    notes.append(f"{what} has no size that can be read; left out")
-    return None
+    if sizes.shape != (count,) or not (sizes < LARGEST_M).all():
+        raise WarpspaceError(f"its {what} has no size that can be read; left out")
+    return sizes
 
 
-def _mesh(
-    given: Any, where: str, folders: tuple[Path, Path], notes: list[str], read: dict[Path, Any]
-) -> Any:
+def _mesh(given: Any, folders: tuple[Path, Path], read: dict[Path, Any]) -> Any:
     import trimesh
 
     name = str(given.filename or "")
     path = _find(name, *folders)
-    if path is not None and not path.resolve().is_relative_to(folders[1].resolve()):
-        notes.append(
-            f"{where}: mesh {name!r} leads out of {folders[1]}; left out (--mesh-root FOLDER)"
-        )
-        return None
     if path is None:
-        notes.append(f"{where}: mesh {name!r} is missing; left out")
-        return None
+        raise WarpspaceError(f"mesh {name!r} is missing; left out")
+    if not path.resolve().is_relative_to(folders[1].resolve()):
+        raise WarpspaceError(
+            f"mesh {name!r} leads out of {folders[1]}; left out (--mesh-root FOLDER)"
+        )
     if path not in read:
         read[path] = _load(path)
     mesh = read[path]
     if isinstance(mesh, str):
-        notes.append(f"{where}: mesh {name!r} {mesh}; left out")
-        return None
+        raise WarpspaceError(f"mesh {name!r} {mesh}; left out")
     bare = trimesh.Trimesh(np.array(mesh.vertices), np.array(mesh.faces), process=False)
     if given.scale is not None:
         scale = np.asarray(given.scale, dtype=float)
         if scale.shape not in ((), (1,), (3,)) or not (np.abs(scale) < LARGEST_M).all():
-            notes.append(f"{where}: mesh {name!r} has no scale that can be read; left out")
-            return None
+            raise WarpspaceError(f"mesh {name!r} has no scale that can be read; left out")
         bare.apply_transform(np.diag([*np.broadcast_to(scale, 3), 1.0]))
     return bare
 
