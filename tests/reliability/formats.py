@@ -144,8 +144,7 @@ def _import_seeds(name: str) -> list[bytes]:
 
 def _read_import(name: str | None, content: bytes, _: Path) -> object:
     """Read files as their format whatever their first lines say, or as what they look like."""
-    from warpspace.formats.kind import ReadOptions
-    from warpspace.formats.registry import find_format, open_upload, read_errors
+    from warpspace.formats.registry import ReadOptions, find_format, open_upload, read_errors
     from warpspace.formats.to_scene import base_scene, into_scene
 
     base = base_scene("dvf5000")

@@ -5,11 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from warpspace.formats.kind import ReadOptions
 from warpspace.formats.kinds.linuxcnc import squareness
 from warpspace.formats.kinds.skew import skew_factor, skew_lengths
 from warpspace.formats.measured import BACKWARD, FORWARD
-from warpspace.formats.registry import find_format, read_errors
+from warpspace.formats.registry import ReadOptions, find_format, read_errors
 from warpspace.formats.source import source_of_text
 from warpspace.formats.terms import Product, trilinear
 

@@ -1,34 +1,176 @@
-"""The formats there are, and from files to the errors in them."""
+"""What a format is and can, the formats there are, and from files to the errors in them."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import re
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.resources import files
 from pathlib import Path
+from pkgutil import resolve_name
+from typing import Any
 
 from warpspace.exceptions import OptionError, SceneError, UnknownNameError
-from warpspace.formats.kind import Format, ReadOptions
-from warpspace.formats.kinds import (
-    csv_own,
-    fanuc_3d,
-    heidenhain,
-    linuxcnc,
-    rtl,
-    sinumerik,
-    skew,
-    volumetric,
-)
-from warpspace.formats.measured import Imported
-from warpspace.formats.source import MAX_BYTES, Source, read_source, source_of_bytes
+from warpspace.formats.compensation.wanted import Wanted
+from warpspace.formats.measured import Imported, merge
+from warpspace.formats.source import MAX_BYTES, Place, Source, read_source, source_of_bytes
+from warpspace.formats.terms import Tables, errors_of
+from warpspace.machine.axes import is_axis_name
+from warpspace.machine.description import Machine
 from warpspace.plugins import load_plugins
 from warpspace.scene.files import check_file
 
-_KINDS = (csv_own, volumetric, rtl, sinumerik, heidenhain, fanuc_3d, linuxcnc, skew)
-_FORMATS: dict[str, Format] = {one.name: one for kind in _KINDS for one in kind.FORMATS}
+ERROR, CORRECTION = "error", "correction"
+"""What the numbers of a controller's table are: the error, which it subtracts, or what it adds."""
+SIGNS = (ERROR, CORRECTION)
+Files = Mapping[str, str]
+"""Text of each file by what is added to the name that the user gives: "" is that file itself."""
+MOST_FILES = 64
+HEAD_BYTES = 16
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """What a user says about a file that the file itself does not."""
+
+    machine: Machine | None = None  # that its errors are for; None where none is named
+    axis: str = ""  # axis of a file that names none
+    # axis of the machine by its name in the file
+    names: Mapping[str, str] = field(default_factory=dict[str, str])
+    sign: str = ""  # "error" or "correction"; empty for what the documentation of the format says
+    # which of the published variants of a format it is; empty for the usual one
+    variant: str = ""
+
+    def factor(self, usual: str) -> float:
+        """Give the factor from a number of a table to a correction: −1 where it is an error."""
+        return -1.0 if (self.sign or usual) == ERROR else 1.0
+
+    def said_sign(self, usual: str) -> str:
+        """Say what the numbers are: what the user says, else the documentation of the format."""
+        return f"sign: {self.sign}" if self.sign else usual
+
+    def axis_named(self, name: str, at: Source | Place) -> str:
+        """Find the axis of the machine behind a name in a file: X1, MX1 and X mean X."""
+        bare = name.strip().strip('"').upper()
+        given = self.names.get(bare, "")
+        candidates = [given] if given else _candidates(bare)
+        known = [axis for axis in candidates if len(axis) == 1 or given]
+        if self.machine is not None:
+            known = [axis for axis in candidates if axis in self.machine.axes]
+        if not known:
+            says = f"--axis {bare or 'NAME'}=AXIS says which one it is"
+            if self.machine is None:
+                at.unsaid(f"axis {bare!r} is not known", f"X Y Z U V W A B C; {says}")
+            chain, axes = self.machine.chain, ", ".join(self.machine.axes)
+            found = f"axis {bare!r} is none of the machine {chain}, which has {axes}"
+            at.unsaid(found if given else f"{found} ({says})")
+        return known[0]
+
+
+@dataclass(frozen=True)
+class Format:
+    """A kind of file: what it holds, how it is recognised, read, written and evaluated."""
+
+    name: str
+    title: str
+    source: str  # where its structure is published
+    endings: tuple[str, ...]  # usual endings of its files
+    holds: str  # for the list of formats, as the next three
+    units: str
+    grid: str
+    limits: str
+    recognise: Callable[[str, str], bool]  # by the first lines of a file and its name
+    # the errors that files hold; None for those that `tables` correct
+    read: Callable[[Sequence[Source], ReadOptions], Imported] | None = None
+    # what the controller evaluates after reading them; None where it is no controller's
+    tables: Callable[[Sequence[Source], ReadOptions], Tables] | None = None
+    write: Callable[[Wanted], Files] | None = None  # the files that compensate
+    apart: bool = False  # whether each of its files is a table by itself
+    points: int = 21  # per axis where none are asked for
+    most_points: int = 10_000  # per axis that the controller takes
+    # whether it holds error parameters, from which the controller works out its corrections
+    parametric: bool = False
+    variants: tuple[str, ...] = ()  # published ones, the usual one first
+    names_variants: bool = False  # whether its files name variants of their own, such as profiles
+    orientation: bool = False  # whether corrections of rotary axes have a place in it
+    # whether it can move all positions by the same; where not, a part that lies elsewhere cannot be
+    # corrected, and its placement is fitted out of relative errors
+    offsets: bool = True
+    measured: bool = False  # whether its runs are readings, which are kept with the scene
+
+    @property
+    def can_write(self) -> bool:
+        """Whether `warpspace compensate` writes it."""
+        return self.write is not None
+
+    def errors(self, sources: Sequence[Source], options: ReadOptions) -> Imported:
+        """Give the errors that files hold."""
+        if self.read is not None:
+            return self.read(sources, options)
+        if self.tables is None:
+            raise OptionError(f"{self.name} is written only; expected another format")
+        parts = [[source] for source in sources] if self.apart else [sources]
+        found = [
+            errors_of(self.tables(part, options), self.name, part[0], options.machine)
+            for part in parts
+        ]
+        return merge(found) if len(found) > 1 else found[0]
+
+
+@cache
+def _words() -> dict[str, Any]:
+    return tomllib.loads((files("warpspace.formats") / "formats.toml").read_text("utf-8"))
+
+
+def described(name: str) -> dict[str, Any]:
+    """Give the name, words and figures of a format of the house."""
+    words = _words()["formats"][name]
+    return {**words, "name": name, "endings": tuple(words["endings"])}
+
+
+def has(pattern: str) -> Callable[[str, str], bool]:
+    """Tell files by a pattern in their first lines, whatever their name."""
+    found = re.compile(pattern, re.MULTILINE)
+    return lambda head, _: found.search(head) is not None
+
+
+def _candidates(bare: str) -> list[str]:
+    found = [bare] if is_axis_name(bare) else []
+    stem = bare.removeprefix("M").rstrip("0123456789")
+    if len(stem) == 1 and is_axis_name(stem) and stem not in found:
+        found.append(stem)
+    return found
+
+
+def parse_axis_options(texts: Sequence[str]) -> tuple[str, dict[str, str]]:
+    """Read what a user says of axes: one letter, or NAME=AXIS."""
+    axis, names = "", {}
+    for text in texts:
+        name, equals, target = text.partition("=")
+        found = (target if equals else name).strip().upper()
+        if not is_axis_name(found):
+            raise OptionError(f"--axis {text!r}; expected an axis (X) or NAME=AXIS (AX1=X)")
+        if equals:
+            names[name.strip().upper()] = found
+        else:
+            axis = found
+    return axis, names
+
+
+_KINDS = ["csv_own", "volumetric", "rtl", "sinumerik", "heidenhain", "fanuc_3d", "linuxcnc", "skew"]
+_ADDED: dict[str, Format] = {}
+
+
+@cache
+def _own() -> dict[str, Format]:
+    kinds = (resolve_name(f"{__package__}.kinds.{kind}:FORMATS") for kind in _KINDS)
+    return {one.name: one for kind in kinds for one in kind}
 
 
 def formats() -> tuple[Format, ...]:
     """List all formats."""
     load_plugins()
-    return tuple(_FORMATS.values())
+    return (*_own().values(), *_ADDED.values())
 
 
 def find_format(name: str) -> Format:
@@ -47,14 +189,14 @@ def register_format(found: Format) -> None:
     OptionError
         If another one has its name.
     """
-    if found.name in _FORMATS:
+    if found.name in {**_own(), **_ADDED}:
         raise OptionError(f"format {found.name!r} is there already; expected a name of its own")
-    _FORMATS[found.name] = found
+    _ADDED[found.name] = found
 
 
 def unregister_format(name: str) -> None:
     """Take a format away again."""
-    del _FORMATS[name]
+    del _ADDED[name]
 
 
 def recognise(sources: Sequence[Source]) -> Format:
@@ -80,10 +222,6 @@ def recognise(sources: Sequence[Source]) -> Format:
     return next(iter(found.values()))
 
 
-MOST_FILES = 64
-HEAD_BYTES = 16
-
-
 @dataclass(frozen=True)
 class Reading:
     """What was read, and as what."""
@@ -93,60 +231,14 @@ class Reading:
     recognised: bool  # whether the format was found in the files; if not, the user said it
 
 
-@dataclass(frozen=True)
-class _Unpublished:
-    """Files whose structure nobody has published: named, with what to export instead."""
-
-    what: str
-    instead: str
-    endings: tuple[str, ...] = ()
-    starts: tuple[bytes, ...] = ()  # what its files begin with
-
-
-_UNPUBLISHED = (
-    _Unpublished(
-        "a spreadsheet",
-        "save the sheet as CSV with the header of `warpspace import --template AXIS`",
-        (".xlsx", ".xls", ".ods"),
-        (b"PK\x03\x04", b"\xd0\xcf\x11\xe0"),
-    ),
-    _Unpublished(
-        "a PDF", "export the numbers as CSV from the program that wrote it", (".pdf",), (b"%PDF",)
-    ),
-    _Unpublished(
-        "a capture of a laser interferometer whose structure is not published",
-        "export the deviations as .rtl or as CSV",
-        (".rtx", ".rtf", ".dyn", ".pos"),
-    ),
-    _Unpublished(
-        "a SINUMERIK VCS file, whose structure is not published",
-        "export the calibration in the Etalon exchange format (variant Vendor) or as CSV",
-        (".vcs", ".vcs2"),
-    ),
-    _Unpublished(
-        "a FANUC file of three-dimensional error compensation, whose structure is not published",
-        "list its points in the table that docs/compensation.md shows under fanuc-3d",
-        (".3de",),
-    ),
-    _Unpublished(
-        "a HEIDENHAIN kinematics table",
-        "export its .COM and .CMA files",
-        (".tab", ".kinematics", ".knc"),
-    ),
-    _Unpublished(
-        "an error map of a coordinate measuring machine, whose structure is not published",
-        "export its error curves as CSV",
-        (".vec", ".cmp", ".map"),
-    ),
-)
-
-
 def refuse_unknown(name: str, content: bytes) -> None:
     """Refuse a file of a structure that nobody has published."""
     lower = name.lower()
-    for kind in _UNPUBLISHED:
-        if any(content.startswith(start) for start in kind.starts) or lower.endswith(kind.endings):
-            raise SceneError(name, [f"is {kind.what}; expected another file: {kind.instead}"])
+    for kind in _words()["unpublished"]:
+        starts = tuple(start.encode("latin-1") for start in kind.get("starts", ()))
+        if content.startswith(starts) or lower.endswith(tuple(kind["endings"])):
+            found = f"is {kind['what']}; expected another file: {kind['instead']}"
+            raise SceneError(name, [found])
 
 
 def open_files(paths: Sequence[Path]) -> list[Source]:

@@ -11,8 +11,7 @@ from warpspace.bench.base import find_test, run_test
 from warpspace.calibration.readings import parse_readings
 from warpspace.exceptions import SceneError
 from warpspace.formats import source
-from warpspace.formats.kind import ReadOptions
-from warpspace.formats.registry import find_format, open_upload, read_errors
+from warpspace.formats.registry import ReadOptions, find_format, open_upload, read_errors
 from warpspace.formats.source import MAX_BYTES, source_of_bytes, source_of_text
 from warpspace.formats.to_scene import into_scene
 from warpspace.scene.library import load_scene

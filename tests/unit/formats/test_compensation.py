@@ -8,10 +8,9 @@ import pytest
 from warpspace.exceptions import OptionError
 from warpspace.formats.compensation.compensate import Compensate, compensate, sweep
 from warpspace.formats.compensation.wanted import build_corrector
-from warpspace.formats.kind import ReadOptions
 from warpspace.formats.kinds import fanuc_3d
 from warpspace.formats.kinds.csv_own import surface_template
-from warpspace.formats.registry import formats, read_errors, recognise
+from warpspace.formats.registry import ReadOptions, formats, read_errors, recognise
 from warpspace.formats.source import source_of_text
 from warpspace.formats.terms import Line, Product
 from warpspace.formats.to_scene import into_scene

@@ -12,8 +12,7 @@ from warpspace.bench.data import DataColumn
 from warpspace.bench.data import parse_table as parse_test
 from warpspace.calibration.readings import parse_table as parse_calibration
 from warpspace.exceptions import SceneError
-from warpspace.formats.kind import ReadOptions
-from warpspace.formats.registry import open_upload, read_errors
+from warpspace.formats.registry import ReadOptions, open_upload, read_errors
 from warpspace.scene.curves import read_csv_column
 from warpspace.scene.files import CsvRows, guard_cell, parse_number, unguard_cell
 

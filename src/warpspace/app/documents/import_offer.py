@@ -6,8 +6,16 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 from warpspace.exceptions import UnsaidError, WarpspaceError
-from warpspace.formats.kind import SIGNS, Format, ReadOptions, parse_axis_options
-from warpspace.formats.registry import Reading, find_format, read_errors, recognise
+from warpspace.formats.registry import (
+    SIGNS,
+    Format,
+    Reading,
+    ReadOptions,
+    find_format,
+    parse_axis_options,
+    read_errors,
+    recognise,
+)
 from warpspace.formats.source import Source
 from warpspace.formats.to_scene import ImportedScene, into_scene
 from warpspace.scene.model import Scene

@@ -16,8 +16,7 @@ from warpspace.app.readouts.html import message
 from warpspace.app.readouts.import_preview import preview_html
 from warpspace.app.state.app_state import start_state
 from warpspace.exceptions import UnsaidError, WarpspaceError
-from warpspace.formats.kind import CORRECTION, ERROR, Format
-from warpspace.formats.registry import formats, open_upload
+from warpspace.formats.registry import CORRECTION, ERROR, Format, formats, open_upload
 from warpspace.formats.source import Source
 
 # --- Widgets of what the files of an import do not say: format, axis, sign and variant ------------

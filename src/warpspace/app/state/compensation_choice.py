@@ -7,8 +7,7 @@ from warpspace.app.state.ranges import Span
 from warpspace.exceptions import OptionError
 from warpspace.formats.compensation.compensate import RESOLUTION, Compensate, read_points
 from warpspace.formats.compensation.wanted import LOOPS
-from warpspace.formats.kind import SIGNS
-from warpspace.formats.registry import find_format, formats
+from warpspace.formats.registry import SIGNS, find_format, formats
 from warpspace.machine.axes import is_linear
 from warpspace.machine.description import Machine
 

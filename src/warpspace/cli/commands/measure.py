@@ -201,8 +201,7 @@ def import_(
         _import_robot(files, output, tool or "", workpiece or "", mesh_root, force=force)
         return
 
-    from warpspace.formats.kind import ReadOptions, parse_axis_options
-    from warpspace.formats.registry import open_files, read_errors
+    from warpspace.formats.registry import ReadOptions, open_files, parse_axis_options, read_errors
     from warpspace.formats.to_scene import base_scene, into_scene
     from warpspace.scene.machines import machine_names
 

@@ -21,8 +21,7 @@ from warpspace.formats.compensation.controller import (
     reversal_notes,
 )
 from warpspace.formats.compensation.wanted import Corrector, Wanted, build_corrector
-from warpspace.formats.kind import SIGNS, Files, Format
-from warpspace.formats.registry import find_format
+from warpspace.formats.registry import SIGNS, Files, Format, find_format
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import TravelDirection
 from warpspace.scene.files import parse_whole

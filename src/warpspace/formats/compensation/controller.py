@@ -9,8 +9,7 @@ from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorField, fit_placement
 from warpspace.field.grid import Grid, build_grid
 from warpspace.formats.compensation.wanted import Corrector, Moved, Wanted
-from warpspace.formats.kind import Files, Format, ReadOptions
-from warpspace.formats.registry import Reading
+from warpspace.formats.registry import Files, Format, Reading, ReadOptions
 from warpspace.formats.source import source_of_text
 from warpspace.formats.terms import Tables
 from warpspace.kinematics.model import Coordinates, Loop

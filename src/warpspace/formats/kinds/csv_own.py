@@ -12,7 +12,6 @@ import numpy as np
 
 from warpspace.exceptions import SceneError, near_miss
 from warpspace.formats.compensation.wanted import Wanted
-from warpspace.formats.kind import Files, Format, ReadOptions
 from warpspace.formats.measured import (
     BACKWARD,
     BOTH,
@@ -29,6 +28,7 @@ from warpspace.formats.measured import (
     tables_of,
     zero_key,
 )
+from warpspace.formats.registry import Files, Format, ReadOptions, described
 from warpspace.formats.source import (
     DEG_PER,
     MM_PER,
@@ -386,22 +386,10 @@ def _planes(table: _Table) -> Imported:
 
 
 FORMAT = Format(
-    name=NAME,
-    title="measurement table of warpspace",
-    source="docs/import.md",
-    endings=(".csv", ".txt"),
-    holds="any error along its axis, with runs, directions and uncertainties; over two axes, with"
-    " directions; constants",
-    units="as the header says: um mm nm in, urad mrad rad arcsec deg",
-    grid="any positions; over two axes every point of a grid",
+    **described(NAME),
     limits=f"{MAX_POINTS:,} rows",
     recognise=recognise,
     read=read,
     write=write,
-    points=41,
-    most_points=2001,
-    parametric=True,
-    orientation=True,
-    measured=True,
 )
 FORMATS = (FORMAT,)

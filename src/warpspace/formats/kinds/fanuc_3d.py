@@ -12,7 +12,7 @@ import numpy as np
 
 from warpspace.exceptions import OptionError
 from warpspace.formats.compensation.wanted import Wanted
-from warpspace.formats.kind import CORRECTION, Files, Format, ReadOptions, has
+from warpspace.formats.registry import CORRECTION, Files, Format, ReadOptions, described, has
 from warpspace.formats.source import MM_PER, Source
 from warpspace.formats.terms import Grid3, Tables
 
@@ -128,18 +128,11 @@ def write(wanted: Wanted) -> Files:
 
 
 FORMAT = Format(
-    name="fanuc-3d",
-    title="FANUC three-dimensional error compensation, a grid of corrections",
-    source="FANUC Series 30i-MODEL A, Three-dimensional error compensation, A-79351E",
-    endings=(".csv",),
-    holds="corrections of X, Y and Z over X, Y and Z",
-    units="mm, detection units",
-    grid="equal steps along each of three axes",
+    **described("fanuc-3d"),
     limits=f"{MOST_POINTS} points an axis, ±{MOST_COUNT} detection units times the magnification",
     recognise=has(rf"\A\s*{MARK}"),
     tables=read_tables,
     write=write,
-    points=9,
     most_points=MOST_POINTS,
 )
 FORMATS = (FORMAT,)

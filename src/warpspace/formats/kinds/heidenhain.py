@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from warpspace.formats.compensation.wanted import Wanted
-from warpspace.formats.kind import ERROR, Files, Format, ReadOptions
+from warpspace.formats.registry import ERROR, Files, Format, ReadOptions, described
 from warpspace.formats.source import Place, Source
 from warpspace.formats.terms import HELD, Line, Tables
 from warpspace.machine.axes import TravelDirection
@@ -232,14 +232,7 @@ def _spelled(name: str, rows: Sequence[Sequence[str]], width: int = WIDTH) -> st
 
 
 FORMAT = Format(
-    name="heidenhain",
-    title="HEIDENHAIN .COM and .CMA, nonlinear axis error compensation",
-    source="HEIDENHAIN, Technical Manual MANUALplus 620 (01/2012), 6.10.3, pages 713 to 718",
-    endings=(".cma", ".com"),
-    holds="displacements of any axis over any axis; by direction where a table corrects one axis",
-    units="mm, degrees",
-    grid="equal steps along the axis looked up",
-    limits="256 points a table, 0.0001 mm",
+    **described("heidenhain"),
     recognise=recognise,
     tables=read_tables,
     write=write,

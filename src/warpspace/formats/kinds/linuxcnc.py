@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from warpspace.formats.compensation.wanted import AXES, Wanted
-from warpspace.formats.kind import Files, Format, ReadOptions, has
+from warpspace.formats.registry import Files, Format, ReadOptions, described, has
 from warpspace.formats.source import Source, shown, spell
 from warpspace.formats.terms import HELD, Affine, Line, Tables
 from warpspace.machine.axes import TravelDirection, is_linear
@@ -223,14 +223,7 @@ def _write_matrix(wanted: Wanted) -> Files:
 
 
 COMP = Format(
-    name="linuxcnc-comp",
-    title="LinuxCNC COMP_FILE, screw compensation of a joint",
-    source="LinuxCNC documentation, INI Configuration, [JOINT_<num>] COMP_FILE",
-    endings=(".comp", ".ini", ".txt"),
-    holds="the positioning error of each axis, forward and backward",
-    units="mm, degrees (machine units)",
-    grid="any ascending positions",
-    limits="256 rows a joint; end values held",
+    **described("linuxcnc-comp"),
     recognise=_is_comp,
     tables=_read_comp,
     write=_write_comp,
@@ -238,15 +231,7 @@ COMP = Format(
     variants=(POSITIONS, OFFSETS),
 )
 MATRIX = Format(
-    name="linuxcnc-matrix",
-    title="LinuxCNC matrixkins, 3 × 3 matrix of calibrated kinematics",
-    source="LinuxCNC manual page matrixkins(9)",
-    endings=(".hal",),
-    holds="squareness between X, Y and Z, and their scales",
-    units="mm/mm",
-    grid="none: the same everywhere",
-    offsets=False,
-    limits="nine numbers, no constant part",
+    **described("linuxcnc-matrix"),
     recognise=has(r"matrixkins\.C_"),
     tables=_read_matrix,
     write=_write_matrix,

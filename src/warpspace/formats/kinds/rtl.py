@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from warpspace.formats.kind import Format, ReadOptions, has
 from warpspace.formats.measured import BACKWARD, FORWARD, Imported, Run, Series, merge
+from warpspace.formats.registry import Format, ReadOptions, described, has
 from warpspace.formats.source import Place, Source
 from warpspace.machine.axes import is_linear
 from warpspace.machine.limits import MAX_POINTS, MAX_RUNS
@@ -167,16 +167,8 @@ def read(sources: Sequence[Source], options: ReadOptions) -> Imported:
 
 
 FORMAT = Format(
-    name=NAME,
-    title="laser interferometer file .rtl, positioning runs",
-    source="not published; inferred from files that public programs write (docs/import.md)",
-    endings=(".rtl",),
-    holds="the positioning error of one axis, run by run, forward and backward",
-    units="mm, µm (inferred)",
-    grid="any targets",
-    limits="read only",
+    **described(NAME),
     recognise=has(r"(?s)\A(?=.*HEADER::)(?=.*(TARGET DATA|DEVIATIONS)::)"),
     read=read,
-    measured=True,
 )
 FORMATS = (FORMAT,)

@@ -21,7 +21,7 @@ import numpy as np
 
 from warpspace.exceptions import OptionError
 from warpspace.formats.compensation.wanted import Wanted, shares
-from warpspace.formats.kind import ERROR, Files, Format, ReadOptions, has
+from warpspace.formats.registry import ERROR, Files, Format, ReadOptions, described, has
 from warpspace.formats.source import Place, Source, shown, spell
 from warpspace.formats.terms import HELD, MODULO, Line, Product, Tables, Term
 from warpspace.machine.axes import TravelDirection
@@ -413,37 +413,17 @@ def _interaction(both: Array) -> Array:
     return both - first[:, None] - second + one @ first
 
 
-_MANUAL = "Siemens, SINUMERIK 840D sl Function Manual Extended Functions, K3, 6FC5397-1BP40-3BA1"
-_ENDINGS = (".ini", ".spf", ".mpf", ".arc", ".txt")
 FORMATS = (
     Format(
-        name="sinumerik-enc",
-        title="SINUMERIK $AA_ENC_COMP, measuring system error compensation",
-        source=_MANUAL,
-        endings=_ENDINGS,
-        holds="the positioning error of each axis (EXX, EYY, ECC …)",
-        units="mm, degrees",
-        grid="equal steps along each axis",
-        limits="as many points as MD38000 keeps; end values held, or modulo",
+        **described("sinumerik-enc"),
         recognise=_assigns(ENC),
         tables=_read_enc,
         write=_write_enc,
-        apart=True,
     ),
     Format(
-        name="sinumerik-cec",
-        title="SINUMERIK $AN_CEC, sag and angularity compensation",
-        source=_MANUAL,
-        endings=_ENDINGS,
-        holds="displacements of any axis over any axis, by direction of travel, and products of"
-        " two",
-        units="mm, degrees",
-        grid="equal steps along the axis looked up",
-        limits="62 tables, as many points as MD18342 keeps; end values held, or modulo",
+        **described("sinumerik-cec"),
         recognise=_assigns(CEC),
         tables=_read_cec,
         write=_write_cec,
-        apart=True,
-        orientation=True,
     ),
 )

@@ -19,8 +19,8 @@ from dataclasses import replace
 import numpy as np
 
 from warpspace.formats.compensation.wanted import AXES, Wanted
-from warpspace.formats.kind import Files, Format, ReadOptions, has
 from warpspace.formats.measured import BOTH, Imported, Run, Series, merge
+from warpspace.formats.registry import Files, Format, ReadOptions, described, has
 from warpspace.formats.source import RAD_TO_URAD, Place, Source, spell
 from warpspace.formats.terms import Affine, Tables, errors_of
 
@@ -306,31 +306,15 @@ def _write_marlin(wanted: Wanted) -> Files:
 
 
 KLIPPER = Format(
-    name="klipper",
-    title="Klipper skew correction and axis twist compensation",
-    source="Klipper documentation, Skew Correction and Axis Twist Compensation",
-    endings=(".cfg", ".gcode"),
-    holds="squareness in XY, XZ and YZ; roll of X (read only)",
-    units="mm",
-    grid="none: the same everywhere",
-    offsets=False,
+    **described("klipper"),
     limits=f"three factors: {', '.join(PLANES)}",
-    names_variants=True,
     recognise=has(r"SET_SKEW|\[skew_correction|\[axis_twist_compensation"),
     read=_read_klipper,
     tables=_klipper_tables,
     write=_write_klipper,
 )
 MARLIN = Format(
-    name="marlin",
-    title="Marlin skew correction, M852 and Configuration.h",
-    source="Marlin documentation, M852 Bed Skew Compensation",
-    endings=(".gcode", ".h"),
-    holds="squareness in XY, XZ and YZ",
-    units="mm/mm",
-    grid="none: the same everywhere",
-    offsets=False,
-    limits="three factors of six decimals, at most ±1",
+    **described("marlin"),
     recognise=_is_marlin,
     tables=_marlin_tables,
     write=_write_marlin,

@@ -21,7 +21,6 @@ import numpy as np
 
 from warpspace.exceptions import OptionError
 from warpspace.formats.compensation.wanted import Wanted
-from warpspace.formats.kind import Files, Format, ReadOptions
 from warpspace.formats.measured import (
     BOTH,
     Imported,
@@ -35,6 +34,7 @@ from warpspace.formats.measured import (
     tables_of,
     zero_key,
 )
+from warpspace.formats.registry import Files, Format, ReadOptions, described
 from warpspace.formats.source import MM_TO_UM, RAD_TO_URAD, Place, Source, spell
 from warpspace.machine.axes import PARAMETERS, direction_index, is_linear, parameter
 from warpspace.machine.limits import MAX_POINTS
@@ -402,37 +402,17 @@ def _write_iso(wanted: Wanted) -> Files:
 
 
 ISO_FORMAT = Format(
-    name=ISO,
-    title="text of volumetric compensation with ISO names (Etalon exchange format)",
-    source="ISG kernel documentation, FCT-C26 Volumetric Compensation, Etalon Exchange Format",
-    endings=(".exc", ".txt", ".ini"),
-    holds="any component error along its axis, and constants; not direction of travel",
-    units="mm, rad; positions mm, degrees",
-    grid="any ascending positions",
-    limits="as many records as max_records keeps; corrects the position only",
+    **described(ISO),
     recognise=_is_iso,
     read=_read_with(lambda source: [_read_iso(source)]),
     write=_write_iso,
-    points=41,
-    most_points=2001,
-    parametric=True,
     variants=VARIANTS,
 )
 ISG_FORMAT = Format(
-    name=ISG,
-    title="CSV of volumetric compensation (ISG kernel, TwinCAT CNC)",
-    source="ISG kernel documentation, FCT-C26 Volumetric Compensation, ISG CSV format",
-    endings=(".csv", ".txt"),
-    holds="any component error along its axis or over two axes, and constants",
-    units="mm, rad; arguments mm, degrees",
-    grid="any ascending positions; a full grid of two axes",
-    limits="as many records as max_records keeps; corrects the position only",
+    **described(ISG),
     recognise=_is_isg,
     read=_read_with(_read_isg),
     write=_write_isg,
-    points=41,
-    most_points=2001,
-    parametric=True,
     variants=VARIANTS,
 )
 FORMATS = (ISO_FORMAT, ISG_FORMAT)
