@@ -9,7 +9,7 @@ import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.contributions import (
-    Contribution,
+    Share,
     SharesResult,
     variance_contributions,
 )
@@ -45,7 +45,7 @@ class Concept:
     shares: SharesResult
 
     @property
-    def leading(self) -> tuple[Contribution, ...]:
+    def leading(self) -> tuple[Share, ...]:
         """The three errors that matter most."""
         return self.shares.rows[:NAMED]
 

@@ -1,4 +1,4 @@
-"""Which tolerances matter: how the parameters share the variance of the volumetric error."""
+"""What each parameter contributes: its tolerance to the variance, its error to that of a point."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -21,11 +21,17 @@ from warpspace.analysis.description import Result, Watch
 from warpspace.analysis.options import error_words, option
 from warpspace.analysis.sampled import Sampled
 from warpspace.exceptions import OptionError
+from warpspace.field.evaluate import View, amplitudes_of, build_basis, error_values, evaluate_exact
+from warpspace.kinematics.chain import columns, nominal_point
+from warpspace.kinematics.model import Coordinates, Model
 from warpspace.machine.axes import parameter
+from warpspace.machine.errors import ErrorSet
 from warpspace.units import Array
 
 if TYPE_CHECKING:
     from warpspace.scene.model import Scene
+
+# --- Which tolerances matter: how the parameters share the variance of the volumetric error -------
 
 CHECK_MACHINES = 20_000
 CHECK_NODES = 512
@@ -34,7 +40,7 @@ DEFAULT_SOBOL, MAX_SOBOL = 1024, 65_536
 
 
 @dataclass(frozen=True, slots=True)
-class Contribution:
+class Share:
     """What one parameter's tolerance adds."""
 
     key: str
@@ -85,7 +91,7 @@ def variance_contributions(case: Case, sobol: int | None = None) -> "SharesResul
     sampled = _sampled_variance(case)
     indices = _sobol(case, sobol) if sobol else {}
     rows = [
-        Contribution(
+        Share(
             key,
             float(draws.half_width[index]),
             float(variance[index]),
@@ -186,7 +192,7 @@ class SharesResult(Result):
     """Shares of the variance by parameter, largest first."""
 
     keys = ("contributions", "variance_um2", "rms_um")
-    contributions: tuple[Contribution, ...]
+    contributions: tuple[Share, ...]
     # µm²; trace(J Σ Jᵀ) averaged over the points: the variance of E between machines
     variance_um2: float
     # root of E|E|²: the variance, and the mean error that centres off zero give, together
@@ -195,7 +201,7 @@ class SharesResult(Result):
     where: str = ""
 
     @property
-    def rows(self) -> tuple[Contribution, ...]:
+    def rows(self) -> tuple[Share, ...]:
         """The shares."""
         return self.contributions
 
@@ -224,7 +230,7 @@ class SharesResult(Result):
         yield share_bars(self.rows, title, self.where)
 
 
-def share_bars(rows: tuple[Contribution, ...], title: str, subtitle: str) -> Bars:
+def share_bars(rows: tuple[Share, ...], title: str, subtitle: str) -> Bars:
     """Give the chart of shares; Sobol indices beside them where there are any."""
     shares = Series([100.0 * row.share for row in rows], "exact", "key", form=".1f")
     sampled = [100.0 * row.sampled_share for row in rows]
@@ -254,3 +260,80 @@ def share_bars(rows: tuple[Contribution, ...], title: str, subtitle: str) -> Bar
         title, subtitle, [error_words(row.key) for row in rows], tuple(panels),
         legend=tuple(legend),
     )  # fmt: skip
+
+
+# --- Why a point is where it is: the contribution of every parameter to its error -----------------
+
+
+@dataclass(frozen=True, slots=True)
+class Contribution:
+    """What one parameter does to one point."""
+
+    key: str  # parameter key
+    value: float  # µm or µrad; the error at the point's axis position
+    error_um: Array  # [3]; displacement of the point by this error alone, first order
+    # its part along the total error: these parts add up to the length of the first-order error
+    along_um: float
+    direction: Array  # [3]; unit vector in R along or about which the error acts
+    origin_mm: Array  # [3]; origin in R of the frame the error sits in
+    lever_mm: Array  # [3]; from that origin to the point
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """The error of one point, taken apart."""
+
+    nominal_mm: Array  # [3]
+    error_um: Array  # [3]; from the exact chain
+    orientation_urad: Array  # [3]; from the exact chain
+    # all parameters of the loop that are not zero there, largest first
+    contributions: tuple[Contribution, ...]
+    # [3]; exact error minus the sum of the contributions: what the first order leaves out
+    remainder_um: Array
+
+
+def explain(
+    model: Model,
+    errors: ErrorSet,
+    coordinates: Coordinates,
+    view: View | None = None,
+    point_mm: Array | None = None,
+) -> Explanation:
+    """Take the error of one point apart into its parameters.
+
+    At one position of every axis; the nominal point in R is the functional one of the loop unless
+    given. With a reference each contribution is that of the point minus that of the reference.
+    """
+    view = view or View()
+    point = nominal_point(model, view.loop, coordinates) if point_mm is None else point_mm
+    keys = [key for key in errors if parameter(key).axis in model.machine.axes]
+    vectors = build_basis(model, errors, keys, coordinates, view, point).contributions(
+        amplitudes_of(errors, keys)
+    )
+    total = vectors.sum(axis=0)
+    length = float(np.linalg.norm(total))
+    towards = total / length if length > 0.0 else np.zeros(3)
+    found = columns(model, view.loop, keys, coordinates, point)
+    values = error_values(model, errors, coordinates)
+    parts = [
+        Contribution(
+            key,
+            float(values[key]),
+            vector,
+            float(vector @ towards),
+            found[key].direction,
+            point - found[key].lever_mm,
+            found[key].lever_mm,
+        )
+        for key, vector in zip(keys, vectors, strict=True)
+        if key in found and np.any(vector != 0.0)
+    ]
+    parts.sort(key=lambda part: float(np.linalg.norm(part.error_um)), reverse=True)
+    exact = evaluate_exact(model, errors, coordinates, view, point)
+    return Explanation(
+        np.asarray(point, dtype=float),
+        exact.error_um,
+        exact.orientation_urad,
+        tuple(parts),
+        exact.error_um - total,
+    )

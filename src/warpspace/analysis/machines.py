@@ -265,7 +265,7 @@ class Machines(SampledMachines):
     def _case(self, scene: "Scene", plan: Plan) -> Case:
         if self.source is Source.TOLERANCES:
             return self.case(scene, plan)
-        from warpspace.analysis.uncertain import uncertain_case
+        from warpspace.analysis.measured import uncertain_case
 
         return uncertain_case(scene, plan, self.loop, self.distribution or Distribution.NORMAL)
 

@@ -1,20 +1,32 @@
-"""Measured machines: each error against its tolerance, and what the model predicts from them."""
+"""Measured machines: their errors against tolerances, what they predict, how far that is certain.
 
-from collections.abc import Sequence
+The uncertainties of different errors are taken as independent; that of one error as one number
+for its whole curve, which the errors of a calibration are: a reading that is too large at one
+position is so at the next one. At one point without a reference this makes no difference.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from dataclasses import field as dataclass_field
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from warpspace.analysis.cases import Case, Places, Plan
+from warpspace.analysis.distribution import SIGMAS, Distribution, Draws, loop_keys
 from warpspace.analysis.statistics import Statistics, statistics, volume_statistics
-from warpspace.field.evaluate import ErrorField
-from warpspace.field.grid import build_grid
-from warpspace.kinematics.model import Loop
+from warpspace.exceptions import SceneError
+from warpspace.field.evaluate import ErrorField, amplitudes_of, build_basis, evaluate_first_order
+from warpspace.field.grid import DEFAULT_NODES, build_grid
+from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.machine.axes import PARAMETERS, parameter
+from warpspace.machine.curves.curve import ErrorFunction
 from warpspace.machine.errors import ErrorSet, ToleranceSet
 from warpspace.scene.model import Scene, choose_view, evaluate_grid
+from warpspace.units import Array
 
-DEFAULT_NODES = 11
-SHEARS = {"XY": (0, 1, "EC0Y", -1.0), "XZ": (0, 2, "EB0Z", 1.0), "YZ": (1, 2, "EA0Z", -1.0)}
+PREDICTED_NODES = 11  # per axis
+SHEARS = {"XY": (0, 1, -1.0), "XZ": (0, 2, 1.0), "YZ": (1, 2, -1.0)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +84,7 @@ def measured(
     *,
     tolerances: ToleranceSet | None = None,
     loop: Loop | str = Loop.TOOL,
-    grid: int | Sequence[int] = DEFAULT_NODES,
+    grid: int | Sequence[int] = PREDICTED_NODES,
 ) -> Measured:
     """Judge the errors of a scene against tolerances and predict its volumetric error.
 
@@ -107,5 +119,117 @@ def shear(field: ErrorField) -> dict[str, float]:
     gradient = 1e3 * np.linalg.lstsq(design, error, rcond=None)[0][1:].T
     return {
         plane: float(sign * (gradient[first, second] + gradient[second, first]))
-        for plane, (first, second, _, sign) in SHEARS.items()
+        for plane, (first, second, sign) in SHEARS.items()
     }
+
+
+# --- What the standard uncertainty of measured errors does to the field, and to |E| ---------------
+
+SIGMAS_OF = {Distribution.NORMAL: SIGMAS, Distribution.UNIFORM: 3.0**0.5}
+"""Half width in standard uncertainties."""
+
+
+@dataclass(frozen=True, slots=True)
+class FieldUncertainty:
+    """Standard uncertainty (k = 1) of a field."""
+
+    error_um: Array  # [..., 3]; of each component of the position error
+    # [...]; of its length: along the error, or of the vector as a whole where the error is zero
+    norm_um: Array
+    orientation_urad: Array  # [..., 3]
+
+
+@dataclass(frozen=True, slots=True)
+class UncertainCase(Case):
+    """A measured machine whose errors are off by their standard uncertainties."""
+
+    errors: ErrorSet = dataclass_field(default_factory=ErrorSet)  # as measured
+    # standard uncertainty along the axis of each error
+    uncertainty: ErrorSet = dataclass_field(default_factory=ErrorSet)
+
+    def machines(self, rng: np.random.Generator, count: int) -> Array:
+        """Draw by how many standard uncertainties each error is off, and one last, [count, K + 1].
+
+        The one is the factor of the errors as measured.
+        """
+        draws = self.draws
+        size = np.full(len(draws.keys), SIGMAS_OF[Distribution(draws.distribution)])
+        unit = Draws(draws.keys, np.zeros(len(draws.keys)), size, draws.distribution)
+        return np.column_stack([unit.draw(rng, count), np.ones(count)])
+
+    def responses(self, places: Places) -> Array:
+        """Give responses to a standard uncertainty each, the measured error last, [3, K + 1, N]."""
+        keys, model, view = self.draws.keys, self.model, self.view
+        at, point = places.coordinates, places.point_mm
+        basis = build_basis(model, self.uncertainty, keys, at, view, point)
+        factors = amplitudes_of(self.uncertainty, keys)[:, None, None]
+        parts = factors * basis.position.reshape(len(keys), -1, 3)
+        measured = evaluate_first_order(model, self.errors, at, view, point)
+        both = np.concatenate([parts, measured.error_um.reshape(1, -1, 3)])
+        return np.ascontiguousarray(np.moveaxis(both, -1, 0))
+
+
+def uncertain_case(
+    scene: Scene,
+    plan: Plan,
+    loop: Loop = Loop.TOOL,
+    distribution: Distribution = Distribution.NORMAL,
+) -> UncertainCase:
+    """Give what a measured machine may be: its errors, each off by its standard uncertainty."""
+    own = ErrorSet(scene_uncertainty(scene, loop))
+    keys = tuple(own)
+    size = SIGMAS_OF[distribution] * np.abs(amplitudes_of(own, keys))
+    drawn = Draws(keys, amplitudes_of(scene.errors, keys), size, distribution)
+    view = scene.view(loop)
+    return UncertainCase(scene.model, drawn, scene.workspace, view, plan, scene.errors, own)
+
+
+def scene_uncertainty(scene: Scene, loop: Loop) -> Mapping[str, ErrorFunction]:
+    """Collect the standard uncertainties of the errors that act in a loop of a scene."""
+    if not scene.uncertainty:
+        problem = "has no uncertainties; expected an [uncertainty] section, for instance EXX = 0.4"
+        raise SceneError(scene.name, [problem])
+    keys = loop_keys(scene.model, loop, tuple(scene.uncertainty))
+    return {key: scene.uncertainty[key] for key in keys}
+
+
+def evaluate_uncertainty(
+    scene: Scene,
+    *,
+    at: Mapping[str, ArrayLike] | None = None,
+    grid: int | Sequence[int] | None = None,
+    loop: Loop | str = Loop.TOOL,
+    frame: str = "machine",
+) -> FieldUncertainty:
+    """Propagate the standard uncertainties of a scene to its field, to first order.
+
+    With a reference it is the uncertainty of the difference to it. The errors of the scene give the
+    direction along which the uncertainty of the length counts. See `warpspace.evaluate` for the
+    parameters.
+
+    Notes
+    -----
+    Root of the sum of (gain × standard uncertainty)² over the errors (GUM, 5.1.2).
+    """
+    model, view = scene.model, choose_view(scene, loop, frame)
+    own = ErrorSet(scene_uncertainty(scene, view.loop))
+    if at is not None:
+        coordinates = complete_coordinates(scene.machine, at, scene.workspace.positions)
+        where = coordinates, view, None
+    else:
+        nodes = build_grid(model, scene.workspace, DEFAULT_NODES if grid is None else grid)
+        where = nodes.coordinates, view, nodes.point_mm
+    nominal = evaluate_first_order(model, scene.errors, *where)
+    length = nominal.norm_um[..., None]
+    along = np.where(length > 0.0, nominal.error_um / np.where(length > 0.0, length, 1.0), 0.0)
+    position, tilt = np.zeros(nominal.error_um.shape), np.zeros(nominal.error_um.shape)
+    norm = np.zeros(nominal.norm_um.shape)
+    for key in own:
+        one = build_basis(model, own, (key,), *where)
+        (amplitude,) = amplitudes_of(own, (key,))
+        part = amplitude * one.position[0]
+        position += part**2
+        tilt += (amplitude * one.orientation[0]) ** 2
+        norm += np.sum(part * along, axis=-1) ** 2
+    norm = np.where(length[..., 0] > 0.0, norm, np.sum(position, axis=-1))
+    return FieldUncertainty(np.sqrt(position), np.sqrt(norm), np.sqrt(tilt))

@@ -8,13 +8,13 @@ import numpy as np
 
 from warpspace.analysis.adjusting import Objective, Search, Volume
 from warpspace.analysis.blocks import Bars, Block, Column, Panel, Series, Table, number_columns
-from warpspace.analysis.description import Change, Result, Watch, silent
-from warpspace.analysis.options import ALL, Keys, Limits, option
-from warpspace.analysis.sampled import Looked
+from warpspace.analysis.description import Analysis, Change, Result, Watch, silent
+from warpspace.analysis.options import ALL, LOOP_HELP, Keys, Limits, option
 from warpspace.analysis.statistics import Statistics, Summary, volume_statistics
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorBasis, amplitudes_of, placed_words
 from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid
+from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import Parameter, parameter
 from warpspace.machine.limits import (
     MAX_ERROR,
@@ -26,6 +26,7 @@ from warpspace.machine.limits import (
 from warpspace.units import Array, spell, spell_short
 
 if TYPE_CHECKING:
+    from warpspace.field.evaluate import View
     from warpspace.scene.model import Scene
 
 DEFAULT_LIMIT = 200.0  # µm or µrad by which an error may be changed, unless somebody says otherwise
@@ -76,7 +77,7 @@ class AdjustedSet(Summary):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Repair(Looked):
+class Repair(Analysis):
     """Find which errors of SCENE to adjust, and to what.
 
     For each error stands what leaving it out, and what its best value, gives for the whole volume
@@ -92,6 +93,12 @@ class Repair(Looked):
     has_chart = True
     makes_scenes = True
     scene_help = "Write the scene with the last set listed applied"
+    loop: Loop | None = option(None, LOOP_HELP, unset="tool; relative with --placed")
+    placed: bool = option(
+        False,
+        "Leave out where the workpiece lies: three shifts and three small rotations of it, fitted"
+        " for the least RMS over the working volume. Looks at the relative loop",
+    )
     objective: Objective = option(
         Objective.RMS,
         "What is made as small as possible over the volume: RMS or largest |E|",
@@ -119,6 +126,21 @@ class Repair(Looked):
         low=REPAIR_NODES[0],
         high=REPAIR_NODES[1],
     )
+
+    @property
+    def seen_loop(self) -> Loop:
+        """The loop, where none is given too."""
+        return self.loop or (Loop.RELATIVE if self.placed else Loop.TOOL)
+
+    def seen(self, scene: "Scene") -> "tuple[Scene, View]":
+        """Give a scene as it is looked at, and how."""
+        if self.placed and self.seen_loop is not Loop.RELATIVE:
+            raise OptionError(
+                f"{{placed}}: where the workpiece lies is not told by the {self.loop} loop;"
+                f" expected loop {Loop.RELATIVE}"
+            )
+        scene = replace(scene, placed=True) if self.placed else scene
+        return scene, scene.view(self.seen_loop)
 
     def run(self, scene: "Scene", watch: Watch = silent, /) -> "RepairResult":
         """Find the sets to first order, and evaluate each with the exact chain."""

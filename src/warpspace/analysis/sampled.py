@@ -7,13 +7,11 @@ from warpspace.analysis.cases import DEFAULT_NODES, DEFAULT_SAMPLES, Case, Cylin
 from warpspace.analysis.description import Analysis
 from warpspace.analysis.distribution import Distribution, Draws, build_draws, loop_keys
 from warpspace.analysis.options import LOOP_HELP, Grammar, option
-from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop
 from warpspace.machine.limits import LOCAL_WORKERS, SAMPLES
 from warpspace.scene.files import parse_number
 
 if TYPE_CHECKING:
-    from warpspace.field.evaluate import View
     from warpspace.scene.model import Scene
 
 
@@ -114,33 +112,3 @@ class KeptLimit(SampledMachines):
     def plan_of(self, limit_um: float | None) -> Plan:
         """Give what is sampled and how."""
         return replace(self.plan(Over(self.over), limit_um), workers=self.workers)
-
-
-# --- Options of an analysis of what is seen through a loop ----------------------------------------
-
-
-@dataclass(frozen=True, kw_only=True)
-class Looked(Analysis):
-    """An analysis of errors seen through a loop, with or without where the workpiece lies."""
-
-    loop: Loop | None = option(None, LOOP_HELP, unset="tool; relative with --placed")
-    placed: bool = option(
-        False,
-        "Leave out where the workpiece lies: three shifts and three small rotations of it, fitted"
-        " for the least RMS over the working volume. Looks at the relative loop",
-    )
-
-    @property
-    def seen_loop(self) -> Loop:
-        """The loop, where none is given too."""
-        return self.loop or (Loop.RELATIVE if self.placed else Loop.TOOL)
-
-    def seen(self, scene: "Scene") -> "tuple[Scene, View]":
-        """Give a scene as it is looked at, and how."""
-        if self.placed and self.seen_loop is not Loop.RELATIVE:
-            raise OptionError(
-                f"{{placed}}: where the workpiece lies is not told by the {self.loop} loop;"
-                f" expected loop {Loop.RELATIVE}"
-            )
-        scene = replace(scene, placed=True) if self.placed else scene
-        return scene, scene.view(self.seen_loop)

@@ -9,7 +9,7 @@ import pytest
 import warpspace
 from warpspace import evaluate, load_scene
 from warpspace.analysis.concepts import Concepts, compare_concepts, expected_um
-from warpspace.analysis.explain import explain
+from warpspace.analysis.contributions import explain
 from warpspace.analysis.gains import Gain, gains_at, gains_max, mark_key_errors
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.field.evaluate import View

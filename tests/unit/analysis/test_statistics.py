@@ -8,10 +8,15 @@ import pytest
 import warpspace
 from warpspace.analysis.cases import Plan
 from warpspace.analysis.distribution import Distribution
-from warpspace.analysis.measured import Check, check_errors, shear
+from warpspace.analysis.measured import (
+    Check,
+    check_errors,
+    evaluate_uncertainty,
+    shear,
+    uncertain_case,
+)
 from warpspace.analysis.montecarlo import montecarlo
 from warpspace.analysis.statistics import statistics, volume_statistics
-from warpspace.analysis.uncertain import evaluate_uncertainty, uncertain_case
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.field.evaluate import ErrorField
 from warpspace.field.grid import build_grid

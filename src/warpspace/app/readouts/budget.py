@@ -5,7 +5,7 @@ from collections.abc import Callable, Collection, Mapping
 import numpy as np
 from markupsafe import Markup
 
-from warpspace.analysis.explain import Contribution
+from warpspace.analysis.contributions import Contribution
 from warpspace.app.evaluation.budget import Answer
 from warpspace.app.readouts.html import message, render, signed, small
 from warpspace.machine.axes import parameter

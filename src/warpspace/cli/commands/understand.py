@@ -29,7 +29,7 @@ from warpspace.cli.tables import print_text, progress
 from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
-    from warpspace.analysis.uncertain import FieldUncertainty
+    from warpspace.analysis.measured import FieldUncertainty
     from warpspace.field.evaluate import ErrorField, View
     from warpspace.field.grid import Grid
     from warpspace.scene.model import Scene
@@ -113,7 +113,7 @@ def field(
         axes, result, nodes = _evaluate(loaded, points, grid, view, exact=exact)
         places = axes if points else None
         if uncertain:
-            from warpspace.analysis.uncertain import evaluate_uncertainty
+            from warpspace.analysis.measured import evaluate_uncertainty
 
             spread = evaluate_uncertainty(loaded, at=places, grid=grid, loop=loop, frame=frame)
         said = {} if exact else say_second_order(second_order(loaded, loop, at=places))

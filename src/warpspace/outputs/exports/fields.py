@@ -23,7 +23,7 @@ from warpspace.units import MICROMETRE, MICRORADIAN, MM_PER_UM, Array
 if TYPE_CHECKING:
     import pyvista as pv
 
-    from warpspace.analysis.uncertain import FieldUncertainty
+    from warpspace.analysis.measured import FieldUncertainty
 
 ABOUT = "about_json"  # name under which NPZ and VTS files say what they hold
 DECIMALS = 9  # of numbers in text: a billionth of a micrometre

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpspace.analysis.cases import LIMIT_OVER, Over, Plan
-from warpspace.analysis.contributions import Shares
+from warpspace.analysis.contributions import Explanation, Shares, explain
 from warpspace.analysis.description import Analysis, Result, silent
 from warpspace.analysis.distribution import choose_distribution
-from warpspace.analysis.explain import Explanation, explain
 from warpspace.analysis.gains import Gains
 from warpspace.analysis.machines import Machines, MachinesResult
 from warpspace.analysis.montecarlo import MonteCarlo

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from viser import SceneApi
 
-from warpspace.analysis.explain import Contribution
+from warpspace.analysis.contributions import Contribution
 from warpspace.app.browser.handles import Handle
 from warpspace.app.evaluation.budget import Answer, answer
 from warpspace.app.evaluation.live_picture import LivePicture
