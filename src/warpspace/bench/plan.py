@@ -156,18 +156,13 @@ def simulate(scene: Scene, plan: Plan, *, exact: bool = True) -> Array:
     """
     if not exact:
         return respond(scene, plan).readings
-    return sense(plan, site_errors(scene, plan))
-
-
-def site_errors(scene: Scene, plan: Plan) -> Array:
-    """Evaluate the error of the tool against the workpiece at every site, exactly, [n, 3], µm."""
     found = np.zeros((len(plan.point_mm), 3))
     model = _both_ways(scene)
     for rows, errors in _by_travel(scene.errors, plan):
         coordinates = {name: values[rows] for name, values in plan.coordinates.items()}
         field = evaluate_exact(model, errors, coordinates, RELATIVE, plan.point_mm[rows])
         found[rows] = field.error_um
-    return found
+    return sense(plan, found)
 
 
 def sense(plan: Plan, error_um: Array) -> Array:
@@ -223,7 +218,9 @@ def _differences(plan: Plan, values: Array) -> Array:
 
 def _by_travel(errors: ErrorSet, plan: Plan) -> Iterator[tuple[Whole, ErrorSet]]:
     every = np.arange(len(plan.point_mm))
-    axes = [axis for axis in plan.travel if _depends_on_travel(errors, axis)]
+    functions = errors.functions.items()
+    directional = {parameter(key).axis for key, one in functions if isinstance(one, Directional)}
+    axes = [axis for axis in plan.travel if axis in directional]
     if not axes:
         yield every, errors
         return
@@ -238,13 +235,6 @@ def _by_travel(errors: ErrorSet, plan: Plan) -> Iterator[tuple[Whole, ErrorSet]]
 
 def _both_ways(scene: Scene) -> Model:
     return replace(scene.model, direction=TravelDirection.MEAN)
-
-
-def _depends_on_travel(errors: ErrorSet, axis: str) -> bool:
-    return any(
-        parameter(key).axis == axis and isinstance(function, Directional)
-        for key, function in errors.functions.items()
-    )
 
 
 def _travelling(errors: ErrorSet, way: Mapping[str, float]) -> ErrorSet:

@@ -243,14 +243,20 @@ def _fit(
     after = stack.residuals(part, solved.amplitudes, solved.unknown)
     used = stack.size + (len(free) if prior is not None else 0)
     freedom = used - len(free) - len(stack.unknowns)
-    sigma = _sigma(stack, after, freedom) if solved.scale is None else solved.scale
+    misses = np.concatenate([row.ravel() for row in after]) * np.concatenate(stack.weights())
+    sigma = solved.scale or float(np.sqrt(np.sum(misses**2) / max(freedom, 1)))
     is_scaled = stack.has_uncertainties or solved.scale is not None
     covariance = covariance_of(solved, len(free)) * (1.0 if is_scaled else sigma**2)
     parameters, combinations = _found(
         terms, part, rank, solved, covariance, freedom, stack, has_prior=prior is not None
     )
     errors = part.errors_with(solved.amplitudes)
-    _check_size(part, solved.amplitudes)
+    for row, value in zip(part.parameters, solved.amplitudes, strict=True):
+        if not abs(value) <= MAX_ERROR:
+            raise OptionError(
+                f"{row.key} comes out as {value:.4g} {row.unit}; expected at most ±{MAX_ERROR:g}."
+                " Are units, kind of readings and machine right?"
+            )
     title = f"{scene.title.removesuffix(CALIBRATED)}{CALIBRATED}"[:MAX_TEXT]
     fitted_scene = replace(scene, title=title, errors=errors)
     outliers = _outliers(stack, after)
@@ -326,11 +332,6 @@ def _prior(scene: Scene, keys: Sequence[str]) -> tuple[Array, Array]:
     return np.array([row.centre for row in rows]), widths / np.sqrt(3.0)
 
 
-def _sigma(stack: Stack, after: Sequence[Array], freedom: int) -> float:
-    rows = np.concatenate([row.ravel() for row in after]) * np.concatenate(stack.weights())
-    return float(np.sqrt(np.sum(rows**2) / max(freedom, 1)))
-
-
 def _correlation(covariance: Array) -> Array:
     width = np.sqrt(np.diag(covariance))
     width = np.where(width > 0.0, width, 1.0)
@@ -386,15 +387,6 @@ def _outliers(stack: Stack, after: Sequence[Array]) -> list[tuple[int, ...]]:
     return [tuple(int(row) for row in np.flatnonzero(one > limit)) for one in lengths]
 
 
-def _check_size(terms: Terms, amplitudes: Array) -> None:
-    for row, value in zip(terms.parameters, amplitudes, strict=True):
-        if not abs(value) <= MAX_ERROR:
-            raise OptionError(
-                f"{row.key} comes out as {value:.4g} {row.unit}; expected at most ±{MAX_ERROR:g}."
-                " Are units, kind of readings and machine right?"
-            )
-
-
 def _predict(
     scene: Scene,
     terms: Terms,
@@ -409,11 +401,10 @@ def _predict(
     if not predict:
         return (), ()
     held = Stack.of(scene, predict, stack.watch)
-    known_before = named(stack.unknowns, begin.unknown)
-    known_after = named(stack.unknowns, solved.unknown)
-    new = [name for name in held.unknowns if name not in known_after]
+    before = named(stack.unknowns, begin.unknown)
+    after = named(stack.unknowns, solved.unknown)
+    new = [name for name in held.unknowns if name not in after]
     notes: tuple[str, ...] = ()
-    before, after = dict(known_before), dict(known_after)
     if new:
         own_before = solve(held, terms.only(()), robust=request.robust).unknown
         fixed = replace(

@@ -113,9 +113,10 @@ def _spheres(scene: Scene) -> Iterator[Candidate]:
     still = {name: np.array([value]) for name, value in scene.workspace.positions.items()}
     centre = nominal_tip(scene, still)
     rotary = [name for name, axis in scene.machine.axes.items() if not axis.is_linear]
+    travels = {name: scene.machine.axes[name].travel for name in rotary}
     turns = {
-        name: np.array([turn for turn in TURNS_DEG if _within(scene, name, turn)])
-        for name in rotary
+        name: np.array([turn for turn in TURNS_DEG if low <= turn <= high])
+        for name, (low, high) in travels.items()
     }
     for name in rotary:
         others = [other for other in rotary if other != name] or [""]
@@ -132,7 +133,8 @@ def _spheres(scene: Scene) -> Iterator[Candidate]:
                 with suppress(SceneError):
                     at = _reached(scene, solve_linear(scene, at, target, ""))
                     if (count := len(at[name])) > 1:
-                        title = f"sphere, TCP on: {name} at {_list(at[name])}°{held}"
+                        spelled = ", ".join(f"{value:g}" for value in at[name])
+                        title = f"sphere, TCP on: {name} at {spelled}°{held}"
                         yield Candidate(title, _nominal(scene, "sphere-tcp", at, target[:count]))
 
 
@@ -143,15 +145,6 @@ def _reached(scene: Scene, at: Mapping[str, Array]) -> dict[str, Array]:
         if axis.is_linear:
             inside &= (at[name] >= axis.travel[0]) & (at[name] <= axis.travel[1])
     return {name: values[inside] for name, values in at.items()}
-
-
-def _within(scene: Scene, name: str, turn: float) -> bool:
-    low, high = scene.machine.axes[name].travel
-    return low <= turn <= high
-
-
-def _list(values: Array) -> str:
-    return ", ".join(f"{value:g}" for value in values)
 
 
 NODES = 5  # nodes per axis of the map whose uncertainty counts

@@ -221,8 +221,6 @@ def automatic(scene: Scene, together: Sequence[Readings]) -> tuple[str, ...]:
     Slopes of straightness come last: a straightness is told from a line of its own, and its slope
     belongs to the squareness.
     """
-    from warpspace.calibration.registry import find_kind
-
     keys: dict[str, None] = {}
     for readings in together:
         for key in find_kind(readings.kind).automatic_keys(readings, scene):
@@ -332,7 +330,7 @@ def rms_mm(residuals: Sequence[Array]) -> float:
     return float(np.sqrt(np.mean(lengths**2)))
 
 
-def named(unknowns: Sequence[str], values: Array) -> Mapping[str, float]:
+def named(unknowns: Sequence[str], values: Array) -> dict[str, float]:
     """Give the unknowns by name, mm."""
     return {name: float(value) for name, value in zip(unknowns, values, strict=True)}
 

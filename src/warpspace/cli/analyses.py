@@ -37,7 +37,9 @@ def command_of(kind: "type[Analysis]") -> click.Command:
     options, run_it = MORE.get(kind.name, ((), None))
     command: Callable[..., None] = _runner(kind, run_it)
     command.__doc__ = kind.explained()
-    decorators = [_scenes(kind), *map(_click_option, kind.options())]
+    is_one = kind.scenes == (1, 1)
+    argument = scene_argument() if is_one else scene_argument("scenes", nargs=-1, required=True)
+    decorators = [argument, *map(_click_option, kind.options())]
     if kind.has_table:
         decorators.append(csv_option)
     if kind.makes_scenes:
@@ -53,12 +55,6 @@ def command_of(kind: "type[Analysis]") -> click.Command:
     for decorate in reversed([*decorators, *options, json_option]):
         command = decorate(command)
     return click.command(name=kind.name)(command)
-
-
-def _scenes(kind: "type[Analysis]") -> Callable[..., Any]:
-    if kind.scenes == (1, 1):
-        return scene_argument()
-    return scene_argument("scenes", nargs=-1, required=True)
 
 
 def _click_option(one: Option) -> Callable[..., Any]:
@@ -159,13 +155,21 @@ def write_result(
     found: "Result", csv_path: str | None, plot: str | None, output: str | None, *, force: bool
 ) -> list[str]:
     """Write what was asked for: scene or files, whose names it gives, table and chart."""
+    from warpspace.scene.files import spell_row
+
     wrote = [output] if output else []
     if output is not None and (texts := found.texts()):
         wrote = write_texts(texts, Path(output), force=force)
     elif output is not None:
-        write_scene(found, output, force=force)
+        from warpspace.scene.save import scene_to_toml
+
+        if not (changes := found.changes()):
+            raise OptionError(f"-o {output}: {found.no_change}, so no scene is written")
+        write_text(output, scene_to_toml(changes[-1].scene), force=force)
     if csv_path is not None:
-        write_csv(found, csv_path, force=force)
+        table = found.file_table()
+        rows = () if table is None else table.csv_rows()
+        write_text(csv_path, "".join(map(spell_row, rows)), force=force)
     if plot is not None:
         from warpspace.outputs.charts.results import result_chart
         from warpspace.outputs.save import write_chart
@@ -182,30 +186,6 @@ def write_texts(texts: Mapping[str, str], path: Path, *, force: bool) -> list[st
     for add, target in targets.items():
         write_text(target, texts[add], force=force)
     return [str(target) for target in targets.values()]
-
-
-def write_csv(found: "Result", path: str, *, force: bool) -> None:
-    """Write the table of a result."""
-    from warpspace.outputs.files import write_atomically
-    from warpspace.scene.files import spell_row
-
-    table = found.file_table()
-    with (
-        write_atomically(path, overwrite=force) as temporary,
-        temporary.open("w", newline="", encoding="utf-8") as file,
-    ):
-        if table is not None:
-            file.writelines(map(spell_row, table.csv_rows()))
-
-
-def write_scene(found: "Result", path: str, *, force: bool) -> None:
-    """Write the last scene that a result proposes."""
-    from warpspace.scene.save import scene_to_toml
-
-    changes = found.changes()
-    if not changes:
-        raise OptionError(f"-o {path}: {found.no_change}, so no scene is written")
-    write_text(path, scene_to_toml(changes[-1].scene), force=force)
 
 
 # --- Scenes of a command -------------------------------------------------------------------------

@@ -311,17 +311,15 @@ class Circular(BenchTest):
         fit = fit_circle_readings(runs[0].plan, runs[0].readings)
         if fit.squareness_urad is not None and not self.rotary:
             curves.append(self._squareness(fit, runs[0].plan))
+        title = f"{self.bar} deviation along the circle about {self.rotary}"
+        if not self.rotary:
+            title = f"{self.plane} plane, 0° at +{self.plane[0]}, 90° at +{self.plane[1]}"
         return (
             Lines(
-                "polar", self._title(), "angle [°]", "deviation [µm]", tuple(curves), (),
+                "polar", title, "angle [°]", "deviation [µm]", tuple(curves), (),
                 "As read." if self.rotary else "About the least-squares centre.",
             ),
         )  # fmt: skip
-
-    def _title(self) -> str:
-        if self.rotary:
-            return f"{self.bar} deviation along the circle about {self.rotary}"
-        return f"{self.plane} plane, 0° at +{self.plane[0]}, 90° at +{self.plane[1]}"
 
     def _squareness(self, fit: CircleFit, plan: Plan) -> Curve:
         """Draw what mean radius and squareness alone would give."""

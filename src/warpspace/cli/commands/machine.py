@@ -130,6 +130,8 @@ def check(
     stands what the LaserTRACER gave, for the machines of the thesis. The shear is that of the best
     affine fit to the predicted map: which plane became a rhombus.
     """
+    from dataclasses import asdict
+
     from warpspace.analysis.measured import measured
     from warpspace.scene.library import load_scene
 
@@ -144,7 +146,21 @@ def check(
     say_first_order(loop, *loaded)
     pairs = list(zip(loaded, found, strict=True))
     if as_json:
-        print_json({"machines": [_json(scene, result) for scene, result in pairs]})
+        print_json(
+            {
+                "machines": [
+                    {
+                        "scene": scene.name,
+                        "checks": [{**asdict(row), "passes": row.passes} for row in result.checks],
+                        "predicted": asdict(result.predicted),
+                        "statistics_nodes": asdict(result.predicted_nodes),
+                        "measured_um": laser_tracer_um(scene),
+                        "shear_urad": result.shear_urad,
+                    }
+                    for scene, result in pairs
+                ]
+            }
+        )
         return
     for scene, result in pairs:
         print_blocks(_against(scene, result))
@@ -192,19 +208,6 @@ def laser_tracer_um(scene: "Scene") -> float | None:
     if scene.name not in names:
         return None
     return float(printed_tables()["table_5_5"]["volumetric_um"][names.index(scene.name)])
-
-
-def _json(scene: "Scene", result: "Measured") -> dict[str, object]:
-    from dataclasses import asdict
-
-    return {
-        "scene": scene.name,
-        "checks": [{**asdict(check), "passes": check.passes} for check in result.checks],
-        "predicted": asdict(result.predicted),
-        "statistics_nodes": asdict(result.predicted_nodes),
-        "measured_um": laser_tracer_um(scene),
-        "shear_urad": result.shear_urad,
-    }
 
 
 def _against(scene: "Scene", result: "Measured") -> Iterator[Block]:

@@ -163,7 +163,12 @@ def draw(
     for option, value in given.items():
         if value is not None and not moves:
             raise OptionError(f"{option} belongs to a .gif, .webp or .mp4 file; given {output}")
-    _check_figure(figure or "error-map")
+    name = figure or "error-map"
+    if name in figure_names(scenes=2):
+        command = figure_command(name) or "compare A B -o FILE"
+        raise OptionError(f"figure {name!r} takes two scenes or more: warpspace {command}")
+    if name not in figure_names():
+        raise UnknownNameError("figure", name, figure_names())
     settings = figure_settings(size=size or (MOVING_SIZE if moves else SIZE), **options)
     moving = None
     if moves:
@@ -178,7 +183,7 @@ def draw(
     loaded = load_placed(scene, direction, settings.loop, placed=placed)
     say_first_order(settings.loop, loaded)
     if moving is None:
-        draw_figure_file(figure or "error-map", [loaded], settings, output, force=force)
+        draw_figure_file(name, [loaded], settings, output, force=force)
         echo(f"wrote {output}")
         return
     from warpspace.outputs.animation import write_animation
@@ -186,14 +191,6 @@ def draw(
     with progress("drawing", moving.frames, "pictures") as bar:
         write_animation(loaded, output, moving, overwrite=force, progress=bar.advance)
     echo(f"{output}: {moving.frames} pictures, {moving.frames / moving.fps:.1f} s")
-
-
-def _check_figure(figure: str) -> None:
-    if figure in figure_names(scenes=2):
-        command = figure_command(figure) or "compare A B -o FILE"
-        raise OptionError(f"figure {figure!r} takes two scenes or more: warpspace {command}")
-    if figure not in figure_names():
-        raise UnknownNameError("figure", figure, figure_names())
 
 
 @click.command()
@@ -255,14 +252,10 @@ def compare(
         echo(f"wrote {output}")
 
 
-def _formats_help() -> str:
-    return ", ".join(f"{form.ending} ({form.about})" for form in export_formats())
-
-
 @click.command()
 @scene_argument()
 @output_option(
-    f"File to write: {_formats_help()}.",
+    f"File to write: {', '.join(f'{form.ending} ({form.about})' for form in export_formats())}.",
     added=lambda: [form.ending for form in export_formats()],
 )
 @exaggeration_option
@@ -367,15 +360,9 @@ def report(
     output: str,
     concepts: tuple[str, ...],
     others: tuple[str, ...],
-    spec_um: float | None,
-    samples: int,
-    distribution: str,
-    seed: int,
-    grid: int,
-    exaggeration: float | Literal["auto"] | None,
-    loop: str,
     *,
     force: bool,
+    **options: Any,
 ) -> None:
     """Write the design review of one SCENE or two.
 
@@ -390,19 +377,11 @@ def report(
 
     if len(scenes) > 2:
         raise OptionError(f"report: {len(scenes)} scenes; expected one, or two to compare")
-    settings = ReportSettings(
-        loop=loop,
-        grid=grid,
-        exaggeration=exaggeration,
-        spec_um=spec_um,
-        samples=samples,
-        seed=seed,
-        distribution=distribution,
-    )
+    settings = ReportSettings(**options)
     loaded = [load_scene(scene) for scene in scenes]
     beside = [load_scene(scene) for scene in concepts]
     asked = {name: _asked(name) for name in others}
-    say_first_order(loop, *loaded)
+    say_first_order(settings.loop, *loaded)
     with progress("writing the review"):
         written = write_report(
             loaded,
