@@ -503,43 +503,40 @@ def _ranges(machine: Machine) -> dict[str, Range]:
 
 SHOWN = 6  # names that a remark lists
 
-_OF_LINKS: tuple[tuple[str, Callable[[Any], object]], ...] = (
-    ("masses and inertias", lambda link: link.inertial is not None),
-    ("collision shapes", lambda link: bool(link.collisions)),
-    ("materials", lambda link: any(visual.material is not None for visual in link.visuals)),
-)
-_OF_JOINTS: tuple[tuple[str, Callable[[Any], object]], ...] = (
+_NO_PLACE: tuple[tuple[str, str, Callable[[Any], object]], ...] = (
+    ("links", "masses and inertias", lambda link: link.inertial is not None),
+    ("links", "collision shapes", lambda link: bool(link.collisions)),
+    ("links", "materials", lambda link: any(one.material is not None for one in link.visuals)),
     (
+        "joints",
         "largest efforts and velocities",
         lambda joint: (
             joint.limit is not None and (joint.limit.effort or joint.limit.velocity) is not None
         ),
     ),
-    ("damping and friction", lambda joint: joint.dynamics is not None),
-    ("safety controllers", lambda joint: joint.safety_controller is not None),
-    ("calibrations", lambda joint: joint.calibration is not None),
+    ("joints", "damping and friction", lambda joint: joint.dynamics is not None),
+    ("joints", "safety controllers", lambda joint: joint.safety_controller is not None),
+    ("joints", "calibrations", lambda joint: joint.calibration is not None),
 )
 
 
 def left_out(robot: Any, others: Sequence[str], kept: Collection[str]) -> list[str]:
     """Name the parts of a robot that a machine does not hold."""
-    notes: list[str] = []
     gone = [link.name for link in robot.links if link.name not in kept]
-    if gone:
-        notes.append(f"not between workpiece and tool, left out: links {_listed(gone)}")
-    moving = [joint for joint in robot.joints if joint.child in gone]
-    mimics = [joint.name for joint in moving if joint.mimic is not None]
-    if mimics:
-        notes.append(f"mimic joints, left out: {_listed(mimics)}")
-    for what, has in _OF_LINKS:
-        if names := [link.name for link in robot.links if has(link)]:
-            notes.append(f"{what} have no place: links {_listed(names)}")
-    for what, has in _OF_JOINTS:
-        if names := [joint.name for joint in robot.joints if has(joint)]:
-            notes.append(f"{what} have no place: joints {_listed(names)}")
-    if others:
-        notes.append(f"have no place: {_listed(list(dict.fromkeys(others)))}")
-    return notes
+    mimics = [one.name for one in robot.joints if one.child in gone and one.mimic is not None]
+    found = [
+        ("not between workpiece and tool, left out: links", gone),
+        ("mimic joints, left out:", mimics),
+        *(
+            (
+                f"{what} have no place: {kind}",
+                [one.name for one in getattr(robot, kind) if has(one)],
+            )
+            for kind, what, has in _NO_PLACE
+        ),
+        ("have no place:", list(dict.fromkeys(others))),
+    ]
+    return [f"{what} {_listed(names)}" for what, names in found if names]
 
 
 def _listed(names: Iterable[str]) -> str:
