@@ -19,7 +19,7 @@ from warpspace.units import Array
 
 Json = dict[str, Any]
 UNLIT = "KHR_materials_unlit"
-LINES, TRIANGLES = 1, 4
+LINES = 1  # the mode of a primitive
 _M_PER_MM = 1e-3
 _COLOUR, _TARGET = "_linear_colour", "_target_"
 _UINT16, _LARGEST_UINT16 = 5123, 65534

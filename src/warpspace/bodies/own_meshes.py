@@ -35,12 +35,7 @@ class LoadedMesh:
 
 
 def load_mesh(
-    path: str | Path,
-    frame: str,
-    *,
-    unit: str | None = None,
-    up: str | None = None,
-    colour: tuple[int, int, int] = MIDDLE,
+    path: str | Path, frame: str, *, unit: str | None = None, up: str | None = None
 ) -> LoadedMesh:
     """Read a user's mesh as a body."""
     path = Path(path)
@@ -54,7 +49,7 @@ def load_mesh(
         changed = path.stat().st_mtime_ns
     except OSError:
         changed = 0
-    return _read_mesh(path, changed, frame, unit, up, colour)
+    return _read_mesh(path, changed, frame, unit, up)
 
 
 @lru_cache(maxsize=16)
@@ -64,7 +59,6 @@ def _read_mesh(
     frame: str,
     unit: str | None,
     up: str | None,
-    colour: tuple[int, int, int],
 ) -> LoadedMesh:
     standard_unit, standard_up = FORMATS[path.suffix.lower()]
     mesh = open_meshes(path, f"{path.suffix[1:].upper()} file").to_mesh()
@@ -82,7 +76,7 @@ def _read_mesh(
         raise OptionError(f"{path}: all of its triangles are points or lines")
     with np.errstate(all="ignore"):  # a flat surface has no volume, and no centre of it
         open_edges = _clean(mesh)
-        body = build_body(mesh, path.stem, frame, colour)
+        body = build_body(mesh, path.stem, frame, MIDDLE)
     if not open_edges:
         return LoadedMesh(body)
     warning = f"{path}: the surface is not closed ({open_edges} open edges); it is drawn as it is"

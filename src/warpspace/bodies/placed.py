@@ -15,7 +15,7 @@ from warpspace.field.evaluate import View, find_placement, placement_effect
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import BASE, BodyMotion, body_motions, branch_pose
 from warpspace.kinematics.model import Coordinates, Loop, Model, complete_coordinates
-from warpspace.machine.axes import TravelDirection, parameter
+from warpspace.machine.axes import parameter
 from warpspace.machine.description import Machine
 from warpspace.machine.errors import ErrorSet
 from warpspace.scene.model import Scene
@@ -31,20 +31,15 @@ def load_bodies(machine: Machine) -> tuple[Body, ...]:
     return tuple(body for body in (*bodies, *own.values()) if body.frame in frames)
 
 
-def error_values_of(
-    errors: ErrorSet,
-    amplitudes: Mapping[str, float],
-    coordinates: Coordinates,
-    direction: str = TravelDirection.MEAN,
+def _error_values(
+    errors: ErrorSet, amplitudes: Mapping[str, float], coordinates: Coordinates, direction: str
 ) -> dict[str, float]:
     """Evaluate error curves at one position, with amplitudes of their own."""
-    found: dict[str, float] = {}
-    for key, amplitude in amplitudes.items():
-        axis = parameter(key).axis
-        if amplitude == 0.0 or axis not in coordinates:
-            continue
-        found[key] = amplitude * float(errors.shape_at(key, coordinates, direction))
-    return found
+    return {
+        key: amplitude * float(errors.shape_at(key, coordinates, direction))
+        for key, amplitude in amplitudes.items()
+        if parameter(key).axis in coordinates and amplitude != 0.0
+    }
 
 
 def view_motions(
@@ -57,7 +52,7 @@ def view_motions(
     """Find how the bodies move as a view sees it, so that they agree with its deformed grid."""
     view = view or View()
     coordinates = complete_coordinates(model.machine, positions)
-    values = error_values_of(errors, amplitudes, coordinates, model.direction)
+    values = _error_values(errors, amplitudes, coordinates, model.direction)
     motions = body_motions(model, values, coordinates)
     turn, shift = np.zeros(3), np.zeros(3)
     if view.loop is Loop.RELATIVE:
@@ -73,7 +68,7 @@ def view_motions(
             shift = shift + at_zero * MM_PER_UM
     if view.reference is not None:
         held = complete_coordinates(model.machine, {**positions, **view.reference})
-        values = error_values_of(errors, amplitudes, held, model.direction)
+        values = _error_values(errors, amplitudes, held, model.direction)
         there = body_motions(model, values, held)
         shift = shift + _held_displacement(model, there, view.loop)
     return {
