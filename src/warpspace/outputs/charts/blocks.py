@@ -242,11 +242,7 @@ def _draw_panel(axis: Axes, panel: Panel, bars: Bars, size: float, *, first: boo
     drawn = [one for one in panel.series if not one.as_mark]
     room = (ROOM if any(one.form for one in panel.series) else 1.05) * longest
     for series in panel.series:
-        for row, value in enumerate(series.values):
-            if value is None:
-                continue
-            there = [one for one in drawn if one.values[row] is not None]
-            _draw_one(axis, series, row, value, there, bars, size)
+        _draw_series(axis, series, drawn, bars.keys, room, size)
     if panel.before is not None:
         axis.axvline(panel.before, color=ground().ink, linewidth=1.0, linestyle=(0, (4, 3)))
     quiet(axis)
@@ -256,50 +252,39 @@ def _draw_panel(axis: Axes, panel: Panel, bars: Bars, size: float, *, first: boo
     axis.tick_params(axis="x", labelsize=size)
     axis.set_xlim(-1.05 * longest if panel.signed else 0.0, room)
     axis.set_xlabel(panel.unit, size=size)
-    for series in panel.series:
-        if series.form:
-            _number(axis, series, drawn, room, size)
     axis.set_title(
         panel.title, size=TEXT * size / SMALL, weight="bold", loc="left" if first else "center"
     )
 
 
-def _draw_one(
+def _draw_series(
     axis: Axes,
     series: Series,
-    row: int,
-    value: float,
-    there: list[Series],
-    bars: Bars,
+    drawn: list[Series],
+    keys: Sequence[bool],
+    end: float,
     size: float,
 ) -> None:
-    if series.as_mark:
-        axis.plot([value], [row], "|", color=ground().ink, markersize=size)
-        return
-    stands_out = series.role == "plain" and bool(bars.keys) and bars.keys[row]
-    spread = series.spread[row] if series.spread else None
-    axis.barh(
-        _place(series, row, there), value, height=0.7 / len(there),
-        color=_bar_colour("key" if stands_out else series.role),
-        error_kw={"elinewidth": 0.9, "ecolor": ground().muted}, xerr=spread,
-    )  # fmt: skip
-
-
-def _place(series: Series, row: int, there: list[Series]) -> float:
-    index = next(i for i, one in enumerate(there) if one is series)
-    return row + 0.7 * ((index + 0.5) / len(there) - 0.5)
-
-
-def _number(axis: Axes, series: Series, drawn: list[Series], end: float, size: float) -> None:
     for row, value in enumerate(series.values):
         if value is None:
             continue
+        if series.as_mark:
+            axis.plot([value], [row], "|", color=ground().ink, markersize=size)
+            continue
         there = [one for one in drawn if one.values[row] is not None]
-        text = axis.text(
-            value + 0.012 * end, _place(series, row, there), f"{value:{series.form}}",
-            va="center", size=0.9 * size,
+        index = next(i for i, one in enumerate(there) if one is series)
+        place = row + 0.7 * ((index + 0.5) / len(there) - 0.5)
+        stands_out = series.role == "plain" and bool(keys) and keys[row]
+        axis.barh(
+            place, value, height=0.7 / len(there),
+            color=_bar_colour("key" if stands_out else series.role),
+            error_kw={"elinewidth": 0.9, "ecolor": ground().muted},
+            xerr=series.spread[row] if series.spread else None,
         )  # fmt: skip
-        text.set_path_effects([Stroke(linewidth=2.5, foreground=ground().paper), Normal()])
+        if series.form:
+            words = f"{value:{series.form}}"
+            text = axis.text(value + 0.012 * end, place, words, va="center", size=0.9 * size)
+            text.set_path_effects([Stroke(linewidth=2.5, foreground=ground().paper), Normal()])
 
 
 # --- Curves ---------------------------------------------------------------------------------------
