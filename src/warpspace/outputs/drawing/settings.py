@@ -4,8 +4,10 @@ Colour on a body means error and comes from `warpspace.geometry.colour`; everyth
 Sizes are pixels of a 1600 × 1200 figure; a figure of another size multiplies them by its factor.
 """
 
+import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from importlib.resources import files
 from typing import Any, Final
 
 from warpspace.analysis.concepts import Concepts
@@ -50,38 +52,12 @@ class Theme:
     grid: str  # lines on the coloured surface
     isoline: str
     band: str  # tolerance bands
-    series: tuple[str, ...]  # curves and bars
+    series: Sequence[str]  # curves and bars
     body: str  # machine bodies
 
 
-LIGHT = Theme(
-    name="light",
-    paper="#ffffff",
-    ink="#17202b",
-    muted="#55637a",
-    faint="#d5dae1",
-    accent="#c8283c",
-    ghost="#8b95a5",
-    grid="#0f1722",
-    isoline="#ffffff",
-    band="#dfe6ee",
-    series=("#1f6fb2", "#c8283c", "#2f8f5b", "#8a5fb0", "#c77f1a", "#4c5b6b"),
-    body="#b9bdc4",
-)
-DARK = Theme(
-    name="dark",
-    paper="#12161c",
-    ink="#eef1f5",
-    muted="#a3afbf",
-    faint="#38424f",
-    accent="#ff6b78",
-    ghost="#98a4b5",
-    grid="#0b0f15",
-    isoline="#ffffff",
-    band="#263140",
-    series=("#62b0ee", "#ff6b78", "#63c590", "#bb95dd", "#e8ab55", "#a9b5c3"),
-    body="#848b95",
-)
+_THEMES = tomllib.loads((files("warpspace.outputs.drawing") / "themes.toml").read_text("utf-8"))
+LIGHT, DARK = (Theme(name, **_THEMES[name]) for name in ("light", "dark"))
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,9 @@
-"""The figures there are: one entry here, and one module that draws it."""
+"""The figures there are: one entry in catalogue.toml, and one module that draws it."""
 
+import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from importlib.resources import files
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING
 
@@ -34,58 +36,9 @@ class FigureKind:
         return resolve_name(self.draw) if isinstance(self.draw, str) else self.draw
 
 
-_HERE = "warpspace.outputs.figures."
-_KINDS = {
-    kind.name: replace(kind, draw=f"{_HERE}{kind.draw}")
-    for kind in (
-        FigureKind(
-            "error-map", "The deformed working volume, coloured.", "maps:draw_error_map"
-        ),
-        FigureKind(
-            "slices", "Three slices through the working volume.", "maps:draw_slices",
-            evidence=True,
-        ),
-        FigureKind(
-            "orientation-map", "Orientation error of the tool axis.",
-            "maps:draw_orientation", evidence=True,
-        ),
-        FigureKind(
-            "error-curves", "Errors along each axis, with their tolerance bands.",
-            "curves:draw_curves", evidence=True,
-        ),
-        FigureKind(
-            "traces", "Traces of the rotary table, nominal and actual.", "machine:draw_traces",
-            evidence=True,
-        ),
-        FigureKind(
-            "rotary", "Error motions of the rotary axes, ISO 230-7.", "charts:draw_rotary"
-        ),
-        FigureKind(
-            "machine", "The machine with its deformed bodies.", "machine:draw_machine",
-            evidence=True,
-        ),
-        FigureKind("gains", "Largest error gains over the travel.", "charts:draw_gains"),
-        FigureKind(
-            "montecarlo", "Volumetric error of machines within tolerance.",
-            "charts:draw_montecarlo",
-        ),
-        FigureKind(
-            "repair",
-            "Before and after the best repair, and what each error does to the whole volume.",
-            "side_by_side:draw_repair",
-        ),
-        FigureKind("ballbar", "Circular test, ISO 230-4.", "charts:draw_ballbar"),
-        FigureKind(
-            "comparison", "Two scenes and their difference.", "side_by_side:draw_comparison",
-            scenes=2, command="compare A B -o FILE",
-        ),
-        FigureKind(
-            "concepts", "Machines side by side within the same tolerances.",
-            "side_by_side:draw_concepts", scenes=2, most_scenes=MOST_CONCEPTS,
-            command="concepts SCENE… --plot FILE",
-        ),
-    )
-}  # fmt: skip
+_TABLE = (files("warpspace.outputs.figures") / "catalogue.toml").read_text("utf-8")
+_KINDS = {name: FigureKind(name, **row) for name, row in tomllib.loads(_TABLE).items()}
+_KINDS["concepts"] = replace(_KINDS["concepts"], most_scenes=MOST_CONCEPTS)
 
 
 def register_figure(kind: FigureKind) -> None:
