@@ -10,8 +10,8 @@ from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.machine import drawn_bodies, tool_point
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.look import linear_spans, slice_spans
+from warpspace.app.viewport.marks import corner_arrows
 from warpspace.field.evaluate import evaluate_exact
-from warpspace.picture.marks import corner_arrows
 from warpspace.picture.mesh import isoline_pieces, map_mesh
 from warpspace.picture.traces import evaluate_axis_motion, evaluate_traces, name_trace, trace_lines
 from warpspace.scene.library import load_scene

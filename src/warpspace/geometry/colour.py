@@ -116,3 +116,20 @@ def linear_to_srgb(linear: Array) -> Array:
     """Apply the sRGB transfer curve, [..., 3] of 0 … 1."""
     positive = np.maximum(linear, 0.0)
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * positive ** (1 / 2.4) - 0.055)
+
+
+# --- Round values along an axis -------------------------------------------------------------------
+
+NO_SPAN = 1e-12  # A range below this part of its ends is rounding, mm a part of 1 mm
+
+
+def tick_values(low: float, high: float, most: float) -> list[float]:
+    """Choose round values within a range."""
+    span = high - low
+    if not span > NO_SPAN * max(1.0, abs(low), abs(high)):
+        return [low]
+    step = nice_step(span)
+    while span / step > max(most, 2.0):
+        step = nice_step(10.0 * step * 1.01)
+    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    return [round(step * number, 10) for number in range(first, last + 1)]

@@ -5,6 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from warpspace.app.evaluation.budget import pick_point, pick_surface
+from warpspace.app.viewport.marks import build_arrows, corner_arrows, scale_bars, worst_point
 from warpspace.geometry.colour import build_scale
 from warpspace.geometry.surfaces import (
     box_edges,
@@ -16,12 +18,9 @@ from warpspace.geometry.surfaces import (
     isolines,
     outer_faces,
     outer_surface,
-    pick_point,
-    pick_surface,
     thicken,
     triangulate,
 )
-from warpspace.picture.marks import build_arrows, corner_arrows, scale_bars, worst_point
 from warpspace.units import MM_PER_UM
 
 

@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw, ImageFont, PngImagePlugin
 
 from warpspace.app.documents.conditions import picture_conditions
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.picture.marks import scale_bars
+from warpspace.app.viewport.marks import scale_bars
 from warpspace.picture.words import reference_words, spell_factor
 from warpspace.resources import __version__
 

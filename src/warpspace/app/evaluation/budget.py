@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpspace.analysis.contributions import Explanation, explain
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -17,8 +18,6 @@ from warpspace.geometry.surfaces import (
     deform,
     is_thin,
     outer_surface,
-    pick_point,
-    pick_surface,
 )
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, nominal_point
@@ -178,3 +177,61 @@ def with_lever(state: AppState, key: str) -> AppState:
     """Choose the contribution whose axis and lever are drawn; the same one again ends it."""
     known = key in state.amplitudes
     return replace(state, lever="" if not known or key == state.lever else key)
+
+
+# --- Picking: where a ray from the eye meets a surface or passes a line ---------------------------
+
+_PARALLEL = 1e-12
+
+
+@dataclass(frozen=True, slots=True)
+class Hit:
+    """Where a ray meets a surface."""
+
+    vertices: NDArray[np.intp]  # [3]; vertex numbers of the triangle
+    # [3]; barycentric weights of the point in it; they interpolate anything given per vertex
+    weights: Array
+    distance: float  # along the ray, in lengths of its direction
+
+
+def pick_surface(
+    origin: Array, direction: Array, vertices: Array, triangles: NDArray[np.intp]
+) -> Hit | None:
+    """Find the first triangle, [T, 3], that a ray meets (Möller and Trumbore, all at once).
+
+    Origin and direction, [3], are in the units of the vertices, [M, 3]; None where the ray misses.
+    """
+    a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
+    first, second = b - a, c - a
+    across = np.cross(direction, second)
+    determinant = np.sum(first * across, axis=-1)
+    safe = np.where(np.abs(determinant) < _PARALLEL, np.inf, determinant)
+    from_a = origin - a
+    u = np.sum(from_a * across, axis=-1) / safe
+    turned = np.cross(from_a, first)
+    v = np.sum(direction * turned, axis=-1) / safe
+    distance = np.sum(second * turned, axis=-1) / safe
+    inside = (u >= 0) & (v >= 0) & (u + v <= 1) & (distance > 0) & np.isfinite(safe)
+    if not inside.any():
+        return None
+    at = int(np.argmin(np.where(inside, distance, np.inf)))
+    weights = np.array([1.0 - u[at] - v[at], u[at], v[at]])
+    return Hit(triangles[at], weights, float(distance[at]))
+
+
+def pick_point(
+    origin: Array, direction: Array, points: Array, tolerance: float
+) -> tuple[int, float] | None:
+    """Find the point, [M, 3], that a ray passes most closely, as seen from its origin.
+
+    Its number, and its distance along the ray; None where none lies within a tolerance, rad.
+    """
+    if len(points) == 0:
+        return None
+    unit = direction / np.linalg.norm(direction)
+    sight = points - origin
+    along = sight @ unit
+    aside = np.linalg.norm(sight - along[:, None] * unit, axis=-1)
+    angle = np.where(along > 0.0, np.arctan2(aside, np.maximum(along, _PARALLEL)), np.inf)
+    nearest = int(np.argmin(angle))
+    return (nearest, float(along[nearest])) if angle[nearest] <= tolerance else None

@@ -8,7 +8,7 @@ from warpspace.analysis.blocks import Curve, Lines
 from warpspace.app.evaluation.bench import BenchPicture
 from warpspace.app.readouts.html import message, render
 from warpspace.bench.base import LEAST, lay_polar
-from warpspace.picture.marks import tick_values
+from warpspace.geometry.colour import tick_values
 from warpspace.units import Array
 
 NONE_CHOSEN = (

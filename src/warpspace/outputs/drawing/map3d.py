@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
+from warpspace.geometry.colour import tick_values
 from warpspace.geometry.surfaces import (
     Index,
     box_edges,
@@ -37,7 +38,6 @@ from warpspace.outputs.drawing.render import (
 )
 from warpspace.outputs.drawing.settings import SIZES
 from warpspace.outputs.drawing.sheet import DrawnMap
-from warpspace.picture.marks import tick_values
 from warpspace.picture.model import Picture, map_faces
 from warpspace.units import MICROMETRE, Array, spell, spell_short
 

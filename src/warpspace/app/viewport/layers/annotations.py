@@ -12,7 +12,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.palette import palette
 from warpspace.app.viewport.layers import NOTHING, SCENE_PER_MM, colour_bytes, polyline_pieces
 from warpspace.app.viewport.layers.adding import add_ball, add_lines
-from warpspace.picture.marks import (
+from warpspace.app.viewport.marks import (
     CornerArrows,
     WorstPoint,
     build_arrows,

@@ -9,8 +9,8 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.palette import palette
 from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes
 from warpspace.app.viewport.layers.adding import add_lines
+from warpspace.geometry.colour import tick_values
 from warpspace.geometry.surfaces import is_thin
-from warpspace.picture.marks import tick_values
 from warpspace.units import Array
 
 AWAY = 0.13

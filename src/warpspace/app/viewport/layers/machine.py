@@ -15,8 +15,8 @@ from warpspace.app.evaluation.machine import drawn_bodies, nominal_bodies, tool_
 from warpspace.app.evaluation.palette import palette
 from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes
 from warpspace.app.viewport.layers.adding import add_ball
+from warpspace.app.viewport.marks import spell_micrometres
 from warpspace.app.viewport.tone_map import Rgb
-from warpspace.picture.marks import spell_micrometres
 from warpspace.units import Array
 
 # --- Bodies of a machine in the drawing: added once, then moved by their vertices -----------------

@@ -5,8 +5,8 @@ from viser import SceneApi
 
 from warpspace.app.browser.handles import Handle
 from warpspace.app.viewport.layers import SCENE_PER_MM
+from warpspace.app.viewport.marks import build_arrows
 from warpspace.geometry.surfaces import round_down
-from warpspace.picture.marks import build_arrows
 from warpspace.units import Array
 
 COLOURS = {True: (138, 143, 152), False: (47, 116, 192)}

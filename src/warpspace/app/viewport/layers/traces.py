@@ -19,7 +19,7 @@ from warpspace.app.evaluation.palette import palette
 from warpspace.app.evaluation.rotation import chosen_trace, moved_traces, points_on_traces
 from warpspace.app.viewport.layers import NOTHING, SCENE_PER_MM, colour_bytes, polyline_pieces
 from warpspace.app.viewport.layers.adding import add_lines
-from warpspace.picture.marks import spell_micrometres
+from warpspace.app.viewport.marks import spell_micrometres
 from warpspace.picture.traces import TraceLine
 from warpspace.units import Array
 

@@ -1,12 +1,10 @@
 """What is written on a picture of the bent volume: corner arrows, the worst point, scale bars."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.geometry.colour import nice_step
 from warpspace.geometry.surfaces import Shape, corners, deform, round_down
 from warpspace.units import MM_PER_UM, Array
 
@@ -106,22 +104,7 @@ def scale_bars(longest_mm: float, exaggeration: float) -> tuple[ScaleBar, ScaleB
     )
 
 
-# --- Round values along an axis -------------------------------------------------------------------
-
-NO_SPAN = 1e-12  # A range below this part of its ends is rounding, mm a part of 1 mm
-
-
-def tick_values(low: float, high: float, most: float) -> list[float]:
-    """Choose round values within a range."""
-    span = high - low
-    if not span > NO_SPAN * max(1.0, abs(low), abs(high)):
-        return [low]
-    step = nice_step(span)
-    while span / step > max(most, 2.0):
-        step = nice_step(10.0 * step * 1.01)
-    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
-    return [round(step * number, 10) for number in range(first, last + 1)]
-
+# --- Arrows as meshes -----------------------------------------------------------------------------
 
 SIDES = 10
 _HEAD_PART = 0.7  # longest head, as a part of the arrow
