@@ -253,15 +253,6 @@ class Slice(Picture):
     position_mm: float  # where it stands
 
 
-def subtract_slices(one: Sequence[P], other: Sequence[P]) -> tuple[P, ...]:
-    """Subtract the errors of slices, one − other, where both lie in one place."""
-    return tuple(
-        subtract_pictures(first, second)
-        for first, second in zip(one, other, strict=False)
-        if same_nodes(first.grid.nominal_mm, second.grid.nominal_mm)
-    )
-
-
 # --- Named views: from where a picture is looked at -----------------------------------------------
 
 Direction = tuple[float, float, float]

@@ -113,12 +113,6 @@ def reference_words(scene: Scene) -> str:
     return f"reference point {list_axes(scene.reference)}"
 
 
-def exclusion_words(excluded: Sequence[str], only: Sequence[str] = ()) -> tuple[str, ...]:
-    """Say which errors a picture leaves out: ``excluded: EA0Z``, ``only: EAX``."""
-    found = [f"only: {', '.join(only)}"] if only else []
-    return (*found, *([f"excluded: {', '.join(excluded)}"] if excluded else []))
-
-
 def range_words(low: float, high: float, unit: str) -> str:
     """Say that colours end where somebody chose: ``range fixed 0–50 µm``."""
     between = "–" if low >= 0.0 else " to "

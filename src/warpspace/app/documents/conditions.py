@@ -6,7 +6,7 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.table import table_words
 from warpspace.field.evaluate import placed_words, second_order_words
 from warpspace.picture.comparison import conditions_of_both
-from warpspace.picture.words import direction_words, exclusion_words, range_words
+from warpspace.picture.words import direction_words, range_words
 from warpspace.scene.model import second_order
 
 
@@ -17,9 +17,9 @@ def state_conditions(state: AppState) -> tuple[str, ...]:
     excluded = [key for key in own if key in chosen.excluded]
     only = [key for key in state.amplitudes if key in chosen.only and key not in chosen.excluded]
     if not chosen.only:
-        return exclusion_words(excluded)
+        return (f"excluded: {', '.join(excluded)}",) if excluded else ()
     if any(not chosen.active(key) for key in own):
-        return exclusion_words([], only or ["no error"])
+        return (f"only: {', '.join(only or ['no error'])}",)
     return ()
 
 

@@ -17,7 +17,6 @@ from warpspace.picture.model import (
     choose_scale,
     same_nodes,
     subtract_pictures,
-    subtract_slices,
     subtract_traces,
 )
 from warpspace.scene.model import Scene
@@ -135,7 +134,11 @@ def _difference(a: LivePicture, b: LivePicture) -> LivePicture:
         change,
         bench=None,
         traces=subtract_traces(b.traces, a.traces),
-        slices=subtract_slices(b.slices, a.slices),
+        slices=tuple(
+            subtract_pictures(one, other)
+            for one, other in zip(b.slices, a.slices, strict=False)
+            if same_nodes(one.grid.nominal_mm, other.grid.nominal_mm)
+        ),
     )
 
 
