@@ -159,9 +159,7 @@ def find_kind(name: str) -> Kind:
     return _test_kind(name)
 
 
-@lru_cache(maxsize=256)
-def _test_kind(text: str) -> Kind:
-    return TestReadings(text)
+_test_kind = lru_cache(maxsize=256)(TestReadings)
 
 
 def recognise(table: ReadingTable, scene: Scene) -> Kind:

@@ -89,7 +89,14 @@ def sample(
     ):
         result = asked.run_all(scenes, watch, executor=executor, workers=number, take=take)
     if output is not None and asked.in_rows:
-        _write_rows(output, result.rows, force=force)
+        from warpspace.outputs.exports.fields import write_rows
+
+        kinds = {
+            name: "text" if name in NAMED else "integer" if name in COUNTED else "number"
+            for name in result.rows[0]
+        }
+        with write_rows(output, kinds, overwrite=force) as append:
+            append({name: [row[name] for row in result.rows] for name in kinds})
     return result
 
 
@@ -176,17 +183,6 @@ def _machine_table(
             append({"scene": scene, "machine": machine, "error_um": values})
 
         yield take
-
-
-def _write_rows(output: str, rows: Sequence[Any], *, force: bool) -> None:
-    from warpspace.outputs.exports.fields import write_rows
-
-    kinds = {
-        name: "text" if name in NAMED else "integer" if name in COUNTED else "number"
-        for name in rows[0]
-    }
-    with write_rows(output, kinds, overwrite=force) as append:
-        append({name: [row[name] for row in rows] for name in kinds})
 
 
 MORE: dict[str, tuple[tuple[Callable[..., Any], ...], Callable[..., Any]]] = {

@@ -6,7 +6,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Generator, Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
@@ -88,11 +88,6 @@ def task_of(name: str) -> "Task":
     return tasks.get(name, "machine")
 
 
-def _names() -> Iterator[str]:
-    yield from " ".join(BUNDLED.values()).split()
-    yield from (entry.name for entry in entries())
-
-
 def _build(name: str) -> click.Command:
     """Import the command, or make it from its analysis."""
     for entry in entries():
@@ -108,7 +103,10 @@ def _build(name: str) -> click.Command:
     return {command.name: command for command in found}[name]
 
 
-COMMANDS = Commands(_names, _build)  # the commands of `warpspace`
+COMMANDS = Commands(
+    lambda: (*" ".join(BUNDLED.values()).split(), *(entry.name for entry in entries())), _build
+)
+"""The commands of `warpspace`."""
 
 
 def register_command(command: click.Command) -> None:

@@ -4,7 +4,7 @@ import os
 import sys
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -80,14 +80,12 @@ FRAMES, FPS = 48, 15.0
 @click.option("--no-browser", is_flag=True, help="Only print the address of the page.")
 def view(
     scene: str,
-    host: str,
-    port: int | None,
     allow_hosts: tuple[str, ...],
     token: str | None,
     *,
-    shared: bool,
     no_token: bool,
     no_browser: bool,
+    **options: Any,
 ) -> None:
     """Open SCENE in the browser, with a slider per error.
 
@@ -107,15 +105,13 @@ def view(
     run_viewer(
         shown,
         {loaded.title: loaded for loaded in bundled.values()},
-        host=host,
-        port=port,
-        shared=shared,
         services=build_services(),
         access=Access(allow_hosts, token, no_token=no_token),
         code=sys.stdout.isatty(),
         browser=not no_browser,
         say=echo,
         warn=lambda text: echo(text, err=True, fg="yellow"),
+        **options,
     )
 
 
@@ -267,13 +263,11 @@ def compare(
 def export(
     scene: str,
     output: str,
-    exaggeration: float | Literal["auto"] | None,
-    grid: int,
-    component: str,
     loop: str,
     direction: str | None,
     *,
     force: bool,
+    **options: Any,
 ) -> None:
     """Write SCENE into a file for other programs.
 
@@ -283,13 +277,7 @@ def export(
     from warpspace.picture.model import evaluate_picture
 
     with progress("writing"):
-        picture = evaluate_picture(
-            load_placed(scene, direction, loop),
-            exaggeration=exaggeration,
-            grid=grid,
-            loop=loop,
-            component=component,
-        )
+        picture = evaluate_picture(load_placed(scene, direction, loop), loop=loop, **options)
         write_export(picture, Path(output), overwrite=force)
     kind = next(form for form in export_formats() if form.ending == Path(output).suffix.lower())
     if kind.left_out:
