@@ -168,6 +168,9 @@ def main() -> None:
         try:
             Path.cwd()  # a folder that is gone breaks libraries in ways nobody could read
             cli.main(standalone_mode=False)
+            if ending.number:  # what ended the app; threads may still work within libraries in C
+                sys.stdout.flush()
+                os._exit(0)
         except click.exceptions.Exit as stop:
             sys.exit(stop.exit_code)
         except click.exceptions.NoArgsIsHelpError as error:
