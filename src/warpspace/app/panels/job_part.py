@@ -58,8 +58,8 @@ class JobPart:
             if self._context.page.is_open:
                 self._show(progress)
                 return
-        except RuntimeError:  # viser refuses handles of a page that has just been closed
-            if self._context.page.is_open:
+        except RuntimeError as error:  # viser removes the handles of a page before it says so
+            if self._context.page.is_open and "removed" not in str(error):
                 raise
         self._jobs.cancel()
 
