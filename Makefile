@@ -18,7 +18,7 @@ SPHINX := OMP_NUM_THREADS=1 $(BIN)/python -m sphinx -d docs/_build/doctrees docs
 PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help view test nightly reliability coverage lint format bench screenshots docs linkcheck \
+.PHONY: help view test nightly reliability coverage lint style format bench screenshots docs linkcheck \
     drawings dist packaging golden clean system-packages
 
 help: ## list the targets
@@ -28,7 +28,7 @@ view: $(RUN_STAMP) ## open the app (make view SCENE=teach_squareness ARGS="--por
 	$(BIN)/warpspace view $(SCENE) $(ARGS)
 
 test: system-packages $(DEV_STAMP) ## install what is missing, then lint, type-check and test
-	$(MAKE) --no-print-directory lint
+	$(MAKE) --no-print-directory style
 	bash .ci/tests.sh
 
 nightly: system-packages $(DEV_STAMP) ## run what takes long: full products, proofs, details of pages (ARGS="--minutes 40")
@@ -46,10 +46,12 @@ coverage: system-packages $(DEV_STAMP) ## run the tests and say which lines none
 	bash .ci/tests.sh --cov --cov-append --cov-report=
 	$(BIN)/python -m coverage report
 
-lint: $(DEV_STAMP) ## format check, ruff, pyright, import contracts
+lint: style ## format check, ruff, import contracts, pyright
+	$(BIN)/pyright
+
+style: $(DEV_STAMP)
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	$(BIN)/pyright
 	$(BIN)/lint-imports --no-logo
 
 format: $(DEV_STAMP) ## format the code and apply safe fixes

@@ -2,8 +2,8 @@
 
     python examples/screenshots.py [NAME …] [--to docs/images]
 
-`make screenshots` runs it; it starts the app itself. Each picture is a visit: a scene, the tab that
-is opened, and what is done there. Pictures of a tab show its column beside the box.
+`make screenshots` runs it; it starts the app itself. Each picture is a visit: a scene, the size of
+the page, and what is done there. Every visit has a tab of its own.
 """
 
 import argparse
@@ -21,15 +21,13 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from PIL import Image
 from playwright.sync_api import Browser, Page, sync_playwright
 
-from warpspace.app.browser.room import column_widths
 from warpspace.app.server.viewer import Viewer
 from warpspace.cli.services import build_services
 from warpspace.scene.library import load_scene
 
 SCENES = ("dvf5000_first", "dvf5000_second", "teach_wobbling_table", "fork_head_bc")
-WHOLE, ONE_TAB = (1600, 900), (1280, 900)
+SIZE = (1440, 900)
 """Width and height of the page, CSS pixels."""
-LEFT_WIDTH, RIGHT_WIDTH = column_widths(ONE_TAB[0])
 CHROMIUM = [
     "--headless=new",
     "--no-sandbox",
@@ -40,8 +38,17 @@ CHROMIUM = [
     "--disable-sync",
 ]
 TO = Path(__file__).resolve().parents[1] / "docs" / "images"
-LOADED = "() => window.__viserMutable?.nodeRefFromName['/box/surface']"
-SETTLED_MS, PAUSE_MS, PATIENCE_MS = 2500, 400, 30_000
+FILE = "laser_x.csv"
+READINGS = """\
+run,direction,X [mm],EXX [um],ECX [urad]
+1,+,-275,0.0,-4.1
+1,+,-125,1.9,-1.2
+1,+,0,3.4,0.4
+1,+,125,4.0,2.9
+1,+,275,5.8,6.3
+"""
+"""A file that is imported."""
+SETTLED_MS, PAUSE_MS, PATIENCE_MS = 3000, 400, 60_000
 COLOURS = 256
 
 
@@ -53,28 +60,20 @@ class Visit:
     ----------
     act : callable
         What is done once the page stands.
-    tab : str
-        Tab that the picture is about; empty for the whole page.
     scene : str
-    share : float
-        Of its column's height that the panel of the tab is given.
+    size : tuple of int
+    part : str
+        Selector of the part of the page that is kept; empty for all of it.
     """
 
     act: Callable[[Page], None]
-    tab: str = ""
     scene: str = "dvf5000_first"
-    share: float = 0.72
+    size: tuple[int, int] = SIZE
+    part: str = ""
 
 
 def as_opened(page: Page) -> None:
     """Leave everything as it is."""
-
-
-def choose(page: Page, label: str, option: str) -> None:
-    """Choose an option of a dropdown."""
-    page.get_by_label(label, exact=True).first.click()
-    page.get_by_role("option", name=option, exact=True).first.click()
-    page.wait_for_timeout(PAUSE_MS)
 
 
 def press(page: Page, name: str) -> None:
@@ -83,17 +82,15 @@ def press(page: Page, name: str) -> None:
     page.wait_for_timeout(PAUSE_MS)
 
 
-def tick(page: Page, name: str) -> None:
-    """Tick a check box."""
-    page.get_by_role("checkbox", name=name, exact=True).check()
+def open_task(page: Page, name: str) -> None:
+    """Open a task."""
+    page.get_by_role("tab", name=name, exact=True).click()
     page.wait_for_timeout(PAUSE_MS)
 
 
-def write(page: Page, label: str, value: str) -> None:
-    """Write into the number box of an error."""
-    box = page.locator(f"input[data-number='{label}']")
-    box.fill(value)
-    box.press("Enter")
+def unfold(page: Page, title: str) -> None:
+    """Unfold a section of the task that is open."""
+    page.locator("#ws-right summary, #ws-right [data-do='page:fold']", has_text=title).first.click()
     page.wait_for_timeout(PAUSE_MS)
 
 
@@ -102,198 +99,102 @@ def dark(page: Page) -> None:
     page.keyboard.press("m")
 
 
-def tested(page: Page) -> None:
-    """Run the R-test on the model."""
-    choose(page, "Test", "sphere")
-
-
-def signed(page: Page) -> None:
-    """Colour by one signed component."""
-    choose(page, "Component", "E_z")
-
-
-def switched(page: Page) -> None:
-    """Include only two errors, one of which is excluded."""
-    for word in ("only EAX", "only EAY", "exclude EAY"):
-        page.locator(f"button[data-word='{word}']").click()
-        page.wait_for_timeout(PAUSE_MS)
-
-
-def curved(page: Page) -> None:
-    """Make the curve of one error a table."""
-    choose(page, "Curve", "table")
-    page.locator("textarea").first.fill("-225 0\n-75 -31\n75 -24\n225 -43.7")
-    page.wait_for_timeout(PAUSE_MS)
-
-
-def asked(page: Page) -> None:
-    """Ask a point why it is off, and one contribution where it comes from."""
-    page.mouse.click(LEFT_WIDTH + 250, 430)
-    page.locator("[data-contribution='EA0Z']").click()
-    press(page, "Show the whole lever")
-
-
-def repaired(page: Page) -> None:
-    """Compare with the best set of two adjustments."""
-    page.locator("[data-set='2'] button", has_text="Compare").click()
-    page.wait_for_timeout(PAUSE_MS)
-
-
-def by_effect(page: Page) -> None:
-    """Rank by what the errors do."""
-    choose(page, "Ranked by", "effect of the present errors")
+def opened_row(page: Page) -> None:
+    """Open the row of one error."""
+    page.locator("#ws-error-EAY").click()
 
 
 def compared(page: Page) -> None:
-    """Pin, mend one squareness, draw the difference."""
-    press(page, "Pin as before")
-    write(page, "EA0Z", "0")
-    press(page, "B − A")
+    """Apply the best single adjustment, and draw what it changes."""
+    page.locator("#ws-right").get_by_role("button", name="Apply").first.click()
+    page.locator("[data-piece=compared] button", has_text="B − A").click()
 
 
-def sliced(page: Page) -> None:
-    """Look at slices with isolines."""
-    choose(page, "Show as", "slices")
-    tick(page, "Isolines")
+def asked(page: Page) -> None:
+    """Show the lever of the largest contribution of the worst point."""
+    unfold(page, "Details")
+    page.locator("[data-do='worst:lever'][data-value='EA0Z']").click()
 
 
-def bent(page: Page) -> None:
-    """Draw the machine as its errors bend it."""
-    tick(page, "Machine bodies")
-    tick(page, "Bodies deformed by the errors")
-    page.keyboard.press("f")
+def tested(page: Page) -> None:
+    """Run the R-test on the model."""
+    open_task(page, "Measure")
+    unfold(page, "Standard tests")
+    page.get_by_label("Standard test", exact=True).select_option("sphere")
 
 
-def allocated(page: Page) -> None:
-    """Allocate tolerances for 40 µm."""
-    page.wait_for_selector("[data-value='histogram']")
-    box = page.get_by_label("|E| allowed [µm]", exact=True).last
+def improved(page: Page) -> None:
+    """Choose a control; the repairs stand below."""
+    open_task(page, "Improve")
+    page.get_by_label("Control", exact=True).select_option("sinumerik-cec")
+    page.get_by_role("button", name="Save table").wait_for()
+
+
+def designed(page: Page) -> None:
+    """Hold the tolerances against 40 µm."""
+    open_task(page, "Design")
+    box = page.get_by_label("|E| at most").first
     box.fill("40")
     box.press("Enter")
-    page.wait_for_timeout(PAUSE_MS)
-    press(page, "Allocate")
-    page.wait_for_selector("[data-value='allocated']")
+    press(page, "Allocate tolerances")
+    page.get_by_text("Allocated:").wait_for()
 
 
-def side_by_side(page: Page) -> None:
-    """Compare three machines of the library."""
-    press(page, "Choose machines …")
-    for title in ("Trunnion A-C machining centre", "Rotary table C with a swivel head B"):
-        page.locator(".ws-choice button", has_text=title).first.click()
-        page.wait_for_timeout(PAUSE_MS)
-    press(page, "Done")
-    press(page, "Compare")
-    page.wait_for_selector(".ws-concepts img", timeout=180_000)
+def turned(page: Page) -> None:
+    """Look at the error motion of a rotary table."""
+    open_task(page, "Machine")
+    unfold(page, "Rotary axes")
+    page.locator(".ws-plots").wait_for()
 
 
-def calibrated(page: Page) -> None:
-    """Fit the bundled readings of a fork head, and draw the machine that they give."""
-    choose(page, "Bundled readings", "tcp_on.csv")
-    press(page, "Fit")
-    outcome = page.locator("[data-value='calibration']")
-    outcome.wait_for(timeout=60_000)
-    outcome.locator("[data-word='compare']").click()
-    page.wait_for_timeout(PAUSE_MS)
-    choose(page, "Residual arrows in the box", "before")
-    outcome.evaluate("part => part.scrollIntoView({ block: 'start' })")
+def imported(page: Page) -> None:
+    """Open a table of measured errors."""
+    with page.expect_file_chooser() as chooser:
+        page.locator("#ws-top [data-upload=files]").click()
+    chooser.value.set_files({"name": FILE, "mimeType": "text/csv", "buffer": READINGS.encode()})
+    page.get_by_role("dialog").get_by_role("button", name="Apply").wait_for()
 
 
-def compensated(page: Page) -> None:
-    """Compute a table for a control, and draw what it leaves."""
-    choose(page, "Table", "HEIDENHAIN .COM and .CMA, nonlinear axis error compensation")
-    points = page.get_by_label("Points per axis", exact=True).first
-    points.fill("11")
-    points.press("Enter")
-    page.wait_for_timeout(PAUSE_MS)
-    press(page, "Compute")
-    maps = page.locator("[data-value='compensation maps']")
-    maps.wait_for(timeout=60_000)
-    choose(page, "The box shows", "what is left")
-    page.wait_for_timeout(SETTLED_MS)
-    maps.evaluate("part => part.scrollIntoView({ block: 'end' })")
+def reported(page: Page) -> None:
+    """Open the window of the report, with a result put into it."""
+    press(page, "Report")
 
 
 VISITS = {
     "app": Visit(as_opened),
     "app_dark": Visit(dark),
-    "app_rotary": Visit(signed, scene="teach_wobbling_table"),
-    "tab_errors": Visit(switched, "Errors"),
-    "tab_error_curve": Visit(curved, "Error curve", share=0.45),
-    "tab_volumetric_error": Visit(as_opened, "Volumetric error", share=0.52),
-    "tab_error_budget": Visit(asked, "Error budget"),
-    "tab_repair": Visit(repaired, "Repair"),
-    "tab_sensitivities": Visit(by_effect, "Sensitivities"),
-    "tab_tests": Visit(tested, "Tests", share=0.62),
-    "tab_compare": Visit(compared, "Compare"),
-    "tab_concepts": Visit(side_by_side, "Concepts", share=0.9),
-    "tab_calibrate": Visit(calibrated, "Calibrate", "fork_head_bc", share=0.93),
-    "tab_files": Visit(as_opened, "Files", share=0.4),
-    "tab_view": Visit(sliced, "View"),
-    "tab_machine": Visit(bent, "Machine", share=0.6),
-    "tab_machine_editor": Visit(as_opened, "Machine editor"),
-    "tab_rotary_axes": Visit(as_opened, "Rotary axes", "teach_wobbling_table"),
-    "tab_tolerances": Visit(allocated, "Tolerances"),
-    "tab_compensate": Visit(compensated, "Compensate", share=0.9),
-    "tab_conventions": Visit(as_opened, "Conventions"),
+    "app_1024": Visit(as_opened, size=(1024, 768)),
+    "app_phone": Visit(as_opened, size=(390, 844)),
+    "app_wide": Visit(as_opened, size=(2560, 1440)),
+    "app_compare": Visit(compared),
+    "task_understand": Visit(asked),
+    "task_measure": Visit(tested),
+    "task_improve": Visit(improved),
+    "task_design": Visit(designed),
+    "task_machine": Visit(turned, "teach_wobbling_table"),
+    "window_import": Visit(imported),
+    "window_report": Visit(reported),
+    "errors_row": Visit(opened_row, part="#ws-left"),
 }
 """File name to visit."""
-LEFT_TABS, LOWER_TABS = (
-    ("Errors", "Error curve"),
-    (
-        "Error curve",
-        "View",
-        "Concepts",
-        "Machine",
-        "Machine editor",
-        "Rotary axes",
-        "Tolerances",
-        "Compensate",
-        "Conventions",
-    ),
-)
-
-
-def open_tab(page: Page, visit: Visit) -> None:
-    """Open the tab of a visit and give it room."""
-    if visit.tab != "Errors":
-        page.get_by_role("tab", name=visit.tab, exact=True).first.click()
-    side = "left" if visit.tab in LEFT_TABS else "right"
-    divider = page.locator(f"[data-dock-region={side}] [data-dock-divider=column]").bounding_box()
-    assert divider is not None, side
-    x, y = divider["x"] + 4, divider["y"] + divider["height"] / 2
-    share = 1 - visit.share if visit.tab in LOWER_TABS else visit.share
-    page.mouse.move(x, y)
-    page.mouse.down()
-    page.mouse.move(x, share * ONE_TAB[1], steps=5)
-    page.mouse.up()
-    page.wait_for_timeout(PAUSE_MS)
 
 
 def take(browser: Browser, viewer: Viewer, visit: Visit) -> Image.Image:
     """Take one picture."""
-    width, height = ONE_TAB if visit.tab else WHOLE
+    width, height = visit.size
     page = browser.new_page(viewport={"width": width, "height": height})
     page.set_default_timeout(PATIENCE_MS)
     page.goto(f"{viewer.url}/?fixedDpr=1")
-    page.wait_for_function(LOADED, timeout=60_000)
-    page.wait_for_selector("html[data-warpspace=open]", timeout=60_000)
+    page.wait_for_selector("html[data-warpspace=open]")
     page.wait_for_timeout(SETTLED_MS)
-    # the client's remark on software rendering
-    for button in page.locator(".mantine-Notification-closeButton").all():
-        button.click()
-    if visit.tab:
-        open_tab(page, visit)
     visit.act(page)
     page.evaluate("document.activeElement?.blur()")
     page.mouse.move(width / 2, height - 5)
     page.wait_for_timeout(SETTLED_MS)
-    shot = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+    found = page.locator(visit.part) if visit.part else page
+    shot = Image.open(io.BytesIO(found.screenshot())).convert("RGB")
     page.context.close()
-    if not visit.tab:
-        return shot
-    if visit.tab in LEFT_TABS:
-        return shot.crop((0, 0, width - RIGHT_WIDTH, height))
-    return shot.crop((LEFT_WIDTH, 0, width, height))
+    return shot
 
 
 def with_few_colours(shot: Image.Image) -> Image.Image:

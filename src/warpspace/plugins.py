@@ -1,8 +1,7 @@
-"""Additions of other packages: figures, formats, tabs, curves and conventions they register."""
+"""Additions of other packages: analyses, figures, formats, curves and conventions they register."""
 
 import logging
 from functools import cache
-from importlib.metadata import entry_points
 
 logger = logging.getLogger(__name__)
 GROUP = "warpspace.plugins"
@@ -15,6 +14,8 @@ def load_plugins() -> None:
     A module registers what it adds when it is imported, see `docs/architecture.md`. One that
     cannot be imported is left out, and logged.
     """
+    from importlib.metadata import entry_points  # a sixth of the start of a short command
+
     for entry in entry_points(group=GROUP):
         try:
             entry.load()

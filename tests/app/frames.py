@@ -1,6 +1,12 @@
 """Frames of a page that are drawn when a test asks for one, and not sixty times a second."""
 
+from io import BytesIO
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from PIL import Image
+
+from warpspace.geometry.colour import colour_table
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Page
@@ -37,3 +43,12 @@ def new_visitor(
 def draw(page: "Page") -> None:
     """Draw one frame of a page of `new_visitor`; it stays on the screen until the next."""
     assert page.evaluate(DRAW) == 0, "WebGL reports an error"
+
+
+def pixels_of_the_map(png: bytes) -> int:
+    """Count pixels whose colour is one of the colour map's, within three levels."""
+    shown = np.asarray(Image.open(BytesIO(png)).convert("RGB")).reshape(-1, 3).astype(np.int16)
+    table = colour_table().astype(np.int16)
+    key, counts = np.unique(shown, axis=0, return_counts=True)
+    near = np.abs(key[:, None] - table[None]).max(axis=-1).min(axis=-1) <= 3
+    return int(counts[near].sum())

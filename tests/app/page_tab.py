@@ -1,13 +1,10 @@
 """A tab of a real Chromium with the app in it: what tests ask of it, and do to it."""
 
-import json
 from collections.abc import Callable
-from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from app.frames import draw, new_visitor
 from warpspace.app.evaluation.evaluate import LiveModel
@@ -16,18 +13,15 @@ from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.store import StateStore
-from warpspace.app.viewport.named_views import CameraSetup
-from warpspace.geometry.colour import colour_table
+from warpspace.app.viewport.tab_camera import CameraSetup
 from warpspace.scene.library import load_scene
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
+    from playwright.sync_api import Browser, Locator, Page
 
 # What the client or Chromium says of itself in a software renderer.
 HARMLESS = (
     "THREE.Clock", "GL Driver Message", "SwiftShader", "Software WebGL", "favicon",
-    # of a widget that comes and goes between two messages, viser still sends what changed of it
-    "Tried to update non-existent component",
 )  # fmt: skip
 VERTICES = """() => {
   const node = window.__viserMutable.nodeRefFromName['/box/surface'];
@@ -62,38 +56,56 @@ PLACE = """name => {
   const at = node.position.clone().setFromMatrixPosition(node.matrixWorld).applyMatrix4(world);
   return at.toArray();
 }"""
-TIDY = """() => {
-  history.replaceState(null, '', location.pathname + '?fixedDpr=1');
-  const close = '.mantine-Notification-closeButton, #warpspace-server button';
-  document.querySelectorAll(close).forEach(b => b.click());
-  return document.querySelectorAll('.mantine-Notification-root, #warpspace-server').length;
+SEEN = """() => {
+  const seen = node => {
+    if (!node.checkVisibility()) return false;
+    const box = node.getBoundingClientRect();
+    if (!box.width || !box.height || getComputedStyle(node).visibility === 'hidden') return false;
+    const x = box.x + box.width / 2, y = box.y + box.height / 2;
+    if (x < 0 || y < 0 || x >= innerWidth || y >= innerHeight) return false;
+    const top = document.elementFromPoint(x, y);
+    return top && (top === node || node.contains(top) || top.contains(node));
+  };
+  const count = what => [...document.querySelectorAll(what)].filter(seen).length;
+  const words = [];
+  const walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while (walk.nextNode()) {
+    const node = walk.currentNode, parent = node.parentElement;
+    if (!node.data.trim() || parent.closest('option, script, style') || !seen(parent)) continue;
+    words.push(...node.data.trim().split(/\\s+/));
+  }
+  return [count('button, [role=button], summary'), count('input, select, textarea'), words.length];
 }"""
-"""Takes the link out of the address, closes the messages, and counts those that were there."""
+"""Buttons, inputs and words that are visible and not covered."""
+SCENES = [load_scene(name) for name in ("dvf5000_first", "dvf5000_second", "teach_tilted_c")]
+"""What the app with services is started with, the first of them shown."""
 LIVE = LiveModel()
 
 
 def wait_until_open(page: "Page") -> None:
     """Wait until all of a page is there."""
-    shown = ":is([data-value='max'], [data-strip='max']):visible"  # the latter on a phone
-    page.wait_for_selector(f"html[data-warpspace=open] {shown}", timeout=60_000)
+    page.wait_for_selector("html[data-warpspace=open] [data-piece=head] h1", timeout=60_000)
 
 
 class Tab:
-    """A browser tab with the app in it; `query` goes into its address."""
+    """A browser tab with the app in it; `query` goes into its address.
 
-    def __init__(
-        self, page: "Page", viewer: Viewer, query: str = "", *, everything: bool = True
-    ) -> None:
-        self.page, self.viewer = page, viewer
+    `actions` counts what a user has done: clicks, choices, numbers typed, files given.
+    """
+
+    def __init__(self, page: "Page", viewer: Viewer, query: str = "") -> None:
+        self.page, self.viewer, self.actions = page, viewer, 0
         self.errors: list[str] = []
         page.on("pageerror", lambda error: self.errors.append(str(error)))
         page.on("console", self._listen)
         page.goto(f"{viewer.url}/?fixedDpr=1{query}")
         wait_until_open(page)
         self.until(lambda: self.vertices() is not None)
-        if everything:
-            self.list_all()
         self._camera = self.session.context.camera.remember()
+
+    def _listen(self, message: Any) -> None:
+        if message.type == "error" and not any(word in message.text for word in HARMLESS):
+            self.errors.append(message.text)
 
     @property
     def session(self) -> Session:
@@ -101,16 +113,10 @@ class Tab:
         token = self.page.evaluate("window.__warpspaceTab")
         return next(session for session in self.viewer.sessions if session.token == token)
 
-    def list_all(self) -> None:
-        """List the errors that are zero as well."""
-        box = self.page.get_by_role("checkbox", name="Hide errors that are zero")
-        if box.is_checked():
-            box.uncheck()
-            self.until(lambda: self.listed() == len(self.session.state.amplitudes))
-
-    def listed(self) -> int:
-        """Number of errors listed."""
-        return self.page.locator("input[data-number]").count()
+    @property
+    def state(self) -> AppState:
+        """What the session shows, or is about to."""
+        return self.session.state
 
     def begin_anew(self) -> None:
         """Make the page again what it was when it was opened, in a tenth of the time."""
@@ -120,25 +126,88 @@ class Tab:
             session.use(StateStore(start))
             session.context.camera._stand = CameraSetup()
 
-        self.page.wait_for_selector("html[data-warpspace=open]")
+        self.actions = 0
         self.page.keyboard.press("Escape")
-        self.written("Find an error").fill("")
-        self.list_all()
-        self.panel("Volumetric error")
-        self.panel("View")
         session.context.act(forget)
         session.context.look_from(self._camera)
-        self.until(lambda: self.page.evaluate(TIDY) == 0)
+        self.page.evaluate(
+            "() => { history.replaceState(null, '', location.pathname + '?fixedDpr=1');"
+            " document.querySelectorAll('.ws-toast button').forEach(b => b.click()); }"
+        )
         self.until(lambda: session.state == start and self.shows_state(start))
+
+    # --- what a user does ----------------------------------------------------------------------
+
+    def click(self, name: str, role: Any = "button", within: str = "#ws-page") -> None:
+        """Click a button, or something of another role, by its name."""
+        self.actions += 1
+        found = self.page.locator(within).get_by_role(role, name=name, exact=True)
+        found.first.click()
+
+    def task(self, name: str) -> None:
+        """Open a task."""
+        self.click(name, "tab")
+
+    def unfold(self, name: str) -> None:
+        """Unfold a section of the open task by its first words."""
+        self.actions += 1
+        self.page.locator(f"#ws-right .ws-fold:has-text({name!r})").first.click()
+
+    def choose(self, label: str, option: str) -> None:
+        """Choose from a list."""
+        self.actions += 1
+        self.page.get_by_label(label, exact=True).first.select_option(label=option)
+
+    def type(self, label: str, text: str) -> None:
+        """Type into a box and press Enter."""
+        self.actions += 1
+        box = self.page.get_by_label(label, exact=True).first
+        box.fill(text)
+        box.press("Enter")
+
+    def give(self, name: str, content: bytes, click: Callable[[], None]) -> None:
+        """Give a file to the chooser that a click opens."""
+        with self.page.expect_file_chooser() as chooser:
+            click()
+        self.actions += 1
+        chooser.value.set_files({"name": name, "mimeType": "text/plain", "buffer": content})
+
+    def press(self, *keys: str) -> None:
+        """Press keys with nothing in focus."""
+        self.page.evaluate("document.activeElement && document.activeElement.blur()")
+        for key in keys:
+            self.actions += 1
+            self.page.keyboard.press(key)
+
+    def send(self, name: str, value: object = "") -> None:
+        """Send an event as a page does, or as a hostile one might."""
+        self.page.evaluate("([name, value]) => warpspacePage.send(name, value)", [name, value])
+
+    # --- what is seen --------------------------------------------------------------------------
+
+    def part(self, name: str) -> "Locator":
+        """A piece of the page by the name of its place."""
+        return self.page.locator(f"[data-piece='{name}']")
+
+    def says(self, words: str, within: str = "#ws-page") -> None:
+        """Wait until something is said."""
+        self.page.locator(within).get_by_text(words).first.wait_for(timeout=60_000)
+
+    def seen(self) -> tuple[int, int, int]:
+        """Buttons, inputs and words that are visible and not covered."""
+        buttons, inputs, words = self.page.evaluate(SEEN)
+        return buttons, inputs, words
+
+    def in_sight(self, place: str) -> bool:
+        """Whether an element is on the screen as it stands."""
+        box = self.page.locator(place).first.bounding_box()
+        size = self.page.viewport_size or {"width": 0, "height": 0}
+        return box is not None and box["y"] >= 0 and box["y"] + box["height"] <= size["height"]
 
     def screenshot(self) -> bytes:
         """Draw the page as it is now, and give its picture."""
         draw(self.page)
         return self.page.screenshot()
-
-    def _listen(self, message: Any) -> None:
-        if message.type == "error" and not any(word in message.text for word in HARMLESS):
-            self.errors.append(message.text)
 
     def until(self, fine: Callable[[], bool], seconds: float = 60.0) -> None:
         """Wait until something holds."""
@@ -170,28 +239,10 @@ class Tab:
         found = self.page.evaluate(VERTICES)
         return None if found is None else tuple(np.reshape(part, (-1, 3)) for part in found)
 
-    def shows_colours(self, wanted: np.ndarray) -> bool:
-        """Whether the surface drawn has these colours; not while the page loads another one."""
-        found = self.surface()
-        return (
-            found is not None
-            and found[1].shape == wanted.shape
-            and np.allclose(found[1], wanted, atol=1e-5)
-        )
-
     def vertices(self) -> np.ndarray | None:
         """Vertices of the drawn surface, [M, 3], mm."""
         found = self.surface()
         return None if found is None else found[0]
-
-    def shows(self, vertices: np.ndarray) -> bool:
-        """Whether the surface drawn has these vertices."""
-        drawn = self.vertices()
-        return (
-            drawn is not None
-            and drawn.shape == vertices.shape
-            and np.allclose(drawn, vertices, atol=1e-3)
-        )
 
     def drawn(self, name: str) -> np.ndarray | None:
         """Points of a node that is shown, [n, 3]; None where it is hidden or absent."""
@@ -200,121 +251,14 @@ class Tab:
 
     def shows_state(self, state: AppState) -> bool:
         """Whether the surface drawn is that of a state."""
-        return self.shows(drawn_nodes(LIVE.evaluate(state)))
-
-    def until_shown(self, state: AppState, seconds: float = 60.0) -> None:
-        """Wait until the surface drawn is that of a state."""
-        wanted = drawn_nodes(LIVE.evaluate(state))
-        self.until(lambda: self.shows(wanted), seconds)
-
-    def text(self, value: str) -> str:
-        """A number on the page, as it is spelt."""
-        return self.page.inner_text(f"[data-value='{value}']")
-
-    def number(self, value: str) -> float:
-        """A number on the page, without its unit."""
-        return float(self.text(value).split()[0])
-
-    def widget(self, label: str) -> str:
-        """Id of the widget whose label begins with a word."""
-        script = """label => [...document.querySelectorAll('label')]
-            .find(l => l.textContent.startsWith(label))?.getAttribute('for')"""
-        return self.page.wait_for_function(script, arg=label).json_value()
-
-    def box(self, label: str) -> Any:
-        """Number box of the slider whose label begins with a word: that of an error, or viser's."""
-        own = self.page.locator(f"input[data-number='{label}']")
-        if own.count():
-            return own
-        return self.page.locator(f"[id='{self.widget(label)}'] ~ div input")
-
-    def written(self, label: str) -> Any:
-        """Text box beside a label; viser does not tie them together."""
-        row = self.page.locator(f"//label[text()='{label}']/ancestor::div[2]")
-        return row.locator("input, textarea").first
-
-    def thumb(self, label: str) -> Any:
-        """Thumb of the slider whose label begins with a word."""
-        return self.page.locator(f"[id='{self.widget(label)}'] [role=slider]")
-
-    def send(self, label: str, value: str) -> None:
-        """Send a value as a hostile page would, spelt in JavaScript."""
-        self.page.evaluate(
-            f"window.__viserMutable.sendMessage({{type: 'GuiUpdateMessage',"
-            f" uuid: {json.dumps(self.widget(label))}, updates: {{value: {value}}}}})"
-        )
-
-    def drag(self, label: str, values: list[float]) -> None:
-        """Send the positions of a drag 10 ms apart, however busy the page is with drawing."""
-        self.page.evaluate(
-            """([uuid, values]) => {
-              for (const value of values) {
-                window.__viserMutable.sendMessage(
-                  {type: 'GuiUpdateMessage', uuid, updates: {value}});
-                const until = performance.now() + 10;
-                while (performance.now() < until);
-              }
-            }""",
-            [self.widget(label), values],
-        )
-
-    def press(self, *keys: str) -> None:
-        """Press keys with no widget in focus."""
-        self.page.evaluate("document.activeElement && document.activeElement.blur()")
-        for key in keys:
-            self.page.keyboard.press(key)
-
-    def button(self, name: str) -> None:
-        """Press a button."""
-        self.page.get_by_role("button", name=name, exact=True).last.click()
-
-    def arrived(self, label: str, value: str) -> None:
-        """Wait until what was put into a widget is on the server: messages may overtake it."""
-        handles = self.session._client.gui._gui_input_handle_from_uuid
-        self.until(
-            lambda: any(
-                (one.label, str(one.value)) == (label, value)
-                for one in list(handles.values())
-                if hasattr(one, "label") and hasattr(one, "value")
-            )
-        )
-
-    def tick(self, label: str) -> None:
-        """Click a check box."""
-        self.page.locator(f"[id='{self.widget(label)}']").click()
+        wanted, drawn = drawn_nodes(LIVE.evaluate(state)), self.vertices()
+        fine = drawn is not None and drawn.shape == wanted.shape
+        return fine and np.allclose(drawn, wanted, atol=1e-3)
 
     def place(self, name: str) -> np.ndarray | None:
         """Where a node that is shown stands, in the drawing's axes, mm."""
         found = self.page.evaluate(PLACE, name)
         return None if found is None else 100.0 * np.array(found)
-
-    def panel(self, name: str) -> None:
-        """Bring a tab of a panel to the front."""
-        self.page.get_by_role("tab", name=name, exact=True).click()
-
-    def upload(self, name: str, content: bytes) -> None:
-        """Give a scene or the like to the page, in the tab Files."""
-        self.page.locator("input[type=file][accept^='.toml']").set_input_files(
-            {"name": name, "mimeType": "text/plain", "buffer": content}
-        )
-
-    def choose(self, label: str, option: str) -> None:
-        """Choose an option of a dropdown."""
-        self.page.get_by_label(label, exact=True).first.click()
-        self.page.get_by_role("option", name=option, exact=True).first.click()
-
-
-SCENES = [load_scene(name) for name in ("dvf5000_first", "dvf5000_second", "teach_tilted_c")]
-"""What the app with services is started with, the first of them shown."""
-
-
-def pixels_of_the_map(png: bytes) -> int:
-    """Count pixels whose colour is one of the colour map's, within three levels."""
-    shown = np.asarray(Image.open(BytesIO(png)).convert("RGB")).reshape(-1, 3).astype(np.int16)
-    table = colour_table().astype(np.int16)
-    key, counts = np.unique(shown, axis=0, return_counts=True)
-    near = np.abs(key[:, None] - table[None]).max(axis=-1).min(axis=-1) <= 3
-    return int(counts[near].sum())
 
 
 def drawn_nodes(picture: LivePicture) -> np.ndarray:
@@ -323,13 +267,7 @@ def drawn_nodes(picture: LivePicture) -> np.ndarray:
 
 
 def open_page(
-    viewer: Viewer,
-    browser: "Browser",
-    query: str = "",
-    size: tuple[int, int] = (1280, 720),
-    *,
-    everything: bool = True,
+    viewer: Viewer, browser: "Browser", query: str = "", size: tuple[int, int] = (1440, 900)
 ) -> Tab:
     """Open the app as a visitor of its own; `query` goes into the address."""
-    page = new_visitor(browser, size).new_page()
-    return Tab(page, viewer, query, everything=everything)
+    return Tab(new_visitor(browser, size).new_page(), viewer, query)

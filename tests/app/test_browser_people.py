@@ -1,8 +1,9 @@
-"""A first visit and work without a mouse in a real Chromium."""
+"""A first visit, work without a mouse, and what a screen reader finds, in a real Chromium."""
 
+from collections import Counter
 from dataclasses import replace
 
-import pytest
+from axe_playwright_python.sync_playwright import Axe
 
 from app.frames import new_visitor
 from app.page_tab import SCENES, Tab, wait_until_open
@@ -10,13 +11,23 @@ from app.wire import end_work
 from warpspace.app.documents.scene_file import state_to_toml
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import start_state
+from warpspace.app.tasks.tasks import TASKS
 
-TITLES = ["What this is", "Drag", "Click", "Repair", "Compare"]
-FOCUS_IN_TOUR = "document.getElementById('warpspace-tour').contains(document.activeElement)"
-
-
-def title(page):
-    return page.inner_text("#warpspace-tour h2")
+START = start_state(SCENES[0])
+TITLES = ["The bent volume", "Its errors", "Five tasks"]
+APART = """() => {
+  const [card, target] = ["#ws-tour", ".ws-pointed"].map(
+    which => document.querySelector(which).getBoundingClientRect());
+  return card.left >= target.right || card.right <= target.left
+    || card.top >= target.bottom || card.bottom <= target.top;
+}"""
+FOCUSED = """() => {
+  const own = document.activeElement, part = own.closest("#ws-top, #ws-left, #ws-over, #ws-right");
+  return [part?.id ?? "", parseFloat(getComputedStyle(own).outlineWidth)];
+}"""
+UNFOLD = """() => document.querySelectorAll("#ws-right details:not(:has(> [data-do]))")
+  .forEach(part => { part.open = true; })"""
+"""Unfolds what the page unfolds by itself."""
 
 
 def tree(page):
@@ -31,190 +42,153 @@ def tree(page):
     ]
 
 
-def test_the_tour_is_shown_once_and_keeps_the_keys_to_itself(viewer, browser):
-    with new_visitor(browser) as context:
+def test_first_steps_are_shown_once_beside_what_they_explain(viewer, browser):
+    with new_visitor(browser, (1440, 900)) as context:
         page = context.new_page()
         page.goto(viewer.url)
-        page.wait_for_selector("#warpspace-tour", timeout=60_000)
-        dialog = page.get_by_role("dialog", name="What this is")
-        assert dialog.get_attribute("aria-modal") == "true"
-        assert "DVF5000, first machine measured. Seven key errors" in dialog.inner_text()
-        # five steps with Enter, and Tab never leaves them
-        seen = [title(page)]
-        for _ in range(4):
-            for key in ("Tab", "Tab", "Tab", "Tab", "Shift+Tab", "Shift+Tab", "t", "h"):
-                page.keyboard.press(key)
-                assert page.evaluate(FOCUS_IN_TOUR)
-            page.get_by_role("button", name="Next", exact=True).focus()
+        for number, title in enumerate(TITLES, start=1):
+            page.get_by_role("dialog", name=f"{title} ({number} of 3)").wait_for(timeout=60_000)
+            assert page.evaluate(APART) or number == 1  # the drawing is the rest of the page
+            assert page.evaluate(
+                "document.querySelector('#ws-tour').contains(document.activeElement)"
+            )
             page.keyboard.press("Enter")
-            seen.append(title(page))
-        assert seen == TITLES
-        page.keyboard.press("ArrowLeft")
-        assert title(page) == "Repair"
-        # what is behind can neither be reached nor heard
-        assert ("tab", "View") not in tree(page)
-        page.keyboard.press("Escape")
-        assert page.locator("#warpspace-tour").count() == 0
-        assert "×1000" in page.inner_text("[data-value=factor]")
-        assert page.get_by_text("Keys and help").count() == 0
-        assert ("tab", "View") in tree(page)
+        page.wait_for_selector("#ws-tour", state="detached")
         page.reload()
         wait_until_open(page)
-        assert page.locator("#warpspace-tour").count() == 0
-        # it comes back from the help and from the palette
-        page.keyboard.press("h")
-        page.get_by_role("button", name="Take the tour").click()
-        page.wait_for_selector("#warpspace-tour")
-        page.get_by_role("button", name="Skip").click()
-        page.wait_for_selector("#warpspace-tour", state="detached")
+        assert page.locator("#ws-tour").count() == 0
         page.keyboard.press("Control+k")
-        page.get_by_placeholder("Search commands").fill("tour")
+        page.get_by_label("Find a command").fill("first steps")
         page.keyboard.press("Enter")
-        page.wait_for_selector("#warpspace-tour")
+        page.wait_for_selector("#ws-tour .main:focus")  # once the window has given it back
+        page.keyboard.press("Escape")
+        page.wait_for_selector("#ws-tour", state="detached")
 
 
 def test_words_of_a_scene_are_never_run(browser):
     words = "<img src=x onerror='window.taken=1'><script>window.taken=1</script>"
     scene = replace(SCENES[0], title=f"T {words}", description=f"D {words}")
-    with Viewer(scene) as viewer, new_visitor(browser, (1024, 768)) as context:
-        tab = Tab(context.new_page(), viewer, "&tour=on", everything=False)
+    evil = replace(SCENES[1], title=f"U {words}", name=f"V {words}")
+    with Viewer(scene, {evil.title: evil}) as viewer, new_visitor(browser) as context:
+        tab = Tab(context.new_page(), viewer)
         page = tab.page
-        tab.until(lambda: page.locator("#warpspace-tour").count() == 1)
-        tab.until(lambda: words in page.inner_text("#warpspace-tour"))
-        card = page.locator("#warpspace-tour section").bounding_box()
-        assert card["x"] >= 0
-        assert card["y"] >= 0
-        assert card["x"] + card["width"] <= 1024
-        assert card["y"] + card["height"] <= 768
-        page.keyboard.press("Escape")
-        page.get_by_text("About this scene").click()
-        tab.until(lambda: words in page.inner_text("[data-value=description]"))
-        tab.panel("Files")
-        evil = replace(SCENES[1], title=f"U {words}")
-        tab.upload("evil.toml", state_to_toml(start_state(evil)).encode())
-        tab.until(lambda: tab.session.state.scene.name == "evil")
-        tab.panel("Compare")
-        tab.button("Pin as before")
-        tab.until(page.get_by_text("<script>").first.is_visible)
-        page.keyboard.press("h")
-        tab.until(lambda: page.locator(".ws-help").count() == 1)
+        tab.until(lambda: words in page.title())
+        for window in ("scenes", "files", "report", "help"):
+            tab.send("page:open", window)
+            page.wait_for_selector(f"[data-key=window-{window}]")
+            tab.press("Escape")
+        tab.give("evil.toml", state_to_toml(start_state(evil)).encode(),
+                 lambda: page.get_by_role("button", name="Open", exact=True).click())  # fmt: skip
+        tab.until(lambda: tab.state.scene.title.startswith("U "))
+        tab.send("compare:pin")
+        for task in TASKS:
+            tab.send("page:task", task)
+            page.wait_for_selector(f"#ws-task-{task}[aria-selected=true]")
+        tab.says("U <img src=x")
         assert page.evaluate("window.taken") is None
         assert page.locator("img[src=x]").count() == 0
         assert tab.errors == []
         end_work(viewer)
 
 
-START = start_state(SCENES[0])
-NAMED = {
-    "button", "checkbox", "combobox", "dialog", "image", "group", "searchbox", "slider",
-    "spinbutton", "tab", "tablist", "textbox", "Canvas", "DisclosureTriangle",
-}  # fmt: skip
-FOCUSED = "document.activeElement.getAttribute('aria-label') ?? document.activeElement.innerText"
-SCHEME = "document.documentElement.getAttribute('data-mantine-color-scheme')"
-OUTLINE = "parseFloat(getComputedStyle(document.activeElement).outlineWidth)"
-
-
-def test_an_error_is_found_set_looked_at_and_undone_without_a_mouse(tab):
-    page = tab.page
-    keys = page.keyboard.press
-    # 1. find: the cursor goes into the search box, and on to the number of what was found
+def test_an_error_is_found_set_and_undone_without_a_mouse(tab):
+    page, keys = tab.page, tab.page.keyboard.press
+    # from the top over the errors and the drawing to the tasks, and the focus is seen
+    page.evaluate("document.activeElement.blur()")
+    order: list[str] = []
+    while "ws-right" not in order[-1:]:
+        keys("Tab")
+        part, outline = page.evaluate(FOCUSED)
+        assert outline >= 2.0
+        order += [part] if part not in order[-1:] else []
+    # a message that still stands, or what scrolls, may take the focus between two regions
+    assert [part for part in order if part] == ["ws-top", "ws-left", "ws-over", "ws-right"]
+    # found by a part of its name, and its number typed on its slider
     keys("/")
     page.keyboard.type("squareness y to x")
-    tab.until(lambda: page.locator(".ws-error").count() == 1)
-    keys("Enter")
-    tab.until(lambda: page.evaluate(FOCUSED).startswith("EC0Y"))
-    # 2. set: in a box they are letters
-    keys("Control+a")
+    tab.until(lambda: page.locator("#ws-left input[type=range]").count() == 1)
+    page.locator("#ws-left input[type=range]").focus()
     page.keyboard.type("-12.5")
     keys("Enter")
-    tab.until(lambda: tab.session.state.amplitudes["EC0Y"] == -12.5)
-    keys("Escape")
-    # 3. colour by z, true scale, dark mode
-    keys("4")
-    tab.until(lambda: tab.session.state.component == "z")
-    keys("t")
-    tab.until(lambda: "true scale" in tab.text("factor"))
-    keys("m")
-    tab.until(lambda: page.evaluate(SCHEME) == "dark")
-    keys("m")
-    tab.until(lambda: page.evaluate(SCHEME) == "light")
-    keys("Control+z")
-    keys("Control+z")
-    keys("Control+z")
-    tab.until(lambda: tab.session.state.exaggeration is None)
-    # 4. open a tab by its name; the focus is on it, and Tab goes on into it
-    keys("Control+k")
-    tab.until(lambda: page.evaluate("document.activeElement.placeholder") == "Search commands...")
-    page.keyboard.type("tab: compare")
-    page.get_by_text("Tab: Compare").wait_for()
-    keys("Enter")
-    compare = page.get_by_role("tab", name="Compare", exact=True)
-    tab.until(lambda: compare.get_attribute("aria-selected") == "true")
-    tab.until(lambda: page.evaluate(FOCUSED) == "Compare")
-    # ... and its neighbour with an arrow
+    tab.until(lambda: tab.state.amplitudes["EC0Y"] == -12.5)
+    # the focus is on its slider again, and stays there while the page is written anew
+    slider = "document.activeElement.dataset.set === 'errors:set.EC0Y'"
+    tab.until(lambda: page.evaluate(slider))
     keys("ArrowRight")
-    beside = page.get_by_role("tab", name="Calibrate", exact=True)
-    tab.until(lambda: beside.get_attribute("aria-selected") == "true")
-    # 5. undo both
-    keys("Control+z")
-    keys("Control+z")
-    tab.until(lambda: tab.session.state.component == "norm")
-    tab.until(lambda: tab.session.state.amplitudes["EC0Y"] == START.amplitudes["EC0Y"])
-    # 6. and all errors are there again
-    tab.until(lambda: float(tab.box("EC0Y").input_value()) == START.amplitudes["EC0Y"])
-    keys("/")
-    keys("Delete")
-    tab.until(lambda: page.locator(".ws-error").count() > 30)
-    # 7. where the focus is can be seen, and a folder is opened with a key
-    folder = page.get_by_role("button", name="B axis · 10 errors")
-    for place in (
-        tab.thumb("EXX"),
-        tab.box("EXX"),
-        page.get_by_role("button", name="Undo", exact=True),
-        page.get_by_role("tab", name="Machine", exact=True),
-        page.get_by_label("Nominal box", exact=True),
-        page.get_by_label("Component", exact=True).first,
-        folder,
+    tab.until(lambda: tab.state.amplitudes["EC0Y"] > -12.5)
+    tab.until(lambda: tab.shows_state(tab.state))
+    assert page.evaluate(slider)
+    # a task by its arrow, a section by Enter
+    page.locator("#ws-task-understand").focus()
+    keys("ArrowRight")
+    page.wait_for_selector("#ws-task-measure[aria-selected=true]:focus")
+    # letters and digits act where nothing is typed
+    for key, holds in (
+        ("4", lambda: tab.state.component == "z"),
+        ("t", lambda: tab.state.exaggeration == 1.0),
+        ("m", lambda: tab.state.shown.dark),
     ):
-        place.focus()
-        assert page.evaluate(OUTLINE) >= 2.0
-    tab.until(lambda: folder.get_attribute("aria-expanded") == "false")
-    keys("Enter")
-    tab.until(lambda: folder.get_attribute("aria-expanded") == "true")
-    tab.until(tab.thumb("EXB").is_visible)
-    keys(" ")
-    tab.until(lambda: folder.get_attribute("aria-expanded") == "false")
-
-
-@pytest.mark.nightly
-def test_all_that_is_operated_or_drawn_has_a_name(tab):
-    for name in tab.page.get_by_role("tab").all_inner_texts():
-        tab.panel(name)
-        assert tab.page.get_by_role("tab", name=name, exact=True).get_attribute("title") == name
-        tab.until(
-            lambda: [role for role, said in tree(tab.page) if role in NAMED and not said] == []
+        keys(key)
+        tab.until(holds)
+    page.wait_for_selector("html.ws-dark")
+    page.locator("[data-key=bench] > summary").focus()
+    for opened in (1, 0):
+        keys("Enter" if opened else "Space")
+        tab.until(lambda opened=opened: page.locator("[data-key=bench][open]").count() == opened)
+    # a window keeps the focus, and gives it back
+    keys("Control+k")
+    page.get_by_label("Find a command").wait_for()
+    for _ in range(60):
+        keys("Tab")
+        assert page.evaluate(
+            "document.activeElement === document.body"
+            " || document.getElementById('ws-window').contains(document.activeElement)"
         )
-    tab.panel("View")
-    tab.panel("Volumetric error")
-    tab.session.context.post(lambda state: state.with_chosen_error("EAY"))
-    # a slider and its number, a text box, a group of buttons, a chart, the drawing, the colours
-    wanted = {
-        ("slider", "EAX · ε_xX · roll of X [µrad]"),
-        ("textbox", "EAX · ε_xX · roll of X [µrad]"),
-        ("textbox", "Find an error"),
-        ("slider", "Exaggeration, logarithmic"),
-        ("group", "History"),
-        ("button", "Command palette"),
-        ("combobox", "Component"),
-        (
-            "image",
-            (
-                "Chart of EAY, pitch of Y: starts with 0 µrad at −225 mm,"
-                " ends with −43.7 µrad at 225 mm"
-            ),
-        ),
-    }
-    tab.until(lambda: wanted <= {*tree(tab.page)})
-    images = [said for role, said in tree(tab.page) if role == "image"]
-    for begin in ("Drawing of the deformed working volume. DVF5000", "Colour bar from 0 to 60 µm"):
-        assert any(said.startswith(begin) for said in images)
+    keys("Escape")
+    page.wait_for_selector("[data-key=bench] > summary:focus")
+    while tab.state.amplitudes != START.amplitudes:
+        before = tab.state
+        keys("Control+z")
+        tab.until(lambda before=before: tab.state != before)
+
+
+def serious(tab):
+    """What axe-core finds serious or critical on the page as it is."""
+    found = Axe().run(tab.page).response["violations"]
+    return [
+        (one["id"], [node["html"][:200] for node in one["nodes"]])
+        for one in found
+        if one["impact"] in ("serious", "critical")
+    ]
+
+
+def test_a_screen_reader_finds_landmarks_headings_and_names(tab):
+    for dark in (False, True):
+        if dark:
+            tab.press("m")
+            tab.page.wait_for_selector("html.ws-dark")
+        assert serious(tab) == []
+        for task, words in TASKS.items():
+            tab.task(words)
+            tab.page.wait_for_selector(f"#ws-task-{task}[aria-selected=true]")
+            sections = tab.session.display.parts["tasks"].sections[task]
+            for name in sections:
+                if not dark and name not in tab.state.page.open:
+                    tab.send("page:fold", name)
+                place = f"[data-piece='section.{name}']"
+                tab.page.wait_for_selector(f"{place} .ws-body, {place} > .ws-section:not(details)",
+                                           state="attached")  # fmt: skip
+            tab.page.evaluate(UNFOLD)
+            assert serious(tab) == [], task
+        for window in ("scenes", "files", "report", "help", "palette", "share", "machines"):
+            tab.send("page:open", window)
+            tab.page.wait_for_selector(f"[data-key=window-{window}]")
+            assert serious(tab) == [], window
+            tab.page.keyboard.press("Escape")
+    found = tree(tab.page)
+    roles = Counter(role for role, _ in found)
+    for landmark in ("banner", "navigation", "main", "complementary"):
+        assert roles[landmark] == 1, landmark
+    (top,) = [name for role, name in found if role == "heading" and name.startswith("mean ")]
+    assert "max 51.7 µm" in top
+    assert ("slider", "EAX roll of X") in found

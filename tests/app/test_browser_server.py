@@ -10,8 +10,8 @@ import viser
 
 from app.frames import new_visitor
 from app.page_tab import Tab, open_page, wait_until_open
-from app.raw_client import running_app
 from app.wire import end_work
+from page_client import running_app
 from warpspace.app.server.doors import Access
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import start_state
@@ -101,40 +101,41 @@ def test_a_tab_with_the_token_lives_on(browser):
         tab.until(lambda: "token" not in tab.page.evaluate("document.cookie"))
         tab.until(lambda: "token" not in tab.page.url)
         tab.until(lambda: "fixedDpr=1" in tab.page.url)
-        tab.send("EXX", "7")
-        tab.until(lambda: tab.session.state == moved)
+        tab.send("errors:set.EXX", "7")
+        tab.until(lambda: tab.state == moved)
         before = tab.session
         viewer._server._websock_server.disconnect_all_clients()
         tab.until(lambda: before not in viewer.sessions)
         tab.until(lambda: any(s.token == before.token for s in viewer.sessions))
-        tab.until(lambda: tab.session.state == moved)
-        tab.until(lambda: float(tab.box("EXX").input_value()) == 7.0)
+        tab.until(lambda: tab.state == moved)
+        tab.page.wait_for_selector("[data-box='errors:set.EXX'][data-text='7']", state="attached")
         tab.press("Control+z")  # its history as well
-        tab.until(lambda: tab.session.state == start_state(scene))
+        tab.until(lambda: tab.state == start_state(scene))
         tab.press("Control+Shift+z")
-        tab.until(lambda: tab.session.state == moved)
+        tab.until(lambda: tab.state == moved)
         tab.page.reload()
         wait_until_open(tab.page)
-        tab.until_shown(moved)
+        tab.until(lambda: tab.shows_state(moved))
         # another tab of the same browser is another visitor
         fresh = Tab(tab.page.context.new_page(), viewer)
-        fresh.until_shown(start_state(scene))
+        fresh.until(lambda: fresh.shows_state(start_state(scene)))
         ended = fresh.session
         fresh.page.close()
         tab.until(lambda: ended not in viewer.sessions)
-        tab.until(lambda: tab.session.state == moved)
+        tab.until(lambda: tab.state == moved)
         tab.page.evaluate(
-            "() => { window.warpspaceCopy = button => { window.put = button.dataset.copy; }; }"
+            "() => { navigator.clipboard.writeText = async text => { window.put = text; }; }"
         )
-        tab.page.get_by_role("tab", name="Files", exact=True).click()
-        for name, carried in (("Link", []), ("Link with token", [TOKEN])):
-            tab.page.get_by_text(name, exact=True).click()
+        for name, carried in (("Copy link", []), ("Copy link with token", [TOKEN])):
+            tab.click("Share")
+            tab.click(name, within="#ws-window")
             tab.page.wait_for_function("window.put")
             copied = parse_qs(urlsplit(tab.page.evaluate("window.put")).query)
             tab.page.evaluate("window.put = ''")
             assert copied.get("token", []) == carried
             assert copied["view"]
             tab.until(lambda: "token" not in tab.page.url)
+            tab.press("Escape")
         assert tab.errors == []
         tab.page.context.close()
         stranger = browser.new_context().new_page()
@@ -149,44 +150,34 @@ BOX = "#warpspace-server"
 SECONDS = 90.0
 
 
-def number_box(page, label):
-    """Number box of an error."""
-    return page.locator(f"input[data-number='{label}']")
+SAYS = "document.querySelector('[data-piece=head] h1')?.innerText"
 
 
 def maximum(page):
-    """The largest error, as the page spells it."""
-    return page.inner_text("[data-value='max']")
+    """Mean and largest error, as the page spells them."""
+    return page.inner_text("[data-piece=head] h1")
 
 
-def wait_for_maximum(page, wanted):
-    """Wait until the page says a largest error."""
-    script = "w => document.querySelector(\"[data-value='max']\")?.innerText === w"
-    page.wait_for_function(script, arg=wanted, timeout=SECONDS * 1000)
-
-
-def wait_for_another(page, before):
-    """Wait until the page says another largest error."""
-    page.wait_for_function(
-        "w => document.querySelector(\"[data-value='max']\").innerText !== w", arg=before
-    )
+def wait_for(page, wanted, *, other=False):
+    """Wait until the page says a mean and largest error, or others."""
+    script = f"([wanted, other]) => ({SAYS} === wanted) !== other"
+    page.wait_for_function(script, arg=[wanted, other], timeout=SECONDS * 1000)
 
 
 def change(page):
-    """Change an error; give the largest error once the tab has kept what was changed."""
-    before, box = maximum(page), number_box(page, "EAX")
-    box.fill("12")
-    box.press("Enter")
-    wait_for_another(page, before)
+    """Change an error; give what is said of it once the tab has kept it."""
+    before = maximum(page)
+    page.evaluate("warpspacePage.send('errors:set.EAX', '-80')")
+    wait_for(page, before, other=True)
     page.wait_for_function(
-        "JSON.parse(sessionStorage.getItem('warpspace-kept') ?? '{}').text?.includes('EAX=12')"
+        "JSON.parse(sessionStorage.getItem('warpspace-kept') ?? '{}').text?.includes('EAX=-80')"
     )
     return maximum(page)
 
 
 def test_killed_server_is_said_and_its_tab_restored(browser, tmp_path):
     page = new_visitor(browser).new_page()
-    with running_app(tmp_path, "dvf5000_first") as server:
+    with running_app("dvf5000_first", folder=tmp_path) as server:
         port = int(server.url.rpartition(":")[2])
         page.goto(f"http://127.0.0.1:{port}/?fixedDpr=1")
         wait_until_open(page)
@@ -196,27 +187,27 @@ def test_killed_server_is_said_and_its_tab_restored(browser, tmp_path):
     said = page.inner_text(BOX)
     assert "does not answer" in said
     assert re.search(r"Kept in this tab: .* as of \d", said)
-    page.wait_for_function(f"/tried again every second; so far for ([2-9]|\\d\\d+) s/.test("
+    page.wait_for_function(f"/Trying again every second, for ([2-9]|\\d\\d+) s/.test("
                            f"document.querySelector('{BOX}').innerText)")  # fmt: skip
     assert page.get_attribute(BOX, "role") == "alert"
     assert maximum(page) == changed  # the last picture stays
     # another scene: what comes back is the tab's own
-    with running_app(tmp_path, "dvf5000_second", port=port):
+    with running_app("dvf5000_second", folder=tmp_path, port=port):
         page.wait_for_selector(f"{BOX}[role=status]", timeout=SECONDS * 1000)
         wait_until_open(page)
-        wait_for_maximum(page, changed)
+        wait_for(page, changed)
         said = page.inner_text(BOX)
         assert "This tab is restored" in said
         assert "Not restored: what Undo and Redo could go back to;" in said
-        assert number_box(page, "EAX").input_value() == "12"
+        assert page.get_attribute("[data-box='errors:set.EAX']", "data-text") == "-80"
         page.get_by_role("button", name="Close", exact=True).click()
         assert page.locator(BOX).count() == 0
         # Undo goes to what the server was started with, Redo back again
         page.locator("canvas").first.focus()
         page.keyboard.press("Control+z")
-        wait_for_another(page, changed)
+        wait_for(page, changed, other=True)
         page.keyboard.press("Control+Shift+z")
-        wait_for_maximum(page, changed)
+        wait_for(page, changed)
         page.context.close()
 
 
@@ -224,8 +215,8 @@ def test_interrupted_connection_says_that_all_is_there_and_a_lost_state_that_it_
     with Viewer(load_scene("dvf5000_nominal")) as viewer:
         tab = open_page(viewer, browser)
         page = tab.page
-        tab.send("EXX", "7")
-        tab.until(lambda: tab.session.state.amplitudes["EXX"] == 7.0)
+        tab.send("errors:set.EXX", "7")
+        tab.until(lambda: tab.state.amplitudes["EXX"] == 7.0)
         # viser connects at once while the page is in front: as if it were not
         page.evaluate("document.hasFocus = () => false")
         viewer._server._websock_server.disconnect_all_clients()
@@ -236,7 +227,7 @@ def test_interrupted_connection_says_that_all_is_there_and_a_lost_state_that_it_
         )
         page.wait_for_selector(f"{BOX}[role=status]")
         tab.until(lambda: "everything is as it was, Undo too" in page.inner_text(BOX))
-        tab.until(lambda: tab.session.state.amplitudes["EXX"] == 7.0)
+        tab.until(lambda: tab.state.amplitudes["EXX"] == 7.0)
         # what a page has kept may be anything
         viewer._memory._cache.clear()
         page.evaluate("sessionStorage.setItem('warpspace-tab', 'f'.repeat(32))")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app.frames import new_visitor
-from app.page_tab import TIDY, Tab
+from app.page_tab import Tab
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import start_state
 from warpspace.app.viewport.layers import SCENE_PER_MM
@@ -18,10 +18,9 @@ BOXES = """() => {
     return [left, top, right, bottom];
   };
   const all = selector => [...document.querySelectorAll(selector)].map(box);
-  return { head: all(".ws-room-head > *")[0], tabs: all("[role=tab]"),
-    room: box(window.__viserMutable.canvas), docks: all("[data-dock-region]"),
-    foot: all(".ws-room-foot")[0], shown: ["mean", "max", "max at"].map(
-      name => all(`[data-value="${name}"]`)[0]), scale: all(".ws-scale")[0] };
+  return { head: all("[data-piece=head] > *")[0], tabs: all("[role=tab]"), foot: all(".ws-foot")[0],
+    room: box(window.__viserMutable.canvas), legend: all("[data-piece=legend] .ws-scale")[0],
+    columns: all("#ws-left, #ws-right, #ws-top") };
 }"""
 PROJECT = """points => {
   const { camera, canvas, nodeRefFromName } = window.__viserMutable;
@@ -84,22 +83,21 @@ def check_page(tab):
     head, room = found["head"], found["room"]
     page = [0.0, 0.0, *tab.page.viewport_size.values()]
     assert within(head, room)
-    assert len(found["tabs"]) >= 11
+    assert len(found["tabs"]) == 5
     for name in found["tabs"]:
         assert not overlap(head, name)
         assert within(name, page)
         # as wide and as high as a finger or a mouse wants it
         assert min(name[2] - name[0], name[3] - name[1]) >= 20
-    # read without a scroll or a click: mean, max and where, and the colour bar
-    right = next(dock for dock in found["docks"] if dock[0] > room[0])
-    for shown in (*found["shown"], found["scale"]):
-        assert within(shown, right)
-        assert not overlap(shown, head)
-    # between heading and scale bars, and filling what is left one way or the other
+    for column in found["columns"]:
+        assert not overlap(column, room)
+    assert within(found["legend"], room)
+    assert not overlap(found["legend"], head)
+    # between heading and controls, and filling what is left one way or the other
     free = [room[0], head[3], room[2], found["foot"][1]]
     assert within(box, free)
     width, height = box[2] - box[0], box[3] - box[1]
-    assert max(width / (free[2] - free[0]), height / (free[3] - free[1])) > 0.62
+    assert max(width / (free[2] - free[0]), height / (free[3] - free[1])) > 0.5
 
 
 def test_nothing_is_covered_and_the_box_fills_its_room_unless_it_was_turned(open_tab):
@@ -158,7 +156,7 @@ def projected(tab, length_mm):
     return float(np.linalg.norm(b - a))
 
 
-VIEWS = {"Front": (0, -1, 0), "Right": (1, 0, 0), "Top": (0, 0, 1), "Iso": None}
+VIEWS = {"front": (0, -1, 0), "right": (1, 0, 0), "top": (0, 0, 1), "iso": None}
 
 
 def test_every_view_looks_along_its_axis_through_both_lenses_with_right_scale_bars(tab):
@@ -174,7 +172,7 @@ def test_every_view_looks_along_its_axis_through_both_lenses_with_right_scale_ba
     lengths: set[float] = set()
     wide = camera.fov
     for view, direction in VIEWS.items():
-        tab.button(view)
+        tab.send("controls:view", view)
         if direction is not None:
             tab.until(
                 lambda direction=direction: np.allclose(
@@ -187,52 +185,29 @@ def test_every_view_looks_along_its_axis_through_both_lenses_with_right_scale_ba
     assert len(lengths) > 2
     tab.still(away)  # the page has told the server where its camera has come to stand
     before = size()
-    tab.tick("Orthographic")
+    tab.send("controls:set.lens", 1)
     tab.until(lambda: abs(np.rad2deg(camera.fov) - 3.0) < 1e-6)
     tab.until(lambda: size() == pytest.approx(before, rel=5e-3))
     settled(tab)
     bars_agree(tab)
-    tab.tick("Orthographic")
+    tab.send("controls:set.lens", 0)
     tab.until(lambda: abs(camera.fov - wide) < 1e-6)
-    tab.tick("Scale bars")
+    tab.send("state:set.look.bars", 0)
     tab.until(lambda: tab.page.locator("[data-bar-scale]").count() == 0)
 
 
-def test_a_phone_shows_drawing_and_numbers_with_the_panels_in_a_sheet(viewer, browser):
+def test_a_phone_has_the_drawing_on_top_and_the_columns_below(viewer, browser):
     context = new_visitor(browser, PHONE, device_scale_factor=1, is_mobile=True, has_touch=True)
-    # the sheet of panels folds by itself, and what is in it is not there then
-    phone = Tab(context.new_page(), viewer, everything=False)
+    phone = Tab(context.new_page(), viewer)
     box = settled(phone)
     found = phone.page.evaluate(BOXES)
     free = [found["room"][0], found["head"][3], found["room"][2], found["foot"][1]]
     assert within(box, free)
-    assert (box[2] - box[0]) / (free[2] - free[0]) > 0.62
-    strip = phone.page.locator(".ws-room-strip")
-    text = strip.inner_text()
-    statistics = PICTURE.statistics
-    for number in (statistics.mean_um, statistics.max_um):
-        assert f"{number:.2f} µm" in text
-    assert "max at" in text
-    assert within(found["foot"], [0, 0, *PHONE])
-    # the sheet is opened: the drawing stays in view above it
-    phone.until(lambda: phone.page.evaluate(TIDY) == 0)
-    phone.page.get_by_text("Errors", exact=True).first.tap()
-    phone.page.wait_for_selector("text=Find an error")
-    sheet = phone.page.get_by_text("Find an error", exact=True)
-    phone.until(lambda: extent(phone)[3] < sheet.bounding_box()["y"])
-    for name, tabs in (("Volumetric error", 5), ("View", 5)):
-        section = phone.page.get_by_role("button", name=f"Expand panel {name}", exact=True)
-        section.scroll_into_view_if_needed()
-        section.tap()
-        chosen = phone.page.get_by_role("tab", name=name, exact=True).locator("xpath=..")
-        names = chosen.get_by_role("tab").all()
-        assert len(names) >= tabs
-        for tab in names:
-            tab.scroll_into_view_if_needed()
-            tab.tap()
-            phone.until(lambda tab=tab: tab.get_attribute("aria-selected") == "true")
-            at = tab.bounding_box()
-            assert at["x"] >= 0
-            assert at["x"] + at["width"] <= PHONE[0]
+    assert within(found["legend"], found["room"])
+    assert "mean 30.9 µm" in phone.part("head").inner_text()
+    assert phone.page.evaluate("document.documentElement.scrollWidth") <= PHONE[0]
+    phone.page.get_by_role("tab", name="Improve").scroll_into_view_if_needed()
+    phone.page.get_by_role("tab", name="Improve").tap()
+    phone.says("Compensate")
     context.close()
     assert phone.errors == []

@@ -1,43 +1,39 @@
 """The app draws what a table of compensation leaves: the same numbers, honest about which."""
 
+import io
 import threading
+import zipfile
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from app.parts import answer_of, part_of, section
 from still_scenes import still_scene
 from warpspace.app.documents.conditions import picture_conditions
 from warpspace.app.documents.files import build_request, exported_words, file_stem
-from warpspace.app.documents.kept_tab import NO_TABLE, kept_text, read_kept
+from warpspace.app.documents.legend import subject_words
 from warpspace.app.documents.offline_page import build_offline_html, point_words
 from warpspace.app.documents.scene_file import state_to_toml
-from warpspace.app.documents.services import CancelledError, CompensationRequest
+from warpspace.app.documents.services import CancelledError
 from warpspace.app.evaluation import budget
 from warpspace.app.evaluation.budget import pick_worst, with_picked
 from warpspace.app.evaluation.compare import with_pin
-from warpspace.app.evaluation.compensation import (
-    BOTH,
-    LEFT,
-    StoppedError,
-    answer,
-    ask,
-    holds_for,
-    with_box,
-)
 from warpspace.app.evaluation.conventions import with_reference
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.machine import tool_point
 from warpspace.app.evaluation.machine_edits import with_changed_scene
-from warpspace.app.readouts.compensation import box_words, compensation_html, note_html
-from warpspace.app.readouts.summary import heading, summary
+from warpspace.app.evaluation.resulting_scene import active_scene
+from warpspace.app.server.tab_keeper import NO_TABLE, kept_text, read_kept
 from warpspace.app.state.app_state import start_state
-from warpspace.app.state.compensation_choice import CompensationChoice
 from warpspace.app.state.table import without_table, without_words
+from warpspace.app.state.tree import put
+from warpspace.app.tasks.improve import BOTH, LEFT, CompensatePart, holds_for, packed, with_box
 from warpspace.cli.services import draw_compensation
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.field.grid import build_grid
-from warpspace.formats.compensation.compensate import compensate
+from warpspace.formats.compensation.compensate import Compensate, compensate, read_points
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import TravelDirection
 from warpspace.outputs.save import draw_maps
@@ -46,12 +42,20 @@ from warpspace.scene.library import load_scene
 SCENE = load_scene("dvf5000_first")
 START = replace(start_state(SCENE), nodes=9)
 LIVE = LiveModel()
-CHOICE = CompensationChoice("heidenhain", "9")
+WITH_TABLE = "with the table HEIDENHAIN .COM and .CMA (X 9, Y 9, Z 9 points)"
+CHOICE = {"formats": "heidenhain", "points": "9"}
+
+
+def asking(state=START, choice=CHOICE):
+    """Give the part, and the state with what was chosen."""
+    part = part_of(CompensatePart, "compensate")
+    part.context.store = SimpleNamespace(state=state)
+    return part, replace(state, forms={f"compensate.{key}": one for key, one in choice.items()})
 
 
 def computed(state=START, choice=CHOICE):
     """Compute what a choice leaves."""
-    return answer(ask(state, choice), threading.Event(), lambda _: None)
+    return answer_of(*asking(state, choice))
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +65,7 @@ def found():
 
 @pytest.fixture(scope="module")
 def controller(found):
-    return found.found.controller
+    return found.controller
 
 
 @pytest.fixture(scope="module")
@@ -81,27 +85,31 @@ def left(controller):
     ],
 )
 def test_the_box_has_the_field_of_the_command(name, points, loop, orientation):
-    choice = CompensationChoice(name, points, loop=loop, orientation=orientation)
-    given = computed(choice=choice).found
-    command = compensate(SCENE, replace(choice.plan()), 9)
+    choice = {"formats": name, "points": points, "loop": loop, "orientation": str(int(orientation))}
+    given = computed(choice=choice)
+    asked = Compensate(
+        formats=(name,), points=read_points(points) if points else None, loop=loop or None,
+        orientation=orientation,
+    )  # fmt: skip
+    command = compensate(SCENE, asked, 9)
     picture = LIVE.evaluate(with_box(START, LEFT, given.controller))
     assert picture.state.loop == Loop(command.loop)
     assert np.abs(picture.field.error_um - command.after.error_um).max() < 1e-9
     tilts = picture.field.orientation_urad - command.after.orientation_urad
     assert np.abs(tilts).max() < 1e-9
-    assert given.after_statistics == compensate(SCENE, choice.plan()).after_statistics
+    assert given.after_statistics == compensate(SCENE, asked).after_statistics
 
 
 def test_the_machine_may_drift_under_its_table(left, controller):
     drifted = left.with_amplitude("EXX", 7.0).with_amplitude("EA0Z", -12.0)
     grid = build_grid(SCENE.model, SCENE.workspace, 9)
-    shifted = ask(drifted, CHOICE).start
+    shifted = active_scene(drifted)
     wanted = controller.field(grid.coordinates, grid.nominal_mm, shifted)
     picture = LIVE.evaluate(drifted)
     assert np.abs(picture.field.error_um - wanted.error_um).max() < 1e-9
     assert picture.statistics.max_um > 2.0 * LIVE.evaluate(left).statistics.max_um
     # and what is excluded counts no more
-    without = replace(drifted, exclusions=drifted.exclusions.with_excluded("EA0Z", True))
+    without = put(drifted, "exclusions.excluded", "+EA0Z")
     assert np.abs(LIVE.evaluate(without).field.error_um - picture.field.error_um).max() > 1.0
 
 
@@ -110,7 +118,10 @@ def test_before_and_after_stand_side_by_side(left, controller):
     assert picture.compared.a == LIVE.evaluate(START).statistics
     after = LIVE.evaluate(left)
     assert picture.compared.b == after.statistics
-    assert "with the table heidenhain (X 9, Y 9, Z 9 points)" in picture.compared.titles[1]
+    assert (
+        "with the table HEIDENHAIN .COM and .CMA (X 9, Y 9, Z 9 points)"
+        in picture.compared.titles[1]
+    )
     assert "table" not in picture.compared.titles[0]
     change = np.linalg.norm(after.field.error_um - LIVE.evaluate(START).field.error_um, axis=-1)
     assert picture.compared.difference.max_um == pytest.approx(change.max())
@@ -169,17 +180,17 @@ def test_what_changes_the_machine_ends_the_table(left, controller):
 
 
 def test_whatever_is_shown_says_which_machine_it_is_of(left, controller):
-    words = "with the table heidenhain (X 9, Y 9, Z 9 points)"
+    words = WITH_TABLE
     both = with_box(START, BOTH, controller)
     picture = LIVE.evaluate(left)
     page = build_offline_html(picture)
-    for shown in (heading(picture), summary(picture), picture_conditions(picture), page):
+    for shown in (subject_words(picture), picture_conditions(picture), page):
         assert words in shown
     assert "first-order model" not in page
     assert words not in build_offline_html(LIVE.evaluate(START))
     for state in (left, both, with_pin(left)):
         assert "without the table" in without_words(state)
-        assert "heidenhain (X 9" in exported_words(LIVE.evaluate(state))
+        assert "HEIDENHAIN .COM and .CMA (X 9" in exported_words(LIVE.evaluate(state))
         bare = without_table(state)
         assert bare.controller is None
         assert bare.comparison.b is None
@@ -196,43 +207,66 @@ def test_no_file_keeps_the_table_and_a_restored_tab_says_so(controller):
     assert NO_TABLE not in read_kept(kept_text(START, None, [SCENE]), [SCENE]).missing
 
 
+def shown(part, state, found):
+    """Give what the section says of a table that was computed."""
+    part._answer = (part.question(state), found)
+    return section(part, state)
+
+
 def test_words_of_others_are_escaped(found, controller):
     hostile = "<script>alert(1)</script>"
     worded = replace(controller, label=hostile, notes=(hostile,), assumed=(hostile,))
-    given = replace(found.found, controller=worded)
+    given = replace(found, controller=worded)
     left = with_box(START, LEFT, worded)
     for text in (
-        compensation_html(given, "", box_words(left, given), current=False),
-        note_html(hostile, known=True),
-        heading(LIVE.evaluate(left)),
-        summary(LIVE.evaluate(left)),
+        shown(*asking(), given),
+        build_offline_html(LIVE.evaluate(left)).partition("<iframe")[0],
     ):
         assert "<script>" not in text
         assert "&lt;script&gt;" in text
 
 
+def test_a_table_is_saved_whole_and_the_box_then_shows_before_and_after(found):
+    part, state = asking()
+    assert "SINUMERIK 840D CEC" in section(part, state)
+    assert 'data-do="compensate:table"' in shown(part, state, found)
+    after = part.take(state, "table", "")
+    assert after.controller is found.controller
+    assert after.comparison.b is not None
+    ((name, content),) = part.context.told
+    assert name == "compensation.zip"
+    assert zipfile.ZipFile(io.BytesIO(content)).namelist() == [
+        f"compensation{add or found.format.endings[0]}" for add in found.files
+    ]
+    assert packed(found) == (name, content)  # the same table gives the same bytes
+    assert part.take(after, "box", "machine").controller is None
+    assert part.take(state, "box", "<b>") == state
+    assert part.take(state, "set.formats", "<b>").forms["compensate.formats"] == "<b>"
+
+
+def test_what_is_left_of_rounding_is_said_and_not_drawn(found):
+    part, state = asking(choice={"formats": "heidenhain", "points": "9", "resolution": "0.05"})
+    part.ask(state, part.values(state), part.scenes(state))
+    words = shown(part, state, found)  # its largest error is below the step asked for
+    assert "resolution of the numbers in the file" in words
+    assert 'data-value="left" title="Nothing is left but rounding"' in words
+    part, state = asking()
+    assert "resolution of the numbers" not in shown(part, state, found)
+
+
 @pytest.mark.parametrize(
     ("choice", "says"),
     [
-        (CompensationChoice("<b>nonsense"), "format"),
-        (CompensationChoice("heidenhain", "9" * 5000), "at most 100 characters"),
-        (CompensationChoice("heidenhain", resolution=float("nan")), "expected 0"),
+        ({"formats": "<b>nonsense"}, "choose a controller"),
+        ({**CHOICE, "points": "102"}, "at most 101"),
+        ({**CHOICE, "resolution": "nan"}, "expected"),
     ],
 )
 def test_nonsense_gives_one_message(choice, says):
     with pytest.raises(WarpspaceError) as raised:
         computed(choice=choice)
     assert says in str(raised.value)
-    assert "\n" not in str(raised.value)
     assert len(str(raised.value)) < 300
-
-
-def test_cancelled_work_ends_and_leaves_the_turn_to_others():
-    cancelled = threading.Event()
-    cancelled.set()
-    with pytest.raises(StoppedError):
-        answer(ask(START, CHOICE), cancelled, lambda _: None)
-    assert computed().found.after_statistics.max_um > 0.0
 
 
 def test_a_point_that_is_asked_about_lies_on_the_drawn_box(left):
@@ -267,17 +301,17 @@ def test_the_table_of_another_machine_is_none_of_this_one(controller):
 
 
 def test_maps_are_drawn_beside_the_page_and_can_be_cancelled(found):
-    request, cancelled = CompensationRequest(found.found, dark=False), threading.Event()
-    assert draw_compensation(request, cancelled).startswith(b"\x89PNG")
+    cancelled = threading.Event()
+    assert draw_compensation(found, False, False, cancelled).startswith(b"\x89PNG")
     cancelled.set()
     with pytest.raises(CancelledError):
-        draw_compensation(request, cancelled)
+        draw_compensation(found, False, False, cancelled)
 
 
 @pytest.mark.parametrize("name", ["wFXt", "wXFt", "only Y moves", "only X stands still"])
 def test_machines_with_few_moving_axes_have_box_and_maps_too(name):
     state = start_state(still_scene(name))
-    given = computed(state, CompensationChoice("heidenhain", "5")).found
+    given = computed(state, {**CHOICE, "points": "5"})
     picture = LIVE.evaluate(with_box(state, BOTH, given.controller))
     assert picture.compared.b.max_um <= picture.compared.a.max_um
     for narrow in (True, False):
@@ -287,5 +321,5 @@ def test_machines_with_few_moving_axes_have_box_and_maps_too(name):
 @pytest.mark.parametrize("name", ["wCFt", "nothing moves"])
 def test_machines_with_nothing_to_correct_are_refused_in_one_line(name):
     with pytest.raises(OptionError, match="to correct") as refused:
-        computed(start_state(still_scene(name)), CompensationChoice("heidenhain", "5"))
+        computed(start_state(still_scene(name)))
     assert "\n" not in str(refused.value)

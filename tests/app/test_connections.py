@@ -10,7 +10,7 @@ import viser
 from viser import _messages as messages
 
 from warpspace.app.browser.arrivals import CARRIER, MOST_KNOWN, Arrivals
-from warpspace.app.browser.uploads import MOST_AT_ONCE, MOST_PARTS, Uploads, read_refusal
+from warpspace.app.browser.uploads import MOST_AT_ONCE, MOST_PARTS, Uploads
 from warpspace.app.server import network, viewer
 from warpspace.app.server.network import free_port, is_local, page_url, resolve_host
 from warpspace.app.server.tab_memory import (
@@ -320,17 +320,3 @@ def test_all_buttons_together_take_only_so_many_at_once(client):
         client.start(4, 2, name=f"{number}", widget=(BUTTON, OTHER)[number % 2])
     assert len(client.gui._current_file_upload_states) == MOST_AT_ONCE
     assert "at once" in client.refused[0]
-
-
-@pytest.mark.parametrize(
-    ("told", "name", "size"),
-    [
-        ("12.5:3000000:a:b.toml", "a:b.toml", 3e6),
-        ("", "", 0.0),
-        ("1:²:a", "a", 0.0),
-        ("1:-5:a", "a", 0.0),
-        ("1:" + "9" * 400 + ":a", "a", 0.0),
-    ],
-)
-def test_what_a_page_tells_of_a_refused_file_may_be_anything(told, name, size):
-    assert read_refusal(told) == (name, size)

@@ -4,29 +4,33 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from markupsafe import Markup
 
-from warpspace.analysis.adjusting import Objective
+from app.parts import lone_part
 from warpspace.analysis.repair import repaired
 from warpspace.app.documents.conditions import order_conditions, picture_conditions
 from warpspace.app.documents.files import build_request
-from warpspace.app.documents.scene_file import open_text, state_to_toml
-from warpspace.app.documents.view_settings import settings_line, with_settings
+from warpspace.app.documents.legend import subject_words
+from warpspace.app.documents.scene_file import (
+    open_text,
+    settings_line,
+    state_to_toml,
+    with_settings,
+)
 from warpspace.app.evaluation.conventions import (
-    Effects,
     choices,
     chosen,
+    effects_of,
     with_choice,
     with_own_conventions,
     with_reference,
     with_travel,
 )
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.evaluation.repair import ask
 from warpspace.app.evaluation.resulting_scene import scene_of
-from warpspace.app.readouts.conventions import conventions_html
-from warpspace.app.readouts.summary import heading, summary
 from warpspace.app.state.app_state import start_state
+from warpspace.app.state.picked import Picked
+from warpspace.app.tasks.machine import ConventionsSection
+from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import TravelDirection
 from warpspace.picture.mesh import edge_pieces
 from warpspace.picture.model import evaluate_picture
@@ -43,31 +47,29 @@ WEIGHTS = LIVE.evaluate(START).grid.weights
 def test_every_choice_can_be_made_and_measures_its_change(choice):
     state = with_choice(START, choice)
     assert choice in chosen(state)
-    effect = Effects().of(START)[choice]
+    effect = effects_of(START)[choice]
     change = LIVE.evaluate(state).field.error_um - LIVE.evaluate(START).field.error_um
     length = np.linalg.norm(change, axis=-1)
     assert effect.mean_um == pytest.approx(float((WEIGHTS * length).sum()), abs=1e-9)
     assert effect.max_um == pytest.approx(float(length.max()), abs=1e-9)
 
 
-@pytest.mark.parametrize("nodes", [5, 21])
-def test_effects_are_those_of_the_nodes_of_the_result_whatever_was_moved_before(nodes):
-    effects = Effects()
-    state = START.with_nodes(nodes)
-    effects.of(state)
-    for key, value in (("EAX", 9.0), ("EAX", -4.0), ("EBZ", 3.0), ("EXX", 2.0)):
-        state = state.with_amplitude(key, value)
-        effects.of(state)
-    state = state.reset().with_amplitude("EXC", 7.0)
-    found = effects.of(state)
-    for choice in ("loop=workpiece", "direction C=-1", "component_errors=before_motion"):
-        own, other = LIVE.evaluate(state), LIVE.evaluate(with_choice(state, choice))
-        length = np.linalg.norm(other.field.error_um - own.field.error_um, axis=-1)
-        mean = float((own.grid.weights * length).sum())
-        assert found[choice].mean_um == pytest.approx(mean, abs=1e-9)
-        assert found[choice].max_um == pytest.approx(float(length.max()), abs=1e-9)
-    assert f"{nodes}×{nodes}×{nodes} nodes" in conventions_html(state, found, lambda *_: Markup())
-    assert all(effect.max_um == 0.0 for effect in effects.of(state.zeroed()).values())
+def test_the_section_offers_what_is_in_force_and_holds_the_point_that_is_picked():
+    section = lone_part(ConventionsSection)
+    text = section.body(LIVE.evaluate(START))
+    assert 'value="component_errors=after_motion" checked' in text
+    assert "before motion" in text
+    state = section.take(START, "choose", "reference=point")
+    state = section.take(state, "set.X", "100,5 mm")
+    assert state.scene.reference["X"] == 100.5
+    assert "Held at X" in section.body(LIVE.evaluate(state))
+    section.take(state, "pick", "")
+    section.context.post = lambda update: update
+    assert section.context.next_click is not None
+    section.context.next_click(Picked({"X": 0.0}))
+    assert section.context.next_click is None
+    assert section.take(state, "own", "").scene is START.scene
+    assert section.take(START, "set.Q", "<b>") is START
 
 
 def test_nonsense_changes_nothing():
@@ -122,7 +124,7 @@ def test_the_box_the_heading_and_files_have_the_direction(way):
     state = with_travel(TWO, way)
     picture = LIVE.evaluate(state)
     words = "reversal" if way == "difference" else {"mean": "mean of both"}.get(way, way)
-    assert words in heading(picture)
+    assert any(words in said for said in subject_words(picture))
     assert words in picture_conditions(picture)[0]
     shares = {"mean": 3.25, "forward": 3.0, "backward": 2.0, "difference": 1.0}
     at_end = float(picture.field.error_um[-1, 0, 0, 1])
@@ -142,7 +144,7 @@ def test_readings_and_uncertainties_are_saved_with_what_is_changed():
 
 WORDS = "placement of the workpiece fitted out"
 SECOND = load_scene("dvf5000_second")
-PLACED = replace(start_state(SECOND), placed=True, nodes=5).with_loop("relative")
+PLACED = replace(replace(start_state(SECOND), placed=True, nodes=5), loop=Loop("relative"))
 
 
 def test_the_drawn_field_is_that_of_the_command():
@@ -153,9 +155,8 @@ def test_the_drawn_field_is_that_of_the_command():
         picture.statistics.rms_um
         < 0.5 * LIVE.evaluate(replace(PLACED, placed=False)).statistics.rms_um
     )
-    assert WORDS in summary(picture)
     assert WORDS in picture_conditions(picture)
-    assert WORDS not in summary(LIVE.evaluate(PLACED.with_loop("tool")))
+    assert WORDS not in picture_conditions(LIVE.evaluate(replace(PLACED, loop=Loop("tool"))))
 
 
 def test_files_and_links_keep_it():
@@ -177,12 +178,6 @@ def test_turned_axes_carry_the_volume_that_is_fitted():
     np.testing.assert_allclose(shown.field.error_um, exported.error_um, atol=1e-9)
 
 
-def test_repair_asks_for_the_shape_of_a_part():
-    before = ask(PLACED, Objective.RMS, any_error=False, limit=200.0).answer().before
-    wanted = evaluate(SECOND, grid=5, loop="relative", placed=True)
-    assert before.max_um == pytest.approx(wanted.norm_um.max())
-
-
 def test_the_heading_and_files_say_when_the_first_order_is_not_enough():
     measured = load_scene("dvf5000_first")
     assert order_conditions(LIVE.evaluate(start_state(measured))) == ()
@@ -191,7 +186,6 @@ def test_the_heading_and_files_say_when_the_first_order_is_not_enough():
     (words,) = order_conditions(picture)
     assert words.startswith("first order; the exact chain differs by up to")
     assert words in picture_conditions(picture)
-    assert words in heading(picture, words)
     # what is excluded does not count
     excluded = replace(large.exclusions, excluded=frozenset({"EC0Y", "EA0Z"}))
     assert order_conditions(LIVE.evaluate(replace(large, exclusions=excluded))) == ()

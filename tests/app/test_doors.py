@@ -15,7 +15,7 @@ from websockets.exceptions import ConnectionClosedError
 from websockets.protocol import State
 
 from app.wire import dial
-from page_protocol import PROTOCOL
+from page_client import PROTOCOL
 from reliability.doors import GUESSES, HOSTS, ORIGINS, PATHS, TOKEN
 from warpspace.app.server import guard, network, run, viewer
 from warpspace.app.server.doors import Access, Asked, Doors, Place, read_place

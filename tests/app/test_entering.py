@@ -1,25 +1,25 @@
 """Numbers, curves and clicks as people enter them."""
 
+import json
+
 import numpy as np
 import pytest
 
 from warpspace import load_scene
-from warpspace.app.browser.clicks import LONGEST_WORD, MOST_CLICKS, read_clicks
-from warpspace.app.documents.view_settings import with_settings
-from warpspace.app.readouts.error_controls import with_switched
+from warpspace.app.browser.events import MOST_EVENTS, Event, read_events
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import start_state
-from warpspace.app.state.curve_text import (
+from warpspace.app.state.ranges import Exclusions
+from warpspace.app.state.store import History
+from warpspace.app.state.tree import toggled
+from warpspace.app.state.typed_numbers import read_typed, spell_typed
+from warpspace.app.tasks.error_curve import (
     convert_shape,
     kind_titles,
-    parse_shape,
     read_curve,
     shape_kind,
     spell_rows,
 )
-from warpspace.app.state.ranges import Exclusions
-from warpspace.app.state.store import History
-from warpspace.app.state.typed_numbers import read_typed, spell_typed
 from warpspace.exceptions import OptionError
 from warpspace.machine.errors import Constant, Harmonics, Poly, Ramp, Table
 from warpspace.machine.limits import MAX_ERROR
@@ -66,18 +66,10 @@ def test_a_box_spells_what_it_reads_back(value):
 
 @pytest.mark.parametrize(("value", "kept"), [(1e9, MAX_ERROR), (-1e300, -MAX_ERROR)])
 def test_what_no_model_holds_for_is_clamped_and_said(value, kept):
-    typed = edits.with_typed_amplitude(START, "EAX", value)
+    typed = START.with_amplitude("EAX", value)
     assert typed.amplitudes["EAX"] == kept
     assert len(typed.notes) == 1
-    assert edits.with_typed_amplitude(START, "QQQ", 1.0).notes == (
-        "QQQ: no parameter of this machine",
-    )
-
-
-def test_a_link_says_what_is_excluded_and_what_alone_takes_part():
-    found = with_settings(START, "excluded=EXX&only=EAX,EBX").exclusions
-    assert found.excluded == {"EXX"}
-    assert found.only == {"EAX", "EBX"}
+    assert START.with_amplitude("QQQ", 1.0).notes == ("QQQ: no parameter of this machine",)
 
 
 WANTED = Table(SPAN, ((-275.0, -1.5), (0.0, 2.0), (275.0, 0.25)))
@@ -119,7 +111,7 @@ EXAMPLES = [
 
 @pytest.mark.parametrize("function", EXAMPLES, ids=shape_kind)
 def test_rows_read_back_to_the_function(function):
-    assert parse_shape(shape_kind(function), spell_rows(function), SPAN) == function
+    assert read_curve(shape_kind(function), spell_rows(function), SPAN).function == function
 
 
 @pytest.mark.parametrize("function", EXAMPLES, ids=shape_kind)
@@ -145,7 +137,7 @@ def test_an_error_that_is_taken_to_zero_keeps_its_curve(function):
     ],
 )
 def test_spellings(kind, text, function):
-    assert parse_shape(kind, text, SPAN) == function
+    assert read_curve(kind, text, SPAN).function == function
 
 
 @pytest.mark.parametrize(
@@ -174,7 +166,7 @@ def test_spellings(kind, text, function):
 )
 def test_refused_with_a_message(kind, text, message):
     with pytest.raises(OptionError, match=message):
-        parse_shape(kind, text, SPAN)
+        read_curve(kind, text, SPAN)
 
 
 @pytest.mark.parametrize("kind", kind_titles())
@@ -185,7 +177,7 @@ def test_another_kind_starts_from_the_present_curve(function, kind):
     if function is not None and kind in {"constant", "ramp", "harmonics"}:
         assert converted.amplitude == pytest.approx(function.amplitude, rel=1e-6)
     # what the editor would show is what it would read
-    assert parse_shape(kind, spell_rows(converted), SPAN) is not None
+    assert read_curve(kind, spell_rows(converted), SPAN).function is not None
 
 
 def test_long_tables_are_thinned_out_for_editing():
@@ -196,15 +188,12 @@ def test_long_tables_are_thinned_out_for_editing():
     assert rows[-1].split() == ["275", "27.5"]
 
 
-@pytest.mark.parametrize("word", ["", "only", "only EXA", "exclude <script>", "delete EAX", " EAX"])
-def test_words_that_mean_nothing_change_nothing(word):
-    assert with_switched(START, word) is START
-
-
 def test_each_switch_is_a_step_however_fast_they_follow_each_other():
     history = History(START)
-    for number, word in enumerate(("exclude EAX", "exclude EBX", "exclude EBX", "only EBX")):
-        history = history.push(with_switched(history.present, word), 0.01 * number)
+    steps = (("excluded", "EAX"), ("excluded", "EBX"), ("excluded", "EBX"), ("only", "EBX"))
+    for number, (name, key) in enumerate(steps):
+        now = toggled(history.present, f"exclusions.{name}", key)
+        history = history.push(now, 0.01 * number)
     assert history.undoes == "exclusions.only.+EBX"
     history = history.undo()
     assert history.present.exclusions == Exclusions(frozenset({"EAX"}))
@@ -213,15 +202,17 @@ def test_each_switch_is_a_step_however_fast_they_follow_each_other():
     assert history.undo().undo().present == START
 
 
-def test_clicks_are_read_in_order_with_their_numbers():
-    assert read_clicks("7:only EAX\n8:exclude EBX") == ((7, "only EAX"), (8, "exclude EBX"))
-    assert read_clicks("3:a:b") == ((3, "a:b"),)
-    assert len(read_clicks("\n".join(f"{i}:a" for i in range(10_000)))) == MOST_CLICKS
-    assert len(read_clicks("1:" + "a" * 1_000_000)[0][1]) == LONGEST_WORD
+def test_events_are_read_in_order_with_their_numbers():
+    found = read_events('[[7, "errors:set.EAX", "1:2"], [8, "page:undo", ""]]')
+    assert found == ((7, Event("errors", "set.EAX", "1:2")), (8, Event("page", "undo", "")))
+    assert len(read_events(json.dumps([[i, "a:b", ""] for i in range(1, 999)]))) == MOST_EVENTS
 
 
 @pytest.mark.parametrize(
-    "text", ["", "only EAX", "x:only EAX", "-1:a", "²:a", "9" * 40 + ":a", "1.5:a", "None"]
-)
-def test_what_is_no_click_is_left_out(text):
-    assert read_clicks(text) == ()
+    "text",
+    ["", "{}", "[[1]]", '[[0, "a:b", ""]]', '[["1", "a:b", ""]]', '[[1, "no colon", ""]]',
+     json.dumps([[1, "a:" + "b" * 999, ""]]), json.dumps([[1, "a:b", "c" * 999_999]]),
+     "[" * 99_999],
+)  # fmt: skip
+def test_what_is_no_event_is_left_out(text):
+    assert read_events(text) == ()

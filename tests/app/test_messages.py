@@ -2,10 +2,10 @@
 
 import asyncio
 import importlib
+import json
 import logging
 import threading
 import time
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,22 +15,24 @@ import pytest
 import viser
 from viser import _messages as messages
 
-from app.raw_client import App, connected, dial, nonsense, until, update
-from app.wire import Wire
+from app.hostile import camera, connected, events, nonsense
+from app.wire import Wire, opened
 from app.wire import dial as dial_viewer
-from page_protocol import CAMERA, pack
+from page_client import CAMERA, App, dial, pack, until, update
 from reliability.outcome import Lag
-from warpspace.app.browser.incoming import may_pass, may_set, moved
+from warpspace.app.browser.events import MOST_EVENTS, Event, read_events
+from warpspace.app.browser.incoming import may_pass, may_set
+from warpspace.app.browser.page import Page
 from warpspace.app.browser.viser_private import (
     dom_id,
     listen_to_all,
     serve_with,
-    show_marks,
     wake_sender_on_its_thread,
 )
 from warpspace.app.server.network import RepeatedLines
 from warpspace.app.server.session import Turns
 from warpspace.app.server.viewer import Viewer
+from warpspace.cli.services import build_services
 from warpspace.scene.library import load_scene
 
 
@@ -59,7 +61,7 @@ USED = {
     "server": "_websock_server.register_handler _websock_server.queue_message",
     "client": "_websock_connection.queue_message _websock_connection.register_handler"
     " _websock_connection.unregister_handler _websock_connection.get_message_buffer"
-    " gui._release_cross_scope_nesting gui._handle_file_transfer_start"
+    " gui._handle_file_transfer_start"
     " gui._handle_file_transfer_part gui._current_file_upload_states"
     " gui._websock_interface.register_handler gui._websock_interface.unregister_handler"
     " gui._handle_gui_updates gui._gui_input_handle_from_uuid",
@@ -91,16 +93,9 @@ def test_messages_have_the_fields_that_are_used(name):
     assert not missing, f"viser {viser.__version__}: {name} lacks {sorted(missing)}"
 
 
-def test_widgets_have_ids_and_marks_and_a_connection_an_event_that_wakes_its_sender(client):
+def test_widgets_have_ids_and_a_connection_an_event_that_wakes_its_sender(client):
     widget = client[1].gui.add_text("", "")
     assert look_up(widget, "_impl.uuid") == dom_id(widget)
-    slider = client[1].gui.add_slider("", 0.0, 1.0, 0.1, 0.0, marks=((0.0, "0"),))
-    show_marks(slider, ((0.0, "0"), (1.0, "1")))
-    look_up(messages, "GuiSliderMark")
-    assert look_up(slider, "_impl.props._marks") == (
-        messages.GuiSliderMark(0.0, "0"),
-        messages.GuiSliderMark(1.0, "1"),
-    )
     buffer = look_up(client[1], "_websock_connection.get_message_buffer")()
     look_up(buffer, "message_event.set")
 
@@ -161,7 +156,7 @@ def test_only_its_own_thread_wakes_a_sender():
 
 def test_clients_that_read_nothing_do_not_hold_up_the_end():
     viewer = Viewer(load_scene("dvf5000_first"))
-    app, lag = App(viewer.url.replace("http", "ws", 1), psutil.Process(), Path()), Lag()
+    app, lag = App(viewer.url.replace("http", "ws", 1), psutil.Process()), Lag()
 
     async def run():
         sockets = [await dial(app) for _ in range(3)]
@@ -186,10 +181,8 @@ def test_what_a_page_really_says_passes():
     for message in (
         CAMERA,
         {"type": "GuiUpdateMessage", "uuid": "a", "updates": {"value": "t", "width": 1280}},
-        {"type": "GuiUpdateMessage", "uuid": "a", "updates": {"value": [1, 2.5, 3]}},
         {"type": "ScenePointerMessage", "event_type": "click", "ray_origin": [1, 2, 3.5],
          "ray_direction": [0, 0, 1], "screen_pos": [[0.5, 0.5]], "modifier": None},
-        {"type": "CommandTriggerMessage", "uuid": "a"},
         {"type": "FileTransferStartUpload", "source_component_uuid": "a", "transfer_uuid": "b",
          "filename": "s.toml", "mime_type": "", "part_count": 1, "size_bytes": 900},
         {"type": "FileTransferPart", "source_component_uuid": "a", "transfer_uuid": "b",
@@ -206,65 +199,85 @@ def test_what_makes_no_sense_does_not_pass():
 
 
 @pytest.mark.parametrize(
-    ("present", "update", "fine"),
+    ("present", "updates", "fine"),
     [
-        (1.5, {"value": 2}, True),
-        (3, {"value": 2.5}, True),
-        (True, {"value": False}, True),
-        ((1.0, 2.0), {"value": [3, 4]}, True),
-        ((), {"value": []}, True),
-        (1.5, {"value": True}, False),
-        (1.5, {"value": "2"}, False),
-        (True, {"value": 1}, False),
-        ("a", {"value": 1.0}, False),
-        ((1.0, 2.0), {"value": [3.0]}, False),
-        ((1.0,), {"value": ["a"]}, False),
-        ((1.0,), {"value": 1.0}, False),
-        (None, {"value": "a"}, False),
-        (3, {"value": float("nan")}, False),
-        (3, {"value": 1e300}, False),
         ("a", {"value": "b"}, True),
+        ("a", {"value": 1.0}, False),
+        (1.5, {"value": 2.0}, False),
+        (None, {"value": "a"}, False),
         ("a", {"value": "b", "uuid": "c"}, False),
         ("a", {"uuid": "c"}, False),
         ("a", {}, False),
     ],
 )
-def test_only_the_value_of_a_widget_may_be_set_and_only_to_one_of_its_kind(present, update, fine):
-    assert may_set(present, update) is fine
-    if present == "a" and fine:  # an option that there is
-        assert may_set("a", update, ("a", "b"))
-        assert not may_set("a", update, ("a", "c"))
+def test_only_the_value_of_a_widget_may_be_set_and_only_to_a_text(present, updates, fine):
+    assert may_set(present, updates) is fine
 
 
-def test_only_moves_are_put_together():
-    assert moved(update("a", {"value": 2.5})) == moved(update("a", {"value": 3})) is not None
-    assert moved(update("a", {"value": [1, 2]})) != moved(update("b", {"value": [1, 2]}))
-    assert moved(pack(CAMERA)) is not None
-    click = pack({"type": "CommandTriggerMessage", "uuid": "a"})
-    for message in (update("a", {"value": True}), update("a", {"value": "Undo"}), click, b"", "x"):
-        assert moved(message) is None
-
-
-def test_of_a_page_in_haste_each_widget_gets_the_last_value_in_order():
+def test_of_a_page_in_haste_the_last_camera_counts_and_every_text():
     seen: list[tuple[str, object]] = []
     with Viewer(load_scene("dvf5000_nominal")) as viewer:
         listen_to_all(viewer._server, lambda _, uuid, said: seen.append((uuid, said["value"])))
-        app = App(viewer.url.replace("http", "ws", 1), psutil.Process(), Path())
+        app = App(viewer.url.replace("http", "ws", 1), psutil.Process())
 
         async def run():
             async with connected(app) as socket:
                 for number in range(600):
-                    await socket.send(update(f"slider {number % 3}", {"value": float(number)}))
+                    await socket.send(camera(fov=0.3 + number / 1e4))
                     if number % 100 == 99:
-                        await socket.send(update("button", {"value": True}))
-                await until(lambda: ("slider 2", 599.0) in seen, 60.0)
+                        await socket.send(pack(update("carrier", {"value": str(number)})))
+                await until(lambda: ("carrier", "599") in seen, 60.0)
 
-        asyncio.run(run())
-    assert len(seen) < 300
-    assert [value for uuid, value in seen if uuid == "button"] == [True] * 6
-    values = [value for uuid, value in seen if uuid != "button"]
-    assert values == sorted(values)
-    assert values[-3:] == [597.0, 598.0, 599.0]
+                (client,) = viewer._server.get_clients().values()
+                return client.camera.fov
+
+        assert asyncio.run(run()) == pytest.approx(0.3 + 599 / 1e4)
+    assert [value for _, value in seen] == [f"{number}99" for number in ("", *range(1, 6))]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "", "{}", "null", "[[]]", '[["1", "a:b", ""]]', '[[1, "a:b", null]]', '[[NaN, "a:b", ""]]',
+        '[[-1, "a:b", ""]]', '[[0, "a:b", ""]]', '[[1, "no colon", ""]]', "[" * 100_000,
+        json.dumps([[1, "a:" + "b" * 200, ""]]), json.dumps([[1, "a:b", "9" * 20_001]]),
+    ],
+    ids=range(13),
+)  # fmt: skip
+def test_what_is_no_event_is_left_out(text):
+    assert read_events(text) == ()
+
+
+def test_events_are_numbered_and_at_most_so_many():
+    found = read_events(json.dumps([[n, f"state:set.a:{n}", "x"] for n in range(1, 100)]))
+    assert len(found) == MOST_EVENTS
+    assert found[0] == (1, Event("state", "set.a:1", "x"))
+
+
+def test_events_that_no_page_sends_are_refused_in_words_and_the_page_goes_on(caplog):
+    with opened(load_scene("dvf5000_first"), services=build_services()) as (wire, session):
+        sent = events(sorted(session.display.parts))
+        for at in range(0, len(sent), MOST_EVENTS):
+            wire.say_all(sent[at : at + MOST_EVENTS])
+            time.sleep(0.01)  # no faster than a page may
+        wire.say_all([("page:reset", ""), ("errors:set.EAX", "17"), ("page:close", "")])
+        assert wire.read_until(lambda: session.state.amplitudes["EAX"] == 17.0, 60.0)
+        assert wire.read_until(lambda: 'data-text="17"' in wire.pieces["error.EAX"])
+        assert wire.toasts
+        assert not [text for _, title, text in wire.toasts if title == "That did not work"]
+        assert "<img" not in "".join(wire.pieces.values())
+    assert [record.getMessage() for record in caplog.records if record.levelname == "ERROR"] == []
+
+
+def test_texts_stay_texts_within_a_script():
+    page, sent, evil = object.__new__(Page), list[str](), 'x"</script><script>alert(1)//\u2028'
+    page._sent, page.run_script = {}, sent.append
+    page.notify(evil, evil)
+    page.set_title(evil)
+    page.put({"head": evil})
+    for script in sent:
+        assert "</script>" not in script
+        assert "\u2028" not in script
 
 
 def test_who_has_kept_the_server_busy_stands_back():

@@ -1,23 +1,24 @@
-"""Pages: built in steps, their jobs and turns, tabs of plug-ins, machines that stand still."""
+"""Pages: built in steps, their jobs and turns, added analyses, machines that stand still."""
 
 import threading
 import time
 from contextlib import ExitStack
+from dataclasses import dataclass
 
 import pytest
 
-from app.wire import OPEN, Wire, dial, opened
+from app.wire import Wire, dial, opened
 from still_scenes import TEXTS, still_scene
+from warpspace.analysis.catalogue import register, unregister
+from warpspace.analysis.description import Analysis, Result
 from warpspace.app.documents.services import CancelledError, Jobs, Progress, Services
-from warpspace.app.evaluation import allocation, cache, calibration, compensation, concepts
-from warpspace.app.panels import repair
+from warpspace.app.evaluation import cache
 from warpspace.app.server import page_steps
-from warpspace.app.server.page_steps import PageContents
+from warpspace.app.server.page_steps import PageSteps
 from warpspace.app.server.session import Session
-from warpspace.app.server.tabs import Tab, register_tab, tabs, unregister_tab
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import start_state
-from warpspace.app.state.listing import used_keys
+from warpspace.app.tasks.errors import used_keys
 from warpspace.scene.library import load_scene
 
 FIRST = load_scene("dvf5000_first")
@@ -45,52 +46,31 @@ def wire(viewer):
         yield Wire(socket)
 
 
-def test_the_map_and_its_first_sliders_come_before_all_else(wire, monkeypatch):
+def test_what_lies_around_the_map_comes_when_that_is_drawn(wire, monkeypatch):
     monkeypatch.setattr(page_steps, "ANSWER_S", 1e6)
-    assert wire.read_until(lambda: any("opening" in script for script in wire.scripts))
+    assert wire.read_until(lambda: wire.stage == "opening" and wire.question is not None)
     assert "GlbMessage" in wire.kinds
-    assert wire.keys == {"EAX"}  # those of X that are not zero
-    first = set(wire.labels)
-    assert not wire.read_until(lambda: set(wire.labels) != first, seconds=0.5)
-    # the next step when the page has drawn the first one: what lies on and around the map
+    assert {name.rpartition(".")[2] for name in wire.sliders} >= KEYS
     lines = wire.kinds.count("LineSegmentsMessage")
-    wire.update(*wire.question)
-    assert wire.read_until(lambda: wire.kinds.count("LineSegmentsMessage") > lines)
-    assert set(wire.labels) == first
-    # an answer to a question of before does not count
-    wire.update(wire.question[0], "1")
-    assert not wire.read_until(lambda: set(wire.labels) != first, seconds=0.5)
-    while OPEN not in wire.scripts:
-        asked = len(wire.scripts)
-        wire.update(*wire.question)
-        assert wire.read_until(lambda asked=asked: len(wire.scripts) > asked)
-    assert wire.keys == KEYS
-    assert {"Scene", "Structural loop", "Conventions of the scene"} <= set(wire.labels)
-
-
-def test_a_page_that_does_not_answer_gets_all_of_it_and_every_control_explains_itself(
-    wire, viewer, monkeypatch
-):
-    monkeypatch.setattr(page_steps, "ANSWER_S", 0.05)
-    assert wire.read_until(lambda: OPEN in wire.scripts)
-    assert wire.keys == KEYS
-    for handle in viewer.sessions[-1]._client.gui._gui_input_handle_from_uuid.values():
-        assert not getattr(handle, "visible", True) or getattr(handle, "hint", "none needed"), (
-            f"{handle.label} does not explain itself"
-        )
+    wire.update(wire.question[0], "0")  # no answer to this question
+    assert not wire.read_until(lambda: wire.is_open, seconds=0.5)
+    assert wire.kinds.count("LineSegmentsMessage") == lines
+    wire.answer()
+    assert wire.read_until(lambda: wire.is_open)
+    assert wire.kinds.count("LineSegmentsMessage") > lines
 
 
 def test_a_broken_update_is_said_and_takes_nothing_else_with_it(wire, viewer, caplog):
     def broken(_):
         raise RuntimeError("a wheel came off")
 
-    assert wire.read_until(lambda: OPEN in wire.scripts)
+    assert wire.read_until(lambda: wire.is_open)
     session = viewer.sessions[-1]
     session.context.post(broken)
     session.context.post(lambda state: state.with_amplitude("EXX", 4.0))
-    assert wire.read_until(lambda: "NotificationShowMessage" in wire.kinds)
+    assert wire.read_until(lambda: bool(wire.toasts))
     assert wire.read_until(lambda: session.state.amplitudes["EXX"] == 4.0)
-    assert "a wheel came off" in str(wire.messages)
+    assert "a wheel came off" in str(wire.toasts)
     assert "a wheel came off" in caplog.text
 
 
@@ -99,35 +79,31 @@ def test_pages_that_open_at_once_get_all_of_it(viewer, monkeypatch, caplog):
     with ExitStack() as stack:
         wires = [Wire(stack.enter_context(dial(viewer))) for _ in range(8)]
         for wire in wires:
-            assert wire.read_until(lambda wire=wire: OPEN in wire.scripts)
-            assert wire.keys == KEYS
-            assert "Conventions of the scene" in wire.labels
-            assert "NotificationShowMessage" not in wire.kinds
+            assert wire.read_until(lambda wire=wire: wire.is_open)
+            assert wire.pieces == wires[0].pieces
+            assert wire.toasts == []
     assert not caplog.records
 
 
-def test_a_page_that_leaves_while_it_is_built_leaves_nothing_behind(viewer, monkeypatch):
-    reached, left, build = threading.Event(), threading.Event(), PageContents._build_behind
+def test_a_page_that_leaves_while_it_is_built_ends_its_session(viewer, monkeypatch):
+    reached, left, build = threading.Event(), threading.Event(), PageSteps._draw_around
 
-    def build_late(contents, picture):
+    def build_late(steps, picture):
         reached.set()
         assert left.wait(20.0)
-        return build(contents, picture)
+        return build(steps, picture)
 
-    monkeypatch.setattr(PageContents, "_build_behind", build_late)
+    monkeypatch.setattr(PageSteps, "_draw_around", build_late)
     monkeypatch.setattr(page_steps, "ANSWER_S", 0.0)
-    places = viewer._places._tabs
     with dial(viewer) as socket:
         Wire(socket)
         assert reached.wait(20.0)
         (session,) = viewer.sessions
-        assert places["View"]._children
     while viewer.sessions:
         time.sleep(0.01)
     left.set()
     session._worker.join(20.0)
     assert not session._worker.is_alive()
-    assert {name: len(tab._children) for name, tab in places.items() if tab._children} == {}
 
 
 def test_what_comes_just_as_a_wait_ends_is_not_lost(wire, viewer, monkeypatch):
@@ -243,38 +219,40 @@ def test_what_is_made_for_a_page_that_has_gone_is_given_up():
             given_up.set()
         return b""
 
-    with opened(FIRST, services=Services(draw_figure=draw)) as (_, session, panels):
-        session.context.act(panels["FilesPanel"]._figure)
+    with opened(FIRST, services=Services(draw_figure=draw)) as (wire, _):
+        wire.say("files:figure")
         assert begun.wait(20)
     assert given_up.wait(20)
 
 
-SHOWN: list[float] = []
+@dataclass(frozen=True, kw_only=True)
+class Counted(Result):
+    """How many errors there are."""
+
+    errors: int
+
+    def blocks(self):
+        yield f"This scene has {self.errors} errors."
 
 
-class NotesPanel:
-    def __init__(self, context, state):
-        context.gui.add_button(f"Notes on {state.scene.title}")
+class Notes(Analysis):
+    """Count the errors of SCENE."""
 
-    def read(self, state):
-        return state
+    name, task = "notes", "understand"
 
-    def show(self, picture):
-        SHOWN.append(picture.statistics.mean_um)
+    def run(self, scene, watch):
+        return Counted(errors=len(list(scene.errors)))
 
 
-def test_an_added_tab_appears_and_follows_the_picture():
-    register_tab(Tab("Notes", "settings", [NotesPanel]))
+def test_an_added_analysis_is_a_section_of_its_task_and_runs_there():
+    register(Notes)
     try:
-        assert [tab.name for tab in tabs() if tab.place == "settings"][-1] == "Notes"
-        with opened(FIRST) as (wire, _, _):
-            assert "Notes on DVF5000, first machine measured" in wire.labels
-            before = len(SHOWN)
-            wire.update(wire.widgets["EAX"], 33.0)
-            assert wire.read_until(lambda: len(SHOWN) > before)
-            assert SHOWN[-1] != SHOWN[0]
+        with opened(FIRST) as (wire, _):
+            assert "<h3>Notes</h3>" in wire.pieces["section.notes"]
+            wire.say("page:fold", "notes")
+            assert wire.read_until(lambda: "has 7 errors" in wire.pieces["section.notes"])
     finally:
-        unregister_tab("Notes")
+        unregister("notes")
 
 
 class GoneError(Exception):
@@ -291,15 +269,9 @@ def test_one_piece_of_work_waits_for_another_and_may_be_given_up():
         pass
 
 
-@pytest.mark.parametrize("module", [allocation, calibration, compensation, concepts, repair])
-def test_all_kinds_of_fits_share_one_turn(module):
-    assert module.taken_turn is cache.taken_turn
-    assert not [name for name, value in vars(module).items() if type(value) is type(cache._TURN)]
-
-
 @pytest.mark.parametrize("name", TEXTS)
 def test_a_page_opens_with_its_map_and_without_a_problem(name, monkeypatch):
     monkeypatch.setattr(page_steps, "ANSWER_S", 0.0)
-    with opened(still_scene(name)) as (wire, _, _):
+    with opened(still_scene(name)) as (wire, _):
         assert "GlbMessage" in wire.kinds
-        assert "NotificationShowMessage" not in wire.kinds
+        assert wire.toasts == []

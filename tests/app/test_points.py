@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from warpspace.app.evaluation.budget import answer, pick
-from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.picked import Picked
@@ -30,7 +29,7 @@ def look_at(picture, target):
 @pytest.mark.parametrize("surface", ["surface", "cut", "slices"])
 def test_a_ray_through_a_drawn_node_finds_its_axis_positions(surface):
     state = replace(START, look=START.look.with_choice(surface=surface), nodes=11)
-    picture = LIVE.evaluate(state.with_shown(traces=False))
+    picture = LIVE.evaluate(replace(state, shown=replace(state.shown, traces=False)))
     drawn = picture.slices[0].drawn_mm if picture.slices else picture.drawn_mm
     grid = picture.slices[0].grid if picture.slices else picture.grid
     front = drawn[2, 0, 3] if not picture.slices else drawn.reshape(11, 11, 3)[4, 2]
@@ -165,11 +164,3 @@ def test_a_typed_point_has_the_error_of_the_exact_chain(at):
     np.testing.assert_allclose(shown.explanation.error_um, wanted.error_um, atol=1e-9)
     np.testing.assert_allclose(shown.explanation.nominal_mm, wanted.nominal_mm, atol=1e-9)
     assert dict(shown.at).keys() == FIRST.machine.axes.keys()
-
-
-def test_only_what_is_steered_can_be_changed():
-    pinned = with_pin(START)
-    for shown, steered in (("a", False), ("b", True), ("difference", False)):
-        state = replace(pinned, comparison=pinned.comparison.with_shown(shown))
-        assert LIVE.evaluate(state.with_nodes(3)).is_steered == steered
-    assert LIVE.evaluate(START).is_steered

@@ -1,24 +1,18 @@
-"""A page without a browser that remembers what it is sent."""
+"""A page without a browser on an app of this process, whose messages a test reads one by one."""
 
-import re
 import secrets
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from typing import Any
 
 from websockets.sync.client import ClientConnection, connect
 
-from page_protocol import CAMERA, HOW, pack, unpack, update
+from page_client import CAMERA, HOW, Page, pack, unpack, update
 from warpspace.app.browser.arrivals import CARRIER
-from warpspace.app.browser.page import stage_script
 from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
-from warpspace.machine.axes import PARAMETERS
 from warpspace.scene.model import Scene
-
-OPEN = stage_script("open")
-"""The script by which a page learns that it has all."""
 
 
 def dial(viewer: Viewer) -> ClientConnection:
@@ -26,17 +20,13 @@ def dial(viewer: Viewer) -> ClientConnection:
     return connect(viewer.url.replace("http", "ws", 1), **HOW)
 
 
-class Wire:
+class Wire(Page):
     """A page that shows nothing and remembers what it was sent."""
 
     def __init__(self, socket: ClientConnection) -> None:
+        super().__init__()
         self._socket = socket
         self.kinds: list[str] = []
-        self.labels: list[str] = []
-        self.scripts: list[str] = []
-        self.messages: list[dict[str, Any]] = []
-        self.widgets: dict[str, str] = {}
-        self.chosen: list[str] = []
         self.update(CARRIER, secrets.token_hex(16))
         self.send(CAMERA)
 
@@ -45,6 +35,19 @@ class Wire:
 
     def update(self, uuid: str, value: object) -> None:
         self.send(update(uuid, {"value": value}))
+
+    def say(self, name: str, value: object = "") -> None:
+        """Send an event."""
+        self.say_all([(name, value)])
+
+    def say_all(self, events: list[tuple[str, Any]]) -> None:
+        """Send events at once."""
+        self.send(self.event(*events))
+
+    def answer(self) -> None:
+        """Say that all is drawn that was asked about last."""
+        assert self.question is not None
+        self.update(*self.question)
 
     def read_until(self, fine: Callable[[], bool], seconds: float = 20.0) -> bool:
         """Read until something holds; tell whether it did before nothing came any more."""
@@ -58,36 +61,14 @@ class Wire:
                 continue
             heard = time.monotonic()
             for message in unpack(raw):
-                self._take(message)
+                self.kinds.append(message["type"])
+                self.take(message)
         return True
 
-    def _take(self, message: dict[str, Any]) -> None:
-        self.messages.append(message)
-        self.kinds.append(message["type"])
-        label = message.get("props", {}).get("label") if "props" in message else None
-        if isinstance(label, str):
-            self.labels.append(label)
-            self.widgets.setdefault(label.split(" ")[0], message["uuid"])
-        if isinstance(value := message.get("updates", {}).get("value"), str):
-            self.chosen.append(value)
-        if isinstance(value := message.get("value"), str):
-            self.chosen.append(value)
-        if message["type"] == "RunJavascriptMessage":
-            self.scripts.append(message["source"])
-
     @property
-    def keys(self) -> set[str]:
-        """Keys of the errors that have a slider; those of tolerances do not count."""
-        return {label.split(" ")[0] for label in self.labels if "±" not in label} & set(PARAMETERS)
-
-    @property
-    def question(self) -> tuple[str, str]:
-        """The latest question whether all is drawn: widget and number."""
-        found = re.findall(
-            r'requestAnimationFrame|uuid: "([^"]+)", updates: \{ value: "(\d+)" \}',
-            "".join(self.scripts),
-        )
-        return [pair for pair in found if pair[0]][-1]
+    def is_open(self) -> bool:
+        """Whether all of the page is there."""
+        return self.stage == "open"
 
 
 def end_work(viewer: Viewer) -> None:
@@ -101,11 +82,11 @@ def end_work(viewer: Viewer) -> None:
 
 
 @contextmanager
-def opened(scene: Scene, **how: Any) -> Iterator[tuple[Wire, Session, dict[str, Any]]]:
-    """Open a page on an app of its own; give it, its session and its panels by their class."""
+def opened(scene: Scene, **how: Any) -> Generator[tuple[Wire, Session]]:
+    """Open a page on an app of its own; give it and its session."""
     with Viewer(scene, **how) as viewer, dial(viewer) as socket:
         wire = Wire(socket)
-        assert wire.read_until(lambda: OPEN in wire.scripts, seconds=60.0)
+        assert wire.read_until(lambda: wire.is_open, seconds=60.0)
         (session,) = viewer.sessions
-        yield wire, session, {type(panel).__name__: panel for panel in session.display.panels}
+        yield wire, session
         end_work(viewer)

@@ -250,3 +250,24 @@ def test_view_ends_at_once_while_a_figure_is_drawn(how, tmp_path):
     said = (tmp_path / "log").read_text()
     assert "Traceback" not in said, said
     assert "ended" in said
+
+
+SIGNALLED_THREAD = """
+import signal, threading
+from warpspace.app.server import run
+from warpspace.cli import main
+heard = threading.Event()
+run.has_other_users = lambda: heard.set() or False
+def send():
+    heard.wait()
+    threading.Event().wait(1.0)  # until the main thread waits for its end
+    signal.pthread_kill(threading.get_ident(), signal.SIGTERM)
+threading.Thread(target=send).start()
+main()
+"""
+
+
+def test_view_heeds_a_signal_that_the_system_gives_to_another_thread(tmp_path):
+    process = start(tmp_path, "view", "--no-browser", code=SIGNALLED_THREAD)
+    assert process.wait(30) in (0, 128 + signal.SIGTERM)
+    assert "ended" in (tmp_path / "log").read_text()

@@ -6,21 +6,24 @@ import runpy
 import shlex
 import sys
 import tomllib
+from unittest.mock import MagicMock
 
 import pytest
 
 import warpspace
 from doc_pages import DOCS, ROOT, anchors, blocks, entries, links, pages, section
-from warpspace.app.server.tabs import tabs
+from warpspace.app.tasks.catalogue import build_parts
+from warpspace.app.tasks.commands import COMMANDS as KEYS
+from warpspace.app.tasks.parts import Section
+from warpspace.app.tasks.tasks import TASKS
 from warpspace.cli.main import COMMANDS
 from warpspace.kinematics.model import convention_names
 from warpspace.machine.curves.registry import curve_kinds
 from warpspace.scene.library import load_scene
 from warpspace.scene.schema import CONVENTION, POINTS, VIEW
 
-WORDS_OF_A_HOW_TO = 25
+WORDS_OF_A_SECTION = 10
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
-LEFT_TAB = "Error curve"
 
 
 def site_part(name):
@@ -99,12 +102,35 @@ def test_the_list_of_commands_leads_to_each():
     assert {f"{name}.md" for name in COMMANDS} <= listed
 
 
-def test_every_tab_has_a_how_to():
-    for tab in ("Errors", LEFT_TAB, *(tab.name for tab in tabs())):
-        text = section(DOCS / "app.md", tab)
-        assert text is not None, f"docs/app.md has no section {tab}: say what a user does there"
-        words = re.sub(r"!\[[^\]]*\]\([^)]*\)", "", text).split()
-        assert len(words) >= WORDS_OF_A_HOW_TO, f"docs/app.md, {tab}: say what a user does there"
+def test_every_task_has_a_how_to_and_a_picture():
+    for name, task in TASKS.items():
+        text = section(DOCS / "app.md", task)
+        assert text is not None, f"docs/app.md has no section {task}: say what a user does there"
+        assert f"](images/task_{name}.png)" in text
+
+
+def test_every_section_of_a_task_has_its_words():
+    text = (DOCS / "app.md").read_text("utf-8")
+    parts = {one.name: one for one in build_parts(MagicMock())}
+    names = [name for names in parts["tasks"].sections.values() for name in names]
+    found = [parts[name] for name in names if isinstance(parts.get(name), Section)]
+    assert len(found) > len(TASKS)
+    for one in found:
+        part = re.search(rf"(?ms)^## {TASKS[one.task]}\n(.*?)(?=^## )", text)
+        titled = re.search(rf"(?ms)(?:^### {one.title}$|\*\*{one.title}\*\*)(.*)", part[1])
+        assert titled, f"docs/app.md, {TASKS[one.task]}, has no {one.title}: say what it does"
+        words = re.split(r"(?m)^###|\*\*", titled[1], maxsplit=1)[0].split()
+        assert len(words) >= WORDS_OF_A_SECTION, f"docs/app.md, {one.title}: say what it does"
+
+
+def test_every_command_of_the_page_and_its_key_are_named():
+    text = section(DOCS / "app.md", "Keys")
+    named = re.split(r"[\s,]+", " ".join(re.findall(r"^\| ([^|]+) \|", text, re.MULTILINE)))
+    for one in KEYS:
+        if one.keys:
+            assert one.spelt in named, one.label
+        else:
+            assert f"*{one.label}*" in " ".join(text.split())
 
 
 def command_lines():
@@ -220,22 +246,6 @@ def test_pictures_are_small():
     assert sum(sizes) < 3.5e6
     machines = [p.stat().st_size for p in (ROOT / "assets/machines").glob("*/picture.png")]
     assert max(machines) < 2e5
-
-
-def test_there_is_one_picture_of_every_tab():
-    server = ROOT / "src/warpspace/app/server"
-    layout = "".join((server / name).read_text("utf-8") for name in ("tabs.py", "page_steps.py"))
-    named = re.findall(r'(?:add_tab|set_panel_label)\("([^"]+)"\)', layout)
-    every = {tab.name for tab in tabs()} | set(named) - {"warpspace"}
-    script = (ROOT / "examples/screenshots.py").read_text("utf-8")
-    visits = re.findall(r'"tab_(\w+)": Visit\(\w+, "([^"]+)"', script)
-    # the heading is on every picture
-    assert sorted(tab for _, tab in visits) == sorted(every)
-    assert len(visits) > 10
-    page = (ROOT / "docs/app.md").read_text("utf-8")
-    for name, tab in visits:
-        assert name == tab.lower().replace(" ", "_")
-        assert f"](images/tab_{name}.png)" in page
 
 
 def test_every_kind_of_curve_and_every_convention_is_documented():

@@ -157,6 +157,7 @@ def _file(path: Path) -> list[str]:
     if path.suffix == ".html":
         text = re.sub(r"<(script|style|svg).*?</\1>|<[^>]+>", "\n", text, flags=re.DOTALL)
         text = re.sub(r"data:[^\"']{60,}", "", text)
+        text = re.sub(r"\d{4}-\d\d-\d\d \d\d:\d\d UTC", "DATE", text)
         return _short([line.strip() for line in text.splitlines() if line.strip()], MOST_LINES)
     return _short(text.splitlines(), MOST_LINES)
 

@@ -19,6 +19,7 @@ from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.comparison import Side
 from warpspace.app.state.picked import Picked
+from warpspace.app.state.tree import put
 from warpspace.app.viewport.camera import CameraMemory
 from warpspace.cli.services import write_export
 from warpspace.outputs.animation import shared_palette
@@ -33,18 +34,20 @@ START = start_state(FIRST, nodes=5)
 
 
 def without(key, state=START):
-    return replace(state, exclusions=state.exclusions.with_excluded(key, excluded=True))
+    return put(state, "exclusions.excluded", f"+{key}")
 
 
 def fixed(state):
-    return LIVE.evaluate(replace(state, look=state.look.with_top(50.0)))
+    return LIVE.evaluate(
+        replace(state, look=replace(state.look, range_top=50.0, range_mode="fixed"))
+    )
 
 
 def test_conditions_name_what_is_excluded_and_the_range():
     assert picture_conditions(LIVE.evaluate(START)) == ()
     both = without("EA0Z", without("EAX"))
     assert picture_conditions(fixed(both)) == ("excluded: EAX, EA0Z", "range fixed 0–50 µm")
-    only = replace(START, exclusions=START.exclusions.with_only("EAX", only=True))
+    only = put(START, "exclusions.only", "+EAX")
     assert picture_conditions(LIVE.evaluate(only)) == ("only: EAX",)
     # an error that is zero changes nothing when it is left out
     assert picture_conditions(LIVE.evaluate(without("EXX"))) == ()
@@ -69,7 +72,9 @@ def test_exports_of_the_app_say_the_conditions():
 
 def test_a_comparison_says_the_conditions_of_each_side():
     state = with_sides(without("EA0Z"), Side(), scene_side(SECOND))
-    picture = LIVE.evaluate(replace(state, comparison=state.comparison.with_shown("difference")))
+    picture = LIVE.evaluate(
+        replace(state, comparison=replace(state.comparison, shown="difference"))
+    )
     assert picture_conditions(picture) == ("A excluded: EA0Z",)
     rows = list(csv.DictReader(io.StringIO(write_export(build_request(picture), ".csv").decode())))
     assert rows[0]["conditions"] == "A excluded: EA0Z"

@@ -10,29 +10,29 @@ import viser
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from app.parts import lone_part
 from random_scenes import scenes
 from warpspace import to_pyvista
+from warpspace.app.browser.room import Room
+from warpspace.app.documents.legend import kept_words, legend_html, numbers_words, subject_words
 from warpspace.app.documents.offline_page import build_offline_html, offline_picture
-from warpspace.app.evaluation.budget import answer, pick, with_picked
+from warpspace.app.evaluation.budget import pick, with_picked
 from warpspace.app.evaluation.compare import with_pin
-from warpspace.app.evaluation.conventions import Effects
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.evaluation.sensitivities import rank_picture
-from warpspace.app.panels.sensitivities import spell_ranking
-from warpspace.app.readouts.budget import answer_html
-from warpspace.app.readouts.conventions import conventions_html
-from warpspace.app.readouts.rotary_axes import circle_rows, circle_table
-from warpspace.app.readouts.summary import comparison_html, heading, summary
+from warpspace.app.evaluation.rotation import circle_rows
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.look import QUANTITIES, SURFACES
 from warpspace.app.state.picked import Picked
+from warpspace.app.tasks.machine import ConventionsSection
+from warpspace.app.tasks.rotary import circles
+from warpspace.app.tasks.understand import WorstPart
 from warpspace.app.viewport.layers.annotations import AnnotationsLayer
 from warpspace.app.viewport.layers.asked_point import AskedPointLayer
 from warpspace.app.viewport.layers.axes import AxesLayer, axes_room_mm
 from warpspace.app.viewport.layers.box import BoxLayer, OtherSideLayer, ghost_dashes
 from warpspace.app.viewport.layers.machine import MachineLayer
 from warpspace.app.viewport.layers.traces import TracesLayer
-from warpspace.app.viewport.named_views import VIEWS, CameraSetup, view_pose
+from warpspace.app.viewport.tab_camera import VIEWS, CameraSetup, view_pose
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
 from warpspace.outputs.exports.fields import build_vts
@@ -72,7 +72,7 @@ def states(draw):
     look = replace(
         opened.look,
         surface=draw(st.sampled_from(list(SURFACES))),
-        quantity=draw(st.sampled_from(QUANTITIES)),
+        quantity=draw(st.sampled_from([*QUANTITIES])),
         isolines=True,
         arrows=True,
     )
@@ -98,7 +98,7 @@ def test_every_state_has_a_finite_picture(server, state):
     for layer in LAYERS:
         layer(server.scene, picture)
     for view in VIEWS:
-        pose = view_pose(axes_room_mm(picture), 1.6, CameraSetup(view))
+        pose = view_pose(axes_room_mm(picture), Room(1600.0, 1000.0), CameraSetup(view))
         assert np.isfinite(pose.position).all()
         assert math.dist(pose.position, pose.look_at) > 0.0
 
@@ -131,15 +131,13 @@ def _check_finite(picture):
 def test_every_panel_has_words_for_it(state):
     picture = LiveModel().evaluate(state)
     at = {name: 0.0 for name in state.scene.machine.axes if is_linear(name)}
+    asked = replace(picture, state=with_picked(state, Picked(at)))
     said = [
-        summary(picture),
-        heading(picture),
-        circle_table(circle_rows(picture)),
-        comparison_html(picture),
-        conventions_html(state, Effects().of(state), lambda *_: {}),
-        spell_ranking(rank_picture(picture)),
-        spell_ranking(rank_picture(picture, middle=True, by_effect=True)),
-        answer_html(answer(state, Picked(at), picture.exaggeration), "", lambda *_: {}),
+        legend_html(picture),
+        " ".join((numbers_words(picture), kept_words(picture)[0], *subject_words(picture))),
+        circles(circle_rows(picture)),
+        lone_part(ConventionsSection).body(picture),
+        *WorstPart(None).pieces(asked).values(),
     ]
     for html in said:
         assert not {"nan", "inf"} & set(html.replace("<", " ").replace(">", " ").split())

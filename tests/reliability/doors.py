@@ -12,7 +12,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from app.raw_client import App, Tab, running_app, upload
+from app.hostile import upload
+from page_client import App, Tab, running_app
 from reliability.outcome import Lag, Outcome
 
 TOKEN = "kp3Zq8vN2xT7wR5yLd0m"
@@ -127,7 +128,7 @@ async def _exhaust(app: App, count: int, tally: Tally) -> None:
         await honest.answer_s(20.0)
         before = app.memory_mb
         for number, content in enumerate(itertools.islice(itertools.cycle(bombs()), count)):
-            for message in upload(other.widgets["Open"], f"bomb{number}", content):
+            for message in upload(other.facts["uploads"]["files"][0], f"bomb{number}", content):
                 await other.socket.send(message)
             waited = await honest.answer_s(number % 9 + 0.5)
             tally.slowest_s = max(tally.slowest_s, waited)
@@ -142,7 +143,7 @@ def run(count: int) -> Outcome:
     """Make so many attempts, a hundredth of them uploads."""
     tally, uploads, before = Tally(), max(1, min(count // 100, 200)), 0.0
     options = ("--token", TOKEN)
-    with tempfile.TemporaryDirectory() as folder, running_app(Path(folder), *options) as app:
+    with tempfile.TemporaryDirectory() as folder, running_app(*options, folder=Path(folder)) as app:
         port = int(app.url.rpartition(":")[2])
         ways = itertools.product(({}, UPGRADE), attempts(port))
         tried = itertools.islice(itertools.cycle(ways), count - uploads)
@@ -157,7 +158,7 @@ def run(count: int) -> Outcome:
             tally.faults.append(f"requests cost {growth:.0f} MB")
         if len(app.log) > 60:
             tally.faults.append(f"{len(app.log)} lines of log")
-    with tempfile.TemporaryDirectory() as folder, running_app(Path(folder)) as app:
+    with tempfile.TemporaryDirectory() as folder, running_app(folder=Path(folder)) as app:
         asyncio.run(_exhaust(app, uploads, tally))
     tally.faults += tally.lag.judge(tally.slowest_s, LONGEST_S)
     spelt = ", ".join(f"{kind} {number:,}" for kind, number in sorted(tally.done.items()))

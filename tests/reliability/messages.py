@@ -3,24 +3,16 @@
 import asyncio
 import itertools
 import random
+import re
 import tempfile
 from pathlib import Path
 
-from app.raw_client import (
-    App,
-    Tab,
-    connected,
-    nonsense,
-    pack,
-    running_app,
-    send_all,
-    steadily,
-    update,
-)
-from page_protocol import CAMERA
+from app.hostile import carried, connected, events, nonsense, send_all, steadily
+from page_client import CAMERA, App, Tab, pack, running_app
 from reliability.outcome import Lag, Outcome
 from reliability.reading import mutate
 
+PARTS = re.compile(r'data-(?:do|set|live|piece)="(?:section\.)?([a-z]+)[:"]')
 LONGEST_S = 1.0
 """What the honest tab may wait for an answer."""
 MOST_MB = 60.0
@@ -29,18 +21,22 @@ SLOW = 4
 """Clients that read nothing of what they are sent."""
 FLOOD = 5000
 """Messages of one flood: more than the app takes of one client at once."""
+ROUNDS = 4
 TABS = 4
 """Tabs that move all their sliders as often as a page may."""
 
 
 def run(count: int) -> Outcome:
     """Send so many messages."""
-    with tempfile.TemporaryDirectory() as folder, running_app(Path(folder)) as app:
+    with tempfile.TemporaryDirectory() as folder, running_app(folder=Path(folder)) as app:
         lag = Lag()
-        warm = count // 4  # libraries are loaded then, and the heap has its size for so many
-        first, taken, _ = asyncio.run(_attack(app, warm, lag))
-        sent, later, growth = asyncio.run(_attack(app, count - warm, lag))
-        sent, taken = first + sent, [*taken, *later]
+        # within the first rounds libraries are loaded, tabs kept, and the heap has its size
+        warm = count // (2 * ROUNDS)
+        rounds = [warm] * ROUNDS + [count - ROUNDS * warm]
+        found = [asyncio.run(_attack(app, part, lag)) for part in rounds]
+        sent, sizes = sum(number for number, *_ in found), [size for *_, size in found]
+        growth = sizes[-1] - max(sizes[:-1])  # the heap gives back now more, now less
+        taken = [one for _, answers, _ in found for one in answers]
         faults = lag.judge(max(taken), LONGEST_S)
         if growth > MOST_MB:
             faults.append(f"memory has grown by {growth:.0f} MB")
@@ -57,9 +53,15 @@ def run(count: int) -> Outcome:
 async def _attack(app: App, count: int, lag: Lag) -> tuple[int, list[float], float]:
     chance = random.Random(14)
     async with Tab(app) as honest, Tab(app) as hostile:
-        kinds = nonsense(list(hostile.widgets.values())[:12])
+        widgets = [
+            hostile.facts["carrier"],
+            *(found[0] for found in hostile.facts["uploads"].values()),
+        ]
+        known = PARTS.findall("".join(hostile.pieces.values()))
+        mixed = nonsense(widgets) + carried(widgets[0]) + events(sorted({*known, "page", "state"}))
+        chance.shuffle(mixed)
+        kinds = [one if isinstance(one, bytes) else pack(hostile.event(one)) for one in mixed]
         await honest.answer_s(20.0)
-        before = app.memory_mb
         slow = [asyncio.create_task(_read_nothing(app, chance)) for _ in range(SLOW)]
         steady = count // 10
         drags = steady // TABS * TABS
@@ -74,7 +76,7 @@ async def _attack(app: App, count: int, lag: Lag) -> tuple[int, list[float], flo
             asyncio.create_task(steadily(hostile.socket, cycle(kinds, steady))),
             *(asyncio.create_task(_move_all(app, steady // TABS)) for _ in range(TABS)),
             asyncio.create_task(send_all(app, shuffled)),
-            asyncio.create_task(_flood(app, hostile.widgets["EAX"], floods, counts)),
+            asyncio.create_task(_flood(app, hostile, floods, counts)),
         ]
         taken: list[float] = []
         for value in itertools.count(1):
@@ -89,7 +91,7 @@ async def _attack(app: App, count: int, lag: Lag) -> tuple[int, list[float], flo
         await asyncio.gather(*slow, return_exceptions=True)
         taken.append(await honest.answer_s(15.0))
         taken.append(await hostile.answer_s(12.0))
-        return steady + drags + rest + counts["flood"], taken, app.memory_mb - before
+        return steady + drags + rest + counts["flood"], taken, app.memory_mb
 
 
 def cycle(kinds: list[bytes], count: int) -> list[bytes]:
@@ -97,12 +99,12 @@ def cycle(kinds: list[bytes], count: int) -> list[bytes]:
     return list(itertools.islice(itertools.cycle(kinds), count))
 
 
-async def _flood(app: App, widget: str, times: int, counts: dict[str, int]) -> None:
+async def _flood(app: App, tab: Tab, times: int, counts: dict[str, int]) -> None:
     for _ in range(times):
         async with connected(app) as socket:
             await socket.send(pack(CAMERA))
             for number in range(FLOOD):
-                await socket.send(update(widget, {"value": number % 20 / 2.0}))
+                await socket.send(pack(tab.event(("errors:set.EAX", str(number % 20 / 2.0)))))
                 counts["flood"] += 1
 
 
@@ -116,9 +118,8 @@ async def _read_nothing(app: App, chance: random.Random) -> None:
 
 async def _move_all(app: App, count: int) -> None:
     async with Tab(app) as tab:
-        sliders = list(tab.sliders.items())
         moves = (
-            update(widget, {"value": low + (high - low) * (number * 0.377 % 1.0)})
-            for number, (widget, (low, high)) in enumerate(itertools.cycle(sliders))
+            pack(tab.event((name, f"{20.0 * (number * 0.377 % 1.0) - 10.0:g}")))
+            for number, name in enumerate(itertools.cycle(tab.sliders))
         )
         await steadily(tab.socket, list(itertools.islice(moves, count)))

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from http.cookies import SimpleCookie
 from pathlib import Path
 
-from app.raw_client import App, Tab, running_app
+from page_client import App, Tab, running_app
 from reliability.outcome import Outcome
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "deployment" / "nginx.conf"
@@ -76,7 +76,7 @@ def site() -> Iterator[Site]:
         for number in range(2):
             (folder / str(number)).mkdir()
             options = ("--token", TOKEN, "--allow-host", f"{NAME}:{https}")
-            servers.append(stack.enter_context(running_app(folder / str(number), *options)))
+            servers.append(stack.enter_context(running_app(*options, folder=folder / str(number))))
         trust = _certificate(folder)
         text = EXAMPLE.read_text("utf-8")
         for server, port in zip(servers, ("8081", "8082"), strict=True):

@@ -9,9 +9,9 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from markupsafe import Markup
 from matplotlib.figure import Figure
 
+from app.parts import body_of
 from chains import central_differences
 from cli.conftest import warpspace
 from warpspace.analysis.blocks import Curve, Lines
@@ -19,12 +19,12 @@ from warpspace.analysis.options import option
 from warpspace.app.documents.files import build_request
 from warpspace.app.documents.scene_file import open_text, state_to_toml
 from warpspace.app.evaluation.bench import BenchPicture
-from warpspace.app.evaluation.conventions import Effects, choices, chosen, with_choice
+from warpspace.app.evaluation.conventions import choices, chosen, effects_of, with_choice
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.readouts.conventions import conventions_html
 from warpspace.app.state.app_state import start_state
-from warpspace.app.state.curve_text import convert_shape, kind_titles, parse_shape, spell_rows
 from warpspace.app.state.edits import with_curve
+from warpspace.app.tasks.error_curve import convert_shape, kind_titles, read_curve, spell_rows
+from warpspace.app.tasks.machine import ConventionsSection
 from warpspace.bench.base import BenchTest, bench_names, register_test, unregister_test
 from warpspace.bench.data import DataColumn
 from warpspace.bench.plan import Outcome, Quantity, build_plan
@@ -267,11 +267,11 @@ def test_first_order_of_a_convention_is_the_derivative_of_the_exact_chain(loop):
 
 def test_the_app_offers_a_curve_reads_converts_and_stores_it():
     assert kind_titles()[-1] == "half sine"
-    curve = parse_shape("half sine", "2.5  # in the middle", SPAN)
+    curve = read_curve("half sine", "2.5  # in the middle", SPAN).function
     assert curve == HalfSine(SPAN, 2.5)
     assert spell_rows(curve) == "2.5"
     with pytest.raises(OptionError, match="one number: the value in the middle"):
-        parse_shape("half sine", "", SPAN)
+        read_curve("half sine", "", SPAN)
     assert convert_shape(Constant(SPAN, 7.0), "half sine", SPAN) == HalfSine(SPAN, 7.0)
     assert isinstance(convert_shape(curve, "polynomial", SPAN), Poly)
     assert "half_sine along X" in curve.slider_words("X")
@@ -286,9 +286,9 @@ def test_the_app_offers_a_convention_says_what_it_changes_and_stores_it():
     assert "component_errors=split" in choices(start)
     state = with_choice(start, "component_errors=split")
     assert "component_errors=split" in chosen(state)
-    assert Effects().of(state)["component_errors=split"].max_um > 0.0
-    text = conventions_html(state, {}, lambda word, role: Markup())
-    assert 'data-choice="component_errors=split" aria-checked="true"' in text
+    assert effects_of(state)["component_errors=split"].max_um > 0.0
+    text = body_of(ConventionsSection, state)
+    assert 'value="component_errors=split" checked' in text
     assert "shifts before, turns after motion" in text
     back, _ = open_text(state_to_toml(state), "dvf5000_first", "x.toml")
     assert back.scene.model == state.scene.model

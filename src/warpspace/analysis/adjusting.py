@@ -13,7 +13,6 @@ from math import comb
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpspace.analysis.statistics import Statistics, volume_statistics
 from warpspace.field.evaluate import ErrorBasis
@@ -25,6 +24,7 @@ SILENT = 1e-12  # µm per µm or µrad: a response below it everywhere is none
 CLOSE_UM = 1e-4  # the largest error is found to within this of the least there can be, µm
 NODES_AT_ONCE = 40  # worst nodes for which planes are added in one step
 MOST_STEPS = 300
+NO_FALL = 1e-14  # share of the largest slope there can be that is none
 
 
 @dataclass(frozen=True)
@@ -68,11 +68,6 @@ class Volume:
             stacked = np.concatenate([triangle, np.array(rows).T])
             triangle = cast("Array", np.linalg.qr(stacked, mode="r"))
         return triangle[:, :-1], triangle[:, -1]
-
-    def rms_um(self, indices: tuple[int, ...], change: Array) -> float:
-        """Root mean square of the volume after a change of some amplitudes, µm."""
-        matrix, error = self.triangle
-        return float(np.linalg.norm(matrix[:, indices] @ change + error))
 
     def changed(self, indices: tuple[int, ...], values: Array) -> Array:
         """Give all amplitudes with some of them set to other values, [K], µm or µrad."""
@@ -170,15 +165,37 @@ class Search:
 
 def least_rms(volume: Volume, indices: tuple[int, ...], bounds: Array) -> Solution:
     """Make the root mean square of the volume smallest: weighted least squares within bounds."""
-    from scipy.optimize import lsq_linear
-
     matrix, error = volume.triangle
-    low, high = bounds[list(indices)].T
-    change: Array = np.asarray(np.linalg.lstsq(matrix[:, indices], -error)[0], dtype=float)
-    if np.any(change < low) or np.any(change > high):
-        found = lsq_linear(matrix[:, indices], -error, (low, high), method="bvls", tol=1e-12)
-        change = np.clip(np.asarray(found.x, dtype=float), low, high)
-    return Solution(indices, change, volume.rms_um(indices, change))
+    chosen = matrix[:, indices]
+    change = _least_squares(chosen, -error, *bounds[list(indices)].T)
+    return Solution(indices, change, float(np.linalg.norm(chosen @ change + error)))
+
+
+def _least_squares(matrix: Array, goal: Array, low: Array, high: Array) -> Array:
+    """Solve within bounds by active sets (Stark and Parker, 1995)."""
+    change: Array = np.asarray(np.linalg.lstsq(matrix, goal)[0], dtype=float)
+    if np.all((change >= low) & (change <= high)):
+        return change
+    change = np.clip(change, low, high)
+    free = (change > low) & (change < high)
+    for _ in range(MOST_STEPS):
+        held = goal - matrix[:, ~free] @ change[~free]
+        step = np.zeros_like(change)
+        step[free] = np.linalg.lstsq(matrix[:, free], held)[0] - change[free]
+        room = np.where(step > 0.0, high, low) - change
+        shares = np.divide(room, step, out=np.ones_like(step), where=np.abs(step) > np.abs(room))
+        nearest = int(np.argmin(shares))
+        change = np.clip(change + shares[nearest] * step, low, high)
+        if shares[nearest] < 1.0:  # the first to meet its bound stays there
+            change[nearest] = high[nearest] if step[nearest] > 0.0 else low[nearest]
+            free[nearest] = False
+            continue
+        fall = matrix.T @ (goal - matrix @ change)
+        fall = np.where(free, 0.0, np.where(change == low, fall, -fall))
+        if fall.max() <= NO_FALL * np.linalg.norm(goal) * np.linalg.norm(matrix):
+            break
+        free[int(np.argmax(fall))] = True
+    return change
 
 
 def least_max(
@@ -211,7 +228,8 @@ def least_max(
         norm = np.sqrt(np.einsum("nc,nc->n", error, error))
         if (largest := float(norm.max())) < best_um:
             best, best_um = change, largest
-        worst = _worst(norm)
+        count = min(NODES_AT_ONCE, norm.size)
+        worst = np.argpartition(norm, -count)[-count:]
         unit = error[worst] / np.maximum(norm[worst], np.finfo(float).tiny)[:, None]
         slopes = np.einsum("knc,nc->nk", chosen[:, worst], unit)
         planes.append(np.column_stack([slopes, -np.ones(len(worst))]))
@@ -225,11 +243,6 @@ def least_max(
             break
         change = np.clip(found.x[:size], *bounds[list(indices)].T)
     return Solution(indices, best, best_um)
-
-
-def _worst(norm: Array) -> NDArray[np.intp]:
-    count = min(NODES_AT_ONCE, norm.size)
-    return np.argpartition(norm, norm.size - count)[norm.size - count :]
 
 
 def _joined(indices: Sequence[int]) -> tuple[int, ...]:

@@ -345,7 +345,6 @@ def round_down(widths: Array) -> Array:
 
 
 def _task(draws: Draws, asked: Allocate, ensemble: Ensemble, widest: float) -> Task:
-    """Say what is to be minimised."""
     moves = ensemble.mean_square_gain > NO_EFFECT
     fixed = np.array([key in asked.fixed for key in draws.keys])
     free = moves & (draws.half_width > 0.0) & ~fixed

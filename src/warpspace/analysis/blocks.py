@@ -219,7 +219,7 @@ def table_html(table: Table) -> str:
     head = "".join(_head(column) for column in table.shown)
     marks = [*table.marks, *[""] * len(table.rows)]
     body = "".join(
-        f"<tr{_class(mark)}>"
+        (f'<tr class="{mark}">' if mark else "<tr>")
         + "".join(_cell(column, text) for column, text in zip(table.shown, row, strict=True))
         + "</tr>"
         for row, mark in zip(table.cells()[:MOST_ROWS], marks, strict=False)
@@ -266,7 +266,3 @@ def _cell(column: Column, text: str) -> str:
 
 def _unit(unit: str) -> str:
     return f" <small>{escape(unit)}</small>" if unit else ""
-
-
-def _class(mark: str) -> str:
-    return f' class="{mark}"' if mark else ""

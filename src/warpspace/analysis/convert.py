@@ -233,7 +233,6 @@ def field_difference(one: Scene, other: Scene) -> tuple[float, float]:
 
 
 def _with(target: Target, scene: Scene, name: str, text: str) -> Target:
-    """Add one wish; a `ValueError` where it cannot be read."""
 
     def by_axis(read: Callable[[str], object], kinds: str = "all") -> dict[str, Any]:
         """Read values by axis, or one for all."""

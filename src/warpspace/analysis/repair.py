@@ -136,7 +136,7 @@ class Repair(Analysis):
         """Give a scene as it is looked at, and how."""
         if self.placed and self.seen_loop is not Loop.RELATIVE:
             raise OptionError(
-                f"{{placed}}: where the workpiece lies is not told by the {self.loop} loop;"
+                f"{{placed}}: the {self.loop} loop does not show where the workpiece lies;"
                 f" expected loop {Loop.RELATIVE}"
             )
         scene = replace(scene, placed=True) if self.placed else scene
@@ -148,7 +148,7 @@ class Repair(Analysis):
 
         scene, view = self.seen(scene)
         nodes = build_grid(scene.model, scene.workspace, self.grid)
-        basis = grid_basis(scene, nodes, view)
+        basis = grid_basis(scene, nodes, view, self.included(scene))
         values = amplitudes_of(scene.errors, basis.keys)
         found = find_repairs(basis, nodes, values, self, scene, watch)
         exact = [
@@ -161,6 +161,10 @@ class Repair(Analysis):
         ]
         left_out = second_order(scene, self.seen_loop)
         return replace(found, repairs=tuple(sets), second_order=left_out)
+
+    def included(self, scene: "Scene") -> Sequence[str]:
+        """List the errors that are looked at: all of a scene."""
+        return scene.parameter_keys
 
     def limit_of(self, key: str) -> float:
         """Give the largest change of one error, µm or µrad."""
@@ -240,7 +244,7 @@ class RepairResult(Result):
 
     def _set_blocks(self) -> Iterator[Block]:
         if not self.before.max_um:
-            yield "No point is off in this loop: there is nothing to repair."
+            yield "The error is zero everywhere in this loop: there is nothing to repair."
             return
         if not self.repairs:
             yield "No squareness or alignment acts in this loop; other errors can be adjusted."
@@ -376,7 +380,6 @@ def find_repairs(
 
 
 def _candidates(volume: Volume, asked: Repair) -> tuple[int, ...]:
-    """Give the places of the errors that are tried, and check what was said of limits."""
     keys = volume.basis.keys
     acting = [keys[index] for index in volume.acting]
     if ALL in asked.adjustable:

@@ -92,7 +92,6 @@ def _number(
 
 
 def _text(table: str, key: str, printed: str, computed: str, unit: str = "", note: str = "") -> Row:
-    """Build the row of a word, or of several numbers that are printed together."""
     return Row(_source(table), key, printed, computed, printed == computed, unit, 0, note)
 
 

@@ -243,7 +243,7 @@ class BenchResult(Result):
 
 
 def run_test(
-    scene: Scene, test: BenchTest, data: str | Path | None = None, *, exact: bool = True
+    scene: Scene, test: BenchTest, data: str | Path | DataTable | None = None, *, exact: bool = True
 ) -> BenchResult:
     """Run a test on the model of a scene, and evaluate measured readings beside it.
 
@@ -251,8 +251,9 @@ def run_test(
     ----------
     scene : Scene
     test : BenchTest
-    data : str or Path, optional
-        CSV file with the columns of the test. The model is then run through the same poses.
+    data : str, Path or Table, optional
+        CSV file with the columns of the test, or what was read of one. The model is then run
+        through the same poses.
     exact : bool, optional
         The exact chain; else the first order.
 
@@ -276,7 +277,11 @@ def run_test(
     >>> round(result.model.outcome["z_um"], 1)
     21.5
     """
-    table = None if data is None else read_table(data, test.data_columns(scene))
+    table = (
+        data
+        if data is None or isinstance(data, DataTable)
+        else read_table(data, test.data_columns(scene))
+    )
     plan, measured = (test.plan(scene), None) if table is None else test.plan_data(scene, table)
     readings = simulate(scene, plan, exact=exact)
     runs = (Run("model", plan, readings, test.evaluate(plan, readings)),)

@@ -133,7 +133,6 @@ def _value(column: DataColumn, line: int, text: str, rows: CsvRows) -> float:
 
 
 def _word(column: DataColumn, line: int, text: str, rows: CsvRows) -> str:
-    """Read one word; note one that is not allowed."""
     text = unguard_cell(text)
     if column.names and text not in column.names:
         known = near_miss(text, column.names)

@@ -260,7 +260,6 @@ class Stack:
         self.parts.box(frame, what, x, y, self._lower(height * self.u))
 
     def _add_plate(self, frame: str, height: float) -> None:
-        """Add a table with T-slots along x: pairs of lines a little above it."""
         x, y, z = self.range(0), self.range(1), self.bed_mm + _ABOVE_MM
         width = (y[1] - y[0]) / 60.0
         rows = [row + s for row in np.linspace(*y, 6)[1:-1] for s in (-width, width)]
@@ -334,7 +333,6 @@ class Stack:
         self.bed_mm = float(middle[2]) - 0.8 * radius - 0.4 * self.u
 
     def _add_headstock(self, axis: Way, parent: str) -> None:
-        """Add a chuck at one end of the volume, and on the frame before it the headstock."""
         layout, parts, u, k = self.layout, self.parts, self.u, axis.k
         m, line, tip, half = 1 - k, axis.origin_mm, layout.tip_mm[k], layout.half_mm[k]
         side = 1.0 if line[k] > tip + 0.5 * half else -1.0
@@ -363,7 +361,6 @@ class Stack:
         self.swept_mm, self.bed_mm = self.half_mm.copy(), low
 
     def _add_cradle(self, axis: Way, parent: str) -> None:
-        """Add a cradle that tilts what is above, and on the frame before it two towers."""
         layout, u, k = self.layout, self.u, axis.k
         m, z, line = 1 - k, self.bed_mm, axis.origin_mm
         middle, pivot, plate = float(self.centre_mm[k]), float(line[2]), z - 0.65 * u

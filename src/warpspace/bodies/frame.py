@@ -124,7 +124,6 @@ class _Behind(_Frame):
         self._add_column(axes, half, column_at, high)
 
     def _add_column(self, axes: list[Way], half: float, at: float, high: float) -> None:
-        """Add a column, and below it a foot upon rails for each axis that it rides on."""
         u, frames = self.u, [*(axis.name for axis in axes), BASE]
         top = self.stack.bed_mm + 0.75 * u * len(axes)
         self.posts(frames[0], "column", half, (at, at + 2.4 * u), (top, high), 0.9)
@@ -291,7 +290,6 @@ class _Overhead(_Frame):
     # --- what stands ----------------------------------------------------------------------------
 
     def _add_beam(self, name: str, rear: _Rear, what: str) -> float:
-        """Add a beam, and give its half length."""
         u = self.u
         rear.low = max(rear.low, float(self.layout.high_mm[2]) + self.layout.gap_mm)
         rear.high = max(rear.low + 2.6 * u, min(rear.high, rear.low + 3.6 * u))
@@ -303,7 +301,6 @@ class _Overhead(_Frame):
         return half
 
     def _add_bridge(self, name: str, rear: _Rear, reach: float) -> _Rear:
-        """Add a beam on two legs that run on walls about as high as the table."""
         u, bed = self.u, self.stack.bed_mm
         wall = max(bed + 0.1 * u, float(self.layout.low_mm[2]) - 0.9 * u)
         half, middle = self._add_beam(name, rear, "bridge"), rear.plane + 0.9 * u

@@ -1,8 +1,7 @@
-"""Binary glTF files, written by trimesh: coloured surfaces and lines that no light changes.
+"""Binary glTF files: coloured surfaces and lines that no light changes.
 
-trimesh lays out the file. What it has no words for is set in the document before it is written:
-unlit materials, colours as linear floats beyond 0 … 1, lines with numbered points, and places to
-which a viewer can morph the points.
+Materials are unlit, colours are linear floats also beyond 0 … 1, lines are pairs of numbered
+points, and there may be places to which a viewer can morph the points.
 """
 
 import json
@@ -19,11 +18,12 @@ from warpspace.units import Array
 
 Json = dict[str, Any]
 UNLIT = "KHR_materials_unlit"
-LINES = 1  # the mode of a primitive
+LINES, _TRIANGLES = 1, 4  # modes of a primitive
 _M_PER_MM = 1e-3
-_COLOUR, _TARGET = "_linear_colour", "_target_"
-_UINT16, _LARGEST_UINT16 = 5123, 65534
-_VERTEX_BUFFER, _INDEX_BUFFER = 34962, 34963
+_LARGEST_UINT16 = 65534
+_VERTICES, _INDICES = 34962, 34963  # what a view of the buffer is for
+_COMPONENTS = {"<u2": 5123, "<u4": 5125, "<f4": 5126}
+_TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,94 +66,105 @@ def build_gltf(
     extras: Mapping[str, Any] | None = None,
 ) -> bytes:
     """Write surfaces and lines to one binary file."""
-    from trimesh import Scene
-    from trimesh.exchange.gltf import export_glb
-
-    parts = [part for part in parts if len(part.indices)]
-    asset: Json = {"version": "2.0", "generator": generator}
+    document, body = _lay_out(parts, root, generator)
     if extras:
         json.dumps(extras, allow_nan=False)
-        asset["extras"] = dict(extras)
-    scene = Scene()
-    scene.graph.update(frame_to=root)
-    for group in dict.fromkeys(part.group for part in parts if part.group):
-        scene.graph.update(frame_to=group, frame_from=root)
-    for part in parts:
-        scene.add_geometry(
-            _geometry(part), geom_name=part.name, parent_node_name=part.group or root
+        document["asset"]["extras"] = dict(extras)
+    return _join(document, body)
+
+
+def _join(document: Json, body: bytes | bytearray) -> bytes:
+    text = json.dumps(document, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    return b"".join(
+        (
+            struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(body)),
+            struct.pack("<I4s", len(text), b"JSON"),
+            text,
+            struct.pack("<I4s", len(body), b"BIN\0"),
+            body,
         )
-
-    def complete(tree: Json) -> None:
-        tree["asset"] = asset
-        _complete(tree, parts)
-
-    return export_glb(
-        scene,
-        include_normals=False,
-        tree_postprocessor=complete,
-        buffer_postprocessor=_narrow_indices,
     )
 
 
-def _geometry(part: Part) -> Any:
-    """Lay a part out as a mesh of trimesh.
-
-    The pairs of lines fill its triangles up, the last pair up to three times: in the file both are
-    a flat list of numbers.
-    """
-    from trimesh import Trimesh
-
-    indices = part.indices
-    if indices.shape[1] == 2:
-        indices = np.concatenate([indices, indices[-1:].repeat(-len(indices) % 3, axis=0)])
-    values: dict[str, NDArray[np.floating[Any]]] = dict(part.attributes)
-    if part.colours is not None:
-        values[_COLOUR] = part.colours
-    for name, shift in part.targets.items():
-        values[_TARGET + name] = shift
-    return Trimesh(
-        part.points,
-        indices.reshape(-1, 3),
-        vertex_attributes={key: np.asarray(value, "<f4") for key, value in values.items()},
-        process=False,
-    )
-
-
-def _narrow_indices(buffers: dict[Any, bytes], tree: Json) -> None:
-    keys, accessors = list(buffers), list(tree["accessors"].values())
-    for at in {p["indices"] for mesh in tree["meshes"] for p in mesh["primitives"]}:
-        accessor = accessors[at]
-        if accessor["max"][0] <= _LARGEST_UINT16:
-            key = keys[accessor["bufferView"]]
-            data = np.frombuffer(buffers[key], "<u4").astype("<u2").tobytes()
-            buffers[key] = data + bytes(-len(data) % 4)
-            accessor["componentType"] = _UINT16
-
-
-def _complete(tree: Json, parts: Sequence[Part]) -> None:
+def _lay_out(parts: Sequence[Part], root: str, generator: str) -> tuple[Json, bytearray]:
+    parts = [part for part in parts if len(part.indices)]
     materials = list(dict.fromkeys(part.material for part in parts))
-    tree["materials"] = [_material(material) for material in materials]
-    tree["extensionsUsed"] = [UNLIT]
-    for mesh, part in zip(tree["meshes"], parts, strict=True):
-        (primitive,) = mesh["primitives"]
-        attributes: dict[str, int] = primitive["attributes"]
-        primitive["material"] = materials.index(part.material)
-        if part.indices.shape[1] == 2:
-            primitive["mode"] = LINES
-            tree["accessors"][primitive["indices"]]["count"] = part.indices.size
-        if part.colours is not None:
-            attributes["COLOR_0"] = attributes.pop(_COLOUR)
-        if part.targets:
-            primitive["targets"] = [
-                {"POSITION": attributes.pop(_TARGET + name)} for name in part.targets
-            ]
-            mesh["weights"] = [0.0] * len(part.targets)
-            mesh["extras"]["targetNames"] = list(part.targets)
-        for accessor, target in (
-            *((at, _VERTEX_BUFFER) for at in attributes.values()),
-            (primitive["indices"], _INDEX_BUFFER),
-        ):
-            tree["bufferViews"][tree["accessors"][accessor]["bufferView"]]["target"] = target
+    groups = list(dict.fromkeys(part.group for part in parts if part.group))
+    children: dict[str, list[int]] = {name: [] for name in ("", *groups)}
+    children[""] += range(1, len(children))
+    for at, part in enumerate(parts, len(children)):
+        children[part.group].append(at)
+    arrays = _Arrays()
+    document: Json = {
+        "asset": {"version": "2.0", "generator": generator},
+        "extensionsUsed": [UNLIT],
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [
+            *({"name": name or root, "children": below} for name, below in children.items()),
+            *({"name": part.name, "mesh": at} for at, part in enumerate(parts)),
+        ],
+        "materials": [_material(material) for material in materials],
+        "meshes": [_mesh(part, materials.index(part.material), arrays) for part in parts],
+        "accessors": arrays.accessors,
+        "bufferViews": arrays.views,
+        "buffers": [{"byteLength": len(arrays.body)}],
+    }
+    return document, arrays.body
+
+
+class _Arrays:
+    """Arrays one after the other; equal ones are stored once."""
+
+    def __init__(self) -> None:
+        self.body = bytearray()
+        self.views: list[Json] = []
+        self.accessors: list[Json] = []
+        self._known: dict[tuple[str, int, bytes], int] = {}
+
+    def put(self, values: NDArray[Any], kind: str, target: int | None = None) -> int:
+        """Store numbers, [n] or [n, 1 to 4]; gives the number of their accessor and view."""
+        rows = np.asarray(values, kind).reshape(len(values), -1)
+        data = rows.tobytes()
+        at = self._known.setdefault((kind, rows.shape[1], data), len(self.views))
+        if at == len(self.views):
+            view = {"buffer": 0, "byteOffset": len(self.body), "byteLength": len(data)}
+            self.views.append(view)
+            self.body += data + bytes(-len(data) % 4)
+            self.accessors.append(
+                {
+                    "bufferView": at,
+                    "componentType": _COMPONENTS[kind],
+                    "count": len(rows),
+                    "type": _TYPES[rows.shape[1]],
+                    "min": rows.min(axis=0).tolist(),
+                    "max": rows.max(axis=0).tolist(),
+                }
+            )
+        if target is not None:
+            self.views[at]["target"] = target
+        return at
+
+
+def _mesh(part: Part, material: int, arrays: _Arrays) -> Json:
+    values: dict[str, NDArray[Any]] = {"POSITION": part.points, **part.attributes}
+    if part.colours is not None:
+        values["COLOR_0"] = part.colours
+    kind = "<u2" if part.indices.max() <= _LARGEST_UINT16 else "<u4"
+    primitive: Json = {
+        "attributes": {key: arrays.put(of, "<f4", _VERTICES) for key, of in values.items()},
+        "indices": arrays.put(part.indices.reshape(-1), kind, _INDICES),
+        "mode": LINES if part.indices.shape[1] == 2 else _TRIANGLES,
+        "material": material,
+    }
+    mesh: Json = {"name": part.name, "primitives": [primitive]}
+    if part.targets:
+        shifts = part.targets.values()
+        primitive["targets"] = [{"POSITION": arrays.put(shift, "<f4")} for shift in shifts]
+        mesh["weights"] = [0.0] * len(shifts)
+        mesh["extras"] = {"targetNames": list(part.targets)}
+    return mesh
 
 
 def _material(material: Material) -> Json:
@@ -174,47 +185,27 @@ def _material(material: Material) -> Json:
 
 
 # --- A binary glTF file that is written again and again with other points and colours -------------
-# trimesh lays the file out once, which takes it a millisecond or two; a slider move then replaces
-# positions, colours and bounds in it.
-
-_HEAD = 20  # bytes before the document: header of the file, and of the first chunk
+# A slider move replaces positions, colours and bounds in a file that is laid out once.
 
 
 class GltfTemplate:
     """The file of one coloured part."""
 
     def __init__(self, name: str, indices: NDArray[np.integer[Any]], count: int) -> None:
-        # trimesh stores equal arrays once: points and colours must differ
+        # equal arrays are stored once: points and colours must differ
         numbers = np.arange(3.0 * count).reshape(-1, 3)
-        data = build_gltf([Part(name, numbers, indices, colours=-1.0 - numbers)])
-        (length,) = struct.unpack("<I", data[12:16])
-        self._document: dict[str, Any] = json.loads(data[_HEAD : _HEAD + length])
-        self._body = data[_HEAD + length + 8 :]
+        part = Part(name, numbers, indices, colours=-1.0 - numbers)
+        self._document, self._body = _lay_out([part], "scene", "warpspace")
         attributes = self._document["meshes"][0]["primitives"][0]["attributes"]
         self._position, self._colour = attributes["POSITION"], attributes["COLOR_0"]
 
     def fill(self, points: Array, colours: NDArray[np.floating[Any]]) -> bytes:
         """Write the file with other points and colours."""
         body = bytearray(self._body)
-        vertices = np.ascontiguousarray(points, "<f4")
-        for accessor, values in ((self._position, vertices), (self._colour, colours)):
-            view = self._document["bufferViews"][
-                self._document["accessors"][accessor]["bufferView"]
-            ]
-            start, content = view["byteOffset"], np.ascontiguousarray(values, "<f4").tobytes()
-            body[start : start + len(content)] = content
-        bounds = self._document["accessors"][self._position]
-        columns = np.ascontiguousarray(vertices.T)
-        bounds["min"], bounds["max"] = columns.min(axis=1).tolist(), columns.max(axis=1).tolist()
-        text = json.dumps(self._document, separators=(",", ":")).encode()
-        text += b" " * (-len(text) % 4)
-        total = _HEAD + len(text) + 8 + len(body)
-        return b"".join(
-            (
-                struct.pack("<4sII", b"glTF", 2, total),
-                struct.pack("<I4s", len(text), b"JSON"),
-                text,
-                struct.pack("<I4s", len(body), b"BIN\0"),
-                body,
-            )
-        )
+        for at, values in ((self._position, points), (self._colour, colours)):
+            start = self._document["bufferViews"][at]["byteOffset"]
+            rows = np.ascontiguousarray(values, "<f4")
+            body[start : start + rows.nbytes] = rows.tobytes()
+            columns, found = np.ascontiguousarray(rows.T), self._document["accessors"][at]
+            found["min"], found["max"] = columns.min(axis=1).tolist(), columns.max(axis=1).tolist()
+        return _join(self._document, body)

@@ -210,7 +210,6 @@ def _shape(visual: Any, pose: Array, folders: tuple[Path, Path], read: dict[Path
 
 
 def _sizes(given: Any, count: int, what: str) -> Array:
-    """Read the sizes of a shape, [count], metres."""
     try:
         sizes = np.abs(np.asarray(given, dtype=float))
     except (TypeError, ValueError):

@@ -70,7 +70,7 @@ class Calibrate(Analysis):
         " circular:plane=XZ:radius=150 (`warpspace test --list`; its test sphere is r-test here)."
         " Once for all files, or once for each, --data before --predict",
         flag="--kind",
-        unset="told by the columns of each file",
+        unset="recognised from the columns of each file",
     )
     frame: Literal["machine", "workpiece"] | None = option(
         None,

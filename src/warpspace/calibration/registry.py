@@ -130,7 +130,6 @@ def _set_up(readings: Readings, unknowns: tuple[str, ...]) -> Array:
 
 
 def _value(option: Option, text: str, given: str) -> Any:
-    """Read the value of an option of a test; axes are looked at where the test is laid."""
     try:
         if option.name == "at":
             parts = (part.partition("=") for part in text.split(",") if part)

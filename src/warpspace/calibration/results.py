@@ -262,7 +262,7 @@ class Calibration(Result):
                 yield f"  far off: {group.file} line {group.readings.lines[at]}"
         yield from (f"  {words}" for words in spell_rank(self.rank, self.slopes))
         for keys, measurement in self.apart.items():
-            yield f"    {keys[0]} would be told by: {measurement}"
+            yield f"    {keys[0]} would be determined by: {measurement}"
         if self.steps:
             columns = (
                 Column("measurement", leads=True, wraps=True),
@@ -316,7 +316,12 @@ class Calibration(Result):
             )  # fmt: skip
             yield Lines("plane", title, *labels, curves)
         for unit in (MICROMETRE, MICRORADIAN):
-            rows = sorted((one for one in self._told() if one.unit == unit), key=_weight)
+            rows = sorted(
+                (one for one in self._told() if one.unit == unit),
+                key=lambda one: (
+                    abs(one.value - one.before) / max(one.standard_uncertainty or 1.0, 1e-12)
+                ),
+            )
             if kept := rows[-MOST_BARS:][::-1]:
                 spread = [
                     (one.interval_95[1] - one.value) if one.interval_95 else 0.0 for one in kept
@@ -379,7 +384,3 @@ def _circle_words(circle: Circle) -> str:
 def _joined(start: Array, end: Array) -> Array:
     """Give one curve through all pairs, with gaps between them, [3 n]."""
     return np.stack([start, end, np.full(len(start), np.nan)], axis=-1).ravel()
-
-
-def _weight(one: Found) -> float:
-    return abs(one.value - one.before) / max(one.standard_uncertainty or 1.0, 1e-12)

@@ -89,7 +89,6 @@ def task_of(name: str) -> "Task":
 
 
 def _build(name: str) -> click.Command:
-    """Import the command, or make it from its analysis."""
     for entry in entries():
         if entry.name == name:
             from warpspace.cli.analyses import command_of

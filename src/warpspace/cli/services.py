@@ -19,12 +19,13 @@ if TYPE_CHECKING:
     from concurrent.futures import Future
     from pathlib import Path
 
+    from warpspace.analysis.concepts import Concepts
     from warpspace.app.documents.services import (
-        CompensationRequest,
-        ConceptRequest,
+        ReportRequest,
         Request,
         Services,
     )
+    from warpspace.formats.compensation.compensate import Compensation
     from warpspace.outputs.drawing.settings import FigureSettings
     from warpspace.picture.model import ScenePicture
     from warpspace.scene.model import Scene
@@ -43,6 +44,7 @@ def build_services() -> "Services":
         write_export,
         draw_concepts,
         draw_compensation,
+        write_report,
         figures=tuple((kind.name, kind.caption) for kind in figure_kinds() if kind.scenes == 1),
         exports=tuple((form.ending, form.about) for form in export_formats() if form.in_app),
     )
@@ -87,19 +89,19 @@ def draw_figure(request: "Request", cancelled: threading.Event) -> bytes:
     return _render(name, scenes, settings, cancelled)
 
 
-def draw_concepts(request: "ConceptRequest", cancelled: threading.Event) -> bytes:
+def draw_concepts(
+    scenes: "Sequence[Scene]", plan: "Concepts", dark: bool, cancelled: threading.Event
+) -> bytes:
     """Draw machines side by side as a PNG; otherwise as `draw_figure`."""
     from warpspace.outputs.drawing.settings import FigureSettings
 
-    settings = FigureSettings(dark=request.dark, loop=request.loop, concepts=request.plan)
-    if request.strip_px is not None:
-        width, height = request.strip_px
-        size = (width, height * len(request.scenes))
-        settings = replace(settings, size=size, strip=True)
-    return _render("concepts", request.scenes, settings, cancelled)
+    settings = FigureSettings(dark=dark, loop=str(plan.loop), concepts=plan)
+    return _render("concepts", scenes, settings, cancelled)
 
 
-def draw_compensation(request: "CompensationRequest", cancelled: threading.Event) -> bytes:
+def draw_compensation(
+    found: "Compensation", dark: bool, narrow: bool, cancelled: threading.Event
+) -> bytes:
     """Draw the maps of a compensation as a PNG."""
     from warpspace.outputs.processes import ProcessPool
     from warpspace.outputs.save import draw_maps
@@ -107,7 +109,7 @@ def draw_compensation(request: "CompensationRequest", cancelled: threading.Event
     with _turn(cancelled):
         pool = ProcessPool(1)
         try:
-            drawn = pool.submit(draw_maps, request.found, dark=request.dark, narrow=request.narrow)
+            drawn = pool.submit(draw_maps, found, dark=dark, narrow=narrow)
             return _wait(drawn, cancelled, pool.kill, "maps were")
         except WorkersLostError:
             raise RenderError("the maps could not be drawn: their process has ended") from None
@@ -146,7 +148,6 @@ def _turn(cancelled: threading.Event) -> Generator[None]:
 def _wait(
     drawn: "Future[bytes]", cancelled: threading.Event, end: Callable[[], None], what: str
 ) -> bytes:
-    """Wait for a drawing; where it is cancelled, end what draws it."""
     from concurrent.futures import wait
 
     from warpspace.app.documents.services import CancelledError
@@ -192,6 +193,24 @@ def write_export(request: "Request", ending: str) -> bytes:
         target = folder / f"export{ending}"
         write(picture, target, overwrite=False)
         return target.read_bytes()
+
+
+def write_report(
+    request: "ReportRequest", cancelled: threading.Event
+) -> tuple[bytes, tuple[str, ...]]:
+    """Write a report; give the file, and which figures are missing."""
+    from warpspace.outputs.files import temporary_folder
+    from warpspace.outputs.report import ReportSettings
+    from warpspace.outputs.report import write_report as write
+
+    settings = ReportSettings(
+        loop=request.loop, grid=request.nodes, exaggeration=request.exaggeration,
+        spec_um=request.limit_um, author=request.author, questions=request.questions,
+    )  # fmt: skip
+    with _turn(cancelled), temporary_folder() as folder:
+        target = folder / f"report{request.ending}"
+        written = write(request.scenes, target, settings, embed=embed_view, results=request.results)
+        return target.read_bytes(), written.missing
 
 
 # --- The offline page, which the app writes: outputs know nothing of the app ----------------------

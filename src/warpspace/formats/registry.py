@@ -98,6 +98,10 @@ class Format:
     offsets: bool = True
     measured: bool = False  # whether its runs are readings, which are kept with the scene
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Go to another process by name: what reads and writes stays where it is."""
+        return find_format, (self.name,)
+
     @property
     def can_write(self) -> bool:
         """Whether `warpspace compensate` writes it."""

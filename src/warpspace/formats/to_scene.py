@@ -101,12 +101,10 @@ def into_scene(reading: Reading, base: Scene | None, title: str, name: str) -> I
 
 
 def _without(table: Mapping[str, T], curves: Mapping[str, ErrorFunction]) -> dict[str, T]:
-    """Give the entries of parameters that are not imported."""
     return {key: value for key, value in table.items() if key not in curves}
 
 
 def _check_keys(found: Imported, base: Scene, name: str) -> None:
-    """Refuse parameters that the machine does not have."""
     machine = base.machine
     expected = f"expected errors of {', '.join(machine.axes)}"
     needed = [(key, parameter(key).axis) for key in found.keys]
@@ -131,7 +129,6 @@ def _ranges(found: Imported) -> dict[str, tuple[float, float]]:
 
 
 def _check_travel(found: Imported, base: Scene, name: str) -> None:
-    """Refuse positions that the machine does not reach."""
     problems: list[str] = []
     for axis, (low, high) in _ranges(found).items():
         one = base.machine.axes[axis]

@@ -239,7 +239,10 @@ def face_axis(face: Index, shape: Shape) -> int:
 def crease_lines(faces: Sequence[Index], shape: Shape) -> list[Index]:
     """Find the edges where patches meet at an angle, and open borders: node indices, each once."""
     met: defaultdict[tuple[int, int], list[int]] = defaultdict(list)
-    borders = [(face_axis(face, shape), _borders(face)) for face in faces]
+    borders = [
+        (face_axis(face, shape), [face[0, :], face[-1, :], face[:, 0], face[:, -1]])
+        for face in faces
+    ]
     for axis, lines in borders:
         for line in lines:
             for pair in _pairs(line):
@@ -269,10 +272,6 @@ def face_lines(faces: Sequence[Index], shape: Shape, every: Shape) -> list[Index
 def _held_axis(patch: Index, shape: Shape) -> int:
     first, last = (np.stack(np.unravel_index(patch[row, 0], shape)) for row in (0, -1))
     return int(np.argmax(first != last))
-
-
-def _borders(face: Index) -> list[Index]:
-    return [face[0, :], face[-1, :], face[:, 0], face[:, -1]]
 
 
 def _pairs(line: Index) -> list[tuple[int, int]]:

@@ -265,7 +265,6 @@ def shared_palette(pictures: Sequence[Image.Image]) -> Image.Image:
 
 
 def _find_encoder() -> str:
-    """Find the program that writes MP4; say what to install where there is none."""
     try:
         import imageio_ffmpeg
 

@@ -6,6 +6,7 @@ The name of a temporary file says which machine and which process it belongs to:
 
 import os
 import re
+import secrets
 import shutil
 import socket
 import stat
@@ -66,14 +67,11 @@ def write_atomically(path: str | Path, *, overwrite: bool = True) -> Generator[P
     What a process that was killed has left in the folder is removed first.
     """
     target = check_target(path, overwrite=overwrite)
-    temporary: Path | None = None
+    # named before it is there: a signal that comes right then leaves nothing behind
+    temporary = target.parent / f"{temporary_prefix()}{secrets.token_hex(6)}{target.suffix}"
     try:
         clear_leftovers(target.parent)
-        handle, name = tempfile.mkstemp(
-            suffix=target.suffix, prefix=temporary_prefix(), dir=target.parent
-        )
-        temporary = Path(name)
-        os.close(handle)
+        temporary.touch(mode=0o600, exist_ok=False)
         yield temporary
         check_target(path, overwrite=overwrite)
         temporary.chmod(_mode(target))
@@ -84,7 +82,7 @@ def write_atomically(path: str | Path, *, overwrite: bool = True) -> Generator[P
     except OSError as error:
         raise OutputError(f"{target}: cannot be written: {_reason(error)}") from error
     finally:
-        if temporary is not None:
+        with suppress(OSError):
             temporary.unlink(missing_ok=True)
 
 

@@ -154,6 +154,7 @@ def parse_scene(
         exaggeration=view["exaggeration"],
         reference=reference,
         placed=view["placed"],
+        limit_um=view["limit_um"],
         description=texts[1],
         notes=(*scene_notes(machine, workspace, errors), *body_notes(machine)),
         uncertainty=uncertainty,

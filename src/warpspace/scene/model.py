@@ -64,6 +64,8 @@ class Scene:
         Standard uncertainty (k = 1) of errors along their axes by key, µm or µrad, never negative.
     measured : mapping of str to Measurement
         Readings that errors were made from, by key.
+    limit_um : float or None, µm
+        Largest length of an error that is accepted.
     """
 
     name: str
@@ -80,6 +82,7 @@ class Scene:
     notes: tuple[str, ...] = ()
     uncertainty: Mapping[str, ErrorFunction] = field(default_factory=dict[str, ErrorFunction])
     measured: Mapping[str, Measurement] = field(default_factory=dict[str, Measurement])
+    limit_um: float | None = None
 
     @property
     def machine(self) -> Machine:
@@ -205,7 +208,7 @@ def placed_in(scene: Scene, loop: Loop | str, *, placed: bool = True) -> Scene:
     """Give a scene whose relative errors leave out where the workpiece lies, if that is wanted."""
     if placed and loop != Loop.RELATIVE:
         raise OptionError(
-            f"placed: where the workpiece lies is not told by the {loop} loop; expected loop"
+            f"placed: the {loop} loop does not show where the workpiece lies; expected loop"
             f" {Loop.RELATIVE}"
         )
     return replace(scene, placed=True) if placed else scene

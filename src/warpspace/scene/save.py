@@ -143,6 +143,7 @@ def scene_to_toml(scene: Scene, notation: Notation | None = None) -> str:
         "exaggeration": "auto" if scene.exaggeration is None else scene.exaggeration,
         "reference": "absolute" if scene.reference is None else scene.reference,
         **({"placed": True} if scene.placed else {}),
+        **({} if scene.limit_um is None else {"limit_um": scene.limit_um}),
     }
     parts.append(_section("view", view))
     return "\n".join(part for part in parts if part)

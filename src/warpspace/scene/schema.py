@@ -224,6 +224,7 @@ VIEW = Section(
         "exaggeration": (_exaggeration, None),
         "reference": (_reference, None),
         "placed": (_placed, False),
+        "limit_um": (_number(*limits.LIMIT_UM), None),
     }
 )
 DEFAULTS = Section({name: (_number(*_HALF_WIDTH), None) for name in TOLERANCE_CLASSES})

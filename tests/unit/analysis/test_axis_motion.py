@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from warpspace.analysis.axis_motion import LEVER_MM, axis_motion, fit_circle, times_a_turn
-from warpspace.app.readouts.rotary_axes import circle_deviation
+from warpspace.app.evaluation.rotation import circle_deviation
 
 ANGLE = np.linspace(0.0, 360.0, 73)
 THETA = np.deg2rad(ANGLE)

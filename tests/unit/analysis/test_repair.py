@@ -2,13 +2,14 @@
 
 from dataclasses import replace
 from itertools import combinations, pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear, minimize
 
 from warpspace.analysis import adjusting
-from warpspace.analysis.adjusting import Objective
+from warpspace.analysis.adjusting import Objective, least_rms
 from warpspace.analysis.repair import Repair, repaired
 from warpspace.analysis.statistics import volume_statistics
 from warpspace.field.evaluate import evaluate_first_order
@@ -123,6 +124,17 @@ def test_rms_within_limits_is_the_bounded_optimum():
     for key, value in found.adjust.items():
         allowed = 1.5 if key == "EA0Z" else limit
         assert abs(value - FIRST.errors.amplitude(key)) <= allowed + 1e-9
+
+
+def test_rms_is_least_where_many_limits_are_met_one_after_the_other():
+    rng = np.random.default_rng(1)
+    for _ in range(100):
+        matrix = rng.normal(size=(12, 10)) @ (np.eye(10) + 3.0 * rng.normal(size=(10, 10)))
+        error, high = 10.0 * rng.normal(size=12), 3.0 * rng.random(10)
+        limits = np.stack([-high, high], -1)
+        found = least_rms(SimpleNamespace(triangle=(matrix, error)), tuple(range(10)), limits)
+        second = lsq_linear(matrix, -error, (-high, high), method="bvls", max_iter=1000)
+        assert found.value_um == pytest.approx(np.sqrt(2 * second.cost), abs=1e-9)
 
 
 @pytest.mark.parametrize(

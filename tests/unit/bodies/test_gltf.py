@@ -1,4 +1,3 @@
-import io
 import json
 import struct
 
@@ -99,21 +98,10 @@ def test_nan_in_the_extras_is_refused():
 def test_a_filled_template_is_the_file_written_anew_and_an_earlier_one_keeps_its_bytes():
     rng, triangles = np.random.default_rng(3), np.array([[0, 1, 2], [1, 3, 2]])
     template = GltfTemplate("surface", triangles, 4)
-    filled, anew, before = [], [], []
+    filled, anew = [], []
     for _ in range(3):
         points, colours = rng.normal(size=(4, 3)), rng.normal(size=(4, 3))
         filled.append(template.fill(points, colours))
-        before.append(bytes(filled[-1]))
         anew.append(build_gltf([Part("surface", points, triangles, colours=colours)]))
-        assert colours.astype("<f4").tobytes() in before[-1]
-    assert [*map(bytes, filled)] == before
-    for pair in zip(filled, anew, strict=True):
-        for data in pair:
-            assert len(data) % 4 == 0
-            assert int.from_bytes(data[8:12], "little") == len(data)
-        one, other = (
-            trimesh.load_scene(io.BytesIO(data), file_type="glb", process=False).geometry["surface"]
-            for data in pair
-        )
-        np.testing.assert_array_equal(one.vertices, other.vertices)
-        np.testing.assert_array_equal(one.faces, other.faces)
+        assert colours.astype("<f4").tobytes() in anew[-1]
+    assert filled == anew

@@ -282,7 +282,10 @@ def test_a_volume_along_one_axis_tells_fewer_numbers():
 
 
 def test_only_the_relative_loop_has_a_placement():
-    with pytest.raises(OptionError, match="tool loop; expected loop relative"):
+    with pytest.raises(
+        OptionError,
+        match="tool loop does not show where the workpiece lies; expected loop relative",
+    ):
         evaluate(_scene("EC0Y = 40.0\n"), placed=True)
 
 

@@ -1,8 +1,12 @@
 """Drawing: places of labels, hidden parts of lines, projections, numbers as figures spell them."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from warpspace.exceptions import OptionError
+from warpspace.outputs.charts.results import result_chart
 from warpspace.outputs.drawing.canvas import Occupancy, place_label
 from warpspace.outputs.drawing.render import (
     Projection,
@@ -125,3 +129,8 @@ def test_the_operator_sees_x_to_the_right_and_z_upwards():
 def test_one_point_is_drawn_in_the_middle():
     projection = fit_projection("iso", np.array([[3.0, 4.0, 5.0]]), RECT)
     assert np.allclose(projection.project(np.array([3.0, 4.0, 5.0])), [500.0, 350.0])
+
+
+def test_a_result_without_charts_is_refused_by_its_title():
+    with pytest.raises(OptionError, match="Nothing moves: there is no chart"):
+        result_chart(SimpleNamespace(blocks=lambda: ["Nothing moves"]))

@@ -12,9 +12,9 @@ from typing import Any
 
 import viser
 
+from warpspace.app.browser.page import script_source
 from warpspace.app.browser.viser_private import listen_to_all, send_script_to_all
 
-STORAGE_KEY = "warpspace-tab"
 CARRIER = "warpspace-tab-token"
 """Stands for a widget in the message of a page; viser knows none of this name."""
 LEAST_WIDTH, MOST_WIDTH = 200, 20_000
@@ -86,29 +86,9 @@ class Arrivals:
 
 def ask_script(carrier: str) -> str:
     """Write the script that makes a page hand over its token, and its width in CSS pixels."""
-    return f"""(() => {{
-  const key = {json.dumps(STORAGE_KEY)};
-  let token = window.__warpspaceTab;
-  try {{ token = sessionStorage.getItem(key) || token; }} catch {{}}
-  token = token || [...crypto.getRandomValues(new Uint8Array(16))]
-    .map(byte => byte.toString(16).padStart(2, "0")).join("");
-  window.__warpspaceTab = token;
-  try {{ sessionStorage.setItem(key, token); }} catch {{}}
-  let tries = 0;
-  const hand = () => {{
-    const viewer = window.__viserMutable;
-    if (!viewer) {{ if (tries++ < 200) setTimeout(hand, 25); return; }}
-    viewer.sendMessage({{
-      type: "GuiUpdateMessage", uuid: {json.dumps(carrier)},
-      updates: {{ value: token, width: innerWidth }}
-    }});
-  }};
-  hand();
-}})();"""
+    return f"{script_source('arrivals.js').rstrip()}({json.dumps(carrier)});"
 
 
 def rename_script(token: str) -> str:
     """Write the script that gives a page another token (a duplicated tab comes with a copy)."""
-    key, value = json.dumps(STORAGE_KEY), json.dumps(token)
-    store = f"sessionStorage.setItem({key}, {value});"
-    return f"window.__warpspaceTab = {value}; try {{ {store} }} catch {{}}"
+    return f"warpspaceRename({json.dumps(token)});"

@@ -1,50 +1,10 @@
 """Handles of viser: inputs bound to a value of the state, and outputs that are only assigned to."""
 
-from collections.abc import Callable
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import numpy as np
 
-T = TypeVar("T")
-Changed = Callable[[], None]
 _UNSET = object()
-
-
-class Input(Generic[T]):
-    """A viser input and the value of it that the program has dealt with.
-
-    What the browser sets meanwhile is never overwritten: `show` writes only where the wanted value
-    differs from the one read last.
-    """
-
-    def __init__(self, handle: Any, changed: Changed) -> None:
-        self.handle = handle
-        self._seen: T = handle.value
-        self._touched = False
-
-        async def note(event: Any) -> None:  # a plain function would take a thread of a pool
-            if event.client is not None:
-                self._touched = True
-                changed()
-
-        handle.on_update(note)
-
-    def poll(self) -> T | None:
-        """Give the value a browser has set since the last poll, else None."""
-        if not self._touched:
-            return None
-        self._touched = False
-        value: T = self.handle.value
-        if value == self._seen:
-            return None
-        self._seen = value
-        return value
-
-    def show(self, value: T) -> None:
-        """Make the widget show a value; what shows it already is left alone."""
-        if value != self._seen:
-            self._seen = value
-            self.handle.value = value
 
 
 class Handle:

@@ -2,7 +2,7 @@
 
 viser builds an object of whatever kind a message names and sets whatever attribute of a widget it
 names. Here only the kinds the app has a use for pass, with fields of the right type and size; of
-a widget a page sets nothing but `value`, to something of the kind it shows.
+a widget a page sets nothing but `value`, which is a text.
 What is refused is left out and the connection stays open, since a new one would cost the server
 more than a message that is dropped.
 """
@@ -21,7 +21,6 @@ logger = logging.getLogger(__name__)
 LARGEST_NUMBER = 1e9
 LONGEST_NAME = 1_000
 LONGEST_TEXT = 1_000_000  # of the value of a text field, characters
-MOST_NUMBERS = 16  # in the value of a widget that shows several
 LARGEST_SIDE_PX = 16_384  # of the page's picture, and of a picture that it renders
 PNG_START = b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR"
 
@@ -30,21 +29,18 @@ Side = Annotated[float, Meta(ge=0, le=LARGEST_SIDE_PX)]
 Count = Annotated[int, Meta(ge=0, le=2**40)]
 Name = Annotated[str, Meta(max_length=LONGEST_NAME)]
 Text = Annotated[str, Meta(max_length=LONGEST_TEXT)]
-Numbers = Annotated[tuple[Number, ...], Meta(max_length=MOST_NUMBERS)]
 Vector = tuple[Number, Number, Number]
-Value = bool | float | Text | Numbers
-"""Of a widget; the app clamps a number that is too large or none, and tells the user so."""
 
 
 class Update(Struct, forbid_unknown_fields=True):
     """What is set: the value and, where a page says who it is, its width."""
 
-    value: Value
+    value: Text
     width: Number | None = None
 
 
 class WidgetChanged(Struct, tag_field="type", tag="GuiUpdateMessage", forbid_unknown_fields=True):
-    """A widget was moved, clicked or written into, or a script of ours answers."""
+    """A script of ours says something: events, an answer, what it has kept."""
 
     uuid: Name
     updates: Update
@@ -74,14 +70,6 @@ class DrawingClicked(
     ray_direction: Vector
     screen_pos: tuple[tuple[Number, Number]]
     modifier: Annotated[str, Meta(max_length=40)] | None
-
-
-class CommandChosen(
-    Struct, tag_field="type", tag="CommandTriggerMessage", forbid_unknown_fields=True
-):
-    """A command of the palette, or its key."""
-
-    uuid: Name
 
 
 class UploadStarted(
@@ -116,13 +104,7 @@ class PictureRendered(
 
 
 _READER = msgspec.msgpack.Decoder(
-    WidgetChanged
-    | CameraMoved
-    | DrawingClicked
-    | CommandChosen
-    | UploadStarted
-    | UploadContinued
-    | PictureRendered
+    WidgetChanged | CameraMoved | DrawingClicked | UploadStarted | UploadContinued | PictureRendered
 )
 
 
@@ -151,46 +133,21 @@ def may_pass(raw: bytes) -> bool:
 
 
 def moved(raw: object) -> str | None:
-    """Name what a message moves where the last move says all: a widget with numbers, the camera.
-
-    None for any other message: two clicks on a button are two clicks.
-    """
+    """Name what a message moves where the last move says all: the camera; None for all others."""
     try:
         message = _READER.decode(raw) if isinstance(raw, bytes) else None
     except ValueError:
         return None
-    if isinstance(message, WidgetChanged):
-        value = message.updates.value
-        return None if isinstance(value, bool | str) else f"widget {message.uuid}"
     return "camera" if isinstance(message, CameraMoved) else None
 
 
-def may_set(
-    present: object, updates: dict[str, Any], options: tuple[str, ...] | None = None
-) -> bool:
-    """Tell whether a page may update a widget."""
-    fine = updates.keys() == {"value"} and _is_alike(present, updates["value"])
-    if fine and options is not None:
-        fine = updates["value"] in options
+def may_set(present: object, updates: dict[str, Any]) -> bool:
+    """Tell whether a page may update a widget: one that holds a text."""
+    fine = updates.keys() == {"value"} and isinstance(present, str)
+    fine = fine and isinstance(updates["value"], str)
     if not fine:
         logger.warning("a page has sent a value that its widget cannot have; it is left out")
     return fine
-
-
-def _is_alike(present: object, value: object) -> bool:
-    if isinstance(present, tuple):
-        return (
-            isinstance(value, list | tuple)
-            and len(value) == len(present)
-            and all(map(_is_alike, present, value))
-        )
-    if isinstance(present, bool | str):
-        return type(value) is type(present)
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return False
-    if isinstance(present, int):  # viser makes one of it
-        return abs(value) <= LARGEST_NUMBER
-    return isinstance(present, float) and (isinstance(value, float) or value.bit_length() <= 64)
 
 
 def _is_picture(payload: bytes) -> bool:

@@ -1,23 +1,17 @@
-// The room between the panels: heading, scale bars, values on isolines, one switch, drawn over the
-// 3-D view. Nothing here takes a click but the buttons; the camera is read, never moved.
+// What lies over the drawing and follows the camera: scale bars, values on isolines, words beside
+// points with their leaders, numbers and names of the axes, the triad. The camera is read, never moved.
 (() => {
   if (window.warpspaceRoom) return;
-  const MOST_LABELS = 12, LABEL_APART = 52, BAR_PX = 150, BAR_PART = 0.32, PHONE_PX = 576;
-  const SETTLED_MS = 160, LEAST_FACING = 0.12, LARGE_PX = 1600, PLATE_MS = 250, KEY = "warpspace-machine";
-  const state = { html: {}, labels: [], slices: [], centre: [0, 0, 0], factor: 1, perMm: 0.01 };
-  let widget = "", told = "", seen = "", plates = 0, timer = 0, remembered = false;
+  const MOST_LABELS = 12, LABEL_APART = 52, BAR_PX = 130, BAR_PART = 0.22;
+  const SETTLED_MS = 160, LEAST_FACING = 0.12, PLATE_MS = 250;
+  const state = { labels: [], slices: [], axes: [], marks: [], corners: [], triad: [],
+    centre: [0, 0, 0], factor: 1, perMm: 0.01 };
+  let told = "", seen = "", plates = 0, timer = 0;
 
-  const root = document.createElement("div");
-  root.id = "warpspace-room";
-  root.innerHTML = `<section class="ws-room-head" data-room="head" aria-label="What is shown"></section>
-    <div class="ws-room-labels" aria-hidden="true"></div>
-    <div class="ws-room-foot"><div class="ws-room-bars"></div>
-    <div class="ws-room-buttons" data-room="buttons"></div>
-    <section class="ws-room-strip" data-room="strip" aria-label="Colours and numbers"></section></div>`;
-  const part = name => root.querySelector(`.ws-room-${name}`);
+  const root = warpspacePage.over;
+  const part = name => root.querySelector(`.ws-${name}`);
   const view = () => window.__viserMutable;
-  const sheet = () => innerWidth > PHONE_PX ? null : document.querySelector(
-    'div[style*="position: fixed"][style*="bottom: 0px"][style*="min-height: 3.5em"]');
+  const zoom = () => root.currentCSSZoom ?? 1;
 
   const roundDown = value => {
     const decade = 10 ** Math.floor(Math.log10(value));
@@ -89,24 +83,136 @@
     });
   };
 
-  // viser writes black on white, as large on every screen; on a dark page its labels are to be
-  // light on dark, in a very large room larger
-  const DARK = [/vec4\(0\.0, 0\.0, 0\.0, a\)/, "vec4(0.86, 0.89, 0.93, a)"];
-  const PLATE = [/vec4\(1\.0, 1\.0, 1\.0, 0\.85 \* vAlpha\)/, "vec4(0.10, 0.11, 0.13, 0.80 * vAlpha)"];
-  const LARGE = [/float refScale = 800\.0/, "float refScale = 1200.0"];
-  const colourLabels = () => {
-    let changed = false;
-    view().scene?.traverse(({ material }) => {
-      if (!material?.uniforms?.uLabelData) return;
-      const made = material.userData.asMade ??= [material.fragmentShader, material.vertexShader];
-      const fragment = state.dark ? made[0].replace(...DARK).replace(...PLATE) : made[0];
-      const vertex = root.clientWidth > LARGE_PX ? made[1].replace(...LARGE) : made[1];
-      if (material.fragmentShader === fragment && material.vertexShader === vertex) return;
-      material.fragmentShader = fragment;
-      material.vertexShader = vertex;
-      material.needsUpdate = changed = true;
+  // --- words beside points: away from the volume, with a leader, over nothing else ------------------
+  const canvasContext = document.createElement("canvas").getContext("2d");
+  const widths = new Map();
+  const widthOf = (text, bold) => {
+    const font = `${bold ? "600 " : ""}12px system-ui, "DejaVu Sans", sans-serif`, key = font + text;
+    if (!widths.has(key)) {
+      if (widths.size > 500) widths.clear();
+      canvasContext.font = font;
+      widths.set(key, canvasContext.measureText(text).width + 8);
+    }
+    return widths.get(key);
+  };
+  const overlaps = (a, b) => a.x < b.x + b.w && b.x < a.x + a.w && a.y < b.y + b.h && b.y < a.y + a.h;
+  // the outline of points on the screen, counter-clockwise
+  const outline = points => {
+    const sorted = [...points].sort((a, b) => a.x - b.x || a.y - b.y);
+    const half = list => {
+      const kept = [];
+      for (const p of list) {
+        while (kept.length > 1) {
+          const [a, b] = kept.slice(-2);
+          if ((b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x) > 0) break;
+          kept.pop();
+        }
+        kept.push(p);
+      }
+      return kept.slice(0, -1);
+    };
+    return [...half(sorted), ...half(sorted.reverse())];
+  };
+  const within = (shape, x, y) => shape.length > 2 && shape.every((a, i) => {
+    const b = shape[(i + 1) % shape.length];
+    return (b.x - a.x) * (y - a.y) - (b.y - a.y) * (x - a.x) >= 0;
+  });
+  const touches = (shape, { x, y, w, h }) => [[0, 0], [1, 0], [0, 1], [1, 1], [.5, .5], [.5, 0], [.5, 1]]
+    .some(([u, v]) => within(shape, x + u * w, y + v * h));
+  const taken = () => ["head", "legend", "controls", "bars", "triad", "compared"].map(part)
+    .filter(node => node?.offsetWidth)
+    .map(node => {
+      let x = 0, y = 0;
+      for (let up = node; up && up !== root; up = up.offsetParent) { x += up.offsetLeft; y += up.offsetTop; }
+      return { x, y, w: node.offsetWidth, h: node.offsetHeight };
     });
-    if (changed) view().requestRender?.();
+  const WAYS = [0, 25, -25, 50, -50, 80, -80, 120, -120].map(degrees => degrees * Math.PI / 180);
+  const FAR = [20, 34, 52, 76];
+
+  const drawWords = (camera, world, rect) => {
+    const home = part("words"), lines = part("leaders");
+    const at = point => project(camera, world, rect, point);
+    const shape = state.corners.length ? outline(state.corners.map(at)) : [];
+    const middle = { x: shape.reduce((sum, p) => sum + p.x, 0) / (shape.length || 1),
+      y: shape.reduce((sum, p) => sum + p.y, 0) / (shape.length || 1) };
+    const used = taken(), placed = [], leaders = [];
+    const room = { x: 2, y: 2, w: rect.width - 4, h: rect.height - 4 };
+    const fits = box => box.x >= room.x && box.y >= room.y && box.x + box.w <= room.x + room.w
+      && box.y + box.h <= room.y + room.h;
+    const put = (label, box) => { used.push(box); placed.push({ ...label, ...box }); };
+    const beyond = new Map();
+    // along an axis: numbers beyond the ends of their ticks, the name beyond the numbers
+    for (const { text, at: end, from, kind, axis } of state.axes) {
+      const p = at(end), foot = at(from);
+      if (p.depth <= 0) continue;
+      const long = Math.hypot(p.x - foot.x, p.y - foot.y);
+      const [u, v] = long > 1 ? [(p.x - foot.x) / long, (p.y - foot.y) / long] : [0, 1];
+      const w = widthOf(text, kind === "axis"), h = 16;
+      const reach = Math.abs(u) * w / 2 + Math.abs(v) * h / 2;
+      const away = 3 + reach + (kind === "axis" ? beyond.get(axis) ?? 0 : 0);
+      if (kind === "tick") beyond.set(axis, Math.max(beyond.get(axis) ?? 0, 2 * reach + 2));
+      // a name that would lie on something is moved along its axis and further out
+      for (const along of kind === "axis" ? [0, 40, -40, 80, -80] : [0])
+        for (const more of kind === "axis" ? [0, 14] : [0]) {
+          const box = { x: p.x + u * (away + more) - v * along - w / 2,
+            y: p.y + v * (away + more) + u * along - h / 2, w, h };
+          if (placed.at(-1)?.label === text + axis) continue;
+          if (fits(box) && !used.some(other => overlaps(box, other)) && !touches(shape, box))
+            put({ text, kind, label: text + axis }, box);
+        }
+    }
+    const deep = state.corners.reduce((sum, one) => sum + at(one).depth, 0) / (state.corners.length || 1);
+    for (const { text: words, at: point, kind } of state.marks) {
+      const p = at(point);
+      if (p.depth <= 0 || p.x < 0 || p.y < 0 || p.x > rect.width || p.y > rect.height) continue;
+      // what the box itself hides
+      const behind = state.solid && p.depth > deep && within(shape, p.x, p.y);
+      if (behind && kind === "corner") continue;
+      const text = behind && kind === "worst" ? `${words}, at the back` : words;
+      const w = widthOf(text, kind === "worst"), h = 17;
+      const own = Math.atan2(p.y - middle.y, p.x - middle.x);
+      let best = null;
+      for (const far of FAR) for (const turn of WAYS) {
+        const u = Math.cos(own + turn), v = Math.sin(own + turn);
+        const box = { x: p.x + u * (far + w / 2) - w / 2, y: p.y + v * (far + h / 2) - h / 2, w, h };
+        let cost = far + 12 * Math.abs(turn);
+        if (!fits(box)) cost += 2000;
+        cost += 1000 * used.filter(other => overlaps(box, other)).length;
+        if (touches(shape, box)) cost += 300;
+        if (!best || cost < best.cost) best = { cost, box };
+      }
+      if (best.cost >= 1000 && !["worst", "asked"].includes(kind)) continue;
+      put({ text, kind }, best.box);
+      const { box } = best;
+      const x = Math.min(Math.max(p.x, box.x), box.x + w), y = Math.min(Math.max(p.y, box.y), box.y + h);
+      const long = Math.hypot(x - p.x, y - p.y);
+      if (long > 8) leaders.push([p.x + 5 * (x - p.x) / long, p.y + 5 * (y - p.y) / long, x, y, kind]);
+    }
+    while (home.children.length > placed.length) home.lastChild.remove();
+    placed.forEach(({ x, y, text, kind }, number) => {
+      const label = home.children[number] ?? home.appendChild(document.createElement("span"));
+      if (label.textContent !== text) label.textContent = text;
+      if (label.dataset.kind !== kind) label.dataset.kind = kind;
+      label.style.transform = `translate(${x.toFixed(1)}px,${y.toFixed(1)}px)`;
+    });
+    lines.innerHTML = leaders.map(([a, b, c, d, kind]) =>
+      `<path data-kind="${kind}" d="M${a.toFixed(1)} ${b.toFixed(1)}L${c.toFixed(1)} ${d.toFixed(1)}"/>`).join("");
+  };
+
+  // which axis is which: the three of the machine, seen as the camera sees them
+  const drawTriad = (camera, world) => {
+    const place = document.querySelector(".ws-triad svg");
+    if (!place) return;
+    const origin = through(world, [0, 0, 0]);
+    const turned = state.triad.map(({ name, way }) => {
+      const end = through(world, way), to = end.map((value, k) => k < 3 ? value - origin[k] : 0);
+      const m = camera.matrixWorldInverse.elements;
+      const [x, y, z] = [0, 1, 2].map(i => m[i] * to[0] + m[4 + i] * to[1] + m[8 + i] * to[2]);
+      return { name, x, y: -y, z };
+    }).sort((a, b) => a.z - b.z);
+    place.innerHTML = turned.map(({ name, x, y }) => `<g class="ws-axis-${name.toLowerCase()}">
+      <path d="M0 0L${(27 * x).toFixed(1)} ${(27 * y).toFixed(1)}"/>
+      <text x="${(36 * x).toFixed(1)}" y="${(36 * y).toFixed(1)}">${name}</text></g>`).join("");
   };
 
   // the ghost of the machine is drawn before all else and hides nothing: the map keeps its colours
@@ -124,19 +230,29 @@
     if (changed) view().requestRender?.();
   };
 
+  // the trace that is looked at is seen whole, also where the box lies before it
+  const bringForward = () => {
+    for (const name of ["/traces/actual", "/traces/nominal"])
+      view().nodeRefFromName[name]?.traverse(piece => {
+        if (!piece.material?.depthTest) return;
+        piece.material.depthTest = false;
+        piece.renderOrder = 100;
+        view().requestRender?.();
+      });
+  };
+
+  // how large the drawing is, and how much of it lies under what is written at its edges
   const tell = rect => {
-    const below = sheet()?.getBoundingClientRect();
-    const foot = part("foot").getBoundingClientRect(), head = part("head").getBoundingClientRect();
-    const covered = below && below.height ? rect.bottom - below.top : 0;
-    const size = [rect.width, rect.height, covered].map(Math.round).join();
+    const size = [rect.width, rect.height].map(Math.round).join();
     clearTimeout(timer);
-    if (size === told || !state.html.head) return;
+    if (size === told || !part("head").firstChild) return;
     timer = setTimeout(() => {
       told = size;
-      const top = Math.max(0, head.bottom - rect.top);
-      const bottom = Math.max(covered, rect.bottom - foot.top, 0);
-      view().sendMessage({ type: "GuiUpdateMessage", uuid: widget, updates: {
-        value: [performance.now(), rect.width, rect.height, top, bottom].map(Math.round).join() } });
+      const z = zoom(), head = part("head"), foot = part("foot"), legend = part("legend");
+      const top = z * (head.offsetTop + head.offsetHeight), bottom = rect.height - z * foot.offsetTop;
+      const right = rect.width - z * legend.offsetLeft;
+      warpspacePage.send("room:size",
+        [performance.now(), rect.width, rect.height, top, bottom, right].map(Math.round).join());
     }, SETTLED_MS);
   };
 
@@ -145,63 +261,34 @@
     requestAnimationFrame(frame);
     const mutable = view(), canvas = mutable?.canvas, camera = mutable?.camera;
     const world = mutable?.nodeRefFromName?.[""]?.matrixWorld?.elements;
-    if (!canvas?.isConnected || !camera || !world || !widget) return;
-    const rect = canvas.getBoundingClientRect(), covered = sheet()?.offsetHeight ?? 0;
+    if (!canvas?.isConnected || !camera || !world) return;
+    const rect = canvas.getBoundingClientRect();
     const now = performance.now();
-    if (now > plates) { plates = now + PLATE_MS; colourLabels(); holdBackGhost(); }
-    const layout = `${rect.x},${rect.y},${rect.width},${rect.height},${covered}`;
+    if (now > plates) { plates = now + PLATE_MS; holdBackGhost(); bringForward(); }
+    const layout = `${rect.x},${rect.y},${rect.width},${rect.height}`;
     const looks = camera.matrixWorld.elements.join() + camera.projectionMatrix.elements.join();
     if (layout + looks === seen) return;
     seen = layout + looks;
     if (pending !== layout) {
       pending = layout;
-      Object.assign(root.style, { left: `${rect.x}px`, top: `${rect.y}px`,
-        width: `${rect.width}px`, height: `${rect.height}px` });
-      root.classList.toggle("ws-room-narrow", rect.width < 480);
       tell(rect);
     }
     camera.updateMatrixWorld();
-    drawBars(camera, world, rect);
-    drawLabels(camera, world, rect);
-  };
-
-  // on a phone the sheet of panels starts folded, once a page, so that the drawing is seen
-  const foldSheet = tries => {
-    if (innerWidth > PHONE_PX || sessionStorage.getItem("warpspace-folded")) return;
-    const paper = sheet();
-    const handle = paper?.querySelector('[style*="height: 3.5em"][style*="cursor: pointer"]');
-    if (!handle) { if (tries) setTimeout(foldSheet, 50, tries - 1); return; }
-    sessionStorage.setItem("warpspace-folded", "1");
-    handle.click();
+    // in pixels of what lies over the drawing, which a very large page shows larger
+    const own = { width: rect.width / zoom(), height: rect.height / zoom() };
+    drawBars(camera, world, own);
+    drawLabels(camera, world, own);
+    drawWords(camera, world, own);
+    drawTriad(camera, world);
   };
 
   window.warpspaceRoom = {
-    // the widget that is told how large the room is
-    open(name) {
-      widget = name; told = seen = pending = "";
-      if (!root.isConnected) { document.body.append(root); requestAnimationFrame(frame); }
-      try { foldSheet(100); } catch { /* no storage: the sheet stays open */ }
-    },
-    // whatever has changed: pieces of HTML, and what bars and labels follow from
+    // whatever has changed: what bars and labels follow from
     show(changes) {
-      Object.assign(state, changes, { html: { ...state.html, ...changes.html } });
-      for (const [name, html] of Object.entries(changes.html ?? {}))
-        root.querySelector(`[data-room="${name}"]`).innerHTML = html;
-      const button = root.querySelector('[data-word="machine"]');
-      if (button && !remembered) {
-        remembered = true;
-        let last = null;
-        try { last = localStorage.getItem(KEY); } catch { /* no storage */ }
-        if (last === "hidden" && button.getAttribute("aria-pressed") === "true") button.click();
-      }
+      Object.assign(state, changes);
       seen = pending = "";
-      if ("dark" in changes) plates = 0;
+      plates = 0;
     },
   };
-  root.addEventListener("click", ({ target, isTrusted }) => {
-    const button = target.closest('[data-word="machine"]');
-    if (!button || !isTrusted) return;
-    const hidden = button.getAttribute("aria-pressed") === "true";
-    try { localStorage.setItem(KEY, hidden ? "hidden" : "shown"); } catch { /* no storage */ }
-  });
+  requestAnimationFrame(frame);
 })();

@@ -7,7 +7,7 @@ version of viser that lacks one fails there with a clear message and not somewhe
 import asyncio
 import contextlib
 import threading
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator
 from concurrent.futures import Future
 from importlib import import_module
 from typing import Any, TypeAlias
@@ -28,15 +28,6 @@ def dom_id(handle: Any) -> str:
     Style sheets and scripts find a widget by it. A public `handle.uuid` would replace this.
     """
     return str(handle._impl.uuid)  # noqa: SLF001
-
-
-def show_marks(slider: Any, marks: Iterable[tuple[float, str]]) -> None:
-    """Put other marks below a slider; each is a value and its label.
-
-    viser takes marks when a slider is added and has no way to change them: without this, those of a
-    slider whose range has grown stay where they were. A public `slider.marks` would replace this.
-    """
-    slider._marks = tuple(messages.GuiSliderMark(value, label) for value, label in marks)  # noqa: SLF001
 
 
 def send_script(client: ClientHandle, source: str) -> None:
@@ -120,15 +111,6 @@ def wake_sender_on_its_thread(client: ClientHandle) -> None:
     event.set = set_on_loop
 
 
-def release_tabs(client: ClientHandle) -> None:
-    """Take out of the server's tabs what a client has built there since its connection ended.
-
-    viser does so when the connection ends, when a step of the page may still be on its way. A
-    public call that drops the widgets of a client that has left would replace this.
-    """
-    client.gui._release_cross_scope_nesting()  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
-
-
 class UploadMessages:
     """The messages of one client's uploads, which checks of our own see before viser does.
 
@@ -197,7 +179,7 @@ def check_messages(may_pass: Callable[[bytes], bool]) -> None:
 
 def check_updates(
     owner: ViserServer | ClientHandle,
-    may_set: Callable[[object, dict[str, Any], tuple[str, ...] | None], bool],
+    may_set: Callable[[object, dict[str, Any]], bool],
 ) -> None:
     """Have what a page sets of a widget checked against the value the widget has.
 
@@ -212,7 +194,7 @@ def check_updates(
         handle = gui._gui_input_handle_from_uuid.get(message.uuid)  # noqa: SLF001
         if handle is None:
             return
-        if may_set(handle.value, message.updates, getattr(handle, "options", None)):
+        if may_set(handle.value, message.updates):
             await theirs(client_id, message)
 
     connection.unregister_handler(messages.GuiUpdateMessage, theirs)

@@ -6,7 +6,10 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.table import table_words
 from warpspace.field.evaluate import placed_words, second_order_words
 from warpspace.picture.comparison import conditions_of_both
-from warpspace.picture.words import direction_words, range_words
+from warpspace.picture.words import (
+    direction_words,
+    range_words,
+)
 from warpspace.scene.model import second_order
 
 

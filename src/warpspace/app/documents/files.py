@@ -4,6 +4,8 @@ import base64
 import binascii
 import re
 from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from warpspace.app.browser.uploads import size_message
 from warpspace.app.documents.conditions import state_conditions
@@ -75,6 +77,22 @@ def upload_text(
         raise OptionError(
             f"{source} is not UTF-8 text (byte {error.start}); expected a {what}"
         ) from None
+
+
+MOST_NOTES = 12  # remarks on a robot description that are shown
+
+
+def robot_text(name: str, content: bytes) -> tuple[str, list[str]]:
+    """Read a robot description (URDF) as a scene file, without meshes; with remarks on it."""
+    from warpspace.scene.urdf import imported_text, left_out, place_robot, read_robot
+
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / safe_file_name(name)
+        path.write_bytes(content)
+        robot, others = read_robot(path)
+    found = place_robot(robot, name)
+    notes = [*found.notes, *left_out(robot, others, found.frame_of)]
+    return imported_text(found.machine, safe_file_name(name), notes, {}), notes[:MOST_NOTES]
 
 
 # --- What files show while two states are compared: what is drawn, under its own name -------------

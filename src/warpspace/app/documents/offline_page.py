@@ -9,23 +9,39 @@ import io
 import json
 from collections.abc import Mapping
 from dataclasses import replace
+from importlib.resources import files
+from string import Template
 from typing import Any
 
 import numpy as np
 import viser
-from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
+from warpspace.app.browser.html import (
+    attributes,
+    fill,
+    join,
+    lowered,
+    number,
+    rows,
+    tag,
+    thousands,
+)
 from warpspace.app.documents.conditions import picture_conditions
+from warpspace.app.documents.legend import (
+    kept_words,
+    legend_html,
+    numbers_words,
+    place_words,
+    subject_words,
+)
 from warpspace.app.evaluation.budget import active_errors, answer
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.readouts import summary as legend
-from warpspace.app.readouts.html import style_sheet
 from warpspace.app.state.app_state import start_state
 from warpspace.app.viewport.camera import CameraMemory, fit_camera
-from warpspace.app.viewport.layers import SCENE_PER_MM
 from warpspace.app.viewport.layers.adding import light_scene
+from warpspace.app.viewport.layers.annotations import AnnotationsLayer, LabelsLayer
 from warpspace.app.viewport.layers.asked_point import AskedPointLayer
 from warpspace.app.viewport.layers.axes import AxesLayer, axes_room_mm
 from warpspace.app.viewport.layers.box import BoxLayer, OtherSideLayer
@@ -36,7 +52,13 @@ from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
 from warpspace.machine.errors import ErrorFunction
 from warpspace.picture.model import choose_scale
-from warpspace.picture.words import convention_words, own_axes, reference_words, spell_point
+from warpspace.picture.words import (
+    convention_words,
+    own_axes,
+    reference_words,
+    spell_factor,
+    spell_point,
+)
 from warpspace.resources import __version__
 from warpspace.scene.model import Scene
 
@@ -46,6 +68,15 @@ POLICY = (
     " connect-src data: blob:; worker-src blob: data:; frame-src 'self'"
 )
 """What the browser may load: what is in the file, and nothing else."""
+LAYERS = (
+    TracesLayer,
+    AxesLayer,
+    OtherSideLayer,
+    AskedPointLayer,
+    AnnotationsLayer,
+    LabelsLayer,
+)
+FEW = 12  # errors that are listed at once
 ASPECT = 1.5
 MARGIN = 1.3  # room around the box, for the axes beside it
 
@@ -75,43 +106,28 @@ def offline_picture(
     )
 
 
-def build_scene_html(
-    picture: LivePicture, aspect: float = ASPECT, camera: CameraMemory | None = None
-) -> str:
+def build_scene_html(picture: LivePicture, camera: CameraMemory | None = None) -> str:
     """Export the 3-D scene of a picture as a page of its own, without a word around it."""
     with contextlib.redirect_stdout(io.StringIO()):  # the server says hello and goodbye
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         try:
             light_scene(server.scene)
-            for layer in (BoxLayer, TracesLayer, AxesLayer, OtherSideLayer, AskedPointLayer):
+            BoxLayer(server.scene, picture)
+            for layer in LAYERS:
                 layer(server.scene, picture)
-            if camera is None:
-                _place_camera(server, picture, aspect)
-            else:
-                _keep_camera(server, camera)
+            kept, first = camera or _fitted(picture), server.initial_camera
+            first.up, first.fov = kept.up, kept.fov_rad
+            first.position, first.look_at = kept.position, kept.look_at
             return server.scene.as_html(dark_mode=picture.state.shown.dark)
         finally:
             server.stop()
 
 
-def _place_camera(server: viser.ViserServer, picture: LivePicture, aspect: float) -> None:
+def _fitted(picture: LivePicture) -> CameraMemory:
     drawn = np.concatenate([picture.grid.nominal_mm, picture.drawn_mm]).reshape(-1, 3)
     if is_thin(picture.shape):
         drawn = np.concatenate([drawn, axes_room_mm(picture)])
-    pose = fit_camera(drawn, aspect, margin=MARGIN)
-    camera = server.initial_camera
-    camera.up = (0.0, 0.0, 1.0)
-    camera.fov = pose.fov_rad
-    camera.position = pose.position * SCENE_PER_MM
-    camera.look_at = pose.look_at * SCENE_PER_MM
-
-
-def _keep_camera(server: viser.ViserServer, kept: CameraMemory) -> None:
-    camera = server.initial_camera
-    camera.up = kept.up
-    camera.fov = kept.fov_rad
-    camera.position = kept.position
-    camera.look_at = kept.look_at
+    return fit_camera(drawn, ASPECT, margin=MARGIN).drawn
 
 
 def build_offline_html(
@@ -125,23 +141,51 @@ def build_offline_html(
     conditions = list(picture_conditions(picture))
     about = {**(provenance or {}), **({"conditions": conditions} if conditions else {})}
     stored = json.dumps(about, ensure_ascii=False, allow_nan=False)
-    templates = Environment(
-        loader=PackageLoader("warpspace.app"), autoescape=True, undefined=StrictUndefined
+    template = Template(
+        files("warpspace.app.documents").joinpath("offline.html").read_text("utf-8")
     )
-    return templates.get_template("offline.html.j2").render(
-        title=picture.title,
+    errors = parameter_rows(picture)
+    counted = "unlike in A and B" if picture.is_difference else "not zero"
+    point = point_words(picture)
+    found = picture.statistics
+    numbers = {"mean": found.mean_um, "RMS": found.rms_um, "P95": found.p95_um, "max": found.max_um}
+    return template.substitute(
+        title=escape(picture.title),
         program=f"warpspace {__version__}",
         policy=POLICY,
-        style=Markup(style_sheet()),  # noqa: S704 - ours
-        heading=Markup(legend.heading(picture)),  # noqa: S704 - escaped where it is built
-        summary=Markup(legend.summary(picture)),  # noqa: S704
-        scene=Markup(inner),  # noqa: S704
-        parameters=parameter_rows(picture),
-        counted="unlike in A and B" if picture.is_difference else "not zero",
-        point=point_words(picture),
-        remarks=remarks(picture),
-        provenance=Markup(stored.replace("<", "\\u003c")),  # noqa: S704
-    )
+        heading=join(tag("p", words) for words in heading_words(picture)),
+        legend=legend_html(picture),
+        numbers=tag("b", lowered(f"{picture.length_words} over the volume"))
+        + rows((name, f"{number(value, 2)} µm") for name, value in numbers.items()),
+        scene=inner,
+        point=tag("p", point, class_="point") if point else "",
+        errors=fill(
+            "<details{open}><summary>{count} {counted}</summary><table>{rows}</table></details>",
+            open=attributes(open=len(errors) <= FEW),
+            count=f"{len(errors)} error{'' if len(errors) == 1 else 's'}", counted=counted,
+            rows=join(tag("tr", join(map(_cell, row.values()))) for row in errors),
+        ),
+        remarks=join(tag("span", words) for words in remarks(picture)),
+        provenance=stored.replace("<", "\\u003c"),
+    )  # fmt: skip
+
+
+def _cell(text: str) -> Markup:
+    return tag("td", text)
+
+
+def heading_words(picture: LivePicture) -> list[str]:
+    """Say numbers, place of the max, limit, machine, factor, and what is unlike the scene."""
+    state, grid = picture.drawn_state, picture.grid
+    size = " × ".join(f"{edge:.0f}" for edge in grid.extent_mm)
+    kept = "" if picture.is_difference else f" · {kept_words(picture)[0]}"
+    machine, nodes = state.scene.machine, thousands(picture.field.norm_um.size)
+    about = f"{machine.title}, chain {machine.chain} · {size} mm · {nodes} nodes"
+    return [
+        f"{numbers_words(picture)} {place_words(picture)}{kept}",
+        f"{about} · exaggeration {spell_factor(picture.exaggeration)}",
+        *(word for word in subject_words(picture) if word != picture.title),
+    ]
 
 
 def parameter_rows(picture: LivePicture) -> list[dict[str, str]]:

@@ -7,6 +7,7 @@ differs from it, or the whole file, packed.
 
 import base64
 import binascii
+import math
 import re
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -14,23 +15,18 @@ from dataclasses import replace
 from urllib.parse import parse_qsl, urlencode
 
 from warpspace.app.documents.files import LONGEST_NAME, safe_name
-from warpspace.app.documents.view_settings import (
-    MAX_FIELDS,
-    camera_of,
-    comparison_line,
-    settings_line,
-    with_comparison,
-    with_settings,
-)
-from warpspace.app.documents.view_settings import PREFIX as COMPARISON
+from warpspace.app.evaluation.compare import plain_state, scene_side
 from warpspace.app.evaluation.resulting_scene import scene_of
 from warpspace.app.evaluation.scene_edits import same_shape
 from warpspace.app.state.app_state import AppState, start_state
-from warpspace.app.state.comparison import NOBODY, PRESENT
+from warpspace.app.state.comparison import BEFORE, NOBODY, PRESENT, SHOWN, Comparison, Side
+from warpspace.app.state.leaf import Leaf, Unreadable
+from warpspace.app.state.tree import leaves, set_leaf, spell_value, stored
 from warpspace.app.viewport.camera import CameraMemory
 from warpspace.exceptions import OptionError
 from warpspace.machine.limits import MAX_PACKED_TEXT
 from warpspace.resources import __version__
+from warpspace.scene.files import parse_number
 from warpspace.scene.library import load_scene, parse_scene, scene_names
 from warpspace.scene.machines import load_machine, machine_names
 from warpspace.scene.model import Scene
@@ -189,9 +185,7 @@ def _read_link(link: str, find: Find) -> tuple[AppState, CameraMemory | None]:
     scene = find(name)
     if scene is None:
         raise OptionError(f"the link names the scene {name[:LONGEST_NAME]!r}, which is not here")
-    line = urlencode(
-        [(k, v) for k, v in pairs.items() if k != SCENE and not k.startswith(COMPARISON)]
-    )
+    line = urlencode([(k, v) for k, v in pairs.items() if k != SCENE and not k.startswith(PREFIX)])
     return with_settings(start_state(scene), line), camera_of(line)
 
 
@@ -270,3 +264,163 @@ class SceneList(Mapping[str, Scene]):
 def dropped_words(title: str) -> str:
     """Say that a scene has left the list."""
     return f"The newest {MOST_OPENED} opened scenes are kept; {title} left the list."
+
+
+# --- How a scene is looked at as one line of text -------------------------------------------------
+# A query string (``loop=relative&B=30&look.surface=cut``) with only what differs from the scene as
+# opened. Reading it trusts nothing: every value passes the pure updates of the state, what cannot
+# be read is left out and named.
+
+MAX_LENGTH = 16_000
+MAX_FIELDS = 400
+CAMERA = "camera"
+CAMERA_NUMBERS = 10
+FARTHEST = 1000.0  # farthest place of a camera, in units of the drawing
+FOV_RAD = (0.01, 2.5)
+
+
+def settings_line(state: AppState, camera: CameraMemory | None = None) -> str:
+    """Spell how a state is looked at, and its amplitudes, as a query string."""
+    opened = start_state(state.scene)
+    pairs = [
+        (leaf.linked, spell_value(leaf, now))
+        for leaf in leaves(state).values()
+        if leaf.linked and (now := stored(state, leaf.path)) != stored(opened, leaf.path)
+    ]
+    if camera is not None:
+        numbers = (*camera.position, *camera.look_at, *camera.up, camera.fov_rad)
+        pairs.append((CAMERA, ",".join(f"{number:.6g}" for number in numbers)))
+    return urlencode(pairs)
+
+
+def with_settings(state: AppState, line: str) -> AppState:
+    """Apply a line of settings to a state."""
+    unread: list[str] = []
+    known, named = leaves(state), _linked(state)
+    for name, value in _settings(line):
+        if name == CAMERA:
+            continue
+        try:
+            state = set_leaf(state, named[name], value)
+        except (KeyError, Unreadable):
+            unread.append(f"{name}={value}"[:60])
+        if leaves(state) is not known:  # for instance the options of a test
+            known, named = leaves(state), _linked(state)
+    if unread:
+        more = f" and {len(unread) - 4} more" if len(unread) > 4 else ""
+        note = f"settings left out, since they mean nothing here: {', '.join(unread[:4])}{more}"
+        state = replace(state, notes=(*state.notes, note))
+    return state
+
+
+def _linked(state: AppState) -> dict[str, Leaf]:
+    return {leaf.linked: leaf for leaf in leaves(state).values() if leaf.linked}
+
+
+def camera_of(line: str) -> CameraMemory | None:
+    """Read the camera of a line of settings; None where there is none that can be used."""
+    text = dict(_settings(line)).get(CAMERA)
+    if text is None:
+        return None
+    try:
+        numbers = [parse_number(word) for word in text.split(",")]
+    except ValueError:
+        return None
+    if len(numbers) != CAMERA_NUMBERS:
+        return None
+    position, look_at, up = ((n[0], n[1], n[2]) for n in (numbers[:3], numbers[3:6], numbers[6:9]))
+    distance = math.dist(position, look_at)
+    usable = max(map(abs, numbers)) <= FARTHEST and distance > 1e-3 and math.hypot(*up) > 1e-3
+    if not usable or not FOV_RAD[0] <= numbers[9] <= FOV_RAD[1]:
+        return None
+    return CameraMemory(position, look_at, up, numbers[9])
+
+
+def _settings(line: str) -> list[tuple[str, str]]:
+    if len(line) > MAX_LENGTH:
+        return []
+    try:
+        return parse_qsl(line, keep_blank_values=True, max_num_fields=MAX_FIELDS)
+    except ValueError:
+        return []
+
+
+# --- A comparison as one line of text -------------------------------------------------------------
+# What is compared, what is drawn, and what was pinned.
+#
+# A side that is a scene, and what was pinned, are spelt as links of their own, so that they come
+# back as they are seen: by the name of a scene that is known, or with all that is in them.
+
+PREFIX = "compare."
+PINNED = "pinned"
+NOW = "now"  # what is steered, in files and links
+TITLE = f"{BEFORE}: "  # what the title of a pinned state begins with
+LONGEST_TITLE = 200
+NAMES = frozenset({"a", "b", "shown", "ghost", PINNED, "a.title", "b.title", "pinned.title"})
+Write = Callable[[AppState], str]
+Read = Callable[[str], AppState]
+
+
+def comparison_line(comparison: Comparison[AppState], write: Write) -> str:
+    """Spell a comparison as a query string."""
+    pairs: list[tuple[str, str]] = []
+    for name, side in (("a", comparison.a), ("b", comparison.b)):
+        if side is None or (name == "a" and side.state is None):
+            continue
+        pairs.append((name, _side_text(side, write)))
+        if side.is_scene and side.state and side.title != scene_side(side.state.scene).title:
+            pairs.append((f"{name}.title", side.title))
+    if comparison.shown != Comparison().shown:
+        pairs.append(("shown", comparison.shown))
+    if not comparison.ghost:
+        pairs.append(("ghost", "0"))
+    pinned = comparison.pinned
+    if pinned is not None and pinned.state is not None:
+        pairs += [(PINNED, write(pinned.state)), ("pinned.title", pinned.title)]
+    return urlencode([(PREFIX + name, value) for name, value in pairs])
+
+
+def _side_text(side: Side[AppState], write: Write) -> str:
+    if side.state is None:
+        return NOW
+    return write(side.state) if side.is_scene else PINNED
+
+
+def with_comparison(state: AppState, pairs: Mapping[str, str], read: Read) -> AppState:
+    """Give a state the comparison that somebody has written down."""
+    given = {k.removeprefix(PREFIX): v for k, v in pairs.items() if k.startswith(PREFIX)}
+    if not given:
+        return state
+    for name in given:
+        if name not in NAMES:
+            raise OptionError(f"the comparison says {name[:30]!r}, which means nothing")
+    pinned = None
+    notes = state.notes
+    if PINNED in given:
+        before = read(given[PINNED])
+        notes = (*notes, *(f"{BEFORE}: {note}" for note in before.notes))
+        plain = replace(plain_state(before), notes=())
+        title = TITLE + given.get("pinned.title", "").removeprefix(TITLE)
+        pinned = Side(title[:LONGEST_TITLE], plain)
+    a, b = (_side(given, name, pinned, read) for name in "ab")
+    shown, ghost = given.get("shown", Comparison().shown), given.get("ghost", "1")
+    if shown not in SHOWN or ghost not in ("0", "1"):
+        raise OptionError("the comparison does not say what is drawn: expected a, b or difference")
+    found = Comparison(a or Side(), b, shown, ghost == "1", pinned)
+    return replace(state, comparison=found, notes=notes)
+
+
+def _side(
+    given: Mapping[str, str], name: str, pinned: Side[AppState] | None, read: Read
+) -> Side[AppState] | None:
+    """Read one side; None where there is none."""
+    text = given.get(name)
+    if text is None or text == NOW:
+        return None if text is None else Side()
+    if text == PINNED:
+        if pinned is None:
+            raise OptionError("the comparison is with a pinned state, but holds none")
+        return pinned
+    side = scene_side(read(text).scene)
+    title = given.get(f"{name}.title", side.title)[:LONGEST_TITLE]
+    return side if title in (NOW, PRESENT, NOBODY, "") else replace(side, title=title)

@@ -3,7 +3,7 @@
 import math
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,7 @@ from warpspace.scene.model import Scene
 
 if TYPE_CHECKING:
     from warpspace.analysis.concepts import Concepts
+    from warpspace.analysis.description import Result
     from warpspace.formats.compensation.compensate import Compensation
 
 
@@ -55,26 +56,18 @@ class Request:
 
 
 @dataclass(frozen=True, slots=True)
-class ConceptRequest:
-    """Machines that are to be drawn side by side."""
+class ReportRequest:
+    """The report that is to be written."""
 
-    scenes: tuple[Scene, ...]
-    plan: "Concepts"  # how they are sampled
+    scenes: tuple[Scene, ...]  # one, or two that are compared
     loop: str
-    dark: bool  # light ink on a dark ground
-    # or None; width and height of each picture where they are wanted alone, one below the other;
-    # None for a sheet with words and numbers
-    strip_px: tuple[int, int] | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class CompensationRequest:
-    """Maps of a compensation that are to be drawn: before, after, and what is left."""
-
-    found: "Compensation"
-    dark: bool  # light ink on a dark ground
-    # whether they are for a column of the page, without title and numbers; else a sheet
-    narrow: bool = False
+    nodes: int  # grid nodes per axis
+    exaggeration: float
+    limit_um: float
+    author: str
+    questions: tuple[str, ...]
+    results: "Mapping[str, Result]"  # of analyses, by heading
+    ending: str  # ".html" or ".pdf"
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,10 +79,17 @@ class Services:
     draw_figure: Callable[[Request, threading.Event], bytes] | None = None
     # takes a request and an ending (".glb", ".csv"); gives the file's content
     write_export: Callable[[Request, str], bytes] | None = None
-    # as `draw_figure`, of machines side by side
-    draw_concepts: Callable[[ConceptRequest, threading.Event], bytes] | None = None
-    # as `draw_figure`, of the maps of a compensation
-    draw_compensation: Callable[[CompensationRequest, threading.Event], bytes] | None = None
+    # as `draw_figure`, of machines side by side: how they are sampled, and whether in dark colours
+    draw_concepts: Callable[[Sequence[Scene], "Concepts", bool, threading.Event], bytes] | None = (
+        None
+    )
+    # as `draw_figure`, of the maps of a compensation: whether in dark colours, and whether for a
+    # column of the page, without title and numbers
+    draw_compensation: Callable[["Compensation", bool, bool, threading.Event], bytes] | None = None
+    # gives a report, and what is missing of it
+    write_report: (
+        Callable[[ReportRequest, threading.Event], tuple[bytes, tuple[str, ...]]] | None
+    ) = None
     # names of the figures of one scene, and what each shows
     figures: tuple[tuple[str, str], ...] = ()
     exports: tuple[tuple[str, str], ...] = ()  # endings of the formats, and what each is for

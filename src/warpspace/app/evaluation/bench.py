@@ -96,7 +96,7 @@ class BenchSource:
 
 def prepare(state: AppState) -> Prepared:
     """Lay the test of a state on its machine."""
-    scene = replace(state.scene, workspace=_standing(state))
+    scene = replace(state.scene, workspace=standing(state))
     kind = find_test(state.bench.name)
     typed = state.bench.options
     named = (one for one in kind.settings() if typed.get(one.name, "").strip())
@@ -111,7 +111,8 @@ def prepare(state: AppState) -> Prepared:
     return Prepared(test, plan, nominal, response)
 
 
-def _standing(state: AppState) -> Workspace:
+def standing(state: AppState) -> Workspace:
+    """Give the working volume with its rotary axes where they stand."""
     workspace = state.scene.workspace
     moved = {
         axis: value

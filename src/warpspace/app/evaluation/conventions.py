@@ -34,10 +34,9 @@ from warpspace.kinematics.model import (
 from warpspace.machine.axes import TravelDirection, axis_parameters, is_linear, parameter
 from warpspace.machine.description import Axis
 from warpspace.machine.errors import ErrorSet, Table
-from warpspace.scene.model import Scene, grid_basis
+from warpspace.scene.model import Scene, evaluate_grid
 from warpspace.units import Array
 
-OWN = "own"  # the scene's own conventions, among the choices that are compared with them
 Reference = Mapping[str, float] | None
 
 
@@ -60,30 +59,11 @@ def reference_spans(scene: Scene) -> dict[str, Span]:
     }
 
 
-def with_component_errors(state: AppState, order: str) -> AppState:
-    """Take another convention for component errors; an unknown name changes nothing."""
-    if order not in convention_names():
-        return state
-    model = replace(state.scene.model, component_errors=order, own_component_errors=())
-    return _with_scene(state, replace(state.scene, model=model))
-
-
 def with_travel(state: AppState, direction: str) -> AppState:
     """Look at errors for another direction of travel; an unknown one changes nothing."""
     if direction not in [*TravelDirection]:
         return state
     model = replace(state.scene.model, direction=TravelDirection(direction))
-    return _with_scene(state, replace(state.scene, model=model))
-
-
-def with_direction(state: AppState, axis: str, direction: int) -> AppState:
-    """Let an axis move with (+1) or against (−1) its name; anything else changes nothing."""
-    machine = state.scene.machine
-    if axis not in machine.axes or direction not in (1, -1):
-        return state
-    turned = replace(machine.axes[axis], direction=direction, direction_given=True)
-    axes = {**machine.axes, axis: turned}
-    model = replace(state.scene.model, machine=replace(machine, axes=axes))
     return _with_scene(state, replace(state.scene, model=model))
 
 
@@ -111,18 +91,23 @@ def with_reference(state: AppState, at: Reference) -> AppState:
 def with_choice(state: AppState, choice: str) -> AppState:
     """Apply a choice as a page spells it, for instance "direction C=-1"; others change nothing."""
     what, _, value = choice.partition("=")
+    model = state.scene.model
     match what.split(" "):
-        case ["component_errors"]:
-            return with_component_errors(state, value)
+        case ["component_errors"] if value in convention_names():
+            changed = replace(model, component_errors=value, own_component_errors=())
+            return _with_scene(state, replace(state.scene, model=changed))
         case ["loop"] if value in [*Loop]:
-            return state.with_loop(value)
+            return replace(state, loop=Loop(value))
         case ["reference"] if value == "absolute":
             return with_reference(state, None)
         case ["reference"] if value == "point":
             own = state.origin.reference or {}
             return with_reference(state, state.scene.reference or own)
-        case ["direction", axis] if value in ("1", "-1"):
-            return with_direction(state, axis, int(value))
+        case ["direction", axis] if value in ("1", "-1") and axis in model.machine.axes:
+            turned = replace(model.machine.axes[axis], direction=int(value), direction_given=True)
+            axes = {**model.machine.axes, axis: turned}
+            changed = replace(model, machine=replace(model.machine, axes=axes))
+            return _with_scene(state, replace(state.scene, model=changed))
         case _:
             return state
 
@@ -180,89 +165,32 @@ def chosen(state: AppState) -> set[str]:
     }
 
 
-class Effects:
-    """Works out what every choice does; keeps the changes of the map for the next amplitudes.
-
-    The first-order model is linear in the amplitudes, so that an amplitude that has moved adds its
-    own part to what is known already. The response to the one that was moved last is kept.
-    """
-
-    def __init__(self) -> None:
-        self._for: tuple[object, ...] = ()
-        self._looks: dict[str, AppState] = {}
-        self._changes: dict[str, Array] = {}
-        self._amplitudes = self._weights = np.zeros(0)
-        self._moved: tuple[str, ...] = ()
-        self._responses: dict[str, Array] = {}
-
-    def of(self, state: AppState) -> dict[str, Effect]:
-        """Compare each choice, taken alone, with the scene's own conventions."""
-        turned = tuple(state.positions.items())
-        needed = (state.origin, state.scene, turned, state.seen, state.nodes)
-        amplitudes = np.fromiter(state.active.values(), float, len(state.amplitudes))
-        if not self._looks or not amplitudes.any() or not _same(needed, self._for):
-            self._for = needed
-            self._begin(state)
-        self._add(amplitudes, tuple(state.amplitudes))
-        found = {choice: Effect(choice, 0.0, 0.0) for choice in choices(state)}
-        for choice, change in self._changes.items():
-            length = np.linalg.norm(change, axis=-1)
-            mean = float(np.sum(self._weights * length))
-            found[choice] = Effect(choice, mean, float(length.max()))
-        return found
-
-    def _begin(self, state: AppState) -> None:
-        own, held = own_state(state), state.scene.reference
-        own_choices = chosen(own)
-        looks = {c: with_choice(own, c) for c in choices(state) if c not in own_choices}
-        if held is not None:
-            looks["reference=point"] = with_reference(own, held)
-        self._looks = {OWN: own, **looks, "all": state}
-        self._weights = _grid(own).weights
-        shape = (*self._weights.shape, 3)
-        self._changes = {choice: np.zeros(shape) for choice in self._looks if choice != OWN}
-        self._amplitudes = np.zeros(len(state.amplitudes))
-        self._moved, self._responses = (), {}
-
-    def _add(self, amplitudes: Array, keys: tuple[str, ...]) -> None:
-        """Add what the amplitudes that have moved change, [K], µm or µrad."""
-        steps = amplitudes - self._amplitudes
-        indices = np.flatnonzero(steps)
-        moved = tuple(keys[index] for index in indices)
-        if not moved:
-            return
-        if moved != self._moved:
-            self._moved, self._responses = moved, {}
-        parts: dict[str, Array] = {}
-        for choice, look in self._looks.items():
-            response = self._responses.get(choice)
-            if response is None:
-                response = _response(look, moved)
-            if len(moved) == 1:
-                self._responses[choice] = response
-            parts[choice] = np.tensordot(steps[indices], response, axes=1)
-        for choice in self._changes:
-            self._changes[choice] = self._changes[choice] + parts[choice] - parts[OWN]
-        self._amplitudes = amplitudes
-
-
-def own_state(state: AppState) -> AppState:
-    """Give the state with the conventions of its scene: order, reference, directions and loop."""
-    return replace(with_own_conventions(state), loop=start_loop(state.origin))
-
-
-def _same(new: tuple[object, ...], old: tuple[object, ...]) -> bool:
-    return len(new) == len(old) and all(
-        a is b if isinstance(a, Scene) else a == b for a, b in zip(new, old, strict=True)
-    )
+def effects_of(state: AppState) -> dict[str, Effect]:
+    """Work out what each choice, taken alone, does to the map; "all" is what is in force."""
+    own = own_state(state)
+    known, looks = chosen(own), {"all": state}
+    looks |= {c: with_choice(own, c) for c in choices(state) if c not in known}
+    if state.scene.reference is not None:
+        looks["reference=point"] = with_reference(own, state.scene.reference)
+    weights, before = _grid(own).weights, _error(own)
+    found = {choice: Effect(choice, 0.0, 0.0) for choice in known}
+    for choice, look in looks.items():
+        length = np.linalg.norm(_error(look) - before, axis=-1)
+        found[choice] = Effect(choice, float(np.sum(weights * length)), float(length.max()))
+    return found
 
 
 def _grid(state: AppState) -> Grid:
     return build_grid(state.scene.model, state.scene.workspace.moved(state.positions), state.nodes)
 
 
-def _response(state: AppState, keys: tuple[str, ...]) -> Array:
-    return grid_basis(state.scene, _grid(state), state.view(), keys).position
+def _error(state: AppState) -> Array:
+    return evaluate_grid(active_scene(state), _grid(state), state.view()).error_um
+
+
+def own_state(state: AppState) -> AppState:
+    """Give the state with the conventions of its scene: order, reference, directions and loop."""
+    return replace(with_own_conventions(state), loop=start_loop(state.origin))
 
 
 # --- What it would cost if errors had been measured in another convention than is read ------------

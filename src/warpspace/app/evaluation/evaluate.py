@@ -31,6 +31,7 @@ from warpspace.scene.model import grid_basis
 from warpspace.units import Array
 
 CACHE_BYTES = 400_000_000
+KEPT = 0.27  # place of the colour of what keeps the limit, on the scale of signed values
 TRACE_SAMPLES = 73  # points along a trace: every five degrees of a turn
 
 
@@ -113,10 +114,35 @@ class LiveModel:
         )
 
 
+@dataclass(frozen=True)
+class PassFail(ColourScale):
+    """Two colours: what keeps a limit, and what does not."""
+
+    limit: float = 0.0
+
+    @classmethod
+    def of(cls, scale: ColourScale, limit: float) -> "PassFail":
+        """Tell apart what a limit tells apart, within the ends of a scale."""
+        top = max(scale.high, limit)
+        return cls(0.0, top, diverging=True, label=scale.label, unit=scale.unit, limit=limit)
+
+    def fraction(self, values: Array) -> Array:
+        """Place values on the scale: near its low end, or near its high one."""
+        return np.where(np.asarray(values) > self.limit, 1.0 - KEPT, KEPT)
+
+    @property
+    def ticks(self) -> tuple[float, ...]:
+        """The limit: where its isoline runs."""
+        return (self.low, self.limit, self.high)
+
+
 def _chosen_colours(state: AppState, field: ErrorField, basis: ErrorBasis) -> ColourScale | None:
     """Give the colours that a user has chosen: fixed, or shared; None for round ends."""
     quantity, component = state.look.quantity, state.component
     values = coloured_values(field, component, quantity)
+    if state.look.pass_fail and quantity == "position" and component == "norm":
+        limit = state.specification.limit_um
+        return PassFail.of(choose_scale([values], component), limit)
     if state.look.range_mode == "fixed":
         return choose_scale([values], component, quantity, end=state.look.range_top)
     if state.look.range_mode == "shared":

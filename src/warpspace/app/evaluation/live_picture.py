@@ -62,13 +62,6 @@ class LivePicture(Picture):
         """Name of what is drawn: the scene, or a side of a comparison, or the difference."""
         return self.state.scene.title if self.compared is None else self.compared.title
 
-    @property
-    def is_steered(self) -> bool:
-        """Whether what is drawn is what the sliders move, not what that is compared with."""
-        chosen = self.state.comparison
-        side = {"a": chosen.a, "b": chosen.b}.get(self.compared.shown) if self.compared else None
-        return self.compared is None or (side is not None and side.state is None)
-
     def both_words(self, word: Callable[[AppState], str]) -> str:
         """Say something of what is drawn; of a difference for both sides where they differ."""
         if self.compared is None or not self.is_difference:

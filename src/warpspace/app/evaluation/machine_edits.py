@@ -13,7 +13,7 @@ from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.edits import curve_of
 from warpspace.app.state.look import linear_spans
-from warpspace.app.state.ranges import Span, amplitude_span, position_spans
+from warpspace.app.state.ranges import Span, position_spans
 from warpspace.app.state.typed_numbers import read_typed
 from warpspace.exceptions import WarpspaceError
 from warpspace.machine.axes import parameter
@@ -53,7 +53,7 @@ def with_guide_error(state: AppState, axis: str, index: int, value_um: float) ->
     for key, amplitude in ((gantry.positioning_key, mean), (gantry.rotation_key, rotation)):
         if edits.curve_of(state, key).amplitude == 0.0:  # it takes the curve of the other one
             state = edits.with_curve(state, key, shape)
-        state = edits.with_typed_amplitude(state, key, amplitude)
+        state = state.with_amplitude(key, amplitude)
     return state
 
 
@@ -63,7 +63,7 @@ def with_same_guides(before: AppState, state: AppState, axis: str) -> AppState:
     if was is None or now is None or was.rotation_key != now.rotation_key:
         return state
     turned = state.amplitudes[now.rotation_key] * now.rotation_weight / was.rotation_weight
-    return edits.with_typed_amplitude(state, now.rotation_key, turned)
+    return state.with_amplitude(now.rotation_key, turned)
 
 
 def _shape(state: AppState, gantry: Gantry) -> ErrorFunction:
@@ -126,14 +126,18 @@ def library_scene(name: str) -> Scene | None:
 T = TypeVar("T")
 Edit = Callable[[Scene], Edited]
 SHOWN = 30  # characters of what was typed that a message repeats
-NUMBERS: Mapping[str, Callable[[Scene, str, int, float], Edited]] = {
-    "offset": scene_edits.change_offset,
-    "rotation": scene_edits.change_rotation,
-    "travel": scene_edits.change_travel,
-    "volume": scene_edits.change_volume,
-    "span": lambda scene, axis, _, value: scene_edits.change_span(scene, axis, value),
+NUMBERS = frozenset({"offset", "rotation", "travel", "volume", "span"})
+OF_FRAME: Mapping[str, Callable[[Scene, str], Edited]] = {
+    "left": lambda scene, axis: scene_edits.move_axis(scene, axis, -1),
+    "right": lambda scene, axis: scene_edits.move_axis(scene, axis, 1),
+    "side": scene_edits.switch_side,
+    "remove": scene_edits.remove_axis,
+    "turn": scene_edits.reverse,
+    "gantry": scene_edits.switch_gantry,
+    "across": scene_edits.turn_gantry,
+    "mesh": scene_edits.remove_mesh,
 }
-"""What is set by a frame, the number of an entry, and a value."""
+"""What can be done with a frame of a machine, by its word."""
 UNCHANGED = "the machine stays as it was"
 
 
@@ -142,13 +146,13 @@ def with_edit(state: AppState, edit: Edit) -> AppState:
     try:
         edited = edit(state.scene)
     except WarpspaceError as problem:
-        return _noted(state, f"{problem}; {UNCHANGED}")
+        return _noted(state, f"{str(problem).removeprefix('machine: ')}; {UNCHANGED}")
     if edited.scene == state.scene:
         return _noted(state, *edited.notes)
     try:
         changed = with_changed_scene(state, edited.scene)
     except WarpspaceError as problem:
-        return _noted(state, f"{problem}; {UNCHANGED}")
+        return _noted(state, f"{str(problem).removeprefix('machine: ')}; {UNCHANGED}")
     return _noted(changed, *edited.notes)
 
 
@@ -175,16 +179,13 @@ def with_changed_scene(state: AppState, scene: Scene) -> AppState:
         )
         for axis, span in ranges.items()
     }
-    spans = {key: _span(state, scene, key, amplitudes[key]) for key in keys}
     same_axes = scene.machine.chain == state.scene.machine.chain
     changed = replace(
         state,
         scene=scene,
         loaded=loaded,
         amplitudes=amplitudes,
-        spans=spans,
         positions=positions,
-        position_spans=ranges,
         exclusions=state.exclusions.within(keys),
         tolerances=ToleranceSet(state.tolerances.default, kept),
         specification=replace(
@@ -234,14 +235,6 @@ def _amplitude(state: AppState, scene: Scene, key: str) -> float:
     if present == was.amplitude:
         return now.amplitude
     return now.amplitude * curve_of(state, key).amplitude / was.amplitude
-
-
-def _span(state: AppState, scene: Scene, key: str, amplitude: float) -> Span:
-    """Give the range of a slider: the present one, unless the amplitude lies beyond."""
-    known = state.spans.get(key)
-    if known is not None and _within(amplitude, known):
-        return known
-    return amplitude_span(key, amplitude, scene.tolerances.get(key))
 
 
 def with_own_machine(state: AppState) -> AppState:
@@ -301,24 +294,8 @@ def with_word(state: AppState, word: str) -> AppState:
     match what, words:
         case "chain", _:
             return with_edit(state, lambda scene: scene_edits.change_chain(scene, rest))
-        case (("left" | "right"), [axis]):
-            return with_edit(state, lambda scene: scene_edits.move_axis(scene, axis, what))
-        case "side", [axis]:
-            return with_edit(state, lambda scene: scene_edits.switch_side(scene, axis))
-        case "remove", [axis]:
-            return with_edit(state, lambda scene: scene_edits.remove_axis(scene, axis))
-        case "turn", [axis] if axis in state.scene.machine.axes:
-            against = -state.scene.machine.axes[axis].direction
-            return with_edit(state, lambda s: scene_edits.change_direction(s, axis, against))
-        case "type", [name]:
-            library = library_scene(name)
-            return state if library is None else with_library_scene(state, library)
-        case "gantry", [axis]:
-            return with_edit(state, lambda scene: scene_edits.switch_gantry(scene, axis))
-        case "across", [axis]:
-            return with_edit(state, lambda scene: scene_edits.turn_gantry(scene, axis))
-        case "mesh", [frame]:
-            return with_edit(state, lambda scene: scene_edits.remove_mesh(scene, frame))
+        case _, [frame] if what in OF_FRAME:
+            return with_edit(state, lambda scene: OF_FRAME[what](scene, frame))
         case "guide", [axis, ("0" | "1") as guide, typed] if axis in state.scene.machine.gantries:
             return _with_guide(state, axis, int(guide), typed)
         case "sizes", [""]:
@@ -337,8 +314,8 @@ def _with_number(state: AppState, what: str, frame: str, entry: int, typed: str)
     value = read_typed(typed, unit)
     if value is None:
         return _no_number(state, f"{what} of {frame}", typed, unit)
-    change = NUMBERS[what]
-    changed = with_edit(state, lambda scene: change(scene, frame, entry, value))
+    change = scene_edits.change_number
+    changed = with_edit(state, lambda scene: change(scene, what, frame, entry, value))
     return with_same_guides(state, changed, frame) if what == "span" else changed
 
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.edits import curve_of
+from warpspace.app.state.specification import START_UM
 from warpspace.machine.errors import ErrorSet
 from warpspace.scene.model import Scene
 
@@ -19,6 +20,7 @@ def scene_of(state: AppState) -> Scene:
         for axis, value in state.positions.items()
         if value != scene.workspace.positions.get(axis)
     }
+    limit = state.specification.limit_um
     return replace(
         scene,
         errors=ErrorSet({key: curve_of(state, key) for key in keys}),
@@ -26,6 +28,7 @@ def scene_of(state: AppState) -> Scene:
         tolerances=state.tolerances,
         exaggeration=state.exaggeration,
         placed=state.placed,
+        limit_um=None if scene.limit_um is None and limit == START_UM else limit,
     )
 
 

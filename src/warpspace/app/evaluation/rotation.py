@@ -1,13 +1,18 @@
 """Which axis is played, and where the traced points are while it turns."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpspace.analysis.axis_motion import AxisMotion, assemble_motion
+from warpspace.analysis.axis_motion import AxisMotion, assemble_motion, fit_circle
 from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.evaluation.machine import standing
 from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.state.app_state import AppState
+from warpspace.geometry.traces import Trace
+from warpspace.kinematics import transforms
+from warpspace.kinematics.chain import branch_pose
+from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.picture.traces import (
     TraceLine,
     evaluate_axis_motion,
@@ -15,7 +20,8 @@ from warpspace.picture.traces import (
     name_trace,
     trace_lines,
 )
-from warpspace.units import Array
+from warpspace.picture.words import spell_point
+from warpspace.units import MM_PER_UM, URAD_PER_RAD, Array
 
 
 def played_axis(state: AppState) -> str | None:
@@ -105,3 +111,82 @@ def motion_of(picture: LivePicture, line: TraceLine) -> AxisMotion | None:
 def _of_state(state: AppState, line: TraceLine) -> AxisMotion | None:
     scene = active_scene(state)
     return evaluate_axis_motion(replace(scene, trace_points_mm=(line.trace.point_mm,)), line)
+
+
+# --- The traces of a picture as numbers: how each circle runs -------------------------------------
+
+MOST_ROWS = 40
+_SMALLEST_MM = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class CircleDeviation:
+    """How the trace of a point differs from its nominal circle or arc."""
+
+    radius_mm: float  # nominal radius
+    centre_um: float  # displacement of the centre in the plane of the circle
+    radial_um: float  # peak to valley of the radial error once centre and radius are fitted
+    axial_um: float  # peak to valley of the axial error once offset and tilt are fitted
+    axial_offset_um: float  # mean displacement along the axis
+    tilt_urad: float  # tilt of the plane of the trace
+
+
+def circle_deviation(nominal_mm: Array, error_um: Array) -> CircleDeviation:
+    """Take the error of a trace, [n, 3], µm, apart into displacement, tilt and what remains.
+
+    The nominal points, [n, 3], mm, lie on a circle or arc in order, at least five and not all in
+    one line.
+
+    Notes
+    -----
+    Least squares of ``1, cos θ, sin θ`` to the radial and to the axial error; first order in
+    error/radius.
+    """
+    centre_mm, radius, normal = fit_circle(nominal_mm)
+    outwards = (nominal_mm - centre_mm) / radius
+    first = outwards[0]
+    angle = np.arctan2(outwards @ np.cross(normal, first), outwards @ first)
+    harmonic = np.stack([np.ones_like(angle), np.cos(angle), np.sin(angle)], -1)
+    radial = np.sum(error_um * outwards, axis=-1)
+    axial = error_um @ normal
+    around, *_ = np.linalg.lstsq(harmonic, radial, rcond=None)
+    along, *_ = np.linalg.lstsq(harmonic, axial, rcond=None)
+    return CircleDeviation(
+        radius,
+        float(np.hypot(*around[1:])),
+        float(np.ptp(radial - harmonic @ around)),
+        float(np.ptp(axial - harmonic @ along)),
+        float(along[0]),
+        float(np.hypot(*along[1:]) * MM_PER_UM / radius * URAD_PER_RAD),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class CircleRow:
+    """One trace in numbers; `deviation` is None where the point lies on the axis.
+
+    `place` says where its point is while the rotary axes stand as they do.
+    """
+
+    trace: Trace
+    deviation: CircleDeviation | None
+    place: str = ""
+
+
+def circle_rows(picture: LivePicture) -> list[CircleRow]:
+    """Take the errors of all traces of a picture apart."""
+    rows: list[CircleRow] = []
+    for line in trace_lines(picture.traces):
+        spread = float((line.nominal_mm.max(axis=0) - line.nominal_mm.min(axis=0)).max())
+        found = circle_deviation(line.nominal_mm, line.error_um) if spread > _SMALLEST_MM else None
+        rows.append(CircleRow(line.trace, found, _place(picture, line)))
+    return rows[:MOST_ROWS]
+
+
+def _place(picture: LivePicture, line: TraceLine) -> str:
+    state = picture.drawn_state
+    axes, _ = standing(state, {})
+    side = "workpiece" if line.loop is Loop.WORKPIECE else "tool"
+    pose = branch_pose(state.scene.model, side, complete_coordinates(state.scene.machine, axes))
+    point_mm = transforms.apply(pose, np.asarray(line.trace.point_mm))
+    return spell_point({name: axes[name] for name in state.positions}, point_mm)

@@ -1,11 +1,10 @@
 """Changes of the machine of a scene: pure functions from one valid scene to another one."""
 
-import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
-from warpspace.exceptions import ChainError, OptionError, UnknownNameError
+from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.field.grid import Workspace, find_volume_axes
 from warpspace.machine import limits
 from warpspace.machine.axes import direction_index, is_linear, parameter
@@ -169,124 +168,69 @@ def _left_out(scene: Scene, gone: Collection[str]) -> list[str]:
     return notes
 
 
-# --- Numbers of a machine and of its working volume -----------------------------------------------
-
-ENDS = ("lower", "upper")
-DIRECTIONS = ("x", "y", "z")
+# --- Numbers of a machine and of its working volume: what may be is what a file may hold ----------
 
 
-def change_offset(scene: Scene, frame: str, index: int, value: float) -> Edited:
-    """Set one coordinate of the origin of a frame in the frame before it."""
-    what = f"offset of {frame} along {_named(index, DIRECTIONS)}"
-    kept, notes = _clamped(what, value, limits.MAX_LENGTH_MM, "mm")
-    return _with_place(scene, frame, ("offset_mm", "fixed_mm"), index, kept, notes)
+def change_number(scene: Scene, what: str, frame: str, index: int, value: float) -> Edited:
+    """Set an entry of the offset, rotation, travel or volume of a frame, or a gantry's span."""
+    machine = scene.machine
+    if what in ("offset", "rotation"):
+        unit = "mm" if what == "offset" else "deg"
+        return _with_place(scene, f"{what}_{unit}", f"fixed_{unit}", frame, (index, value))
+    if what == "span":
+        return _with_gantry(scene, frame, replace(_gantry(scene, frame), span_mm=value))
+    axis = machine.axis(frame)
+    if what == "travel":
+        return _with_axis(scene, replace(axis, travel=_with_entry(axis.travel, index, value)))
+    ends = _with_entry(scene.workspace.ranges[frame], index, value)
+    workspace = Workspace({**scene.workspace.ranges, frame: ends})
+    return _checked(scene, replace(scene, workspace=workspace))
 
 
-def change_rotation(scene: Scene, frame: str, index: int, value: float) -> Edited:
-    """Set one angle of the fixed rotation of a frame against the frame before it."""
-    what = f"rotation of {frame} about {_named(index, DIRECTIONS)}"
-    kept, notes = _clamped(what, value, limits.FULL_TURN_DEG, "°")
-    return _with_place(scene, frame, ("rotation_deg", "fixed_deg"), index, kept, notes)
-
-
-def change_travel(scene: Scene, axis: str, end: int, value: float) -> Edited:
-    """Set one end of the travel of an axis."""
+def reverse(scene: Scene, axis: str) -> Edited:
+    """Let an axis move against its name, or with it again."""
     present = scene.machine.axis(axis)
-    what = f"{_named(end, ENDS)} end of the travel of {axis}"
-    kept, notes = _clamped(what, value, limits.MAX_LENGTH_MM, present.unit)
-    low, high = _with_entry(present.travel, end, kept)
-    if high - low < limits.MIN_SPAN:
-        raise OptionError(
-            f"travel of {axis} {low:g} … {high:g} {present.unit}; expected the lower end below the"
-            " upper"
-        )
-    return _with_axis(scene, replace(present, travel=(low, high)), notes)
+    turned = replace(present, direction=-present.direction, direction_given=True)
+    return _with_axis(scene, turned)
 
 
-def change_direction(scene: Scene, axis: str, direction: int) -> Edited:
-    """Let an axis move with (+1) or against (−1) its name."""
-    present = scene.machine.axis(axis)
-    if direction not in (1, -1):
-        raise OptionError(f"direction of {axis} {direction}; expected 1 or −1")
-    return _with_axis(scene, replace(present, direction=direction, direction_given=True))
-
-
-def change_volume(scene: Scene, axis: str, end: int, value: float) -> Edited:
-    """Set one end of the range of an axis in the working volume."""
-    unit = scene.machine.axis(axis).unit
-    what = f"{_named(end, ENDS)} end of {axis} in the working volume"
-    kept, notes = _clamped(what, value, limits.MAX_LENGTH_MM, unit)
-    low, high = _with_entry(scene.workspace.ranges[axis], end, kept)
-    if low > high or 0.0 < high - low < limits.MIN_SPAN:
-        raise OptionError(
-            f"working volume of {axis} {low:g} … {high:g} {unit}; expected the lower end below the"
-            " upper, or both equal where the axis stands still"
-        )
-    workspace = Workspace({**scene.workspace.ranges, axis: (low, high)})
-    return _checked(scene, replace(scene, workspace=workspace), notes)
-
-
-def _with_place(
-    scene: Scene,
-    frame: str,
-    tables: tuple[str, str],
-    index: int,
-    value: float,
-    notes: tuple[str, ...],
-) -> Edited:
+def _with_place(scene: Scene, own: str, fixed: str, frame: str, entry: tuple[int, float]) -> Edited:
     """Change one entry of the offset or the rotation of an axis or of a fixed frame."""
-    machine, (own, fixed) = scene.machine, tables
+    machine = scene.machine
     if frame in machine.axes:
         axis = machine.axes[frame]
-        return _with_axis(
-            scene, replace(axis, **{own: _with_entry(getattr(axis, own), index, value)}), notes
-        )
+        return _with_axis(scene, replace(axis, **{own: _with_entry(getattr(axis, own), *entry)}))
     if frame not in FIXED_FRAMES:
         raise UnknownNameError("frame", frame, (*machine.axes, *FIXED_FRAMES))
     present = getattr(machine, fixed)
-    entries = {**present, frame: _with_entry(present.get(frame, ORIGIN), index, value)}
+    entries = {**present, frame: _with_entry(present.get(frame, ORIGIN), *entry)}
     kept = {
         name: entries[name]
         for name in FIXED_FRAMES
         if name in entries and (fixed == "fixed_mm" or entries[name] != ORIGIN)
     }
-    return _with_machine(scene, replace(machine, **{fixed: kept}), notes)
+    return _with_machine(scene, replace(machine, **{fixed: kept}))
 
 
-def _with_axis(scene: Scene, axis: Axis, notes: tuple[str, ...] = ()) -> Edited:
+def _with_axis(scene: Scene, axis: Axis) -> Edited:
     axes = {**scene.machine.axes, axis.name: axis}
-    return _with_machine(scene, replace(scene.machine, axes=axes), notes)
+    return _with_machine(scene, replace(scene.machine, axes=axes))
 
 
-def _with_machine(scene: Scene, machine: Machine, notes: tuple[str, ...] = ()) -> Edited:
-    return _checked(scene, replace(scene, model=replace(scene.model, machine=machine)), notes)
+def _with_machine(scene: Scene, machine: Machine) -> Edited:
+    return _checked(scene, replace(scene, model=replace(scene.model, machine=machine)))
 
 
-def _checked(scene: Scene, changed: Scene, notes: tuple[str, ...]) -> Edited:
+def _checked(scene: Scene, changed: Scene) -> Edited:
     """Check a scene, unless nothing has changed."""
-    return Edited(scene, notes) if changed == scene else checked(scene, changed, notes)
+    return Edited(scene) if changed == scene else checked(scene, changed)
 
 
-def _named(index: int, names: tuple[str, ...]) -> str:
-    if index not in range(len(names)):
-        what = "end" if names == ENDS else "direction"
-        raise OptionError(f"{what} {index}; expected 0 to {len(names) - 1} for {', '.join(names)}")
-    return names[index]
-
-
-def _with_entry(entries: Sequence[float], index: int, value: float) -> tuple[float, ...]:
-    return tuple(value if at == index else entry for at, entry in enumerate(entries))
-
-
-def _clamped(what: str, value: float, limit: float, unit: str) -> tuple[float, tuple[str, ...]]:
-    """Bring a number within ± a limit; note that it was not."""
-    if math.isnan(value):
-        raise OptionError(f"{what}: nan; expected a number")
-    kept = min(max(value, -limit), limit)
-    kept = 0.0 if abs(kept) < limits.MIN_NUMBER else kept
-    if value in {kept, 0.0}:
-        return kept, ()
-    return kept, (f"{what} = {value:g} {unit} is beyond ±{limit:g} {unit}; clamped to {kept:g}",)
+def _with_entry(entries: tuple[float, ...], index: int, value: float) -> Any:
+    if index not in range(len(entries)):
+        raise OptionError(f"entry {index}; expected 0 to {len(entries) - 1}")
+    value = 0.0 if abs(value) < limits.MIN_NUMBER else value
+    return (*entries[:index], value, *entries[index + 1 :])
 
 
 # --- What belongs to frames beside their places: two guides of a gantry, meshes of a user ---------
@@ -308,19 +252,6 @@ def switch_gantry(scene: Scene, axis: str) -> Edited:
         if other.is_linear and ACROSS[other.index] == across
     ]
     return _with_gantry(scene, axis, Gantry(axis, max(spans, default=START_SPAN_MM), across))
-
-
-def change_span(scene: Scene, axis: str, value: float) -> Edited:
-    """Set the distance between the guides of a gantry, mm, clamped to what a file may hold."""
-    gantry = _gantry(scene, axis)
-    if math.isnan(value):
-        raise OptionError(f"span of {axis}: nan; expected a number")
-    low, high = limits.GANTRY_SPAN_MM
-    kept = min(max(value, low), high)
-    note = f"span of {axis} = {value:g} mm; expected {low:g} to {high:g} mm, clamped to {kept:g}"
-    return _with_gantry(
-        scene, axis, replace(gantry, span_mm=kept), () if kept == value else (note,)
-    )
 
 
 def turn_gantry(scene: Scene, axis: str) -> Edited:
@@ -353,46 +284,34 @@ def _gantry(scene: Scene, axis: str) -> Gantry:
     return found
 
 
-def _with_gantry(
-    scene: Scene, axis: str, gantry: Gantry | None, notes: tuple[str, ...] = ()
-) -> Edited:
+def _with_gantry(scene: Scene, axis: str, gantry: Gantry | None) -> Edited:
     both = {**scene.machine.gantries, axis: gantry}
     ordered = {name: one for name in scene.machine.axes if (one := both.get(name)) is not None}
-    return _with_machine(scene, replace(scene.machine, gantries=ordered), notes)
+    return _with_machine(scene, replace(scene.machine, gantries=ordered))
 
 
 # --- Another chain, another order, the other side, another machine of the library -----------------
 
-MOST_CHAIN_TEXT = 100  # characters of a chain, as in a file
+MOST_CHAIN_TEXT = 101  # characters of a chain that are read: one more than in a file
 FRAME = "F"
-STEPS = {"left": -1, "right": 1}
-"""Ways in which an axis moves along the written chain: towards the workpiece, towards the tool."""
 
 
 def change_chain(scene: Scene, text: str) -> Edited:
     """Give the machine of a scene another chain as a user has typed it."""
-    if len(text) > MOST_CHAIN_TEXT:
-        raise ChainError(
-            f"chain of {len(text)} characters; expected at most {MOST_CHAIN_TEXT},"
-            " for instance wCBFXYZt"
-        )
-    chain = parse_chain(text)
+    chain = parse_chain(text[:MOST_CHAIN_TEXT])
     if chain == scene.machine.chain:
         return Edited(scene)
     return with_machine(scene, rearranged(scene.machine, chain))
 
 
-def move_axis(scene: Scene, axis: str, way: str) -> Edited:
-    """Move an axis by one place along the written chain; across the frame it changes sides."""
+def move_axis(scene: Scene, axis: str, step: int) -> Edited:
+    """Move an axis along the written chain, by -1 towards the workpiece; across the frame too."""
     scene.machine.axis(axis)
-    if way not in STEPS:
-        raise UnknownNameError("way", way, STEPS)
     places = _places(scene)
     place = places.index(axis)
-    other = place + STEPS[way]
-    if not 0 <= other < len(places):
+    if not 0 <= place + step < len(places):
         return Edited(scene)
-    places[place], places[other] = places[other], places[place]
+    places.insert(place + step, places.pop(place))
     return _placed(scene, places)
 
 

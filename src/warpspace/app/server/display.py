@@ -1,36 +1,38 @@
-"""Everything of a tab that shows the picture: the layers of its drawing and its panels."""
+"""Everything of a tab that shows the picture: layers of its drawing and parts of its page."""
 
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 
+from warpspace.app.browser.events import Event
+from warpspace.app.browser.page import Page
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.panels import Deferred, Panel, Resting, Selective
 from warpspace.app.state.app_state import AppState
+from warpspace.app.state.store import Update
+from warpspace.app.tasks.parts import Part
+from warpspace.app.tasks.window import Window
 from warpspace.app.viewport.layers import Layer
 
-SETTLE_S = 0.1
-"""Pause in the changes after which charts follow: longer than between two moves of a drag."""
-LONGEST_SETTLE_S = 0.4  # charts lag no longer than this behind while a slider is being dragged
-REST_S = 0.5  # pause after which the slowest panels follow; a drag does not pay for them
+PAUSE_S = 0.1
+"""Pause in the changes after which parts follow: longer than between two moves of a drag."""
+LONGEST_PAUSE_S = 0.4  # what follows in a pause lags no longer than this while a slider is dragged
+REST_S = 0.5  # pause after which the slowest parts follow; a drag does not pay for them
 
 
 class Display:
-    """Layers and panels of one tab; none at first."""
+    """Layers and parts of one tab; none at first."""
 
-    def __init__(self) -> None:
+    def __init__(self, page: Page) -> None:
+        self._page = page
         self.layers: tuple[Layer, ...] = ()
-        self.panels: tuple[Panel, ...] = ()
+        self.parts: dict[str, Part] = {}
+        self._shown: dict[Part, object] = {}
         self._state: AppState | None = None
-        self._unsettled_since: float | None = None
-        # isinstance of a protocol is slow: asked once, not on every slider move
-        self._selective: dict[Layer | Panel, Selective] = {}
-        self._deferred: list[Deferred] = []
-        self._resting: list[Resting] = []
-        self._restless_since: float | None = None
-        self._waiting: deque[Callable[[LivePicture], None]] = deque()
-        self._concerned: dict[Layer | Panel, tuple[object, ...]] = {}
+        self._changed_at: float | None = None
+        self._rest_from: float | None = None
+        self._waiting: deque[Part] = deque()
+        self._picture: LivePicture | None = None
 
     @property
     def state(self) -> AppState | None:
@@ -38,69 +40,102 @@ class Display:
         return self._state
 
     def add(
-        self, picture: LivePicture, layers: Sequence[Layer] = (), panels: Sequence[Panel] = ()
+        self, picture: LivePicture, layers: Sequence[Layer] = (), parts: Sequence[Part] = ()
     ) -> None:
-        """Add parts that have just been built."""
-        for panel in panels:
-            panel.show(picture)
-        self.layers, self.panels = (*self.layers, *layers), (*self.panels, *panels)
-        for part in (*layers, *panels):
-            if isinstance(part, Selective):
-                self._selective[part] = part
-                self._concerned[part] = part.concerns(picture)
-        self._deferred += [panel for panel in panels if isinstance(panel, Deferred)]
-        self._resting += [panel for panel in panels if isinstance(panel, Resting)]
-        self._state = picture.state
-        self._unsettle()
+        """Add what has just been built, and write its pieces."""
+        self.layers = (*self.layers, *layers)
+        self.parts |= {part.name: part for part in parts}
+        self._write(parts, picture)
+        self._note(picture)
 
     def show(self, picture: LivePicture, *, anew: bool = False) -> None:
-        """Show a picture; charts follow when changes pause."""
-        self._state = picture.state
-        for part in (*self.layers, *self.panels):
-            selective = self._selective.get(part)
-            if selective is None:
-                part.show(picture)
-                continue
-            concerned = selective.concerns(picture)
-            if anew or self._concerned.get(part) != concerned:
-                self._concerned.pop(part, None)
-                part.show(picture)
-                self._concerned[part] = concerned
-        self._unsettle()
+        """Show a picture; what is slow follows when changes pause."""
+        for layer in self.layers:
+            layer.show(picture)
+        # a part that has just come into sight is not kept waiting, nor is one that has left it
+        due = [
+            part for part in self.parts.values()
+            if part.follows == "at once" or self._shown.get(part) is None
+            or not part.is_seen(picture.state)
+        ]  # fmt: skip
+        if anew:
+            due = [*self.parts.values()]
+            self._shown |= dict.fromkeys(due)
+        self._write(due, picture)
+        self._note(picture)
 
-    def _unsettle(self) -> None:
-        now = time.monotonic()
-        if self._unsettled_since is None:
-            self._unsettled_since = now
-        if self._resting:
-            self._restless_since = now
+    def _note(self, picture: LivePicture) -> None:
+        self._state, self._picture = picture.state, picture
+        self._rest_from = now = time.monotonic()
+        self._changed_at = self._changed_at or now
+
+    def renew(self, part: Part) -> None:
+        """Write a part anew, since something beside the state has changed; from the session."""
+        if self._picture is not None:
+            self._write([part], self._picture)
+
+    def closed(self) -> None:
+        """Take note that the page has closed its window by itself; the same may be opened again."""
+        self._page.forget("window")
+        windows = [part for part in self.parts.values() if isinstance(part, Window)]
+        self._shown |= dict.fromkeys(windows)
+
+    def _write(self, parts: Iterable[Part], picture: LivePicture) -> None:
+        pieces: dict[str, str] = {}
+        for part in parts:
+            key = _key(part, picture)
+            if key != self._shown.get(part):
+                self._shown[part] = key
+                if key is not None:
+                    pieces |= part.pieces(picture)
+        self._page.put(pieces)
 
     @property
     def pause_s(self) -> float | None:
-        """How long to wait for further changes before charts follow; None where none has to."""
+        """How long to wait for further changes before parts follow; None where none has to."""
         if self._waiting:
             return 0.0
-        if self._unsettled_since is not None:
-            return SETTLE_S
-        since = self._restless_since
+        if self._changed_at is not None:
+            return PAUSE_S
+        since = self._rest_from
         return None if since is None else max(0.0, since + REST_S - time.monotonic())
 
     def is_due(self, *, paused: bool) -> bool:
-        """Tell whether a chart is to follow now."""
+        """Tell whether a part is to follow now."""
         if self._waiting:
             return True
-        since, now = self._unsettled_since, time.monotonic()
+        since, now = self._changed_at, time.monotonic()
         if since is not None:
-            return paused or now - since > LONGEST_SETTLE_S
-        return self._restless_since is not None and now - self._restless_since >= REST_S
+            return paused or now - since > LONGEST_PAUSE_S
+        return self._rest_from is not None and now - self._rest_from >= REST_S
 
     def settle(self, picture: LivePicture, guarded: Callable[[Callable[[], object]], None]) -> None:
-        """Bring the next chart up to date; one at a time, so that a slider never waits for all."""
-        if not self._waiting and self._unsettled_since is not None:
-            self._unsettled_since = None
-            self._waiting.extend(panel.settle for panel in self._deferred)
-        elif not self._waiting:
-            self._restless_since = None
-            self._waiting.extend(panel.rest for panel in self._resting)
-        if self._waiting:
-            guarded(partial(self._waiting.popleft(), picture))
+        """Bring the next part up to date; one at a time, so that a slider never waits for all."""
+        if not self._waiting:
+            follows = "in a pause" if self._changed_at is not None else "at rest"
+            self._rest_from = None if self._changed_at is None else self._rest_from
+            self._changed_at = None
+            self._waiting.extend(p for p in self.parts.values() if p.follows == follows)
+            if follows == "at rest":
+                for layer in self.layers:
+                    guarded(partial(getattr(layer, "rest", _nothing), picture))
+        while self._waiting:
+            part = self._waiting.popleft()
+            if _key(part, picture) != self._shown.get(
+                part
+            ):  # what has nothing to write takes no turn
+                guarded(partial(self._write, [part], picture))
+                break
+
+    def update(self, event: Event) -> Update | None:
+        """Give what an event does to the state; None where it is for nobody."""
+        part = self.parts.get(event.part)
+        return None if part is None else lambda state: part.take(state, event.word, event.value)
+
+
+def _key(part: Part, picture: LivePicture) -> object:
+    return part.depends(picture) if part.is_seen(picture.state) else None
+
+
+def _nothing(_picture: LivePicture) -> None:
+    """Most layers have nothing to do at rest."""

@@ -1,6 +1,6 @@
 """Serves the app until it is interrupted, and tells the user how to reach it."""
 
-import threading
+import time
 import warnings
 import webbrowser
 from collections.abc import Callable, Mapping
@@ -75,6 +75,7 @@ def run_viewer(
                 warn(OTHER_USERS)
             if browser and not open_browser(viewer.link):
                 say(f"no browser could be opened; open {viewer.link} yourself")
-            threading.Event().wait()
+            while True:  # a signal that the system gives to another thread is seen within a second
+                time.sleep(1.0)
         except KeyboardInterrupt:
             say("\nended")

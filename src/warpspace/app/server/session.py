@@ -1,13 +1,13 @@
-"""One browser tab: the one thread that joins its widgets, its state and its drawing.
+"""One browser tab: the one thread that joins its page, its state and its drawing.
 
 The way of a slider move:
 
-1. `browser/handles.py`: viser's callback marks the widget and wakes the session;
-2. here, `_follow`: the session lets every panel read its widgets (`panels/errors.py`),
-3. applies what they have read to the state (`state/store.py`),
-4. evaluates the state (`evaluation/evaluate.py`) and
-5. has all parts of the page show the picture (`server/display.py`): layers (`viewport/layers/`)
-   and panels (`panels/`) assign to viser's handles, which send what has changed.
+1. `browser/page.js` sends an event, `browser/events.py` queues it and wakes the session;
+2. here, `_follow`: the event's part (`tasks/parts.py`) says what it does to the state,
+3. which is applied (`state/store.py`) and
+4. evaluated (`evaluation/evaluate.py`);
+5. all that shows the picture follows (`server/display.py`): layers (`viewport/layers/`) assign to
+   viser's handles, parts write pieces of HTML; what has not changed is not sent.
 
 The session reads the last position of a slider when it gets there, so that is always what is shown,
 however fast the slider was moved.
@@ -28,14 +28,13 @@ from warpspace.app.documents.scene_file import SceneList
 from warpspace.app.documents.services import Services
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.panels import PanelContext
 from warpspace.app.server.display import Display
 from warpspace.app.server.page_steps import PageSteps
 from warpspace.app.server.tab_keeper import TabKeeper
 from warpspace.app.server.tab_memory import TabRecord, new_token
-from warpspace.app.server.tabs import Places, apply_theme
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.store import StateStore, apply_each
+from warpspace.app.tasks.context import Context
 from warpspace.app.viewport.tab_camera import focus
 
 logger = logging.getLogger(__name__)
@@ -99,22 +98,22 @@ class Session:
         live: LiveModel,
         scenes: SceneList,
         store: StateStore,
-        places: Places,
         arrival: Arrival,
         claim: "Callable[[Session, str], TabRecord | None] | None" = None,
         services: Services | None = None,
         *,
         shared: bool = False,
     ) -> None:
-        self._client, self._live, self._places = client, live, places
-        self.context = PanelContext(server, client, store, scenes, services or Services())
+        self._client, self._live = client, live
+        self.context = Context(server, client, store, scenes, services or Services())
         self.token = new_token()
         self._arrival: Arrival | None = arrival
         self._claim = claim
         self._shared = shared
         self._keeper: TabKeeper | None = None
-        self.display = Display()
-        self.steps = PageSteps(self.context, places, self.display)
+        self.display = Display(self.context.page)
+        self.context.renew, self.context.closed = self.display.renew, self.display.closed
+        self.steps = PageSteps(self.context, self.display)
         self._stopped = threading.Event()
         self._worker = threading.Thread(
             target=self._run, name=f"warpspace-session-{client.client_id}", daemon=True
@@ -123,7 +122,7 @@ class Session:
     @property
     def state(self) -> AppState:
         """What is shown, or about to be."""
-        return self.context.store.state
+        return self.context.state
 
     def start(self) -> None:
         """Build page and drawing, then follow the widgets."""
@@ -148,7 +147,7 @@ class Session:
     def use(self, store: StateStore) -> None:
         """Steer another state from now on."""
         self.context.store.unsubscribe(self.context.changed)
-        self.context.store = store
+        self.context.store, self.context.unfolded = store, store.state.page
         store.subscribe(self.context.changed)
 
     def _run(self) -> None:
@@ -159,7 +158,6 @@ class Session:
                 self._turn()
         finally:
             self.context.store.unsubscribe(self.context.changed)
-            self._guarded(self.context.page.leave)
             TURNS.forget(self)
 
     def _turn(self) -> None:
@@ -189,12 +187,11 @@ class Session:
             self._recognize(self._arrival)
         picture = self._live.evaluate(self.state)
         with self._client.atomic():
-            if picture.state.shown.dark != self._places.dark:
-                apply_theme(self._client.gui, dark=picture.state.shown.dark)
+            self._darken(picture)
             self.context.page.set_title(picture.state.scene.title)
             self.context.camera.place(picture)
             self.steps.begin(picture)
-            self.display.add(picture, panels=[keeper])
+            self.display.add(picture, parts=[keeper])
         self._client.flush()
         self.context.shown = picture
 
@@ -212,12 +209,10 @@ class Session:
         context = self.context
         if self._arrival is not None and self._arrival.is_there:
             self._recognize(self._arrival)
-        updates = [*(panel.read for panel in self.display.panels), *context.take_updates()]
-        notes = context.store.apply(
-            lambda state: apply_each(state, updates, self._guarded),
-            by=context.changed,
-            at=context.changed_at,
-        )
+        events = [context.events.popleft() for _ in range(len(context.events))]
+        updates = [found for event in events if (found := self.display.update(event))]
+        updates += context.take_updates()
+        notes = context.apply(lambda state: apply_each(state, updates, self._guarded))
         while action := context.take_action():
             self._guarded(action)
         state, shown = self.state, context.shown
@@ -234,11 +229,17 @@ class Session:
             if before is not None and focus(before.state) != focus(picture.state):
                 context.page.set_title(picture.state.scene.title)
                 context.camera.place(picture)
-            if before is not None and before.state.shown.dark != picture.state.shown.dark:
-                apply_theme(self._client.gui, dark=picture.state.shown.dark)
+            if before is None or before.state.shown.dark != picture.state.shown.dark:
+                self._darken(picture)
+        self._client.flush()
         context.shown = picture
         if notes:
-            context.notify("Clamped", "\n".join(notes), "yellow")
+            context.notify("Clamped", "\n".join(notes), "warning")
+
+    def _darken(self, picture: LivePicture) -> None:
+        dark = picture.state.shown.dark
+        self._client.gui.configure_theme(dark_mode=dark, show_logo=False, show_share_button=False)
+        self.context.page.call("dark", dark)
 
     def _settle(self, picture: LivePicture) -> None:
         with TURNS.take(self), self._client.atomic():

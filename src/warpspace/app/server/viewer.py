@@ -14,7 +14,7 @@ import viser
 
 from warpspace.app.browser.arrivals import Arrivals
 from warpspace.app.browser.incoming import guard_server, guard_widgets
-from warpspace.app.browser.page import TIDY_ADDRESS, page_style, style_script
+from warpspace.app.browser.page import style_sheets
 from warpspace.app.browser.viser_private import send_script_to_all, serve_with
 from warpspace.app.documents.scene_file import SceneList
 from warpspace.app.documents.services import Services
@@ -32,7 +32,6 @@ from warpspace.app.server.network import (
 )
 from warpspace.app.server.session import Session
 from warpspace.app.server.tab_memory import TabMemory, TabRecord, is_token, new_token
-from warpspace.app.server.tabs import lay_out
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.store import StateStore
 from warpspace.app.viewport.layers.adding import light_scene
@@ -83,9 +82,7 @@ class Viewer:
         self._server = _serve(self.address, self.port, self._guard)
         light_scene(self._server.scene)
         self._arrivals = Arrivals(self._server)
-        send_script_to_all(self._server, style_script("page", page_style()))
-        send_script_to_all(self._server, TIDY_ADDRESS)
-        self._places = lay_out(self._server.gui, dark=self._start.shown.dark)
+        send_script_to_all(self._server, style_sheets("page.css"))
         self._server.on_client_connect(self._connect)
         self._server.on_client_disconnect(self._disconnect)
         # the first tab need not wait for it
@@ -127,7 +124,7 @@ class Viewer:
     def _warm(self) -> None:
         """Do before the first tab what it would have to wait for."""
         surface_glb(self._live.evaluate(self._start))
-        importlib.import_module("warpspace.app.evaluation.probability")
+        importlib.import_module("warpspace.app.tasks.design")
 
     def _connect(self, client: viser.ClientHandle) -> None:
         guard_widgets(client)
@@ -138,7 +135,6 @@ class Viewer:
             self._live,
             SceneList(self._scenes),
             store,
-            self._places,
             self._arrivals.expect(client.client_id),
             self._claim,
             self._services,

@@ -4,44 +4,63 @@ Whatever comes from a browser passes through the methods here: they bring number
 keep the old value in place of what is none, and note in `AppState.notes` what they changed.
 """
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from warpspace.app.state.bench import BenchLook
 from warpspace.app.state.comparison import Comparison
+from warpspace.app.state.leaf import described, error_names, said
 from warpspace.app.state.look import Look, MachineLook, RotaryLook
+from warpspace.app.state.page_look import PageLook
 from warpspace.app.state.picked import Picked
-from warpspace.app.state.ranges import Exclusions, Span, amplitude_spans, position_spans
+from warpspace.app.state.ranges import Exclusions, Span, position_spans
 from warpspace.app.state.specification import Specification
 from warpspace.field.evaluate import View
-from warpspace.geometry.colour import COMPONENTS
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
 from warpspace.machine.errors import ErrorFunction, ErrorSet, ToleranceSet
 from warpspace.machine.limits import EXAGGERATION as FACTORS
-from warpspace.machine.limits import LIVE_NODES
+from warpspace.machine.limits import LIVE_NODES, MAX_ERROR
 from warpspace.scene.model import Scene
 
 if TYPE_CHECKING:
     from warpspace.formats.compensation.controller import Controller
 
+AMPLITUDE = Span(-MAX_ERROR, MAX_ERROR, 0.1)
 NODES = Span(*LIVE_NODES, 2.0)  # grid nodes per axis: odd numbers
 EXAGGERATION = Span(*FACTORS, 1.0)
-TRUE_SCALE = 1.0
 START_NODES = 21
+COMPONENT_NAMES = {
+    "position": {"norm": "|E| length", "x": "E_x", "y": "E_y", "z": "E_z"},
+    "orientation": {
+        "norm": "|φ| tilt of the tool axis",
+        "x": "φ_x tilt about x",
+        "y": "φ_y tilt about y",
+        "z": "φ_z tilt about z",
+    },
+}
+"""What the components are called, for each quantity that can be coloured."""
+LOOP_NAMES = {
+    Loop.TOOL.value: "tool point",
+    Loop.WORKPIECE.value: "workpiece point",
+    Loop.RELATIVE.value: "tool relative to workpiece",
+}
 
 
 @dataclass(frozen=True, slots=True)
 class Shown:
     """What is drawn beside the bent box."""
 
-    traces: bool = True
-    ghost: bool = True
-    grid_lines: bool = True
-    axes: bool = True
-    dark: bool = False
+    traces: bool = described(
+        True, "Rotary traces", hint="Circles and arcs of the table: nominal light, actual dark."
+    )
+    ghost: bool = described(True, "Nominal box", hint="The working volume without errors, dashed.")
+    grid_lines: bool = described(True, "Grid lines", hint="Lines of the grid on the deformed box.")
+    axes: bool = described(True, "Axes", hint="Coordinates of the machine in mm.")
+    dark: bool = described(
+        False, "Dark mode", hint="Light lines on a dark ground; the colours of the map stay."
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,45 +68,114 @@ class AppState:
     """All that a picture depends on."""
 
     # machine, curves of the errors, working volume; its amplitudes are where reset goes
-    scene: Scene
-    amplitudes: Mapping[str, float]  # µm or µrad; amplitude of every parameter of the scene
-    positions: Mapping[str, float]  # degrees; where the rotary axes stand
+    scene: Scene = field(metadata=said("Scene"))
+    # µm or µrad; amplitude of every parameter of the scene
+    amplitudes: Mapping[str, float] = field(
+        metadata=said(
+            "Errors",
+            kind="number",
+            each=lambda state: dict.fromkeys(state.amplitudes, AMPLITUDE),
+            linked="{key}",
+            path="errors",
+        )
+    )
+    # degrees; where the rotary axes stand
+    positions: Mapping[str, float] = field(
+        metadata=said(
+            "Rotary positions",
+            kind="number",
+            one="Position of {}",
+            each=lambda state: state.position_spans,
+            linked="{key}",
+            hint="Position while the working volume is evaluated.",
+        )
+    )
     start: Mapping[str, float]  # µm or µrad; amplitudes that reset goes back to: the scene's
-    spans: Mapping[str, Span]  # ranges of the amplitudes and of the positions
-    position_spans: Mapping[str, Span]
-    exaggeration: float | None = None  # display factor; None chooses a round one
-    component: str = "norm"  # what is coloured: norm, x, y or z
-    loop: Loop = Loop.TOOL
-    # whether the placement of the workpiece is fitted out of the relative loop
-    placed: bool = False
-    nodes: int = START_NODES  # grid nodes per axis
+    # None chooses a round one
+    exaggeration: float | None = described(
+        None,
+        "Exaggeration",
+        choices={"auto": "auto"},
+        kind="number",
+        span=EXAGGERATION,
+        hint="How much larger than true the errors are drawn.",
+    )
+    component: str = described(
+        "norm",
+        "Component",
+        choices=lambda state: COMPONENT_NAMES[state.look.quantity],
+        hint="What the colours mean: the length or one signed component of the quantity.",
+    )
+    loop: Loop = described(
+        Loop.TOOL,
+        "Structural loop",
+        choices=LOOP_NAMES,
+        hint="Whose error deforms the box: tool, workpiece, or one against the other.",
+    )
+    placed: bool = described(
+        False,
+        "Placement of the workpiece fitted out",
+        hint="Remove the position of the workpiece, which does not show on a part: three shifts"
+        " and three small rotations, fitted over the working volume.",
+    )
+    nodes: int = described(
+        START_NODES,
+        "Grid density",
+        span=NODES,
+        unit="nodes",
+        hint="Nodes along X, Y and Z at which the error is computed.",
+    )
     shown: Shown = field(default_factory=Shown)
     # parameters that do not take part, or alone do
     exclusions: Exclusions = field(default_factory=Exclusions)
     # what machines are sampled from: the scene's, as far as they have not been moved
-    tolerances: ToleranceSet = field(default_factory=ToleranceSet)
+    tolerances: ToleranceSet = field(
+        default_factory=ToleranceSet,
+        metadata=said(
+            "Tolerances",
+            kind="number",
+            one="Tolerance of {}",
+            each=lambda state: dict.fromkeys(state.amplitudes),
+            linked="",
+            hint="Half width of the tolerance; 0 holds the error at its centre.",
+        ),
+    )
     # what the tolerances are held against
     specification: Specification = field(default_factory=Specification)
     # the scene as it was opened, where curves of `scene` have been edited since
-    loaded: Scene | None = None
+    loaded: Scene | None = field(default=None, metadata=said("Scene"))
     # title of the scene whose errors a machine chosen from the library left behind; empty for none,
     # and after the next change of scene
-    left_behind: str = ""
+    left_behind: str = field(default="", metadata=said("Scene"))
     # MachineLook, RotaryLook, BenchLook; what is shown of the field and of the schematic machine,
     # traced, and run as a test
     look: Look = field(default_factory=Look)
     machine: MachineLook = field(default_factory=MachineLook)
     rotary: RotaryLook = field(default_factory=RotaryLook)
     bench: BenchLook = field(default_factory=BenchLook)
-    picked: Picked | None = None  # the point whose error is explained
-    lever: str = ""  # key of the contribution whose axis and lever are drawn; empty for none
-    comparison: "Comparison[AppState]" = field(default_factory=Comparison[Any])  # what is compared
+    # the point whose error is explained
+    picked: Picked | None = field(default=None, metadata=said("Point"))
+    lever: str = described(
+        "",
+        "Lever",
+        choices=lambda state: {"": "none", **error_names(state)},
+        hint="The error whose axis and lever are drawn.",
+    )
+    # what is compared
+    comparison: "Comparison[AppState]" = field(
+        default_factory=Comparison[Any], metadata=said("Comparison")
+    )
     # whose table corrects the machine that is drawn; never saved or linked
-    controller: "Controller | None" = None
-    # key of the error whose curve is shown: chosen, or the one moved last; empty for none yet. It
-    # counts in no comparison of states, and undo leaves it.
-    chosen_error: str = field(default="", compare=False)
+    controller: "Controller | None" = field(default=None, metadata=said("Table of compensation"))
+    # what of the page is open, and what its forms were told; undo leaves both
+    page: PageLook = field(default_factory=PageLook, compare=False)
+    forms: Mapping[str, str] = field(default_factory=dict[str, str], compare=False)
     notes: tuple[str, ...] = ()  # what the latest change had to clamp
+
+    @property
+    def position_spans(self) -> Mapping[str, Span]:
+        """Ranges of the positions of the rotary axes, degrees."""
+        return position_spans(self.scene)
 
     @property
     def origin(self) -> Scene:
@@ -124,12 +212,11 @@ class AppState:
         return scene.view(loop or self.loop)
 
     def with_amplitude(self, key: str, value: float) -> "AppState":
-        """Set the amplitude of one parameter, µm or µrad, within its slider's range."""
+        """Set the amplitude of one parameter, µm or µrad, as far as the model holds."""
         if key not in self.amplitudes:
             return self._noted(f"{key}: no parameter of this machine")
         row = parameter(key)
-        span = self.spans[key]
-        kept, noted = self._clamped(value, self.amplitudes[key], span, key, row.unit)
+        kept, noted = self._clamped(value, self.amplitudes[key], AMPLITUDE, key, row.unit)
         return replace(noted, amplitudes={**self.amplitudes, key: kept})
 
     def with_position(self, axis: str, value: float) -> "AppState":
@@ -140,42 +227,6 @@ class AppState:
         kept, noted = self._clamped(value, self.positions[axis], span, axis, "°")
         return replace(noted, positions={**self.positions, axis: kept})
 
-    def with_exaggeration(self, value: float | None) -> "AppState":
-        """Set the display factor; None chooses a round one."""
-        if value is None:
-            return replace(self, exaggeration=None)
-        if math.isnan(value):
-            return self._noted("exaggeration = nan; expected a number, it stays as it was")
-        kept, noted = self._clamped(value, value, EXAGGERATION, "exaggeration", "")
-        return replace(noted, exaggeration=kept)
-
-    def with_nodes(self, value: float) -> "AppState":
-        """Set the grid density: the odd number of nodes nearest to a value."""
-        kept, noted = self._clamped(value, self.nodes, NODES, "grid", "nodes")
-        return replace(noted, nodes=min(2 * int(kept // 2) + 1, int(NODES.high)))
-
-    def with_component(self, component: str) -> "AppState":
-        """Choose what is coloured."""
-        if component not in COMPONENTS:
-            return self._noted(f"component: expected one of {', '.join(COMPONENTS)}")
-        return replace(self, component=component)
-
-    def with_loop(self, loop: str) -> "AppState":
-        """Choose the structural loop."""
-        if loop not in [*Loop]:
-            return self._noted(f"loop: expected one of {', '.join(Loop)}")
-        return replace(self, loop=Loop(loop))
-
-    def with_chosen_error(self, key: str) -> "AppState":
-        """Choose the error whose curve is shown; what is no key of this machine changes nothing."""
-        if key not in self.amplitudes or key == self.chosen_error:
-            return self
-        return replace(self, chosen_error=key)
-
-    def with_shown(self, **changes: bool) -> "AppState":
-        """Switch what is drawn beside the box."""
-        return replace(self, shown=replace(self.shown, **changes))
-
     def with_scene(self, scene: Scene) -> "AppState":
         """Show another scene, in its own loop; component, density and switches stay."""
         fresh = start_state(scene)
@@ -185,32 +236,25 @@ class AppState:
             nodes=self.nodes,
             shown=self.shown,
             exaggeration=fresh.exaggeration,
-            specification=self.specification,
+            specification=self.specification if scene.limit_um is None else fresh.specification,
             look=self.look,
             machine=self.machine,
             rotary=replace(self.rotary, off=frozenset()),
             bench=self.bench,
-            chosen_error=self.chosen_error,
+            page=self.page,
         )
 
-    def reset(self, axis: str | None = None) -> "AppState":
-        """Give the errors of one axis, or of all, the scene's values and curves again."""
-        chosen = {k: v for k, v in self.start.items() if axis is None or parameter(k).axis == axis}
-        own, present = self.own_curves, self.scene.errors.functions
-        curves = {key: function for key, function in present.items() if key not in chosen}
-        curves |= {key: function for key, function in own.items() if key in chosen}
-        scene = self.scene
-        if curves != scene.errors.functions:
-            scene = replace(scene, errors=ErrorSet(curves))
-        if scene == self.origin:
-            scene = self.origin
+    def reset(self) -> "AppState":
+        """Give all errors the scene's values and curves again."""
+        changed = replace(self.scene, errors=ErrorSet(self.own_curves))
+        # the same object where it is the same scene
+        scene = next((one for one in (self.origin, self.scene) if one == changed), changed)
         loaded = None if scene is self.origin else self.loaded
-        return replace(self, amplitudes={**self.amplitudes, **chosen}, scene=scene, loaded=loaded)
+        return replace(self, amplitudes=self.start, scene=scene, loaded=loaded)
 
-    def zeroed(self, axis: str | None = None) -> "AppState":
-        """Set the errors of one axis, or of all, to zero."""
-        chosen = {k: 0.0 for k in self.amplitudes if axis is None or parameter(k).axis == axis}
-        return replace(self, amplitudes={**self.amplitudes, **chosen})
+    def zeroed(self) -> "AppState":
+        """Set all errors to zero."""
+        return replace(self, amplitudes=dict.fromkeys(self.amplitudes, 0.0))
 
     def without_notes(self) -> "AppState":
         """Forget what was clamped."""
@@ -230,31 +274,31 @@ class AppState:
         kept = span.clamp(value, fallback)
         if kept == value:
             return kept, self
-        given = f"{value:g}" if math.isfinite(value) else str(value)
-        allowed = f"{span.low:g} to {span.high:g} {unit}".rstrip()
-        shown = f"{kept:g} {unit}".rstrip()
-        return kept, self._noted(f"{what} = {given} is outside {allowed}; clamped to {shown}")
+        return kept, self._noted(span.clamped_words(value, kept, what, unit))
 
 
 def start_state(scene: Scene, **changes: Any) -> AppState:
     """Build the state a scene is first shown in."""
     start = {key: scene.errors.amplitude(key) for key in scene.parameter_keys}
     at = scene.workspace.positions
-    ranges = position_spans(scene)
-    positions = {axis: at.get(axis, 0.0) for axis in ranges}
+    positions = {axis: at.get(axis, 0.0) for axis in position_spans(scene)}
     state = AppState(
         scene,
         start,
         positions,
         start,
-        amplitude_spans(scene),
-        ranges,
         scene.exaggeration,
         loop=start_loop(scene),
         placed=scene.placed,
+        specification=start_specification(scene),
         tolerances=scene.tolerances,
     )
     return replace(state, **changes)
+
+
+def start_specification(scene: Scene) -> Specification:
+    """Give what a design is held against: the limit of the scene, where it has one."""
+    return Specification() if scene.limit_um is None else Specification(scene.limit_um)
 
 
 def start_loop(scene: Scene) -> Loop:

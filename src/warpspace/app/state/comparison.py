@@ -1,7 +1,9 @@
 """Which two states are compared, and which of them is drawn."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Generic, TypeVar
+
+from warpspace.app.state.leaf import described
 
 State = TypeVar("State")
 """What a side holds: the state of the app, which in turn holds a comparison."""
@@ -31,13 +33,11 @@ class Comparison(Generic[State]):
 
     a: Side[State] = field(default_factory=Side[State])
     b: Side[State] | None = None  # none while nothing is compared
-    shown: str = "a"  # what is drawn: a key of `SHOWN`
-    ghost: bool = True  # whether the other one is drawn as a wireframe
+    shown: str = described("a", "Side that is drawn", choices=SHOWN, linked="")
+    ghost: bool = described(
+        True, "Other side as a wireframe", hint="The other one is drawn beside it.", linked=""
+    )
     pinned: Side[State] | None = None  # what was pinned last: the state before
-
-    def with_shown(self, shown: str) -> "Comparison[State]":
-        """Choose what is drawn; an unknown word changes nothing."""
-        return replace(self, shown=shown) if shown in SHOWN else self
 
     def off(self) -> "Comparison[State]":
         """End it; what was pinned stays."""

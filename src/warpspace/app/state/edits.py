@@ -1,13 +1,10 @@
 """Changes of a state: curves and tolerances of its scene, what of it is seen. Pure, clamped."""
 
-import math
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.ranges import Span, amplitude_span, round_up
-from warpspace.app.state.specification import Specification
-from warpspace.app.state.spelling import Unreadable
+from warpspace.app.state.ranges import Span, round_up
 from warpspace.machine.axes import parameter
 from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet, Tolerance
 from warpspace.machine.limits import MAX_ERROR, MAX_HALF_WIDTH, MIN_HALF_WIDTH
@@ -44,28 +41,7 @@ def with_curve(state: AppState, key: str, function: ErrorFunction) -> AppState:
         scene=replace(state.scene, errors=errors),
         loaded=state.origin,
         amplitudes={**state.amplitudes, key: amplitude},
-        spans={**state.spans, key: _grown_span(state, key, amplitude)},
     )
-
-
-def _grown_span(state: AppState, key: str, amplitude: float) -> Span:
-    span = state.spans[key]
-    if span.low <= amplitude <= span.high:
-        return span
-    return amplitude_span(key, amplitude, state.scene.tolerances.get(key))
-
-
-def with_typed_amplitude(state: AppState, key: str, value: float) -> AppState:
-    """Set the amplitude of one parameter to a number that was typed or stored, µm or µrad.
-
-    Unlike the slider's own (`AppState.with_amplitude`), it may lie beyond the slider's range, which
-    then grows; only what the model does not hold for is clamped.
-    """
-    if key not in state.amplitudes:
-        return state.with_amplitude(key, value)
-    if math.isfinite(value):
-        state = replace(state, spans={**state.spans, key: _grown_span(state, key, value)})
-    return state.with_amplitude(key, value)
 
 
 def half_width_of(state: AppState, key: str) -> float:
@@ -126,46 +102,6 @@ def with_half_widths(state: AppState, half_widths: Mapping[str, float]) -> AppSt
     Only for numbers that the program has worked out itself: they are taken as they are.
     """
     return replace(state, tolerances=state.tolerances.with_half_widths(half_widths))
-
-
-def with_fixed(state: AppState, key: str, fixed: bool) -> AppState:
-    """Fix the tolerance of one parameter, or free it; an unknown one changes nothing."""
-    if key not in state.amplitudes:
-        return state
-    return with_specification(state, state.specification.with_fixed(key, fixed))
-
-
-def with_costs(state: AppState, text: str) -> AppState:
-    """Set the costs of tolerances from a list as a user types it; notes say what is wrong."""
-    try:
-        wanted = state.specification.with_costs(text, state.amplitudes.keys())
-    except Unreadable as problem:
-        return replace(state, notes=(*state.notes, f"costs stay as they were; {problem}"))
-    return with_specification(state, wanted)
-
-
-def with_excluded(state: AppState, key: str, excluded: bool) -> AppState:
-    """Exclude one parameter from the picture, or include it again."""
-    if key not in state.amplitudes:
-        return state
-    return replace(state, exclusions=state.exclusions.with_excluded(key, excluded))
-
-
-def with_only(state: AppState, key: str, only: bool) -> AppState:
-    """Add one parameter to those that alone take part, or take it away."""
-    if key not in state.amplitudes:
-        return state
-    return replace(state, exclusions=state.exclusions.with_only(key, only))
-
-
-def include_all(state: AppState) -> AppState:
-    """Include all parameters again."""
-    return replace(state, exclusions=type(state.exclusions)())
-
-
-def with_specification(state: AppState, specification: Specification) -> AppState:
-    """Hold the tolerances against another specification."""
-    return replace(state, specification=specification)
 
 
 def with_sight(state: AppState, *, inside: bool) -> AppState:

@@ -5,9 +5,10 @@ Numbers from a browser pass through `Span.clamp` here; names that are none keep 
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
+from warpspace.app.state.leaf import MOST_TYPED, described
 from warpspace.app.state.ranges import Span
 from warpspace.field.grid import slice_ranges
 from warpspace.geometry.traces import TILT_STEP_DEG
@@ -23,12 +24,14 @@ SURFACES = {
     "slices": "slices",
     "grid": "grid lines only",
 }
-QUANTITIES = ("position", "orientation")
+QUANTITIES = {
+    "position": "position error [µm]",
+    "orientation": "tool-orientation error [µrad]",
+}
 RANGES = {"auto": "auto", "fixed": "fixed", "shared": "shared"}
 RANGE_TOP = Span(*limits.RANGE_TOP, 0.001)
 START_TOP = 50.0
 POINT_MM = Span(-2000.0, 2000.0, 1.0)
-MOST_TYPED = 200
 MOST_HELD = 8  # positions that one axis can be held at while another one is turned
 
 
@@ -36,21 +39,51 @@ MOST_HELD = 8  # positions that one axis can be held at while another one is tur
 class Look:
     """What is shown of the field, and how."""
 
-    surface: str = "surface"  # A key of `SURFACES`
-    # "position" or "orientation": the position error in µm or the tool-axis tilt in µrad
-    quantity: str = "position"
-    # auto: round ends for what is shown; fixed: `range_top`; shared: one range for all components,
-    # for now and for the scene as it was opened
-    range_mode: str = "auto"
-    range_top: float = START_TOP  # end of a fixed range, µm or µrad
-    # lines of equal value, corner arrows, marker of the worst point, scale bars in the picture
-    isolines: bool = False
-    arrows: bool = False
-    worst: bool = True
-    bars: bool = True
-    # where slices lie; an axis not given in the middle of its range
-    slices_mm: Mapping[str, float] = field(default_factory=dict[str, float])
-    follow: bool = False  # whether the slices pass through the tool point instead
+    surface: str = described(
+        "surface", "Surface", choices=SURFACES, hint="How the volume is drawn."
+    )
+    quantity: str = described(
+        "position", "Quantity", choices=QUANTITIES, hint="Which error the colours mean."
+    )
+    range_mode: str = described(
+        "auto",
+        "Colour range",
+        choices=RANGES,
+        hint="auto: round ends for what is shown. fixed: the number below. shared: one range for"
+        " all components, for now and for the scene as opened.",
+    )
+    range_top: float = described(
+        START_TOP,
+        "End of the colour range",
+        span=RANGE_TOP,
+        hint="End of a fixed range, µm or µrad; signed components run from minus to plus.",
+    )
+    isolines: bool = described(
+        False, "Isolines", hint="Lines of equal value at the numbers of the colour bar."
+    )
+    arrows: bool = described(
+        False, "Corner arrows", hint="Displacement of the eight corners, with its length."
+    )
+    worst: bool = described(True, "Worst point", hint="Where the coloured value is largest.")
+    bars: bool = described(
+        True, "Scale bars", hint="Two lengths in the picture: geometry in mm, error in µm."
+    )
+    pass_fail: bool = described(
+        False, "Pass or fail", hint="Which part of the volume keeps the limit, and which does not."
+    )
+    # an axis not given in the middle of its range
+    slices_mm: Mapping[str, float] = described(
+        dict[str, float](),
+        "Slices",
+        one="Slice across {}",
+        each=lambda state: slice_spans(state.scene),
+        hint="Where the volume is cut.",
+    )
+    follow: bool = described(
+        False,
+        "Slices through the tool point",
+        hint="The slices follow the positions of X, Y and Z.",
+    )
 
     @property
     def tilts(self) -> bool:
@@ -66,69 +99,71 @@ class Look:
         }
         return replace(self, **{k: v for k, v in names.items() if v in allowed.get(k, ())})
 
-    def with_top(self, value: float) -> "Look":
-        """Set the end of a fixed range, and make the range fixed."""
-        return replace(self, range_top=RANGE_TOP.clamp(value, self.range_top), range_mode="fixed")
-
-    def with_slice(self, axis: str, value: float, span: Span) -> "Look":
-        """Move the slice across an axis, mm."""
-        kept = span.clamp(value, self.slices_mm.get(axis, (span.low + span.high) / 2.0))
-        return replace(self, slices_mm={**self.slices_mm, axis: kept})
-
-    def switched(self, **on: bool) -> "Look":
-        """Switch what is drawn."""
-        return replace(self, **on)
-
 
 @dataclass(frozen=True, slots=True)
 class MachineLook:
     """The schematic machine."""
 
-    shown: bool = False  # whether its bodies are drawn
-    bent: bool = True  # whether they are bent by the exaggerated errors
-    # whether, where they are not drawn, a ghost of them lies around the working volume
-    ghost: bool = True
-    # positions of the linear axes; an axis not given in the middle of its workspace
-    linear_mm: Mapping[str, float] = field(default_factory=dict[str, float])
-
-    def with_linear(self, axis: str, value: float, span: Span) -> "MachineLook":
-        """Move a linear axis, mm."""
-        kept = span.clamp(value, self.linear_mm.get(axis, (span.low + span.high) / 2.0))
-        return replace(self, linear_mm={**self.linear_mm, axis: kept})
-
-    def switched(self, **on: bool) -> "MachineLook":
-        """Switch what is drawn."""
-        return replace(self, **on)
+    shown: bool = described(
+        False,
+        "Machine bodies",
+        hint="A schematic of the machine around the working volume, in true proportions.",
+    )
+    bent: bool = described(
+        True,
+        "Bodies deformed by the errors",
+        hint="Each body is displaced by the errors before it in the chain, exaggerated as the"
+        " box is. Off: nominal.",
+    )
+    ghost: bool = described(
+        True,
+        "Ghost of the machine",
+        hint="The bodies, nearly transparent, around the working volume.",
+    )
+    # an axis not given in the middle of its workspace
+    linear_mm: Mapping[str, float] = described(
+        dict[str, float](),
+        "Positions of the machine",
+        one="Machine {}",
+        each=lambda state: linear_spans(state.scene),
+        hint="Position of the axis; moves the bodies and the tool point.",
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class RotaryLook:
     """Which points are traced, and where the axes stand that do not turn."""
 
-    off: frozenset[int] = frozenset()  # numbers of the scene's trace points that are not traced
-    own_mm: Vector | None = None  # or None; A point of the user's own in the workpiece frame
-    # degrees; positions an axis is held at while another one turns; an axis not given where
-    # `warpspace.geometry.traces` puts it
-    held: tuple[tuple[str, tuple[float, ...]], ...] = ()
-    # name of the trace that is looked at (`picture.traces.name_trace`); a name of none of
-    # them, for instance an empty one, lets the app choose
-    chosen: str = ""
-
-    def with_chosen(self, name: str) -> "RotaryLook":
-        """Look at the trace of a name; anything, since it comes from a browser."""
-        return replace(self, chosen=name[:MOST_TYPED])
-
-    def with_point(self, number: int, *, on: bool) -> "RotaryLook":
-        """Trace one of the scene's points, or do not."""
-        return replace(self, off=self.off - {number} if on else self.off | {number})
-
-    def with_own(self, point_mm: Vector | None) -> "RotaryLook":
-        """Trace a point of the user's own; None for none."""
-        if point_mm is None:
-            return replace(self, own_mm=None)
-        before = self.own_mm or (0.0, 0.0, 0.0)
-        x, y, z = (POINT_MM.clamp(v, old) for v, old in zip(point_mm, before, strict=True))
-        return replace(self, own_mm=(x, y, z))
+    # by their numbers among the scene's trace points
+    off: frozenset[int] = described(
+        frozenset[int](),
+        "Points that are not traced",
+        choices=lambda state: trace_point_words(state.scene),
+        hint="Points of the scene, in the workpiece frame.",
+    )
+    own_mm: Vector | None = described(
+        None,
+        "Traced point of one's own",
+        kind="point",
+        span=POINT_MM,
+        unit="mm",
+        linked="rotary.own",
+        hint="x, y and z in the workpiece frame; empty for none.",
+    )
+    # an axis not given where `warpspace.geometry.traces` puts it
+    held: tuple[tuple[str, tuple[float, ...]], ...] = described(
+        (),
+        "Positions that rotary axes are held at",
+        kind="numbers",
+        one="{} held at",
+        each=lambda state: state.position_spans,
+        hint="Positions while the other rotary axis turns, separated by commas; empty for a few"
+        " around the present one.",
+    )
+    # a name of none of them (`picture.traces.name_trace`) lets the app choose
+    chosen: str = described(
+        "", "Trace", hint="The trace in colour, with its name; the others are faint."
+    )
 
     def with_held(self, axis: str, positions: tuple[float, ...]) -> "RotaryLook":
         """Hold an axis at other positions, degrees; none for those by default."""
@@ -142,6 +177,14 @@ class RotaryLook:
             *(p for number, p in enumerate(scene.trace_points_mm) if number not in self.off),
             *own,
         )
+
+
+def trace_point_words(scene: Scene) -> dict[str, str]:
+    """Spell the trace points of a scene by their numbers."""
+    return {
+        str(number): "(" + ", ".join(f"{value:g}" for value in point) + ") mm"
+        for number, point in enumerate(scene.trace_points_mm)
+    }
 
 
 def slice_spans(scene: Scene) -> dict[str, Span]:

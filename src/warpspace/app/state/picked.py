@@ -3,10 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from warpspace.app.state.spelling import read_point, refuse, spell_numbers
+from warpspace.app.state.leaf import Unreadable, spell_numbers
 from warpspace.kinematics.model import Loop
 from warpspace.machine.description import Vector
+from warpspace.scene.files import parse_number
 
+TRACE_EXPECTED = "expected a loop and a traced point"
 FARTHEST_MM = 1e5  # farthest point of a workpiece that a link may ask about
 
 
@@ -31,7 +33,10 @@ def spell_trace(picked: Picked) -> str:
 def read_trace(text: str) -> Picked:
     """Read which trace a point lies on; where the axes stand is still to come."""
     loop, _, point = text.partition(",")
-    point_mm = read_point(point)
-    if loop not in [*Loop] or max(map(abs, point_mm)) > FARTHEST_MM:
-        refuse()
-    return Picked({}, Loop(loop), point_mm)
+    try:
+        x, y, z = map(parse_number, point.split(","))
+    except ValueError:
+        raise Unreadable(TRACE_EXPECTED) from None
+    if loop not in [*Loop] or max(abs(x), abs(y), abs(z)) > FARTHEST_MM:
+        raise Unreadable(TRACE_EXPECTED)
+    return Picked({}, Loop(loop), (x, y, z))

@@ -2,8 +2,9 @@
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
+from warpspace.app.state.leaf import described, error_names
 from warpspace.machine.axes import parameter
 from warpspace.machine.errors import Tolerance
 from warpspace.machine.limits import MAX_ERROR, MIN_HALF_WIDTH, MIN_NUMBER
@@ -25,17 +26,19 @@ class Span:
     high: float
     step: float  # distance between two positions of a slider
 
-    @property
-    def marks(self) -> tuple[tuple[float, str], ...]:
-        """Both ends and zero, with what is written there."""
-        return ((self.low, f"{self.low:g}"), (0.0, "0"), (self.high, f"{self.high:g}"))
-
     def clamp(self, value: float, fallback: float) -> float:
         """Bring a number that may be anything into the range; what is no number falls back."""
         if math.isnan(value):
             return fallback
         kept = min(max(value, self.low), self.high)
         return 0.0 if 0.0 < abs(kept) < MIN_NUMBER else kept
+
+    def clamped_words(self, value: float, kept: float, what: str, unit: str) -> str:
+        """Say that a number was brought into the range."""
+        given = f"{value:g}" if math.isfinite(value) else str(value)
+        allowed = f"{self.low:g} to {self.high:g} {unit}".rstrip()
+        shown = f"{kept:g} {unit}".rstrip()
+        return f"{what} = {given} is outside {allowed}; clamped to {shown}"
 
 
 def round_up(value: float) -> float:
@@ -58,14 +61,6 @@ def amplitude_span(key: str, value: float, tolerance: Tolerance | None) -> Span:
         least = reach if reach >= MIN_HALF_WIDTH else least
     high = min(round_up(max(least, 2.0 * abs(value))), MAX_ERROR)
     return Span(-high, high, _step(high))
-
-
-def amplitude_spans(scene: Scene) -> dict[str, Span]:
-    """Choose the slider ranges of all parameters of a scene, by key."""
-    return {
-        key: amplitude_span(key, scene.errors.amplitude(key), scene.tolerances.get(key))
-        for key in scene.parameter_keys
-    }
 
 
 def position_spans(scene: Scene) -> dict[str, Span]:
@@ -93,9 +88,22 @@ def position_spans(scene: Scene) -> dict[str, Span]:
 class Exclusions:
     """Parameters that do not take part, and those that alone do."""
 
-    excluded: frozenset[str] = frozenset()  # keys that do not take part
-    # where there are any, only these take part; an excluded one among them still does not
-    only: frozenset[str] = frozenset()
+    excluded: frozenset[str] = described(
+        frozenset[str](),
+        "Excluded errors",
+        one="Exclusion of {}",
+        choices=error_names,
+        linked="excluded",
+        hint="Errors that are left out.",
+    )
+    only: frozenset[str] = described(
+        frozenset[str](),
+        "Errors drawn alone",
+        one="Only {}",
+        choices=error_names,
+        linked="only",
+        hint="Where there are any, all others are left out, and so are excluded ones among them.",
+    )
 
     def __bool__(self) -> bool:
         """Whether anything is left out."""
@@ -111,18 +119,6 @@ class Exclusions:
             return amplitudes
         return {key: value if self.active(key) else 0.0 for key, value in amplitudes.items()}
 
-    def with_excluded(self, key: str, excluded: bool) -> "Exclusions":
-        """Exclude one parameter, or include it again."""
-        return replace(self, excluded=_with(self.excluded, key, excluded))
-
-    def with_only(self, key: str, only: bool) -> "Exclusions":
-        """Add one parameter to those that alone take part, or take it away."""
-        return replace(self, only=_with(self.only, key, only))
-
     def within(self, keys: Collection[str]) -> "Exclusions":
         """Keep what concerns the parameters of a machine."""
         return Exclusions(self.excluded & frozenset(keys), self.only & frozenset(keys))
-
-
-def _with(keys: frozenset[str], key: str, on: bool) -> frozenset[str]:
-    return keys | {key} if on else keys - {key}

@@ -2,11 +2,12 @@
 
 import re
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
+from warpspace.app.state.leaf import Unreadable, described, error_names
 from warpspace.app.state.ranges import Span
-from warpspace.app.state.spelling import Unreadable, read_number
 from warpspace.machine.limits import COST, PROBABILITY
+from warpspace.scene.files import parse_number
 
 LIMIT_UM = Span(1.0, 300.0, 0.5)
 PERCENT = Span(100.0 * PROBABILITY[0], 100.0 * PROBABILITY[1], 0.1)
@@ -21,40 +22,47 @@ MOST_COSTS_TEXT = 2000  # characters of a list of costs
 class Specification:
     """The specification of a review."""
 
-    limit_um: float = START_UM  # largest |E| allowed
-    over: str = MAX  # "sampled" or "max"
-    distribution: str = UNIFORM  # "uniform", or "normal" with 3σ at the limits
-    # %; share of the machines that is to keep the limit once tolerances are allocated
-    percent: float = 95.0
-    # parameters whose tolerance is neither allocated nor scaled
-    fixed: frozenset[str] = frozenset()
-    costs: str = ""  # cost of tolerances where it is not 1, for instance ``EA0Z=4,EXX=0.5``
-
-    def with_limit(self, value: float) -> "Specification":
-        """Set the limit, µm, within its range; what is no number changes nothing."""
-        return replace(self, limit_um=LIMIT_UM.clamp(value, self.limit_um))
-
-    def with_over(self, over: str) -> "Specification":
-        """Choose where it holds; an unknown word changes nothing."""
-        return replace(self, over=over) if over in (SAMPLED, MAX) else self
-
-    def with_distribution(self, distribution: str) -> "Specification":
-        """Choose how parameters fall into tolerance; an unknown word changes nothing."""
-        known = distribution in (UNIFORM, NORMAL)
-        return replace(self, distribution=distribution) if known else self
-
-    def with_percent(self, value: float) -> "Specification":
-        """Set the wanted share of the machines, %; what is no number changes nothing."""
-        return replace(self, percent=PERCENT.clamp(value, self.percent))
-
-    def with_fixed(self, key: str, fixed: bool) -> "Specification":
-        """Fix the tolerance of a parameter, or free it."""
-        keys = self.fixed | {key} if fixed else self.fixed - {key}
-        return replace(self, fixed=keys)
-
-    def with_costs(self, text: str, known: Collection[str]) -> "Specification":
-        """Set the costs from a list as a user types it."""
-        return replace(self, costs=spell_costs(read_costs(text, known)))
+    limit_um: float = described(
+        START_UM,
+        "|E| allowed",
+        span=LIMIT_UM,
+        unit="µm",
+        hint="The limit: the largest volumetric error that is accepted.",
+    )
+    over: str = described(
+        MAX,
+        "Evaluated at",
+        choices={MAX: "everywhere", SAMPLED: "a random point"},
+        hint="Where each sampled machine has to stay within the limit: everywhere in the volume, or"
+        " at one random point (as in the thesis).",
+    )
+    distribution: str = described(
+        UNIFORM,
+        "Errors in their tolerance",
+        choices={UNIFORM: "uniform", NORMAL: "normal, 3σ at the limits"},
+        hint="How the errors of the machines are spread over their tolerances.",
+    )
+    percent: float = described(
+        95.0,
+        "Probability wanted",
+        span=PERCENT,
+        unit="%",
+        hint="Share of the machines that is to stay within the limit once tolerances are"
+        " allocated.",
+    )
+    fixed: frozenset[str] = described(
+        frozenset[str](),
+        "Fixed tolerances",
+        one="Fixed tolerance of {}",
+        choices=error_names,
+        hint="Tolerances that are neither allocated nor scaled.",
+    )
+    costs: str = described(
+        "",
+        "Costs of tolerances",
+        longest=MOST_COSTS_TEXT,
+        hint="Cost of a tolerance where it is not 1, for instance EA0Z=4, EXX=0.5.",
+    )
 
 
 def read_costs(text: str, known: Collection[str]) -> dict[str, float]:
@@ -71,8 +79,8 @@ def read_costs(text: str, known: Collection[str]) -> dict[str, float]:
         if key not in known:
             raise Unreadable(f"{shown!r}: no parameter of this machine")
         try:
-            cost = read_number(words[1])
-        except Unreadable:
+            cost = parse_number(words[1])
+        except ValueError:
             raise Unreadable(f"{shown!r}: expected a number, for instance EA0Z=4") from None
         if not COST[0] <= cost <= COST[1]:
             raise Unreadable(f"{shown!r}: expected {COST[0]:g} to {COST[1]:g}")

@@ -11,6 +11,7 @@ from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any, Generic, TypeAlias, TypeVar, cast
 
 from warpspace.app.state.app_state import AppState
+from warpspace.app.state.leaf import Description, default_of, description, lowered, name_of
 
 # --- Undo and redo of any frozen state, as one frozen value itself --------------------------------
 # What a slider drag sends in quick succession becomes one step. The number of steps kept is
@@ -128,6 +129,46 @@ def _equal(old: object, new: object) -> bool:
         return bool(old == new)
     except ValueError:
         return False
+
+
+PARTS_OF_MACHINE = ("scene.model.machine", "scene.workspace")
+
+
+def change_words(what: str) -> str:
+    """Say in words what `describe_change` has found."""
+    paths = what.split(", ")
+    if "scene.name" not in paths and any(path.startswith(PARTS_OF_MACHINE) for path in paths):
+        return "machine"
+    if "controller" in paths:  # what it is compared with has changed with it
+        paths = ["controller"]
+    found = {path: _change(path.split(".")) for path in paths}
+    unique = list(dict.fromkeys(found.values()))
+    if "scene" in unique:
+        errors = {words for path, words in found.items() if path.startswith("amplitudes.")}
+        unique = list(errors) if len(errors) == 1 else ["scene"]
+    return unique[0] if len(unique) == 1 else f"{unique[0]} and {len(unique) - 1} more"
+
+
+def _change(parts: list[str]) -> str:
+    """Say which field has changed, by the words of the innermost that has any."""
+    kind: type | None = AppState
+    words: Description | None = None
+    inner = parts
+    for depth, part in enumerate(parts, start=1):
+        entry = next((e for e in fields(kind) if e.name == part), None) if kind else None
+        if entry is None:
+            break
+        start, own = default_of(entry), description(entry)
+        if own is not None:
+            words, inner = own, parts[depth:]
+        kind = type(start) if is_dataclass(start) and not (own and own.leaf.kind) else None
+    names = [part.lstrip("+-") for part in inner]
+    error = next((name_of(name) for name in names if name_of(name) != name), "")
+    if words is None:
+        return error or names[-1].replace("_", " ")
+    if names and (words.each is not None or words.one != "{}"):
+        return lowered(words.one.format(error or names[-1]))
+    return lowered(words.leaf.label)
 
 
 Update: TypeAlias = Callable[[AppState], AppState]

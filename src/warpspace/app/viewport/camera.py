@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from warpspace.app.viewport.layers import SCENE_PER_MM
 from warpspace.picture.model import VIEWS, Direction
 from warpspace.units import Array
 
@@ -31,6 +32,12 @@ class CameraPose:
     look_at: Array
     fov_rad: float
 
+    @property
+    def drawn(self) -> CameraMemory:
+        """The same in units of the drawing, where it was fitted to millimetres."""
+        (x, y, z), (a, b, c) = (SCENE_PER_MM * self.position, SCENE_PER_MM * self.look_at)
+        return CameraMemory((x, y, z), (a, b, c), (0.0, 0.0, 1.0), self.fov_rad)
+
 
 def fit_camera(
     points: Array,
@@ -38,28 +45,27 @@ def fit_camera(
     direction: Direction = VIEWS["iso"],
     fov_deg: float = FOV_DEG,
     margin: float = MARGIN,
-    top: float = 0.0,
-    bottom: float = 0.0,
+    margins: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
 ) -> CameraPose:
-    """Place a camera so that points fill the picture."""
+    """Place a camera so that points fill the picture but its margins: left, right, top, bottom."""
     flat = points.reshape(-1, 3)
     back = np.asarray(direction, dtype=float) / np.linalg.norm(direction)
     right = np.cross((0.0, 0.0, 1.0), back)
     right = right / np.linalg.norm(right)
     up = np.cross(back, right)
-    half = float(np.tan(np.deg2rad(fov_deg) / 2.0))
-    side = half * max(aspect, 0.1) / margin
-    # middle and half height of what is to be filled
-    middle, free = (bottom - top) * half, (1.0 - top - bottom) * half / margin
+    half = np.tan(np.deg2rad(fov_deg) / 2.0) * np.array([max(aspect, 0.1), 1.0])
+    before, after = np.array([margins[0], margins[3]]), np.array([margins[1], margins[2]])
+    # middle and half size of what is to be filled
+    middle, free = (before - after) * half, (1.0 - before - after) * half / margin
     target, distance = (flat.min(axis=0) + flat.max(axis=0)) / 2.0, 1.0
-    offset = 0.0
+    offset = np.zeros(2)
     for _ in range(_ROUNDS):
-        x, y, towards = ((flat - target) @ np.stack([right, up, back], axis=1)).T
-        from_middle = np.abs(y - offset + middle * towards)
-        distance = float((np.maximum(np.abs(x) / side, from_middle / free) + towards).max())
-        seen_x, seen_y = x / (distance - towards), y / (distance - towards)
-        shift_x = (seen_x.min() + seen_x.max()) / 2.0
-        shift_y = (seen_y.min() + seen_y.max()) / 2.0 - middle
+        seen = (flat - target) @ np.stack([right, up, back], axis=1)
+        across, towards = seen[:, :2], seen[:, 2]
+        from_middle = np.abs(across - offset + towards[:, None] * middle)
+        distance = float(((from_middle / free).max(axis=1) + towards).max())
+        at = across / (distance - towards)[:, None]
+        shift = (at.min(axis=0) + at.max(axis=0)) / 2.0 - middle
         offset = middle * distance
-        target = target + distance * (shift_x * right + shift_y * up)
+        target = target + distance * (shift[0] * right + shift[1] * up)
     return CameraPose(target + distance * back, target, float(np.deg2rad(fov_deg)))

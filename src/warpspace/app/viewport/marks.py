@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from warpspace.geometry.surfaces import Shape, corners, deform, round_down
 from warpspace.units import MM_PER_UM, Array
 
-LABEL_GAP = 0.035  # how far outside its arrow a number stands, as a part of the longest edge
 BAR_FRACTION = 0.25  # longest scale bar, as a part of the longest edge
 
 
@@ -18,7 +17,6 @@ class CornerArrows:
 
     start_mm: Array  # [n, 3]; nominal corner, and where it is drawn
     end_mm: Array
-    label_mm: Array  # [n, 3]; where its number stands, outside the volume
     norm_um: Array  # [n]; length of the error there
 
     @property
@@ -54,33 +52,15 @@ def spell_micrometres(value_um: float) -> str:
 
 
 def corner_arrows(
-    shape: Shape,
-    nominal_mm: Array,
-    error_um: Array,
-    exaggeration: float,
-    size_mm: float | None = None,
+    shape: Shape, nominal_mm: Array, error_um: Array, exaggeration: float
 ) -> CornerArrows:
     """Find the arrows from the nominal to the displaced corners, eight for a full volume.
 
-    Points and errors are [nx, ny, nz, 3], mm and µm; the gap before a number is a part of
-    `size_mm`, by default of the longest edge.
+    Points and errors are [nx, ny, nz, 3], mm and µm.
     """
     chosen = corners(shape)
-    nominal = nominal_mm.reshape(-1, 3)
-    error = error_um.reshape(-1, 3)[chosen]
-    start = nominal[chosen]
-    end = deform(start, error, exaggeration)
-    middle = (nominal.min(axis=0) + nominal.max(axis=0)) / 2.0
-    size = float(np.ptp(nominal, axis=0).max()) if size_mm is None else size_mm
-    # outside both ends of the arrow, away from the middle of the volume
-    tip = np.where(
-        (np.linalg.norm(end - middle, axis=-1) > np.linalg.norm(start - middle, axis=-1))[:, None],
-        end,
-        start,
-    )
-    outwards = np.sign(start - middle)
-    length = np.linalg.norm(error, axis=-1)
-    return CornerArrows(start, end, tip + LABEL_GAP * size * outwards, length)
+    start, error = nominal_mm.reshape(-1, 3)[chosen], error_um.reshape(-1, 3)[chosen]
+    return CornerArrows(start, deform(start, error, exaggeration), np.linalg.norm(error, axis=-1))
 
 
 def worst_point(values: Array, nominal_mm: Array, drawn_mm: Array) -> WorstPoint:

@@ -1,25 +1,63 @@
 """The camera of one tab: put where all of the box is seen, remembered, put back."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+
 import numpy as np
 from viser import ClientHandle
 
-from warpspace.app.browser.room import Room, column_widths
+from warpspace.app.browser.room import PHONE_PX, PHONE_SHARE, TOP_PX, Room, column_widths
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import machine_room_mm
 from warpspace.app.state.app_state import AppState
-from warpspace.app.viewport.camera import CameraMemory
+from warpspace.app.viewport.camera import FOV_DEG, CameraMemory, CameraPose, fit_camera
 from warpspace.app.viewport.layers import SCENE_PER_MM
 from warpspace.app.viewport.layers.axes import axes_room_mm
-from warpspace.app.viewport.named_views import (
-    TELEPHOTO_DEG,
-    VIEWS,
-    CameraSetup,
-    change_lens,
-    clipping,
-    view_pose,
-)
+from warpspace.picture import model
+from warpspace.picture.model import Direction
 from warpspace.units import Array
+
+TELEPHOTO_DEG = 3.0  # stands in for an orthographic camera, which viser has not
+NEAR, FAR = 0.01, 1000.0
+"""Clipping planes of the usual camera, scene units."""
+STEEPEST = 1e-3
+"""How far the view from above leans to the front: exactly above, an orbiting camera has no up."""
+VIEWS: Mapping[str, Direction] = {**model.VIEWS, "top": (0.0, -STEEPEST, 1.0)}
+"""From what is looked at towards the camera."""
+
+
+@dataclass(frozen=True, slots=True)
+class CameraSetup:
+    """How the camera is set up."""
+
+    view: str = "iso"  # A key of `VIEWS`
+    orthographic: bool = False  # whether it is the telephoto
+
+    @property
+    def fov_deg(self) -> float:
+        """Vertical field of view, degrees."""
+        return TELEPHOTO_DEG if self.orthographic else FOV_DEG
+
+
+def view_pose(points: Array, room: Room, stand: CameraSetup) -> CameraPose:
+    """Place a camera for a named view so that points fill the room of the drawing."""
+    return fit_camera(points, room.aspect, VIEWS[stand.view], stand.fov_deg, margins=room.margins)
+
+
+def change_lens(position: Array, look_at: Array, fov_rad: float, new_fov_rad: float) -> Array:
+    """Move a camera along its line of sight so that what it looks at keeps its size."""
+    ratio = float(np.tan(fov_rad / 2.0) / np.tan(new_fov_rad / 2.0))
+    return look_at + ratio * (position - look_at)
+
+
+def clipping(position: Array, points: Array, *, orthographic: bool) -> tuple[float, float]:
+    """Choose near and far planes, as distances from a camera."""
+    distance = float(np.linalg.norm(position - points.reshape(-1, 3), axis=-1).max())
+    return (0.02 * distance if orthographic else NEAR), max(FAR, 5.0 * distance)
+
+
+# --- The camera of a tab --------------------------------------------------------------------------
 
 LEAST_SIZE = 120  # CSS pixels of a picture that is taken to be one
 MOVED = 1e-3
@@ -89,10 +127,8 @@ class TabCamera:
             return self._told
         camera = self._camera
         width = self.page_width or camera.image_width
-        return Room(
-            max(width - sum(column_widths(width)), LEAST_SIZE),
-            max(camera.image_height, LEAST_SIZE),
-        )
+        high = camera.image_height * (PHONE_SHARE if width <= PHONE_PX else 1.0) - TOP_PX
+        return Room(max(width - sum(column_widths(width)), LEAST_SIZE), max(high, LEAST_SIZE))
 
     def take_room(self, room: Room, picture: LivePicture) -> bool:
         """Take note of the drawing's room; a camera that nobody has moved fills it again."""
@@ -112,14 +148,8 @@ class TabCamera:
 
     def fit(self, picture: LivePicture) -> None:
         """Fill the room between the panels with the box, its traces and axes."""
-        camera, room = self._camera, self.room
         points = self._room_mm(picture)
-        pose = view_pose(points, room.aspect, self._stand, room.top_share, room.bottom_share)
-        self._clip(pose.position * SCENE_PER_MM, points)
-        camera.up_direction = (0.0, 0.0, 1.0)
-        camera.fov = pose.fov_rad
-        camera.position = pose.position * SCENE_PER_MM
-        camera.look_at = pose.look_at * SCENE_PER_MM
+        self._stand_at(view_pose(points, self.room, self._stand).drawn, points)
         self._put = self.remember()
 
     def px_per_mm(self, picture: LivePicture, height: float) -> float | None:
@@ -144,14 +174,16 @@ class TabCamera:
 
     def restore(self, memory: CameraMemory) -> None:
         """Put it where it stood."""
-        camera, self._put = self._camera, None
-        camera.up_direction = memory.up
         telephoto = memory.fov_rad < np.deg2rad(2.0 * TELEPHOTO_DEG)
-        self._stand = CameraSetup(self._stand.view, telephoto)
-        self._clip(np.array(memory.position), np.array([memory.look_at]) / SCENE_PER_MM)
-        camera.fov = memory.fov_rad
-        camera.position = memory.position
-        camera.look_at = memory.look_at
+        self._stand, self._put = CameraSetup(self._stand.view, bool(telephoto)), None
+        self._stand_at(memory, np.array([memory.look_at]) / SCENE_PER_MM)
+
+    def _stand_at(self, place: CameraMemory, points_mm: Array) -> None:
+        camera = self._camera
+        self._clip(np.array(place.position), points_mm)
+        camera.up_direction, camera.fov = place.up, place.fov_rad
+        camera.position = place.position
+        camera.look_at = place.look_at
 
 
 def _near(a: CameraMemory, b: CameraMemory) -> bool:

@@ -51,14 +51,19 @@ def inverse_tone_map(srgb: NDArray[np.uint8]) -> Floats:
 
 
 @cache
-def _table(*, diverging: bool) -> Floats:
+def level_colours(*, diverging: bool) -> Floats:
+    """Give the vertex colours of all levels of a scale, [LEVELS, 3]."""
     return inverse_tone_map(colour_table(diverging=diverging))
 
 
 def vertex_colours(scale: ColourScale, values: Array) -> Floats:
     """Map values to vertex colours that arrive on screen as the scale's colours, [..., 3]."""
-    index = np.rint(scale.fraction(values) * (LEVELS - 1)).astype(np.intp)
-    return _table(diverging=scale.diverging)[index]
+    return level_colours(diverging=scale.diverging)[colour_levels(scale, values)]
+
+
+def colour_levels(scale: ColourScale, values: Array) -> NDArray[np.uint8]:
+    """Give the level of each value on the scale, 0 to LEVELS − 1."""
+    return np.rint(scale.fraction(values) * (LEVELS - 1)).astype(np.uint8)
 
 
 @lru_cache(maxsize=64)

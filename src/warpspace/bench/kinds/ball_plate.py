@@ -249,7 +249,6 @@ def _affine(place: Array, deviation: Array) -> tuple[float, float, float]:
 
 
 def _length_error(seen: Array, deviation: Array) -> float:
-    """Largest error of the distance of two balls, with its sign, µm."""
     one, other = np.triu_indices(len(seen), 1)
     apart = seen[one] - seen[other]
     length = np.linalg.norm(apart, axis=-1)

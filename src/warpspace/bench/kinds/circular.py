@@ -393,11 +393,6 @@ class Ballbar:
     scale_difference_um: float
 
     @property
-    def both_alike(self) -> bool:
-        """Whether both runs trace the same."""
-        return self.hysteresis_um < ALIKE_UM
-
-    @property
     def clockwise_there_um(self) -> Array:
         """The clockwise run at the angles of the other one, µm."""
         return np.concatenate([self.clockwise_um[:1], self.clockwise_um[:0:-1]])

@@ -75,7 +75,7 @@ FRAMES, FPS = 48, 15.0
 @click.option(
     "--no-token",
     is_flag=True,
-    help="Ask nobody for a token: whoever reaches --host sees the scenes and can use the app.",
+    help="Require no token: anyone who can reach --host sees the scenes and can use the app.",
 )
 @click.option("--no-browser", is_flag=True, help="Only print the address of the page.")
 def view(
@@ -316,7 +316,16 @@ def export(
     cls=RenamedOption,
     former=("--spec-um",),
     type=float,
-    help="Of |E| in µm, to say whether it is kept, and how likely a machine keeps it.",
+    help="Of |E| in µm, to say whether it is kept, and how likely a machine keeps it; otherwise"
+    " that of SCENE.",
+)
+@click.option("--author", default="", help="Who answers for it; on the first page.")
+@click.option(
+    "--question",
+    "questions",
+    multiple=True,
+    metavar="TEXT",
+    help="What is still open; on the first page; may be given several times.",
 )
 @click.option(
     "--samples",
@@ -354,10 +363,11 @@ def report(
 ) -> None:
     """Write the design review of one SCENE or two.
 
-    Two stand side by side. First a page with the verdict, then the evidence: maps, contributions at
-    the worst point, errors and tolerances, gains, Monte Carlo, conventions and provenance. With
-    --concepts also a table and pictures of machines side by side, as `warpspace concepts` has them;
-    --with adds a section of any other analysis. The file needs no network.
+    The first page is the verdict: whether the limit is kept, four numbers, a map and what to do.
+    Appendices hold the evidence: maps, contributions at the worst point, errors and tolerances,
+    gains, Monte Carlo, conventions and provenance. With --concepts also a table and pictures of
+    machines side by side, as `warpspace concepts` has them; --with adds an appendix of any other
+    analysis. The file needs no network.
     """
     from warpspace.analysis.description import silent
     from warpspace.outputs.report import ReportSettings, write_report

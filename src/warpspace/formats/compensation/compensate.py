@@ -101,7 +101,7 @@ class Compensate(Analysis):
         flag="--format",
     )
     points: Annotated[Points | None, Grammar("N|X=N,…", read_points, many=True)] = option(
-        None, "Points of the table along each axis", flag="--grid", unset="what suits the format"
+        None, "Points of the table along each axis", flag="--grid", unset="as the format needs"
     )
     resolution: float = option(
         0.0,
@@ -337,7 +337,7 @@ def compensate(
     files = kind.write(wanted)
     watch()
     grid = build_grid(scene.model, scene.workspace, nodes)
-    label = f"{kind.name} ({spell_points(kind, points)})"
+    label = f"{kind.title.partition(',')[0]} ({spell_points(kind, points)})"
     controller = read_back(kind, files, wanted, label)
     watch()
     own = evaluated(controller, grid, scene.model.direction)

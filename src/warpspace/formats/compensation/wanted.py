@@ -176,7 +176,6 @@ def _inverse(matrix: Array) -> Array:
 
 
 def _times(matrix: Array, vector: Array) -> Array:
-    """Multiply matrices with vectors, [..., n]."""
     return np.einsum("...ij,...j->...i", matrix, vector)
 
 

@@ -30,7 +30,6 @@ LIMITS = (
 
 
 def _settings(source: Source) -> tuple[float, int]:
-    """Read detection unit in mm and magnification."""
     unit, magnification = DETECTION_MM, 1
     for at, text in source.scan():
         key, _, value = (part.strip() for part in text.lstrip("# ").partition("="))

@@ -142,7 +142,6 @@ def _lines(source: Source, along: str, options: ReadOptions) -> list[Line]:
 
 
 def _check_steps(places: np.ndarray, rows: Sequence[tuple[Place, Cells]]) -> None:
-    """Refuse positions that do not ascend in equal steps."""
     steps = np.diff(places)
     for index, step in enumerate(steps):
         at, _ = rows[index + 1]

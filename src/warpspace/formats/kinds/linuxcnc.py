@@ -80,7 +80,6 @@ def _assignment(
 
 
 def _rows(source: Source, per_unit: float, notes: list[str]) -> np.ndarray:
-    """Read the rows of a table as far as LinuxCNC does, [n, 3], mm or degrees."""
     rows: list[list[float]] = []
     for number, line in enumerate(source.lines, start=1):
         at, found = source.at(number), _ROW.match(line)
@@ -120,7 +119,6 @@ def _kind(rows: np.ndarray, given: str) -> tuple[str, tuple[str, ...]]:
 
 
 def _read_comp(sources: Sequence[Source], options: ReadOptions) -> Tables:
-    """Read the tables as the motion controller holds them."""
     known, tables = _assignment(sources)
     terms: list[Line] = []
     inches = any(size != 1.0 for _, _, size in known.values())
@@ -149,7 +147,6 @@ def _read_comp(sources: Sequence[Source], options: ReadOptions) -> Tables:
 
 
 def _write_comp(wanted: Wanted) -> Files:
-    """Write a table of type 1 for each axis, and the INI lines that name them."""
     files: dict[str, str] = {}
     lines = [f"# {wanted.title}", f"# joints counted as {JOINTS}: trivkins without coordinates="]
     for axis in wanted.axes:
@@ -186,7 +183,6 @@ def squareness(first_diagonal_mm: float, second_diagonal_mm: float) -> float:
 
 
 def _read_matrix(sources: Sequence[Source], options: ReadOptions) -> Tables:
-    """Read the matrix as the kinematics module holds it."""
     found: dict[tuple[str, str], float] = {}
     for source in sources:
         for at, bare in source.scan("#"):

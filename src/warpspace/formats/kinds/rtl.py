@@ -51,7 +51,6 @@ def _sections(source: Source) -> dict[str, Lines]:
 
 
 def _pair(text: str) -> tuple[str, str] | None:
-    """Part a key, in small letters, from its value."""
     matched = _KEY.fullmatch(text)
     return (matched[1].strip().lower(), matched[2].strip()) if matched else None
 
@@ -86,7 +85,6 @@ def _targets(source: Source, lines: Lines) -> tuple[list[float], list[int]]:
 
 
 def _axis(source: Source, sections: dict[str, Lines], options: ReadOptions) -> str:
-    """Find the axis: what the user says, else what the file says."""
     if options.axis:
         return options.axis_named(options.axis, source)
     pairs = [(at, _pair(text)) for at, text in sections.get("USER-TEXT", [])]

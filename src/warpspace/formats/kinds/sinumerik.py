@@ -134,7 +134,6 @@ def _assignments(
 
 
 def _index(text: str, at: Place) -> int:
-    """Read the index of a table or of an interpolation point."""
     return at.whole(text, "index", 0, MOST_INDEX)
 
 
@@ -152,14 +151,12 @@ def _point_lines(prefix: str, point: Callable[[int], str], values: Array) -> lis
 
 
 def _range_lines(prefix: str, index: str, places: Array) -> list[str]:
-    """Spell the range of a table in equal steps, whose own indices are given."""
     step = (places[-1] - places[0]) / (len(places) - 1)
     bounds = zip(RANGE, (step, places[0], places[-1]), strict=True)
     return [f"${prefix}_{setting}[{index}]={float(number)!r}" for setting, number in bounds]
 
 
 def _archive(name: str, wanted: Wanted, sign: str, body: Sequence[str]) -> Files:
-    """Spell an archive with its head and its end."""
     head = [f"%_N_{name}_INI", "CHANDATA(1)", f"; written by warpspace for {wanted.title}"]
     head.append(f"; {'sign: ' + wanted.sign if wanted.sign else sign}")
     return {"": "\n".join([*head, *body, "M17"]) + "\n"}
@@ -306,7 +303,6 @@ class CrossTable:
 
 
 def _cross_tables(wanted: Wanted, factor: float, most: int) -> list[CrossTable]:
-    """Give the tables that correct all axes over all axes."""
     mean, axes = wanted.toward(TravelDirection.MEAN), wanted.axes
     needed = {
         (target, *group): values

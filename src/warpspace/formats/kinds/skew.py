@@ -112,7 +112,6 @@ def _sections(source: Source) -> dict[str, Section]:
 
 
 def _factors(source: Source, options: ReadOptions, notes: list[str]) -> dict[str, float]:
-    """Read the skew factors of a file: what its commands set, else its one profile."""
     found: dict[str, float] = {}
     profiles: dict[str, dict[str, float]] = {}
     loaded, name = options.variant, ""
@@ -155,7 +154,6 @@ def _factors(source: Source, options: ReadOptions, notes: list[str]) -> dict[str
 
 
 def _klipper_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
-    """Read the skew factors as the firmware holds them."""
     factors: dict[str, float] = {}
     notes: list[str] = []
     for source in sources:
@@ -203,7 +201,6 @@ def _twist(source: Source, options: ReadOptions) -> Imported | None:
 
 
 def _read_klipper(sources: Sequence[Source], options: ReadOptions) -> Imported:
-    """Read squareness errors from skew factors, and roll of X from a twist."""
     parts: list[Imported] = []
     for source in sources:
         twist = _twist(source, options)
@@ -215,7 +212,6 @@ def _read_klipper(sources: Sequence[Source], options: ReadOptions) -> Imported:
 
 
 def _write_klipper(wanted: Wanted) -> Files:
-    """Write the command that sets the factors."""
     parts = [
         f"{plane}=" + ",".join(f"{length:.6f}" for length in skew_lengths(factor))
         for plane, factor in fitted_factors(wanted).items()
@@ -241,7 +237,6 @@ def _is_marlin(head: str, name: str) -> bool:
 
 
 def _marlin_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
-    """Read the skew factors as the firmware holds them."""
     found: dict[str, tuple[Place, float]] = {}
     defined: dict[str, dict[str, tuple[Place, float]]] = {}
     notes: list[str] = []
@@ -293,7 +288,6 @@ def _marlin_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
 
 
 def _write_marlin(wanted: Wanted) -> Files:
-    """Write the command that sets the factors."""
     factors = fitted_factors(wanted)
     words = [
         f"{letter}{spell(float(wanted.round(factors[plane])), DIGITS)}"

@@ -85,7 +85,6 @@ def check_axes(held: Imported, name: str) -> None:
 
 
 def _finished(found: Imported, options: ReadOptions) -> Imported:
-    """Say what is assumed, and translate the alternative model."""
     found = replace(
         found,
         units=("mm", "rad", "degrees for rotary positions"),
@@ -163,7 +162,6 @@ Row = tuple[Place, dict[str, float]]
 
 
 def _is_isg(head: str, name: str) -> bool:
-    """Tell it by its first header: arguments and parameters, nothing else."""
     del name
     for text in head.splitlines():
         bare = text.split("//")[0].strip()
@@ -249,7 +247,6 @@ def _read_block(source: Source, block: Block) -> Imported:
 
 
 def _check_arguments(at: Place, key: str, arguments: Sequence[str]) -> None:
-    """Refuse an error that does not depend on its own axis, and a constant that does."""
     row = parameter(key)
     if not arguments:
         if not row.is_constant:
@@ -278,7 +275,6 @@ def _isg_plane(source: Source, key: str, arguments: Sequence[str], rows: Sequenc
 
 
 def _write_isg(wanted: Wanted) -> Files:
-    """Write the errors of a scene, a block an axis."""
     held = in_one_direction(sampled(wanted), wanted)
     check_axes(held, ISG)
 
@@ -310,7 +306,6 @@ _OPEN = re.compile(r"Gridpoints\s*=\s*\{?", re.IGNORECASE)
 
 
 def _is_iso(head: str, name: str) -> bool:
-    """Tell it by its blocks."""
     del name
     blocks = [error for error in _SECTION.findall(head) if error_name(error)]
     return bool(blocks) and bool(re.search(r"Gridpoints|VALUE\s*=", head, re.IGNORECASE))

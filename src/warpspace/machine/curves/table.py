@@ -366,7 +366,6 @@ def _cell(at: Numbers, position: Array) -> tuple[Indices, Indices, Array]:
 
 
 def _axes(raw: object, reader: ValueReader) -> tuple[str, str] | None:
-    """Read the names of the two axes; None where problems were noted."""
     place: Path = (FORM, "axes")
     own = reader.axis
     names = list(cast("Sequence[object]", raw)) if isinstance(raw, list | tuple) else []

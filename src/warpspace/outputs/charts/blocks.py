@@ -3,6 +3,7 @@
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import replace
 from typing import Any, cast
 
 import matplotlib as mpl
@@ -45,11 +46,6 @@ def key_colour() -> str:
     return ground().series[0]
 
 
-def bar_colour() -> str:
-    """Colour of the other bars."""
-    return "#b4bfcc" if ground() is LIGHT else "#56616f"
-
-
 def style() -> Any:
     """Give the context that charts are drawn in."""
     theme = ground()
@@ -73,7 +69,7 @@ def style() -> Any:
 
 
 def sheet(
-    width: float, height: float, title: str, subtitle: str, top_in: float = 0.85
+    width: float, height: float, title: str, subtitle: str, top_in: float
 ) -> tuple[Figure, float]:
     """Start a figure with a title and a line below it."""
     figure = Figure(figsize=(width, height), dpi=DPI, facecolor=ground().paper)
@@ -103,7 +99,9 @@ def quiet(axes: Axes, grid: str = "x") -> None:
 
 CHART_IN, ROW_IN, GAP_IN = 4.9, 4.6, 0.25
 """Width, height and distance of charts that stand side by side."""
-WIDTH_IN = 11.0
+WIDTH_IN, PRINTED_IN = 11.0, 7.4
+"""Width of bars; of what a report has, without a heading and printed as wide as its page."""
+HEAD_IN = 0.65
 BAR_IN = 0.235  # height of one bar; rows of two are wider
 FEW = 8  # rows below which bars beside other charts grow no wider
 ROOM = 1.14  # of the longest bar: room for the number beside it
@@ -114,12 +112,12 @@ Box = tuple[float, float, float, float]
 
 
 def chart_figure(chart: Bars | Lines | Histogram) -> Figure:
-    """Draw one chart on a sheet of its own."""
+    """Draw one chart for a report, which says its heading."""
+    if isinstance(chart, Lines):
+        return charts_sheet([replace(chart, title="")], "", "")
     if isinstance(chart, Bars):
-        return bars_chart(chart)
-    if isinstance(chart, Histogram):
-        return histogram_chart(chart)
-    return charts_sheet([chart], chart.title, chart.note)
+        return bars_chart(replace(chart, title="", subtitle=""))
+    return histogram_chart(replace(chart, title="", subtitle="", told=()))
 
 
 def charts_sheet(
@@ -135,9 +133,10 @@ def charts_sheet(
     columns = columns or len(charts)
     rows = -(-len(charts) // columns)
     width = columns * CHART_IN + beside_in
-    height = 0.85 + rows * (ROW_IN + GAP_IN) + below_in
+    above = 0.2 + (HEAD_IN if title else 0.0)
+    height = above + rows * (ROW_IN + GAP_IN) + below_in
     with style():
-        figure, top = sheet(width, height, title, subtitle)
+        figure, top = sheet(width, height, title, subtitle, above)
         for number, chart in enumerate(charts):
             row, column = divmod(number, columns)
             bottom = top - (row * (ROW_IN + GAP_IN) + ROW_IN) / height
@@ -176,8 +175,9 @@ def bars_chart(bars: Bars) -> Figure:
     with style():
         beside = max((_beside(panel) for panel in bars.panels), default=1)
         row = BAR_IN * (1.0 + 0.55 * (beside - 1))
-        height = 1.75 + row * max(len(bars.rows), 3)
-        figure, top = sheet(WIDTH_IN, height, bars.title, bars.subtitle, top_in=1.15)
+        width, above = (WIDTH_IN, 0.5 + HEAD_IN) if bars.title else (PRINTED_IN, 0.5)
+        height = above + 0.6 + row * max(len(bars.rows), 3)
+        figure, top = sheet(width, height, bars.title, bars.subtitle, above)
         axes = figure.subplots(
             1, len(bars.panels), sharey=True, squeeze=False,
             width_ratios=[panel.width for panel in bars.panels],
@@ -185,13 +185,13 @@ def bars_chart(bars: Bars) -> Figure:
         longest = max((len(words) for words in bars.rows), default=0)
         left = min(max(1.2, 0.3 + 0.066 * longest), 3.6)
         figure.subplots_adjust(
-            left=left / WIDTH_IN, right=0.98, top=top, bottom=0.62 / height, wspace=0.09
+            left=left / width, right=0.98, top=top, bottom=0.62 / height, wspace=0.09
         )
         draw_bars(list(axes), bars)
         if bars.legend:
             figure.legend(
                 handles=legend_handles(bars), loc="lower left",
-                bbox_to_anchor=(left / WIDTH_IN, top + 0.16 / height), ncols=4, frameon=False,
+                bbox_to_anchor=(left / width, top + 0.16 / height), ncols=4, frameon=False,
                 fontsize=SMALL, borderpad=0.0, handlelength=1.0, handleheight=0.8,
             )  # fmt: skip
         return figure
@@ -223,7 +223,8 @@ def _beside(panel: Panel) -> int:
 
 
 def _bar_colour(role: str) -> str:
-    return {"key": key_colour(), "set": ground().series[2]}.get(role, bar_colour())
+    plain = "#b4bfcc" if ground() is LIGHT else "#56616f"
+    return {"key": key_colour(), "set": ground().series[2]}.get(role, plain)
 
 
 def _longest(panel: Panel) -> float:
@@ -251,7 +252,7 @@ def _draw_panel(axis: Axes, panel: Panel, bars: Bars, size: float, *, first: boo
     axis.tick_params(axis="y", length=0)
     axis.tick_params(axis="x", labelsize=size)
     axis.set_xlim(-1.05 * longest if panel.signed else 0.0, room)
-    axis.set_xlabel(panel.unit, size=size)
+    axis.set_xlabel(panel.unit if first or panel.unit != bars.panels[0].unit else "", size=size)
     axis.set_title(
         panel.title, size=TEXT * size / SMALL, weight="bold", loc="left" if first else "center"
     )
@@ -379,7 +380,7 @@ def _polar(axes: Axes, chart: Lines) -> None:
         axes.plot(radius * np.cos(turn), radius * np.sin(turn), color=colour,
                   linewidth=1.0 if value == 0.0 else 0.8)  # fmt: skip
         if value != 0.0:
-            axes.text(0.0, radius, f"{value:+g}", size=SMALL - 2.0, color=ground().muted,
+            axes.text(0.0, radius, f"{value:+g}", size=SMALL - 1.5, color=ground().muted,
                       ha="center", va="center", bbox=_paper(0.4))  # fmt: skip
     for degrees in (0, 90, 180, 270):
         x, y = np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))
@@ -417,7 +418,9 @@ LABEL_ROWS = 4  # rows of labels above the bars, at most
 def histogram_chart(found: Histogram) -> Figure:
     """Draw a distribution with its marks and limit."""
     with style():
-        figure, top = sheet(*HISTOGRAM_IN, found.title, found.subtitle, top_in=1.5)
+        width, height = HISTOGRAM_IN if found.title else (PRINTED_IN, HISTOGRAM_IN[1] - HEAD_IN)
+        above = 0.85 + (HEAD_IN if found.title else 0.0)
+        figure, top = sheet(width, height, found.title, found.subtitle, above)
         axes = figure.add_axes((0.085, 0.115, 0.885, top - 0.115))
         edges, heights, limit = found.edges, found.heights, found.limit
         beyond = [limit is not None and low >= limit for low in edges[:-1]]

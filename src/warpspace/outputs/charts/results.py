@@ -13,6 +13,7 @@ from matplotlib.patheffects import withStroke
 
 from warpspace.analysis.blocks import Bars, Histogram, Lines
 from warpspace.analysis.description import Result
+from warpspace.exceptions import OptionError
 from warpspace.outputs.charts.blocks import (
     CHART_IN,
     DPI,
@@ -20,6 +21,7 @@ from warpspace.outputs.charts.blocks import (
     ROW_IN,
     SMALL,
     TEXT,
+    WIDTH_IN,
     bars_chart,
     charts_sheet,
     ground,
@@ -45,6 +47,8 @@ def result_chart(found: Result) -> Figure:
         return histogram_chart(histogram)
     said = [block.strip() for block in blocks if isinstance(block, str)]
     title, subtitle = [*said, ""][:2]
+    if not charts:
+        raise OptionError(f"{title}: there is no chart of it")
     return charts_sheet(charts, title, subtitle, 2 if len(charts) == 4 else min(len(charts), 3))
 
 
@@ -112,10 +116,10 @@ def _numbers(
 
 # --- A compensation: |E| before and after in slices -----------------------------------------------
 
-WIDTH_IN, PLANE_IN = 11.0, 3.2
+PLANE_IN = 3.2
 COLUMN_IN = 4.3, 5.0  # of the maps in a column of the app
 WORDS = 9.0
-LEAST_UM = 1e-3  # upper end of a colour scale where nothing is left
+LEAST_UM = 0.005  # upper end of a colour scale where nothing but the rounding of a file is left
 PLANES = ((0, 1), (0, 2), (1, 2))  # axes across and up of each slice
 
 
@@ -175,7 +179,6 @@ def compensation_column(found: "Compensation") -> Figure:
 
 
 def _planes(found: "Compensation") -> list[tuple[int, int]]:
-    """List the slices there are; none of a machine with one axis."""
     return [plane for plane in PLANES if all(found.grid.shape[i] > 1 for i in plane)]
 
 

@@ -22,7 +22,7 @@ from matplotlib.patheffects import Normal, Stroke
 from matplotlib.textpath import text_to_path
 
 from warpspace.outputs.drawing.render import Rect, resample
-from warpspace.outputs.drawing.settings import FONT, SIZES, Theme, factor
+from warpspace.outputs.drawing.settings import FONT, PRINTED_FACTOR, SIZES, Theme, factor
 from warpspace.units import Array
 
 Points = Array | Sequence[tuple[float, float]] | Sequence[Array]  # [n, 2], px
@@ -60,9 +60,12 @@ _ELLIPSIS = "…"
 class Canvas:
     """A figure whose coordinates are its pixels, origin bottom left."""
 
-    def __init__(self, width: int, height: int, theme: Theme, *, exact: bool = True) -> None:
+    def __init__(
+        self, width: int, height: int, theme: Theme, *, exact: bool = True, printed: bool = False
+    ) -> None:
         self.width, self.height, self.theme, self.exact = width, height, theme, exact
-        self.factor = factor(width, height)
+        self.printed = printed
+        self.factor = PRINTED_FACTOR if printed else factor(width, height)
         self.margin = self.px(SIZES.margin) * min(1.0, width / self.px(1000.0))
         self.figure = Figure(
             figsize=(width / DPI, height / DPI), dpi=DPI, facecolor=theme.paper, layout=None
@@ -94,7 +97,7 @@ class Canvas:
         width = self.text_size(text, size, weight)[0]
         if width <= room:
             return text, size
-        smaller = max(0.7, room / width)
+        smaller = max(min(SIZES.small / size, 1.0) if self.printed else 0.7, room / width)
         size *= smaller
         if width * smaller <= room * 1.0001:
             return text, size

@@ -166,7 +166,6 @@ def draw_map(
     projection: Projection | None = None,
     annotate: Annotate | None = draw_corners,
     ghost: bool = True,
-    axes: bool = True,
 ) -> DrawnMap:
     """Draw a bent volume."""
     nodes = picture.drawn_mm.reshape(-1, 3)
@@ -182,8 +181,7 @@ def draw_map(
     draw_lone_line(canvas, picture, projection, taken)
     if ghost:
         _draw_ghost(canvas, picture, projection, raster, taken)
-    if axes:
-        draw_axes(canvas, picture.grid.nominal_mm, nodes, projection, taken, titles=labels)
+    draw_axes(canvas, picture.grid.nominal_mm, nodes, projection, taken, titles=labels)
     taken.add_rects(canvas.rects[start:])
     if annotate is not None:
         annotate(canvas, picture, projection, raster, taken, rect if labels else None)

@@ -36,6 +36,10 @@ SMALLEST_FACTOR: Final = 0.5
 """Text never gets smaller than this share of its size in a 1600 × 1200 figure."""
 PRINT: Final = 1.3
 """What sizes are multiplied by, so that text can be read where a figure is printed 17 cm wide."""
+PRINTED_PX: Final = 685
+"""Width of a figure in a report: 174 mm."""
+PRINTED_FACTOR: Final = 0.7
+"""Factor on text and lines there: small text has 7 pt."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,9 +124,9 @@ class FigureSettings:
     conditions: tuple[str, ...] = ()
     # how machines are sampled that are set side by side
     concepts: Concepts = field(default_factory=Concepts)
-    # whether machines side by side are pictures alone, one below the other, each as high as the
-    # others: for a page that has words and colour bar of its own
-    strip: bool = False
+    # whether a report says what heading, footer and statistics would: the figure is without them,
+    # as large as it is printed
+    printed: bool = False
 
     def __post_init__(self) -> None:
         """Check the values."""

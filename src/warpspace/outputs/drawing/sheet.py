@@ -226,7 +226,6 @@ def draw_heading(canvas: Canvas, title: str, facts: Sequence[str]) -> float:
 
 
 def _wrap(canvas: Canvas, facts: Sequence[str], room: float) -> list[str]:
-    """Spread facts over two lines; what is left over goes into the last one."""
     rows: list[str] = []
     for fact in facts:
         joined = f"{rows[-1]} · {fact}" if rows else fact
@@ -427,12 +426,17 @@ def start_sheet(
     errors: bool = True,
 ) -> Sheet:
     """Start a figure and draw what surrounds its content."""
-    canvas = Canvas(*settings.size, settings.theme, exact=exact)
-    said = " · ".join(facts)
-    facts = [*facts, *(words for words in settings.conditions if words not in said)]
-    top = draw_heading(canvas, title, facts)
-    bottom = draw_footer(canvas, scenes, legend, errors=errors)
-    margin = canvas.margin
+    printed = settings.printed
+    canvas = Canvas(*settings.size, settings.theme, exact=exact, printed=printed)
+    margin = 0.0 if printed else canvas.margin
+    if printed:
+        draw_legend(canvas, legend, margin, canvas.px(14.0), canvas.width)
+        top, bottom = float(canvas.height), canvas.px(40.0 if legend else 0.0)
+    else:
+        said = " · ".join(facts)
+        facts = [*facts, *(words for words in settings.conditions if words not in said)]
+        top = draw_heading(canvas, title, facts)
+        bottom = draw_footer(canvas, scenes, legend, errors=errors)
     right, width = canvas.width - margin, canvas.px(SIZES.panel)
     edge = right - width - canvas.px(12.0) if panel else right
     content = (0.6 * margin, bottom, edge, top - canvas.px(6.0))

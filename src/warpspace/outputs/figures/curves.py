@@ -20,7 +20,6 @@ SAMPLES = 361
 FEW_READINGS = 5000  # readings that are drawn at most, evenly picked from all
 BAND = 5
 """Colour of a tolerance that several errors of a chart share; one of its own has its error's."""
-TEXT_PX = 14.0
 KINDS = (("XYZ", MICROMETRE, "translation"), ("ABC", MICRORADIAN, "rotation"))
 Errors = tuple[Axis, str, str, str]
 """An axis, the letters of the errors of one kind, their unit and the kind."""
@@ -49,7 +48,8 @@ def draw_curves(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     columns = 1 if len(shown) < 3 else 2
     row = (top - bottom) / max(math.ceil(len(shown) / columns), 1)
     column = (split - left) / columns
-    size = canvas.px(TEXT_PX) * POINTS_PER_PX
+    text = SIZES.text if settings.printed else SIZES.small
+    size = canvas.px(text) * POINTS_PER_PX
     width, height = canvas.width, canvas.height
     with on_ground(settings.theme), style():
         for number, errors in enumerate(shown):

@@ -89,13 +89,16 @@ def say_statistics(
         *(_place_rows(found.max_at_axes, found.max_at_mm) if found.max_um > 0.0 else ()),
     ]
     marks = [("mean", found.mean_um), ("P95", found.p95_um), ("max", found.max_um)]
+    if isinstance(picture, ScenePicture) and picture.scene.limit_um is not None:
+        marks.append(("limit", picture.scene.limit_um))
     if picture.component != "norm":
         low, high = float(values.min()), float(values.max())
         words = f"{spell(low)} … {spell(high)} µm"
         rows.insert(0, (f"{picture.component} component", words))
         marks = [("min", low), ("mean", float(values.mean())), ("max", high)]
     heading, bars = quantity_words(picture.component), (px_per_mm, picture.exaggeration)
-    sheet.draw_panel(picture.scale, heading, marks, [*above, *rows], bars)
+    rows = [] if sheet.settings.printed else [*above, *rows]
+    sheet.draw_panel(picture.scale, heading, marks, rows, bars)
 
 
 def isoline_words(scale: ColourScale, values: Array | None = None) -> str:

@@ -12,12 +12,10 @@ from warpspace.bodies.placed import PlacedBody
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
 from warpspace.machine.limits import REPAIR_NODES
-from warpspace.outputs.charts.blocks import draw_beside, legend_handles, on_ground, style
-from warpspace.outputs.drawing.canvas import POINTS_PER_PX, Canvas
+from warpspace.outputs.drawing.canvas import Canvas
 from warpspace.outputs.drawing.map3d import draw_map, draw_maps_alike
 from warpspace.outputs.drawing.render import Rect, fit_projection
 from warpspace.outputs.drawing.settings import (
-    FONT,
     SIZES,
     FigureSettings,
     evaluate_for,
@@ -31,7 +29,6 @@ from warpspace.outputs.drawing.sheet import (
     isoline_entries,
     line_entry,
     map_legend,
-    metadata,
     scene_facts,
     start_sheet,
 )
@@ -46,7 +43,7 @@ from warpspace.picture.comparison import (
     statistics_change,
 )
 from warpspace.picture.model import ConceptPicture, ScenePicture, picture_concept, view_words
-from warpspace.picture.words import LOOP_WORDS, quantity_words, tolerance_words
+from warpspace.picture.words import LOOP_WORDS, tolerance_words
 from warpspace.scene.model import Scene
 from warpspace.units import Array, spell, spell_count, spell_short, spell_signed
 
@@ -67,20 +64,30 @@ def _evaluate_pair(settings: FigureSettings, scenes: Sequence[Scene]) -> list[Sc
 
 def draw_comparison(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
     """Draw two scenes and their difference side by side."""
+    title = f"Comparison: A {scenes[0].title}, B {scenes[1].title}"
+    return _draw_pair("comparison", title, scenes, settings, [], exact=exact)
+
+
+def _draw_pair(
+    name: str,
+    title: str,
+    scenes: Sequence[Scene],
+    settings: FigureSettings,
+    said: Sequence[str],
+    *,
+    exact: bool,
+) -> Drawing:
     first, second = _evaluate_pair(settings, scenes)
     scale, exaggeration, component = first.scale, first.exaggeration, settings.component
     change = scene_change(first, second)
     if settings.range_fixed:
         change = replace(change, colours=replace(change.scale, low=scale.low, high=scale.high))
-    title = f"Comparison: A {scenes[0].title}, B {scenes[1].title}"
-    facts = [*scene_facts(first, exaggeration), view_words(settings.view, first.grid.shape)]
+    facts = [*scene_facts(first, exaggeration), view_words(settings.view, first.grid.shape), *said]
     words = [isoline_words(one.scale, one.values) for one in (first, change)]
     if all(words) and words[0] != words[1]:
         words = [f"{words[0]}, of {CHANGE} {words[1].removeprefix(EVERY)}"]
     legend = map_legend(next(filter(None, words), ""), diverging=scale.diverging)
-    sheet = start_sheet(
-        "comparison", settings, title, facts, scenes, legend, exact=exact, panel=False
-    )
+    sheet = start_sheet(name, settings, title, facts, scenes, legend, exact=exact, panel=False)
     canvas = sheet.canvas
     left, bottom, right, top = sheet.content
     middle = ((left + right) / 2.0, (bottom + top) / 2.0)
@@ -103,13 +110,18 @@ def _draw_corner(canvas: Canvas, rect: Rect, maps: Sequence[DrawnMap]) -> None:
     for name, drawn in (("A and B", maps[0]), (CHANGE, maps[2])):
         room, scale = 0.9 * step, drawn.picture.scale
         canvas.text(left, top, name, size=SIZES.heading, weight="bold", va="top", room=room)
-        what, high = f"{scale.label}  [{scale.unit}]", top - canvas.px(26.0)
+        label = "" if canvas.printed else f"{scale.label}  "
+        what, high = f"{label}[{scale.unit}]", top - canvas.px(26.0)
         canvas.text(left, high, what, size=SIZES.small, va="top", room=room)
         box = (left, bottom + canvas.px(20.0), left + bar, top - canvas.px(62.0))
         draw_colour_bar(canvas, box, scale)
         left += step
-    start = left + canvas.px(6.0)
-    columns = [start + (right - start) * share for share in (0.29, 0.45, 0.63, 0.99)]
+    start, drawn = left + canvas.px(6.0), maps[0]
+    box = (start, bottom + canvas.px(10.0), right, top)
+    draw_scale_bars(canvas, box, drawn.projection.px_per_mm, drawn.picture.exaggeration)
+    if canvas.printed:
+        return
+    columns = [start + (right - start) * share for share in (0.27, 0.42, 0.64, 0.99)]
     y = top - canvas.px(62.0)
     canvas.text(start, y, "µm", colour=canvas.theme.muted)
     for x, name in zip(columns, ("A", "B", CHANGE, DIFFERENCE_LENGTH), strict=True):
@@ -123,42 +135,22 @@ def _draw_corner(canvas: Canvas, rect: Rect, maps: Sequence[DrawnMap]) -> None:
         texts = (spell(a), spell(b), spell_signed(change[key]), spell(difference))
         for x, text in zip(columns, texts, strict=True):
             canvas.text(x, y, text, ha="right")
-    box, drawn = (start, bottom + canvas.px(10.0), right, y), maps[0]
-    draw_scale_bars(canvas, box, drawn.projection.px_per_mm, drawn.picture.exaggeration)
 
 
-# --- A repair: before and after the best set of adjustments, bars of every effect -----------------
-
-MAPS_SHARE = 0.5  # of the height of the content
-TEXT_PX = 12.0
+# --- A repair: before and after the best set of adjustments ---------------------------------------
 
 
 def draw_repair(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
-    """Draw the volume before and after the best repair, with what each error does to it."""
+    """Draw the volume before and after the best repair."""
     scene = scenes[0]
     found = Repair(loop=Loop(settings.loop), grid=min(settings.grid, REPAIR_NODES[1])).run(scene)
     after = found.changes()[-1].scene if found.repairs else scene
-    pictures = _evaluate_pair(settings, (scene, after))
-    before, scale = pictures[0], pictures[0].scale
+    pair = (
+        replace(scene, title="before"),
+        replace(after, title="after", name=f"{scene.name}_repaired"),
+    )
     title = f"Repair: {scene.title}"
-    facts = [*scene_facts(before, before.exaggeration), _adjusted(found)]
-    legend = map_legend(isoline_words(scale, before.values), diverging=scale.diverging)
-    sheet = start_sheet("repair", settings, title, facts, [scene], legend, exact=exact, panel=False)
-    canvas = sheet.canvas
-    left, bottom, right, top = sheet.content
-    split = bottom + (1.0 - MAPS_SHARE) * (top - bottom)
-    maps = _draw_repaired(canvas, (left, split, right, top), pictures, settings)
-    with on_ground(settings.theme), style():
-        size, legend = canvas.px(TEXT_PX) * POINTS_PER_PX, canvas.px(30.0)
-        width, height = canvas.width, canvas.height
-        box = (left / width, bottom / height, (right - left) / width)
-        bars = found.bars()
-        draw_beside(canvas.figure, bars, (*box, (split - legend - bottom) / height), size)
-        canvas.figure.legend(
-            handles=legend_handles(bars), loc="upper left", ncols=4, frameon=False,
-            bbox_to_anchor=(left / width, split / height), prop={"family": [FONT], "size": size},
-        )  # fmt: skip
-    return sheet.finish(before.exaggeration, maps)
+    return _draw_pair("repair", title, pair, settings, [_adjusted(found)], exact=exact)
 
 
 def _adjusted(found: RepairResult) -> str:
@@ -171,38 +163,15 @@ def _adjusted(found: RepairResult) -> str:
     return f"adjusted for the smallest {found.objective.upper()}: {parts}"
 
 
-def _draw_repaired(
-    canvas: Canvas, rect: Rect, pictures: Sequence[ScenePicture], settings: FigureSettings
-) -> tuple[DrawnMap, ...]:
-    left, bottom, right, top = rect
-    bar = canvas.px(200.0)
-    half = (right - left - bar) / 2.0
-    cells = [(left + half * i, bottom, left + half * (i + 1), top) for i in range(2)]
-    found = [picture.statistics for picture in pictures]
-    names = [
-        f"{name}: mean {spell(one.mean_um)} · RMS {spell(one.rms_um)} · max {spell(one.max_um)} µm"
-        for name, one in zip(("Before", "After"), found, strict=True)
-    ]
-    maps = draw_maps_alike(canvas, pictures, names, cells, settings.view)
-    start, words = right - bar + canvas.px(50.0), quantity_words(settings.component)
-    canvas.text(start, top - canvas.px(4.0), words, va="top", room=bar - canvas.px(50.0))
-    box = (start, bottom + canvas.px(40.0), start + canvas.px(30.0), top - canvas.px(60.0))
-    draw_colour_bar(canvas, box, maps[0].picture.scale)
-    return maps
-
-
 # --- Machines within the same tolerances: one scale of length, one of colours ---------------------
 
 BODY_ALPHA = 0.55
 CELL_HEAD, CELL_FOOT, AXIS_LABELS = 30.0, 74.0, 50.0
 """Room in px above a picture for its title, below it for its numbers, and for labels of axes."""
-STRIP_MARGIN = 0.05  # room around a picture that stands alone, by the shorter side of its cell
 
 
 def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
     """Draw machines within the same tolerances side by side."""
-    if settings.strip:
-        return _draw_strip(scenes, settings, exact=exact)
     plan = replace(settings.concepts, loop=Loop(settings.loop))
     concepts = compare_concepts(scenes, plan)
     pictures = _evaluate_concepts(concepts, settings)
@@ -233,24 +202,10 @@ def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: b
         (f"mean {letter}", f"{spell(one.sampled.mean_um)} µm")
         for letter, one in zip(LETTERS, concepts, strict=False)
     ]
-    sheet.draw_panel(scale, "RMS |E|  [µm]", [], rows, (px_per_mm, None))
+    sheet.draw_panel(
+        scale, "RMS |E|  [µm]", [], [] if settings.printed else rows, (px_per_mm, None)
+    )
     return sheet.finish(1.0, maps)
-
-
-def _draw_strip(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
-    plan = replace(settings.concepts, samples=1, loop=Loop(settings.loop))
-    pictures = _evaluate_concepts(compare_concepts(scenes, plan), settings)
-    canvas = Canvas(*settings.size, settings.theme, exact=exact)
-    width, height = float(canvas.width), canvas.height / len(pictures)
-    margin = STRIP_MARGIN * min(width, height)
-    rooms = [
-        (margin, top - height + margin, width - margin, top - margin)
-        for top in (canvas.height - height * index for index in range(len(pictures)))
-    ]
-    maps, _ = _draw_machines(canvas, pictures, rooms, settings)
-    title = "Concepts"
-    about = metadata(title, scenes, settings, 1.0, "concepts")
-    return Drawing(canvas.figure, title, about, maps, tuple(canvas.rects))
 
 
 def _evaluate_concepts(
@@ -282,7 +237,7 @@ def _draw_machines(
         maps.append(
             draw_map(
                 canvas, picture, room, view, labels=False, projection=projection, annotate=None,
-                ghost=False, axes=not settings.strip,
+                ghost=False,
             )
         )  # fmt: skip
     return tuple(maps), px_per_mm
@@ -333,6 +288,6 @@ def _draw_words(canvas: Canvas, cell: Rect, letter: str, concept: Concept) -> No
         for row in concept.leading
     )
     lines = (" · ".join(shares), " · ".join(numbers), f"chain {scene.machine.chain}")
-    for index, line in enumerate(lines):
+    for index, line in enumerate(lines[-1:] if canvas.printed else lines):
         y = bottom + canvas.px(10.0 + 21.0 * index)
         canvas.text(x, y, line, size=SIZES.small, colour=canvas.theme.muted, room=room)

@@ -30,13 +30,13 @@ POLICY = (
 
 _PATH = re.compile(r' d="[^"]*"')
 _NUMBER = re.compile(r"-?\d+\.\d{3,}")
-_SAFE = " <>=:/;,'()[]{}!$*+?@&|^`~\"\\"
-"""What the address of an image may hold as it is; the page's own escaping comes on top."""
+_UNSAFE = re.compile(r"[%#]|[^\x20-\x7e]+")
+"""What the address of an image holds in code; the page's own escaping comes on top."""
 
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """A paragraph; `role` is "lead" for the verdict, "heading", "body", or "note"."""
+    """A paragraph; `role` is "lead" for the verdict, "heading", "body", "note", or "code"."""
 
     text: str
     role: str = "body"
@@ -75,14 +75,7 @@ class Items:
     items: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Code:
-    """Text as it stands in a file."""
-
-    text: str
-
-
-Block = Text | Cards | Table | Picture | Embedded | Items | Code
+Block = Text | Cards | Table | Picture | Embedded | Items
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,12 +128,8 @@ def render_html(report: Report) -> str:
     templates.filters["kind"] = _kind
     templates.filters["data_uri"] = _data_uri
     templates.filters["attribute_page"] = _attribute_page
-    templates.filters["table"] = _table_markup
+    templates.filters["table"] = lambda table: Markup(table_html(table))  # noqa: S704 - escaped there
     return templates.get_template("report.html.j2").render(report=report, policy=POLICY)
-
-
-def _table_markup(table: Table) -> Markup:
-    return Markup(table_html(table))  # noqa: S704 - escaped there
 
 
 def _data_uri(picture: Picture) -> str:
@@ -148,7 +137,7 @@ def _data_uri(picture: Picture) -> str:
     text = _PATH.sub(lambda path: _NUMBER.sub(_rounded, path.group()), text)
     if "'" not in text:
         text = text.replace('"', "'")  # need no escape in the page
-    return "data:image/svg+xml," + quote(text, safe=_SAFE)
+    return "data:image/svg+xml," + _UNSAFE.sub(lambda found: quote(found.group()), text)
 
 
 def _rounded(number: re.Match[str]) -> str:

@@ -1,43 +1,38 @@
 """A design review in numbers, and the words of its first page."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from warpspace.analysis.adjusting import Objective
+from warpspace.analysis.blocks import Column, Mark, Table, number_columns
 from warpspace.analysis.cases import LIMIT_OVER, Over, Plan
 from warpspace.analysis.contributions import Explanation, Shares, explain
 from warpspace.analysis.description import Analysis, Result, silent
 from warpspace.analysis.distribution import choose_distribution
 from warpspace.analysis.gains import Gains
-from warpspace.analysis.machines import Machines, MachinesResult
-from warpspace.analysis.montecarlo import MonteCarlo
+from warpspace.analysis.machines import Machines
 from warpspace.analysis.repair import Repair, RepairResult
-from warpspace.analysis.statistics import Statistics
+from warpspace.analysis.statistics import Statistics, share_below
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
 from warpspace.machine.limits import REPAIR_NODES
-from warpspace.outputs.report.render import Block, Cards, Text
-from warpspace.picture.comparison import STATISTICS, scene_change, share_exaggeration
+from warpspace.outputs.report.render import Block, Cards, Items, Text
+from warpspace.picture.comparison import scene_change, share_exaggeration
 from warpspace.picture.model import (
-    DIFFERENCE_LENGTH,
     Exaggeration,
     ScenePicture,
     evaluate_picture,
     same_nodes,
 )
-from warpspace.picture.words import TIMES, own_axes, spell_point
+from warpspace.picture.words import TIMES, list_axes, own_axes, spell_in_r, spell_point
 from warpspace.scene.model import Scene, second_order
 from warpspace.units import MINUS, spell, spell_short
 
-SUBJECTS = {
-    "tool": "the tool point",
-    "workpiece": "the workpiece point",
-    "relative": "the tool, relative to the workpiece,",
-}
-UM = "\N{NO-BREAK SPACE}µm"
-_WORTH = 0.01  # share of the RMS that an adjustment must gain to be named
+UM, PERCENT = "\N{NO-BREAK SPACE}µm", "\N{NO-BREAK SPACE}%"
+_WORTH = 0.01  # share of the largest error that an adjustment must gain to be named
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,24 +43,28 @@ class ReportSettings:
     grid: int = 21  # nodes per axis of the working volume
     # "auto" or None; display factor; None takes the first scene's
     exaggeration: Exaggeration = None
-    spec_um: float | None = None  # specification of the volumetric error, µm
+    spec_um: float | None = None  # limit of |E|, µm; None takes that of each scene
     samples: int = 100_000  # of the Monte Carlo
     seed: int = 0
     distribution: str = "uniform"  # "uniform" or "normal"
+    author: str = ""
+    questions: tuple[str, ...] = ()  # what is still open, on the first page
 
-    def analyses(self) -> dict[str, Analysis]:
-        """Give what is asked of every scene."""
+    def analyses(self, limit_um: float | None) -> dict[str, Analysis]:
+        """Give what is asked of a scene with such a limit."""
         loop, seed = Loop(self.loop), self.seed
         drawn = choose_distribution(self.distribution)
 
         def machines(over: Over) -> Machines:
             return Machines(
                 loop=loop, distribution=drawn, seed=seed, samples=self.samples, over=over,
-                limit_um=self.spec_um,
+                limit_um=limit_um,
             )  # fmt: skip
 
+        repair = Repair(loop=loop, grid=min(self.grid, REPAIR_NODES[1]))
         return {
-            "repair": Repair(loop=loop, grid=min(self.grid, REPAIR_NODES[1])),
+            "advice": replace(repair, objective=Objective.MAX, count=1),
+            "repair": repair,
             "gains": Gains(loop=loop, over_travel=True),
             "worst": machines(LIMIT_OVER),
             "sampled": machines(Over.SAMPLED),
@@ -82,6 +81,14 @@ class Reviewed:
     explanation: Explanation  # of the worst node
     linearisation_um: float  # largest difference between the exact chain and the first order
     results: Mapping[str, Result | str]  # of each analysis; why there is none
+    within: float  # share of the volume within the limit; 0 where there is none
+    advice: str  # the one thing to do
+
+    @property
+    def keeps(self) -> bool:
+        """Whether its largest error is within its limit, where it has one."""
+        limit = self.scene.limit_um
+        return limit is None or self.statistics.max_um <= limit
 
     @property
     def scene(self) -> Scene:
@@ -94,6 +101,12 @@ class Reviewed:
         return self.picture.statistics
 
     @property
+    def worst_axes(self) -> str:
+        """Spell where the axes stand at the worst point."""
+        found = self.statistics
+        return list_axes(own_axes(self.scene, found.max_at_axes)) or spell_in_r(found.max_at_mm)
+
+    @property
     def worst_place(self) -> str:
         """Spell the worst point: axis positions, and the point of R."""
         found = self.statistics
@@ -104,12 +117,6 @@ class Reviewed:
         """Spell the size of the working volume."""
         edges = (f"{edge:.6g}" for edge in self.picture.grid.extent_mm)
         return f" {TIMES} ".join(edges) + " mm"
-
-    @property
-    def worst_machines(self) -> MonteCarlo | None:
-        """Give machines within tolerance at the worst point of each."""
-        found = self.results["worst"]
-        return found.points[0].sampled if isinstance(found, MachinesResult) else None
 
     def titled(self, text: str) -> str:
         """Put the letter of the scene before a heading."""
@@ -130,17 +137,14 @@ class Review:
         """Display factor of all pictures."""
         return self.scenes[0].picture.exaggeration
 
-    @property
-    def largest_um(self) -> float:
-        """Largest error of all scenes: the end of the colour scale they share."""
-        return max(one.statistics.max_um for one in self.scenes)
-
 
 def share_pictures(scenes: Sequence[Scene], settings: ReportSettings) -> tuple[ScenePicture, ...]:
     """Evaluate the volumes of one scene or two, drawn with the same factor."""
     if not 1 <= len(scenes) <= 2:
         raise OptionError(f"a report is about one scene or two; given {len(scenes)}")
     Plan(settings.samples, settings.seed, spec_um=settings.spec_um).check()
+    if settings.spec_um is not None:
+        scenes = [replace(scene, limit_um=settings.spec_um) for scene in scenes]
     return share_exaggeration(
         [evaluate_picture(scene, grid=settings.grid, loop=settings.loop) for scene in scenes],
         settings.exaggeration,
@@ -165,6 +169,9 @@ def build_review(
 
 def _review_scene(letter: str, picture: ScenePicture, settings: ReportSettings) -> Reviewed:
     scene, found = picture.scene, picture.statistics
+    results = {
+        name: _ask(analysis, scene) for name, analysis in settings.analyses(scene.limit_um).items()
+    }
     at = {name: np.asarray(value) for name, value in found.max_at_axes.items()}
     point = np.asarray(found.max_at_mm)
     return Reviewed(
@@ -172,8 +179,15 @@ def _review_scene(letter: str, picture: ScenePicture, settings: ReportSettings) 
         picture,
         explain(scene.model, scene.errors, at, picture.view, point),
         second_order(scene, settings.loop).um,
-        {name: _ask(analysis, scene) for name, analysis in settings.analyses().items()},
+        results,
+        _within(picture),
+        _advice(picture, results["advice"], settings),
     )
+
+
+def _within(picture: ScenePicture) -> float:
+    limit = picture.scene.limit_um
+    return 0.0 if limit is None else share_below(picture.field.norm_um, limit)
 
 
 def _ask(analysis: Analysis, scene: Scene) -> Result | str:
@@ -206,109 +220,101 @@ def _signed(text: str) -> str:
     return text if text == "0" or text.startswith(MINUS) else f"+{text}"
 
 
-def percent(share: float, digits: int = 1) -> str:
-    """Spell a share in per cent."""
-    return f"{100.0 * share:.{digits}f}\N{NO-BREAK SPACE}%"
+def volume_share(share: float) -> str:
+    """Spell a share of the volume, 100 % only where it is all of it."""
+    percent = 100.0 * share
+    return f"{percent if share == 1.0 else min(percent, 99.9):.3g}{PERCENT}"
 
 
 def verdict(review: Review) -> str:
-    """Say in a few sentences what a reader must know."""
-    sentences = [one.titled(" ".join(_said_of(one, review.settings))) for one in review.scenes]
-    if len(review.scenes) == 2:
-        a, b = (one.statistics.mean_um for one in review.scenes)
-        change = (b - a) / a if a else 0.0
-        word = f"{percent(abs(change), 0)} {'less' if change < 0.0 else 'more'} than"
-        words = word if abs(change) >= 0.005 else "the same as"
-        how = f"{words} A's {spell(a)}{UM}" if a else "where A has none"
-        sentences.insert(0, f"The mean error of B is {spell(b)}{UM}: {how}.")
-    return " ".join(sentences)
+    """Say what a reader must know: of two scenes which keeps its limit, and how they differ."""
+    if len(review.scenes) == 1:
+        return _verdict_on(review.scenes[0])
+    kept = [
+        f"{one.letter} {'keeps' if one.keeps else 'misses'} the limit of {spell_short(limit)}{UM}"
+        for one in review.scenes
+        if (limit := one.scene.limit_um) is not None
+    ]
+    a, b = (one.statistics.mean_um for one in review.scenes)
+    change = (b - a) / a if a else 0.0
+    words = f"{abs(100.0 * change):.0f}{PERCENT} {'less' if change < 0.0 else 'more'} than"
+    words = words if abs(change) >= 0.005 else "the same as"
+    how = f"{words} A's {spell(a)}{UM}" if a else "where A has none"
+    limits = f"{'; '.join(kept)}. " if kept else ""
+    return f"{limits}The mean error of B is {spell(b)}{UM}: {how}."
 
 
-def _said_of(reviewed: Reviewed, settings: ReportSettings) -> list[str]:
-    found, subject = reviewed.statistics, SUBJECTS[settings.loop]
-    where = f"in the working volume of {reviewed.volume}"
-    if found.max_um == 0.0:
-        sentences = [f"The error set is zero: {subject} is where it should be {where}."]
-    else:
-        sentences = [
-            (
-                f"On average {subject} is {spell(found.mean_um)}{UM} away from where it should be,"
-                f" and at most {spell(found.max_um)}{UM}, {where}."
-            ),
-            f"The worst point is at {reviewed.worst_place}.",
-            *_best_repair(reviewed),
-        ]
-        if settings.spec_um is not None:
-            kept = "kept everywhere" if found.max_um <= settings.spec_um else "not kept"
-            sentences.append(f"The specification of {spell_short(settings.spec_um)}{UM} is {kept}.")
-    return [*sentences, *_promise(reviewed)]
+def _verdict_on(one: Reviewed) -> str:
+    limit, largest = one.scene.limit_um, one.statistics.max_um
+    worst = f"{spell(largest)}{UM} at {one.worst_axes}"
+    volume = f"the working volume of {one.volume}"
+    if largest == 0.0:
+        return f"The error is zero in {volume}."
+    if limit is None:
+        return f"No limit is set. The largest error in {volume} is {worst}."
+    words = f"The limit of {spell_short(limit)}{UM} is"
+    if one.keeps:
+        return f"{words} kept in {volume}: the largest error is {worst}."
+    share = volume_share(one.within)
+    return f"{words} missed: {share} of {volume} is within it, and the worst is {worst}."
 
 
-def _best_repair(reviewed: Reviewed) -> list[str]:
-    """Say which one adjustment helps the whole volume most, where one does."""
-    found = reviewed.results["repair"]
+def _advice(picture: ScenePicture, found: Result | str, settings: ReportSettings) -> str:
+    limit, before = picture.scene.limit_um, picture.statistics.max_um
+    if before == 0.0:
+        return "Nothing to adjust: the error is zero."
+    if limit is not None and before <= limit:
+        return "Nothing to adjust: the limit is kept."
     if not isinstance(found, RepairResult) or not found.repairs:
-        return []
-    best = found.repairs[0]
-    ((key, value),) = best.adjust.items()
-    if not best.rms_um < (1.0 - _WORTH) * found.before.rms_um:
-        return []
+        return "Nothing to adjust: no squareness or alignment acts in this loop."
+    after = evaluate_picture(found.changes()[0].scene, grid=settings.grid, loop=settings.loop)
+    largest = after.statistics.max_um
+    if not largest < (1.0 - _WORTH) * before:
+        return "No single adjustment lowers the largest error; several together may: see Repair."
+    ((key, value),) = found.repairs[0].adjust.items()
     row = parameter(key)
+    then = ""
+    if limit is not None:
+        share = volume_share(_within(after))
+        then = (
+            ", and the limit is kept"
+            if largest <= limit
+            else f", and {share} of the volume is within the limit"
+        )
+    return (
+        f"Adjust {key} ({row.name}) from {given(found.present[key])} to {signed(value)} {row.unit}:"
+        f" the largest error falls from {spell(before)} to {spell(largest)}{UM}{then}."
+    )
+
+
+def first_page(review: Review, picture: Block) -> list[Block]:
+    """Give the verdict, four numbers of each scene, a picture and what to do."""
+    names = ["mean |E|", "P95", "max"]
+    limited = any(one.scene.limit_um is not None for one in review.scenes)
+    rows: list[list[str]] = []
+    for one in review.scenes:
+        found = one.statistics
+        numbers = (found.mean_um, found.p95_um, found.max_um, found.rms_um)
+        rows.append([spell(value) + UM for value in numbers])
+        if limited:
+            rows[-1][-1] = volume_share(one.within) if one.scene.limit_um is not None else "–"
+    names.append("within the limit" if limited else "RMS")
+    if len(rows) == 1:
+        remarks = ("", "95 % of the volume is below it", f"at {review.scenes[0].worst_axes}")
+        cards = zip(names, rows[0], (*remarks, "of the volume" if limited else ""), strict=True)
+        said: Block = Cards(tuple(cards))
+    else:
+        columns = (Column("scene"), *number_columns(names, "s"))
+        titles = [one.titled(one.scene.title) for one in review.scenes]
+        marks: list[Mark] = ["" if one.keeps else "worse" for one in review.scenes]
+        numbered = [(title, *row) for title, row in zip(titles, rows, strict=True)]
+        said = Table(columns, numbered, marks=marks)
+    asked = review.settings.questions
     return [
-        (
-            f"Of all squareness and alignment errors, {key} ({row.name}) helps most: set from"
-            f" {given(found.present[key])} to {signed(value)} {row.unit}, it brings the mean to"
-            f" {spell(best.mean_um)}{UM} and the largest error to {spell(best.max_um)}{UM}."
-        )
+        Text(verdict(review), "lead"),
+        said,
+        Text("What to do", "heading"),
+        *(Text(one.titled(one.advice)) for one in review.scenes),
+        picture,
+        *([Text("Open questions", "heading"), Items(asked)] if asked else []),
     ]
-
-
-def _promise(reviewed: Reviewed) -> list[str]:
-    """Say what the tolerances promise, where there are any."""
-    worst, sampled = reviewed.worst_machines, reviewed.results["sampled"]
-    if worst is None or not isinstance(sampled, MachinesResult):
-        return []
-    start = "Of machines that its tolerances allow,"
-    if (kept := worst.probability) is not None:
-        return [
-            (
-                f"{start} {percent(kept.probability)} keep the specification of"
-                f" {spell_short(kept.spec_um)}{UM} in the whole working volume (95 % interval"
-                f" {percent(kept.low)} to {percent(kept.high)})."
-            )
-        ]
-    mean = sampled.points[0].sampled.mean_um
-    return [
-        (
-            f"{start} 95 % stay below {spell(worst.p95_um)}{UM} at their worst point, and"
-            f" {spell(mean)}{UM} is the mean error."
-        )
-    ]
-
-
-def first_page(review: Review) -> list[Block]:
-    """Give the verdict and the numbers to remember."""
-    scenes = review.scenes
-    alone = f"at {scenes[0].worst_place}" if len(scenes) == 1 else ""
-    cards = [
-        (
-            "mean |E|" if name == "mean" else name,
-            " → ".join(spell(getattr(one.statistics, field)) for one in scenes) + UM,
-            alone if name == "max" else " → ".join(one.letter for one in scenes),
-        )
-        for name, field in STATISTICS.items()
-        if name != "RMS"
-    ]
-    if review.difference is not None:
-        largest = f"{spell(review.difference.max_um)}{UM}"
-        cards.append((f"max {DIFFERENCE_LENGTH}", largest, "largest change of a point"))
-    worst = [one.worst_machines for one in scenes]
-    if all(worst):
-        kept = [one.probability for one in worst if one is not None and one.probability]
-        if kept:
-            shares = " → ".join(percent(one.probability) for one in kept)
-            cards.append((f"keep {spell_short(kept[0].spec_um)}{UM}", shares, "of machines"))
-        else:
-            below = " → ".join(spell(one.p95_um) for one in worst if one is not None)
-            cards.append(("P95 by tolerances", f"{below}{UM}", "worst point, machines"))
-    return [Text(verdict(review), "lead"), Cards(tuple(cards))]

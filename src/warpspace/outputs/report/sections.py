@@ -2,10 +2,10 @@
 
 import hashlib
 import platform
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -17,13 +17,12 @@ from warpspace.analysis.distribution import choose_distribution
 from warpspace.exceptions import NoRendererError, OptionError, RenderError, WarpspaceError
 from warpspace.machine.axes import parameter
 from warpspace.machine.limits import MOST_CONCEPTS
-from warpspace.outputs.drawing.settings import FigureSettings
+from warpspace.outputs.drawing.settings import PRINTED_PX, FigureSettings
 from warpspace.outputs.figures.catalogue import figure_kinds
 from warpspace.outputs.files import check_target, write_atomically
 from warpspace.outputs.processes import FigureWorker
 from warpspace.outputs.report.render import (
     Block,
-    Code,
     Embedded,
     Items,
     Picture,
@@ -56,8 +55,11 @@ from warpspace.scene.model import Scene
 from warpspace.scene.save import scene_to_toml
 from warpspace.units import spell, spell_short
 
-PAPER_SHARE = 0.87  # width of a map among the evidence: two of them then stand on a page
+HEIGHT_PX = 400
+OTHER_PX = {"comparison": 490, "slices": 490, "error-curves": 490, "concepts": 490, "repair": 490}
+"""Heights of figures of several drawings."""
 CHART = "warpspace.outputs.charts.blocks:chart_figure"
+LINES_WIDTH = 0.72  # of the page, at which curves are printed as large as they are drawn
 Chart = Bars | Lines | Histogram
 Drawn = Callable[[], Block]
 """Waits for a figure; gives what stands in its place where it cannot be drawn."""
@@ -99,17 +101,15 @@ class ReportFigures:
                 for kind in figure_kinds()
                 if kind.evidence and kind.name not in left_out
             ]
-            self._evidence.append(
-                [self._begin(name, [scene], caption, PAPER_SHARE) for name, caption in wanted]
-            )
+            self._evidence.append([self._begin(name, [scene], caption) for name, caption in wanted])
 
     def evidence(self, number: int) -> list[Block]:
         """Give the maps of one scene: its error map and whatever else the catalogue has."""
         return [drawn() for drawn in self._evidence[number]]
 
     def repair(self, scene: Scene, prefix: str) -> Block:
-        """Draw the volume before and after the repair, with bars of what each error does."""
-        caption = f"{prefix}Before and after the last set of the table; bars of the whole volume."
+        """Draw the volume before and after the repair."""
+        caption = f"{prefix}Before, after the last set of the table, and their difference."
         return self._begin("repair", [scene], caption)()
 
     def concepts(self, scenes: Sequence[Scene], plan: Concepts, caption: str) -> Block:
@@ -120,14 +120,16 @@ class ReportFigures:
     def chart(self, chart: Chart) -> Block:
         """Draw a chart of a result."""
         data = self._worker.begin_chart("chart", CHART, self._form, chart)()
-        return Picture("chart", chart.title, data, self._form)
+        width = LINES_WIDTH if isinstance(chart, Lines) else 1.0
+        named = isinstance(chart, Histogram)
+        caption = f"Distribution: {chart.x_label}." if named else chart.title
+        return Picture("chart", caption, data, self._form, width)
 
     def _begin(
         self,
         name: str,
         scenes: Sequence[Scene],
         caption: str,
-        width: float = 1.0,
         settings: FigureSettings | None = None,
     ) -> Drawn:
         """Begin a figure; it is drawn a second time where the first fails, then it is missing.
@@ -137,12 +139,14 @@ class ReportFigures:
         # the lean of the tool axis has a factor of its own, at which it is seen
         factor = "auto" if name == "orientation-map" else self._factor
         chosen = settings or FigureSettings(exaggeration=factor, loop=self._loop, grid=self._grid)
+        size = PRINTED_PX, OTHER_PX.get(name, HEIGHT_PX)
+        chosen = replace(chosen, size=size, printed=True)
         begun = self._worker.begin(name, scenes, chosen, self._form)
 
         def drawn() -> Block:
             for wait in (begun, lambda: self._worker.render(name, scenes, chosen, self._form)):
                 try:
-                    return Picture(name, caption, wait(), self._form, width)
+                    return Picture(name, caption, wait(), self._form)
                 except NoRendererError:
                     raise
                 except RenderError as error:
@@ -165,14 +169,8 @@ LOOPS = {
 }
 
 
-class Embed(Protocol):
-    """Builds a page with the interactive scene; handed in, since that needs a server."""
-
-    def __call__(
-        self, scene: Scene, *, exaggeration: float, nodes: int, loop: str, largest: float
-    ) -> str:
-        """Give the page as HTML that requests nothing."""
-        ...
+Embed = Callable[..., str]
+"""Builds a page of a scene, given exaggeration, nodes, loop and largest |E|; it needs a server."""
 
 
 def write_report(
@@ -224,9 +222,9 @@ def build_report(
     with FigureWorker() as worker:
         painter = ReportFigures(worker, pictures, settings.loop, settings.grid, form)
         review = build_review(scenes, settings, pictures)
-        compared = compare_with(scenes, concepts, settings)
+        compared = compare_with([one.scene for one in review.scenes], concepts, settings)
         found = {
-            "": [*first_page(review), painter.first()],
+            "": first_page(review, painter.first()),
             "Where the error is": where(review, painter, embed),
             "Error budget at the worst point": map(explanation, review.scenes),
             "Repair": told(review, painter, "repair"),
@@ -239,18 +237,29 @@ def build_report(
             "Conventions": [conventions(review)],
             "Provenance": provenance(review, files),
         }
-        parts = tuple(Section(heading, tuple(blocks)) for heading, blocks in found.items())
+        parts = tuple(
+            Section(heading and f"Appendix {_letters(number)} · {heading}", tuple(blocks))
+            for number, (heading, blocks) in enumerate(found.items())
+        )
     machines = [one.scene.machine for one in review.scenes]
     facts = (
         *dict.fromkeys(f"{machine.title}, chain {machine.chain}" for machine in machines),
         *dict.fromkeys(one.volume for one in review.scenes),
         f"{settings.loop} loop",
         *dict.fromkeys(reference_words(one.scene) for one in review.scenes),
+        *(f"error set {one.scene.name}" for one in review.scenes),
+        *([f"by {settings.author}"] if settings.author else []),
         report_time().strftime("%Y-%m-%d"),
         f"warpspace {__version__}",
     )
     title = " and ".join(one.titled(one.scene.title) for one in review.scenes)
     return Report(title, OVERLINE, facts, parts, tuple(painter.missing))
+
+
+def _letters(number: int) -> str:
+    """Name an appendix, counted from 1: A to Z, then AA."""
+    rest, last = divmod(number - 1, 26)
+    return (chr(64 + rest) if rest else "") + chr(65 + last)
 
 
 def said(found: Iterable[AnyBlock], painter: ReportFigures | None = None) -> Iterator[Block]:
@@ -259,14 +268,29 @@ def said(found: Iterable[AnyBlock], painter: ReportFigures | None = None) -> Ite
         if isinstance(block, str):
             yield Text(block.strip(), "note" if block.startswith(" ") else "body")
         elif isinstance(block, Table) and block.rows:
-            left = len(block.rows) - MOST_ROWS
-            more = f" {left} more rows are left out." if left > 0 else ""
-            title = f"{block.title.strip()}{more}"
-            yield replace(block, title=title, rows=block.rows[:MOST_ROWS])
+            kept = [i for i, row in enumerate(block.rows) if not _is_zero(block.columns, row)]
+            zero, left = len(block.rows) - len(kept), len(kept) - MOST_ROWS
+            title = block.title.strip()
+            title += f" Rows of zeros left out: {zero}." if zero else ""
+            title += f" {left} more rows are left out." if left > 0 else ""
+            rows = [block.rows[i] for i in kept[:MOST_ROWS]]
+            marks = [block.marks[i] for i in kept[:MOST_ROWS] if block.marks]
+            shown = replace(block, title=title.strip(), rows=rows, marks=marks)
+            yield shown if rows else Text(title.strip(), "note")
         elif isinstance(block, Table):
             yield Text(f"{block.title} {block.empty.strip()}".strip(), "note")
         elif painter is not None:
             yield painter.chart(_first_bars(block) if isinstance(block, Bars) else block)
+
+
+def _is_zero(columns: Sequence[Column], row: Sequence[object]) -> bool:
+    """Tell whether all numbers of a row are zero as they are spelled."""
+    cells = [
+        column.spell(value)
+        for column, value in zip(columns, row, strict=True)
+        if column.shows and isinstance(value, int | float) and not isinstance(value, bool)
+    ]
+    return bool(cells) and not any(re.search("[1-9]", cell) for cell in cells)
 
 
 def _first_bars(bars: Bars) -> Bars:
@@ -314,7 +338,8 @@ def where(review: Review, painter: ReportFigures, embed: Embed | None) -> Iterat
     if review.difference is not None:
         found.append(review.difference)
     yield Text("Each node counts for its share of the volume.")
-    yield from said(statistics_blocks(review.scenes[0].scene, names, found))
+    blocks = statistics_blocks(review.scenes[0].scene, names, found)
+    yield from said(block for block in blocks if not str(block).startswith("  --at"))
     for number, reviewed in enumerate(review.scenes):
         if embed is not None:
             page = embed(
@@ -322,7 +347,7 @@ def where(review: Review, painter: ReportFigures, embed: Embed | None) -> Iterat
                 exaggeration=review.exaggeration,
                 nodes=min(max(reviewed.picture.grid.shape), 21),
                 loop=review.settings.loop,
-                largest=review.largest_um,
+                largest=max(one.statistics.max_um for one in review.scenes),
             )
             title = reviewed.titled(f"{reviewed.scene.title}: turn it with the mouse")
             yield Embedded(title, page)
@@ -349,8 +374,8 @@ def explanation(reviewed: Reviewed) -> Table:
     title = (
         f"{reviewed.titled(reviewed.scene.title)}. What each error does to the worst point,"
         f" {reviewed.worst_place}. The parts along E add up to the length of the first-order error."
-        " This is no advice what to repair: what adds most here may make up for other errors"
-        " elsewhere; see Repair."
+        " The largest contribution is not always the one to adjust, since it may compensate other"
+        " errors elsewhere; see Repair."
     )
     columns = (
         *(Column("key"), Column("error"), Column("value there", "s")),
@@ -361,20 +386,22 @@ def explanation(reviewed: Reviewed) -> Table:
 
 
 def parameters(reviewed: Reviewed) -> Block:
-    """List every error that is not zero or has a tolerance, and whether it keeps it."""
+    """List every error that is not zero or misses its tolerance."""
     scene = reviewed.scene
     rows: list[tuple[str, ...]] = []
     marks: list[Mark] = []
+    zero = 0
     for key in scene.parameter_keys:
         row, tolerance = parameter(key), scene.tolerances.get(key)
         value = scene.errors.amplitude(key)
-        if value == 0.0 and tolerance is None:
-            continue
         limits, kept = "", ""
         if tolerance is not None:
             centre = "" if tolerance.centre == 0.0 else f"{given(tolerance.centre)} "
             limits = f"{centre}± {spell_short(tolerance.half_width)}"
             kept = "yes" if abs(value - tolerance.centre) <= tolerance.half_width else "no"
+        if value == 0.0 and kept != "no":
+            zero += 1
+            continue
         function = scene.errors.functions.get(key) if value else None
         curve = "" if function is None else function.describe(row.unit, spell, spell_short)
         number = given(value) if value else "0"
@@ -382,8 +409,8 @@ def parameters(reviewed: Reviewed) -> Block:
         marks.append("worse" if kept == "no" else "key" if value else "")
     title = reviewed.titled(f"Errors and tolerances of {scene.title}.")
     if not rows:
-        return Text(f"{title} All errors are zero, and there are no tolerances.", "note")
-    title += " Errors that are zero and have no tolerance are left out."
+        return Text(f"{title} All errors are zero; none is out of its tolerance.", "note")
+    title += f" Errors that are zero left out: {zero}." if zero else ""
     columns = (
         *(Column("key"), Column("symbol"), Column("error"), Column("value", "s")),
         *(Column("tolerance", "s"), Column("unit"), Column("kept"), Column("along the axis")),
@@ -494,8 +521,6 @@ def provenance(review: Review, files: Sequence[Path]) -> Iterator[Block]:
         ("made", report_time().strftime("%Y-%m-%d %H:%M UTC")),
         ("with", f"Python {platform.python_version()}, NumPy {np.__version__}"),
         ("grid", f"{settings.grid} nodes per axis"),
-        ("loop", settings.loop),
-        ("exaggeration", f"displacement drawn {spell_factor(review.exaggeration)}"),
         (
             "sampling",
             f"{settings.samples} machines, {settings.distribution}, seed {settings.seed}",
@@ -511,4 +536,4 @@ def provenance(review: Review, files: Sequence[Path]) -> Iterator[Block]:
     for one, text in zip(review.scenes, texts, strict=True):
         words = f"{one.scene.name}.toml, complete: saved as a file it is the scene of this report."
         yield Text(one.titled(words), "heading")
-        yield Code(text.decode())
+        yield Text(text.decode(), "code")

@@ -1,130 +1,94 @@
-"""What is written on the map: corner arrows and the worst point."""
-
-from typing import Any
+"""What is marked on the map: corner arrows, the worst point, the path of a test."""
 
 import numpy as np
-from numpy.typing import NDArray
 from viser import SceneApi
 
 from warpspace.app.browser.handles import Handle
 from warpspace.app.evaluation.bench import BenchPicture
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.palette import palette
+from warpspace.app.viewport.labels import axis_labels, point_labels
 from warpspace.app.viewport.layers import NOTHING, SCENE_PER_MM, colour_bytes, polyline_pieces
 from warpspace.app.viewport.layers.adding import add_ball, add_lines
-from warpspace.app.viewport.marks import (
-    CornerArrows,
-    WorstPoint,
-    build_arrows,
-    corner_arrows,
-    spell_micrometres,
-    worst_point,
-)
-from warpspace.units import MICROMETRE, spell_short
+from warpspace.app.viewport.marks import build_arrows, corner_arrows, worst_point
 
 RADIUS, HEAD, BALL = 0.0032, 0.034, 0.009
 """Shaft and head of an arrow, and the marker of the worst point, as parts of the longest edge."""
-CORNERS = 8
-
-
-def _spell_value(value: float, unit: str) -> str:
-    if unit == MICROMETRE:
-        return f"max {spell_micrometres(value)}"
-    return f"max {value:.1f} {unit}".replace("-", "−")
 
 
 class AnnotationsLayer:
-    """Arrows, marker and their numbers."""
+    """Arrows and marker; their numbers are words of the page."""
 
     def __init__(self, scene: SceneApi, picture: LivePicture) -> None:
         self._scene = scene
         self._arrows: Handle | None = None
-        self._corner_labels = [
-            self._label(f"/marks/corner{n}", "bottom-center") for n in range(CORNERS)
-        ]
         self._ball: Handle | None = None
-        self._worst = self._label("/marks/max", "bottom-center")
         self.show(picture)
-
-    def _label(self, name: str, anchor: Any) -> Handle:
-        return Handle(
-            self._scene.add_label(
-                name, "", visible=False, font_screen_scale=0.8, anchor=anchor, depth_test=True
-            )
-        )
 
     def show(self, picture: LivePicture) -> None:
         """Follow the picture."""
-        worst = worst_point(picture.values, picture.grid.nominal_mm, picture.drawn_mm)
-        self._show_arrows(picture, worst)
-        self._show_worst(picture, worst)
+        self._show_arrows(picture)
+        self._show_worst(picture)
 
-    def _show_arrows(self, picture: LivePicture, worst: WorstPoint) -> None:
+    def _show_arrows(self, picture: LivePicture) -> None:
         if not picture.state.look.arrows:
-            for part in (*self._corner_labels, *([self._arrows] if self._arrows else ())):
-                part.put(visible=False)
+            if self._arrows is not None:
+                self._arrows.put(visible=False)
             return
+        grid, longest = picture.grid, picture.size_mm
         arrows = corner_arrows(
-            picture.grid.shape,
-            picture.grid.nominal_mm,
-            picture.field.error_um,
-            picture.exaggeration,
-            picture.size_mm,
+            grid.shape, grid.nominal_mm, picture.field.error_um, picture.exaggeration
         )
-        for label in self._corner_labels[len(arrows.norm_um) :]:
-            label.put(visible=False)
-        longest = picture.size_mm
         vertices, triangles = build_arrows(
             arrows.start_mm, arrows.end_mm, RADIUS * longest, HEAD * longest
         )
+        colour = palette(picture).edge
         if self._arrows is None or len(self._arrows.handle.vertices) != len(vertices):
             self._arrows = Handle(
                 self._scene.add_mesh_simple(
                     "/marks/arrows",
                     vertices.astype(np.float32),
                     triangles.astype(np.uint32),
-                    color=palette(picture).edge,
+                    color=colour,
                     scale=SCENE_PER_MM,
                     cast_shadow=False,
                     receive_shadow=False,
                 )
             )
-        self._arrows.put(
-            vertices=vertices.astype(np.float32), color=palette(picture).edge, visible=True
-        )
-        marked = carries_worst(picture, arrows, worst)
-        for label, text, at, hidden in zip(
-            self._corner_labels, arrows.texts, arrows.label_mm, marked, strict=False
-        ):
-            label.put(text=text, position=at * SCENE_PER_MM, visible=not hidden)
+        self._arrows.put(vertices=vertices.astype(np.float32), color=colour, visible=True)
 
-    def _show_worst(self, picture: LivePicture, found: WorstPoint) -> None:
+    def _show_worst(self, picture: LivePicture) -> None:
+        found = worst_point(picture.values, picture.grid.nominal_mm, picture.drawn_mm)
         on = picture.state.look.worst and found.value != 0.0
-        self._worst.put(visible=on)
-        if self._ball is not None:
-            self._ball.put(visible=on)
-        if not on:
-            return
-        longest = picture.size_mm
         if self._ball is None:
-            self._ball = add_ball(self._scene, "/marks/ball", BALL * longest, palette(picture).edge)
-        self._ball.put(position=found.drawn_mm * SCENE_PER_MM, color=palette(picture).edge)
-        middle = picture.grid.bounds_mm.mean(axis=0)
-        outwards = np.sign(np.round(found.nominal_mm - middle, 9)) * (1.0, 1.0, 0.0)
-        self._worst.put(
-            text=_spell_value(found.value, picture.scale.unit),
-            position=(found.drawn_mm + 0.03 * longest * outwards) * SCENE_PER_MM,
+            radius = BALL * picture.size_mm
+            self._ball = add_ball(self._scene, "/marks/ball", radius, palette(picture).edge)
+        self._ball.put(
+            position=found.drawn_mm * SCENE_PER_MM, color=palette(picture).edge, visible=on
         )
 
 
-def carries_worst(
-    picture: LivePicture, arrows: CornerArrows, worst: WorstPoint
-) -> NDArray[np.bool_]:
-    """Tell which corners carry the mark of the largest error, which says the same number."""
-    look = picture.state.look
-    if not look.worst or look.tilts or picture.state.component != "norm":
-        return np.zeros(len(arrows.norm_um), dtype=bool)
-    return np.all(np.isclose(arrows.start_mm, worst.nominal_mm), axis=1)
+class LabelsLayer:
+    """All words in 3-D, for a page that cannot place them."""
+
+    def __init__(self, scene: SceneApi, picture: LivePicture) -> None:
+        away = 0.03 * picture.size_mm
+        middle = picture.grid.bounds_mm.mean(axis=0)
+        for number, label in enumerate((*axis_labels(picture), *point_labels(picture))):
+            start = middle if label.from_mm is None else label.from_mm
+            way = label.at_mm - start
+            out = way / max(float(np.linalg.norm(way)), 1e-9)
+            scene.add_label(
+                f"/words/{number}",
+                label.text,
+                position=(label.at_mm + (3.0 if label.kind == "axis" else 1.0) * away * out)
+                * SCENE_PER_MM,
+                font_screen_scale=0.8,
+                anchor="center-center",
+            )
+
+    def show(self, picture: LivePicture) -> None:
+        """Stay; the picture of such a page does not change."""
 
 
 # --- The path of the standard test that is run ----------------------------------------------------
@@ -132,24 +96,19 @@ def carries_worst(
 
 
 class BenchLayer:
-    """The path of a test and its name."""
+    """The path of a test."""
 
     def __init__(self, scene: SceneApi, picture: LivePicture) -> None:
         colours = palette(picture)
         self._nominal = add_lines(scene, "/test/nominal", colours.trace_nominal, 1.5, visible=False)
         self._actual = add_lines(scene, "/test/actual", colours.trace_actual, 3.0, visible=False)
-        self._name = Handle(
-            scene.add_label(
-                "/test/name", "", visible=False, font_screen_scale=0.8, anchor="bottom-center"
-            )
-        )
         self.show(picture)
 
     def show(self, picture: LivePicture) -> None:
         """Draw the path."""
         found = picture.bench
         shown = isinstance(found, BenchPicture) and picture.state.bench.path
-        for part in (self._nominal, self._actual, self._name):
+        for part in (self._nominal, self._actual):
             part.put(visible=shown)
         if not isinstance(found, BenchPicture) or not shown:
             return
@@ -162,11 +121,4 @@ class BenchLayer:
         )
         self._actual.put(
             points=actual if len(actual) else NOTHING, colors=colour_bytes(colours.trace_actual)
-        )
-        ends = np.concatenate([other for _, other in lines])
-        factor = spell_short(picture.exaggeration)
-        self._name.put(
-            text=f"{found.prepared.test.name}: max {spell_micrometres(found.largest_um)},"
-            f" drawn {factor} ×",
-            position=ends[np.argmax(ends[:, 2])] * SCENE_PER_MM,
         )

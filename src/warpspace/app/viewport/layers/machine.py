@@ -15,7 +15,6 @@ from warpspace.app.evaluation.machine import drawn_bodies, nominal_bodies, tool_
 from warpspace.app.evaluation.palette import palette
 from warpspace.app.viewport.layers import SCENE_PER_MM, colour_bytes
 from warpspace.app.viewport.layers.adding import add_ball
-from warpspace.app.viewport.marks import spell_micrometres
 from warpspace.app.viewport.tone_map import Rgb
 from warpspace.units import Array
 
@@ -107,11 +106,6 @@ class MachineLayer:
         self._scene = scene
         self._bodies = BodyMeshes(scene, "/machine", edge_px=0.9)
         self._ball: Handle | None = None
-        self._label = Handle(
-            scene.add_label(
-                "/machine/label", "", visible=False, font_screen_scale=0.8, anchor="center-left"
-            )
-        )
         self._turned: Mapping[str, float] = {}
         self._picture = picture
         self.show(picture)
@@ -128,7 +122,6 @@ class MachineLayer:
 
     def _draw(self) -> None:
         picture, look = self._picture, self._picture.state.machine
-        self._label.put(visible=look.shown)
         if self._ball is not None:
             self._ball.put(visible=look.shown)
         placed = drawn_bodies(picture, self._turned) if look.shown or self._turned else ()
@@ -154,19 +147,14 @@ class MachineLayer:
                 self._scene, "/machine/tool_point", BALL * longest, palette(picture).edge
             )
         self._ball.put(position=found.drawn_mm * SCENE_PER_MM)
-        length = float(np.linalg.norm(found.error_um))
-        self._label.put(
-            text=f"tool point, |E| {spell_micrometres(length)}",
-            position=(found.drawn_mm + 0.03 * longest * np.eye(3)[0]) * SCENE_PER_MM,
-        )
 
 
 # --- The machine as a ghost around its working volume: it tells what the box is a part of ---------
 
-OPACITY = 0.12
+OPACITY = 0.045
 GHOST, DARK_GHOST = (120, 132, 150), (150, 160, 176)
-GHOST_EDGE: Rgb = (190, 196, 206)
-DARK_GHOST_EDGE: Rgb = (78, 85, 96)
+GHOST_EDGE: Rgb = (226, 230, 235)
+DARK_GHOST_EDGE: Rgb = (48, 54, 63)
 
 
 class GhostMachineLayer:

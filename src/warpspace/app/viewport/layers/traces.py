@@ -1,4 +1,4 @@
-"""Traces of the rotary axes: one in colour, with its nominal circle and its name; the others faint.
+"""Traces of the rotary axes: one in colour, with its nominal circle; the others faint.
 
 What no error moves is not drawn. All have the exaggeration of the box. Where the actual trace that
 is looked at and its nominal one coincide on screen only the actual one is drawn.
@@ -13,19 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 from viser import SceneApi
 
-from warpspace.app.browser.handles import Handle
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.palette import palette
 from warpspace.app.evaluation.rotation import chosen_trace, moved_traces, points_on_traces
 from warpspace.app.viewport.layers import NOTHING, SCENE_PER_MM, colour_bytes, polyline_pieces
 from warpspace.app.viewport.layers.adding import add_lines
-from warpspace.app.viewport.marks import spell_micrometres
-from warpspace.picture.traces import TraceLine
 from warpspace.units import Array
 
 APART = 0.002
 """Distance from which nominal and actual are both drawn, as a part of the longest edge."""
-NAME_AWAY = 0.03  # distance of the name from the trace, likewise
 
 
 def apart(nominal_mm: Array, actual_mm: Array, distance_mm: float) -> NDArray[np.float32]:
@@ -38,16 +34,6 @@ def apart(nominal_mm: Array, actual_mm: Array, distance_mm: float) -> NDArray[np
     return polyline_pieces([nominal_mm])[kept]
 
 
-def name_place(line: TraceLine, size_mm: float) -> tuple[Array, float]:
-    """Find where a trace is named: outside of its place of the largest error."""
-    lengths = np.linalg.norm(line.error_um, axis=-1)
-    worst = int(np.argmax(lengths))
-    away = line.actual_mm[worst] - line.actual_mm.mean(axis=0)
-    length = float(np.linalg.norm(away))
-    outwards = away / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
-    return line.actual_mm[worst] + NAME_AWAY * size_mm * outwards, float(lengths[worst])
-
-
 class TracesLayer:
     """Circles and arcs of the scene's trace points, as far as errors move them."""
 
@@ -56,18 +42,13 @@ class TracesLayer:
         self._others = add_lines(scene, "/traces/others", colours.trace_elsewhere, 1.0)
         self._nominal = add_lines(scene, "/traces/nominal", colours.trace_nominal, 1.5)
         self._actual = add_lines(scene, "/traces/actual", colours.trace_actual, 3.0)
-        self._name = Handle(
-            scene.add_label(
-                "/traces/name", "", visible=False, font_screen_scale=0.8, anchor="bottom-center"
-            )
-        )
         self.show(picture)
 
     def show(self, picture: LivePicture) -> None:
         """Draw the traces."""
         moved = moved_traces(picture)
         name = chosen_trace(picture, moved)
-        for part in (self._actual, self._nominal, self._name):
+        for part in (self._actual, self._nominal):
             part.put(visible=bool(name))
         others = [line.actual_mm for other, line in moved.items() if other != name]
         self._others.put(visible=bool(others))
@@ -86,10 +67,6 @@ class TracesLayer:
         )
         self._actual.put(
             points=polyline_pieces([line.actual_mm]), colors=colour_bytes(colours.trace_actual)
-        )
-        place, largest = name_place(line, picture.size_mm)
-        self._name.put(
-            text=f"{name}: max {spell_micrometres(largest)}", position=place * SCENE_PER_MM
         )
 
 

@@ -1,0 +1,49 @@
+// The bent box while it moves: points and colours only. Triangles, the ends of its lines and the
+// table of colours are sent once; what viser holds of it follows when the change has come to rest.
+(() => {
+  if (window.warpspaceMesh) return;
+  const known = { lines: {}, palette: null, count: 0 };
+  const bytes = text => Uint8Array.from(atob(text), letter => letter.charCodeAt(0));
+  const floats = text => new Float32Array(bytes(text).buffer);
+  const find = (name, wanted) => {
+    let found = null;
+    window.__viserMutable?.nodeRefFromName[name]?.traverse(part => {
+      if (!found && wanted(part)) found = part;
+    });
+    return found;
+  };
+  const follow = (attribute, values) => { attribute.array.set(values); attribute.needsUpdate = true; };
+
+  window.warpspaceMesh = {
+    moves: 0,  // for whoever measures from outside
+    // number of points, table of colours, per lines their ends' points and how far these are lifted
+    open({ count, palette, lines }) {
+      known.count = count;
+      known.palette = floats(palette);
+      known.lines = Object.fromEntries(Object.entries(lines).map(([name, [ends, lifts]]) =>
+        [name, { ends: new Uint32Array(bytes(ends).buffer), lifts: floats(lifts) }]));
+    },
+    bend(points, colours) {
+      const mesh = find("/box/surface", part => part.isMesh && part.geometry.attributes.color);
+      const at = mesh?.geometry.attributes;
+      if (!at || at.position.count !== known.count) return;  // it comes with what is sent at rest
+      const place = floats(points), level = bytes(colours), { palette } = known;
+      follow(at.position, place);
+      const size = at.color.itemSize, shade = at.color.array;
+      for (let i = 0; i < level.length; i++)
+        for (let k = 0; k < 3; k++) shade[size * i + k] = palette[3 * level[i] + k];
+      at.color.needsUpdate = true;
+      mesh.geometry.computeBoundingSphere();
+      for (const [name, { ends, lifts }] of Object.entries(known.lines)) {
+        const line = find(name, part => part.geometry?.attributes.instanceStart);
+        const data = line?.geometry.attributes.instanceStart.data;
+        if (data?.array.length !== lifts.length) continue;
+        for (let i = 0; i < ends.length; i++)
+          for (let k = 0; k < 3; k++) data.array[3 * i + k] = place[3 * ends[i] + k] + lifts[3 * i + k];
+        data.needsUpdate = true;
+      }
+      this.moves++;
+      window.__viserMutable.requestRender?.();
+    },
+  };
+})();

@@ -1,0 +1,380 @@
+// The page around the drawing: bar at the top, errors at the left, tasks at the right, what lies over
+// the drawing. The server writes pieces of HTML into named places; what a user does goes back as
+// numbered events. Nothing here knows what a piece is about.
+(() => {
+  if (window.warpspacePage) return;
+  const MOST_EVENTS = 16, SEND_MS = 30, PART_BYTES = 512 * 1024, TOAST_MS = 8000, MOST_FILES = 16;
+  const sent = [], pending = [];
+  const texts = new Map();  // of all pieces, also while their place is not there
+  const known = { carrier: "", uploads: {}, keys: {} };
+  let count = 0, timer = 0, last = 0;
+
+  const shell = document.createElement("div");
+  shell.id = "ws-page";
+  shell.innerHTML = `
+    <header id="ws-top" data-piece="top"></header>
+    <nav id="ws-left" aria-label="Errors" data-piece="errors"></nav>
+    <div id="ws-over" role="region" aria-label="Over the drawing"><section class="ws-head" data-piece="head" aria-label="What is shown"></section>
+      <section class="ws-legend" data-piece="legend" aria-label="Colours"></section>
+      <div class="ws-compared" data-piece="compared"></div>
+      <svg class="ws-leaders" aria-hidden="true"></svg>
+      <div class="ws-labels" aria-hidden="true"></div><div class="ws-words" aria-hidden="true"></div>
+      <div class="ws-foot"><div class="ws-controls" role="group" aria-label="How it is drawn"><div data-piece="controls"></div>
+        <div data-piece="compare"></div></div>
+      <div class="ws-lengths"><div class="ws-triad" data-piece="triad"></div><div class="ws-bars"></div></div></div></div>
+    <aside id="ws-right" aria-label="Tasks" data-piece="tasks"></aside>
+    <dialog id="ws-window" aria-labelledby="ws-window-title" data-piece="window"></dialog>
+    <div id="ws-toasts" role="status" aria-live="polite" popover="manual"></div>`;
+
+  // --- pieces of HTML: only what differs is touched, so that focus and typed text stay -------------
+  const keyOf = node => node.nodeType === 1 ? node.id || node.dataset.key || node.dataset.piece || "" : "";
+  const typing = node => node === document.activeElement && node.dataset.dirty;
+  const ruled = node => node.firstElementChild?.dataset.do;  // whether the server says what is unfolded
+  const copyAttributes = (old, fresh) => {
+    for (const { name } of [...old.attributes])
+      if (!fresh.hasAttribute(name) && (name !== "open" || ruled(old))
+          && !["data-dirty", "data-touched", "style"].includes(name))
+        old.removeAttribute(name);
+    for (const { name, value } of fresh.attributes)
+      if (old.getAttribute(name) !== value) old.setAttribute(name, value);
+    if (fresh.style.cssText !== old.style.cssText) old.style.cssText = fresh.style.cssText;
+    if (old.tagName === "INPUT" && !typing(old)) {
+      if (old.type === "checkbox" || old.type === "radio") old.checked = fresh.hasAttribute("checked");
+      else if (old.value !== fresh.getAttribute("value") && !old.dataset.held)
+        old.value = fresh.getAttribute("value") ?? "";
+    }
+    if (old.tagName === "TEXTAREA" && !typing(old) && old.value !== fresh.textContent)
+      old.value = fresh.textContent;
+  };
+  const patch = (old, fresh) => {
+    const keyed = new Map([...old.children].filter(keyOf).map(node => [keyOf(node), node]));
+    let at = old.firstChild;
+    for (const next of [...fresh.childNodes]) {
+      const key = keyOf(next);
+      const match = key ? keyed.get(key) : at && !keyOf(at) && at.nodeName === next.nodeName ? at : null;
+      if (!match || match.nodeName !== next.nodeName) { old.insertBefore(next, at); continue; }
+      if (match === at) at = at.nextSibling; else old.insertBefore(match, at);
+      if (next.nodeType !== 1) {
+        if (match.nodeValue !== next.nodeValue) match.nodeValue = next.nodeValue;
+        continue;
+      }
+      copyAttributes(match, next);
+      if (!next.hasAttribute("data-piece") && !match.querySelector(":scope > .ws-typed")) patch(match, next);
+      if (match.tagName === "SELECT" && match !== document.activeElement)
+        match.value = next.querySelector("option[selected]")?.value ?? match.options[0]?.value;
+    }
+    while (at) { const gone = at; at = at.nextSibling; gone.remove(); }
+  };
+  const write = (name, html) => {
+    const place = shell.querySelector(`[data-piece="${CSS.escape(name)}"]`);
+    texts.set(name, html);
+    if (!place) return;
+    const fresh = document.createElement("div");
+    fresh.innerHTML = html;
+    patch(place, fresh);
+    for (const { dataset, childNodes } of place.querySelectorAll("[data-piece]"))
+      if (!childNodes.length && texts.get(dataset.piece)) write(dataset.piece, texts.get(dataset.piece));
+    if (name === "window") showWindow(place);
+  };
+
+  // --- a window: keeps the focus, closes with its cross, Esc, or a click beside it ------------------
+  let before = null;
+  const showWindow = dialog => {
+    const filled = dialog.childElementCount > 0;
+    if (filled && !dialog.open) { before = document.activeElement; dialog.showModal(); raiseToasts(); }
+    if (!filled && dialog.open) { dialog.close(); (document.querySelector("#ws-tour .main") ?? before)?.focus?.(); }
+  };
+
+  const closeWindow = () => {  // at once, whenever the server gets to it
+    const dialog = document.getElementById("ws-window");
+    dialog.replaceChildren();
+    showWindow(dialog);
+    send("page:close");
+  };
+
+  // --- events: numbered, the latest ones together, since messages are put together on their way -----
+  const flush = () => {
+    timer = 0; last = performance.now();
+    for (const event of pending.splice(0)) sent.push([++count, ...event]);
+    sent.splice(0, sent.length - MOST_EVENTS);
+    window.__viserMutable?.sendMessage({ type: "GuiUpdateMessage", uuid: known.carrier,
+      updates: { value: JSON.stringify(sent) } });
+  };
+  const send = (name, value = "") => {
+    const same = pending.findIndex(([other]) => other === name);
+    if (same >= 0 && name.includes(":set.")) pending.splice(same, 1);
+    pending.push([name, String(value)]);
+    // the first goes at once, those that follow quickly go together
+    if (pending.length >= MOST_EVENTS || !timer && performance.now() - last >= SEND_MS) flush();
+    else timer ||= setTimeout(flush, Math.max(0, SEND_MS - (performance.now() - last)));
+  };
+  const valueOf = node => node.type === "checkbox" ? (node.checked ? "1" : "0") : node.value;
+
+  shell.addEventListener("click", event => {
+    const part = event.target.closest("[data-do]");
+    if (part?.tagName === "SUMMARY") event.preventDefault();
+    if (part?.dataset.do === "page:close") closeWindow();
+    else if (part && !part.disabled) send(part.dataset.do, part.dataset.value);
+    event.target.closest(".ws-menu button")?.closest("details").removeAttribute("open");
+    const number = event.target.closest("[data-box]");
+    if (number && event.target.tagName !== "INPUT") typeInto(number).select();
+    const upload = event.target.closest("[data-upload]");
+    if (upload) chooseFiles(upload.dataset.upload, upload.dataset.value);
+    const copy = event.target.closest("[data-copy]");
+    if (copy) copyText(copy.dataset.copy);
+    const go = event.target.closest("[data-go]");
+    if (go) document.querySelector(go.dataset.go)?.focus();
+    if (event.target.id === "ws-window") closeWindow();  // beside the window
+  });
+  shell.addEventListener("input", event => {
+    const node = event.target, name = node.dataset?.live ?? (node.type === "range" ? node.dataset?.set : null);
+    if (node.type === "range") {
+      const twin = document.getElementById(node.dataset.twin ?? "");
+      if (twin?.tagName === "INPUT") twin.value = node.value;
+      else if (twin) twin.firstChild.data = node.value.replace("-", "−");
+    } else if (node.dataset?.set) node.dataset.dirty = "1";
+    if (name) send(name, valueOf(node));
+  });
+  shell.addEventListener("change", event => {
+    const node = event.target;
+    delete node.dataset?.dirty;
+    if (node.dataset?.set) send(node.dataset.set, valueOf(node));
+  });
+  for (const [what, held] of [["pointerdown", true], ["pointerup", false], ["pointercancel", false]])
+    addEventListener(what, event => {
+      for (const node of held ? [event.target] : shell.querySelectorAll("[data-held]"))
+        if (node.type === "range") { if (held) node.dataset.held = "1"; else delete node.dataset.held; }
+    }, true);
+  shell.addEventListener("focusout", event => { delete event.target.dataset?.held; });
+
+  // --- a number that is a box only while somebody types it: [data-box] names what it sets -----------
+  const typeInto = text => {
+    const box = Object.assign(document.createElement("input"),
+      { className: "ws-box ws-typed", value: text.dataset.text, defaultValue: text.dataset.text });
+    box.dataset.set = text.dataset.box;
+    box.setAttribute("inputmode", "decimal");
+    box.setAttribute("aria-label", text.dataset.label);
+    const leave = () => { if (box.isConnected) box.remove(); };
+    box.addEventListener("blur", () => setTimeout(leave));  // what was typed is sent before
+    box.addEventListener("keydown", event => {
+      if (event.key !== "Enter" && event.key !== "Escape") return;
+      if (event.key === "Escape") box.value = box.defaultValue;
+      event.stopPropagation();
+      text.parentElement.querySelector("input[type=range]")?.focus();
+    });
+    text.append(box);
+    return box;
+  };
+
+  // --- a list that is sorted anew when hand and focus have left it: [data-leave] names the event ----
+  const left = event => {
+    const list = event.target.closest?.("[data-leave]");
+    if (!list?.dataset.touched || list.contains(event.relatedTarget)) return;
+    setTimeout(() => {
+      const own = document.activeElement, inside = list.contains(own) && own.matches(":focus-visible");
+      if (inside || list.matches(":hover") || list.querySelector("[data-held]")) return;
+      delete list.dataset.touched;
+      send(list.dataset.leave);
+    });
+  };
+  for (const name of ["pointerout", "focusout", "pointerup"]) addEventListener(name, left);
+  shell.addEventListener("change", event => {
+    const list = event.target.closest("[data-leave]");
+    if (list) list.dataset.touched = "1";
+  });
+
+  // --- menus: one at a time, closed by a click beside them or Esc ----------------------------------
+  const closeMenus = but => shell.querySelectorAll("details:is(.ws-menu, .ws-pop)[open]").forEach(menu => {
+    if (menu !== but) menu.open = false;
+  });
+  addEventListener("pointerdown", event => closeMenus(event.target.closest?.("details:is(.ws-menu, .ws-pop)")), true);
+  addEventListener("keydown", event => {
+    const menu = event.key === "Escape" && event.target.closest?.("details:is(.ws-menu, .ws-pop)[open]");
+    if (menu) { menu.open = false; menu.querySelector("summary").focus(); }
+  });
+
+  // --- keys: digits typed on a slider set its number; others act unless something is typed into -----
+  const spelt = event => [event.ctrlKey || event.metaKey ? "ctrl" : "", event.shiftKey ? "shift" : "",
+    event.altKey ? "alt" : "", event.key.toLowerCase()].filter(Boolean).join("+");
+  addEventListener("keydown", event => {
+    const node = event.target, own = node.tagName;
+    if (own === "INPUT" && node.type === "range" && /^[-−0-9.,]$/.test(event.key)) {
+      const box = document.getElementById(node.dataset.twin ?? "");
+      if (box) {
+        event.preventDefault();
+        const typed = box.dataset.box ? typeInto(box) : box;
+        typed.focus(); typed.value = event.key; typed.dataset.dirty = "1";
+      }
+      return;
+    }
+    if (node.getAttribute?.("role") === "tab") {  // arrows go along the tabs, Enter opens one
+      const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+      const tabs = [...node.parentElement.children];
+      const to = step ? tabs[(tabs.indexOf(node) + step + tabs.length) % tabs.length]
+        : event.key === "Enter" || event.key === " " ? node : null;
+      if (to) { event.preventDefault(); to.focus(); to.click(); return; }
+    }
+    if (node.getAttribute?.("role") === "treeitem") {  // likewise along a tree
+      const step = { ArrowDown: 1, ArrowUp: -1 }[event.key], open = ["Enter", " "].includes(event.key);
+      const items = [...node.closest("[role=tree]").querySelectorAll("[role=treeitem]")];
+      if (step) items[items.indexOf(node) + step]?.focus();
+      if (open) node.querySelector("[data-do]").click();
+      if (step || open) { event.preventDefault(); return; }
+    }
+    if (event.key === "Escape" && node.dataset?.dirty) {
+      delete node.dataset.dirty; node.value = node.defaultValue; return;
+    }
+    const writes = own === "TEXTAREA" || own === "SELECT"
+      || own === "INPUT" && !["range", "checkbox", "radio"].includes(node.type);
+    if (writes && !(event.ctrlKey || event.metaKey)) return;
+    const [name, value] = (known.keys[spelt(event)] ?? "").split("=");
+    if (!name || document.getElementById("ws-window").open && name !== "page:close") return;
+    if (writes && ["page:undo", "page:redo"].includes(name)) return;  // of what is typed
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    if (name === "find") document.querySelector("#ws-find")?.focus();
+    else if (name === "upload") chooseFiles(value);
+    else send(name, value);
+  }, true);
+  // a box with data-enter sends it with Enter only; arrows go from it through the list below it
+  shell.addEventListener("keydown", event => {
+    const node = event.target;
+    if (node.dataset?.enter && event.key === "Enter") send(node.dataset.enter, node.value);
+    const list = node.closest("[data-list]"), step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
+    if (!list || !step) return;
+    const items = [...list.querySelectorAll("input, button")];
+    items[items.indexOf(node) + step]?.focus();
+    event.preventDefault();
+  });
+  document.addEventListener("cancel", event => {
+    if (event.target.id === "ws-window") { event.preventDefault(); closeWindow(); }
+  }, true);
+
+  // --- files: refused here when too large, sent in parts ------------------------------------------
+  const sendFile = async (purpose, file, word) => {
+    const [uuid, most] = known.uploads[purpose];
+    if (file.size > most) { send(`${purpose}:refused`, `${file.size}:${file.name}`); return; }
+    if (word) send(`${purpose}:sending`, word);
+    const bytes = new Uint8Array(await file.arrayBuffer());
+    const parts = Math.max(1, Math.ceil(bytes.length / PART_BYTES));
+    const transfer = crypto.randomUUID?.() ?? `${Date.now()}-${Math.random()}`;
+    const say = message => window.__viserMutable.sendMessage(
+      { source_component_uuid: uuid, transfer_uuid: transfer, ...message });
+    say({ type: "FileTransferStartUpload", filename: file.name, mime_type: file.type || "text/plain",
+      part_count: parts, size_bytes: bytes.length });
+    for (let part = 0; part < parts; part++)
+      say({ type: "FileTransferPart", part_index: part,
+        content: bytes.slice(part * PART_BYTES, (part + 1) * PART_BYTES) });
+  };
+  const chooseFiles = (purpose, word) => {
+    const input = document.createElement("input");
+    input.type = "file"; input.multiple = true; input.accept = known.uploads[purpose]?.[2] ?? "";
+    input.onchange = () => [...input.files].slice(0, MOST_FILES).forEach(f => sendFile(purpose, f, word));
+    input.click();
+  };
+  const hasFiles = event => [...(event.dataTransfer?.types ?? [])].includes("Files");
+  addEventListener("dragover", event => { if (hasFiles(event)) event.preventDefault(); });
+  addEventListener("drop", event => {
+    if (!hasFiles(event)) return;
+    event.preventDefault();
+    const numbers = event.target.closest?.("textarea.ws-rows-box");
+    if (numbers) {
+      event.dataTransfer.files[0].text().then(text => {
+        numbers.value = text;
+        send(numbers.dataset.set, text);
+      });
+      return;
+    }
+    const purpose = event.target.closest?.("[data-drop]")?.dataset.drop ?? "files";
+    [...event.dataTransfer.files].slice(0, MOST_FILES).forEach(file => sendFile(purpose, file));
+  });
+
+  // above a window that is open, too
+  const raiseToasts = () => {
+    const shelf = shell.querySelector("#ws-toasts");
+    if (!shelf.isConnected || !shelf.showPopover) return;
+    if (shelf.matches(":popover-open")) shelf.hidePopover();
+    if (shelf.childElementCount) shelf.showPopover();
+  };
+  // --- messages that go by themselves --------------------------------------------------------------
+  const toast = (kind, title, text = "") => {
+    const box = document.createElement("section");
+    box.className = `ws-toast ws-${kind}`;
+    box.append(Object.assign(document.createElement("strong"), { textContent: title }));
+    if (text) box.append(Object.assign(document.createElement("p"), { textContent: text }));
+    const close = Object.assign(document.createElement("button"), { textContent: "✕" });
+    close.setAttribute("aria-label", "Close this message");
+    close.onclick = () => box.remove();
+    box.append(close);
+    const shelf = shell.querySelector("#ws-toasts");
+    shelf.append(box);
+    raiseToasts();
+    if (kind !== "stays") setTimeout(() => box.remove(), TOAST_MS);
+  };
+  const copyText = async (text, title = "Copied", words = "") => {
+    try { await navigator.clipboard.writeText(text); toast("done", title, words); }
+    catch { toast("stays", "Copy this", `${text}\n${words}`); }
+  };
+
+  // --- the page's address: the link it was opened with, taken once a tab, and the link that is shared --
+  const LINK_KEY = "warpspace-link", LINK = "view";
+  const stored = () => { try { return sessionStorage.getItem(LINK_KEY); } catch { return null; } };
+  const store = link => {
+    window.__warpspaceLink = link;
+    try { sessionStorage.setItem(LINK_KEY, link); } catch { /* a page that may keep nothing */ }
+  };
+  const linkOf = () => new URLSearchParams(location.search).get(LINK);
+  const showAddress = parameters =>
+    history.replaceState(null, "", location.pathname + (String(parameters) && `?${parameters}`));
+  const tidyAddress = () => {  // the token has let the cookie in, and is needed no more
+    const parameters = new URLSearchParams(location.search);
+    if (!parameters.has("token")) return;
+    parameters.delete("token");
+    showAddress(parameters);
+  };
+
+  window.warpspacePage = {
+    send, toast, copyText, over: shell.querySelector("#ws-over"),
+    // whether it was opened with a link that has just been taken
+    hasLink: () => known.hasLink,
+    // how far the page is, for whoever drives it from outside
+    stage(word) {
+      document.documentElement.dataset.warpspace = word;
+      if (word === "open") this.tour();
+    },
+    // says when all before it is drawn
+    drawn(uuid, number) {
+      const tell = () => window.__viserMutable?.sendMessage(
+        { type: "GuiUpdateMessage", uuid, updates: { value: String(number) } });
+      if (document.hidden) setTimeout(tell, 0);
+      else requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(tell, 0)));
+    },
+    share(word, token, words) {
+      const parameters = new URLSearchParams(location.search);
+      store(word);
+      parameters.set(LINK, word);
+      showAddress(parameters);
+      const address = new URL(location.href);
+      if (token) address.searchParams.set("token", token);
+      copyText(address.href, "Link copied", words);
+    },
+    // the widget that carries events, the uploads ({purpose: [widget, bytes, endings]}), the keys
+    open({ uploads, ...facts }) {
+      Object.assign(known, facts);
+      Object.assign(known.uploads, uploads);
+      count = Math.max(count, 0);
+      if (!shell.isConnected) {
+        document.body.append(shell);
+        document.getElementById("root").setAttribute("role", "main");
+        document.getElementById("root").setAttribute("aria-label", "Drawing of the bent volume");
+      }
+      tidyAddress();
+      if (!facts.carrier) return;
+      const link = linkOf();
+      known.hasLink = Boolean(link) && link !== (stored() || window.__warpspaceLink);
+      if (known.hasLink) { store(link); send("files:link", link); }
+    },
+    show(pieces) { for (const [name, html] of Object.entries(pieces)) write(name, html); },
+    dark(on) { document.documentElement.classList.toggle("ws-dark", on); },
+  };
+})();

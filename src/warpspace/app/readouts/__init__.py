@@ -1,1 +1,0 @@
-"""Numbers as HTML: pure text, every foreign word escaped."""

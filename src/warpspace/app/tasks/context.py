@@ -1,0 +1,173 @@
+"""What the parts of one page share: its page, camera and state, and a queue for callbacks.
+
+A callback runs on a thread of viser's. It only takes note (`changed`, `post`, `act`); the one
+thread of the tab's session takes everything in.
+"""
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from viser import ClientHandle, GuiApi, ViserServer
+
+from warpspace.app.browser.events import Event, Events, event_of
+from warpspace.app.browser.page import Page
+from warpspace.app.browser.uploads import Uploads
+from warpspace.app.documents.scene_file import SceneList
+from warpspace.app.documents.services import Services
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.state.app_state import AppState
+from warpspace.app.state.picked import Picked
+from warpspace.app.state.store import StateStore, Update
+from warpspace.app.viewport.camera import CameraMemory
+from warpspace.app.viewport.layers.moving import MovingLayer
+from warpspace.app.viewport.tab_camera import TabCamera
+
+if TYPE_CHECKING:
+    from warpspace.analysis.description import Result
+    from warpspace.app.tasks.parts import Part
+
+
+class Context:
+    """What a part of the page may use of its tab."""
+
+    def __init__(
+        self,
+        server: ViserServer,
+        client: ClientHandle,
+        store: StateStore,
+        scenes: SceneList,
+        services: Services,
+    ) -> None:
+        self.client, self.page, self.camera = client, Page(server, client), TabCamera(client)
+        self.uploads = Uploads(client)
+        self.events: deque[Event] = deque()
+        self.page.open(Events(client.gui, self._take_event))
+        self.store, self.scenes, self.services = store, scenes, services
+        self.shown: LivePicture | None = None
+        self.stage: MovingLayer | None = None
+        self.next_click: Callable[[Picked], None] | None = None
+        self.renew: Callable[[Part], None] = lambda _: None  # write a part anew, at once
+        self.closed: Callable[[], None] = lambda: None  # the page has closed its window by itself
+        self.reported: list[tuple[str, Result]] = []  # what is to stand in the report
+        self.offer_import: Callable[[str, bytes], None] = lambda _name, _content: None
+        self.changed_at = time.monotonic()
+        self.unfolded = store.state.page  # of this page, also where the state is shared
+        self._own: tuple[AppState, AppState] | None = None
+        self._wake = threading.Event()
+        self._updates: deque[Update] = deque()
+        self._actions: deque[Callable[[], None]] = deque()
+
+    @property
+    def gui(self) -> GuiApi:
+        """Widgets, private to this tab."""
+        return self.client.gui
+
+    @property
+    def state(self) -> AppState:
+        """The present state, with what is unfolded on this page."""
+        shared = self.store.state
+        if shared.page is self.unfolded:
+            return shared
+        if (
+            self._own is None
+            or self._own[0] is not shared
+            or self._own[1].page is not self.unfolded
+        ):
+            self._own = shared, replace(shared, page=self.unfolded)
+        return self._own[1]
+
+    def apply(self, update: Update) -> tuple[str, ...]:
+        """Apply a pure update to the present state; give what it had to clamp."""
+
+        def own(state: AppState) -> AppState:
+            found = update(replace(state, page=self.unfolded))
+            self.unfolded = found.page
+            return found
+
+        return self.store.apply(own, by=self.changed, at=self.changed_at)
+
+    def wake(self) -> None:
+        """Have the session look what there is to be done; returns at once."""
+        self._wake.set()
+
+    def _take_event(self, event: Event) -> None:
+        self.events.append(event)
+        self.changed()
+
+    def changed(self) -> None:
+        """Take note that something has been set; returns at once."""
+        self.changed_at = time.monotonic()
+        self._wake.set()
+
+    def send(self, event: str, value: str = "") -> None:
+        """Do what an event of the page does; returns at once."""
+        self._take_event(event_of(event, value))
+
+    def post(self, update: Update) -> None:
+        """Queue a pure update of the state; returns at once."""
+        self._updates.append(update)
+        self.changed()
+
+    def act(self, action: Callable[[], None]) -> None:
+        """Queue something to be done beside the state (undo, a modal); returns at once.
+
+        The session does it, and shows and logs what it raises.
+        """
+        self._actions.append(action)
+        self._wake.set()
+
+    def wait(self, seconds: float | None) -> bool:
+        """Wait for a change, at most so long; tell whether there was one. For the session."""
+        woken = self._wake.wait(seconds)
+        if woken:  # else what has come since the wait ended would be lost
+            self._wake.clear()
+        return woken
+
+    def take_updates(self) -> list[Update]:
+        """Take the updates that were queued. For the session."""
+        return [self._updates.popleft() for _ in range(len(self._updates))]
+
+    def take_action(self) -> Callable[[], None] | None:
+        """Take the next action that was queued; None where there is none. For the session."""
+        return self._actions.popleft() if self._actions else None
+
+    def notify(self, title: str, text: str = "", kind: str = "done") -> None:
+        """Show a message in this tab: "done", "warning", "problem", or one that "stays"."""
+        self.page.notify(title, text, kind)
+
+    def save_file(self, name: str, content: str | bytes) -> None:
+        """Have the browser save a file."""
+        data = content.encode() if isinstance(content, str) else content
+        self.client.send_file_download(name, data, save_immediately=True)
+        self.client.flush()
+
+    def look_from(self, memory: CameraMemory) -> None:
+        """Put the camera somewhere with what is shown next."""
+        self.camera.wanted = memory
+        self._wake.set()
+
+    def show_opened(
+        self, opened: AppState, camera: CameraMemory | None, *, whole: bool = True
+    ) -> str:
+        """Show an opened state from its camera."""
+        # here, since not every opened scene is drawn where many follow each other
+        _, dropped = self.scenes.add(opened.origin)
+
+        def update(now: AppState) -> AppState:
+            if camera is not None:
+                # with this change, not before it: another scene places the camera anew
+                self.look_from(camera)
+            return opened if whole else replace(opened, comparison=now.comparison)
+
+        self.post(update)
+        return dropped
+
+    def fit_view(self, view: str | None = None, lens: bool | None = None) -> None:
+        """Put the camera to a named view (the last one by default), or change its lens."""
+        if self.shown is not None:
+            self.camera.choose(self.shown, view, lens)
+            self.client.flush()

@@ -1,0 +1,329 @@
+"""The column at the left: errors by their effect, the largest first; a row opens into its curve."""
+
+import unicodedata
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from difflib import get_close_matches
+from functools import lru_cache
+
+import numpy as np
+from markupsafe import Markup
+
+from warpspace.app.browser.html import EMPTY, button, fill, join, number, slider, tag, text_box
+from warpspace.app.evaluation.cache import Identity
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.state import edits
+from warpspace.app.state.app_state import AppState
+from warpspace.app.state.ranges import Exclusions, Span, amplitude_span
+from warpspace.app.state.tree import toggled
+from warpspace.app.state.typed_numbers import read_typed, spell_typed
+from warpspace.app.tasks.context import Context
+from warpspace.app.tasks.error_curve import CurveEditor
+from warpspace.app.tasks.parts import Part
+from warpspace.machine.axes import ErrorKind, Parameter, parameter
+from warpspace.scene.model import grid_basis
+from warpspace.units import MINUS
+
+LONGEST_QUERY = 80
+FOLDED = "zero"  # section of the errors that are zero
+OF_ALL = {
+    "reset": ("Reset to the scene", "Values and curves of the scene"),
+    "zero": ("Set all to zero", "The nominal machine"),
+    "include": ("Include all", "End every “only” and “exclude”"),
+}
+"""What can be done with all errors: words and hint by event."""
+
+
+class ErrorsPart(Part):
+    """Search, rows by effect, and those that are zero folded away.
+
+    Order, scale of the bars and ranges of the sliders stay until the hand has left the column
+    (`sort`, sent by the page), or something else has changed the errors: nothing slips away from
+    under the pointer.
+    """
+
+    name = "errors"
+    follows = "at once"
+
+    def __init__(self, context: Context) -> None:
+        super().__init__(context)
+        self._curves = CurveEditor()
+        self._gains: Mapping[str, float] = {}
+        self._gains_for: tuple[object, ...] = ()
+        self._sorted_for: tuple[object, ...] = ()
+        self._sorted_at: Mapping[str, float] = {}  # amplitudes when the rows were last sorted
+        self._own: set[str] = set()  # errors that this column has changed since then
+        self._order: tuple[str, ...] = ()
+        self._used: frozenset[str] = frozenset()
+        self._largest = 1.0
+        self._spans: dict[str, Span] = {}
+        self._rows: dict[str, tuple[object, ...]] = {}
+
+    def depends(self, picture: LivePicture) -> tuple[object, ...]:
+        """Follow the errors, and what is unfolded or searched for."""
+        state = picture.state
+        return (
+            Identity(state.amplitudes), Identity(state.exclusions), Identity(state.scene),
+            state.page.query, state.page.row, FOLDED in state.page.open, state.seen,
+            Identity(state.positions), self._sorted_for, self._curves.version,
+        )  # fmt: skip
+
+    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
+        """Write the list where it has changed, and the rows that have."""
+        state = picture.state
+        made_for = (Identity(state.scene), state.seen, tuple(state.positions.items()))
+        others = made_for != self._gains_for and not self._own
+        if made_for != self._gains_for:
+            self._gains, self._gains_for = _gains(picture, state), made_for
+        sorted_for = (Identity(state.origin), tuple(state.amplitudes), *made_for[1:])
+        before = self._sorted_at
+        changed = {key for key, value in state.amplitudes.items() if value != before.get(key)}
+        if others or sorted_for != self._sorted_for or changed - self._own:
+            self._sort(state, sorted_for)
+        return {**self._list(state), **self._changed_rows(state)}
+
+    def _sort(self, state: AppState, sorted_for: tuple[object, ...]) -> None:
+        effects = self._effects(state)
+        order = tuple(sorted(effects, key=lambda key: -effects[key]))
+        used = frozenset(used_keys(state))
+        if (order, used) != (self._order, self._used):
+            self._rows = {}  # their places are new
+        self._order, self._used = order, used
+        self._largest = max(effects.values(), default=0.0) or 1.0
+        self._spans = _spans(state)
+        self._sorted_for, self._sorted_at, self._own = sorted_for, state.amplitudes, set()
+
+    def _effects(self, state: AppState) -> dict[str, float]:
+        return {key: self._gains.get(key, 0.0) * abs(v) for key, v in state.amplitudes.items()}
+
+    def _list(self, state: AppState) -> dict[str, str]:
+        query = state.page.query
+        found = set(find_parameters(query, self._order)) if query.strip() else self._used
+        listed = [key for key in self._order if key in found]
+        zero = [] if query.strip() else [key for key in self._order if key not in found]
+        opened = FOLDED in state.page.open or not listed
+        places = _places(listed, state.page.row)
+        if query.strip() and not listed:
+            places = tag("p", "No error goes by this name.", class_="ws-quiet")
+        elif zero:
+            words = tag("div", f"{len(zero)} errors are zero",
+                        data_do="page:fold", data_value=FOLDED, id="ws-error-zero")  # fmt: skip
+            places += tag(
+                "div", words, class_="ws-zero", role="treeitem", aria_labelledby="ws-error-zero",
+                tabindex=-1 if listed else 0, aria_expanded=str(opened).lower(),
+            )  # fmt: skip
+            places += _places(zero, state.page.row) if opened else EMPTY
+        if listed or zero:  # for the keyboard: arrows go along it, Enter unfolds
+            places = tag("div", places, role="tree", aria_label="Errors by effect")
+        left_out = ""
+        if state.exclusions:
+            count = sum(not state.exclusions.active(key) for key in self._used)
+            left_out = f"{count} of {len(self._used)} errors left out. "
+        note = tag("p", join((left_out, button("Include all", "errors:include", kind="link")))
+                   if left_out else "", class_="ws-quiet")  # fmt: skip
+        find = text_box(
+            "errors:find", query, placeholder="Find an error  /", live=True, label="Find an error",
+            id="ws-find",
+        )  # fmt: skip
+        menu = tag("details", tag("summary", "⋯", aria_label="All errors", title="All errors")
+                   + tag("div", join(button(words, f"errors:{word}", kind="quiet", hint=hint)
+                                     for word, (words, hint) in OF_ALL.items())),
+                   class_="ws-menu")  # fmt: skip
+        touched = state.exclusions or state.changed_keys or FOLDED in state.page.open
+        head = tag("div", find + (menu if touched else ""), class_="ws-find")
+        body = tag("div", places, class_="ws-errors", data_leave="errors:sort")
+        return {"errors": head + note + body}
+
+    def _changed_rows(self, state: AppState) -> dict[str, str]:
+        pieces: dict[str, str] = {}
+        for key in self._order:
+            value, span = state.amplitudes[key], self._spans[key]
+            if abs(value) > span.high:  # typed
+                span = self._spans[key] = amplitude_span(key, value, None)
+            effect, opened = self._gains.get(key, 0.0) * abs(value), key == state.page.row
+            made = (
+                value, effect, self._largest, span, state.exclusions.active(key), opened,
+                (Identity(state.scene), Identity(state.exclusions), self._curves.version)
+                if opened else None,
+            )  # fmt: skip
+            if self._rows.get(key) != made:
+                self._rows[key] = made
+                more = self._curves.html(state, key) if opened else EMPTY
+                share = min(effect / self._largest, 1.0)
+                pieces[f"error.{key}"] = _row(state, parameter(key), span, effect, share, more)
+        return pieces
+
+    def take(self, state: AppState, word: str, value: str) -> AppState:
+        """Set an error or its curve, search, unfold a row, only, exclude, reset."""
+        what, _, key = word.partition(".")
+        if what in ("set", "kind", "rows", "own") and key in state.amplitudes:
+            self._own.add(key)
+            return self._set(state, key, value) if what == "set" else self._curves.take(
+                state, what, key, value
+            )  # fmt: skip
+        if what in ("sort", "find"):
+            self._sorted_for = ()
+        if what == "sort":
+            self.context.act(lambda: self.context.renew(self))
+        if what == "find":
+            return replace(state, page=replace(state.page, query=value[:LONGEST_QUERY]))
+        if what == "row":
+            row = value if value in state.amplitudes and value != state.page.row else ""
+            return replace(state, page=replace(state.page, row=row))
+        if what == "only":
+            return toggled(state, "exclusions.only", value)
+        if what == "exclude":
+            return toggled(state, "exclusions.excluded", value)
+        if what == "include":
+            return replace(state, exclusions=Exclusions())
+        if what == "zero":
+            return state.zeroed()
+        return state.reset() if what == "reset" else state
+
+    def _set(self, state: AppState, key: str, value: str) -> AppState:
+        unit = parameter(key).unit
+        typed = read_typed(value, unit)
+        if typed is not None:
+            return state.with_amplitude(key, typed)
+        kept = spell_typed(state.amplitudes[key]).replace("-", MINUS)
+        words = f"{key}: “{value[:40]}” is no number; it stays {kept} {unit}."
+        self.context.notify("Not a number", words, "warning")
+        return state
+
+
+def _places(keys: list[str], row: str) -> Markup:
+    """Give the places of rows; the first, or the unfolded one, is the keyboard's way in."""
+    start = row if row in keys else next(iter(keys), "")
+    return join(
+        tag("div", "", data_piece=f"error.{key}", class_="ws-error", role="treeitem",
+            aria_expanded=str(key == row).lower(), aria_labelledby=f"ws-error-{key}",
+            tabindex=0 if key == start else -1)
+        for key in keys
+    )  # fmt: skip
+
+
+def _row(
+    state: AppState, row: Parameter, span: Span, effect: float, share: float, more: Markup
+) -> Markup:
+    key, value, name = row.key, state.amplitudes[row.key], f"errors:set.{row.key}"
+    active, text = state.exclusions.active(key), spell_typed(value).replace("-", MINUS)
+    head = fill(
+        '<div class="{kind}" id="ws-error-{key}" data-do="errors:row" data-value="{key}"'
+        ' title="{symbol}, {words}: {of}"><span>{effect} µm</span><b>{key}</b> {words}</div>',
+        kind="ws-error-head" if active else "ws-error-head off", key=key, symbol=row.symbol,
+        of=row.kind.value, words=row.name, effect=number(effect) if active else "–",
+    )  # fmt: skip
+    function = edits.curve_of(state, key)
+    setting = fill(
+        '<div class="ws-effect"><i style="width:{share}%"></i></div>'
+        '<div class="ws-error-set" title="{hint}">{slider}'
+        '<span class="ws-edit" id="ws-box-{key}" data-box="{name}" data-text="{typed}"'
+        ' data-label="{key} in {unit}">{text}</span><span class="ws-unit">{unit}</span></div>',
+        share=f"{100.0 * share:.1f}", key=key, name=name, typed=spell_typed(value), text=text,
+        hint=f"{row.name}: {function.slider_words(row.axis)}. Drag, or type a number.",
+        slider=slider(name, value, span.low, span.high, span.step, twin=f"box-{key}",
+                      label=f"{key} {row.name}", text=f"{text} {row.unit}"),
+        unit=row.unit,
+    )  # fmt: skip
+    return head + setting + more
+
+
+def _spans(state: AppState) -> dict[str, Span]:
+    """Give the ranges of sliders: one for all errors of a kind, wider where a value needs it."""
+    scene = state.origin
+    kinds: dict[ErrorKind, list[Span]] = defaultdict(list)
+    for key, start in state.start.items():
+        kinds[parameter(key).kind].append(amplitude_span(key, start, scene.tolerances.get(key)))
+    widest = {kind: max(spans, key=lambda span: span.high) for kind, spans in kinds.items()}
+    found: dict[str, Span] = {}
+    for key, value in state.amplitudes.items():
+        common = widest[parameter(key).kind]
+        found[key] = common if abs(value) <= common.high else amplitude_span(key, value, None)
+    return found
+
+
+def _gains(picture: LivePicture, state: AppState) -> dict[str, float]:
+    """Give the RMS effect in the volume of a unit of each error alone, µm."""
+    basis = grid_basis(state.scene, picture.grid, picture.view)
+    squares = np.sum(basis.position**2, axis=-1).reshape(len(basis.keys), -1)
+    rms = np.sqrt(squares @ picture.grid.weights.reshape(-1))
+    return dict(zip(basis.keys, rms.tolist(), strict=True))
+
+
+# --- Finding errors by what people call them ------------------------------------------------------
+
+# --- Finding error parameters by what people call them --------------------------------------------
+# Key, symbol, plain name, axis, kind.
+
+_GREEK = {"δ": "delta", "ε": "epsilon", "α": "alpha", "β": "beta", "γ": "gamma"}
+_FILLER = frozenset({"of", "the", "to", "in", "about", "axis", "error", "errors"})
+_NEAR = 0.75
+
+
+def find_parameters(query: str, keys: Sequence[str]) -> tuple[str, ...]:
+    """Find the parameters that a user asks for."""
+    tokens = _tokens(query)
+    if not tokens:
+        return tuple(keys)
+    rows = [parameter(key) for key in keys]
+    exact = tuple(row.key for row in rows if all(_fits(token, row) for token in tokens))
+    if exact:
+        return exact
+    known = {word for row in rows for word in _words(row) if len(word) > 2}
+    corrected = [_corrected(token, known) for token in tokens]
+    return tuple(row.key for row in rows if all(_fits(token, row) for token in corrected))
+
+
+def _tokens(query: str) -> list[str]:
+    """Cut a query into words that mean something; what is only filler stays."""
+    words = fold(query[:LONGEST_QUERY]).split()
+    return [word for word in words if word not in _FILLER] or words
+
+
+def fold(text: str) -> str:
+    """Fold case, accents and spelling of Greek letters away; punctuation becomes blanks."""
+    plain = unicodedata.normalize("NFKD", text).casefold()
+    for letter, name in _GREEK.items():
+        plain = plain.replace(letter, f" {name} ")
+    return "".join(c if c.isalnum() else " " for c in plain if not unicodedata.combining(c))
+
+
+@lru_cache(maxsize=256)
+def _words(row: Parameter) -> tuple[str, ...]:
+    symbol = fold(row.symbol)
+    return tuple(
+        dict.fromkeys(
+            (
+                row.key.casefold(),
+                *symbol.split(),
+                symbol.replace(" ", ""),
+                *fold(row.name).split(),
+                *fold(row.kind.value).split(),
+                row.axis.casefold(),
+                row.unit.casefold(),
+                fold(row.unit).strip(),
+            )
+        )
+    )
+
+
+def _fits(token: str, row: Parameter) -> bool:
+    """Tell whether a word fits a parameter: a single letter its axis, a longer one any beginning.
+
+    A key fits from its second letter as well, so that "c0y" finds EC0Y.
+    """
+    words = _words(row)
+    if len(token) == 1:
+        return token == row.axis.casefold() or token in fold(row.name).split()
+    return any(word.startswith(token) for word in words) or token in row.key.casefold()
+
+
+def _corrected(token: str, known: Iterable[str]) -> str:
+    close = get_close_matches(token, list(known), n=1, cutoff=_NEAR)
+    return close[0] if close else token
+
+
+def used_keys(state: AppState) -> tuple[str, ...]:
+    """Give the errors that are not zero now, or were not when the scene was opened."""
+    return tuple(key for key, value in state.amplitudes.items() if value or state.start[key])

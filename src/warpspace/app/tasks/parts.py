@@ -1,0 +1,84 @@
+"""What a part of the page is: pieces of HTML that follow the picture, and what its events do.
+
+The server writes pieces into named places; the page sends back events, ``part:word`` with a value
+(`browser/events.py`). A part knows neither widgets nor threads, and no other part.
+"""
+
+from collections.abc import Mapping
+from typing import ClassVar, Literal
+
+from markupsafe import Markup
+
+from warpspace.app.browser.html import EMPTY, fold
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.state.app_state import AppState
+from warpspace.app.tasks.context import Context
+
+Follows = Literal["at once", "in a pause", "at rest"]
+
+
+class Part:
+    """A part of the page."""
+
+    name: str = ""  # its events begin with it
+    follows: ClassVar[Follows] = "in a pause"  # at once: with every picture of a drag
+
+    def __init__(self, context: Context) -> None:
+        self.context = context
+
+    def is_seen(self, state: AppState) -> bool:
+        """Tell whether it is on the screen; what is not is neither computed nor sent."""
+        return True
+
+    def depends(self, picture: LivePicture) -> tuple[object, ...]:
+        """Give what its pieces are made of; as long as that is equal they are not made anew."""
+        return (id(picture),)
+
+    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
+        """Give HTML by the name of its place."""
+        raise NotImplementedError
+
+    def take(self, state: AppState, word: str, value: str) -> AppState:
+        """Do what an event says; word and value come from a browser and may be anything."""
+        return state
+
+
+class Section(Part):
+    """A section of a task; folded it is neither computed nor sent."""
+
+    task = ""
+    title = ""
+    sentence = ""  # what it is for: below the title where it is unfolded, else its hint
+
+    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
+        """Give what its body is made of."""
+        return (id(picture),)
+
+    def body(self, picture: LivePicture) -> Markup:
+        """Write what stands below the title."""
+        raise NotImplementedError
+
+    def heading(self, picture: LivePicture) -> str:
+        """Give the title of the unfolded section."""
+        return self.title
+
+    def is_open(self, state: AppState) -> bool:
+        """Tell whether it is unfolded."""
+        return self.name in state.page.open
+
+    def is_seen(self, state: AppState) -> bool:
+        """Only within its task."""
+        return state.page.task == self.task
+
+    def depends(self, picture: LivePicture) -> tuple[object, ...]:
+        """Folded it depends on nothing."""
+        return (True, *self.concerns(picture)) if self.is_open(picture.state) else (False,)
+
+    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
+        """Write the section."""
+        opened = self.is_open(picture.state)
+        body = self.body(picture) if opened else EMPTY
+        title = self.heading(picture) if opened else self.title
+        section = fold(self.name, title, body, opens="page:fold", open_=opened,
+                       hint=self.sentence)  # fmt: skip
+        return {f"section.{self.name}": section}

@@ -1,0 +1,56 @@
+"""Parts of the page without a page."""
+
+from types import SimpleNamespace
+from typing import Any
+
+from warpspace.analysis.catalogue import entries
+from warpspace.app.documents.services import Services
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.state.app_state import AppState
+
+LIVE = LiveModel()
+
+
+class Nobody(SimpleNamespace):
+    """The context of a page that is not there."""
+
+    def __getattr__(self, name: str) -> Any:  # the state is that of its store, unless one is set
+        if name == "state":
+            return self.store.state
+        raise AttributeError(name)
+
+
+def lone_part(kind: Any, said: list[Any] | None = None) -> Any:
+    """Build a part for nobody; what it would tell a user goes into a list."""
+    told = [] if said is None else said
+    return kind(Nobody(
+        act=lambda do: do(), renew=lambda _: None, notify=lambda *words: told.append(words),
+        next_click=None, stage=None, scenes=SimpleNamespace(add=told.append),
+    ))  # fmt: skip
+
+
+def body_of(kind: Any, state: AppState) -> str:
+    """Give what a section or a window shows of a state."""
+    return str(lone_part(kind).body(LIVE.evaluate(state)))
+
+
+def part_of(kind: Any, name: str) -> Any:
+    """Build a part for nobody."""
+    (entry,) = [one for one in entries() if one.name == name]
+    posted, told = [], []
+    return kind(Nobody(
+        act=lambda do: do(), renew=lambda _: None, post=posted.append, posted=posted, told=told,
+        notify=lambda *words: told.append(words), save_file=lambda *file: told.append(file),
+        page=SimpleNamespace(is_open=True), scenes={}, services=Services(),
+    ), entry)  # fmt: skip
+
+
+def answer_of(part: Any, state: AppState) -> Any:
+    """Run the analysis of a part here."""
+    (values, scenes) = part.values(state), part.scenes(state)
+    return part.ask(state, values, scenes).run_all(scenes, lambda _: None)
+
+
+def section(part: Any, state: AppState) -> str:
+    """Give what stands below the title of a section."""
+    return str(part.body(SimpleNamespace(state=state)))

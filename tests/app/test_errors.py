@@ -1,0 +1,100 @@
+"""The column of errors: rows by effect, what a row says and sets, what stays while a hand moves."""
+
+import pytest
+
+from app.parts import LIVE, lone_part
+from warpspace.app.evaluation.conventions import with_reference
+from warpspace.app.state.app_state import start_state
+from warpspace.app.tasks.errors import ErrorsPart
+from warpspace.scene.library import load_scene
+
+STATE = start_state(load_scene("dvf5000_first"))
+
+
+class Column:
+    """The column without a page."""
+
+    def __init__(self, state=STATE):
+        self.said = []
+        self.part, self.state = lone_part(ErrorsPart, self.said), state
+
+    def do(self, word, value=""):
+        self.state = self.part.take(self.state, word, value)
+        return self.part.pieces(LIVE.evaluate(self.state))
+
+
+def places(pieces):
+    return [
+        name.split(".")[1]
+        for name in pieces["errors"].split('data-piece="')[1:]
+        for name in [name.split('"')[0]]
+    ]
+
+
+def test_the_largest_effect_comes_first_and_a_move_renders_one_row_in_its_place():
+    column = Column()
+    first = column.do("none")
+    assert places(first)[:3] == ["EA0Z", "EAY", "EC0Y"]
+    assert "34 errors are zero" in first["errors"]
+    moved = column.do("set.EAX", "900")
+    assert [*moved] == ["errors", "error.EAX"]
+    assert places(moved)[0] == "EA0Z"
+    assert places(column.do("sort"))[0] == "EAX"
+
+
+def test_what_something_else_changes_is_sorted_at_once():
+    column = Column()
+    column.do("none")
+    column.state = column.state.with_amplitude("EAX", 40.0)
+    for key in [key for key in column.state.amplitudes if key.endswith("Z")]:
+        column.state = column.state.with_amplitude(key, 0.0)
+    assert places(column.do("none"))[0] == "EAY"
+    column.state = with_reference(column.state, {"X": 0.0, "Y": 225.0, "Z": -80.0})
+    held = column.do("none")  # order and bars follow what is held still
+    assert "width:100.0%" in held[f"error.{places(held)[0]}"]
+
+
+def test_a_slider_has_the_range_of_its_kind_again_after_a_wild_number():
+    column = Column()
+    column.do("none")
+    assert 'max="100"' in column.do("row", "EAY")["error.EAY"]
+    assert 'max="100000"' in column.do("set.EAY", "1e9")["error.EAY"]
+    column.do("set.EAY", "-40")
+    again = column.do("sort")
+    assert 'max="100"' in again["error.EAY"]
+    spans = column.part._spans
+    assert spans["EAY"] == spans["EAX"]
+
+
+def test_a_row_opens_into_curve_origin_and_numbers_and_goes_back():
+    column = Column()
+    opened = column.do("row", "EAY")["error.EAY"]
+    assert "assumed" in opened
+    assert "Undo the edit" not in opened
+    column.do("kind.EAY", "table")
+    edited = column.do("rows.EAY", "position;value\n-225;0\n225;<b>")["error.EAY"]
+    assert 'aria-invalid="true"' in edited
+    assert "&lt;b&gt;" in edited
+    edited = column.do("rows.EAY", "q;value\n-225;0,5\n225;-30")["error.EAY"]
+    assert "Undo the edit" in edited
+    assert column.state.amplitudes["EAY"] == -30.0
+    column.do("own.EAY")
+    assert column.state.amplitudes == STATE.amplitudes
+
+
+@pytest.mark.parametrize("word", ["set.EQQ", "rows.", "only", "kind.EAY", "row", "x"])
+def test_hostile_events_change_nothing(word):
+    column = Column()
+    column.do(word, "<script>")
+    assert column.state.without_notes() == STATE
+
+
+def test_what_is_no_number_is_said_and_exclusions_are_counted():
+    column = Column()
+    column.do("set.EAY", "x7")
+    assert "−43.7" in column.said[0][1]
+    assert "6 of 7 errors left out" in column.do("only", "EAY")["errors"]
+    column.do("include")
+    assert not column.state.exclusions
+    column.do("zero")
+    assert not any(column.state.amplitudes.values())

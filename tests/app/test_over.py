@@ -1,0 +1,166 @@
+"""What lies over the drawing: heading, limit, colour bar, controls, comparison, axes, labels."""
+
+import re
+from dataclasses import replace
+from io import BytesIO
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from app.parts import LIVE, lone_part
+from warpspace import load_scene
+from warpspace.app.documents.legend import kept_words, legend_html, marks
+from warpspace.app.documents.view_image import HEAD_PX, view_png
+from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
+from warpspace.app.evaluation.resulting_scene import scene_of
+from warpspace.app.state.app_state import start_state
+from warpspace.app.state.comparison import NOBODY, Side
+from warpspace.app.tasks.controls import ComparePart, ControlsPart, chosen_map
+from warpspace.app.tasks.over import ComparedPart, HeadPart
+from warpspace.app.viewport.camera import CameraMemory, fit_camera
+from warpspace.app.viewport.labels import axes, point_labels
+from warpspace.app.viewport.tab_camera import CameraSetup
+from warpspace.app.viewport.tone_map import colour_levels
+from warpspace.exceptions import SceneError
+from warpspace.scene.library import parse_scene
+from warpspace.scene.save import scene_to_toml
+
+SCENE = load_scene("dvf5000_first")
+START = start_state(SCENE, nodes=9)
+
+
+def limited(limit_um):
+    return replace(START, specification=replace(START.specification, limit_um=limit_um))
+
+
+def pieces(kind, state):
+    part = lone_part(kind)
+    part.context.scenes, part.context.camera = {}, part.context
+    part.context.stand = CameraSetup()
+    return part.pieces(LIVE.evaluate(state))
+
+
+def test_the_heading_says_numbers_place_and_limit_once():
+    head = pieces(HeadPart, START)["head"]
+    assert re.search(r"<h1>mean 3\d\.\d µm · max 51\.7 µm</h1>", head)
+    assert head.count("X 275 Y −225 Z −480") == 1
+    assert "in R" not in head
+
+
+@pytest.mark.parametrize(("limit", "kept"), [(51.0, False), (52.0, True), (1.0, False)])
+def test_the_limit_is_kept_only_where_the_largest_error_keeps_it(limit, kept):
+    words, found = kept_words(LIVE.evaluate(limited(limit)))
+    assert found is kept
+    assert words.startswith("all of") is kept
+    assert "100" not in words
+
+
+def test_pass_and_fail_are_two_colours_told_apart_by_the_limit():
+    state = limited(40.0)
+    picture = LIVE.evaluate(replace(state, look=replace(state.look, pass_fail=True)))
+    levels = colour_levels(picture.scale, picture.values)
+    assert len(np.unique(levels)) == 2
+    assert ((levels == levels.max()) == (picture.values > 40.0)).all()
+    assert "linear-gradient" in legend_html(picture)
+    assert 40.0 in picture.scale.ticks
+
+
+def test_names_beside_the_colour_bar_keep_apart():
+    for component, limit in (("norm", 51.5), ("norm", 500.0), ("x", 40.0)):
+        placed = [
+            m.name_at for m in marks(LIVE.evaluate(replace(limited(limit), component=component)))
+        ]
+        assert min(np.diff(placed)) > 0.06
+        assert placed[-1] <= (1.07 if limit == 500.0 else 1.0)  # above the bar
+
+
+def test_a_scene_file_carries_the_limit():
+    scene = replace(SCENE, limit_um=40.0)
+    back = parse_scene(scene_to_toml(scene), "x")
+    assert start_state(back).specification.limit_um == 40.0
+    assert scene_of(start_state(back)).limit_um == 40.0
+    assert scene_of(START).limit_um is None
+    text = scene_to_toml(scene).replace("limit_um = 40.0", "limit_um = -1")
+    with pytest.raises(SceneError, match=r"view\.limit_um = -1: expected"):
+        parse_scene(text, "x")
+
+
+def test_axes_are_numbered_in_positions_of_the_machine():
+    picture = LIVE.evaluate(START)
+    for k, axis in enumerate(axes(picture)):
+        low, high = SCENE.workspace.ranges[axis.name]
+        # a number lies where the nodes at that position are drawn
+        nodes = np.moveaxis(picture.grid.nominal_mm, k, 0)[..., k].reshape(9, -1)[:, 0]
+        for text, at in axis.ticks:
+            position = float(text.replace("−", "-"))
+            assert low <= position <= high
+            if picture.grid.ways[k] > 0:
+                expected = np.interp(position, np.linspace(low, high, 9), nodes)
+                assert at[k] == pytest.approx(expected)
+
+
+def test_the_worst_corner_is_labelled_once():
+    state = replace(START, look=replace(START.look, arrows=True))
+    kinds = [label.kind for label in point_labels(LIVE.evaluate(state))]
+    assert kinds.count("worst") == 1
+    assert kinds.count("corner") == 7
+
+
+def test_controls_set_what_is_coloured_and_how_the_machine_is_drawn():
+    part = lone_part(ControlsPart)
+    limit = part.take(START, "map", "limit")
+    assert chosen_map(limit) == "limit"
+    assert chosen_map(part.take(limit, "map", "orientation.y")) == "orientation.y"
+    for word, drawn in (("off", (False, False)), ("ghost", (False, True)), ("solid", (True, True))):
+        machine = part.take(START, "machine", word).machine
+        assert (machine.shown, machine.ghost) == drawn
+    for word in ("map", "machine", "set.travel", "view"):
+        assert part.take(START, word, "<script>").scene is SCENE
+    html = pieces(ControlsPart, START)["controls"]
+    assert 'data-set="state:set.look.isolines"' in html
+    assert 'data-value="slices"' in html
+
+
+def test_comparing_is_shown_and_left_by_one_switch():
+    assert pieces(ComparedPart, START)["compared"] == ""
+    pinned = with_pin(START).with_amplitude("EXX", 9.0)
+    html = pieces(ComparedPart, pinned)["compared"]
+    assert html.count('aria-pressed="true"') == 1
+    part = lone_part(ComparePart)
+    part.context.scenes = {}
+    assert part.take(pinned, "leave", "").comparison.b is None
+    assert part.take(pinned, "set.b", NOBODY).comparison.b is None
+    assert part.take(pinned, "set.a", "no such scene") is pinned
+    assert part.take(pinned, "shown", "difference").comparison.shown == "difference"
+    change = replace(pinned, comparison=replace(pinned.comparison, shown="difference"))
+    head = pieces(HeadPart, change)
+    assert "change: mean" in head["head"]
+    assert "volume within" not in head["head"]
+    assert "E<sub>B</sub> − E<sub>A</sub>" in head["legend"]
+
+
+def test_titles_are_escaped_wherever_they_lie_over_the_drawing():
+    evil = replace(SCENE, title="<img src=x onerror=alert(1)>")
+    state = with_sides(START, Side(), scene_side(evil))
+    for kind in (HeadPart, ComparedPart, ComparePart):
+        html = "".join(pieces(kind, state).values())
+        assert "<img" not in html
+
+
+def test_a_picture_of_the_view_has_words_where_the_camera_saw_their_points():
+    picture = LIVE.evaluate(START)
+    pose = fit_camera(picture.drawn_mm.reshape(-1, 3), 1.4, margins=(0.2, 0.2, 0.2, 0.2))
+    camera = CameraMemory(
+        tuple(0.01 * pose.position), tuple(0.01 * pose.look_at), (0.0, 0.0, 1.0), pose.fov_rad
+    )
+    pixels = np.full((500, 700, 4), 255, np.uint8)
+    plain, worded = (
+        np.asarray(Image.open(BytesIO(view_png(pixels, picture, None, seen)))).astype(int)
+        for seen in (None, camera)
+    )
+    changed = np.abs(plain - worded).sum(axis=-1)[HEAD_PX:, :700]
+    # below the worst corner, which is the lowest one in sight; at the left of the vertical axis
+    assert changed[420:, 350:600].any()
+    assert changed[100:400, :200].any()
+    assert not changed[150:300, 300:400].any()

@@ -1,0 +1,58 @@
+"""Positions of the axes, and how traced points run round rotary ones."""
+
+from dataclasses import replace
+
+import pytest
+
+from app.parts import LIVE, body_of, lone_part
+from warpspace.app.state.app_state import start_state
+from warpspace.app.state.edits import axis_span, with_curve
+from warpspace.app.state.tree import put
+from warpspace.app.tasks.machine import PositionsSection
+from warpspace.app.tasks.rotary import RotarySection
+from warpspace.machine.errors import Ramp
+from warpspace.scene.library import load_scene
+
+STATE = start_state(load_scene("dvf5000_first"), nodes=5)
+
+
+def test_every_axis_has_a_slider_whose_event_moves_it():
+    moved = put(put(STATE, "positions.B", "-30"), "machine.linear_mm.X", "100")
+    text = body_of(PositionsSection, moved)
+    assert text.count('type="range"') == 5
+    assert 'value="-30"' in text
+    assert "Tool point: axes X 100 " in text
+
+
+def test_traces_are_drawn_in_numbers_where_an_error_moves_them():
+    assert "No error moves the traced points" in body_of(RotarySection, STATE)
+    rising = Ramp(axis_span(STATE, "EZC"), 8.0)  # by hand: 8 µm higher after a turn
+    state = with_curve(STATE, "EZC", rising)
+    text = body_of(RotarySection, state)
+    assert text.count("<svg") == 3
+    assert "8.00 µm" in text
+    hidden = body_of(RotarySection, replace(state, shown=replace(state.shown, traces=False)))
+    assert "Draw the traces" in hidden
+    assert "<svg" not in hidden
+    assert "no rotary axis" in body_of(
+        RotarySection, start_state(load_scene("machine_c_frame_mill"))
+    )
+
+
+def test_a_table_that_is_paused_can_stand_there_and_axes_be_held_at_quarters():
+    section = lone_part(RotarySection)
+    state = replace(STATE, page=replace(STATE.page, task="machine", open=frozenset({"rotary"})))
+    section.context.store = section.context
+    section.context.state, section.context.page = state, section.context
+    section.context.put = lambda pieces: None
+    section._follow({"C": 89.7})
+    assert "Stand here" in section.body(LIVE.evaluate(state))
+    assert section.take(state, "stand", "").positions["C"] == 90.0
+    held = dict(section.take(state, "quarters", "").rotary.held)
+    assert held["C"] == (0.0, 90.0, 180.0, 270.0)
+    assert section.take(state, "point.1", "0").rotary.off == {1}
+
+
+@pytest.mark.parametrize("word", ["point.x", "point.99", "point.", "stand", "<b>"])
+def test_hostile_events_change_nothing(word):
+    assert lone_part(RotarySection).take(STATE, word, "<script>") == STATE

@@ -1,0 +1,193 @@
+"""The bar at the top and its windows: scenes, files, import, report, commands and keys."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+
+from app.parts import Nobody
+from warpspace.app.documents.scene_file import SceneList, open_text
+from warpspace.app.documents.services import Services
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.resulting_scene import scene_of
+from warpspace.app.state.app_state import start_state
+from warpspace.app.state.store import StateStore
+from warpspace.app.tasks.commands import COMMANDS, PaletteWindow, key_events
+from warpspace.app.tasks.files import FilesWindow, ShareWindow
+from warpspace.app.tasks.importing import ImportWindow
+from warpspace.app.tasks.report import ReportWindow
+from warpspace.app.tasks.top import PagePart, ScenesWindow, StatePart, TopPart
+from warpspace.exceptions import SceneError
+from warpspace.scene.library import load_scene
+
+LIVE = LiveModel()
+FIRST, SECOND = load_scene("dvf5000_first"), load_scene("dvf5000_second")
+STATE = start_state(FIRST, nodes=5)
+HOSTILE = "<img src=x onerror=alert(1)>.csv"
+TABLE = b"X [mm],EXX [um]\n-275,0\n0,5\n275,10\n"
+
+
+class Window:
+    """One part on a page that is not there, with what it has the page do."""
+
+    def __init__(self, kind, state=STATE, services=None):
+        self.said, self.sent, self.saved, self.called = [], [], [], []
+        self.store = StateStore(state)
+        button = SimpleNamespace(_impl=SimpleNamespace(uuid="upload"))
+        self.context = Nobody(
+            act=lambda do: do(), renew=lambda _: None, store=self.store, shown=LIVE.evaluate(state),
+            notify=lambda *words: self.said.append(words), services=services or Services(),
+            send=lambda *event: self.sent.append(event), reported=[],
+            save_file=lambda *file: self.saved.append(file),
+            scenes=SceneList({FIRST.title: FIRST, SECOND.title: SECOND}),
+            gui=SimpleNamespace(add_upload_button=lambda *_, **__: button),
+            uploads=SimpleNamespace(watch=lambda *_: None),
+            page=SimpleNamespace(
+                is_open=True, tell=lambda **_: None, call=lambda *what: self.called.append(what)
+            ),
+            camera=SimpleNamespace(remember=lambda: None), fit_view=lambda: None,
+            client=SimpleNamespace(flush=lambda: None),
+        )  # fmt: skip
+        self.part = kind(self.context)
+
+    def do(self, word, value=""):
+        self.store.apply(lambda state: self.part.take(state, word, value))
+        return self.store.state
+
+    @property
+    def html(self):
+        (found,) = self.part.pieces(LIVE.evaluate(self.store.state)).values()
+        return str(found)
+
+
+def test_undo_is_there_when_there_is_something_to_undo_and_says_what():
+    bar = Window(TopPart)
+    assert 'data-do="page:undo"' not in bar.html
+    bar.store.apply(lambda state: state.with_amplitude("EAX", 7.0))
+    assert "Undo: roll of X (Ctrl+Z)" in bar.html
+    bar.store.undo()
+    assert 'data-do="page:redo"' in bar.html
+    assert 'data-do="page:undo"' not in bar.html
+
+
+def test_scenes_are_chosen_by_title_and_escaped():
+    window = Window(ScenesWindow)
+    window.context.scenes.add(replace(FIRST, name="other", title=HOSTILE, description=HOSTILE))
+    assert "<img" not in window.html
+    assert window.html.count('aria-current="true"') == 1
+    assert window.do("choose", "nothing of that name").scene is FIRST
+    assert window.do("choose", SECOND.title).scene is SECOND
+
+
+def test_every_key_is_there_once_and_none_without_ctrl_changes_the_model():
+    keys = [key for one in COMMANDS for key in one.keys]
+    assert len(keys) == len(set(keys)) == len(key_events())
+    for command in COMMANDS:
+        part, _, word = command.event.partition(":")
+        if part in ("state", "page") and command.keys and "ctrl" not in command.keys[0]:
+            window = Window({"state": StatePart, "page": PagePart}[part])
+            window.part.context.store.apply(lambda state: state.with_amplitude("EAX", 7.0))
+            before = scene_of(replace(window.store.state, exaggeration=None))
+            after = window.do(word, command.value)
+            assert scene_of(replace(after, exaggeration=None)) == before, command.label
+
+
+def test_the_palette_finds_by_words_and_runs_the_first():
+    window = Window(PaletteWindow)
+    window.do("find", "zero err")
+    assert window.html.count('data-do="palette:run"') == 1
+    window.do("first", "whatever")
+    assert window.sent == [("page:zero", "")]
+    window.do("run", HOSTILE)
+    assert len(window.sent) == 1
+
+
+def test_a_file_says_what_it_adds_and_what_it_does_before_it_is_applied():
+    window = Window(ImportWindow)
+    window.part.offer(HOSTILE, TABLE)
+    assert window.sent == [("page:open", "import")]
+    assert "<img" not in window.html
+    assert "It adds EXX." in window.html
+    before = LIVE.evaluate(STATE).statistics
+    assert f"{before.mean_um:.1f} → " in window.html
+    applied = window.do("apply")
+    after = LIVE.evaluate(replace(applied, comparison=STATE.comparison)).statistics
+    assert after.mean_um != pytest.approx(before.mean_um)
+    assert applied.amplitudes["EXX"] == pytest.approx(10.0)
+    assert applied.comparison.a.title.startswith("before the import of")
+    assert window.do("apply") is applied  # once
+
+
+def test_what_replaces_an_error_says_so():
+    window = Window(ImportWindow, STATE.with_amplitude("EXX", 3.0))
+    window.part.offer("x.csv", TABLE)
+    assert "It replaces EXX." in window.html
+
+
+def test_a_file_that_does_not_say_its_axis_asks_in_the_words_of_the_window():
+    window = Window(ImportWindow)
+    window.part.offer("unnamed.comp", b"-20 0.001 0.003\n0 0.002 0.004\n20 0.005 0.006\n")
+    assert 'role="alert"' in window.html
+    assert "--axis" not in window.html
+    assert window.do("apply") is STATE
+    window.do("set.axes", "X")
+    assert "It adds EXX." in window.html
+    with pytest.raises(SceneError):
+        window.part.offer("nothing.bin", b"\0\1\2")
+
+
+def test_a_link_says_what_it_holds_and_asks_before_it_holds_the_token():
+    window = Window(FilesWindow, STATE.with_amplitude("EAX", 7.0))
+    window.do("share")
+    (name, _, token, words) = window.called[-1]
+    assert (name, token) == ("share", None)
+    assert "1 changed error" in words
+    asking = Window(FilesWindow, services=Services(token="secret"))
+    assert asking.do("share").page.window == "share"
+    assert asking.called == []
+    asking.do("share", "token")
+    assert asking.called[-1][2] == "secret"
+    assert "secret" not in Window(ShareWindow).html
+
+
+def test_files_that_a_page_refuses_or_invents_are_said_or_left():
+    window = Window(FilesWindow)
+    window.do("refused", "²:" + HOSTILE)
+    assert "expected a scene file of at most" in window.said[-1][1]
+    window.do("export", "../../etc/passwd")
+    window.do("link", "no link")
+    assert window.saved == []
+    assert "cannot be read" in window.said[-1][1]
+
+
+def test_a_saved_scene_opens_to_the_same_errors():
+    window = Window(FilesWindow, STATE.with_amplitude("EAX", 7.0))
+    window.do("save")
+    ((name, text),) = window.saved
+    assert name == "dvf5000_first.toml"
+    assert open_text(text, "x", "x.toml")[0].amplitudes["EAX"] == 7.0
+
+
+def test_the_report_has_author_questions_and_every_result_under_a_name_of_its_own():
+    asked = []
+
+    def write(request, _cancelled):
+        asked.append(request)
+        return b"%PDF", ()
+
+    window = Window(ReportWindow, services=Services(write_report=write))
+    window.context.reported[:] = [("Gains", 1), ("Gains", 2), (HOSTILE, 3)]
+    window.do("set.author", HOSTILE)
+    window.do("set.questions", "one\n\n two ")
+    assert "<img" not in window.html
+    window.do("remove", "2")
+    window.do("remove", "7")
+    window.do("write", ".exe")
+    assert asked == []
+    window.do("write", ".pdf")
+    while window.part._jobs.busy:
+        pass
+    (request,) = asked
+    assert (request.author, request.questions) == (HOSTILE, ("one", "two"))
+    assert list(request.results) == ["Gains", "Gains (2)"]
+    assert window.saved == [("dvf5000_first_report.pdf", b"%PDF")]
