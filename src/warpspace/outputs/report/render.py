@@ -128,8 +128,12 @@ def render_html(report: Report) -> str:
     templates.filters["kind"] = _kind
     templates.filters["data_uri"] = _data_uri
     templates.filters["attribute_page"] = _attribute_page
-    templates.filters["table"] = lambda table: Markup(table_html(table))  # noqa: S704 - escaped there
+    templates.filters["table"] = _table_markup
     return templates.get_template("report.html.j2").render(report=report, policy=POLICY)
+
+
+def _table_markup(table: Table) -> Markup:
+    return Markup(table_html(table))  # noqa: S704 - escaped there
 
 
 def _data_uri(picture: Picture) -> str:
