@@ -76,7 +76,6 @@ class Volume:
         return amplitudes
 
     def statistics(self, amplitudes: Array) -> Statistics:
-        """Summarise the volume for any amplitudes, [K], µm or µrad."""
         return volume_statistics(self.basis.evaluate(amplitudes, orientation=False), self.grid)
 
 

@@ -102,7 +102,6 @@ class Allocate(KeptLimit):
     fixed: Fixed = option((), "Errors whose tolerance stays as it is")
 
     def run(self, scene: "Scene", watch: Watch, /) -> "AllocateResult":
-        """Search, scale and verify."""
         done = 0.0
 
         def report(share: float) -> None:
@@ -114,7 +113,6 @@ class Allocate(KeptLimit):
         return replace(allocate(case, self, report), scene=scene)
 
     def check_keys(self, known: Sequence[str]) -> None:
-        """Refuse parameters that a machine does not have, and costs that none can have."""
         for key in (*dict(self.costs), *self.fixed):
             if key not in known:
                 raise UnknownNameError("error parameter", key, known)
@@ -135,7 +133,6 @@ class Exact(NamedTuple):
     first_order: float  # probability on the same machines
 
     def words(self) -> str:
-        """Say it in a sentence, with the difference."""
         return (
             f"exact chain: {100.0 * self.probability:.2f} % of {self.machines:,} of these machines,"
             f" {100.0 * (self.probability - self.first_order):+.2f} % against the first order"
@@ -173,7 +170,6 @@ class AllocateResult(Result):
         return tuple(key for key, width in self.tolerances.items() if width >= self.widest)
 
     def as_plain(self) -> dict[str, Any]:
-        """Give the half widths, those that were allocated, and what they keep at what cost."""
         asked = self.asked
         return {
             "limit_um": asked.limit_um,
@@ -195,14 +191,12 @@ class AllocateResult(Result):
         }
 
     def changes(self) -> Sequence[Change]:
-        """Give the scene with the new tolerances."""
         if self.scene is None:
             return ()
         tolerances = self.scene.tolerances.with_half_widths(self.tolerances)
         return [Change("tolerances allocated", replace(self.scene, tolerances=tolerances))]
 
     def blocks(self) -> Iterator[Block]:
-        """Say half widths before and after, and what they keep."""
         asked, draws = self.asked, self.draws
         title = () if self.scene is None else (self.scene.title,)
         yield " · ".join(

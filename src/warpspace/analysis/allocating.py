@@ -37,7 +37,6 @@ class Ensemble:
 
     @property
     def size(self) -> int:
-        """Bytes it holds."""
         spread = 0 if self.spread is None else self.spread.nbytes
         return self.unit.nbytes + self.gains.nbytes + spread
 

@@ -51,7 +51,6 @@ class AxisMotion:
 
     @property
     def motions(self) -> tuple[Motion, Motion, Motion]:
-        """All three."""
         return self.radial, self.axial, self.tilt
 
 

@@ -39,7 +39,6 @@ class Column:
         return isinstance(self.form, str) and bool(self.form)
 
     def spell(self, value: Any) -> str:
-        """Spell a cell."""
         if value is None:
             return ""
         if callable(self.form):
@@ -77,14 +76,12 @@ class Table:
         return tuple(column for column in self.columns if column.shows)
 
     def cells(self) -> list[list[str]]:
-        """Spell the rows of the columns shown."""
         return [
             [c.spell(v) for c, v in zip(self.columns, row, strict=True) if c.shows]
             for row in self.rows
         ]
 
     def csv_rows(self) -> list[list[Any]]:
-        """Give the rows of a CSV file, headings first."""
         place = {column.key: i for i, column in enumerate(self.columns) if column.key}
         order = [place[key] for key in self.csv_order] if self.csv_order else [*place.values()]
         head = [self.columns[i].key for i in order]
@@ -197,7 +194,6 @@ MOST_ROWS = 200  # rows of a table that a page shows; it counts the others
 
 
 def blocks_html(blocks: Iterable[Block]) -> str:
-    """Give everything a result says."""
     return "\n".join(_block_html(block) for block in blocks)
 
 

@@ -37,7 +37,6 @@ class Cylinder:
     height_mm: float
 
     def __str__(self) -> str:
-        """Write its size."""
         return f"Ø{self.diameter_mm:g} × {self.height_mm:g} mm"
 
 
@@ -101,7 +100,6 @@ class Site:
         return len(self.ranges) + (3 if self.loop is Loop.WORKPIECE else 0)
 
     def random(self, rng: np.random.Generator, count: int) -> Places:
-        """Spread points uniformly."""
         return self.places(rng.random((count, self.dimensions)))
 
     def spread(self, nodes: int) -> Places:
@@ -242,7 +240,6 @@ class Plan:
     workers: int | None = None
 
     def check(self) -> None:
-        """Refuse what cannot be sampled."""
         if not SAMPLES[0] <= self.samples <= SAMPLES[1]:
             raise OptionError(f"samples: {self.samples}; expected 1 to {SAMPLES[1]:,}")
         if self.seed < 0:
@@ -330,7 +327,6 @@ class Case:
 
     @property
     def site(self) -> Site:
-        """Where the machines are looked at."""
         return Site(self.model, self.workspace, self.view.loop, self.plan.cylinder)
 
     @property
@@ -413,7 +409,6 @@ def both_orders(case: Case, count: int = EXACT_MACHINES) -> tuple[Array, Array]:
 
 
 def sample_blocks(case: Case, first: int, end: int, *, keep: bool, job: Job | None = None) -> Part:
-    """Sample some blocks of a case."""
     do = case.build_job() if job is None else job
 
     def blocks() -> Iterator[Array]:

@@ -35,7 +35,6 @@ class Entry:
     place: str = ""  # module:Class
 
     def load(self) -> "type[Analysis]":
-        """Import it."""
         return resolve_name(self.place) if self.place else _ADDED[self.name]
 
 
@@ -108,7 +107,6 @@ def register(kind: "type[Analysis]") -> None:
 
 
 def unregister(name: str) -> None:
-    """Take an analysis that was added away again."""
     del _ADDED[name], _ENTRIES[name]
 
 
@@ -124,7 +122,6 @@ def entries() -> tuple[Entry, ...]:
 
 
 def find_analysis(name: str) -> "type[Analysis]":
-    """Look up an analysis."""
     load_plugins()
     if name not in _ENTRIES:
         raise UnknownNameError("analysis", name, _ENTRIES)

@@ -51,7 +51,6 @@ class Certify(Analysis):
     loop: Loop = option(Loop.TOOL, LOOP_HELP)
 
     def run(self, scene: "Scene", watch: Watch, /) -> "CertifyResult":
-        """Take planes and lines out of the bent grid."""
         from warpspace.scene.model import choose_view, evaluate_grid
 
         grid = build_grid(scene.model, scene.workspace, self.nodes)
@@ -80,7 +79,6 @@ class CertifyResult(Result):
     title: str
 
     def blocks(self) -> Iterator[Block]:
-        """Say each deviation."""
         yield f"{self.title} · form of the bent volume"
         columns = (
             *(Column(name, key=name, leads=name != "at") for name in Deviation.keys[:3]),

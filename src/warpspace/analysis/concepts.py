@@ -51,7 +51,6 @@ class Concept:
 
     @property
     def said(self) -> dict[str, Any]:
-        """What its JSON object says."""
         sampled, kept = self.sampled, self.sampled.probability
         return {
             "scene": self.scene.name,
@@ -111,11 +110,9 @@ class Concepts(KeptLimit):
     )
 
     def run(self, scene: "Scene", watch: Watch, /) -> "ConceptsResult":
-        """Sample the machines of one scene."""
         return self.run_all((scene,), watch)
 
     def run_all(self, scenes: "Sequence[Scene]", watch: Watch, /) -> "ConceptsResult":
-        """Sample the machines of each scene."""
         total, done = self.samples * len(scenes), 0
 
         def advance(count: int) -> None:
@@ -136,7 +133,6 @@ class ConceptsResult(Result):
     concepts: tuple[Concept, ...]
 
     def as_plain(self) -> dict[str, Any]:
-        """Give how they were sampled, and the numbers of each."""
         asked = self.asked
         default = dict(self.concepts[0].scene.tolerances.default)
         return {
@@ -152,7 +148,6 @@ class ConceptsResult(Result):
         }
 
     def blocks(self) -> Iterator[Block]:
-        """Say a row for each machine, and which has the smallest mean."""
         asked, first = self.asked, self.concepts[0].scene
         default = ", ".join(f"{name} ±{v:g}" for name, v in first.tolerances.default.items())
         tolerances = f"the tolerances of {first.name}: {default} (µm, µrad)"

@@ -55,7 +55,6 @@ class Share:
 
     @property
     def unit(self) -> str:
-        """Unit of the half width."""
         return parameter(self.key).unit
 
 
@@ -176,7 +175,6 @@ class Shares(Sampled):
     )
 
     def run(self, scene: "Scene", watch: Watch, /) -> "SharesResult":
-        """Share out the variance."""
         if self.sobol is not None and self.sobol < 2:
             raise OptionError(f"{{sobol}} {self.sobol}; expected a power of two, 2 or above")
         plan = Plan(seed=self.seed, cylinder=self.cylinder)
@@ -202,11 +200,9 @@ class SharesResult(Result):
 
     @property
     def rows(self) -> tuple[Share, ...]:
-        """The shares."""
         return self.contributions
 
     def blocks(self) -> Iterator[Block]:
-        """Say the shares, and the Sobol indices where they were asked for."""
         with_sobol = any(row.sobol_total is not None for row in self.rows)
         columns = (
             Column("key", leads=True),

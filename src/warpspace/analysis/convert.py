@@ -61,11 +61,9 @@ class Convert(Analysis):
     )
 
     def run(self, scene: Scene, _watch: Watch, /) -> "ConvertResult":
-        """Convert and compare."""
         return convert_scene(scene, self.target(scene), self.wishes)
 
     def target(self, scene: Scene) -> "Target":
-        """Read what is asked for."""
         target = Target()
         for wish in self.wishes:
             name, equals, text = (part.strip() for part in wish.partition("="))
@@ -115,13 +113,11 @@ class ConvertResult(Result):
     notes: tuple[str, ...]  # what could not be taken along
 
     def texts(self) -> Mapping[str, str]:
-        """Give the scene file."""
         wishes = "; ".join(self.wishes)
         head = f"# Converted from {self.before.name} by warpspace convert: {wishes}\n"
         return {"": head + self.text}
 
     def as_plain(self) -> dict[str, Any]:
-        """Spell it."""
         return {
             "largest_um": self.largest_um,
             "largest_urad": self.largest_urad,
@@ -130,7 +126,6 @@ class ConvertResult(Result):
         }
 
     def blocks(self) -> Iterator[Block]:
-        """Say what has changed, and that the field has not."""
         count = len(self.changed)
         yield f"{self.before.title}: {count} error{'' if count == 1 else 's'} written otherwise"
         columns = (

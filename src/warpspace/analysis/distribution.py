@@ -124,17 +124,14 @@ class Stream:
 
     @property
     def mean_um(self) -> float:
-        """Mean, µm."""
         return self._sum / self.count
 
     @property
     def rms_um(self) -> float:
-        """Root mean square, µm."""
         return math.sqrt(self._sum_squares / self.count)
 
     @property
     def max_um(self) -> float:
-        """Largest sample, µm."""
         return self._largest
 
     @property
@@ -308,7 +305,6 @@ def loop_keys(model: Model, loop: Loop, keys: Sequence[str]) -> tuple[str, ...]:
 
 
 def choose_distribution(word: Distribution | str) -> Distribution:
-    """Read the name of a distribution."""
     if word not in [*Distribution]:
         raise OptionError(f"distribution {word!r}; expected one of {', '.join(Distribution)}")
     return Distribution(word)
@@ -322,7 +318,6 @@ def build_draws(
     clip: bool = False,
     source: str = "tolerances",
 ) -> Draws:
-    """Collect the distribution of every parameter."""
     kind = choose_distribution(distribution)
     if not tolerances:
         problem = (

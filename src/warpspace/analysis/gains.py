@@ -114,17 +114,14 @@ class Gain:
 
     @property
     def parameter(self) -> Parameter:
-        """The row of the parameter table."""
         return parameter(self.key)
 
     @property
     def symbol(self) -> str:
-        """Symbol of the parameter in the thesis."""
         return self.parameter.symbol
 
     @property
     def unit(self) -> str:
-        """Unit of the gain."""
         return f"µm/{self.parameter.unit}"
 
 
@@ -135,7 +132,6 @@ def gains_at(
     at: Mapping[str, ArrayLike],
     share: float = DEFAULT_SHARE,
 ) -> tuple[Gain, ...]:
-    """Compute the gains at one position of the machine."""
     chosen = loop_keys(model, loop, keys)
     coordinates = complete_coordinates(model.machine, at)
     point = nominal_point(model, loop, coordinates)
@@ -296,7 +292,6 @@ class Gains(Analysis):
     )
 
     def run(self, scene: "Scene", _watch: Watch, /) -> "GainsResult":
-        """Compute them at the point or over the travel."""
         if self.at and self.over_travel:
             raise OptionError("{at}: expected one point, and none with {over_travel}")
         if self.step_deg is not None and not self.over_travel:
@@ -311,7 +306,6 @@ class Gains(Analysis):
         return GainsResult(gains=found, asked=self, machine=scene.machine)
 
     def warnings(self, scene: "Scene") -> Iterable[str]:
-        """Say where the point lies outside the travel."""
         return (f"{{at}} {words}" for words in outside_travel(scene.machine, dict(self.at)))
 
 
@@ -332,13 +326,11 @@ class GainsResult(Result, Sequence[Gain]):
 
     @property
     def where(self) -> str:
-        """Which loop and point the gains belong to."""
         if self.asked.over_travel:
             return f"{self.asked.loop} loop · largest absolute gains over the travel"
         return f"{self.asked.loop} loop · gains at {place_words(self.gains[0].at)}"
 
     def blocks(self) -> Iterator[Block]:
-        """Say the ranked table and what makes a key error."""
         count = sum(gain.is_key for gain in self.gains)
         yield f"{self.machine.title} · {self.where}"
         yield self._table()
@@ -388,7 +380,6 @@ class GainsResult(Result, Sequence[Gain]):
         return Table(columns, rows, csv_order=order)
 
     def bars(self) -> Bars:
-        """Give the chart: |E| wide, its components beside it."""
         title = f"Error gains · {self.machine.title}"
         signed = not self.asked.over_travel
         return gain_bars(self.gains, title, self.where, self.asked.share, signed=signed)

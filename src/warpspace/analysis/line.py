@@ -45,7 +45,6 @@ class Line(Analysis):
     exact: bool = option(False, "The exact chain instead of the first order")
 
     def run(self, scene: "Scene", watch: Watch, /) -> "LineResult":
-        """Evaluate the points of the line."""
         from warpspace.scene.model import evaluate
 
         ends = self._ends(scene)
@@ -80,7 +79,6 @@ class Line(Analysis):
         return ends
 
     def warnings(self, scene: "Scene") -> Iterator[str]:
-        """Say which ends lie outside the travel."""
         for name, place in (("start", self.start), ("end", self.end)):
             for words in outside_travel(scene.machine, dict(place)):
                 yield f"{{{name}}} {words}"
@@ -100,7 +98,6 @@ class LineResult(Result):
     title: str
 
     def blocks(self) -> Iterator[Block]:
-        """Say the largest error, the components along the way and their chart."""
         norm = np.linalg.norm(self.error_um, axis=1)
         worst = int(np.argmax(norm))
         place = {name: float(at[worst]) for name, at in self.axes.items()}

@@ -85,7 +85,6 @@ class SweepPoint:
 
     @property
     def row(self) -> dict[str, Any]:
-        """Its numbers by column."""
         sampled, kept = self.sampled, self.sampled.probability
         return {
             "scene": self.scene.name,
@@ -158,7 +157,6 @@ class Machines(SampledMachines):
     )
 
     def run(self, scene: "Scene", watch: Watch, /) -> "MachinesResult":
-        """Sample the machines of one scene."""
         return self.run_all((scene,), watch)
 
     def run_all(
@@ -172,7 +170,6 @@ class Machines(SampledMachines):
         progress: Progress | None = None,
         take: Take | None = None,
     ) -> "MachinesResult":
-        """Sample the machines of all scenes; see `sweep` for the last four."""
         self.check_against(len(scenes))
         total, done = self.machines(len(scenes)), 0
 
@@ -208,11 +205,9 @@ class Machines(SampledMachines):
         return self.rows or bool(self.tolerance)
 
     def machines(self, scenes: int) -> int:
-        """Count the machines that are drawn."""
         return self.samples * scenes * prod(len(values) for _, values in self.tolerance)
 
     def check_against(self, scenes: int) -> None:
-        """Refuse what cannot be sampled, before anything is."""
         steps = dict(self.tolerance)
         for key, _ in self.tolerance[len(steps) - 1 :] if len(steps) < len(self.tolerance) else ():
             raise OptionError(f"{{tolerance}}: {key} is given twice")
@@ -296,7 +291,6 @@ class MachinesResult(Result):
         return getattr(self.points[0].sampled, name)
 
     def as_plain(self) -> dict[str, Any]:
-        """Give the numbers of one scene, of each, or rows."""
         asked = self.asked
         if asked.in_rows:
             return {"tolerances": plain(dict(asked.tolerance)), "rows": [*self.rows]}
@@ -310,7 +304,6 @@ class MachinesResult(Result):
         return {"scenes": each, "from": str(asked.source)}
 
     def blocks(self) -> Iterator[Block]:
-        """Say the numbers; of one scene with a histogram, else as a table."""
         first = self.points[0]
         if self.asked.in_rows or len(self.points) > 1:
             yield from self._several()

@@ -40,7 +40,6 @@ class Check:
 
     @property
     def unit(self) -> str:
-        """Unit of the value."""
         return parameter(self.key).unit
 
     @property

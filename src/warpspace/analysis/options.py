@@ -114,7 +114,6 @@ class Option:
         return self.enum(value)
 
     def check(self, value: Any) -> None:
-        """Refuse a number out of its range."""
         if self.kind not in (int, float) or value is None:
             return
         low = -math.inf if self.low is None else self.low
@@ -124,7 +123,6 @@ class Option:
             raise OptionError(f"{{{self.name}}} {_spell(value)}{unit}; expected {span}{unit}")
 
     def read(self, text: str, scene: "Scene | None") -> Any:
-        """Read a value that was typed."""
         word = text.strip()
         try:
             if self.grammar is not None:
@@ -325,7 +323,6 @@ def read_limits(text: str, _scene: "Scene") -> tuple[tuple[str, float], ...]:
 
 
 def typed_word(text: str, _scene: "Scene") -> str:
-    """Take a word as it is."""
     return text
 
 
@@ -363,7 +360,6 @@ Limits: TypeAlias = Annotated[
 
 
 def place_words(place: Mapping[str, float]) -> str:
-    """Spell axis positions."""
     return ", ".join(f"{name} {value:g}" for name, value in place.items())
 
 

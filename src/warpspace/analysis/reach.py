@@ -42,7 +42,6 @@ class Reach(Analysis):
     nodes: int = option(21, "Nodes per axis of the working volume", low=2, high=61, flag="--grid")
 
     def run(self, scene: "Scene", watch: Watch, /) -> "ReachResult":
-        """Evaluate the volume and look for the largest box."""
         from warpspace.scene.model import choose_view, evaluate_grid
 
         grid = build_grid(scene.model, scene.workspace, self.nodes)
@@ -84,7 +83,6 @@ class ReachResult(Result):
     ranges: Mapping[str, tuple[float, float]]
 
     def blocks(self) -> Iterator[Block]:
-        """Say the share, the box and the limits of parts."""
         yield f"{self.title} · {self.percent:.1f} % of the volume within {self.limit_um:g} µm"
         if self.box is None:
             yield "  no box between nodes of the grid keeps the limit"

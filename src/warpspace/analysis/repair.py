@@ -55,12 +55,10 @@ class Effect:
 
     @property
     def parameter(self) -> Parameter:
-        """The row of the parameter table."""
         return parameter(self.key)
 
     @property
     def unit(self) -> str:
-        """Unit of its values."""
         return self.parameter.unit
 
 
@@ -143,7 +141,6 @@ class Repair(Analysis):
         return scene, scene.view(self.seen_loop)
 
     def run(self, scene: "Scene", watch: Watch = silent, /) -> "RepairResult":
-        """Find the sets to first order, and evaluate each with the exact chain."""
         from warpspace.scene.model import evaluate_grid, grid_basis, second_order
 
         scene, view = self.seen(scene)
@@ -191,7 +188,6 @@ class RepairResult(Result):
 
     @property
     def objective(self) -> Objective:
-        """What was made smallest."""
         return self.asked.objective
 
     @property
@@ -200,14 +196,12 @@ class RepairResult(Result):
         return [one.proven for one in self.repairs]
 
     def changes(self) -> Sequence[Change]:
-        """Give the scene with each set applied."""
         return [
             Change(f"after repair: {_values(one)}", repaired(self.scene, one.adjust))
             for one in self.repairs
         ]
 
     def blocks(self) -> Iterator[Block]:
-        """Say what each error gives, and the sets."""
         smallest = f"smallest {self._objective_words}"
         yield " · ".join((self.scene.title, *self._where, smallest))
         mean, rms, p95, largest = (f"{getattr(self.before, name):.2f}" for name in FOUR)
@@ -290,7 +284,6 @@ class RepairResult(Result):
         )
 
     def bars(self) -> Bars:
-        """Give the chart: each error left out, each at its best value, and the best sets."""
         errors, sets = self.errors[:MOST_BARS], self.repairs
         none = [None] * len(sets), [None] * len(errors)
         panels = tuple(

@@ -59,15 +59,12 @@ class Sampled(Analysis):
 
     @property
     def drawn(self) -> Distribution:
-        """How parameters are distributed over their tolerances."""
         return self.distribution or Distribution.UNIFORM
 
     def draws(self, scene: "Scene") -> Draws:
-        """Give what machines are drawn from."""
         return scene_draws(scene, self.loop, self.drawn, clip=self.clip)
 
     def case(self, scene: "Scene", plan: Plan) -> Case:
-        """Give what is sampled of a scene."""
         return Case(scene.model, self.draws(scene), scene.workspace, scene.view(self.loop), plan)
 
 
@@ -83,7 +80,6 @@ class SampledMachines(Sampled):
     )
 
     def plan(self, over: Over, limit_um: float | None, nodes: int = DEFAULT_NODES) -> Plan:
-        """Give what is sampled and how."""
         return Plan(self.samples, self.seed, over, nodes, limit_um, self.cylinder)
 
 
@@ -110,5 +106,4 @@ class KeptLimit(SampledMachines):
         return "everywhere" if self.over == "max" else "at a random point"
 
     def plan_of(self, limit_um: float | None) -> Plan:
-        """Give what is sampled and how."""
         return replace(self.plan(Over(self.over), limit_um), workers=self.workers)

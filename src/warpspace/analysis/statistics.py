@@ -27,7 +27,6 @@ class Summary:
 
     @property
     def three(self) -> tuple[float, float, float]:
-        """Mean, RMS and max."""
         return self.mean_um, self.rms_um, self.max_um
 
 

@@ -42,7 +42,6 @@ class ThesisCase(NamedTuple):
 
     @property
     def keys(self) -> list[str]:
-        """The 37 parameters of table 4-2."""
         return [
             key
             for key in self.model.machine.parameter_keys

@@ -37,7 +37,6 @@ class Run:
 
     @property
     def is_measured(self) -> bool:
-        """Whether somebody measured them."""
         return self.who == "measured"
 
     def named(self, words: str) -> str:
@@ -101,18 +100,15 @@ class BenchTest(Analysis):
 
     @classmethod
     def settings(cls) -> tuple[Option, ...]:
-        """List the options that say how it is run."""
         return tuple(one for one in cls.options() if one.name != "data")
 
     @classmethod
     def explained(cls) -> str:
-        """Say what is done, and which columns a file of readings has."""
         columns = ",".join(column.name for column in cls.columns)
         title = f"{cls.title} on SCENE ({cls.standard})."
         return f"{title}\n\n{cls.words}\n\nColumns of --data: {columns}."
 
     def run(self, scene: Scene, _watch: Watch, /) -> "BenchResult":
-        """Run it on the model, and evaluate readings beside it."""
         return run_test(scene, self, self.data)
 
     @abstractmethod
@@ -183,12 +179,10 @@ class BenchResult(Result):
 
     @property
     def model(self) -> Run:
-        """What the model gives."""
         return self.runs[0]
 
     @property
     def measured(self) -> Run | None:
-        """What was measured."""
         return self.runs[1] if len(self.runs) > 1 else None
 
     @property
@@ -204,11 +198,9 @@ class BenchResult(Result):
 
     @property
     def charts(self) -> tuple[Lines, ...]:
-        """The customary figure."""
         return self.test.charts(self.runs)
 
     def doubts(self) -> tuple[str, ...]:
-        """Say what a reader should doubt."""
         return self.notes
 
     def as_json(self) -> dict[str, Any]:
@@ -228,7 +220,6 @@ class BenchResult(Result):
         return found | {"notes": list(self.notes)}
 
     def blocks(self) -> Iterator[Block]:
-        """Say the numbers of the standard, and draw its figure."""
         yield f"{self.test.title} ({self.test.standard}) · {self.scene.title}"
         yield f"  {self.model.plan.place} · {self.model.plan.readings} readings"
         rows: dict[str, list[Any]] = {}
@@ -317,7 +308,6 @@ class PolarLayout:
 
 
 def lay_polar(chart: Lines) -> PolarLayout:
-    """Lay out a polar chart."""
     largest = max((float(np.abs(curve.y).max()) for curve in chart.curves), default=0.0)
     ring = round_width(largest / RINGS * (1.0 - 1e-6)) if largest > LEAST else 1.0
     per_unit = REACH / (RINGS * ring)
@@ -364,18 +354,15 @@ def register_test(test: type[BenchTest]) -> None:
 
 
 def unregister_test(name: str) -> None:
-    """Take a kind of test away again."""
     del _TESTS[name]
 
 
 def bench_names() -> tuple[str, ...]:
-    """List the names of all tests."""
     load_plugins()
     return tuple(_TESTS)
 
 
 def find_test(name: str) -> type[BenchTest]:
-    """Look up a kind of test."""
     load_plugins()
     if name not in _TESTS and name not in FORMER:
         raise UnknownNameError("test", name, _TESTS)

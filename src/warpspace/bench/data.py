@@ -50,11 +50,9 @@ class Table:
     notes: tuple[str, ...] = ()  # what a reader should doubt
 
     def __getitem__(self, name: str) -> Array:
-        """Give a column of numbers."""
         return self.columns[name]
 
     def __len__(self) -> int:
-        """Count the rows."""
         return len(self.lines)
 
     def refuse(self, *problems: str) -> SceneError:

@@ -154,7 +154,6 @@ def within_travel(machine: Machine, coordinates: Mapping[str, Array]) -> NDArray
 
 
 def check_travel(scene: Scene, coordinates: Mapping[str, Array], what: str) -> None:
-    """Refuse a path that leaves the travel of an axis."""
     problems: list[str] = []
     for name, values in coordinates.items():
         axis = scene.machine.axes[name]
@@ -214,7 +213,6 @@ def plane_axes(machine: Machine, plane: str) -> tuple[str, str, str]:
 
 
 def find_plane(model: Model, stand: Coordinates, plane: str) -> Plane:
-    """Lay a plane on a machine; see `plane_axes`."""
     first, second, key = plane_axes(model.machine, plane)
     along, up = axis_vector(model, stand, first), axis_vector(model, stand, second)
     about = axis_vector(model, stand, parameter(key).axis, key[1])

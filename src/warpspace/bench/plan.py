@@ -48,7 +48,6 @@ class Plan:
 
     @property
     def readings(self) -> int:
-        """Number of readings."""
         return len(self.site)
 
 
@@ -124,7 +123,6 @@ class Outcome:
     details: Mapping[str, object] = field(default_factory=dict[str, object])
 
     def __getitem__(self, key: str) -> float:
-        """Give a number by its key."""
         return next(quantity.value for quantity in self.quantities if quantity.key == key)
 
 

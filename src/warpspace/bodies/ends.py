@@ -75,7 +75,6 @@ class Head:
         return direction, origin + shift * direction
 
     def build(self) -> Mount:
-        """Build tool, spindle and rotary head."""
         branch = self.layout.tool
         axes = list(takewhile(lambda axis: not axis.is_linear, reversed(branch)))
         inner = branch[: len(branch) - len(axes)]

@@ -414,7 +414,6 @@ _Fixed = tuple[tuple[str, Vector], ...]
 
 
 def generate_bodies(machine: Machine) -> tuple[Body, ...]:
-    """Generate the schematic bodies of a machine from its chain, offsets and travels."""
     axes, source = tuple(machine.axes.values()), machine.bodies.get("t")
     fixed = (tuple(sorted(each.items())) for each in (machine.fixed_mm, machine.fixed_deg))
     shape = (source.shape if source else "") or TOOL_SHAPES[0]

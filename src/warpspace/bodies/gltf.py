@@ -65,7 +65,6 @@ def build_gltf(
     generator: str = "warpspace",
     extras: Mapping[str, Any] | None = None,
 ) -> bytes:
-    """Write surfaces and lines to one binary file."""
     document, body = _lay_out(parts, root, generator)
     if extras:
         json.dumps(extras, allow_nan=False)
@@ -200,7 +199,6 @@ class GltfTemplate:
         self._position, self._colour = attributes["POSITION"], attributes["COLOR_0"]
 
     def fill(self, points: Array, colours: NDArray[np.floating[Any]]) -> bytes:
-        """Write the file with other points and colours."""
         body = bytearray(self._body)
         for at, values in ((self._position, points), (self._colour, colours)):
             start = self._document["bufferViews"][at]["byteOffset"]

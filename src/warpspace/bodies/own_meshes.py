@@ -37,7 +37,6 @@ class LoadedMesh:
 def load_mesh(
     path: str | Path, frame: str, *, unit: str | None = None, up: str | None = None
 ) -> LoadedMesh:
-    """Read a user's mesh as a body."""
     path = Path(path)
     standard = FORMATS.get(path.suffix.lower())
     if standard is None:
@@ -110,7 +109,6 @@ def _clean(mesh: Any) -> int:
 
 
 def own_meshes(machine: Machine) -> dict[str, LoadedMesh]:
-    """Read the meshes that a machine's description names."""
     return {
         frame: _read(frame, source)
         for frame, source in machine.bodies.items()

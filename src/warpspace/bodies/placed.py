@@ -23,7 +23,6 @@ from warpspace.units import MM_PER_UM, RAD_PER_URAD, Array
 
 
 def load_bodies(machine: Machine) -> tuple[Body, ...]:
-    """Give the bodies of a machine."""
     frames = {BASE, "S", "t", "w", *machine.axes}
     kept = read_bodies(Path(machine.body_dir) / BODY_FILE) if machine.body_dir else ()
     own = {frame: loaded.body for frame, loaded in own_meshes(machine).items()}
@@ -106,7 +105,6 @@ class PlacedBody:
 
     @property
     def label(self) -> str:
-        """Name for people, for instance ``X saddle``."""
         frame, _, what = self.body.name.partition("_")
         name = what if frame in ("R", "S", "t") else f"{frame} {what}"
         return name.replace("_", " ")
@@ -153,7 +151,6 @@ def place_bodies(
     exaggeration: float,
     only: Collection[str] | None = None,
 ) -> tuple[PlacedBody, ...]:
-    """Place the bodies of a scene's machine."""
     return tuple(
         PlacedBody(body, motions[body.frame], exaggeration)
         for body in load_bodies(scene.machine)

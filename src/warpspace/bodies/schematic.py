@@ -49,7 +49,6 @@ def frame_of(name: str) -> str:
 
 
 def _colour(mesh: Any) -> tuple[int, int, int]:
-    """Colour of the material of a mesh, sRGB; a grey where it has none."""
     material = getattr(mesh.visual, "material", None)
     if material is None:
         return MIDDLE

@@ -95,7 +95,6 @@ class Calibrate(Analysis):
     )
 
     def run(self, scene: Scene, watch: Share, /) -> Calibration:
-        """Read the files and find the errors."""
         names = (*self.data, *self.predict)
         each = self.kinds if len(self.kinds) > 1 else (self.kinds or (None,)) * len(names)
         if len(each) != len(names):
@@ -121,7 +120,6 @@ class Calibrate(Analysis):
         held: Sequence[Readings] = (),
         watch: Watch = unwatched,
     ) -> Calibration:
-        """Find the errors in readings, and what would tell more."""
         from warpspace.calibration.next_best import next_best, separating
 
         found = calibrate(scene, sets, self, held, watch)

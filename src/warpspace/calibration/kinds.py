@@ -102,13 +102,11 @@ class FromVectors(Kind):
         """Differentiate the prediction: by the error, [n, d, 3], and by unknowns, [n, d, m]."""
 
     def observe(self, scene: Scene, readings: Readings, guess: Guess) -> Array:
-        """Evaluate the errors, and predict."""
         return self.predict(readings, _error_mm(scene, readings, guess), guess)
 
     def slopes(
         self, scene: Scene, readings: Readings, guess: Guess, keys: tuple[str, ...]
     ) -> tuple[Array, Array]:
-        """Put what an error does to a reading behind what a parameter does to the error."""
         error_mm = _error_mm(scene, readings, guess)
         by_error, by_unknown = self.derivatives(readings, error_mm, guess)
         basis = build_basis(scene.model, guess.errors, keys, readings.coordinates, VIEW)
@@ -129,7 +127,6 @@ class Placed(FromVectors):
     sign: ClassVar[float]
 
     def unknowns(self, readings: Readings) -> tuple[str, ...]:
-        """Name three coordinates per session."""
         return tuple(
             f"{self._head(session)} {letter}"
             for session in dict.fromkeys(readings.session)
@@ -137,17 +134,14 @@ class Placed(FromVectors):
         )
 
     def start(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:
-        """Begin with the means of the sessions."""
         member = self._members(readings, unknowns)
         total = np.einsum("ndm,nd->m", member, readings.observed_mm)
         return total / np.maximum(member.sum(axis=(0, 1)), 1.0)
 
     def predict(self, readings: Readings, error_mm: Array, guess: Guess) -> Array:
-        """Add ± the error to the place."""
         return self.sign * error_mm + self._members(readings, guess.unknowns) @ guess.values
 
     def derivatives(self, readings: Readings, error_mm: Array, guess: Guess) -> tuple[Array, Array]:
-        """Give ± one, and which place a reading belongs to."""
         by_error = np.broadcast_to(self.sign * np.eye(3), (*error_mm.shape, 3))
         return by_error, self._members(readings, guess.unknowns)
 
@@ -189,12 +183,10 @@ class Points(Placed):
     sign = 1.0
 
     def fits(self, table: ReadingTable, scene: Scene) -> bool:
-        """Look for the error vectors."""
         del scene
         return _vectors(table) is not None
 
     def read(self, table: ReadingTable, scene: Scene) -> Readings:
-        """Take positions of any axes, and the three components of the error."""
         columns, loop, told = _vectors(table) or (("ex_um", "ey_um", "ez_um"), None, None)
         observed = table.need(columns) * (1.0 if columns[0].endswith("_mm") else 1e-3)
         if loop not in (None, *self.loops) and (
@@ -223,7 +215,6 @@ class Points(Placed):
         return replace(readings, notes=(*notes, note))
 
     def unknowns(self, readings: Readings) -> tuple[str, ...]:
-        """Name a shift per session where the file names sessions."""
         return super().unknowns(readings) if any(readings.session) else ()
 
 
@@ -238,17 +229,14 @@ class Tracker(Points):
     place = "tracker"
 
     def fits(self, table: ReadingTable, scene: Scene) -> bool:
-        """Say no: its columns are those of points."""
         del table, scene
         return False
 
     def unknowns(self, readings: Readings) -> tuple[str, ...]:
-        """Name a shift and a turn per session."""
         names = dict.fromkeys(name[:-2] for name in Placed.unknowns(self, readings))
         return tuple(f"{name} {at}{x}" for name in names for at in ("", "turn ") for x in "xyz")
 
     def start(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:
-        """Begin with none."""
         del readings
         return np.zeros(len(unknowns))
 
@@ -306,12 +294,10 @@ class Lengths(FromVectors):
     columns = "an axis position each (x_mm, b_deg, …), length_mm; session names the station; u_um"
 
     def fits(self, table: ReadingTable, scene: Scene) -> bool:
-        """Look for lengths."""
         del scene
         return "length_mm" in table.columns
 
     def read(self, table: ReadingTable, scene: Scene) -> Readings:
-        """Take positions of any axes, and one length."""
         observed = table.need(("length_mm",))
         coordinates, notes = axis_columns(table, scene, tuple(scene.machine.axes))
         check_poses(coordinates, table.source)
@@ -325,7 +311,6 @@ class Lengths(FromVectors):
         return replace(found, session=labels)
 
     def unknowns(self, readings: Readings) -> tuple[str, ...]:
-        """Name place and dead path of each station."""
         return tuple(
             f"station {name} {what}"
             for name in dict.fromkeys(readings.session)
@@ -333,7 +318,6 @@ class Lengths(FromVectors):
         )
 
     def start(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:
-        """Find each station from the nominal points, from several beginnings."""
         values = np.zeros(len(unknowns))
         stations = self._stations(readings, unknowns)
         for name in dict.fromkeys(readings.session):
@@ -343,12 +327,10 @@ class Lengths(FromVectors):
         return values
 
     def predict(self, readings: Readings, error_mm: Array, guess: Guess) -> Array:
-        """Take the distance, less the dead path."""
         at, away = self._beams(readings, error_mm, guess)
         return (np.linalg.norm(away, axis=-1) - guess.values[at + 3])[:, None]
 
     def derivatives(self, readings: Readings, error_mm: Array, guess: Guess) -> tuple[Array, Array]:
-        """Give the direction of the beam."""
         at, away = self._beams(readings, error_mm, guess)
         beam = away / np.linalg.norm(away, axis=-1, keepdims=True)
         by_unknown = np.zeros((len(readings), 1, len(guess.unknowns)))

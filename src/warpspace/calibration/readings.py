@@ -43,7 +43,6 @@ class ReadingTable:
     frame: str | None = None  # of vectors whose columns do not say it, as the user says
 
     def __len__(self) -> int:
-        """Count the rows."""
         return len(self.lines)
 
     def need(self, names: Sequence[str]) -> Array:
@@ -63,7 +62,6 @@ class ReadingTable:
 
 
 def read_table(path: Path) -> ReadingTable:
-    """Read a CSV file; see `parse_table`."""
     return parse_table(read_text(path, MAX_CSV_BYTES), str(path))
 
 
@@ -165,7 +163,6 @@ class Readings:
     plan: Plan | None = None  # of the test they were taken with, along its path
 
     def __len__(self) -> int:
-        """Count the readings."""
         return len(self.lines)
 
 
@@ -186,7 +183,6 @@ def bundled_data() -> tuple[str, ...]:
 def read_readings(
     name: str, scene: Scene, kind: str | None = None, frame: str | None = None
 ) -> Readings:
-    """Read a file of readings for a machine."""
     path = find_data(name)
     return parse_readings(read_text(path, MAX_CSV_BYTES), str(path), scene, kind, frame)
 
@@ -257,7 +253,6 @@ def take_readings(
     observed_mm: Array,
     notes: tuple[str, ...],
 ) -> Readings:
-    """Put the readings of a file together."""
     return Readings(
         kind,
         coordinates,

@@ -53,12 +53,10 @@ class TestReadings(Kind):
         self._text = text
 
     def fits(self, table: ReadingTable, scene: Scene) -> bool:
-        """Say no: several tests have like columns, and all have options."""
         del table, scene
         return False
 
     def read(self, table: ReadingTable, scene: Scene) -> Readings:
-        """Lay the path of the test through the poses of the file."""
         own = parse_table(table.text, self.test.data_columns(scene), table.source)
         plan, measured = self.test.plan_data(scene, own)
         hint = "Are the readings in the unit that their column names?"
@@ -91,16 +89,13 @@ class TestReadings(Kind):
         )
 
     def unknowns(self, readings: Readings) -> tuple[str, ...]:
-        """Name what the set-up of the test leaves unknown; each file has its own."""
         return tuple(f"{readings.source} {name}" for name in _plan(readings).setup)
 
     def start(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:
-        """Begin with none."""
         del readings
         return np.zeros(len(unknowns))
 
     def observe(self, scene: Scene, readings: Readings, guess: Guess) -> Array:
-        """Run the test on the model, and add what the set-up gives."""
         machine = replace(scene, model=self.test.model(scene), errors=guess.errors)
         taken = simulate(machine, _plan(readings)) * MM_PER_UM
         return (taken + _set_up(readings, guess.unknowns) @ guess.values)[:, None]
@@ -108,7 +103,6 @@ class TestReadings(Kind):
     def slopes(
         self, scene: Scene, readings: Readings, guess: Guess, keys: tuple[str, ...]
     ) -> tuple[Array, Array]:
-        """Take the linear response of the test."""
         machine = replace(scene, model=self.test.model(scene), errors=guess.errors)
         matrix = respond(machine, _plan(readings), keys).matrix * MM_PER_UM
         return matrix[:, None, :], _set_up(readings, guess.unknowns)[:, None, :]
@@ -162,7 +156,6 @@ _test_kind = lru_cache(maxsize=256)(TestReadings)
 
 
 def recognise(table: ReadingTable, scene: Scene) -> Kind:
-    """Tell the kind of a file by its columns."""
     found = next((kind for kind in KINDS.values() if kind.fits(table, scene)), None)
     if found is None:
         there = ", ".join((*table.labels, *table.columns))

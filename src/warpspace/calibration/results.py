@@ -47,7 +47,6 @@ class Found:
 
     @property
     def unit(self) -> str:
-        """Unit of the parameter."""
         return parameter(self.key).unit
 
     @property
@@ -103,7 +102,6 @@ class Residuals:
         return Path(self.readings.source).name
 
     def as_json(self) -> dict[str, Any]:
-        """Spell it reading by reading."""
         told = self.readings
         rows = [
             {
@@ -119,7 +117,6 @@ class Residuals:
         return {"file": self.file, "kind": told.kind, "readings": rows}
 
     def rows(self, use: str, axes: Sequence[str]) -> Iterator[tuple[object, ...]]:
-        """Give rows of the table of residuals."""
         told = self.readings
         for at, line in enumerate(told.lines):
             places = [float(told.coordinates[name][at]) for name in axes]
@@ -151,12 +148,10 @@ class Step:
 
     @property
     def measurement(self) -> str:
-        """What is measured, in words."""
         return self.candidate.name
 
     @property
     def kind(self) -> str:
-        """Kind of its readings."""
         return self.candidate.readings.kind
 
 
@@ -195,11 +190,9 @@ class Calibration(Result):
         return [circle for group in self.fitted for circle in group.readings.circles]
 
     def changes(self) -> tuple[Change, ...]:
-        """Give the scene with the errors found."""
         return (Change("with the errors found", self.scene),)
 
     def as_json(self) -> dict[str, Any]:
-        """Spell it."""
         from dataclasses import asdict
 
         return {
@@ -228,7 +221,6 @@ class Calibration(Result):
         }
 
     def file_table(self) -> Table:
-        """Give the residuals, one line a reading."""
         axes = self.scene.machine.axes
         places = [f"axis_{name}_{'mm' if axis.is_linear else 'deg'}" for name, axis in axes.items()]
         parts = [f"{when}_{x}_mm" for when in ("before", "after") for x in "xyz"]
@@ -238,7 +230,6 @@ class Calibration(Result):
         return Table(tuple(Column(key=key) for key in keys), rows, exact=True)
 
     def blocks(self) -> Iterator[Block]:
-        """Say what was found, what is left, what cannot be told apart and what would help."""
         sets = [(group.file, group.readings) for group in self.fitted]
         files = ", ".join(f"{name} ({one.kind}, {len(one)} readings)" for name, one in sets)
         yield f"{self.title} · {files}"

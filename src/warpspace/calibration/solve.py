@@ -112,8 +112,6 @@ def without(columns: Array, basis: Array) -> Array:
 
 
 def spell_rank(rank: Rank, slopes: Collection[str] = ()) -> tuple[str, ...]:
-    """Say in words what cannot be told apart."""
-
     def name(key: str) -> str:
         return f"the slope of {key}" if key in slopes else key
 
@@ -150,14 +148,12 @@ class Terms:
     start: Array  # [K], µm or µrad; amplitudes of the scene
 
     def errors_with(self, amplitudes: Array) -> ErrorSet:
-        """Give the error set with these amplitudes, [K], µm or µrad."""
         functions = dict(self.errors.functions)
         for key, value in zip(self.keys, amplitudes, strict=True):
             functions[key] = functions[key].with_amplitude(float(value))
         return ErrorSet(functions)
 
     def only(self, keys: Sequence[str]) -> "Terms":
-        """Give the same for some of the parameters."""
         start = np.array([self.start[self.keys.index(key)] for key in keys], dtype=float)
         return replace(self, keys=tuple(keys), start=start)
 
@@ -169,7 +165,6 @@ class Terms:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """The rows of the parameter table."""
         return tuple(parameter(key) for key in self.keys)
 
 
@@ -264,7 +259,6 @@ class Stack:
 
     @classmethod
     def of(cls, scene: Scene, sets: Sequence[Readings], watch: Watch = unwatched) -> "Stack":
-        """Put sets together."""
         names = (name for one in sets for name in find_kind(one.kind).unknowns(one))
         return cls(scene, tuple(sets), tuple(dict.fromkeys(names)), watch)
 
@@ -320,7 +314,6 @@ class Stack:
 
     @property
     def size(self) -> int:
-        """Number of components of all readings."""
         return sum(one.observed_mm.size for one in self.sets)
 
 
@@ -331,7 +324,6 @@ def rms_mm(residuals: Sequence[Array]) -> float:
 
 
 def named(unknowns: Sequence[str], values: Array) -> dict[str, float]:
-    """Give the unknowns by name, mm."""
     return {name: float(value) for name, value in zip(unknowns, values, strict=True)}
 
 

@@ -71,11 +71,9 @@ class SphereTcp(Centres):
     columns = "rotary positions (b_deg, c_deg), x_mm, y_mm, z_mm; u_um, session"
 
     def fits(self, table: ReadingTable, scene: Scene) -> bool:
-        """Look for centres that stay within a few millimetres."""
         return has_centres(table, scene) and spread_mm(table) <= TCP_SPREAD_MM
 
     def read(self, table: ReadingTable, scene: Scene) -> Readings:
-        """Take the centres, and find where the linear axes stood."""
         observed = table.need(READ)
         rotary = rotary_axes(scene)
         coordinates, notes = axis_columns(table, scene, rotary, rotary)
@@ -96,11 +94,9 @@ class Sphere(Centres):
     )
 
     def fits(self, table: ReadingTable, scene: Scene) -> bool:
-        """Look for centres that wander."""
         return has_centres(table, scene) and spread_mm(table) > TCP_SPREAD_MM
 
     def read(self, table: ReadingTable, scene: Scene) -> Readings:
-        """Take the positions of the linear axes; an axis that turns against its name is noted."""
         table.need(READ)
         rotary = rotary_axes(scene)
         linear = tuple(name for name in ("X", "Y", "Z") if name in scene.machine.axes)
@@ -134,12 +130,10 @@ class Sphere(Centres):
 
 
 def rotary_axes(scene: Scene) -> tuple[str, ...]:
-    """Name the rotary axes of a machine."""
     return tuple(name for name, axis in scene.machine.axes.items() if not axis.is_linear)
 
 
 def has_centres(table: ReadingTable, scene: Scene) -> bool:
-    """Tell whether a file has centres at positions of rotary axes."""
     rotary = {f"{name.lower()}_deg" for name in rotary_axes(scene)}
     return set(READ) <= set(table.columns) and bool(rotary & set(table.columns))
 

@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
 
 def command_of(kind: "type[Analysis]") -> click.Command:
-    """Build the command of a kind of analysis."""
     options, run_it = MORE.get(kind.name, ((), None))
     command: Callable[..., None] = _runner(kind, run_it)
     command.__doc__ = kind.explained()
@@ -117,7 +116,6 @@ def _runner(kind: "type[Analysis]", run_it: Callable[..., Any] | None) -> Callab
 
 
 def read_options(kind: "type[Analysis]", values: dict[str, Any], scene: "Scene") -> "Analysis":
-    """Build an analysis from what click has read."""
     given: dict[str, Any] = {}
     for one in options_of(kind):
         value = values[one.name]
@@ -154,7 +152,6 @@ def print_blocks(blocks: "Iterable[Block]") -> None:
 def write_result(
     found: "Result", csv_path: str | None, plot: str | None, output: str | None, *, force: bool
 ) -> list[str]:
-    """Write what was asked for: scene or files, whose names it gives, table and chart."""
     from warpspace.scene.files import spell_row
 
     wrote = [output] if output else []
@@ -230,7 +227,6 @@ def load_scenes(
 
 
 def find_scenes(names: Sequence[str]) -> list[str]:
-    """List the scenes that arguments stand for; a folder stands for the .toml files in it."""
     found: list[str] = []
     for name in names:
         if Path(name).is_dir():

@@ -26,7 +26,6 @@ class InputFile(click.Path):
     """A file that a command reads."""
 
     def files(self, value: str | Path) -> Iterable[Path]:
-        """Find what is read for a value."""
         return (Path(value),)
 
 
@@ -34,7 +33,6 @@ class DataFile(InputFile):
     """A file of readings, or the name of a bundled one."""
 
     def files(self, value: str | Path) -> Iterable[Path]:
-        """Find the file by its name."""
         from warpspace.calibration.readings import find_data
 
         return (find_data(str(value)),)
@@ -51,7 +49,6 @@ class SceneName(click.ParamType[str]):
         param: click.Parameter,  # noqa: ARG002
         incomplete: str,
     ) -> list[CompletionItem]:
-        """Offer the bundled names, and files."""
         from warpspace.scene.library import scene_names
 
         names = [name for name in scene_names() if name.startswith(incomplete)]
@@ -92,7 +89,6 @@ class OutputFile(click.Path):
 
     @property
     def endings(self) -> tuple[str, ...]:
-        """What it may end with."""
         return (*self._endings, *self._added())
 
 
@@ -148,19 +144,15 @@ class Commands(MutableMapping[str, click.Command]):
         return self._added.get(name) or self._built[name]
 
     def __setitem__(self, name: str, command: click.Command) -> None:
-        """Add a command."""
         self._added[name] = guarded(command)
 
     def __delitem__(self, name: str) -> None:
-        """Take away a command that was added."""
         del self._added[name]
 
     def __iter__(self) -> Iterator[str]:
-        """Go through the listed names, built or not."""
         return iter(dict.fromkeys((*self._names(), *self._added)))
 
     def __len__(self) -> int:
-        """Count the listed commands."""
         return sum(1 for _ in self)
 
 

@@ -102,7 +102,6 @@ def sample(
 
 @contextmanager
 def find_workers(scheduler: str | None, workers: int | None, machines: int) -> "Generator[Workers]":
-    """Choose who does the work."""
     if scheduler is not None:
         if workers is not None:
             raise OptionError(

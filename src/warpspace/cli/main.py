@@ -73,11 +73,9 @@ class RenamedCommand(click.Command):
         parent: click.Context | None = None,
         **extra: Any,
     ) -> click.Context:
-        """Read the arguments as the present command."""
         return self.now.make_context(self.now.name, [*self.prefix, *args], parent, **extra)
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the present command."""
         return self.now.invoke(ctx)
 
 
@@ -130,7 +128,6 @@ class TaskGroup(click.Group):
     """The commands under headings by task; analyses are listed without being imported."""
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the lists."""
         sentences = {entry.name: entry.sentence for entry in entries()}
         tasks: dict[str, list[tuple[str, str]]] = {words: [] for words in TASKS.values()}
         room = formatter.width - 6 - max(map(len, self.commands))
@@ -259,7 +256,6 @@ class Ending:
 
     @property
     def word(self) -> str:
-        """What the user is told."""
         return "interrupted" if self.number in (0, signal.SIGINT) else "terminated"
 
     def handle(self, number: int, frame: FrameType | None) -> None:

@@ -47,7 +47,6 @@ COMPONENTS = ("norm", "x", "y", "z")
 
 
 def scene_argument(name: str = "scene", **kwargs: Any) -> Decorator:
-    """Add a SCENE argument."""
     return click.argument(name, type=SceneName(), **kwargs)
 
 
@@ -95,7 +94,6 @@ component_option = click.option(
 def read_exaggeration(
     _ctx: click.Context, _param: click.Parameter, text: str | None
 ) -> float | Literal["auto"] | None:
-    """Read a display factor as a user types it."""
     if text is None:
         return None
     if text.strip().lower() == "auto":
@@ -139,7 +137,6 @@ def grid_option(default: int | None = 21, of: str = "of the working volume") -> 
 
 
 def parse_point(text: str, axes: Collection[str], option: str = "--at") -> dict[str, float]:
-    """Read axis positions as a user types them."""
     from warpspace.analysis.options import read_place
 
     try:
@@ -219,7 +216,6 @@ def output_option(
 
 
 def plot_option(what: str) -> Decorator:
-    """Add the option --plot: a chart beside the numbers."""
     help_text = f"Draw the {what} into this file: .png, .svg or .pdf."
     return click.option("--plot", type=OutputFile(*FIGURES), help=help_text)
 
@@ -233,7 +229,6 @@ def write_text(path: str | Path, text: str, *, force: bool) -> None:
 
 
 def size_text(path: str) -> str:
-    """Spell the size of a file."""
     return f"{Path(path).stat().st_size / 1e6:.2f} MB"
 
 
@@ -292,7 +287,6 @@ def figure_options(size: str | None = "1600x1200", sizes: str = "") -> Decorator
 
 
 def figure_settings(*, grid: int, **options: Any) -> "FigureSettings":
-    """Check the options of a map."""
     from warpspace.field.grid import node_counts
     from warpspace.outputs.drawing.settings import FigureSettings
 

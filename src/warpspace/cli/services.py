@@ -36,7 +36,6 @@ _renderers = threading.Semaphore(MOST_RENDERERS)
 
 
 def build_services() -> "Services":
-    """Give the app its figures and exports."""
     from warpspace.app.documents.services import Services
 
     return Services(
@@ -102,7 +101,6 @@ def draw_concepts(
 def draw_compensation(
     found: "Compensation", dark: bool, narrow: bool, cancelled: threading.Event
 ) -> bytes:
-    """Draw the maps of a compensation as a PNG."""
     from warpspace.outputs.processes import ProcessPool
     from warpspace.outputs.save import draw_maps
 
@@ -161,7 +159,6 @@ def _wait(
 
 
 def write_export(request: "Request", ending: str) -> bytes:
-    """Write an export of a request."""
     from warpspace.outputs.files import temporary_folder
     from warpspace.picture.comparison import scene_change
     from warpspace.picture.model import evaluate_picture
@@ -219,7 +216,6 @@ BYTES_PER_RESPONSE = 48  # position and orientation error of one node to one par
 
 
 def write_page(picture: "ScenePicture", target: "Path", *, overwrite: bool) -> None:
-    """Write the interactive scene as one page that needs no network."""
     from warpspace.app.documents.offline_page import build_offline_html, offline_picture
 
     _check_size(picture)
@@ -258,7 +254,6 @@ register_format(
 def embed_view(
     scene: "Scene", *, exaggeration: float, nodes: int, loop: str, largest: float
 ) -> str:
-    """Build the page with the interactive scene."""
     from warpspace.app.documents.offline_page import build_offline_html, offline_picture
     from warpspace.kinematics.model import Loop
 

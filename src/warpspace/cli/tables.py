@@ -31,14 +31,12 @@ _TOGETHER = re.compile(r"(?<=\d) (?=[µm°%])|(?<= [A-Z]) (?=[-+\d])")
 
 
 def output_width() -> int:
-    """Give the width to print in, in characters."""
     import shutil
 
     return shutil.get_terminal_size((WIDTH_ELSEWHERE, 24)).columns
 
 
 def print_text(text: str) -> None:
-    """Print a sentence."""
     import textwrap
 
     text = plain(text)
@@ -55,7 +53,6 @@ def print_text(text: str) -> None:
 
 
 def print_table(columns: "Sequence[Column]", rows: Sequence[Row], indent: int = 2) -> None:
-    """Print a table."""
     from textwrap import indent as indented
 
     room = output_width() - indent
@@ -198,7 +195,6 @@ class ProgressBar:
         self._shown = shown
 
     def advance(self, steps: float) -> None:
-        """Count steps that are done."""
         if self._shown is not None:
             self._shown.advance(self._shown.task_ids[0], steps)
 

@@ -171,7 +171,6 @@ class Grid:
 
 
 def node_counts(nodes: int | Sequence[int]) -> tuple[int, int, int]:
-    """Check the number of nodes per axis."""
     try:
         given = nodes if isinstance(nodes, Sequence) else (nodes,) * DIMENSIONS
         counts = tuple(map(whole_number, given))
@@ -186,7 +185,6 @@ def node_counts(nodes: int | Sequence[int]) -> tuple[int, int, int]:
 def build_grid(
     model: Model, workspace: Workspace, nodes: int | Sequence[int] = DEFAULT_NODES
 ) -> Grid:
-    """Lay a grid over the working volume."""
     counts = node_counts(nodes)
     axes = workspace.volume_axes
     positions = workspace.positions

@@ -153,19 +153,16 @@ class Imported:
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Parameters that it gives, each once."""
         own = [one.key for one in (*self.series, *self.planes)]
         return tuple(dict.fromkeys((*own, *self.constants, *self.curves)))
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """Axes that its errors belong to, each once."""
         own = [parameter(key).axis for key in self.keys]
         return tuple(dict.fromkeys((*own, *(axis for one in self.planes for axis in one.axes))))
 
     @property
     def size(self) -> int:
-        """How many numbers it holds."""
         series = sum(len(run.values) for one in self.series for run in one.runs)
         planes = sum(
             len(one.first) * len(one.second) * (2 if one.backward else 1) for one in self.planes
@@ -207,12 +204,10 @@ class Summary:
 
     @property
     def unit(self) -> str:
-        """Unit of its values."""
         return parameter(self.key).unit
 
 
 def summaries(found: Imported) -> list[Summary]:
-    """Summarise all errors of an import."""
     rows = [_of_series(one) for one in found.series]
     for plane in found.planes:
         values = plane.table(BOTH)

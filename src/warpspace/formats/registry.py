@@ -104,11 +104,9 @@ class Format:
 
     @property
     def can_write(self) -> bool:
-        """Whether `warpspace compensate` writes it."""
         return self.write is not None
 
     def errors(self, sources: Sequence[Source], options: ReadOptions) -> Imported:
-        """Give the errors that files hold."""
         if self.read is not None:
             return self.read(sources, options)
         if self.tables is None:
@@ -172,13 +170,11 @@ def _own() -> dict[str, Format]:
 
 
 def formats() -> tuple[Format, ...]:
-    """List all formats."""
     load_plugins()
     return (*_own().values(), *_ADDED.values())
 
 
 def find_format(name: str) -> Format:
-    """Find a format by its name."""
     known = {one.name: one for one in formats()}
     if name not in known:
         raise UnknownNameError("format", name, known)
@@ -199,12 +195,10 @@ def register_format(found: Format) -> None:
 
 
 def unregister_format(name: str) -> None:
-    """Take a format away again."""
     del _ADDED[name]
 
 
 def recognise(sources: Sequence[Source]) -> Format:
-    """Find the format of files that belong together."""
     found: dict[str, Format] = {}
     for source in sources:
         kind = next((one for one in formats() if one.recognise(source.head, source.name)), None)
@@ -246,7 +240,6 @@ def refuse_unknown(name: str, content: bytes) -> None:
 
 
 def open_files(paths: Sequence[Path]) -> list[Source]:
-    """Open the files of an import."""
     if len(paths) > MOST_FILES:
         raise OptionError(f"{len(paths)} files; expected at most {MOST_FILES} an import")
     sources: list[Source] = []
@@ -265,7 +258,6 @@ def open_upload(name: str, content: bytes) -> Source:
 
 
 def read_errors(sources: Sequence[Source], options: ReadOptions, format_name: str = "") -> Reading:
-    """Read the errors that files hold."""
     kind = find_format(format_name) if format_name else recognise(sources)
     if options.variant not in ("", *kind.variants) and not kind.names_variants:
         known = ", ".join(kind.variants) or "none"

@@ -83,7 +83,6 @@ class Source:
 
     @property
     def text(self) -> str:
-        """All its lines."""
         return "\n".join(self.lines)
 
     @property
@@ -97,7 +96,6 @@ class Source:
         return self.base.rsplit(".", 1)[0]
 
     def refuse(self, found: str, expected: str = "") -> NoReturn:
-        """Refuse the file."""
         raise SceneError(self.name, [_joined(found, expected)])
 
     def unsaid(self, found: str, expected: str = "") -> NoReturn:
@@ -131,11 +129,9 @@ class Place:
 
     @property
     def shown(self) -> str:
-        """The line as a message shows it."""
         return shown(self.source.lines[self.line - 1])
 
     def refuse(self, found: str, expected: str = "") -> NoReturn:
-        """Refuse the file for this line."""
         self.source.refuse(f"line {self.line}: {found}", expected)
 
     def unsaid(self, found: str, expected: str = "") -> NoReturn:
@@ -152,7 +148,6 @@ class Place:
             self.refuse(f"{what} {shown(text)}", "a finite number")
 
     def whole(self, text: str, what: str, low: int, high: int) -> int:
-        """Read one whole number within limits."""
         value = self.number(text, what)
         if value != int(value) or not low <= value <= high:
             self.refuse(f"{what} {shown(text)}", f"a whole number {low} … {high}")
@@ -180,14 +175,12 @@ class Place:
         return value
 
     def unit(self, unit: str, known: Mapping[str, float], what: str) -> float:
-        """Give the factor of a unit."""
         if unit not in known:
             units = ", ".join(name for name in known if name.isascii())
             self.refuse(f"{what} in {shown(unit)}", f"one of the units {units}")
         return known[unit]
 
     def ascending(self, value: float, before: Sequence[float], what: str, of: str = "") -> None:
-        """Refuse a position that does not lie behind the last one."""
         if before and value <= before[-1]:
             self.refuse(f"{what} {value:g}{of} after {before[-1]:g}", "ascending positions")
 
@@ -203,7 +196,6 @@ def shown(text: str) -> str:
 
 
 def read_source(path: Path) -> Source:
-    """Read a file that a user named."""
     name = str(path)
     check_file(path, MAX_BYTES, name)
     try:

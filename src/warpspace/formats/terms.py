@@ -62,7 +62,6 @@ class Line:
 
     @property
     def size(self) -> int:
-        """How many numbers it takes."""
         return len(self.values) + len(self.backward)
 
     @property
@@ -81,7 +80,6 @@ class Line:
         return interpolate(np.asarray(position, dtype=float), self.positions, values, self.ends)
 
     def corrections(self, coordinates: Coordinates, direction: int = 0) -> dict[str, Array]:
-        """Give the correction of its target."""
         return {self.target: self.at(coordinates[self.source], direction)}
 
 
@@ -99,7 +97,6 @@ class Product:
         return 0
 
     def corrections(self, coordinates: Coordinates, direction: int = 0) -> dict[str, Array]:
-        """Give the correction of the target of the first table."""
         first, second = (np.asarray(coordinates[line.source]) for line in (self.first, self.second))
         return {self.first.target: self.at(first, second, direction)}
 
@@ -122,11 +119,9 @@ class Grid3:
 
     @property
     def size(self) -> int:
-        """How many numbers it takes."""
         return int(self.values.size)
 
     def corrections(self, coordinates: Coordinates, direction: int = 0) -> dict[str, Array]:
-        """Give the corrections of its three axes."""
         del direction
         points = np.broadcast_arrays(*(coordinates[axis] for axis in self.axes))
         found = trilinear(points, self.positions, self.values)
@@ -143,11 +138,9 @@ class Affine:
 
     @property
     def size(self) -> int:
-        """How many numbers it takes."""
         return sum(1 for row in self.matrix for value in row if value)
 
     def corrections(self, coordinates: Coordinates, direction: int = 0) -> dict[str, Array]:
-        """Multiply the matrix with the positions."""
         del direction
         at = [np.asarray(coordinates[axis], dtype=float) for axis in self.axes]
         return {
@@ -157,7 +150,6 @@ class Affine:
 
 
 def interpolate(position: Array, at: Sequence[float], values: Sequence[float], ends: str) -> Array:
-    """Interpolate linearly in a table."""
     places, found = np.asarray(at, dtype=float), np.asarray(values, dtype=float)
     if ends == MODULO and len(places) > 1:
         period = places[-1] - places[0]
@@ -204,7 +196,6 @@ class Tables:
 
     @property
     def size(self) -> int:
-        """How many numbers the controller holds."""
         return sum(term.size for term in self.terms)
 
     def corrections(self, coordinates: Coordinates, direction: int = 0) -> Mapping[str, Array]:

@@ -62,7 +62,6 @@ def plain_scene(found: Imported) -> Scene:
 
 
 def into_scene(reading: Reading, base: Scene | None, title: str, name: str) -> ImportedScene:
-    """Put imported errors into a scene."""
     found = reading.found
     notes: list[str] = []
     if base is None:

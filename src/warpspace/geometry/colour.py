@@ -35,7 +35,6 @@ class ColourScale:
 
     @property
     def name(self) -> str:
-        """Name of the colour map."""
         return DIVERGING if self.diverging else SEQUENTIAL
 
     def colours(self, values: Array) -> Bytes:

@@ -126,7 +126,6 @@ class AxisErrors:
 
     @property
     def constant(self) -> SmallMotion:
-        """The constant errors."""
         values = [self.errors.amplitude(key) for key in self.keys(constant=True)]
         return SmallMotion.from_errors(np.array(values[:3]), np.array(values[3:]))
 

@@ -45,7 +45,6 @@ def join(components: Iterable[Number], out: Array) -> None:
 
 
 def plus(one: Number, other: Number) -> Number:
-    """Add two components."""
     if isinstance(one, float) and one == 0.0:
         return other
     if isinstance(other, float) and other == 0.0:
@@ -54,7 +53,6 @@ def plus(one: Number, other: Number) -> Number:
 
 
 def times(one: Number, other: Number) -> Number:
-    """Multiply two components."""
     for first, second in ((one, other), (other, one)):
         if isinstance(first, float) and first in (0.0, 1.0):
             return second if first else 0.0
@@ -62,28 +60,23 @@ def times(one: Number, other: Number) -> Number:
 
 
 def dot(one: Triple, other: Triple) -> Number:
-    """Scalar product of two vectors."""
     x, y, z = map(times, one, other)
     return plus(plus(x, y), z)
 
 
 def add(one: Triple, other: Triple) -> Triple:
-    """Add two vectors."""
     return triple(map(plus, one, other))
 
 
 def subtract(one: Triple, other: Triple) -> Triple:
-    """Subtract one vector from another."""
     return add(one, scale(-1.0, other))
 
 
 def scale(factor: Number, vector: Triple) -> Triple:
-    """Multiply a vector by a number."""
     return triple(times(factor, value) for value in vector)
 
 
 def cross(one: Triple, other: Triple) -> Triple:
-    """Vector product of two vectors."""
     (a, b, c), (x, y, z) = one, scale(-1.0, other)
     u, v, w = other
     return (
@@ -105,26 +98,22 @@ def move(transform: Array, point: Triple) -> Triple:
 
 
 def multiply(one: Rows, other: Rows) -> Rows:
-    """Multiply two matrices."""
     columns = transpose(other)
     x, y, z = (triple(dot(row, column) for column in columns) for row in one)
     return x, y, z
 
 
 def add_rows(one: Rows, other: Rows) -> Rows:
-    """Add two matrices."""
     x, y, z = map(add, one, other)
     return x, y, z
 
 
 def subtract_rows(one: Rows, other: Rows) -> Rows:
-    """Subtract one matrix from another."""
     x, y, z = map(subtract, one, other)
     return x, y, z
 
 
 def transpose(rows: Rows) -> Rows:
-    """Swap rows and columns."""
     (a, b, c), (d, e, f), (g, h, i) = rows
     return (a, d, g), (b, e, h), (c, f, i)
 

@@ -104,11 +104,9 @@ class AfterMotion(Convention):
     def factors(
         self, constant: Array | None, motion: Array, component: Array | None
     ) -> tuple[Array | None, ...]:
-        """Put component errors behind the motion."""
         return constant, motion, component
 
     def frame(self, frames: AxisFrames, row: Parameter) -> Array:
-        """Give constants the frame before the motion, component errors the one after it."""
         return frames.before if row.is_constant else frames.after
 
 
@@ -123,11 +121,9 @@ class BeforeMotion(Convention):
     def factors(
         self, constant: Array | None, motion: Array, component: Array | None
     ) -> tuple[Array | None, ...]:
-        """Put component errors in front of the motion."""
         return constant, component, motion
 
     def frame(self, frames: AxisFrames, row: Parameter) -> Array:
-        """Give all errors the frame before the motion."""
         del row
         return frames.before
 
@@ -138,13 +134,11 @@ _CONVENTIONS: dict[str, Convention] = {
 
 
 def convention_names() -> tuple[str, ...]:
-    """List the names of all conventions."""
     load_plugins()
     return tuple(_CONVENTIONS)
 
 
 def find_convention(name: str) -> Convention:
-    """Find a convention by its name."""
     # Asked for each parameter of a Jacobian: plug-ins are looked for only where they may matter.
     if name not in _CONVENTIONS and name not in convention_names():
         raise UnknownNameError("convention", name, _CONVENTIONS)
@@ -159,7 +153,6 @@ def register_convention(convention: Convention) -> None:
 
 
 def unregister_convention(name: str) -> None:
-    """Take a convention away again."""
     del _CONVENTIONS[name]
 
 

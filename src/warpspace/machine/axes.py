@@ -32,7 +32,6 @@ _WITHIN = {letter: number % 3 for number, letter in enumerate(AXIS_LETTERS)}
 
 
 def is_axis_name(name: str) -> bool:
-    """Tell whether a text is the name of an axis."""
     return _NAME.fullmatch(name) is not None
 
 
@@ -42,7 +41,6 @@ def is_linear(name: str) -> bool:
 
 
 def is_rotary(name: str) -> bool:
-    """Tell whether an axis turns."""
     return not is_linear(name)
 
 
@@ -168,7 +166,6 @@ class Parameter:
 
     @property
     def unit(self) -> str:
-        """Unit of its values: µm or µrad."""
         return MICRORADIAN if self.is_rotation else MICROMETRE
 
     @property
@@ -253,18 +250,15 @@ class ParameterTable(Mapping[str, Parameter]):
     """Key to parameter, for every axis that a machine may have. Rows are made when asked for."""
 
     def __getitem__(self, key: str) -> Parameter:
-        """Look up one parameter."""
         row = _row(key)
         if row is None:
             raise KeyError(key)
         return row
 
     def __iter__(self) -> Iterator[str]:
-        """List all keys, axis by axis."""
         return (row.key for axis in AXIS_NAMES for row in axis_parameters(axis))
 
     def __len__(self) -> int:
-        """Count the parameters of all axes there can be."""
         return 2 * len(DIRECTIONS) * len(AXIS_NAMES)
 
 
@@ -272,7 +266,6 @@ PARAMETERS = ParameterTable()  # the only table of parameters there is
 
 
 def parameter(key: str) -> Parameter:
-    """Look up one parameter."""
     row = _row(key)
     if row is None:
         classic = [row.key for axis in "XYZABC" for row in axis_parameters(axis)]

@@ -168,7 +168,6 @@ class Axis:
 
     @property
     def is_linear(self) -> bool:
-        """Whether it translates."""
         return is_linear(self.name)
 
     @property
@@ -178,7 +177,6 @@ class Axis:
 
     @property
     def unit(self) -> str:
-        """Unit of its position in files and on screen."""
         return "mm" if self.is_linear else "°"
 
 
@@ -203,7 +201,6 @@ class Machine:
     source: str = ""  # where its structure is published
 
     def axis(self, name: str) -> Axis:
-        """Look up an axis by its name."""
         try:
             return self.axes[name]
         except KeyError:

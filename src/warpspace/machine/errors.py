@@ -42,7 +42,6 @@ class ErrorSet:
             parameter(key)
 
     def __iter__(self) -> Iterator[str]:
-        """Iterate over the keys that are given."""
         return iter(self.functions)
 
     @property
@@ -180,5 +179,4 @@ class Measurement:
 
     @property
     def count(self) -> int:
-        """Number of readings."""
         return sum(len(run.points) for run in self.runs)

@@ -49,7 +49,6 @@ class AnimationSettings:
     figure: FigureSettings = field(default_factory=lambda: FigureSettings(size=(960, 720)))
 
     def __post_init__(self) -> None:
-        """Check the values."""
         if self.motion not in MOTIONS:
             raise OptionError(f"motion {self.motion!r}; expected one of {', '.join(MOTIONS)}")
         if not MIN_FRAMES <= self.frames <= MAX_FRAMES:
@@ -65,7 +64,6 @@ class AnimationSettings:
 
 
 def draw_frame(scene: Scene, settings: AnimationSettings, number: int) -> Drawing:
-    """Draw one picture of an animation."""
     phase = number / settings.frames
     if settings.motion == "rotation":
         return _rotation_frame(scene, settings.figure, phase)
@@ -183,7 +181,6 @@ def write_animation(
     overwrite: bool = True,
     progress: Progress | None = None,
 ) -> None:
-    """Draw an animation of a scene into a file."""
     settings = settings or AnimationSettings()
     target = check_target(path, ENDINGS, overwrite=overwrite)
     ending = target.suffix.lower()

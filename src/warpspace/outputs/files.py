@@ -203,7 +203,6 @@ def mesh_files(
 
 
 def write_meshes(files: Mapping[str, Path], meshes: Mapping[str, Any], *, overwrite: bool) -> None:
-    """Write the meshes of frames."""
     for frame, file in files.items():
         with write_atomically(file, overwrite=overwrite) as temporary:
             meshes[frame].export(temporary, file_type="stl")

@@ -267,7 +267,6 @@ class FigureWorker:
         settings: "FigureSettings | None" = None,
         form: str = "png",
     ) -> bytes:
-        """Draw a figure and wait for it."""
         from warpspace.outputs.drawing.settings import FigureSettings
 
         return self.begin(name, scenes, settings or FigureSettings(), form)()
@@ -326,7 +325,6 @@ class FigureWorker:
             pool.kill()
 
     def __enter__(self) -> "FigureWorker":
-        """Use the worker in a with statement."""
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:

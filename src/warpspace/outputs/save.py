@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
 
 def figure_bytes(drawing: "Drawing", form: str) -> bytes:
-    """Write a drawn figure into memory."""
     facts = drawing.facts
     about = f"{facts['settings']}; scene={facts['scene']}"
     said = {"Title": drawing.title}
@@ -69,7 +68,6 @@ def write_figure(
     *,
     force: bool = True,
 ) -> Path:
-    """Draw a figure into a file, in this process."""
     form = check_target(path, FIGURE_ENDINGS, overwrite=force).suffix.lower().lstrip(".")
     content = render_figure(name, scenes, settings or FigureSettings(), form)
     with write_atomically(path, overwrite=force) as temporary:
@@ -100,7 +98,6 @@ _UNDATED: Final[dict[str, dict[str, str | None]]] = {
 
 
 def encode_figure(figure: Figure, form: str, facts: Mapping[str, str] | None = None) -> bytes:
-    """Write a figure into memory."""
     buffer = io.BytesIO()
     with mpl.rc_context(SAVE_RC):
         if form == "png":

@@ -141,7 +141,6 @@ class Picture:
 
     @property
     def shape(self) -> Shape:
-        """Nodes along the axes of the grid."""
         return self.grid.shape
 
     @property
@@ -166,7 +165,6 @@ class Picture:
 
     @cached_property
     def scale(self) -> ColourScale:
-        """Colours of the values."""
         if self.colours is not None:
             return self.colours
         values, change = [self.values], self.is_difference

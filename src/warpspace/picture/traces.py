@@ -47,7 +47,6 @@ class TraceLines:
         return deform(self.nominal_mm, self.error_um, self.exaggeration)
 
     def each(self) -> Iterator[TraceLine]:
-        """Give the traces one by one."""
         for number, trace in enumerate(self.group.traces):
             yield TraceLine(
                 trace,
@@ -81,7 +80,6 @@ def evaluate_traces(
 
 
 def trace_lines(groups: Sequence[TraceLines]) -> tuple[TraceLine, ...]:
-    """Give the traces of all branches one by one."""
     return tuple(line for group in groups for line in group.each())
 
 

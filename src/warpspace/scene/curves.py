@@ -245,7 +245,6 @@ class CurveReader:
     folder: Path | None = None  # where CSV files are; None where they are not read
 
     def read(self, raw: object, where: str, *, constant: bool = False) -> ErrorFunction | None:
-        """Read the curve of an error."""
         before = len(self.problems.lines)
         curve = self._read(raw, where, constant)
         if constant and not is_number(raw) and len(self.problems.lines) == before:
@@ -253,7 +252,6 @@ class CurveReader:
         return curve if len(self.problems.lines) == before else None
 
     def _read(self, raw: object, where: str, constant: bool) -> ErrorFunction | None:
-        """Read a curve, and the curves within it."""
         if raw is MISSING:
             self.problems.add(where, "is missing")
             return None

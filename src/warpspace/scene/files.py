@@ -125,7 +125,6 @@ def check_file(path: Path, limit_bytes: int, source: str) -> None:
 
 
 def parse_toml(text: str, source: str) -> dict[str, object]:
-    """Parse TOML text."""
     check_outline(text, source)
     try:
         return tomllib.loads(text)
@@ -369,12 +368,10 @@ class CsvRows:
         return value
 
     def note(self, problem: str) -> None:
-        """Note what is wrong with the file."""
         if len(self.problems) < _MOST_PROBLEMS:
             self.problems.append(problem)
 
     def check(self) -> None:
-        """Refuse the file if anything is wrong with it."""
         if self.problems:
             raise SceneError(self.source, self.problems)
 

@@ -46,7 +46,6 @@ def scene_names() -> tuple[str, ...]:
 
 
 def scene_path(name_or_path: str | Path) -> Path:
-    """Find the file of a scene."""
     text = str(name_or_path)
     if text in scene_names():
         return scenes_dir() / f"{text}.toml"
@@ -328,7 +327,6 @@ class _Document:
         return CurveReader(self.problems, span, axis, self.machine.axes, self.folder)
 
     def errors(self) -> ErrorSet:
-        """Read the curves of the errors."""
         found: dict[str, ErrorFunction] = {}
         problems, known = self.problems, self.known("errors")
         known_names = cast("dict[str, object]", self.raw.get("errors") or {})
@@ -354,7 +352,6 @@ class _Document:
         return ErrorSet(found)
 
     def tolerances(self) -> ToleranceSet:
-        """Read the tolerances of classes and of single errors."""
         problems, table, default = self.problems, self.raw.get("tolerances"), None
         if isinstance(table, dict) and "default" in table:
             default = problems.read(schema.DEFAULTS, "tolerances.default", table["default"])
@@ -366,7 +363,6 @@ class _Document:
         return ToleranceSet(given, own)
 
     def uncertainties(self) -> dict[str, ErrorFunction]:
-        """Read the standard uncertainties of errors."""
         found: dict[str, ErrorFunction] = {}
         for key, raw in self.known("uncertainty").items():
             where, constant = f"uncertainty.{key}", PARAMETERS[key].is_constant
@@ -384,7 +380,6 @@ class _Document:
         return found
 
     def measurements(self) -> dict[str, Measurement]:
-        """Read the readings of errors."""
         found: dict[str, Measurement] = {}
         for key, raw in self.known("measured").items():
             reader = ValueReader()

@@ -85,7 +85,6 @@ def body_notes(machine: Machine) -> tuple[str, ...]:
 
 
 def machine_names() -> tuple[str, ...]:
-    """List the bundled machines."""
     return tuple(sorted(path.parent.name for path in assets_dir().glob("machines/*/machine.toml")))
 
 

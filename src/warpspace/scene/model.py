@@ -86,7 +86,6 @@ class Scene:
 
     @property
     def machine(self) -> Machine:
-        """The machine of the scene."""
         return self.model.machine
 
     @property

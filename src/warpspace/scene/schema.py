@@ -155,7 +155,6 @@ class Section:
     build: Callable[..., Any] = dict
 
     def __call__(self, reader: ValueReader, value: Any, path: Path) -> Any:
-        """Read it."""
         before = len(reader.findings)
         table = reader.dictionary(value, path)
         if len(reader.findings) > before:

@@ -39,7 +39,6 @@ JOINT_TYPES = (*MOVING, "fixed", "floating", "planar")
 
 
 def read_robot(path: Path) -> tuple[Any, tuple[str, ...]]:
-    """Read the links and joints of a URDF file."""
     source = str(path)
     text = read_text(path, limits.MAX_SCENE_BYTES)
     others = _check_xml(text, source)
@@ -404,7 +403,6 @@ def _axis_names(joints: Sequence[Any], directions: dict[str, Array]) -> dict[str
 
 
 def _travel(joint: Any, axis: str, notes: list[str]) -> Range:
-    """Give the travel of an axis, mm or degrees."""
     limit = joint.limit
     if joint.type == "continuous":
         return (0.0, 360.0) if direction_index(axis) == 2 else (-180.0, 180.0)

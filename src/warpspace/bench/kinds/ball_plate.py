@@ -58,7 +58,6 @@ class BallPlate(BenchTest):
     positions: int = option(3, "Positions of the plate along the third axis", low=1, high=10)
 
     def plan(self, scene: Scene) -> Plan:
-        """Measure every ball in every position."""
         number, row, column = self._grid()
         return self._lay(scene, number, row, column)
 
@@ -70,7 +69,6 @@ class BallPlate(BenchTest):
         return number, row, column
 
     def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
-        """Measure the balls of a file; position, row and column count from 1."""
         problems: list[str] = []
         given: dict[str, Array] = {}
         for name, most in (
@@ -144,7 +142,6 @@ class BallPlate(BenchTest):
         return (low + high) / 2.0 + pitch * (index - (self.balls - 1) / 2.0)
 
     def evaluate(self, plan: Plan, readings: Array) -> Outcome:
-        """Take what is left of each position, its scales, squareness and errors of distances."""
         rest = left_over(plan, readings)
         first, second, key = PLANES[self.plane]
         sign = float(plan.marks["gain_sign"][0])
@@ -189,7 +186,6 @@ class BallPlate(BenchTest):
         return Outcome(quantities, {"positions": rows, "squareness_key": key})
 
     def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
-        """Draw the plate of each position, deviations exaggerated."""
         first, second = PLANES[self.plane][:2]
         columns = ["XYZ".index(name) for name in (first, second)]
         largest = max(float(np.abs(left_over(run.plan, run.readings)).max()) for run in runs)

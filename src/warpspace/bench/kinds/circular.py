@@ -169,7 +169,6 @@ class Circular(BenchTest):
     )
 
     def plan(self, scene: Scene) -> Plan:
-        """Run the circle counter-clockwise, then clockwise."""
         span = self.end_deg - self.start_deg
         if not 0.0 < span <= TURN:
             raise OptionError(
@@ -181,7 +180,6 @@ class Circular(BenchTest):
         return self._lay(scene, angle, sense)
 
     def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
-        """Run the angles of a file."""
         if len(table) < MIN_POINTS:
             raise table.refuse(f"has {len(table)} readings; expected at least {MIN_POINTS}")
         if np.ptp(table["angle_deg"]) < 1.0:
@@ -191,7 +189,6 @@ class Circular(BenchTest):
         return self._lay(scene, table["angle_deg"], table["direction"]), table["radial_um"]
 
     def data_notes(self, table: Table) -> tuple[str, ...]:
-        """Say where the readings are along another arc."""
         angle = np.unique(table["angle_deg"])
         leeway = max(LEEWAY_DEG, 1.5 * float(np.median(np.diff(angle))))
         ends = float(angle[0]), float(angle[-1])
@@ -251,7 +248,6 @@ class Circular(BenchTest):
         )  # fmt: skip
 
     def evaluate(self, plan: Plan, readings: Array) -> Outcome:
-        """Take circular and radial deviations, hysteresis, squareness, scales and centre."""
         fit = fit_circle_readings(plan, readings)
         letter = "G" if fit.mean_radial_um is None else "G(b)"
         deviation = fit.deviation_um
@@ -294,7 +290,6 @@ class Circular(BenchTest):
         return Outcome(tuple(quantities), details)
 
     def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
-        """Draw the radial deviation on the nominal circle, both ways round."""
         curves: list[Curve] = []
         for run in runs:
             fit = fit_circle_readings(run.plan, run.readings)
@@ -472,7 +467,6 @@ class FormerResult(BenchResult):
     """What the former command `ballbar` gives."""
 
     def as_json(self) -> dict[str, Any]:
-        """Spell it."""
         found = self.model.outcome
         sense = self.model.plan.marks["sense"]
         return {
@@ -488,7 +482,6 @@ class FormerBallbar(Circular):
     """The circular test as the former command `ballbar` has it: to first order."""
 
     def run(self, scene: Scene, _watch: Watch, /) -> FormerResult:
-        """Run it on the model."""
         found = run_test(scene, self, self.data, exact=False)
         left_out = second_order(scene, RELATIVE.loop)
         return FormerResult(found.test, found.scene, found.runs, found.notes, second_order=left_out)

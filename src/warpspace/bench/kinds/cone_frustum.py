@@ -144,11 +144,9 @@ class ConeFrustum(BenchTest):
     points: int = option(72, "Points of the circle", low=8, high=720)
 
     def plan(self, scene: Scene) -> Plan:
-        """Run the circle once."""
         return self._lay(scene, np.linspace(0.0, 360.0, self.points, endpoint=False))
 
     def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
-        """Run the angles of a file, in their order."""
         if len(table) < 8:
             raise table.refuse(f"has {len(table)} readings; expected at least 8")
         if len(table) > MOST:
@@ -207,7 +205,6 @@ class ConeFrustum(BenchTest):
         )  # fmt: skip
 
     def evaluate(self, plan: Plan, readings: Array) -> Outcome:
-        """Take circularity and mean radius."""
         fit = fit_circle_readings(plan, readings)
         return Outcome(
             (
@@ -222,7 +219,6 @@ class ConeFrustum(BenchTest):
         )
 
     def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
-        """Draw the radial deviation on the nominal circle."""
         curves: list[Curve] = []
         for run in runs:
             fit = fit_circle_readings(run.plan, run.readings)

@@ -106,7 +106,6 @@ class Diagonals(BenchTest):
     targets: int = option(11, "Targets along each diagonal", low=2, high=500)
 
     def plan(self, scene: Scene) -> Plan:
-        """Run every diagonal there and back; step diagonals there only."""
         share = np.linspace(0.0, 1.0, self.targets)
         if self.kind == "step":
             return self._steps(scene)
@@ -120,7 +119,6 @@ class Diagonals(BenchTest):
         )
 
     def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
-        """Run the positions of a file; ``position_mm`` counts along the diagonal from its start."""
         names = diagonal_names(self.kind)
         given = table.words["diagonal"]
         problems = [
@@ -266,7 +264,6 @@ class Diagonals(BenchTest):
         )  # fmt: skip
 
     def evaluate(self, plan: Plan, readings: Array) -> Outcome:
-        """Take length, systematic deviation, mean deviation and reversal of each diagonal."""
         names = diagonal_names(self.kind)
         number, way = plan.marks["diagonal"], plan.marks["way"]
         position = plan.marks["position_mm"]
@@ -308,7 +305,6 @@ class Diagonals(BenchTest):
         return Outcome(tuple(quantities), {"diagonals": rows})
 
     def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
-        """Draw the deviation along each diagonal."""
         names = diagonal_names(self.kind)
         curves: list[Curve] = []
         for run in runs:

@@ -74,20 +74,17 @@ class Positioning(BenchTest):
     end: float | None = option(None, "Last target, mm or degrees; the range's other end")
 
     def own_axis(self, scene: Scene) -> str:
-        """Give the axis that runs."""
         axes = scene.machine.axes
         if self.axis and self.axis not in axes:
             raise UnknownNameError("axis", self.axis, axes)
         return self.axis or next(iter(axes))
 
     def data_columns(self, scene: Scene) -> tuple[DataColumn, ...]:
-        """Give the columns of data: degrees and microradians for a rotary axis."""
         if is_linear(self.own_axis(scene)):
             return self.columns
         return (*self.columns[:2], DataColumn("target_deg", "number"), DataColumn("deviation_urad"))
 
     def plan(self, scene: Scene) -> Plan:
-        """Run the targets upwards and downwards, once."""
         axis = self.own_axis(scene)
         low, high = scene.axis_span(axis)
         low = low if self.start is None else self.start
@@ -99,7 +96,6 @@ class Positioning(BenchTest):
         return self._lay(scene, np.concatenate([targets, targets[::-1]]), way, np.ones(len(way)))
 
     def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
-        """Run the targets of a file; refuse what statistics cannot be taken of."""
         linear = is_linear(self.own_axis(scene))
         target = table["target_mm" if linear else "target_deg"]
         readings = table["deviation_um" if linear else "deviation_urad"]
@@ -152,7 +148,6 @@ class Positioning(BenchTest):
         )  # fmt: skip
 
     def evaluate(self, plan: Plan, readings: Array) -> Outcome:
-        """Take A, E, M, R and B of both directions together, and of each."""
         found = target_statistics(plan.marks["target"], plan.marks["way"], readings)
         unit = "µm" if "zero_um" in plan.setup else "µrad"
         suffix = "um" if unit == "µm" else "urad"
@@ -164,7 +159,6 @@ class Positioning(BenchTest):
         return Outcome(tuple(quantities), {"targets": _target_rows(found, unit)})
 
     def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
-        """Draw the means of both directions with their bands over the targets."""
         curves: list[Curve] = []
         bands: list[Band] = []
         note = ""

@@ -80,7 +80,6 @@ class RotaryAxis(BenchTest):
     points: int = option(72, "Positions along the turn", low=8, high=3_600)
 
     def plan(self, scene: Scene) -> Plan:
-        """Turn the axis through its travel, at most once round."""
         axis = rotary_axis(scene.machine, self.axis)
         low, high = scene.machine.axes[axis].travel
         full = high - low >= 360.0
@@ -88,7 +87,6 @@ class RotaryAxis(BenchTest):
         return self._lay(scene, np.linspace(low, end, self.points, endpoint=not full))
 
     def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
-        """Turn the axis to the positions of a file."""
         if len(table) < 8:
             raise table.refuse(f"has {len(table)} positions; expected at least 8")
         if np.ptp(table["angle_deg"]) < 1.0:
@@ -145,7 +143,6 @@ class RotaryAxis(BenchTest):
         )  # fmt: skip
 
     def evaluate(self, plan: Plan, readings: Array) -> Outcome:
-        """Take the error motion values and the axis average line."""
         found = motions(plan, readings)
         axis = plan.place.partition(" ")[0]
         quantities = [
@@ -166,7 +163,6 @@ class RotaryAxis(BenchTest):
         return Outcome(tuple(quantities), details)
 
     def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
-        """Draw the polar plots of the four motions."""
         axis = runs[0].plan.place.partition(" ")[0]
         charts: list[Lines] = []
         units = {"radial": "µm", "tilt": "µrad", "axial": "µm", "angular": "µrad"}
@@ -268,13 +264,11 @@ class Sphere(BenchTest):
     frame: Literal["machine", "workpiece"] = option("machine", "Directions of the readings")
 
     def plan(self, scene: Scene) -> Plan:
-        """Turn the axis as far as the linear axes can follow."""
         axis, ball = self._set_up(scene)
         where = scene, self.model(scene), axis, ball, self.stand(scene)
         return self._lay(scene, reachable(*where, self.start, self.end, self.points))
 
     def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
-        """Turn the axis to the positions of a file."""
         if len(table) < 4:
             raise table.refuse(f"has {len(table)} positions; expected at least 4")
         if np.ptp(table["angle_deg"]) < 1.0:
@@ -315,7 +309,6 @@ class Sphere(BenchTest):
         )
 
     def evaluate(self, plan: Plan, readings: Array) -> Outcome:
-        """Take the range of each direction, as read and with the ball's place fitted."""
         place, rest = fit_setup(plan, readings)
         raw, left = readings.reshape(3, -1), rest.reshape(3, -1)
         quantities = [
@@ -341,7 +334,6 @@ class Sphere(BenchTest):
         return Outcome(tuple(quantities), details)
 
     def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
-        """Draw x, y and z against the angle."""
         curves: list[Curve] = []
         for run in runs:
             rows = run.readings.reshape(3, -1)

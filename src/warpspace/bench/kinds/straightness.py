@@ -46,7 +46,6 @@ class ReferenceLine:
     deviation_um: float  # largest minus smallest distance from the line
 
     def at(self, position_mm: Array) -> Array:
-        """Give the line at positions, [n], µm."""
         return self.offset + self.slope * 1e-3 * position_mm
 
 
@@ -200,7 +199,6 @@ class Straightness(BenchTest):
         return axis, "xyz".index(self.across) if self.across else (own + 1) % 3
 
     def plan(self, scene: Scene) -> Plan:
-        """Run the axis there and back."""
         axis, _ = self.directions(scene)
         position = np.linspace(*scene.axis_span(axis), self.points)
         return self._lay(
@@ -210,7 +208,6 @@ class Straightness(BenchTest):
         )
 
     def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
-        """Run the positions of a file."""
         places = len(np.unique(np.round(table["position_mm"], 6)))
         if places < 3:
             raise table.refuse(f"has {places} positions; expected at least 3")
@@ -222,7 +219,6 @@ class Straightness(BenchTest):
         return lay_lines(self, scene, lines, which, position, way, ("zero_um", "tilt_urad"))
 
     def evaluate(self, plan: Plan, readings: Array) -> Outcome:
-        """Take straightness against the three reference lines."""
         position, mean = mean_by_position(plan.marks["along_mm"], readings)
         found = reference_lines(position, mean)
         quantities = [
@@ -238,7 +234,6 @@ class Straightness(BenchTest):
         return Outcome(tuple(quantities), details)
 
     def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
-        """Draw the deviations about the least-squares line, with the other two lines."""
         curves: list[Curve] = []
         for run in runs:
             position, mean = mean_by_position(run.plan.marks["along_mm"], run.readings)
@@ -295,7 +290,6 @@ class Squareness(BenchTest):
     points: int = option(21, "Positions along each axis", low=3, high=2_000)
 
     def plan(self, scene: Scene) -> Plan:
-        """Run the first axis there and back, then the second."""
         axes = plane_axes(scene.machine, self.plane)[:2]
         positions = [np.linspace(*scene.axis_span(axis), self.points) for axis in axes]
         return self._lay(
@@ -306,7 +300,6 @@ class Squareness(BenchTest):
         )
 
     def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
-        """Run the positions of a file; ``line`` names the axis."""
         axes = plane_axes(scene.machine, self.plane)[:2]
         problems = [
             f"line {int(line)}, line: {word!r}; expected {axes[0]} or {axes[1]} (--plane"
@@ -336,7 +329,6 @@ class Squareness(BenchTest):
         return replace(plan, place=f"{self.plane} · {plan.place}", marks=marks)
 
     def evaluate(self, plan: Plan, readings: Array) -> Outcome:
-        """Take the angle between the reference lines of both axes."""
         key, sign = PLANES[self.plane][2], float(plan.marks["gain_sign"][0])
         lines = [found for _, _, found in _arms(plan, readings)]
         quantities: list[Quantity] = []
@@ -353,7 +345,6 @@ class Squareness(BenchTest):
         return Outcome(tuple(quantities), {"squareness_key": key})
 
     def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
-        """Draw the deviations along both axes with their least-squares lines."""
         charts: list[Lines] = []
         for index, axis in enumerate(self.plane):
             curves: list[Curve] = []

@@ -295,7 +295,6 @@ def _print(rows: "tuple[Row, ...]") -> None:
 
 
 def spell(row: "Row", value: float | str, more: int = 0) -> str:
-    """Spell a value of a row."""
     if isinstance(value, str):
         return value
     if value == int(value) and row.digits == 0:
@@ -304,7 +303,6 @@ def spell(row: "Row", value: float | str, more: int = 0) -> str:
 
 
 def thesis_markdown(rows: "Sequence[Row]") -> str:
-    """Write the page of documentation."""
     from jinja2 import StrictUndefined, Template
 
     text = Path(__file__).with_name("thesis.md.j2").read_text("utf-8")

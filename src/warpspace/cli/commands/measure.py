@@ -33,7 +33,6 @@ def _test_names() -> tuple[str, ...]:
 
 
 def _build_test(name: str) -> click.Command:
-    """Build the command of a test from the options that it declares."""
     from warpspace.bench.base import FORMER, find_test
 
     if name not in _test_names() and name not in FORMER:

@@ -149,7 +149,6 @@ class Compensate(Analysis):
         return self if stem is None else replace(self, stem=stem)
 
     def run(self, scene: Scene, watch: Watch, /) -> "Compensation | Sweep":
-        """Write the table and read it back, or compare several."""
         asked = replace(self, loop="relative") if self.placed and self.loop is None else self
         scene = placed_in(scene, asked.loop or "", placed=self.placed)
         if self.sweep:
@@ -177,12 +176,10 @@ class Compensation(BeforeAfter, Result):
 
     @property
     def loop(self) -> str:
-        """Structural loop that is corrected."""
         return str(self.controller.loop)
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """Axes that are corrected."""
         return self.controller.corrector.moved
 
     @property
@@ -213,16 +210,13 @@ class Compensation(BeforeAfter, Result):
 
     @property
     def points_words(self) -> str:
-        """Spell the points of the table."""
         return spell_points(self.format, self.points)
 
     @property
     def bytes(self) -> int:
-        """Size of the files."""
         return sum(len(text.encode()) for text in self.files.values())
 
     def texts(self) -> Mapping[str, str]:
-        """Give the files."""
         return self.files
 
     def as_json(self) -> dict[str, Any]:
@@ -254,7 +248,6 @@ class Compensation(BeforeAfter, Result):
         }
 
     def blocks(self) -> Iterator[Block]:
-        """Say what it leaves, how large it is and what it takes for granted."""
         yield f"{self.controller.scene.title} · {self.format.title} · loop {self.loop}"
         columns = (
             Column("", leads=True),
@@ -280,14 +273,12 @@ def _four(found: Statistics) -> tuple[float, float, float, float]:
 
 
 def spell_points(kind: Format, points: Mapping[str, int]) -> str:
-    """Spell the points of a table."""
     if kind.grid.startswith("none"):
         return "no grid"
     return ", ".join(f"{axis} {count}" for axis, count in points.items()) + " points"
 
 
 def table_points(kind: Format, scene: Scene, asked: Points | None) -> dict[str, int]:
-    """Give the points of a table along each axis of the volume."""
     axes = [axis for axis in scene.machine.axes if axis in scene.workspace.volume_axes]
     if not axes:
         raise OptionError(f"{scene.name}: no axis has a range in [workspace]; nothing to correct")
@@ -416,7 +407,6 @@ class Step:
 
     @property
     def worst_after_um(self) -> float:
-        """Largest error that is left."""
         return self.after.max_um
 
 
@@ -430,12 +420,10 @@ class Sweep(Result):
     left_out: tuple[str, ...]  # formats of which no table can be made, and why
 
     def as_json(self) -> dict[str, Any]:
-        """Spell it."""
         steps = plain(self.steps)
         return {"before": plain(self.before), "sweep": steps, "left_out": list(self.left_out)}
 
     def blocks(self) -> Iterator[Block]:
-        """Say what each table leaves."""
         mean, rms, p95, largest = (f"{number:.3f}" for number in _four(self.before))
         yield f"{self.title} · before: mean {mean}, RMS {rms}, P95 {p95}, max {largest} µm"
         columns = (
@@ -469,7 +457,6 @@ class Sweep(Result):
 
 
 def sweep(scene: Scene, asked: Compensate) -> Sweep:
-    """Compensate a scene with several tables."""
     names = list(dict.fromkeys(asked.formats)) or [*TABLES, *FEW]
     wanted: list[tuple[str, int]] = []
     for name in names:

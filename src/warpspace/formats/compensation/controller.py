@@ -150,7 +150,6 @@ def _reference(scene: Scene, coordinates: Coordinates) -> dict[str, Array] | Non
 
 
 def read_back(kind: Format, files: Files, wanted: Wanted, label: str) -> Controller:
-    """Read files as the controller does."""
     from warpspace.formats.to_scene import into_scene
 
     scene, corrector = wanted.scene, wanted.corrector
@@ -222,12 +221,10 @@ class BeforeAfter:
 
     @property
     def before_statistics(self) -> Statistics:
-        """Of the scene as it is."""
         return volume_statistics(self.before, self.grid)
 
     @property
     def after_statistics(self) -> Statistics:
-        """Of what is left."""
         return volume_statistics(self.after, self.grid)
 
     def tilt_urad(self, field: ErrorField) -> tuple[float, float]:
@@ -237,7 +234,6 @@ class BeforeAfter:
 
 
 def evaluated(controller: Controller, grid: Grid, direction: str) -> BeforeAfter:
-    """Evaluate a machine before and after a compensation."""
     at, nominal, scene = grid.coordinates, grid.nominal_mm, toward(controller.scene, direction)
     before = controller.without().field(at, nominal, scene)
     return BeforeAfter(before, controller.field(at, nominal, scene), grid)

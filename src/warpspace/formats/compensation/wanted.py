@@ -74,7 +74,6 @@ class Corrector:
 
     @property
     def moved(self) -> tuple[str, ...]:
-        """All axes that are corrected."""
         return (*self.axes, *self.tilting)
 
     def residual(
@@ -254,7 +253,6 @@ class Wanted:
         return -1.0 if (self.sign or usual) == "error" else 1.0
 
     def round(self, values: ArrayLike) -> Array:
-        """Round values to the resolution."""
         step = self.resolution
         given = np.asarray(values, dtype=float)
         return np.round(given / step) * step if step else given

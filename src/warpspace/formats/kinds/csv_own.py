@@ -155,7 +155,6 @@ class _Column:
     unit: str = ""
 
     def value(self, cell: str, at: Place, table: CsvRows) -> float:
-        """Read a cell."""
         if self.role == DIRECTION:
             way = unguard_cell(cell).lower()
             if way not in DIRECTIONS:
@@ -187,11 +186,9 @@ class _Table:
     rows: tuple[_Row, ...]
 
     def of(self, role: str) -> list[str]:
-        """Name the columns of a role."""
         return [one.name for one in self.columns if one.role == role]
 
     def ways(self) -> list[int]:
-        """Give the direction of each row."""
         return [int(row.get((DIRECTION, DIRECTION), BOTH)) for _, row in self.rows]
 
 
@@ -199,7 +196,6 @@ class _Table:
 
 
 def recognise(head: str, name: str) -> bool:
-    """Tell it by a header that names an axis or an error with its unit."""
     try:
         header = source_of_text(head, name).rows(1).header
     except SceneError:
@@ -246,7 +242,6 @@ def _column(at: Place, part: str) -> _Column:
 
 
 def read(sources: Sequence[Source], options: ReadOptions) -> Imported:
-    """Read tables of measured errors."""
     del options
     return merge([_read_one(source) for source in sources])
 

@@ -81,7 +81,6 @@ def _grid(source: Source, options: ReadOptions) -> Grid3:
 
 
 def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
-    """Read the grid as the control holds it."""
     if len(sources) > 1:
         sources[1].refuse("is a second grid", "one")
     said = options.sign or "values are added to the commanded position"

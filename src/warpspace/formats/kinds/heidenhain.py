@@ -35,7 +35,6 @@ Columns = dict[str, list[str]]
 
 
 def recognise(head: str, name: str) -> bool:
-    """Tell it by its first line or its columns."""
     if name.upper().endswith((".COM", ".CMA")) and "BEGIN" in head.upper():
         return True
     return POSITION in head.upper().split()
@@ -154,7 +153,6 @@ def _check_steps(places: np.ndarray, rows: Sequence[tuple[Place, Cells]]) -> Non
 
 
 def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
-    """Read the tables as the control holds them."""
     axes, tables = _assignment(sources)
     if not tables:
         sources[0].refuse("names tables", "the .COM files it names beside it")

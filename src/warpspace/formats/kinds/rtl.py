@@ -160,7 +160,6 @@ def _read_one(source: Source, options: ReadOptions) -> Imported:
 
 
 def read(sources: Sequence[Source], options: ReadOptions) -> Imported:
-    """Read the positioning errors of files."""
     return merge([_read_one(source, options) for source in sources])
 
 

@@ -67,7 +67,6 @@ class Table:
     axes: dict[str, str] = field(default_factory=dict[str, str])  # where the file names them
 
     def line(self, axes: tuple[str, str], prefix: str, what: str, factor: float) -> Line:
-        """Give it as the controller evaluates it."""
         for setting in RANGE:
             if setting not in self.numbers:
                 found = f"{what}: ${prefix}_{setting} is missing"

@@ -52,7 +52,6 @@ class Pieces(ErrorFunction):
         return padded
 
     def evaluate(self, position: Array) -> Array:
-        """Give the value of the piece that each position lies in."""
         starts = np.array(self.starts)
         held = np.clip(np.asarray(position, dtype=float), starts[0], self.end)
         piece = np.clip(np.searchsorted(starts, held, side="right") - 1, 0, len(starts) - 1)
@@ -63,23 +62,19 @@ class Pieces(ErrorFunction):
         return value
 
     def scaled(self, factor: float) -> Self:
-        """Multiply all coefficients."""
         rows = tuple(tuple(factor * c for c in row) for row in self.coefficients)
         return replace(self, coefficients=rows)
 
     def grown(self) -> Self:
-        """Give the line from 0 at the first position to 1 at the last."""
         reach = self.end - self.starts[0]
         return replace(self, starts=self.starts[:1], coefficients=((0.0, 1.0 / reach),))
 
     @property
     def samples(self) -> int:
-        """A few in each piece."""
         return max(SPAN_SAMPLES, PER_PIECE * len(self.starts) + 1)
 
     @property
     def kinks(self) -> tuple[float, ...]:
-        """Where pieces meet, and the ends."""
         return (*self.starts, self.end)
 
     @classmethod
@@ -108,18 +103,15 @@ class Pieces(ErrorFunction):
         return cls(span, starts[:-1], end, tuple(row[1:] for row in rows), points)
 
     def to_toml(self) -> object:
-        """Spell it as ``{ pieces = [[start, c0, c1, …], …], end = q, points = [] }``."""
         pairs = zip(self.starts, self.coefficients, strict=True)
         pieces = [[start, *row] for start, row in pairs]
         return {"pieces": pieces, "end": self.end, "points": list(self.points)}
 
     def describe(self, unit: str, value: Spell, position: Spell) -> str:
-        """Count the pieces."""
         del unit, value, position
         return f"{len(self.starts)} pieces of polynomials"
 
     def rows(self) -> Rows:
-        """Give one piece a row."""
         return [(s, *row) for s, row in zip(self.starts, self.coefficients, strict=True)]
 
 

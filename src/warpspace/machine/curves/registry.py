@@ -20,13 +20,11 @@ _KINDS: dict[str, CurveKind] = {
 
 
 def curve_kinds() -> tuple[CurveKind, ...]:
-    """List all kinds of curve, simplest first."""
     load_plugins()
     return tuple(_KINDS.values())
 
 
 def curve_kind(title: str) -> CurveKind:
-    """Find a kind of curve by its title."""
     kinds = {kind.title: kind for kind in curve_kinds()}
     if title not in kinds:
         raise UnknownNameError("kind of curve", title, kinds)
@@ -49,7 +47,6 @@ def register_curve(kind: CurveKind) -> None:
 
 
 def unregister_curve(name: str) -> None:
-    """Take a kind of curve away again."""
     del _KINDS[name]
 
 

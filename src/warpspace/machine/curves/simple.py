@@ -31,41 +31,33 @@ class OneNumber(ErrorFunction):
     value: float = 0.0
 
     def scaled(self, factor: float) -> Self:
-        """Multiply the number."""
         return replace(self, value=self.value * factor)
 
     @property
     def amplitude(self) -> float:
-        """The number itself."""
         return self.value
 
     def with_amplitude(self, amplitude: float) -> Self:
-        """Give the same curve with another number; at zero it keeps its kind."""
         return replace(self, value=amplitude)
 
     @classmethod
     def read(cls, raw: Any, span: Span, reader: ValueReader) -> Self:
-        """Read the number, bare or as the only entry of its table."""
         place = cls.forms[0] if cls.forms else ()
         number = raw[place[0]] if place else raw
         return cls(span, reader.number(number, place, -limits.MAX_ERROR, limits.MAX_ERROR))
 
     def to_toml(self) -> object:
-        """Spell it as `read` takes it."""
         return {self.forms[0][0]: self.value} if self.forms else self.value
 
     @classmethod
     def from_rows(cls, span: Span, rows: Rows) -> Self:
-        """Read one number."""
         return cls(span, single_value(rows))
 
     def rows(self) -> Rows:
-        """Give the number."""
         return [[self.value]]
 
     @classmethod
     def from_curve(cls, present: ErrorFunction, span: Span) -> Self:
-        """Keep the amplitude."""
         return cls(span, present.amplitude)
 
 
@@ -80,12 +72,10 @@ class Constant(OneNumber):
     slider = "the same everywhere"
 
     def evaluate(self, position: Array) -> Array:
-        """Give the value at every position."""
         return np.full(np.shape(position), self.value)
 
     @property
     def arguments(self) -> tuple[str, ...]:
-        """No axis: it does not vary."""
         return ()
 
 
@@ -108,7 +98,6 @@ class Poly(ErrorFunction):
         return np.asarray(value, dtype=float)
 
     def scaled(self, factor: float) -> Self:
-        """Multiply all coefficients."""
         return replace(self, coefficients=tuple(factor * c for c in self.coefficients))
 
     def grown(self) -> Self:
@@ -129,11 +118,9 @@ class Poly(ErrorFunction):
         return cls(span, tuple(reader.number(c, ("poly", k)) for k, c in enumerate(entries)))
 
     def to_toml(self) -> object:
-        """Spell it as ``{ poly = [c0, c1, …] }``."""
         return {"poly": list(self.coefficients)}
 
     def describe(self, unit: str, value: Spell, position: Spell) -> str:
-        """Name the degree."""
         del unit, value, position
         return f"polynomial of degree {len(self.coefficients) - 1}"
 
@@ -145,12 +132,10 @@ class Poly(ErrorFunction):
         return cls(span, coefficients)
 
     def rows(self) -> Rows:
-        """Give the coefficients one below the other."""
         return [[value] for value in self.coefficients]
 
     @classmethod
     def from_curve(cls, present: ErrorFunction, span: Span) -> Self:
-        """Give the line through both ends of the present curve."""
         low, high = span
         first, last = (float(v) for v in present.evaluate(np.array(span)))
         slope = (last - first) / (high - low)
@@ -168,12 +153,10 @@ class Ramp(OneNumber):
     slider = "rises along {axis}; this is the value at its upper end"
 
     def evaluate(self, position: Array) -> Array:
-        """Give the point of the line at each position."""
         lower, upper = self.span
         return self.value * (np.asarray(position, dtype=float) - lower) / (upper - lower)
 
     def for_span(self, span: Span) -> ErrorFunction:
-        """Give the polynomial it is where the range is another one."""
         if span == self.span:
             return self
         low, high = self.span
@@ -181,7 +164,6 @@ class Ramp(OneNumber):
         return Poly(self.span, (-slope * low, slope))
 
     def describe(self, unit: str, value: Spell, position: Spell) -> str:
-        """Name both ends."""
         del unit, value
         low, high = map(position, self.span)
         return f"ramp, 0 at {low} to the value at {high}"
@@ -214,7 +196,6 @@ class Harmonics(ErrorFunction):
     terms: tuple[tuple[float, float, float], ...] = ()
 
     def evaluate(self, position: Array) -> Array:
-        """Give the sum of the harmonics."""
         angle = np.asarray(position, dtype=float)
         total = np.zeros(angle.shape)
         for order, amplitude, phase in self.terms:
@@ -222,7 +203,6 @@ class Harmonics(ErrorFunction):
         return total
 
     def scaled(self, factor: float) -> Self:
-        """Multiply all amplitudes."""
         return replace(self, terms=tuple((n, factor * a, phase) for n, a, phase in self.terms))
 
     def grown(self) -> Self:
@@ -241,7 +221,6 @@ class Harmonics(ErrorFunction):
 
     @property
     def samples(self) -> int:
-        """Number of positions that resolves the shortest wave."""
         highest = max((order for order, _, _ in self.terms), default=0.0)
         waves = highest * (self.span[1] - self.span[0]) / 360.0
         most = min(MAX_SAMPLES, MAX_COSINES // max(len(self.terms), 1))
@@ -265,11 +244,9 @@ class Harmonics(ErrorFunction):
         return cls(span, tuple(terms))
 
     def to_toml(self) -> object:
-        """Spell it as ``{ harmonics = [[n, A, φ], …] }``."""
         return {"harmonics": [list(term) for term in self.terms]}
 
     def describe(self, unit: str, value: Spell, position: Spell) -> str:
-        """Name the first terms."""
         del position
         terms = ", ".join(f"{value(a)} {unit} × {n:g}" for n, a, _ in self.terms[:SHOWN_TERMS])
         return f"harmonics: {terms}" + (" …" if len(self.terms) > SHOWN_TERMS else "")
@@ -292,12 +269,10 @@ class Harmonics(ErrorFunction):
         return cls(span, tuple(terms))
 
     def rows(self) -> Rows:
-        """Give one term a row."""
         return self.terms
 
     @classmethod
     def from_curve(cls, present: ErrorFunction, span: Span) -> Self:
-        """Give one wave over the range, with the amplitude of the present curve."""
         return cls(span, ((_one_wave(span), present.amplitude, 0.0),))
 
 
@@ -335,11 +310,9 @@ class Directional(ErrorFunction):
 
     @property
     def arguments(self) -> tuple[str, ...]:
-        """Axes that either curve depends on."""
         return tuple(dict.fromkeys((*self.forward.arguments, *self.backward.arguments)))
 
     def evaluate(self, position: Array) -> Array:
-        """Give the mean of both directions."""
         return 0.5 * (self.forward.evaluate(position) + self.backward.evaluate(position))
 
     def evaluate_at(
@@ -357,12 +330,10 @@ class Directional(ErrorFunction):
 
     @property
     def has_directions(self) -> bool:
-        """It does."""
         return True
 
     @property
     def lines(self) -> tuple[tuple[str, ErrorFunction], ...]:
-        """The curves of both directions."""
         pairs = (("forward", self.forward), ("backward", self.backward))
         return tuple(
             (f"{way} {words}".rstrip(), line) for way, one in pairs for words, line in one.lines
@@ -370,38 +341,31 @@ class Directional(ErrorFunction):
 
     @property
     def parts(self) -> tuple[ErrorFunction, ...]:
-        """The curves of both directions."""
         return (*self.forward.parts, *self.backward.parts)
 
     def scaled(self, factor: float) -> Self:
-        """Multiply both curves."""
         return replace(
             self, forward=self.forward.scaled(factor), backward=self.backward.scaled(factor)
         )
 
     @property
     def amplitude(self) -> float:
-        """The amplitude of the curve whose one is larger, forward where they are alike."""
         there, back = self.forward.amplitude, self.backward.amplitude
         return back if math.isnan(back) or abs(back) > abs(there) else there
 
     def without_axes(self, positions: Mapping[str, float]) -> ErrorFunction:
-        """Give both curves without the axes."""
         there, back = (one.without_axes(positions) for one in (self.forward, self.backward))
         return replace(self, forward=there, backward=back)
 
     @property
     def kinks(self) -> tuple[float, ...]:
-        """The kinks of both curves."""
         return tuple(sorted({*self.forward.kinks, *self.backward.kinks}))
 
     @property
     def samples(self) -> int:
-        """As many as the curve needs that needs more."""
         return max(self.forward.samples, self.backward.samples)
 
     def grown(self) -> Self:
-        """Give both directions the same amplitude, each in its kind."""
         return replace(
             self,
             forward=self.forward.with_amplitude(1.0),
@@ -420,30 +384,25 @@ class Directional(ErrorFunction):
         return cls(span, *found)
 
     def to_toml(self) -> object:
-        """Spell both curves."""
         return {"forward": self.forward.to_toml(), "backward": self.backward.to_toml()}
 
     def for_span(self, span: Span) -> ErrorFunction:
-        """Give both curves for another range."""
         there, back = (
             replace(curve.for_span(span), span=span) for curve in (self.forward, self.backward)
         )
         return replace(self, span=span, forward=there, backward=back)
 
     def describe(self, unit: str, value: Spell, position: Spell) -> str:
-        """Describe both curves."""
         there, back = (
             curve.describe(unit, value, position) for curve in (self.forward, self.backward)
         )
         return f"forward {there}, backward {back}"
 
     def rows(self) -> Rows:
-        """Give the rows of the curve forward, then those backward."""
         return [*self.forward.rows(), *self.backward.rows()]
 
     @classmethod
     def from_curve(cls, present: ErrorFunction, span: Span) -> Self:
-        """Give both directions the present curve."""
         if isinstance(present, cls):
             return replace(present, span=span)
         return cls(span, present, present)

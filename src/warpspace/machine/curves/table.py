@@ -48,22 +48,18 @@ class Table(ErrorFunction):
     points: tuple[Point, ...] = ()  # (n, 2); axis position (ascending) and value
 
     def evaluate(self, position: Array) -> Array:
-        """Interpolate between the points."""
         at, value = np.array(self.points).T
         return np.interp(np.asarray(position, dtype=float), at, value)
 
     def scaled(self, factor: float) -> Self:
-        """Multiply all values."""
         return replace(self, points=tuple((q, factor * value) for q, value in self.points))
 
     @property
     def amplitude(self) -> float:
-        """Largest value of a point, with its sign."""
         return max((value for _, value in self.points), key=abs)
 
     @property
     def kinks(self) -> tuple[float, ...]:
-        """The positions of the points."""
         return tuple(q for q, _ in self.points)
 
     def grown(self) -> Self:
@@ -88,13 +84,11 @@ class Table(ErrorFunction):
         return {"table": [list(point) for point in self.points]}
 
     def describe(self, unit: str, value: Spell, position: Spell) -> str:
-        """Count the points."""
         del unit, value, position
         return f"table of {len(self.points)} points"
 
     @classmethod
     def from_rows(cls, span: Span, rows: Rows) -> Self:
-        """Read points; positions must ascend, see `tidied`."""
         refuse_more(len(rows), MAX_CURVE_ROWS, "rows")
         for number, row in enumerate(rows, start=1):
             if len(row) != 2:
@@ -111,7 +105,6 @@ class Table(ErrorFunction):
 
     @classmethod
     def tidied(cls, rows: Rows) -> tuple[Rows, tuple[str, ...]]:
-        """Sort rows by position, and average the values of one position."""
         if any(len(row) != 2 for row in rows):
             return rows, ()  # `from_rows` says so
         if all(low[0] < high[0] for low, high in pairwise(rows)):
@@ -130,7 +123,6 @@ class Table(ErrorFunction):
         return [(q, fsum(values[q]) / len(values[q])) for q in sorted(values)], tuple(remarks)
 
     def rows(self) -> Rows:
-        """Give one point a row."""
         return self.points
 
     @classmethod
@@ -214,7 +206,6 @@ class TwoArguments(ErrorFunction):
 
     @property
     def arguments(self) -> tuple[str, ...]:
-        """Both axes, that of the error first."""
         return self.axes
 
     @property
@@ -225,7 +216,6 @@ class TwoArguments(ErrorFunction):
 
     @cached_property
     def _grid(self) -> Array:
-        """The values as an array, [n, m]."""
         return np.array(self.values)
 
     def evaluate(self, position: Array) -> Array:
@@ -274,19 +264,16 @@ class TwoArguments(ErrorFunction):
         return tuple((f"{self.axes[1]} {at:g}", self.section(at)) for at in shown)
 
     def scaled(self, factor: float) -> Self:
-        """Multiply all values: the surface as a whole."""
         rows = (factor * self._grid).tolist()
         return replace(self, values=tuple(map(tuple, rows)))
 
     @property
     def amplitude(self) -> float:
-        """Largest value of a point, with its sign."""
         flat = self._grid.ravel()
         return float(flat[np.argmax(np.abs(flat))])
 
     @property
     def kinks(self) -> tuple[float, ...]:
-        """The positions of the own axis."""
         return self.positions[0]
 
     def grown(self) -> Self:
@@ -329,7 +316,6 @@ class TwoArguments(ErrorFunction):
         return cls(span, axes, (at[0], at[1]), values)
 
     def to_toml(self) -> object:
-        """Spell it as ``{ table2 = { axes, positions, values } }``."""
         own, other = self.axes
         inner = {
             "axes": [own, other],
@@ -340,18 +326,15 @@ class TwoArguments(ErrorFunction):
         return {FORM: inner}
 
     def describe(self, unit: str, value: Spell, position: Spell) -> str:
-        """Count the points along both axes."""
         del unit, value, position
         own, other = self.axes
         sizes = " × ".join(str(len(at)) for at in self.positions)
         return f"table of {sizes} points over {own} and {other}"
 
     def slider_words(self, axis: str) -> str:
-        """Say that the whole surface is scaled."""
         return f"varies with {axis} and {self.axes[1]}; this is its largest value"
 
     def rows(self) -> Rows:
-        """Give one position of the own axis a row, its values behind it."""
         pairs = zip(self.positions[0], self.values, strict=True)
         return [(position, *row) for position, row in pairs]
 

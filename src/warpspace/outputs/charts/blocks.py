@@ -37,17 +37,14 @@ def on_ground(theme: Theme) -> Generator[None]:
 
 
 def ground() -> Theme:
-    """Give the theme that charts are drawn on here."""
     return _THEME.get()
 
 
 def key_colour() -> str:
-    """Colour of what matters."""
     return ground().series[0]
 
 
 def style() -> Any:
-    """Give the context that charts are drawn in."""
     theme = ground()
     return mpl.rc_context(
         {
@@ -416,7 +413,6 @@ LABEL_ROWS = 4  # rows of labels above the bars, at most
 
 
 def histogram_chart(found: Histogram) -> Figure:
-    """Draw a distribution with its marks and limit."""
     with style():
         width, height = HISTOGRAM_IN if found.title else (PRINTED_IN, HISTOGRAM_IN[1] - HEAD_IN)
         above = 0.85 + (HEAD_IN if found.title else 0.0)

@@ -84,7 +84,6 @@ class Canvas:
     def text_size(
         self, text: str, size: float = SIZES.text, weight: str = "normal"
     ) -> tuple[float, float]:
-        """Measure a line of text, px."""
         width, height = text_extent(clean(text), weight)
         return width * self.px(size), height * self.px(size)
 
@@ -145,7 +144,6 @@ class Canvas:
         zorder: float = 3.0,
         **style: Any,
     ) -> None:
-        """Draw a polyline; styles as for `lines`."""
         spots = [np.asarray(points, dtype=float)]
         self.lines(spots, width=width, zorder=zorder, **style)
 
@@ -182,7 +180,6 @@ class Canvas:
         alpha: float = 1.0,
         zorder: float = 3.0,
     ) -> None:
-        """Fill a polygon."""
         self.axes.add_patch(
             Polygon(np.asarray(points), closed=True, facecolor=colour, edgecolor="none",
                     linewidth=0.0, alpha=alpha, zorder=zorder, clip_on=False)
@@ -293,12 +290,10 @@ class Occupancy:
         return rows, slice(max(0, math.floor(left)), max(0, math.ceil(right)))
 
     def add_rects(self, rects: Iterable[Rect], weight: float = TEXT_COST) -> None:
-        """Mark boxes."""
         for rect in rects:
             self.cost[self._window(rect)] += weight
 
     def add_lines(self, lines: Iterable[Array], weight: float = LINE_COST) -> None:
-        """Mark polylines, [n, 2], px."""
         for line in lines:
             columns, rows = (resample(line, self.cell) / self.cell).astype(int).T
             inside = (rows >= 0) & (rows < self.cost.shape[0])

@@ -167,7 +167,6 @@ def draw_map(
     annotate: Annotate | None = draw_corners,
     ghost: bool = True,
 ) -> DrawnMap:
-    """Draw a bent volume."""
     nodes = picture.drawn_mm.reshape(-1, 3)
     projection = projection or fit_map(canvas, [picture], rect, view, labels=labels)
     faces = map_faces(picture.shape, cut=view == "iso")

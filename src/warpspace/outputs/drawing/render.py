@@ -43,7 +43,6 @@ class Projection:
     centre_px: Array  # [2], px; ... and where it is drawn, origin bottom left.
 
     def project(self, points_mm: Array) -> Array:
-        """Project points."""
         relative = points_mm - self.centre_mm
         plane = np.stack([relative @ self.right, relative @ self.up], -1)
         return self.centre_px + self.px_per_mm * plane

@@ -129,7 +129,6 @@ class FigureSettings:
     printed: bool = False
 
     def __post_init__(self) -> None:
-        """Check the values."""
         if self.component not in COMPONENTS:
             expected = ", ".join(COMPONENTS)
             raise OptionError(f"component {self.component!r}; expected one of {expected}")
@@ -144,12 +143,10 @@ class FigureSettings:
 
     @property
     def theme(self) -> Theme:
-        """Colours of paper and ink."""
         return DARK if self.dark else LIGHT
 
 
 def check_size(size: tuple[int, int]) -> None:
-    """Refuse sizes that cannot be drawn."""
     width, height = size
     small = width < SMALLEST_SIZE[0] or height < SMALLEST_SIZE[1]
     if small or max(size) > LARGEST_SIDE or width * height > LARGEST_AREA:

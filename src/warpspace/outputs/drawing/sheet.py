@@ -68,8 +68,6 @@ def line_entry(
     dashes: tuple[float, float] | None = None,
     alpha: float = 1.0,
 ) -> LegendEntry:
-    """Give the entry of a line."""
-
     def symbol(canvas: Canvas, x: float, y: float, length: float) -> None:
         ends = [(x, y), (x + length, y)]
         ink = colour(canvas.theme)

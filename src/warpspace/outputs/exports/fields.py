@@ -43,7 +43,6 @@ class FieldRecord:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Shape of the batch of points."""
         return self.field.error_um.shape[:-1]
 
     @property
@@ -239,14 +238,12 @@ PROVENANCE = "warpspace_json"
 
 
 def write_vts(picture: ScenePicture, path: str | Path, *, overwrite: bool = True) -> None:
-    """Write the field of a scene as a VTK structured grid, deformed as it is drawn."""
     data = build_vts(picture)
     with write_atomically(path, overwrite=overwrite) as temporary:
         temporary.write_bytes(data)
 
 
 def build_vts(picture: ScenePicture) -> bytes:
-    """Build the field as a VTK structured grid."""
     field = picture.field
     arrays = {
         "error_um": field.error_um,

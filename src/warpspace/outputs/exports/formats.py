@@ -26,7 +26,6 @@ class ExportFormat:
     left_out: str = ""  # what of a scene has no place in it; said when it is written
 
     def load(self) -> Write:
-        """Give the function that writes it."""
         return resolve_name(self.write) if isinstance(self.write, str) else self.write
 
 
@@ -41,12 +40,10 @@ def register_format(form: ExportFormat) -> None:
 
 
 def unregister_format(ending: str) -> None:
-    """Take a format away again."""
     del _FORMATS[ending]
 
 
 def export_formats() -> tuple[ExportFormat, ...]:
-    """List the formats."""
     load_plugins()
     return tuple(_FORMATS.values())
 

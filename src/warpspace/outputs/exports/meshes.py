@@ -42,14 +42,12 @@ _ATTRIBUTES = {
 
 
 def write_glb(picture: ScenePicture, path: str | Path, *, overwrite: bool = True) -> None:
-    """Write the deformed scene as binary glTF."""
     data = build_glb(picture)
     with write_atomically(path, overwrite=overwrite) as temporary:
         temporary.write_bytes(data)
 
 
 def build_glb(picture: ScenePicture) -> bytes:
-    """Build the deformed scene as binary glTF."""
     parts = [
         *_surface(picture),
         *_lines(picture),

@@ -52,7 +52,6 @@ def _meshes(picture: ScenePicture) -> dict[str, Any]:
 
 
 def build_robot(machine: Machine, meshes: dict[str, str]) -> Any:
-    """Build the links and joints of a machine."""
     from yourdfpy import urdf
 
     links = [_link(ROOT, "R", meshes)]

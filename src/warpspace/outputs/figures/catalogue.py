@@ -32,7 +32,6 @@ class FigureKind:
     command: str = ""  # that draws it where `draw` does not
 
     def load(self) -> Draw:
-        """Give the function that draws it."""
         return resolve_name(self.draw) if isinstance(self.draw, str) else self.draw
 
 
@@ -49,12 +48,10 @@ def register_figure(kind: FigureKind) -> None:
 
 
 def unregister_figure(name: str) -> None:
-    """Take a kind of figure away again."""
     del _KINDS[name]
 
 
 def figure_kinds() -> tuple[FigureKind, ...]:
-    """List the kinds of figures."""
     load_plugins()
     return tuple(_KINDS.values())
 
@@ -77,7 +74,6 @@ def draw_figure(
     *,
     exact: bool = True,
 ) -> "Drawing":
-    """Draw a figure by its name."""
     from warpspace.outputs.drawing.settings import FigureSettings
 
     load_plugins()

@@ -35,7 +35,6 @@ CIRCLE = Circular(plane="XY", radius_mm=150.0)
 
 
 def draw_gains(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
-    """Draw the largest error gains over the travel of a scene's machine."""
     scene = scenes[0]
     bars = Gains(loop=Loop(settings.loop), over_travel=True).run(scene, silent).bars()
     title = f"Error gains: {scene.machine.title}"
@@ -45,7 +44,6 @@ def draw_gains(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool
 
 
 def draw_montecarlo(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
-    """Draw the volumetric error of machines drawn from a scene's tolerances."""
     scene = scenes[0]
     asked = Machines(loop=Loop(settings.loop))
     found = montecarlo(asked.case(scene, Plan()))
@@ -61,7 +59,6 @@ def draw_montecarlo(scenes: Sequence[Scene], settings: FigureSettings, *, exact:
 
 
 def draw_ballbar(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
-    """Draw the circular test of ISO 230-4 on a scene."""
     scene = scenes[0]
     found = run_test(scene, CIRCLE)
     title = f"Circular test: {scene.title}"

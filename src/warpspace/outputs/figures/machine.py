@@ -78,7 +78,6 @@ def bodies_of(
 
 
 def draw_machine(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
-    """Draw a machine with its bent bodies and its bent working volume."""
     picture = evaluate_for(settings, scenes[0])
     title = f"Machine and working volume: {picture.scene.title}"
     placed = bodies_of(picture, picture.exaggeration)

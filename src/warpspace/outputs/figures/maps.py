@@ -62,7 +62,6 @@ EVERY = "isolines every "
 
 
 def draw_error_map(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
-    """Draw the error map of a scene."""
     picture = evaluate_for(settings, scenes[0])
     component = settings.component
     what = "Volumetric error map" if component == "norm" else f"Error map, {component} component"
@@ -130,7 +129,6 @@ VIEW_OF = {"Z": "top", "Y": "front", "X": "right"}
 
 
 def draw_slices(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
-    """Draw three slices through the middle of a scene's working volume."""
     picture = evaluate_for(settings, scenes[0])
     exaggeration, scale = picture.exaggeration, picture.scale
     slices = _evaluate_slices(picture, settings.grid)
@@ -260,7 +258,6 @@ class Needles:
 
 
 def draw_orientation(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
-    """Draw the orientation-error map of a scene."""
     picture = evaluate_for(settings, scenes[0], quantity="orientation")
     values, scale, view = picture.values, picture.scale, settings.view
     tilt = np.linalg.norm(picture.field.orientation_urad, axis=-1)

@@ -63,7 +63,6 @@ def _evaluate_pair(settings: FigureSettings, scenes: Sequence[Scene]) -> list[Sc
 
 
 def draw_comparison(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
-    """Draw two scenes and their difference side by side."""
     title = f"Comparison: A {scenes[0].title}, B {scenes[1].title}"
     return _draw_pair("comparison", title, scenes, settings, [], exact=exact)
 
@@ -141,7 +140,6 @@ def _draw_corner(canvas: Canvas, rect: Rect, maps: Sequence[DrawnMap]) -> None:
 
 
 def draw_repair(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
-    """Draw the volume before and after the best repair."""
     scene = scenes[0]
     found = Repair(loop=Loop(settings.loop), grid=min(settings.grid, REPAIR_NODES[1])).run(scene)
     after = found.changes()[-1].scene if found.repairs else scene
@@ -171,7 +169,6 @@ CELL_HEAD, CELL_FOOT, AXIS_LABELS = 30.0, 74.0, 50.0
 
 
 def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
-    """Draw machines within the same tolerances side by side."""
     plan = replace(settings.concepts, loop=Loop(settings.loop))
     concepts = compare_concepts(scenes, plan)
     pictures = _evaluate_concepts(concepts, settings)

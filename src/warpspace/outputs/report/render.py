@@ -98,7 +98,6 @@ class Report:
 
     @property
     def pictures(self) -> tuple[Picture, ...]:
-        """All figures, in order."""
         return tuple(b for part in self.sections for b in part.blocks if isinstance(b, Picture))
 
 
@@ -115,7 +114,6 @@ def _kind(block: Block) -> str:
 
 
 def render_html(report: Report) -> str:
-    """Render a report as a page that needs no network."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     templates = Environment(

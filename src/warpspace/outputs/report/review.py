@@ -92,12 +92,10 @@ class Reviewed:
 
     @property
     def scene(self) -> Scene:
-        """The scene."""
         return self.picture.scene
 
     @property
     def statistics(self) -> Statistics:
-        """Statistics of its field."""
         return self.picture.statistics
 
     @property
@@ -114,7 +112,6 @@ class Reviewed:
 
     @property
     def volume(self) -> str:
-        """Spell the size of the working volume."""
         edges = (f"{edge:.6g}" for edge in self.picture.grid.extent_mm)
         return f" {TIMES} ".join(edges) + " mm"
 

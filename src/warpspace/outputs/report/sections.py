@@ -108,17 +108,14 @@ class ReportFigures:
         return [drawn() for drawn in self._evidence[number]]
 
     def repair(self, scene: Scene, prefix: str) -> Block:
-        """Draw the volume before and after the repair."""
         caption = f"{prefix}Before, after the last set of the table, and their difference."
         return self._begin("repair", [scene], caption)()
 
     def concepts(self, scenes: Sequence[Scene], plan: Concepts, caption: str) -> Block:
-        """Draw machines side by side."""
         settings = FigureSettings(loop=str(plan.loop), grid=self._grid, concepts=plan)
         return self._begin("concepts", scenes, caption, settings=settings)()
 
     def chart(self, chart: Chart) -> Block:
-        """Draw a chart of a result."""
         data = self._worker.begin_chart("chart", CHART, self._form, chart)()
         width = LINES_WIDTH if isinstance(chart, Lines) else 1.0
         named = isinstance(chart, Histogram)
