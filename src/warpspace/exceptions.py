@@ -51,17 +51,7 @@ class WorkersLostError(WarpspaceError):
 
 
 class UnknownNameError(WarpspaceError):
-    """A name that is not among the known ones.
-
-    Parameters
-    ----------
-    what : str
-        What kind of thing was asked for, for instance "parameter".
-    name : str
-        The name asked for.
-    known : iterable of str
-        The names there are.
-    """
+    """A name that is not among the known ones."""
 
     def __init__(self, what: str, name: str, known: Iterable[str]) -> None:
         self.name = name
@@ -98,20 +88,7 @@ class UnsaidError(SceneError):
 
 
 def near_miss(name: str, known: Iterable[str]) -> str:
-    """Give the tail of a message about an unknown name.
-
-    Parameters
-    ----------
-    name : str
-        The name that was asked for.
-    known : iterable of str
-        The names there are.
-
-    Returns
-    -------
-    str
-        ``": did you mean 'EC0Y'?"``, or the list of known names where none is near.
-    """
+    """Give the tail of a message about an unknown name: the near miss, else all names."""
     names = list(known)
     folded = {candidate.casefold(): candidate for candidate in names}
     close = get_close_matches(name.casefold(), folded, n=2, cutoff=0.6)

@@ -53,11 +53,7 @@ class Volume:
 
     @cached_property
     def triangle(self) -> tuple[Array, Array]:
-        """What the RMS depends on: a matrix, [M, K], and the present error in it, [M].
-
-        The RMS of a change d of the amplitudes is |matrix @ d + error|, in µm. It is the triangle
-        of the QR decomposition of all weighted nodes, so that thousands of sets cost little.
-        """
+        """What the RMS depends on: a matrix, [M, K], and the present error in it, [M]."""
         nodes = self.error_um.shape[0]
         root = np.sqrt(self.grid.weights.reshape(-1))
         triangle = np.empty((0, len(self.basis.keys) + 1))
@@ -126,12 +122,7 @@ class Search:
         return None if best is start else best
 
     def best_sets(self, candidates: Sequence[int], count: int) -> Iterator[tuple[Solution, bool]]:
-        """Find the best set of one adjustment, of two, up to a number of them.
-
-        With each comes whether all sets of this size were compared. Where there are too many, the
-        set before is extended by its best partner, and members are then swapped for others as long
-        as that helps.
-        """
+        """Find the best set of one adjustment, of two, up to a number of them."""
         before: Solution | None = None
         for size in range(1, min(count, len(candidates)) + 1):
             proven = comb(len(candidates), size) <= MOST_SETS[self.objective]

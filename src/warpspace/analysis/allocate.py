@@ -247,16 +247,7 @@ def allocate(
     report: Progress = lambda _: None,
     widest: float = MAX_HALF_WIDTH,
 ) -> AllocateResult:
-    """Find the tolerances of least cost that keep a limit with a probability.
-
-    Notes
-    -----
-    Σ cost/w is minimised subject to P(|E| ≤ limit) ≥ probability. The proportions come from a
-    search on a sample of machines (`search_widths`). All free tolerances are then scaled together,
-    exactly (`largest_scale`), to what the new machines of the plan allow, and rounded down: so many
-    of these keep the limit that the lower end of the 95 % interval (Wilson) is the probability or
-    above. Since one factor alone is chosen on them, that is the tolerance limit of Wilks.
-    """
+    """Find the tolerances of least cost that keep a limit with a probability."""
     asked.check_keys(case.model.machine.allowed_keys)
     draws, plan = case.draws, replace(case.plan, spec_um=asked.limit_um)
     plan.check()

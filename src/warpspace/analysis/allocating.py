@@ -65,11 +65,7 @@ class Ensemble:
     def norm_and_slope(
         self, centre: Array, half_width: Array
     ) -> tuple[Array, "Floats", NDArray[np.intp] | None]:
-        """Evaluate |E| of every machine, [S], µm, and what its slopes in half widths follow from.
-
-        That is the unit vector of the error at the point that counts, [3, S], and which of the
-        common points counts, [S]; None where each machine has its own.
-        """
+        """Evaluate |E| of every machine, [S], µm, and what its slopes in half widths follow from."""
         error = self.error_um(centre, half_width)
         at = None
         if error.ndim == 3:
@@ -79,11 +75,7 @@ class Ensemble:
         return norm.astype(float), error / np.maximum(norm, np.float32(1e-12)), at
 
     def slope(self, pull: Floats, at: NDArray[np.intp] | None) -> Array:
-        """Add up the slopes of |E| in each half width over the machines, [K], µm per µm or µrad.
-
-        Each machine pulls with the unit vector of its error times what it counts, [3, S]; see
-        `norm_and_slope` for the point.
-        """
+        """Add up the slopes of |E| in each half width over the machines, [K], µm per µm or µrad."""
         if at is None:
             assert self.spread is not None  # noqa: S101 - each machine has a point of its own
             return np.einsum("cs,csk->k", pull, self.spread, optimize=True).astype(float)
@@ -157,12 +149,7 @@ class Task:
 
 
 def scaled(task: Task, widths: Array, scale_of: ScaleOf) -> Array | None:
-    """Widen or narrow the free tolerances together until enough machines keep the limit, [K].
-
-    The widths give the proportions. Those that are the widest there is stay, if the others can give
-    way; what would become wider stays there. None where no scale will do. `scale_of` takes half
-    widths and which of them move, gives the largest scale.
-    """
+    """Widen or narrow the free tolerances together until enough machines keep the limit, [K]."""
     below = task.free & (widths < task.widest * (1.0 - 1e-6))
     found = None
     if below.any() and not np.array_equal(below, task.free):
@@ -199,10 +186,7 @@ def sample_scale(task: Task, half_width: Array, moving: NDArray[np.bool_]) -> fl
 
 
 def variance_widths(task: Task) -> Array:
-    """Give the proportions that are cheapest where only the variance of E counts, [K], µm or µrad.
-
-    For the free ones (cost / squared gain)^⅓: Σ cost/w for a given Σ (gain·w)² is least there.
-    """
+    """Give the proportions that are cheapest where only the variance of E counts, [K], µm or µrad."""
     square = task.ensemble.mean_square_gain[task.free]
     widths = np.cbrt(task.cost[task.free] / square)
     return task.filled(widths * (0.5 * task.widest / widths.max()))
@@ -277,12 +261,7 @@ def search_widths(task: Task, step: Callable[[], object]) -> Array | None:
 
 
 def scales_within(base_um: Array, move_um: Array, limit_um: float) -> Array:
-    """Find the smallest and largest scale, 0 or above, at which machines keep a limit, [S, 2].
-
-    The error of each at its point, [3, S], or at N points, [3, S, N], µm, has a part that stays and
-    one that the scale multiplies; the limit holds at all points. The first is above the second
-    where no scale will do.
-    """
+    """Find the smallest and largest scale, 0 or above, at which machines keep a limit, [S, 2]."""
     a = np.einsum("c...,c...->...", move_um, move_um)
     b = np.einsum("c...,c...->...", base_um, move_um)
     c = np.einsum("c...,c...->...", base_um, base_um) - limit_um**2
@@ -299,10 +278,7 @@ def scales_within(base_um: Array, move_um: Array, limit_um: float) -> Array:
 
 
 def largest_scale(within: Array, probability: float) -> float | None:
-    """Give the largest scale at which enough machines, [S, 2], keep the limit; see `scales_within`.
-
-    Infinite where the scale does not matter; None where no scale will do.
-    """
+    """Give the largest scale at which enough machines, [S, 2], keep the limit; see `scales_within`."""
     needed = math.ceil(probability * len(within) - 1e-9)
     valid = within[within[:, 0] <= within[:, 1]]
     low, high = np.sort(valid[:, 0]), np.sort(valid[:, 1])

@@ -102,10 +102,7 @@ def assemble_motion(
 
 
 def points_on_axis(nominal_mm: Array) -> tuple[Array, Array]:
-    """Give the nominal points whose errors `axis_motion` needs, [n, 3] each, mm.
-
-    The centre of the circle, and the point `LEVER_MM` above it, each at all places.
-    """
+    """Give the nominal points whose errors `axis_motion` needs, [n, 3] each, mm."""
     centre, _, normal = fit_circle(nominal_mm)
     shape = nominal_mm.shape
     return np.broadcast_to(centre, shape), np.broadcast_to(centre + LEVER_MM * normal, shape)
@@ -123,10 +120,7 @@ def times_a_turn(values: Array) -> int | None:
 
 
 def fit_circle(points_mm: Array) -> tuple[Array, float, Array]:
-    """Find centre, [3], radius and normal, [3], of points, [n, 3], that lie on a circle, mm.
-
-    The normal is right-handed with the order of the points.
-    """
+    """Find centre, [3], radius and normal, [3], of points, [n, 3], that lie on a circle, mm."""
     middle = points_mm.mean(axis=0)
     _, _, axes = np.linalg.svd(points_mm - middle, full_matrices=False)
     flat, radius = fit_flat_circle((points_mm - middle) @ axes[:2].T)

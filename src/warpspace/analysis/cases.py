@@ -264,10 +264,7 @@ class Plan:
 
 
 def node_gains(model: Model, keys: Sequence[str], view: View, places: Places) -> Array:
-    """Compute the gains of parameters that hold everywhere, [3, K, N], µm per µm or µrad.
-
-    One contiguous matrix per component of E.
-    """
+    """Compute the gains of parameters that hold everywhere, [3, K, N], µm per µm or µrad."""
     model = replace(model, direction=TravelDirection.MEAN)  # gains have none
     basis = build_basis(model, ErrorSet(), keys, places.coordinates, view, places.point_mm)
     flat = basis.position.reshape(len(keys), -1, 3)
@@ -378,11 +375,7 @@ class Case:
 
 
 def both_orders(case: Case, count: int = EXACT_MACHINES) -> tuple[Array, Array]:
-    """Evaluate the first machines of a case to first order and exactly, [n, N, 3] each, µm.
-
-    Each parameter holds everywhere. They are looked at at one random point each, or where the
-    largest lies; at most those of the first block, and `EXACT_POINTS`.
-    """
+    """Evaluate the first machines of a case to first order and exactly, [n, N, 3] each, µm."""
     model = replace(case.model, direction=TravelDirection.MEAN)
     view, loop = case.view, case.view.loop
     rng, most = case.plan.block(0)

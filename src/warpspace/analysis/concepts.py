@@ -234,10 +234,7 @@ def with_equal_tolerances(scenes: "Sequence[Scene]", *, own: bool = False) -> "t
 
 
 def expected_um(concept: Concept, grid: Grid) -> Array:
-    """Compute the RMS of |E| of machines within tolerance at each node, [nx, ny, nz], µm.
-
-    Exact for the linear model: √(Σ var(aₖ)·|Jₖ|² + |J·centre|²).
-    """
+    """Compute the RMS of |E| of machines within tolerance at each node, [nx, ny, nz], µm."""
     draws, view = concept.sampled.draws, concept.sampled.view
     basis = build_basis(
         concept.scene.model, ErrorSet(), draws.keys, grid.coordinates, view, grid.point_mm

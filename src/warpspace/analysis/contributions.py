@@ -74,14 +74,7 @@ def _average_gains(case: Case) -> Array:
 
 
 def variance_contributions(case: Case, sobol: int | None = None) -> "SharesResult":
-    """Share out the variance of the volumetric error.
-
-    Notes
-    -----
-    The model is linear and the draws independent, so that the shares are exact: no sampling is
-    behind them. `sampled_share` repeats them from 20,000 sampled machines through the covariance of
-    each parameter with E, cov(aₖ, E)² / var aₖ.
-    """
+    """Share out the variance of the volumetric error."""
     draws = case.draws
     variance, offset = expected_square(case)
     total = float(variance.sum())
@@ -295,11 +288,7 @@ def explain(
     view: View | None = None,
     point_mm: Array | None = None,
 ) -> Explanation:
-    """Take the error of one point apart into its parameters.
-
-    At one position of every axis; the nominal point in R is the functional one of the loop unless
-    given. With a reference each contribution is that of the point minus that of the reference.
-    """
+    """Take the error of one point apart into its parameters."""
     view = view or View()
     point = nominal_point(model, view.loop, coordinates) if point_mm is None else point_mm
     keys = [key for key in errors if parameter(key).axis in model.machine.axes]

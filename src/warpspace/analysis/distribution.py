@@ -59,11 +59,7 @@ class Part:
 def summarise(
     blocks: Iterable[Array], spec_um: float | None = None, *, keep: bool, count: bool
 ) -> Part:
-    """Summarise one block of samples or more, [n] each, µm.
-
-    Samples not above a specification are counted. They are kept, or counted in the bins of the fine
-    histogram.
-    """
+    """Summarise one block of samples or more, [n] each, µm."""
     sums: list[float] = []
     squares: list[float] = []
     kept: list[Array] = []
@@ -148,10 +144,7 @@ class Stream:
         return min(float(_fine_centres()[index]), self._largest)
 
     def histogram(self, edges_um: Array) -> Histogram:
-        """Count the samples in bins with ascending edges, [n + 1], µm.
-
-        Beyond a million samples as exact as the fine histogram.
-        """
+        """Count the samples in bins with ascending edges, [n + 1], µm."""
         if self._values is not None:
             counts = np.histogram(self._values[: self.count], edges_um)[0]
         else:
@@ -201,10 +194,7 @@ class Stream:
 
 
 def machines_needed(samples: int, probability: float) -> int:
-    """Count how many of the machines have to keep a limit to show that so large a share does.
-
-    The lower end of the 95 % interval (Wilson) is then the probability, or above it.
-    """
+    """Count how many of the machines have to keep a limit to show that so large a share does."""
     from scipy import special
 
     deviation = special.ndtri(0.5 + CONFIDENCE / 2.0)

@@ -149,13 +149,7 @@ def gains_max(
     step_deg: float | None = None,
     share: float = DEFAULT_SHARE,
 ) -> tuple[Gain, ...]:
-    """Compute the largest absolute gains over the travel.
-
-    Notes
-    -----
-    A gain is affine in the linear axes, hence largest at an end of their ranges: two positions each
-    are exact. Table 4-4 of the thesis has steps of 10°.
-    """
+    """Compute the largest absolute gains over the travel."""
     chosen = loop_keys(model, loop, keys)
     best: dict[str, Gain] = {}
     for coordinates in _sweep(model, loop, ranges, step_deg):
@@ -167,10 +161,7 @@ def gains_max(
 
 
 def mark_key_errors(rows: Sequence[Gain], share: float = DEFAULT_SHARE) -> tuple[Gain, ...]:
-    """Sort by norm and mark the largest that together make up a share of the sum of squares.
-
-    One µm and one µrad count the same, as in the thesis (section 4.2).
-    """
+    """Sort by norm and mark the largest that together make up a share of the sum of squares."""
     if not 0.0 < share <= 1.0:
         raise OptionError(f"share: {share:g}; expected above 0, at most 1, for instance 0.8")
     # Rounded, so that gains that are equal but for rounding errors keep the order of the table.

@@ -147,10 +147,7 @@ class UncertainCase(Case):
     uncertainty: ErrorSet = dataclass_field(default_factory=ErrorSet)
 
     def machines(self, rng: np.random.Generator, count: int) -> Array:
-        """Draw by how many standard uncertainties each error is off, and one last, [count, K + 1].
-
-        The one is the factor of the errors as measured.
-        """
+        """Draw by how many standard uncertainties each error is off, and one last, [count, K + 1]."""
         draws = self.draws
         size = np.full(len(draws.keys), SIGMAS_OF[Distribution(draws.distribution)])
         unit = Draws(draws.keys, np.zeros(len(draws.keys)), size, draws.distribution)
@@ -200,16 +197,7 @@ def evaluate_uncertainty(
     loop: Loop | str = Loop.TOOL,
     frame: str = "machine",
 ) -> FieldUncertainty:
-    """Propagate the standard uncertainties of a scene to its field, to first order.
-
-    With a reference it is the uncertainty of the difference to it. The errors of the scene give the
-    direction along which the uncertainty of the length counts. See `warpspace.evaluate` for the
-    parameters.
-
-    Notes
-    -----
-    Root of the sum of (gain × standard uncertainty)² over the errors (GUM, 5.1.2).
-    """
+    """Propagate the standard uncertainties of a scene to its field, to first order."""
     model, view = scene.model, choose_view(scene, loop, frame)
     own = ErrorSet(scene_uncertainty(scene, view.loop))
     if at is not None:

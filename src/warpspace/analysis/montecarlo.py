@@ -58,12 +58,7 @@ def montecarlo(
     executor: Executor | None = None,
     take: Take | None = None,
 ) -> MonteCarlo:
-    """Sample machines and collect the distribution of their volumetric error.
-
-    Notes
-    -----
-    First order in the errors. Thesis, section 4.3, has `sampled`.
-    """
+    """Sample machines and collect the distribution of their volumetric error."""
     (found,) = montecarlo_each(
         [case], workers=case.plan.workers, executor=executor, progress=progress, take=take
     )

@@ -337,11 +337,7 @@ def find_repairs(
     scene: "Scene",
     watch: Watch = silent,
 ) -> RepairResult:
-    """Find what repairs a machine: from the first-order response of the nodes of a grid.
-
-    Amplitudes, [K], are the present errors in the order of `basis.keys`; the sets are applied to
-    the scene.
-    """
+    """Find what repairs a machine: from the first-order response of the nodes of a grid."""
     volume = Volume(basis, grid, amplitudes)
     candidates = _candidates(volume, asked)
     limits = np.array([asked.limit_of(key) for key in basis.keys])

@@ -40,11 +40,7 @@ class Statistics(Summary):
 
 
 def volume_statistics(field: ErrorField, grid: Grid) -> Statistics:
-    """Summarise the volume that a grid fills, whatever the number of its nodes.
-
-    Each node counts for its share of the volume, so that corners and edges weigh less than the
-    inside. Between the nodes the length of the error is interpolated.
-    """
+    """Summarise the volume that a grid fills, whatever the number of its nodes."""
     norm, weights = field.norm_um.reshape(grid.shape), grid.weights
     cells = _cell_values(norm).reshape(-1)
     return _summed_up(
@@ -107,10 +103,7 @@ def _to_cells(nodes: int) -> Array:
 
 
 def _percentile(values: Array, place: float) -> float:
-    """Interpolate between the two values beside a place in their order, counted from 0.
-
-    `numpy.quantile` takes thrice the time for what the app works out with every move of a slider.
-    """
+    """Interpolate between the two values beside a place in their order, counted from 0."""
     place = min(max(place, 0.0), values.size - 1.0)
     below = int(place)
     above = min(below + 1, values.size - 1)

@@ -187,10 +187,7 @@ class BenchResult(Result):
 
     @property
     def rms_difference(self) -> float | None:
-        """RMS of measured − model, once the unknowns of the set-up are fitted, µm or µrad.
-
-        None where nothing was measured.
-        """
+        """RMS of measured − model, once the unknowns of the set-up are fitted, µm or µrad."""
         if self.measured is None:
             return None
         difference = self.measured.readings - self.model.readings
@@ -341,13 +338,7 @@ FORMER = {"ballbar": f"{_HERE}.circular:FormerBallbar"}
 
 
 def register_test(test: type[BenchTest]) -> None:
-    """Add a kind of test; it then appears on the command line and in the app.
-
-    Raises
-    ------
-    OptionError
-        If there is one of its name.
-    """
+    """Add a kind of test; it then appears on the command line and in the app."""
     if test.name in _TESTS:
         raise OptionError(f"a test {test.name!r} is there already")
     _TESTS[test.name] = test

@@ -108,15 +108,7 @@ def following_axes(model: Model) -> tuple[str, str, str]:
 
 
 def follow(model: Model, coordinates: Mapping[str, Array], target_mm: Array) -> dict[str, Array]:
-    """Hold the nominal tool point on points of the workpiece frame, [..., 3], as TCP does.
-
-    Rotary axes are where they are to stand, linear ones anywhere.
-
-    Raises
-    ------
-    OptionError
-        If the machine has no three linear axes, or these cannot reach every point.
-    """
+    """Hold the nominal tool point on points of the workpiece frame, [..., 3], as TCP does."""
     names = following_axes(model)
     start = dict(coordinates)
 
@@ -234,11 +226,7 @@ SHARE = 0.3  # radius that is chosen: share of the shortest edge of the working 
 def default_ball(
     scene: Scene, model: Model, axis: str, stand: Mapping[str, Array], radius_mm: float | None
 ) -> Array:
-    """Choose where a ball stands, in the workpiece frame, [3], mm.
-
-    At the height of the middle of the working volume; on a table that turns at the radius from its
-    axis, or at a share of the shortest edge of the volume.
-    """
+    """Choose where a ball stands, in the workpiece frame, [3], mm."""
     middle = np.asarray(ball_point(model, stand))
     line = axis_line(model, stand, axis)
     if line.sign > 0.0:  # the workpiece stands still: the tool swivels about the ball
@@ -282,11 +270,7 @@ def reachable(
     end: float | None,
     points: int,
 ) -> Array:
-    """Choose the positions of a rotary axis, [points], degrees.
-
-    Where no ends are given: the part of its travel around where it stands, at most a turn, along
-    which the linear axes can follow.
-    """
+    """Choose the positions of a rotary axis, [points], degrees."""
     low, high = scene.machine.axes[axis].travel
     here = float(np.clip(stand[axis], low, high))
     if high - low > 360.0:

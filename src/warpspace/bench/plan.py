@@ -66,10 +66,7 @@ def build_plan(
     setup: Mapping[str, Array] | None = None,
     path: tuple[Whole, ...] | None = None,
 ) -> Plan:
-    """Put a plan together; by default each site gives one reading of a fixed direction.
-
-    Coordinates may be scalars, and all readings may share a direction, gain and length.
-    """
+    """Put a plan together; by default each site gives one reading of a fixed direction."""
     sites = len(point_mm)
     rows = np.arange(sites) if site is None else site
     count = len(rows)
@@ -148,10 +145,7 @@ class Response:
 
 
 def simulate(scene: Scene, plan: Plan, *, exact: bool = True) -> Array:
-    """Take the readings of a plan on the model of a scene, [m], µm (angles: µrad).
-
-    Exactly: full rotations, all products, and the true length of a bar; else to first order.
-    """
+    """Take the readings of a plan on the model of a scene, [m], µm (angles: µrad)."""
     if not exact:
         return respond(scene, plan).readings
     found = np.zeros((len(plan.point_mm), 3))

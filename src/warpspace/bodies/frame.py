@@ -437,10 +437,7 @@ def _generate(
 
 
 def _add_bed(parts: Parts, top: float) -> None:
-    """Add a slab under everything that stands on the bed, and a plinth a little smaller.
-
-    Where the slides are turned against R, a wedge leads down to a level floor.
-    """
+    """Add a slab under everything that stands on the bed, and a plinth a little smaller."""
     from trimesh import convex
 
     u, slant = parts.layout.unit_mm, parts.layout.slant

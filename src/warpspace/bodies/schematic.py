@@ -340,10 +340,7 @@ class Parts:
         lines_mm: Iterable[Array] = (),
         colour: Colour | None = None,
     ) -> None:
-        """Add shapes and lines, [2, 3], to the body of a frame.
-
-        What it is called says its colour, unless the first call does.
-        """
+        """Add shapes and lines, [2, 3], to the body of a frame."""
         part = self._parts.setdefault(f"{frame}_{what}", _Part(frame, colour or COLOURS[what]))
         part.shapes.extend(shapes)
         part.lines_mm.extend(lines_mm)

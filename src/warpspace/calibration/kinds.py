@@ -79,10 +79,7 @@ class Kind(ABC):
     def slopes(
         self, scene: Scene, readings: Readings, guess: Guess, keys: tuple[str, ...]
     ) -> tuple[Array, Array]:
-        """Differentiate the readings, [n, d, K], mm per µm or µrad, and by unknowns, [n, d, m].
-
-        To first order in the errors.
-        """
+        """Differentiate the readings, [n, d, K], mm per µm or µrad, and by unknowns, [n, d, m]."""
 
     def automatic_keys(self, readings: Readings, scene: Scene) -> tuple[str, ...]:
         """List the parameters that are looked for where none are named, the likelier first."""

@@ -66,10 +66,7 @@ def read_table(path: Path) -> ReadingTable:
 
 
 def parse_table(text: str, source: str) -> ReadingTable:
-    """Read the text of a CSV file with a header, or what ``field --json`` printed.
-
-    The source names it, nothing is opened.
-    """
+    """Read the text of a CSV file with a header, or what ``field --json`` printed."""
     if text.lstrip().startswith("{"):
         return _parse_field(text, source)
     rows = CsvRows(io.StringIO(text, newline=""), source, MAX_READINGS, once=True)
@@ -204,11 +201,7 @@ def parse_readings(
 def axis_columns(
     table: ReadingTable, scene: Scene, names: Sequence[str], needed: Sequence[str] = ()
 ) -> tuple[dict[str, Array], tuple[str, ...]]:
-    """Give positions of all axes, [n], out of columns such as ``b_deg`` and ``x_mm``, and notes.
-
-    Axes without a column stand where the scene has them, which is noted. One at least of those that
-    are needed must have one.
-    """
+    """Give positions of all axes, [n], out of columns such as ``b_deg`` and ``x_mm``, and notes."""
     axes = scene.machine.axes
     coordinates: dict[str, Array] = {}
     notes: list[str] = []

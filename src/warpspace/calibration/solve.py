@@ -169,11 +169,7 @@ class Terms:
 
 
 def build_terms(scene: Scene, keys: Sequence[str]) -> Terms:
-    """Give each parameter a curve: the scene's own, else what its kind suggests.
-
-    A component error that the scene does not have is a ramp over a linear axis and constant over a
-    rotary one; constants are constant. ``EXY:constant`` and ``EXY:ramp`` choose otherwise.
-    """
+    """Give each parameter a curve: the scene's own, else what its kind suggests."""
     functions = dict(scene.errors.functions)
     names: list[str] = []
     for text in keys:
@@ -211,11 +207,7 @@ def read_keys(text: str, _scene: Scene) -> tuple[str, ...] | None:
 
 
 def automatic(scene: Scene, together: Sequence[Readings]) -> tuple[str, ...]:
-    """List the parameters that ``--fit auto`` looks for in several sets of readings.
-
-    Slopes of straightness come last: a straightness is told from a line of its own, and its slope
-    belongs to the squareness.
-    """
+    """List the parameters that ``--fit auto`` looks for in several sets of readings."""
     keys: dict[str, None] = {}
     for readings in together:
         for key in find_kind(readings.kind).automatic_keys(readings, scene):
@@ -284,10 +276,7 @@ class Stack:
     def derivatives(
         self, terms: Terms, amplitudes: Array, unknown: Array
     ) -> tuple[list[Array], list[Array]]:
-        """Give the change of each prediction, [n·d, K] per µm or µrad and [n·d, m] per mm.
-
-        Errors act to first order here; the residuals are those of the exact model.
-        """
+        """Give the change of each prediction, [n·d, K] per µm or µrad and [n·d, m] per mm."""
         self.watch()
         guess = Guess(terms.errors_with(amplitudes), self.unknowns, unknown)
         by_parameter: list[Array] = []

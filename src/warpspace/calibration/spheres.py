@@ -159,11 +159,7 @@ def places(observed_mm: Array, table: ReadingTable) -> Array:
 def solve_linear(
     scene: Scene, coordinates: dict[str, Array], target_mm: Array, source: str
 ) -> dict[str, Array]:
-    """Find the positions of the linear axes that nominally bring the tool point to targets.
-
-    Coordinates are those of all axes; targets, [n, 3], lie in the workpiece frame. The nominal tool
-    point is an affine function of linear axes at given rotary positions.
-    """
+    """Find the positions of the linear axes that nominally bring the tool point to targets."""
     one_per_direction: dict[int, str] = {}
     for name, axis in scene.machine.axes.items():
         if axis.is_linear:
@@ -185,11 +181,7 @@ def solve_linear(
 
 
 def circles_of(table: ReadingTable, scene: Scene) -> tuple[Circle, ...]:
-    """Fit a circle per run in which one rotary axis turns, and one per axis to all such runs.
-
-    In the plane of the two linear axes across it, as
-    `warpspace.analysis.axis_motion.fit_flat_circle`.
-    """
+    """Fit a circle per run in which one rotary axis turns, and one per axis to all such runs."""
     read = table.need(("x_mm", "y_mm", "z_mm"))
     labels = np.array(table.session or ("",) * len(table))
     rotary = [name for name, axis in scene.machine.axes.items() if not axis.is_linear]

@@ -55,10 +55,7 @@ class SceneName(click.ParamType[str]):
         return [CompletionItem(name) for name in names] or [CompletionItem(incomplete, type="file")]
 
     def files(self, value: str | Path) -> Iterable[Path]:
-        """Find the scene, or those of a folder, and the machine, CSV files and meshes they name.
-
-        One that cannot be read names none; what is wrong with it is said when it is loaded.
-        """
+        """Find the scene, or those of a folder, and the machine, CSV files and meshes they name."""
         from warpspace.machine.limits import MAX_SCENE_BYTES
         from warpspace.scene.files import parse_toml, read_text
         from warpspace.scene.library import scene_path
@@ -93,10 +90,7 @@ class OutputFile(click.Path):
 
 
 def guarded(command: click.Command) -> click.Command:
-    """Have the files of a command looked at before it begins, and its numbers read strictly.
-
-    An error that names an option is told with the flag of that option.
-    """
+    """Have the files of a command looked at before it begins, and its numbers read strictly."""
     command.context_settings.setdefault("help_option_names", ["-h", "--help"])
     for param in command.params:
         if isinstance(param.type, NUMBERS):

@@ -1,8 +1,4 @@
-"""What `concepts` and `montecarlo` have on the command line only.
-
-Machines are drawn side by side, worked on by processes or a cluster, and written in tables of any
-length.
-"""
+"""What `concepts` and `montecarlo` have on the command line only."""
 
 import os
 from collections.abc import Callable, Generator, Sequence

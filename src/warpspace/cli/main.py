@@ -107,18 +107,7 @@ COMMANDS = Commands(
 
 
 def register_command(command: click.Command) -> None:
-    """Add a command of a plug-in; it appears in ``warpspace --help`` beside the bundled ones.
-
-    Parameters
-    ----------
-    command : click.Command
-        With a name that no other command has.
-
-    Raises
-    ------
-    ValueError
-        If it has no name, or one that is taken.
-    """
+    """Add a command of a plug-in; it appears in ``warpspace --help`` beside the bundled ones."""
     if not command.name or command.name in COMMANDS:
         raise ValueError(f"a command {command.name!r} cannot be added: expected a name of its own")
     COMMANDS[command.name] = command

@@ -50,10 +50,7 @@ def build_services() -> "Services":
 
 
 def draw_figure(request: "Request", cancelled: threading.Event) -> bytes:
-    """Draw the map of a request as a PNG; of a comparison both sides and the difference.
-
-    Where tilts are coloured it is the orientation map; a comparison is always of position errors.
-    """
+    """Draw the map of a request as a PNG; of a comparison both sides and the difference."""
     from warpspace.outputs.drawing.settings import FigureSettings
 
     settings = FigureSettings(

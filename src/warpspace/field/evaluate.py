@@ -83,10 +83,7 @@ class ErrorBasis:
         )
 
     def _combine(self, amplitudes: Array, response: Array) -> Array:
-        """One matrix-vector product, [..., 3], without the rows of parameters that are zero.
-
-        The product waits for the memory, and most machines have most parameters at zero.
-        """
+        """One matrix-vector product, [..., 3], without the rows of parameters that are zero."""
         flat = response.reshape(len(self.keys), self.nominal_mm.size)
         used = np.flatnonzero(amplitudes)
         if 2 * len(used) > len(self.keys):

@@ -207,10 +207,7 @@ def build_grid(
 def seen_from_workpiece(
     model: Model, coordinates: Coordinates, workspace: Workspace, point_mm: Array
 ) -> Array:
-    """Move points of R with the axes that carry the workpiece to the middle of their ranges.
-
-    Linear ones go there, and rotary ones that span the volume; see `Grid.nominal_mm`.
-    """
+    """Move points of R with the axes that carry the workpiece to the middle of their ranges."""
     axes, middle = workspace.volume_axes, workspace.positions
     branch = model.machine.branch("workpiece")
     carrying = [axis.name for axis in branch if axis.is_linear or axis.name in axes]

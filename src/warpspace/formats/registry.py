@@ -182,13 +182,7 @@ def find_format(name: str) -> Format:
 
 
 def register_format(found: Format) -> None:
-    """Add a format; it is then recognised, listed, read and written.
-
-    Raises
-    ------
-    OptionError
-        If another one has its name.
-    """
+    """Add a format; it is then recognised, listed, read and written."""
     if found.name in {**_own(), **_ADDED}:
         raise OptionError(f"format {found.name!r} is there already; expected a name of its own")
     _ADDED[found.name] = found

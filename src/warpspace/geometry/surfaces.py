@@ -79,10 +79,7 @@ def box_edges(shape: Shape) -> list[Index]:
 
 
 def grid_lines(shape: Shape, every: tuple[int, int, int]) -> list[Index]:
-    """List every n-th line of each axis on the faces of the grid, first and last included.
-
-    Polylines of flat node indices; each line once.
-    """
+    """List every n-th line of each axis on the faces of the grid, first and last included."""
     numbers = np.arange(np.prod(shape)).reshape(shape)
     lines: list[Index] = []
     for axis in range(3):
@@ -252,10 +249,7 @@ def crease_lines(faces: Sequence[Index], shape: Shape) -> list[Index]:
 
 
 def face_lines(faces: Sequence[Index], shape: Shape, every: Shape) -> list[Index]:
-    """Find every n-th grid line of each axis on patches, those on creases left out.
-
-    Polylines of flat grid indices; each line once.
-    """
+    """Find every n-th grid line of each axis on patches, those on creases left out."""
     creases = {pair for line in crease_lines(faces, shape) for pair in _pairs(line)}
     lines: list[Index] = []
     for face in faces:
@@ -331,10 +325,7 @@ def isoline_segments(
     levels: Sequence[float],
     lift_mm: Array | None = None,
 ) -> Array:
-    """Find the lines of equal value on all faces as pieces of line, [S, 2, 3], mm.
-
-    Faces are moved off the surface by a vector each, [F, 3], mm.
-    """
+    """Find the lines of equal value on all faces as pieces of line, [S, 2, 3], mm."""
     pieces: list[Array] = []
     for number, face in enumerate(faces):
         off = np.zeros(3) if lift_mm is None else lift_mm[number]

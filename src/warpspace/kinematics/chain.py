@@ -61,10 +61,7 @@ def branch_frames(model: Model, side: str, coordinates: Coordinates) -> Iterator
 def branch_pose(
     model: Model, side: str, coordinates: Coordinates, values: ErrorValues | None = None
 ) -> Array:
-    """Multiply out the pose of the tool or workpiece frame in R, [..., 4, 4].
-
-    Without errors at the coordinates it is the nominal one.
-    """
+    """Multiply out the pose of the tool or workpiece frame in R, [..., 4, 4]."""
     pose = np.eye(4)
     errors = values or {}
     for axis in model.machine.branch(side):
@@ -92,11 +89,7 @@ def tool_axis(model: Model, coordinates: Coordinates) -> Array:
 
 
 def point_in_branch(model: Model, side: str, coordinates: Coordinates, point: Vector) -> Array:
-    """Give the nominal position in R of a point of the tool or workpiece frame, [..., 3], mm.
-
-    The point is taken inwards axis by axis, which over a grid costs little: a linear axis changes
-    what it moves along, and no more.
-    """
+    """Give the nominal position in R of a point of the tool or workpiece frame, [..., 3], mm."""
     carried = components.split(np.array(point, dtype=float))
     for _, offset, rotation in reversed(model.machine.end_frames(side)):
         carried = components.move(transforms.placed(offset, rotation), carried)
@@ -462,11 +455,7 @@ class BodyMotion:
 def body_motions(
     model: Model, values: Mapping[str, Array | float], coordinates: Coordinates
 ) -> dict[str, BodyMotion]:
-    """Find the place and the small motion of every body: R, every axis, S, t and w.
-
-    Values are errors at one position of every axis, µm or µrad; absent is zero. S and t ride on the
-    last axis of the tool.
-    """
+    """Find the place and the small motion of every body: R, every axis, S, t and w."""
     still = np.zeros(3)
     found = {BASE: BodyMotion(np.eye(4), still, still)}
     for side in ("tool", "workpiece"):

@@ -209,11 +209,7 @@ def _lower_hull(x: Array, y: Array) -> list[int]:
 def convert_reference_line(
     model: Model, errors: ErrorSet, spans: Mapping[str, Span], lines: Mapping[str, str]
 ) -> ErrorSet:
-    """Take the reference line out of the straightness of linear axes; the field stays.
-
-    The line of a table is laid through its points within the range, as measured, and that of a
-    curve that was converted from one likewise; any other through 101 evenly spread positions.
-    """
+    """Take the reference line out of the straightness of linear axes; the field stays."""
     for axis, line in lines.items():
         own = AxisErrors(model, errors, axis, spans[axis])
         if not model.machine.axes[axis].is_linear:
@@ -301,11 +297,7 @@ class SquarenessSign(StrEnum):
 
 
 def angle_sign(key: str) -> int:
-    """Tell what a positive squareness by the right-hand rule does to the angle between the axes.
-
-    The axis along eᵢ turned about eₖ moves by eₖ × eᵢ, which is +eⱼ where k, i, j follow each other
-    like x, y, z: towards the other axis.
-    """
+    """Tell what a positive squareness by the right-hand rule does to the angle between the axes."""
     row = parameter(key)
     own, about = direction_index(row.axis), row.direction
     return -1 if (own - about) % 3 == 1 else 1

@@ -212,10 +212,7 @@ class Machine:
         return tuple(self.axes[name] for name in names)
 
     def sense(self, axis: str) -> int:
-        """Give +1 where a positive command moves the tool with the axis over the workpiece.
-
-        That is the rule of ISO 841; −1 is against it.
-        """
+        """Give +1 where a positive command moves the tool with the axis over the workpiece."""
         side = 1 if axis in self.chain.tool else -1
         return side * self.axes[axis].direction
 
@@ -234,10 +231,7 @@ class Machine:
 
     @property
     def reference_keys(self) -> tuple[str, ...]:
-        """Keys of the rotations of the reference axis, which the frame R absorbs by definition.
-
-        The reference axis is the first linear one in the order X Y Z U V W.
-        """
+        """Keys of the rotations of the reference axis, which the frame R absorbs by definition."""
         linear = [axis for axis in self.axes if is_linear(axis)]
         return tuple(f"E{letter}0{axis}" for axis in linear[:1] for letter in "ABC")
 

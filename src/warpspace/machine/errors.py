@@ -57,10 +57,7 @@ class ErrorSet:
         return tuple(dict.fromkeys(own if axis == OWN else axis for axis in named))
 
     def evaluate(self, key: str, position: Array) -> Array:
-        """Give one error along its axis, the mean of both directions of travel, [...].
-
-        Of an error that depends on a second axis it is the section in the middle of its positions.
-        """
+        """Give one error along its axis, the mean of both directions of travel, [...]."""
         function = self.functions.get(key)
         return np.zeros(np.shape(position)) if function is None else function.evaluate(position)
 

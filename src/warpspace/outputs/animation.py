@@ -71,10 +71,7 @@ def draw_frame(scene: Scene, settings: AnimationSettings, number: int) -> Drawin
 
 
 def sweep_factor(top: float, phase: float) -> float:
-    """Give the display factor at a phase of the sweep: 1 at its ends, the top in its middle.
-
-    It is rounded to three digits, so that the picture is drawn with the number it shows.
-    """
+    """Give the display factor at a phase of the sweep: 1 at its ends, the top in its middle."""
     share = (1.0 - np.cos(2.0 * np.pi * phase)) / 2.0
     return float(f"{1.0 + (top - 1.0) * share:.3g}")
 

@@ -60,12 +60,7 @@ def check_target(
 
 @contextmanager
 def write_atomically(path: str | Path, *, overwrite: bool = True) -> Generator[Path]:
-    """Give a temporary file beside the target; rename it onto the target when all went well.
-
-    Notes
-    -----
-    What a process that was killed has left in the folder is removed first.
-    """
+    """Give a temporary file beside the target; rename it onto the target when all went well."""
     target = check_target(path, overwrite=overwrite)
     # named before it is there: a signal that comes right then leaves nothing behind
     temporary = target.parent / f"{temporary_prefix()}{secrets.token_hex(6)}{target.suffix}"
@@ -133,13 +128,7 @@ def temporary_prefix() -> str:
 
 
 def clear_leftovers(folder: Path) -> None:
-    """Remove the temporary files in a folder whose process has ended.
-
-    Notes
-    -----
-    Processes are known on this machine only. Files that another machine wrote into a shared
-    folder are removed when they are a day old. What cannot be removed stays.
-    """
+    """Remove the temporary files in a folder whose process has ended."""
     with suppress(OSError), os.scandir(folder) as entries:
         found = [Path(entry.path) for entry in entries if _NAME.match(entry.name)]
         for path in found:
@@ -150,10 +139,7 @@ def clear_leftovers(folder: Path) -> None:
 
 @contextmanager
 def temporary_folder() -> Generator[Path]:
-    """Give a folder of the system's for temporary files, gone afterwards.
-
-    What a killed process has left there is removed by the next that asks for one.
-    """
+    """Give a folder of the system's for temporary files, gone afterwards."""
     clear_leftovers(Path(tempfile.gettempdir()))
     with tempfile.TemporaryDirectory(prefix=temporary_prefix()) as name:
         yield Path(name)

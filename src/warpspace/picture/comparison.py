@@ -94,10 +94,7 @@ def statistics_change(a: Statistics, b: Statistics) -> dict[str, float]:
 def statistics_blocks(
     scene: Scene, names: Sequence[str], found: Sequence[Statistics]
 ) -> Iterator[Block]:
-    """Say the statistics of fields over one volume, and where each is largest.
-
-    Of three the last is that of the change; the change of each statistic then stands beside it.
-    """
+    """Say the statistics of fields over one volume, and where each is largest."""
     columns = [Column("|E|" if len(names) > 1 else "", leads=True)]
     columns += number_columns(names, unit="µm")
     change = statistics_change(*found[:2]) if len(names) == 2 else {}

@@ -76,10 +76,7 @@ def thick_nodes(picture: Picture, nodes_mm: Array) -> Array:
 
 
 def thick_map(picture: Picture) -> tuple[Array, Index, Index]:
-    """Give what a ray can meet of a line or a point that is drawn thick.
-
-    Vertices [M, 3], mm, triangles [T, 3], and the flat index of each vertex's grid node, [M].
-    """
+    """Give what a ray can meet of a line or a point that is drawn thick."""
     thick = thick_nodes(picture, picture.drawn_mm)
     surface = topology(thick.shape[:3]).surface
     nodes = spread_nodes(picture.shape)[surface.nodes]

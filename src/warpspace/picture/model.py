@@ -367,10 +367,7 @@ class ScenePicture(Picture):
 
     @cached_property
     def provenance(self) -> dict[str, Any]:
-        """Program, scene, settings, statistics and parameters, fit for JSON.
-
-        The scene's own text is among it, so that a reader can rebuild the scene exactly.
-        """
+        """Program, scene, settings, statistics and parameters, fit for JSON."""
         scene = self.scene
         return {
             "program": f"warpspace {__version__}",

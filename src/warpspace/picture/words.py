@@ -53,11 +53,7 @@ def spell_in_r(point_mm: Array | Sequence[float]) -> str:
 
 
 def spell_point(axes: Mapping[str, SupportsFloat], point_mm: Array | Sequence[float]) -> str:
-    """Spell a point in both coordinates, to a tenth of a millimetre or degree.
-
-    ``axes X 275 Y −225 Z −480 · in R x 275 y −225 z −51``: where the axes stand (none where nobody
-    knows), and the point in R, as it is drawn.
-    """
+    """Spell a point in both coordinates, to a tenth of a millimetre or degree."""
     return SEPARATOR.join((*([spell_axes(axes)] if axes else ()), spell_in_r(point_mm)))
 
 

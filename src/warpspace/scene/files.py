@@ -39,11 +39,7 @@ _TOKENS = re.compile(
 
 
 def check_outline(text: str, source: str) -> None:
-    """Refuse text whose keys, nesting or number of keys no scene needs.
-
-    Valid text is understood as a TOML reader does, so that nothing in a text or remark counts. Of
-    text that is not valid only the part before the first mistake matters.
-    """
+    """Refuse text whose keys, nesting or number of keys no scene needs."""
     dots = depth = keys = 0
     for count, found in enumerate(_TOKENS.finditer(text)):
         mark = found[0]
@@ -291,10 +287,7 @@ def _spell_cell(value: object) -> str:
 
 
 class CsvRows:
-    """The rows of a table: memory does not grow with what is refused.
-
-    What is wrong with single cells and rows is noted; `check` raises it, all at once.
-    """
+    """The rows of a table: memory does not grow with what is refused."""
 
     def __init__(self, file: TextIO, source: str, most: int, *, once: bool = False) -> None:
         self.source, self.problems = source, list[str]()

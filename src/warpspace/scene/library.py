@@ -291,11 +291,7 @@ class _Document:
     problems: Problems
 
     def known(self, section: str) -> dict[str, object]:
-        """Give the entries of a table whose keys are parameters of the machine.
-
-        Refused are the rotations of the reference axis, nearly always a slip, unless the file
-        frees it.
-        """
+        """Give the entries of a table whose keys are parameters of the machine."""
         known: dict[str, object] = {}
         machine, problems = self.machine, self.problems
         for key, value in problems.table(section, self.raw.get(section)).items():

@@ -38,21 +38,7 @@ PENALTY = 0.02  # of a way of one radian from the position before, where several
 def orient(
     machine: Machine, model: Model, stand: Mapping[str, Array], wanted: Array
 ) -> dict[str, Array]:
-    """Turn two rotary axes so that the tool axis has given directions in the workpiece.
-
-    The directions are unit vectors in the workpiece frame along a closed way, [n, 3].
-
-    Raises
-    ------
-    OptionError
-        If the machine has not two rotary axes, or they cannot reach a direction.
-
-    Notes
-    -----
-    Newton steps from a coarse search over the travel, then from one direction to the next, so that
-    the axes go a continuous way. An axis that goes all the way round is brought back into its
-    travel by whole turns.
-    """
+    """Turn two rotary axes so that the tool axis has given directions in the workpiece."""
     names = [axis.name for axis in machine.axes.values() if not axis.is_linear]
     if len(names) < 2:
         raise OptionError(

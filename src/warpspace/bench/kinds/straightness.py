@@ -50,13 +50,7 @@ class ReferenceLine:
 
 
 def reference_lines(position_mm: Array, deviation_um: Array) -> dict[str, ReferenceLine]:
-    """Lay the three reference lines through deviations, [n], µm, at two positions or more.
-
-    Notes
-    -----
-    The minimum zone is the one of smallest height: two parallel lines that hold all points, one of
-    which lies on an edge of their convex hull.
-    """
+    """Lay the three reference lines through deviations, [n], µm, at two positions or more."""
     order = np.argsort(position_mm, kind="stable")
     x, y = position_mm[order], deviation_um[order]
     middle = x.mean()

@@ -304,13 +304,7 @@ class Wanted:
         return found
 
     def linear_fit(self, allowed: Sequence[tuple[str, str]]) -> dict[tuple[str, str], float]:
-        """Fit corrections of one axis in proportion to the position of another.
-
-        Notes
-        -----
-        Least squares over the working volume, its nodes weighed by their share of it. There is no
-        constant part: such a controller has no place for one.
-        """
+        """Fit corrections of one axis in proportion to the position of another."""
         scene, machine = self.scene, self.scene.machine
         if missing := [axis for axis in AXES if axis not in machine.axes]:
             found_axes = ", ".join(machine.axes)

@@ -106,10 +106,7 @@ def _assigns(name: str) -> Callable[[str, str], bool]:
 def _assignments(
     source: Source, prefix: str, settings: Sequence[str], indices: tuple[str, str]
 ) -> Iterator[tuple[Place, str, list[str], str]]:
-    """Give place, setting (empty for a value), indices and value of each assignment.
-
-    How many indices a value has, and a setting, is seen from how they are spelled in messages.
-    """
+    """Give place, setting (empty for a value), indices and value of each assignment."""
     names = (prefix, *(f"{prefix}_{setting}" for setting in settings))
     any_found = False
     for at, text in source.scan(";"):
@@ -323,10 +320,7 @@ def _cross_tables(wanted: Wanted, factor: float, most: int) -> list[CrossTable]:
 
 
 def _half_reversals(wanted: Wanted, axis: str) -> Needed:
-    """Give half the difference that the direction of one axis makes: over it, and it and another.
-
-    The first axis of each group is that one.
-    """
+    """Give half the difference that the direction of one axis makes: over it, and it and another."""
     base = wanted.toward(TravelDirection.MEAN)
     ways = [base.toward(way, axis) for way in (TravelDirection.FORWARD, TravelDirection.BACKWARD)]
     found: dict[tuple[str, ...], Array] = {}

@@ -46,10 +46,7 @@ def is_number(value: object) -> bool:
 
 
 class ValueReader:
-    """Checks raw values and collects what is wrong with them.
-
-    Every method gives something usable, so that all problems are found in one reading.
-    """
+    """Checks raw values and collects what is wrong with them."""
 
     def __init__(
         self,

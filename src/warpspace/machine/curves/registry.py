@@ -32,10 +32,7 @@ def curve_kind(title: str) -> CurveKind:
 
 
 def register_curve(kind: CurveKind) -> None:
-    """Add a kind of curve; it appears in scene files, the app, reports and figures.
-
-    Its name, title and keys in scene files must be its own.
-    """
+    """Add a kind of curve; it appears in scene files, the app, reports and figures."""
     for other in _KINDS.values():
         keys = {form[0] for form in kind.forms} & {form[0] for form in other.forms}
         if keys or kind.name == other.name or kind.title == other.title:

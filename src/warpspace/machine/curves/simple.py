@@ -101,10 +101,7 @@ class Poly(ErrorFunction):
         return replace(self, coefficients=tuple(factor * c for c in self.coefficients))
 
     def grown(self) -> Self:
-        """Give the line from 0 at the lower end to 1 at the upper; of c0 alone the constant 1.
-
-        The number of coefficients stays.
-        """
+        """Give the line from 0 at the lower end to 1 at the upper; of c0 alone the constant 1."""
         if len(self.coefficients) < 2:
             return replace(self, coefficients=(1.0,))
         low, high = self.span
@@ -206,10 +203,7 @@ class Harmonics(ErrorFunction):
         return replace(self, terms=tuple((n, factor * a, phase) for n, a, phase in self.terms))
 
     def grown(self) -> Self:
-        """Give the first of its waves that is not zero by its order and phase, else one whole wave.
-
-        Orders and phases of all terms stay.
-        """
+        """Give the first of its waves that is not zero by its order and phase, else one whole wave."""
         for index in range(len(self.terms)):
             terms = tuple(
                 (n, float(k == index), phase) for k, (n, _, phase) in enumerate(self.terms)

@@ -127,11 +127,7 @@ class Table(ErrorFunction):
 
     @classmethod
     def from_curve(cls, present: ErrorFunction, span: Span) -> Self:
-        """Give evenly spread points of the present curve, as many as its shape needs.
-
-        Kinks within the range are points as well. A wave too short for the rows that a user may
-        edit is kept at these points only.
-        """
+        """Give evenly spread points of the present curve, as many as its shape needs."""
         peak = abs(present.amplitude)
         kinks = [q for q in present.kinks if span[0] < q < span[1]][: MAX_CURVE_ROWS // 2]
         count, most = FIRST_POINTS, MAX_CURVE_ROWS - len(kinks)

@@ -247,11 +247,7 @@ def draw_maps_alike(
 
 
 def map_room_mm(picture: Picture) -> Array:
-    """Give what of a volume is to be seen, [n, 3], mm: where it is, where it is drawn.
-
-    Around a point also half the length it is sized by: its displacement is chosen for that. Of a
-    curved volume also the box about it, which its axes run along.
-    """
+    """Give what of a volume is to be seen, [n, 3], mm: where it is, where it is drawn."""
     points = [picture.grid.nominal_mm.reshape(-1, 3), picture.drawn_mm.reshape(-1, 3)]
     if any(axis and not is_linear(axis) for axis in picture.grid.axes):
         nodes = np.concatenate(points)

@@ -47,11 +47,7 @@ class FieldRecord:
 
     @property
     def columns(self) -> dict[str, Array]:
-        """Columns of the table by name, each broadcastable to the points; names end in units.
-
-        Those of errors say the loop and what was taken off (the placement, the error at a
-        reference), those of all vectors the frame: R, or w for the workpiece's.
-        """
+        """Columns of the table by name, each broadcastable to the points; names end in units."""
         frame = "w" if self.about.get("frame") == "workpiece" else "R"
         error = f"error_{self.about.get('loop', 'tool')}"
         error += "_placed" if "placement" in self.about else ""
@@ -97,16 +93,7 @@ def column_unit(name: str) -> str:
 
 
 def write_field(record: FieldRecord, path: str | Path, *, overwrite: bool = True) -> None:
-    """Write a field in the format that the ending of a path names.
-
-    Notes
-    -----
-    Parquet: a row a point and row groups of some ten thousand, the unit of each column in its
-    metadata. CSV: the same table, numbers with nine decimals. NPZ: ``nominal_mm``, ``error_um``,
-    ``norm_um``, ``orientation_urad`` with the shape of the grid, and ``axis_X_mm`` and so on, which
-    broadcast to it. VTS: a structured grid of the nominal points with the same arrays. All but CSV
-    say what they belong to: the metadata ``warpspace``, ``about_json``.
-    """
+    """Write a field in the format that the ending of a path names."""
     target = check_target(path, FIELD_ENDINGS, overwrite=overwrite)
     ending = target.suffix.lower()
     if ending in GRID_ENDINGS and len(record.shape) != DIMENSIONS:
@@ -221,13 +208,7 @@ GRID_ENDINGS = (".vts",)  # formats that hold grids only
 
 
 def write_csv(picture: ScenePicture, path: str | Path, *, overwrite: bool = True) -> None:
-    """Write the field of a scene over its grid.
-
-    Notes
-    -----
-    Behind the numbers every row says what it belongs to (scene, loop, reference, convention,
-    program), so that tables of several scenes can be put under each other.
-    """
+    """Write the field of a scene over its grid."""
     record = FieldRecord(picture.grid.coordinates, picture.field, picture.remarks)
     remarks = {name: guard_cell(text) for name, text in picture.remarks.items()}
     with write_atomically(path, overwrite=overwrite) as temporary:

@@ -66,10 +66,7 @@ def draw_ballbar(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bo
 
 
 def draw_rotary(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
-    """Draw radial, axial and tilt error motion of every rotary axis of a scene, one row an axis.
-
-    Each is drawn for the first traced point of the scene, with the other axes where they stand.
-    """
+    """Draw radial, axial and tilt error motion of every rotary axis of a scene, one row an axis."""
     scene = scenes[0]
     chosen = first_lines(scene)
     if not chosen:

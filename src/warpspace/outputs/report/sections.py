@@ -129,10 +129,7 @@ class ReportFigures:
         caption: str,
         settings: FigureSettings | None = None,
     ) -> Drawn:
-        """Begin a figure; it is drawn a second time where the first fails, then it is missing.
-
-        Where a scene has no such figure, its place says why.
-        """
+        """Begin a figure; it is drawn a second time where the first fails, then it is missing."""
         # the lean of the tool axis has a factor of its own, at which it is seen
         factor = "auto" if name == "orientation-map" else self._factor
         chosen = settings or FigureSettings(exaggeration=factor, loop=self._loop, grid=self._grid)
@@ -439,11 +436,7 @@ def differences(review: Review) -> Iterator[Block]:
 def compare_with(
     scenes: Sequence[Scene], others: Sequence[Scene], settings: ReportSettings
 ) -> ConceptsResult | None:
-    """Compare the reviewed machines with others within the tolerances of the first.
-
-    They are sampled as the report samples those of its tolerances; axes count on whichever side
-    they are, whatever the loop of the report.
-    """
+    """Compare the reviewed machines with others within the tolerances of the first."""
     if not others:
         return None
     every = (*scenes, *others)
