@@ -65,7 +65,7 @@ class Ensemble:
     def norm_and_slope(
         self, centre: Array, half_width: Array
     ) -> tuple[Array, "Floats", NDArray[np.intp] | None]:
-        """Evaluate |E| of every machine, [S], µm, and what its slopes in half widths follow from."""
+        """Evaluate |E| of every machine, [S], µm, and what its slopes follow from."""
         error = self.error_um(centre, half_width)
         at = None
         if error.ndim == 3:
@@ -186,7 +186,7 @@ def sample_scale(task: Task, half_width: Array, moving: NDArray[np.bool_]) -> fl
 
 
 def variance_widths(task: Task) -> Array:
-    """Give the proportions that are cheapest where only the variance of E counts, [K], µm or µrad."""
+    """Give the proportions that are cheapest if only the variance of E counts, [K], µm or µrad."""
     square = task.ensemble.mean_square_gain[task.free]
     widths = np.cbrt(task.cost[task.free] / square)
     return task.filled(widths * (0.5 * task.widest / widths.max()))
@@ -278,7 +278,7 @@ def scales_within(base_um: Array, move_um: Array, limit_um: float) -> Array:
 
 
 def largest_scale(within: Array, probability: float) -> float | None:
-    """Give the largest scale at which enough machines, [S, 2], keep the limit; see `scales_within`."""
+    """Give the largest scale where enough machines, [S, 2], keep the limit; see `scales_within`."""
     needed = math.ceil(probability * len(within) - 1e-9)
     valid = within[within[:, 0] <= within[:, 1]]
     low, high = np.sort(valid[:, 0]), np.sort(valid[:, 1])

@@ -147,7 +147,7 @@ class UncertainCase(Case):
     uncertainty: ErrorSet = dataclass_field(default_factory=ErrorSet)
 
     def machines(self, rng: np.random.Generator, count: int) -> Array:
-        """Draw by how many standard uncertainties each error is off, and one last, [count, K + 1]."""
+        """Draw how many standard uncertainties each error is off, and one last, [count, K + 1]."""
         draws = self.draws
         size = np.full(len(draws.keys), SIGMAS_OF[Distribution(draws.distribution)])
         unit = Draws(draws.keys, np.zeros(len(draws.keys)), size, draws.distribution)

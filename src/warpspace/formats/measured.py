@@ -344,7 +344,7 @@ def _ways(curve: ErrorFunction) -> dict[int, ErrorFunction]:
 
 
 def _second_axis(curve: ErrorFunction) -> tuple[str, Array] | None:
-    """Give the other axis that an error depends on, with its positions; None where there is none."""
+    """Give the other axis that an error depends on, with its positions; None where none is."""
     surfaces = [one for one in (curve, *_ways(curve).values()) if isinstance(one, TwoArguments)]
     others = {one.axes[1] for one in surfaces}
     if len(others) != 1:

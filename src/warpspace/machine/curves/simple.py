@@ -203,7 +203,7 @@ class Harmonics(ErrorFunction):
         return replace(self, terms=tuple((n, factor * a, phase) for n, a, phase in self.terms))
 
     def grown(self) -> Self:
-        """Give the first of its waves that is not zero by its order and phase, else one whole wave."""
+        """Give the first wave that is not zero by its order and phase, else one whole wave."""
         for index in range(len(self.terms)):
             terms = tuple(
                 (n, float(k == index), phase) for k, (n, _, phase) in enumerate(self.terms)

@@ -117,7 +117,7 @@ def draw_bodies(
     nominal: bool = True,
     zorder: float = 1.0,
 ) -> Raster | None:
-    """Draw the bodies of a machine with their edges, faintly also where these would be nominally."""
+    """Draw the bodies of a machine with their edges, faintly where these would be nominally."""
     theme = canvas.theme
     raster = render_bodies([_drawn_body(part, theme) for part in placed], projection)
     if raster is None:
