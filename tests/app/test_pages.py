@@ -1,17 +1,20 @@
 """Pages: built in steps, their jobs and turns, added analyses, machines that stand still."""
 
+import re
 import threading
 import time
 from contextlib import ExitStack
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import pytest
 
+from app.parts import Nobody
 from app.wire import Wire, dial, opened
 from still_scenes import TEXTS, still_scene
 from warpspace.analysis.catalogue import register, unregister
 from warpspace.analysis.description import Analysis, Result
-from warpspace.app.documents.services import CancelledError, Jobs, Progress, Services
+from warpspace.app.documents.services import CancelledError, Services
 from warpspace.app.evaluation import cache
 from warpspace.app.server import page_steps
 from warpspace.app.server.page_steps import PageSteps
@@ -19,6 +22,7 @@ from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import start_state
 from warpspace.app.tasks.errors import used_keys
+from warpspace.app.tasks.jobs import Jobs
 from warpspace.scene.library import load_scene
 
 FIRST = load_scene("dvf5000_first")
@@ -160,18 +164,15 @@ def test_what_fails_because_a_page_has_just_gone_is_no_error(viewer, monkeypatch
 
 
 class Watcher:
-    """Collects what jobs report."""
+    """Collects what jobs show and report."""
 
     def __init__(self):
-        self.progress: list[Progress | None] = []
-        self.failures: list[Exception] = []
-        self.ended, self.failed = threading.Event(), threading.Event()
-        self.jobs = Jobs(self._report, self._fail)
+        self.bars, self.failures, self.failed = [], [], threading.Event()
+        context = Nobody(act=lambda do: do(), page=SimpleNamespace(is_open=True))
+        self.jobs = Jobs(context, "part", self._again, self._fail)
 
-    def _report(self, progress):
-        self.progress.append(progress)
-        if progress is None:
-            self.ended.set()
+    def _again(self):
+        self.bars.append(str(self.jobs.html()))
 
     def _fail(self, _, error):
         self.failures.append(error)
@@ -182,13 +183,15 @@ def test_one_job_at_a_time_and_progress_never_claims_to_be_done():
     watcher, go = Watcher(), threading.Event()
     assert watcher.jobs.start("one", lambda _: go.wait(10) and None, 0.2)
     assert not watcher.jobs.start("two", lambda _: None, 0.2)
-    assert not watcher.ended.wait(0.6)
+    time.sleep(0.6)
+    assert watcher.jobs.busy
     go.set()
-    assert watcher.ended.wait(20)
+    while watcher.bars[-1]:
+        time.sleep(0.01)
     assert watcher.failures == []
-    percents = [p.percent for p in watcher.progress if p is not None]
+    percents = [int(re.search(r"one: (\d+) %", bar)[1]) for bar in watcher.bars[:-1]]
     assert percents == sorted(percents)
-    assert max(percents) < 100.0
+    assert max(percents) < 100
     assert not watcher.jobs.busy
 
 

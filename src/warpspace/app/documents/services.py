@@ -1,8 +1,6 @@
 """What the app has others do: drawing figures and writing exports. The command line hands it in."""
 
-import math
 import threading
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -94,81 +92,3 @@ class Services:
     figures: tuple[tuple[str, str], ...] = ()
     exports: tuple[tuple[str, str], ...] = ()  # endings of the formats, and what each is for
     token: str | None = None  # what the app asks for; it goes into a link where that is asked for
-
-
-# --- Long work beside a session: one at a time, with progress, and cancellable --------------------
-
-TICK_S = 0.25
-Work = Callable[[threading.Event], None]
-
-
-@dataclass(frozen=True, slots=True)
-class Progress:
-    """How far a job is."""
-
-    name: str  # what is being done
-    percent: float  # estimated from the time it usually takes; 100 only when done
-
-
-class Jobs:
-    """Runs one job at a time in threads of its own."""
-
-    def __init__(
-        self, report: Callable[[Progress | None], None], failed: Callable[[str, Exception], None]
-    ) -> None:
-        self._report, self._failed = report, failed
-        self._lock = threading.Lock()
-        self._cancelled: threading.Event | None = None
-
-    @property
-    def busy(self) -> bool:
-        """Whether something runs."""
-        with self._lock:
-            return self._cancelled is not None
-
-    def start(self, name: str, work: Work, usual_s: float) -> bool:
-        """Start a job."""
-        with self._lock:
-            if self._cancelled is not None:
-                return False
-            cancelled = self._cancelled = threading.Event()
-        threading.Thread(
-            target=self._watch,
-            args=(name, work, cancelled, usual_s),
-            name="warpspace-job",
-            daemon=True,
-        ).start()
-        return True
-
-    def cancel(self) -> None:
-        """Cancel what runs; its result is not delivered any more."""
-        with self._lock:
-            cancelled = self._cancelled
-        if cancelled is not None:
-            cancelled.set()
-
-    def _watch(self, name: str, work: Work, cancelled: threading.Event, usual_s: float) -> None:
-        done = threading.Event()
-        raised: list[Exception] = []
-
-        def run() -> None:
-            try:
-                work(cancelled)
-            except Exception as error:  # noqa: BLE001 - handed to the session, which shows it
-                raised.append(error)
-            done.set()
-
-        started = time.monotonic()
-        threading.Thread(target=run, name="warpspace-work", daemon=True).start()
-        finished = False
-        while not finished and not cancelled.is_set():
-            part = 1.0 - math.exp(-1.5 * (time.monotonic() - started) / usual_s)
-            self._report(Progress(name, 100.0 * part))
-            finished = done.wait(TICK_S)
-        with self._lock:
-            self._cancelled = None
-        self._report(None)
-        if cancelled.is_set():
-            self._failed(name, CancelledError(f"{name}: cancelled"))
-        elif raised:
-            self._failed(name, raised[0])

@@ -4,8 +4,6 @@ What only a page can do (numbers that follow a drag, a picture in the box) is a 
 the analysis' name: a subclass of `AnalysisPart` in `HOOKS`.
 """
 
-import logging
-import threading
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
@@ -18,8 +16,9 @@ from warpspace.analysis.catalogue import Entry, entries
 from warpspace.analysis.description import Analysis, Change, Result
 from warpspace.analysis.options import Option
 from warpspace.app.browser.events import index_of
-from warpspace.app.browser.html import EMPTY, button, join, number, tag
-from warpspace.app.documents.services import CancelledError, Jobs, Progress
+from warpspace.app.browser.html import EMPTY, button, join, tag
+from warpspace.app.browser.page import error_words
+from warpspace.app.documents.services import CancelledError
 from warpspace.app.evaluation.applying import with_applied, with_proposal
 from warpspace.app.evaluation.cache import Identity, taken_turn
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -29,8 +28,9 @@ from warpspace.app.tasks.cards import Card, Seen, make_cards
 from warpspace.app.tasks.charts import block_html
 from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.forms import form_html, read_form
+from warpspace.app.tasks.jobs import Job, Jobs
 from warpspace.app.tasks.parts import Section
-from warpspace.exceptions import OptionError, WarpspaceError
+from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 
 TITLES = {
@@ -42,7 +42,6 @@ TITLES = {
 WIDEST = 5  # columns of a table that the column of the page has room for
 OF_STATE = frozenset({"loop", "placed"})
 """Options that are set for the whole page, in one place."""
-logger = logging.getLogger(__name__)
 QUICK_S = 0.4  # what is answered within that time is answered anew with every change
 Question = tuple[object, ...]
 
@@ -65,9 +64,8 @@ class AnalysisPart(Section):
         self._cards: tuple[Card, ...] = ()
         self._applied: Question = ()  # what is asked once a change has been applied
         self._problem: tuple[Question, str] | None = None
-        self._progress: Progress | None = None
-        self._share, self._took_s, self._version = 0.0, 0.0, 0
-        self._jobs = Jobs(self._report, self._fail)
+        self._took_s, self._version = 0.0, 0
+        self._jobs = Jobs(context, entry.name, self._again, self._fail)
         self._asked: Question = ()
         self._scene_title = ""
 
@@ -182,7 +180,7 @@ class AnalysisPart(Section):
             parts.append(tag("div", said, class_="ws-result" + (" stale" if faded else "")))
             parts += [tag("p", words, class_="ws-doubt") for words in found.doubts()]
             parts.append(self.actions(found, stale=stale))
-        if not quick or self._answer is None or self._progress is not None:
+        if not quick or self._answer is None or self._jobs.html():
             parts.append(self._run_row())
         values = self.values(state)
         if options := [one for one in self.shown_options(state) if one.name not in OF_STATE]:
@@ -192,16 +190,9 @@ class AnalysisPart(Section):
         return join(parts)
 
     def _run_row(self) -> Markup:
-        if self._progress is None:
-            words = "Run again" if self._answer else "Run"
-            kind = "" if self._answer else "main"
-            run = button(words, f"{self.name}:run", kind=kind)
-            return tag("div", run, class_="ws-actions ws-run")
-        share = 100.0 * self._share if self._share else self._progress.percent
-        bar = tag("progress", "", max=100, value=f"{share:.0f}", aria_label=self.kind.doing)
-        cancel = button("Cancel", f"{self.name}:cancel")
-        inner = join((bar, number(share, 0), " %", cancel))
-        return tag("div", inner, class_="ws-actions ws-run")
+        words = "Run again" if self._answer else "Run"
+        run = button(words, f"{self.name}:run", kind="" if self._answer else "main")
+        return self._jobs.html() or tag("div", run, class_="ws-actions ws-run")
 
     def actions(self, found: Result, *, stale: bool) -> Markup:
         """Give what can be done with a result beside its cards."""
@@ -267,22 +258,22 @@ class AnalysisPart(Section):
             self._refuse(question, error.said(self._label))
             return
 
-        def work(cancelled: threading.Event) -> None:
+        def work(job: Job) -> None:
             def watch(share: float) -> None:
-                self._share = share
-                if cancelled.is_set():
+                job.share = share
+                if job.is_set():
                     raise CancelledError(f"{self.title}: cancelled")
 
-            with taken_turn(lambda: watch(self._share)):
+            with taken_turn(lambda: watch(job.share)):
                 started = time.monotonic()
                 found = asked.run_all(scenes, watch)
                 took_s = time.monotonic() - started
                 cards = make_cards(scenes[0], found.changes(), seen)
-            if not cancelled.is_set():
+            if not job.is_set():
                 self.context.act(partial(self._take_answer, question, found, cards, took_s))
 
-        self._share = 0.0
-        self._jobs.start(self.title, work, max(self._took_s, 1.0))
+        quiet_s = QUICK_S if self._answer and self._took_s < QUICK_S else 0.0
+        self._jobs.start(self.kind.doing, work, max(self._took_s, 1.0), quiet_s)
 
     def _label(self, name: str) -> str:
         return next((one.label for one in self.kind.options() if one.name == name), name)
@@ -294,27 +285,11 @@ class AnalysisPart(Section):
         self._problem, self._took_s = None, took_s
         self._again()
 
-    def _report(self, progress: Progress | None) -> None:
-        if not self.context.page.is_open:
-            self._jobs.cancel()
-        if (
-            progress is not None
-            and self._progress is None
-            and self._took_s < QUICK_S
-            and self._answer
-        ):
-            return  # no bar for a blink
-        self._progress = progress
-        self.context.act(self._again)
-
     def _fail(self, _name: str, error: Exception) -> None:
-        if isinstance(error, CancelledError):
-            return
-        words = error.said(self._label) if isinstance(error, OptionError) else str(error)
-        if not isinstance(error, WarpspaceError):
-            logger.error("%s", self.title, exc_info=error)
-            words = f"{type(error).__name__}: {error}"
-        self.context.act(partial(self._refuse, self._asked, words))
+        if isinstance(error, OptionError):
+            self._refuse(self._asked, error.said(self._label))
+        elif not isinstance(error, CancelledError):
+            self._refuse(self._asked, error_words(error))
 
     def _refuse(self, question: Question, words: str) -> None:
         self._problem = (question, words)

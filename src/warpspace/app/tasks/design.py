@@ -164,7 +164,7 @@ class TolerancesPart(AnalysisPart):
         return told + histogram_html(chart) + tag("p", numbers, class_="ws-tiny")
 
     def _run_row(self) -> Markup:
-        if self._progress is not None:
+        if self._jobs.busy:
             return super()._run_row()
         hint = (
             "The widest tolerances that keep the limit with the wanted probability. A half width w"
@@ -447,7 +447,7 @@ class ConceptsPart(AnalysisPart):
         return sheet + super().actions(found, stale=stale)
 
     def _run_row(self) -> Markup:
-        return super()._run_row() if self._asked or self._progress else EMPTY
+        return super()._run_row() if self._asked or self._jobs.busy else EMPTY
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
         """Choose machines, which compares them; open one; draw the sheet."""
@@ -497,7 +497,6 @@ class ConceptsPart(AnalysisPart):
             if not cancelled.is_set():
                 self.context.act(partial(self.context.save_file, "concepts.png", content))
 
-        self._share = 0.0
         self._jobs.start("Drawing the machines", work, DRAWING_S)
 
 

@@ -1,6 +1,5 @@
 """Files of a page: scenes and data that are opened, scenes, links, pictures and exports."""
 
-import logging
 import threading
 from collections.abc import Callable
 from dataclasses import replace
@@ -9,7 +8,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from warpspace.app.browser.html import EMPTY, button, choice, field, join, number, tag
+from warpspace.app.browser.html import button, choice, field, join, tag
 from warpspace.app.browser.page import error_words
 from warpspace.app.browser.uploads import size_message
 from warpspace.app.browser.viser_private import dom_id
@@ -25,20 +24,20 @@ from warpspace.app.documents.files import (
     unpack,
     upload_text,
 )
-from warpspace.app.documents.services import CancelledError, Jobs, Progress
+from warpspace.app.documents.services import CancelledError
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.comparison import Comparison
 from warpspace.app.state.table import drawn_tables, without_table
 from warpspace.app.tasks.context import Context
+from warpspace.app.tasks.jobs import Jobs
 from warpspace.app.tasks.window import Window, actions
 from warpspace.app.viewport.camera import CameraMemory
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.formats.registry import formats
 from warpspace.machine.limits import MAX_SCENE_BYTES
 
-logger = logging.getLogger(__name__)
 FIGURE_S, VIEW_S, EXPORT_S = 5.0, 1.5, 1.0  # what a file usually takes
 RENDER_TIMEOUT_S = 30.0
 LARGEST_VIEW_PX = 4096
@@ -58,8 +57,7 @@ class JobWindow(Window):
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
-        self._progress: Progress | None = None
-        self._jobs = Jobs(self._report, self._failed)
+        self._jobs = Jobs(context, self.name, lambda: context.renew(self), self._failed)
 
     def make(self, name: str, ending: str, usual_s: float, make: Make) -> None:
         """Make a file beside the session, and have the browser save it."""
@@ -73,15 +71,6 @@ class JobWindow(Window):
             self.context.notify(
                 "One file at a time", "Wait for the other one, or cancel it", "warning"
             )
-
-    def progress(self) -> Markup:
-        """Say what is being made."""
-        if self._progress is None:
-            return EMPTY
-        bar = tag("progress", "", max=100, value=f"{self._progress.percent:.0f}",
-                  aria_label=self._progress.name)  # fmt: skip
-        words = f"{self._progress.name}: {number(self._progress.percent, 0)} %"
-        return actions(bar, tag("span", words), button("Cancel", f"{self.name}:cancel"))
 
     def attempt(self, action: Callable[[], None]) -> None:
         """Do something in the session; say what it raises."""
@@ -100,19 +89,9 @@ class JobWindow(Window):
             self._jobs.cancel()
         return state
 
-    def _report(self, progress: Progress | None) -> None:
-        if not self.context.page.is_open:
-            self._jobs.cancel()
-        self._progress = progress
-        self.context.act(partial(self.context.renew, self))
-
     def _failed(self, name: str, error: Exception) -> None:
-        if not self.context.page.is_open:
-            return  # nobody is there to be told
-        if not isinstance(error, WarpspaceError):
-            logger.error("%s", name, exc_info=error)
         if isinstance(error, CancelledError):
-            self.context.notify(f"{name}: cancelled")
+            self.context.notify(str(error))
         else:
             self.context.notify(f"{name}: not done", error_words(error), "problem")
 
@@ -137,7 +116,7 @@ class FilesWindow(JobWindow):
 
     def depends(self, picture: LivePicture) -> tuple[object, ...]:
         """Follow what exports show, and how far a file is."""
-        return (exported_words(picture), self._figure, self._progress)
+        return (object(),)
 
     def body(self, picture: LivePicture) -> Markup:
         """Offer the files."""
@@ -162,7 +141,7 @@ class FilesWindow(JobWindow):
             tag("h3", "Export"),
             actions(button("Interactive page (HTML)", "files:page",
                            hint="One file that needs no network"), *exports),
-            self.progress(),
+            self._jobs.html(),
         ))  # fmt: skip
 
     def take(self, state: AppState, word: str, value: str) -> AppState:

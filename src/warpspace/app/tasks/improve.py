@@ -232,7 +232,7 @@ class CompensatePart(AnalysisPart):
                            " remain.", class_="ws-quiet")  # fmt: skip
 
     def _run_row(self) -> Markup:
-        return super()._run_row() if self._asked or self._progress else EMPTY
+        return super()._run_row() if self._asked or self._jobs.busy else EMPTY
 
     def headline(self, found: Result) -> Markup:
         """Set before and after beside each other, and say what the box is drawn with."""
@@ -345,7 +345,6 @@ class CompensatePart(AnalysisPart):
             else:
                 self.context.act(partial(self._take_picture, found, png))
 
-        self._share = 0.0
         self._jobs.start("Drawing the maps", work, MAPS_S)
 
     def _take_picture(self, found: Compensation, png: bytes) -> None:

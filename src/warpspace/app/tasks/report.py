@@ -38,8 +38,7 @@ class ReportWindow(JobWindow):
 
     def depends(self, picture: LivePicture) -> tuple[object, ...]:
         """Follow what stands in it, and how far it is."""
-        reported = tuple(id(found) for _, found in self.context.reported)
-        return (reported, self._author, self._questions, self._progress, self._subject(picture))
+        return (object(),)
 
     def _subject(self, picture: LivePicture) -> str:
         found = picture.compared
@@ -65,7 +64,7 @@ class ReportWindow(JobWindow):
             actions(button("Write HTML", "report:write", ".html", kind="main",
                            hint="One page with a rotatable view; needs no network"),
                     button("Write PDF", "report:write", ".pdf", hint="For paper")),
-            self.progress(),
+            self._jobs.html(),
             tag("h3", "Contents"),
             tag("ul", join((*(tag("li", words) for words in ALWAYS), *put))),
             tag("p", hint, class_="ws-quiet"),
