@@ -42,7 +42,7 @@ from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import AppState, start_state
-from warpspace.app.viewport.layers.adding import light_scene
+from warpspace.app.viewport.shapes import light_scene
 from warpspace.scene.library import load_scene
 
 PAGE: Any = {"width": 1600, "height": 900}

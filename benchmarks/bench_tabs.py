@@ -17,7 +17,7 @@ from timing import best
 from warpspace import load_scene
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import start_state
-from warpspace.app.viewport.layers.box import packed
+from warpspace.app.viewport.box import packed
 from warpspace.picture.mesh import map_mesh
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))

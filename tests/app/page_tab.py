@@ -13,7 +13,7 @@ from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.store import StateStore
-from warpspace.app.viewport.tab_camera import CameraSetup
+from warpspace.app.viewport.camera import CameraSetup
 from warpspace.scene.library import load_scene
 
 if TYPE_CHECKING:
@@ -124,7 +124,7 @@ class Tab:
 
         def forget() -> None:
             session.use(StateStore(start))
-            session.context.camera._stand = CameraSetup()
+            session.context.camera.stand = CameraSetup()
 
         self.actions = 0
         self.page.keyboard.press("Escape")

@@ -26,9 +26,10 @@ from warpspace.app.state.look import (
     parse_positions,
 )
 from warpspace.app.state.ranges import Span
-from warpspace.app.viewport.camera import fit_camera
-from warpspace.app.viewport.tab_camera import VIEWS, CameraSetup, clipping, view_pose
-from warpspace.app.viewport.tone_map import inverse_tone_map, line_colour, tone_map
+from warpspace.app.viewport.around import arrows
+from warpspace.app.viewport.camera import VIEWS, CameraSetup, clipping, fit_camera
+from warpspace.app.viewport.colours import inverse_tone_map, line_colour, tone_map
+from warpspace.app.viewport.shapes import SCENE_PER_MM
 from warpspace.field.evaluate import evaluate_first_order
 from warpspace.geometry.colour import colour_table, linear_to_srgb, srgb_to_linear
 from warpspace.geometry.surfaces import isoline_levels
@@ -166,9 +167,10 @@ def test_tool_point_lies_in_the_deformed_grid_and_the_tool_ends_in_it():
 
 def seen(pose, points):
     """Where points are in a picture: to the right and up, in halves of its height, and how deep."""
-    back = (pose.position - pose.look_at) / np.linalg.norm(pose.position - pose.look_at)
+    sight = np.subtract(pose.position, pose.look_at)
+    back = sight / np.linalg.norm(sight)
     right = np.cross((0, 0, 1), back) / np.linalg.norm(np.cross((0, 0, 1), back))
-    away = points - pose.position
+    away = SCENE_PER_MM * points - pose.position
     depth = -(away @ back)
     half = depth * np.tan(pose.fov_rad / 2.0)
     return away @ right / half, away @ np.cross(back, right) / half, depth, back
@@ -177,13 +179,14 @@ def seen(pose, points):
 @pytest.mark.parametrize("view", VIEWS)
 @pytest.mark.parametrize("orthographic", [False, True])
 def test_named_views_show_everything_from_their_side(view, orthographic):
-    points = np.random.default_rng(1).uniform((-3, -2, -1), (3, 2, 4), (50, 3))
-    pose = view_pose(points, Room(900.0, 600.0), CameraSetup(view, orthographic))
+    points = np.random.default_rng(1).uniform((-300, -200, -100), (300, 200, 400), (50, 3))
+    room, stand = Room(900.0, 600.0), CameraSetup(view, orthographic)
+    pose = fit_camera(points, room.aspect, VIEWS[view], stand.fov_deg, margins=room.margins)
     x, y, depth, back = seen(pose, points)
     assert back == pytest.approx(np.array(VIEWS[view]) / np.linalg.norm(VIEWS[view]), abs=1e-9)
     assert np.abs(y).max() <= 1.0
     assert np.abs(x).max() <= 1.5
-    near, far = clipping(pose.position, points, orthographic=orthographic)
+    near, far = clipping(pose.position, SCENE_PER_MM * points, orthographic=orthographic)
     assert near < depth.min() < depth.max() < far
 
 
@@ -256,6 +259,18 @@ def test_camera_sees_every_point_beside_what_is_written(aspect, top, bottom, rig
     assert x.max() <= (1.02 - 2 * right) * aspect
     assert y.min() >= -1.02 + 2 * bottom
     assert y.max() <= 1.02 - 2 * top
+
+
+def test_arrows_run_from_foot_to_tip_and_shrink_to_a_point():
+    foot = np.array([[1.0, 2.0, 3.0], [5.0, 5.0, 5.0], [0.0, 0.0, 0.0]])
+    tip = foot + np.array([[30.0, 0.0, 0.0], [0.1, 0.2, 0.0], [0.0, 0.0, 0.0]])
+    found = arrows(foot, tip, 10.0).reshape(-1, 3, 2, 3)  # shafts, and strokes of heads
+    np.testing.assert_array_equal(found[0], np.stack([foot, tip], axis=1))
+    assert (found[1:, :, 1] == tip).all()
+    length, back = (np.linalg.norm(tip - at, axis=-1) for at in (foot, found[1:, :, 0]))
+    assert back[:, 0] == pytest.approx(np.hypot(10.0, 3.0))
+    assert (back[:, 1] < length[1]).all()
+    assert (found[:, 2] == 0.0).all()
 
 
 COARSE = replace(START, nodes=9)

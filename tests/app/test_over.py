@@ -18,10 +18,9 @@ from warpspace.app.state.app_state import start_state
 from warpspace.app.state.comparison import NOBODY, Side
 from warpspace.app.tasks.controls import ComparePart, ControlsPart, chosen_map
 from warpspace.app.tasks.over import ComparedPart, HeadPart
-from warpspace.app.viewport.camera import CameraMemory, fit_camera
+from warpspace.app.viewport.camera import CameraSetup, fit_camera
+from warpspace.app.viewport.colours import colour_levels
 from warpspace.app.viewport.labels import axes, point_labels
-from warpspace.app.viewport.tab_camera import CameraSetup
-from warpspace.app.viewport.tone_map import colour_levels
 from warpspace.exceptions import SceneError
 from warpspace.scene.library import parse_scene
 from warpspace.scene.save import scene_to_toml
@@ -150,10 +149,7 @@ def test_titles_are_escaped_wherever_they_lie_over_the_drawing():
 
 def test_a_picture_of_the_view_has_words_where_the_camera_saw_their_points():
     picture = LIVE.evaluate(START)
-    pose = fit_camera(picture.drawn_mm.reshape(-1, 3), 1.4, margins=(0.2, 0.2, 0.2, 0.2))
-    camera = CameraMemory(
-        tuple(0.01 * pose.position), tuple(0.01 * pose.look_at), (0.0, 0.0, 1.0), pose.fov_rad
-    )
+    camera = fit_camera(picture.drawn_mm, 1.4, margins=(0.2, 0.2, 0.2, 0.2))
     pixels = np.full((500, 700, 4), 255, np.uint8)
     plain, worded = (
         np.asarray(Image.open(BytesIO(view_png(pixels, picture, None, seen)))).astype(int)

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from app.parts import lone_part
 from random_scenes import scenes
 from warpspace import to_pyvista
-from warpspace.app.browser.room import Room
 from warpspace.app.documents.legend import kept_words, legend_html, numbers_words, subject_words
 from warpspace.app.documents.offline_page import build_offline_html, offline_picture
 from warpspace.app.evaluation.budget import pick, with_picked
@@ -26,13 +25,12 @@ from warpspace.app.state.picked import Picked
 from warpspace.app.tasks.machine import ConventionsSection
 from warpspace.app.tasks.rotary import circles
 from warpspace.app.tasks.understand import WorstPart
-from warpspace.app.viewport.layers.annotations import AnnotationsLayer
-from warpspace.app.viewport.layers.asked_point import AskedPointLayer
-from warpspace.app.viewport.layers.axes import AxesLayer, axes_room_mm
-from warpspace.app.viewport.layers.box import BoxLayer, OtherSideLayer, ghost_dashes
-from warpspace.app.viewport.layers.machine import MachineLayer
-from warpspace.app.viewport.layers.traces import TracesLayer
-from warpspace.app.viewport.tab_camera import VIEWS, CameraSetup, view_pose
+from warpspace.app.viewport.around import around, words
+from warpspace.app.viewport.box import box, ghost_dashes
+from warpspace.app.viewport.camera import VIEWS, fit_camera
+from warpspace.app.viewport.labels import axes_room_mm
+from warpspace.app.viewport.machine import machine
+from warpspace.app.viewport.shapes import Nodes
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
 from warpspace.outputs.exports.fields import build_vts
@@ -40,15 +38,6 @@ from warpspace.outputs.exports.meshes import build_glb
 from warpspace.picture.mesh import edge_pieces, grid_pieces, isoline_pieces, line_mesh, map_mesh
 from warpspace.picture.model import evaluate_picture
 
-LAYERS = (
-    BoxLayer,
-    TracesLayer,
-    AxesLayer,
-    AnnotationsLayer,
-    OtherSideLayer,
-    MachineLayer,
-    AskedPointLayer,
-)  # fmt: skip
 SLOW = settings(
     derandomize=True,
     deadline=None,
@@ -95,12 +84,12 @@ def states(draw):
 def test_every_state_has_a_finite_picture(server, state):
     picture = LiveModel().evaluate(state)
     _check_finite(picture)
-    for layer in LAYERS:
-        layer(server.scene, picture)
-    for view in VIEWS:
-        pose = view_pose(axes_room_mm(picture), Room(1600.0, 1000.0), CameraSetup(view))
-        assert np.isfinite(pose.position).all()
-        assert math.dist(pose.position, pose.look_at) > 0.0
+    shapes = {**box(picture), **around(picture), **words(picture), **machine(picture, {})}
+    Nodes(server.scene).draw(shapes)
+    for view in VIEWS.values():
+        place = fit_camera(axes_room_mm(picture), 1.6, view)
+        assert np.isfinite(place.position).all()
+        assert math.dist(place.position, place.look_at) > 0.0
 
 
 def _check_finite(picture):

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from warpspace.app.evaluation.budget import pick_point, pick_surface
-from warpspace.app.viewport.marks import build_arrows, corner_arrows, scale_bars, worst_point
 from warpspace.geometry.colour import build_scale
 from warpspace.geometry.surfaces import (
     box_edges,
@@ -21,7 +20,6 @@ from warpspace.geometry.surfaces import (
     thicken,
     triangulate,
 )
-from warpspace.units import MM_PER_UM
 
 
 @pytest.fixture
@@ -29,60 +27,6 @@ def box():
     """Nodes of a 200 × 100 × 50 mm box about the origin."""
     axes = [np.linspace(-half, half, count) for half, count in ((100, 5), (50, 3), (25, 4))]
     return np.stack(np.meshgrid(*axes, indexing="ij"), -1)
-
-
-def test_arrows_run_from_nominal_to_drawn_corner(box):
-    error = np.zeros_like(box)
-    error[-1, -1, -1] = (3.0, 4.0, 12.0)
-    arrows = corner_arrows(box.shape[:3], box, error, 1000.0)
-    assert arrows.start_mm.shape == (8, 3)
-    at = int(np.argmax(arrows.norm_um))
-    assert arrows.start_mm[at] == pytest.approx((100, 50, 25))
-    assert arrows.end_mm[at] == pytest.approx((103, 54, 37))
-    assert arrows.texts[at] == "13.0 µm"
-    assert sorted(arrows.texts)[:7] == ["0.0 µm"] * 7
-
-
-def test_worst_point_is_the_largest_magnitude(box):
-    values = np.zeros(box.shape[:3])
-    values[1, 2, 3], values[2, 0, 0] = -7.0, 6.0
-    found = worst_point(values, box, box + 1.0)
-    assert found.value == -7.0
-    assert found.nominal_mm == pytest.approx(box[1, 2, 3])
-    assert found.drawn_mm == pytest.approx(box[1, 2, 3] + 1.0)
-
-
-@pytest.mark.parametrize("factor", [1.0, 37.0, 1000.0, 1e6])
-def test_scale_bars_are_round_and_fit(factor):
-    geometry, error = scale_bars(550.0, factor)
-    assert geometry.length == geometry.drawn_mm == 100.0
-    assert error.drawn_mm == pytest.approx(error.length * MM_PER_UM * factor)
-    for bar in (geometry, error):
-        assert float(f"{bar.length:e}".split("e")[0]) in {1.0, 2.0, 5.0}
-        assert 550 / 4 / 2.5 <= bar.drawn_mm <= 550 / 4
-    assert error.text == {1.0: "100 mm", 37.0: "2000 µm", 1000.0: "100 µm", 1e6: "0.1 µm"}[factor]
-
-
-def volume(vertices, triangles):
-    a, b, c = (vertices[triangles[:, i]] for i in range(3))
-    return float(np.sum(a * np.cross(b, c)) / 6.0)
-
-
-@pytest.mark.parametrize("end", [(30, 0, 0), (0, -30, 0), (0, 0, 30), (10, 20, -5), (0.1, 0, 0)])
-def test_arrow_runs_from_start_to_end_right_side_out(end):
-    start = np.array([[1.0, 2.0, 3.0]])
-    tip = start + np.array([end], dtype=float)
-    vertices, triangles = build_arrows(start, tip, 1.0, 10.0)
-    along = (tip - start)[0] / np.linalg.norm(tip - start)
-    reach = (vertices - start) @ along
-    assert reach.min() == pytest.approx(0.0, abs=1e-12)
-    assert reach.max() == pytest.approx(np.linalg.norm(tip - start))
-    assert volume(vertices - start, triangles) > 0.0
-    directed = {(int(t[i]), int(t[(i + 1) % 3])) for t in triangles for i in range(3)}
-    assert len(directed) == 3 * len(triangles)
-    assert directed == {(b, a) for a, b in directed}  # closed
-    point, _ = build_arrows(start, start, 1.0, 10.0)
-    assert point == pytest.approx(np.tile(start, (len(point), 1)))
 
 
 SHAPE = (5, 7, 9)

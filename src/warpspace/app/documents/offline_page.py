@@ -39,13 +39,11 @@ from warpspace.app.evaluation.budget import active_errors, answer
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import start_state
+from warpspace.app.viewport.around import around, words
+from warpspace.app.viewport.box import box
 from warpspace.app.viewport.camera import CameraMemory, fit_camera
-from warpspace.app.viewport.layers.adding import light_scene
-from warpspace.app.viewport.layers.annotations import AnnotationsLayer, LabelsLayer
-from warpspace.app.viewport.layers.asked_point import AskedPointLayer
-from warpspace.app.viewport.layers.axes import AxesLayer, axes_room_mm
-from warpspace.app.viewport.layers.box import BoxLayer, OtherSideLayer
-from warpspace.app.viewport.layers.traces import TracesLayer
+from warpspace.app.viewport.labels import axes_room_mm
+from warpspace.app.viewport.shapes import Nodes, light_scene
 from warpspace.field.grid import MIN_NODES
 from warpspace.geometry.surfaces import is_thin
 from warpspace.kinematics.model import Loop
@@ -68,14 +66,6 @@ POLICY = (
     " connect-src data: blob:; worker-src blob: data:; frame-src 'self'"
 )
 """What the browser may load: what is in the file, and nothing else."""
-LAYERS = (
-    TracesLayer,
-    AxesLayer,
-    OtherSideLayer,
-    AskedPointLayer,
-    AnnotationsLayer,
-    LabelsLayer,
-)
 FEW = 12  # errors that are listed at once
 ASPECT = 1.5
 MARGIN = 1.3  # room around the box, for the axes beside it
@@ -112,9 +102,7 @@ def build_scene_html(picture: LivePicture, camera: CameraMemory | None = None) -
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         try:
             light_scene(server.scene)
-            BoxLayer(server.scene, picture)
-            for layer in LAYERS:
-                layer(server.scene, picture)
+            Nodes(server.scene).draw({**box(picture), **around(picture), **words(picture)})
             kept, first = camera or _fitted(picture), server.initial_camera
             first.up, first.fov = kept.up, kept.fov_rad
             first.position, first.look_at = kept.position, kept.look_at
@@ -127,7 +115,7 @@ def _fitted(picture: LivePicture) -> CameraMemory:
     drawn = np.concatenate([picture.grid.nominal_mm, picture.drawn_mm]).reshape(-1, 3)
     if is_thin(picture.shape):
         drawn = np.concatenate([drawn, axes_room_mm(picture)])
-    return fit_camera(drawn, ASPECT, margin=MARGIN).drawn
+    return fit_camera(drawn, ASPECT, margin=MARGIN)
 
 
 def build_offline_html(

@@ -14,11 +14,11 @@ from warpspace.app.documents.legend import marks
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.viewport.camera import CameraMemory
 from warpspace.app.viewport.labels import axis_labels, point_labels
-from warpspace.app.viewport.layers import SCENE_PER_MM
-from warpspace.app.viewport.marks import scale_bars
+from warpspace.app.viewport.shapes import SCENE_PER_MM
+from warpspace.geometry.surfaces import round_down
 from warpspace.picture.words import reference_words, spell_factor
 from warpspace.resources import __version__
-from warpspace.units import Array
+from warpspace.units import MM_PER_UM, Array
 
 LIGHT, DARK = ((255, 255, 255), (27, 38, 59)), ((26, 27, 30), (222, 226, 232))
 """Ground and ink."""
@@ -164,15 +164,15 @@ def _seen(camera: CameraMemory, points: Array, size: tuple[int, int]) -> Array:
 def _scale_bars(
     draw: ImageDraw.ImageDraw, picture: LivePicture, px_per_mm: float, ink: tuple[int, int, int]
 ) -> None:
-    # the longest bar is a quarter of the length that is handed over
-    bars = scale_bars(4.0 * BAR_PX / px_per_mm, picture.exaggeration)
+    room, um_mm = BAR_PX / px_per_mm, MM_PER_UM * picture.exaggeration
+    mm, um = round_down(room), round_down(room / um_mm)
+    error = f"{um:g} µm" if um < 1e4 else f"{um * MM_PER_UM:g} mm"
     factor = spell_factor(picture.exaggeration).replace("\u202f", " ")
-    words = ("geometry", f"error, drawn {factor}")
-    height = draw.im.size[1]
-    for number, (bar, word) in enumerate(zip(bars, words, strict=True)):
-        y = height - 18 - (1 - number) * BAR_STEP_PX
-        end = BAR_LEFT_PX + bar.drawn_mm * px_per_mm
+    rows = ((um * um_mm, f"{error} error, drawn {factor}"), (mm, f"{mm:g} mm geometry"))
+    for number, (length, words) in enumerate(rows):
+        y = draw.im.size[1] - 18 - number * BAR_STEP_PX
+        end = BAR_LEFT_PX + length * px_per_mm
         draw.line([(BAR_LEFT_PX, y), (end, y)], ink, 2)
         for x in (BAR_LEFT_PX, end):
             draw.line([(x, y - 6), (x, y)], ink, 2)
-        draw.text((end + 8, y - 13), f"{bar.text} {word}", ink, _font(14))
+        draw.text((end + 8, y - 13), words, ink, _font(14))

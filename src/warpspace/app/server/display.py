@@ -12,7 +12,7 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.store import Update
 from warpspace.app.tasks.parts import Part
 from warpspace.app.tasks.window import Window
-from warpspace.app.viewport.layers import Layer
+from warpspace.app.viewport.shapes import Layer
 
 PAUSE_S = 0.1
 """Pause in the changes after which parts follow: longer than between two moves of a drag."""

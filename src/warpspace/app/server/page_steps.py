@@ -17,9 +17,9 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.server.display import Display
 from warpspace.app.tasks.catalogue import build_parts
 from warpspace.app.tasks.context import Context
-from warpspace.app.viewport.layers import SCENE_PER_MM, Layer
-from warpspace.app.viewport.layers.box import BoxLayer
-from warpspace.app.viewport.layers.moving import MovingLayer, draw_around
+from warpspace.app.viewport.box import BoxLayer
+from warpspace.app.viewport.moving import MovingLayer
+from warpspace.app.viewport.shapes import SCENE_PER_MM, Layer
 
 # --- What a click in the drawing means ------------------------------------------------------------
 # A question why, or the choice of a reference point.
@@ -122,10 +122,10 @@ class PageSteps:
             page.call("stage", "open")
 
     def _draw_box(self, picture: LivePicture) -> Sequence[Layer]:
-        return [BoxLayer(self._context.client.scene, picture, self._context.page)]
+        return [BoxLayer(self._context.client.scene, self._context.page, picture)]
 
     def _draw_around(self, picture: LivePicture) -> Sequence[Layer]:
         context = self._context
         context.stage = MovingLayer(context.client, picture, context.act)
         Pointing(context)
-        return [*draw_around(context.client.scene, picture), context.stage]
+        return [context.stage]

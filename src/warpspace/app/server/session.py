@@ -6,8 +6,8 @@ The way of a slider move:
 2. here, `_follow`: the event's part (`tasks/parts.py`) says what it does to the state,
 3. which is applied (`state/store.py`) and
 4. evaluated (`evaluation/evaluate.py`);
-5. all that shows the picture follows (`server/display.py`): layers (`viewport/layers/`) assign to
-   viser's handles, parts write pieces of HTML; what has not changed is not sent.
+5. all that shows the picture follows (`server/display.py`): layers (`viewport/`) change viser's
+   nodes in place, parts write pieces of HTML; what has not changed is not sent.
 
 The session reads the last position of a slider when it gets there, so that is always what is shown,
 however fast the slider was moved.
@@ -35,7 +35,7 @@ from warpspace.app.server.tab_memory import TabRecord, new_token
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.store import StateStore, apply_each
 from warpspace.app.tasks.context import Context
-from warpspace.app.viewport.tab_camera import focus
+from warpspace.app.viewport.camera import focus
 
 logger = logging.getLogger(__name__)
 TOKEN_WAIT_S = 0.25  # how long the first picture waits for a tab that may have been here before

@@ -34,8 +34,8 @@ from warpspace.app.server.session import Session
 from warpspace.app.server.tab_memory import TabMemory, TabRecord, is_token, new_token
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.store import StateStore
-from warpspace.app.viewport.layers.adding import light_scene
-from warpspace.app.viewport.layers.box import surface_glb
+from warpspace.app.viewport.box import surface_glb
+from warpspace.app.viewport.shapes import light_scene
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 

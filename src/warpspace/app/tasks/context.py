@@ -22,9 +22,8 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.picked import Picked
 from warpspace.app.state.store import StateStore, Update
-from warpspace.app.viewport.camera import CameraMemory
-from warpspace.app.viewport.layers.moving import MovingLayer
-from warpspace.app.viewport.tab_camera import TabCamera
+from warpspace.app.viewport.camera import CameraMemory, TabCamera
+from warpspace.app.viewport.moving import MovingLayer
 
 if TYPE_CHECKING:
     from warpspace.analysis.description import Result

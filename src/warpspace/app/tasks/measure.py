@@ -38,7 +38,8 @@ from warpspace.app.tasks.charts import block_html
 from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.forms import form_html, read_form
 from warpspace.app.tasks.parts import Section
-from warpspace.app.viewport.layers.residuals import ResidualsLayer
+from warpspace.app.viewport.around import residuals
+from warpspace.app.viewport.shapes import Nodes
 from warpspace.bench.base import BenchResult, bench_names, find_test, run_test
 from warpspace.bench.data import parse_table as parse_test
 from warpspace.calibration.calibrate import Calibrate
@@ -315,7 +316,7 @@ class CalibratePart(AnalysisPart):
         self._files: tuple[Measured, ...] = ()
         self._trouble = ""
         self._kind_of_file, self._test_options, self._arrows = "", "", ""
-        self._layer: ResidualsLayer | None = None
+        self._drawn: Nodes | None = None
         self._upload = Uploaded(self, self._add, self._say)
 
     def options(self) -> Sequence[Option]:
@@ -459,19 +460,17 @@ class CalibratePart(AnalysisPart):
         if any(not axis.is_linear for axis in found.scene.machine.branch("workpiece")):
             self._hide()
             return TURNED
-        if self._layer is None:
-            self._layer = ResidualsLayer(self.context.client.scene)
+        self._drawn = self._drawn or Nodes(self.context.client.scene)
         before = self._arrows == "before"
-        factor = self._layer.show(
-            *arrows_of(found, before=before), size_mm=picture.size_mm, before=before
-        )
+        shapes, factor = residuals(*arrows_of(found, before=before), picture.size_mm, before=before)
+        self._drawn.draw(shapes)
         if not factor:
             return "No arrows: none of these readings is a vector."
         return f"Residuals {self._arrows}, drawn × {factor:g}"
 
     def _hide(self) -> None:
-        if self._layer is not None:
-            self._layer.hide()
+        if self._drawn is not None:
+            self._drawn.draw({})
 
 
 def arrows_of(found: Calibration, *, before: bool) -> tuple[Array, Array]:

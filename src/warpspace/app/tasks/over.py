@@ -21,7 +21,7 @@ from warpspace.app.state.comparison import SHOWN
 from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.parts import Part
 from warpspace.app.viewport.labels import Label, axis_labels, point_labels
-from warpspace.app.viewport.layers import SCENE_PER_MM
+from warpspace.app.viewport.shapes import SCENE_PER_MM
 from warpspace.geometry.surfaces import corners
 from warpspace.machine.axes import is_linear
 from warpspace.picture.mesh import isoline_labels

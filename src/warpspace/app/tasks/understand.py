@@ -112,10 +112,8 @@ class WorstPart(Section):
             return
         points = np.concatenate([picture.drawn_mm.reshape(-1, 3), np.stack(origins)])
         room = self.context.camera.room
-        pose = fit_camera(
-            points, room.aspect, fov_deg=float(np.rad2deg(camera.fov_rad)), margins=room.margins
-        )  # fmt: skip
-        self.context.look_from(pose.drawn)
+        fov = float(np.rad2deg(camera.fov_rad))
+        self.context.look_from(fit_camera(points, room.aspect, fov_deg=fov, margins=room.margins))
 
 
 def _length(found: Answer) -> float:

@@ -1,54 +1,78 @@
-"""Where the camera stands: seen from the operator's side, so that what is drawn fills its room."""
+"""The camera of a tab: seen from the operator's side, so that what is drawn fills its room."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from viser import ClientHandle
 
-from warpspace.app.viewport.layers import SCENE_PER_MM
-from warpspace.picture.model import VIEWS, Direction
+from warpspace.app.browser.room import PHONE_PX, PHONE_SHARE, TOP_PX, Room, column_widths
+from warpspace.app.evaluation.cache import Identity
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.evaluation.machine import machine_room_mm
+from warpspace.app.state.app_state import AppState
+from warpspace.app.viewport.labels import axes_room_mm
+from warpspace.app.viewport.shapes import SCENE_PER_MM
+from warpspace.picture import model
+from warpspace.picture.model import Direction
 from warpspace.units import Array
 
 FOV_DEG = 22.0  # vertical field of view: long enough that parallel edges look parallel
+TELEPHOTO_DEG = 3.0  # stands in for an orthographic camera, which viser has not
 MARGIN = 1.06
+NEAR, FAR = 0.01, 1000.0
+"""Clipping planes of the usual camera, scene units."""
+STEEPEST = 1e-3
+"""How far the view from above leans to the front: exactly above, an orbiting camera has no up."""
+VIEWS: Mapping[str, Direction] = {**model.VIEWS, "top": (0.0, -STEEPEST, 1.0)}
+"""From what is looked at towards the camera."""
+LEAST_SIZE = 120  # CSS pixels of a picture that is taken to be one
+MOVED = 1e-3
+"""How far from where it was put, as a part of its distance, a camera has been moved by hand."""
 _ROUNDS = 8
 Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
+class CameraSetup:
+    """How the camera is set up."""
+
+    view: str = "iso"  # A key of `VIEWS`
+    orthographic: bool = False  # whether it is the telephoto
+
+    @property
+    def fov_deg(self) -> float:
+        """Vertical field of view, degrees."""
+        return TELEPHOTO_DEG if self.orthographic else FOV_DEG
+
+
+@dataclass(frozen=True, slots=True)
 class CameraMemory:
-    """Where a tab's camera stood, in units of the drawing."""
+    """Where a camera stands, in units of the drawing."""
 
     position: Vector
     look_at: Vector
     up: Vector
     fov_rad: float
 
-
-@dataclass(frozen=True, slots=True)
-class CameraPose:
-    """Position and target of a camera, [3], in the unit of the points it was fitted to."""
-
-    position: Array
-    look_at: Array
-    fov_rad: float
-
-    @property
-    def drawn(self) -> CameraMemory:
-        """The same in units of the drawing, where it was fitted to millimetres."""
-        (x, y, z), (a, b, c) = (SCENE_PER_MM * self.position, SCENE_PER_MM * self.look_at)
-        return CameraMemory((x, y, z), (a, b, c), (0.0, 0.0, 1.0), self.fov_rad)
+    def is_near(self, other: "CameraMemory") -> bool:
+        """Tell whether nobody has moved it from there by hand."""
+        least = MOVED * float(np.linalg.norm(np.subtract(self.position, self.look_at)))
+        ends = (self.position, other.position), (self.look_at, other.look_at)
+        moved = max(float(np.linalg.norm(np.subtract(one, two))) for one, two in ends)
+        return moved <= least and abs(self.fov_rad - other.fov_rad) < MOVED
 
 
 def fit_camera(
-    points: Array,
+    points_mm: Array,
     aspect: float,
     direction: Direction = VIEWS["iso"],
     fov_deg: float = FOV_DEG,
     margin: float = MARGIN,
     margins: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
-) -> CameraPose:
+) -> CameraMemory:
     """Place a camera so that points fill the picture but its margins: left, right, top, bottom."""
-    flat = points.reshape(-1, 3)
+    flat = points_mm.reshape(-1, 3) * SCENE_PER_MM
     back = np.asarray(direction, dtype=float) / np.linalg.norm(direction)
     right = np.cross((0.0, 0.0, 1.0), back)
     right = right / np.linalg.norm(right)
@@ -68,4 +92,120 @@ def fit_camera(
         shift = (at.min(axis=0) + at.max(axis=0)) / 2.0 - middle
         offset = middle * distance
         target = target + distance * (shift[0] * right + shift[1] * up)
-    return CameraPose(target + distance * back, target, float(np.deg2rad(fov_deg)))
+    position, look_at = (target + distance * back).tolist(), target.tolist()
+    return CameraMemory(tuple(position), tuple(look_at), (0.0, 0.0, 1.0), np.deg2rad(fov_deg))
+
+
+def clipping(position: Array, points: Array, *, orthographic: bool) -> tuple[float, float]:
+    """Choose near and far planes, as distances from a camera."""
+    distance = float(np.linalg.norm(position - points.reshape(-1, 3), axis=-1).max())
+    return (0.02 * distance if orthographic else NEAR), max(FAR, 5.0 * distance)
+
+
+def focus(state: AppState) -> tuple[object, ...]:
+    """Tell what the camera is set up for: the scene, its axes, whether its machine is shown."""
+    return Identity(state.origin), state.scene.machine.chain, state.machine.shown
+
+
+class TabCamera:
+    """The camera of a tab: put where all of the box is seen, remembered, put back."""
+
+    def __init__(self, client: ClientHandle) -> None:
+        self._camera = client.camera
+        self.wanted: CameraMemory | None = None
+        self.page_width: float | None = None
+        self.stand = CameraSetup()  # named view and lens that were chosen last
+        self._told: Room | None = None
+        self._put: CameraMemory | None = None
+
+    def choose(
+        self, picture: LivePicture, view: str | None = None, lens: bool | None = None
+    ) -> None:
+        """Take a named view, or another lens from where the camera stands."""
+        before = self.stand
+        orthographic = before.orthographic if lens is None else lens
+        self.stand = CameraSetup(view or before.view, orthographic)
+        if view is not None or lens is None:
+            self.fit(picture)
+        elif orthographic != before.orthographic:
+            self._change_lens(picture)
+
+    def _change_lens(self, picture: LivePicture) -> None:
+        """Move along the line of sight so that what is looked at keeps its size."""
+        now, fov = self.remember(), float(np.deg2rad(self.stand.fov_deg))
+        ratio = float(np.tan(now.fov_rad / 2.0) / np.tan(fov / 2.0))
+        look_at = np.array(now.look_at)
+        x, y, z = (look_at + ratio * (now.position - look_at)).tolist()
+        self._stand_at(CameraMemory((x, y, z), now.look_at, now.up, fov), self._room_mm(picture))
+
+    def _room_mm(self, picture: LivePicture) -> Array:
+        """Give points around all that is to be seen, mm."""
+        shown = picture.state.machine.shown
+        room = machine_room_mm(picture) if shown else axes_room_mm(picture)
+        return np.concatenate([room, picture.drawn_mm.reshape(-1, 3)])
+
+    @property
+    def room(self) -> Room:
+        """The room of the drawing: as the page has said, until then as its panels will leave it."""
+        if self._told is not None:
+            return self._told
+        camera = self._camera
+        width = self.page_width or camera.image_width
+        high = camera.image_height * (PHONE_SHARE if width <= PHONE_PX else 1.0) - TOP_PX
+        return Room(max(width - sum(column_widths(width)), LEAST_SIZE), max(high, LEAST_SIZE))
+
+    def take_room(self, room: Room, picture: LivePicture) -> bool:
+        """Take note of the drawing's room; a camera that nobody has moved fills it again."""
+        self._told = room
+        if self._put is None or not self._put.is_near(self.remember()):
+            return False
+        self.fit(picture)
+        return True
+
+    def place(self, picture: LivePicture) -> None:
+        """Put it where it is wanted, else where all of the box is seen."""
+        memory, self.wanted = self.wanted, None
+        if memory is None:
+            self.fit(picture)
+            return
+        telephoto = memory.fov_rad < np.deg2rad(2.0 * TELEPHOTO_DEG)
+        self.stand, self._put = CameraSetup(self.stand.view, bool(telephoto)), None
+        self._stand_at(memory, np.array([memory.look_at]) / SCENE_PER_MM)
+
+    def fit(self, picture: LivePicture) -> None:
+        """Fill the room between the panels with the box, its traces and axes."""
+        points, room, stand = self._room_mm(picture), self.room, self.stand
+        found = fit_camera(
+            points, room.aspect, VIEWS[stand.view], stand.fov_deg, margins=room.margins
+        )
+        self._stand_at(found, points)
+        self._put = self.remember()
+
+    def px_per_mm(self, picture: LivePicture, height: float) -> float | None:
+        """Give how long a millimetre across the line of sight is, in the middle of the volume."""
+        camera = self._camera
+        sight = camera.look_at - camera.position
+        away = picture.grid.bounds_mm.mean(axis=0) * SCENE_PER_MM - camera.position
+        depth = float(away @ sight) / float(np.linalg.norm(sight))
+        if depth <= 0.0 or not picture.state.look.bars:
+            return None
+        return height / (2.0 * float(np.tan(camera.fov / 2.0)) * depth) * SCENE_PER_MM
+
+    def remember(self) -> CameraMemory:
+        """Give where it stands."""
+        camera = self._camera
+        return CameraMemory(
+            tuple(camera.position.tolist()),
+            tuple(camera.look_at.tolist()),
+            tuple(camera.up_direction.tolist()),
+            camera.fov,
+        )
+
+    def _stand_at(self, place: CameraMemory, points_mm: Array) -> None:
+        camera, points = self._camera, points_mm * SCENE_PER_MM
+        camera.near, camera.far = clipping(
+            np.array(place.position), points, orthographic=self.stand.orthographic
+        )
+        camera.up_direction, camera.fov = place.up, place.fov_rad
+        camera.position = place.position
+        camera.look_at = place.look_at  # the former takes it along

@@ -5,19 +5,22 @@ The page places them as the camera moves (`browser/room.js`); an offline page ha
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from warpspace.app.evaluation.bench import BenchPicture
 from warpspace.app.evaluation.budget import answer
+from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import tool_point
 from warpspace.app.evaluation.rotation import chosen_trace, moved_traces
-from warpspace.app.viewport.marks import corner_arrows, spell_micrometres, worst_point
+from warpspace.field.grid import Grid
 from warpspace.geometry.colour import tick_values
+from warpspace.geometry.surfaces import corners, is_thin
 from warpspace.machine.axes import is_linear, parameter
 from warpspace.picture.words import list_axes, own_axes, spell_coordinate, spell_factor
-from warpspace.units import MICROMETRE, Array
+from warpspace.units import MICROMETRE, MINUS, MM_PER_UM, Array
 
 AWAY = 0.13
 """Distance of the axes from the nominal box, as a part of the longest edge: the bend has room."""
@@ -49,9 +52,13 @@ class Axis:
 
 def axes(picture: LivePicture) -> tuple[Axis, ...]:
     """Lay out the axes: X along the front, Y along the right, Z up the left of the front."""
-    grid, longest = picture.grid, picture.size_mm
+    return _axes(Identity(picture.grid), AWAY * picture.size_mm)
+
+
+@lru_cache(maxsize=32)
+def _axes(of: Identity, away: float) -> tuple[Axis, ...]:
+    grid: Grid = of.thing
     low, high = grid.bounds_mm
-    away = AWAY * longest
     frames = (
         (np.array([0.0, low[1] - away, low[2]]), np.array([0.0, -1.0, 0.0])),
         (np.array([high[0] + away, 0.0, low[2]]), np.array([1.0, 0.0, 0.0])),
@@ -78,6 +85,18 @@ def axes(picture: LivePicture) -> tuple[Axis, ...]:
     return tuple(found)
 
 
+def axes_room_mm(picture: LivePicture) -> Array:
+    """Give points around the nominal box that leave room for axes and traces, [n, 3], mm."""
+    low, high = picture.grid.bounds_mm
+    away = (AWAY + TICK) * picture.size_mm
+    x, y, z = (low[0] - away, high[0] + away), (low[1] - away, high[1]), (low[2], high[2])
+    room = [np.stack(np.meshgrid(x, y, z), axis=-1)]
+    if is_thin(picture.shape):
+        # what there is to see of a machine with one linear axis or none are its traces
+        room += [at for of in picture.traces for at in (of.nominal_mm, of.actual_mm)]
+    return np.concatenate([points.reshape(-1, 3) for points in room])
+
+
 def axis_labels(picture: LivePicture) -> list[Label]:
     """Give names and numbers of the axes."""
     state = picture.state
@@ -92,40 +111,45 @@ def axis_labels(picture: LivePicture) -> list[Label]:
     return found
 
 
+def worst_node(picture: LivePicture) -> int:
+    """Give the flat number of the node where what is coloured is largest in magnitude."""
+    return int(np.argmax(np.abs(picture.values)))
+
+
+def _spell(value: float, unit: str = MICROMETRE) -> str:
+    """Spell an error: ``23.6 µm``, from 10 mm up ``12.3 mm``."""
+    if unit == MICROMETRE and abs(value) >= 1e4:
+        value, unit = value * MM_PER_UM, "mm"
+    return f"{value:.1f} {unit}".replace("-", MINUS)
+
+
 def point_labels(picture: LivePicture) -> list[Label]:
     """Give what is written beside points of the volume, what matters most first."""
     return [*_worst(picture), *_asked(picture), *_names(picture), *_corners(picture)]
 
 
 def _worst(picture: LivePicture) -> Iterator[Label]:
-    found = worst_point(picture.values, picture.grid.nominal_mm, picture.drawn_mm)
-    if picture.state.look.worst and found.value != 0.0:
-        unit = picture.scale.unit
-        value = (
-            spell_micrometres(found.value)
-            if unit == MICROMETRE
-            else f"{found.value:.1f} {unit}".replace("-", "−")
-        )
-        yield Label(f"max {value}", found.drawn_mm, "worst")
+    worst = worst_node(picture)
+    value = float(picture.values.flat[worst])
+    if picture.state.look.worst and value != 0.0:
+        text = f"max {_spell(value, picture.scale.unit)}"
+        yield Label(text, picture.drawn_mm.reshape(-1, 3)[worst], "worst")
 
 
 def _corners(picture: LivePicture) -> Iterator[Label]:
     look = picture.state.look
     if not look.arrows:
         return
-    arrows = corner_arrows(
-        picture.grid.shape, picture.grid.nominal_mm, picture.field.error_um, picture.exaggeration
-    )
     says_max = look.worst and not look.tilts and picture.state.component == "norm"
-    worst = worst_point(picture.values, picture.grid.nominal_mm, picture.drawn_mm)
-    for text, start, end in zip(arrows.texts, arrows.start_mm, arrows.end_mm, strict=True):
-        if not (says_max and np.allclose(start, worst.nominal_mm)):
-            yield Label(text, end, "corner")
+    for node in corners(picture.shape):
+        if not (says_max and node == worst_node(picture)):
+            text = _spell(float(picture.field.norm_um.flat[node]))
+            yield Label(text, picture.drawn_mm.reshape(-1, 3)[node], "corner")
 
 
 def _asked(picture: LivePicture) -> Iterator[Label]:
     picked, state = picture.state.picked, picture.drawn_state
-    if picked is None or (picture.compared is not None and picture.is_difference):
+    if picked is None or picture.is_difference:
         return
     found = answer(state, picked, picture.exaggeration)
     length = float(np.linalg.norm(found.drawn_um))
@@ -146,7 +170,7 @@ def _names(picture: LivePicture) -> Iterator[Label]:
     state, found = picture.state, picture.bench
     if isinstance(found, BenchPicture) and state.bench.path:
         ends = np.concatenate([other for _, other in found.lines_mm(picture.exaggeration)])
-        words = f"{found.prepared.test.title}: max {spell_micrometres(found.largest_um)}"
+        words = f"{found.prepared.test.title}: max {_spell(found.largest_um)}"
         factor = spell_factor(picture.exaggeration)
         yield Label(f"{words}, drawn {factor}", ends[np.argmax(ends[:, 2])])
     moved = moved_traces(picture)
@@ -154,9 +178,9 @@ def _names(picture: LivePicture) -> Iterator[Label]:
     if name:
         lengths = np.linalg.norm(moved[name].error_um, axis=-1)
         worst = int(np.argmax(lengths))
-        words = f"{name}: max {spell_micrometres(float(lengths[worst]))}"
+        words = f"{name}: max {_spell(float(lengths[worst]))}"
         yield Label(words, moved[name].actual_mm[worst])
     if state.machine.shown:
         point = tool_point(picture)
         length = float(np.linalg.norm(point.error_um))
-        yield Label(f"tool point: {spell_micrometres(length)}", point.drawn_mm, "asked")
+        yield Label(f"tool point: {_spell(length)}", point.drawn_mm, "asked")

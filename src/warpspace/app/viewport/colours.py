@@ -1,15 +1,17 @@
-"""Colours that arrive on screen as they were meant.
+"""Colours of what is drawn, so that they arrive on screen as they were meant.
 
 viser's client tone-maps what it draws (three.js, ACES filmic). For unlit materials the curve can be
 inverted: vertices get the colour that the tone map turns into the wanted one. Some components come
 out below 0 or above 1, so they travel as floats.
 """
 
+from dataclasses import dataclass
 from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.geometry.colour import (
     LEVELS,
     ColourScale,
@@ -67,8 +69,42 @@ def colour_levels(scale: ColourScale, values: Array) -> NDArray[np.uint8]:
 
 
 @lru_cache(maxsize=64)
-def line_colour(rgb: Rgb) -> Rgb:
-    """Give the bytes for a line of one colour that is to arrive as that; near exact below 230."""
+def line_colour(rgb: Rgb) -> NDArray[np.uint8]:
+    """Give the bytes for a line that is to arrive in a colour, [3]; near exact below 230."""
     linear = np.clip(inverse_tone_map(np.array(rgb, dtype=np.uint8)), 0.0, 1.0)
-    r, g, b = (int(value) for value in np.rint(linear_to_srgb(linear.astype(float)) * 255.0))
-    return r, g, b
+    found = np.rint(linear_to_srgb(linear.astype(float)) * 255.0).astype(np.uint8)
+    found.flags.writeable = False  # the same array each time
+    return found
+
+
+# --- Colours of lines, on a light ground and on a dark one ----------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Palette:
+    """Quiet colours around the map, sRGB; only the trace that is looked at stands out."""
+
+    edge: Rgb = (24, 32, 46)
+    grid: Rgb = (24, 32, 46)
+    ghost: Rgb = (140, 150, 165)
+    trace_nominal: Rgb = (130, 139, 153)
+    trace_actual: Rgb = (206, 84, 8)
+    trace_elsewhere: Rgb = (196, 202, 211)
+    axis: Rgb = (110, 120, 135)
+
+
+LIGHT = Palette()
+DARK = Palette(
+    edge=(215, 220, 228),
+    grid=(20, 24, 32),
+    ghost=(130, 138, 150),
+    trace_nominal=(150, 158, 170),
+    trace_actual=(224, 142, 62),
+    trace_elsewhere=(84, 92, 104),
+    axis=(150, 158, 170),
+)
+
+
+def palette(picture: LivePicture) -> Palette:
+    """Choose the colours for the ground a picture is drawn on."""
+    return DARK if picture.state.shown.dark else LIGHT

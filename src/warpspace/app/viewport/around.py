@@ -1,0 +1,194 @@
+"""What is drawn on and around the box: axes, traces, paths, arrows, markers."""
+
+import numpy as np
+
+from warpspace.app.evaluation.bench import BenchPicture
+from warpspace.app.evaluation.budget import answer
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.evaluation.rotation import chosen_trace, moved_traces, points_on_traces
+from warpspace.app.viewport.colours import palette
+from warpspace.app.viewport.labels import TICK, axes, axis_labels, point_labels, worst_node
+from warpspace.app.viewport.shapes import (
+    SCENE_PER_MM,
+    Shape,
+    Shapes,
+    ball,
+    dashes,
+    dots,
+    lines,
+    polylines,
+)
+from warpspace.geometry.surfaces import corners, round_down
+from warpspace.picture.mesh import outline_pieces
+from warpspace.units import Array
+
+# --- Sizes, as parts of the longest edge of the box -----------------------------------------------
+
+HEAD, BALL = 0.034, 0.009  # of an arrow, and the marker of the worst point
+APART = 0.002  # distance from which nominal and actual trace are both drawn
+TURNED = 0.014  # diameter of a traced point while the table turns
+ASKED, AXIS_HALF, DASH = 0.011, 0.32, 0.02
+"""Marker of the point that was asked about, half the axis that turns it, dash of its lever."""
+RESIDUAL_HEAD, LONGEST_RESIDUAL = 0.025, 0.2
+
+ACCENT = (194, 24, 91)  # colour of everything that answers "why?"; it is in no colour map
+RESIDUALS = {True: (138, 143, 152), False: (47, 116, 192)}
+"""Before the calibration, and after; those of the chart."""
+MOST_RESIDUALS = 400
+HEAD_PART = 0.7  # longest head, as a part of its arrow
+STROKES, SLANT = 8, 0.3  # of a head: how many, and how far they stand away, as a part of its length
+
+
+def around(picture: LivePicture) -> Shapes:
+    """Draw all that follows the picture beside the box and the machine."""
+    draws = (_axes, _traces, _path, _other_side, _asked, _marks)
+    return {name: shape for draw in draws for name, shape in draw(picture).items()}
+
+
+def _axes(picture: LivePicture) -> Shapes:
+    if not picture.state.shown.axes or picture.state.machine.shown:
+        return {}
+    tick, found = TICK * picture.size_mm, axes(picture)
+    pieces = [axis.ends_mm for axis in found]
+    pieces += [np.stack([at, at + tick * axis.out]) for axis in found for _, at in axis.ticks]
+    return {"/axes/lines": lines(np.stack(pieces), palette(picture).axis, 1.2)}
+
+
+def _traces(picture: LivePicture) -> Shapes:
+    """Draw traces of rotary axes: one in colour, with its nominal circle; the others faint.
+
+    What no error moves is not drawn, nor what the actual trace covers of the nominal one.
+    """
+    moved = moved_traces(picture)
+    name = chosen_trace(picture, moved)
+    others = [line.actual_mm for other, line in moved.items() if other != name]
+    faint = lines(polylines(others), palette(picture).trace_elsewhere, 1.0)
+    if not name:
+        return {"/traces/others": faint}
+    nominal, actual = (polylines([at]) for at in (moved[name].nominal_mm, moved[name].actual_mm))
+    apart = np.linalg.norm(actual - nominal, axis=-1) > APART * picture.size_mm
+    nominal = nominal[apart.any(axis=-1)]
+    return {"/traces/others": faint, **_pair(picture, "/traces", nominal, actual)}
+
+
+def _path(picture: LivePicture) -> Shapes:
+    """Draw the path of the standard test that is run, with the factor of the box."""
+    found = picture.bench
+    if not isinstance(found, BenchPicture) or not picture.state.bench.path:
+        return {}
+    nominal, actual = zip(*found.lines_mm(picture.exaggeration), strict=True)
+    return _pair(picture, "/test", polylines(nominal), polylines(actual))
+
+
+def _pair(picture: LivePicture, root: str, nominal: Array, actual: Array) -> Shapes:
+    colours = palette(picture)
+    return {
+        f"{root}/nominal": lines(nominal, colours.trace_nominal, 1.5),
+        f"{root}/actual": lines(actual, colours.trace_actual, 3.0),
+    }
+
+
+def _other_side(picture: LivePicture) -> Shapes:
+    """Draw the edges of the side of a comparison that is not drawn, every second piece: dotted."""
+    other = None if picture.compared is None else picture.compared.other_mm
+    if other is None or not picture.state.comparison.ghost:
+        return {}
+    edges = outline_pieces(picture, other)[::2]
+    return {"/compare/other": lines(edges, palette(picture).edge, 2.0)}
+
+
+def _asked(picture: LivePicture) -> Shapes:
+    """Mark the point that was asked about, its displacement, axis and lever of the chosen error."""
+    picked, size = picture.state.picked, picture.size_mm
+    if picked is None or picture.is_difference:
+        return {}
+    found = answer(picture.drawn_state, picked, picture.exaggeration)
+    point = found.explanation.nominal_mm + found.shift_mm
+    shapes = {
+        "/why/marker": ball(found.drawn_mm, ASKED * size, ACCENT),
+        "/why/vector": lines(np.stack([point, found.drawn_mm])[None], ACCENT, 3.0),
+    }
+    for part in found.explanation.contributions:
+        if part.key == picture.state.lever:
+            origin, half = part.origin_mm + found.shift_mm, AXIS_HALF * size * part.direction
+            axis, lever = np.array([[origin - half, origin + half], [origin, point]])[:, None]
+            shapes["/why/axis"] = lines(axis, ACCENT, 3.5)
+            shapes["/why/lever"] = lines(dashes(lever, DASH * size, 0.6 * DASH * size), ACCENT, 2.0)
+    return shapes
+
+
+def _marks(picture: LivePicture) -> Shapes:
+    """Mark the worst node, and the displacement of the corners; their numbers are words."""
+    look, size, colour = picture.state.look, picture.size_mm, palette(picture).edge
+    shapes: dict[str, Shape | None] = {}
+    if look.arrows:
+        chosen = corners(picture.shape)
+        start, end = (
+            at.reshape(-1, 3)[chosen] for at in (picture.grid.nominal_mm, picture.drawn_mm)
+        )
+        shapes["/marks/arrows"] = lines(arrows(start, end, HEAD * size), colour, 2.0)
+    worst = worst_node(picture)
+    if look.worst and picture.values.flat[worst]:
+        at = picture.drawn_mm.reshape(-1, 3)[worst]
+        shapes["/marks/ball"] = ball(at, BALL * size, colour)
+    return shapes
+
+
+def turned_points(picture: LivePicture, position: dict[str, float]) -> Shapes:
+    """Draw the traced points at a position of the axis that is played; none while none is."""
+    if not position or not picture.state.shown.traces:
+        return {}
+    colours, size = palette(picture), TURNED * picture.size_mm
+    nominal, actual = points_on_traces(picture, position)
+    return {
+        "/rotation/nominal": dots(nominal, size, colours.trace_nominal),
+        "/rotation/actual": dots(actual, size, colours.trace_actual),
+    }
+
+
+def residuals(
+    foot_mm: Array, vector_mm: Array, size_mm: float, *, before: bool
+) -> tuple[Shapes, float]:
+    """Draw what a calibration leaves as arrows, the longest about a fifth of the box.
+
+    Returns with them the factor they are drawn with; 0 where none has a length.
+    """
+    every = max(1, -(-len(foot_mm) // MOST_RESIDUALS))
+    foot, vector = foot_mm[::every], vector_mm[::every]
+    longest = float(np.linalg.norm(vector, axis=-1).max(initial=0.0))
+    if longest <= 0.0:
+        return {}, 0.0
+    factor = round_down(LONGEST_RESIDUAL * size_mm / longest)
+    pieces = arrows(foot, foot + factor * vector, RESIDUAL_HEAD * size_mm)
+    return {"/calibration/residuals": lines(pieces, RESIDUALS[before], 1.5)}, factor
+
+
+def arrows(start_mm: Array, end_mm: Array, head_mm: float) -> Array:
+    """Give arrows, [n, 3] to [n, 3], as pieces of line: shafts, and strokes of their heads.
+
+    Short arrows get a smaller head of the same shape; without length one shrinks to a point.
+    """
+    vector = end_mm - start_mm
+    length = np.linalg.norm(vector, axis=-1, keepdims=True)
+    along = vector / np.maximum(length, np.finfo(float).tiny)
+    first = np.cross(along, np.eye(3)[np.argmin(np.abs(along), axis=-1)])
+    first = first / np.maximum(np.linalg.norm(first, axis=-1, keepdims=True), np.finfo(float).tiny)
+    turn = 2.0 * np.pi * np.arange(STROKES)[:, None, None] / STROKES
+    aside = np.cos(turn) * first + np.sin(turn) * np.cross(along, first)  # [STROKES, n, 3]
+    head = end_mm - np.minimum(head_mm, HEAD_PART * length) * (along - SLANT * aside)
+    strokes = np.stack(np.broadcast_arrays(head, end_mm), axis=2).reshape(-1, 2, 3)
+    return np.concatenate([np.stack([start_mm, end_mm], axis=1), strokes])
+
+
+def words(picture: LivePicture) -> Shapes:
+    """Draw all words in 3-D, for a page that cannot place them."""
+    away, middle = 0.03 * picture.size_mm, picture.grid.bounds_mm.mean(axis=0)
+    shapes: dict[str, Shape | None] = {}
+    for number, label in enumerate((*axis_labels(picture), *point_labels(picture))):
+        way = label.at_mm - (middle if label.from_mm is None else label.from_mm)
+        out = away * way / max(float(np.linalg.norm(way)), 1e-9)
+        at = label.at_mm + (3.0 if label.kind == "axis" else 1.0) * out
+        looks = {"font_screen_scale": 0.8, "anchor": "center-center"}
+        follows = {"text": label.text, "position": at * SCENE_PER_MM}
+        shapes[f"/words/{number}"] = Shape("add_label", looks, follows)
+    return shapes

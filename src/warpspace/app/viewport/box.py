@@ -1,0 +1,152 @@
+"""The bent box: coloured surface, grid lines and edges on it, and the nominal box around it."""
+
+import json
+from base64 import b64encode
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from viser import SceneApi
+
+from warpspace.app.browser.page import Page
+from warpspace.app.evaluation.cache import Identity
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.viewport.colours import (
+    Rgb,
+    colour_levels,
+    level_colours,
+    palette,
+    vertex_colours,
+)
+from warpspace.app.viewport.shapes import UNLIT, Nodes, Shape, Shapes, dashes, lines
+from warpspace.bodies.gltf import GltfTemplate
+from warpspace.geometry.surfaces import box_edges, is_thin
+from warpspace.picture.mesh import (
+    edge_pieces,
+    grid_pieces,
+    isoline_pieces,
+    line_mesh,
+    map_mesh,
+)
+from warpspace.units import Array
+
+SURFACE = "/box/surface"
+DASH, GAP = 0.022, 0.014
+"""Dash and gap of the nominal box, as parts of the longest edge."""
+LIGHT_ISOLINE: Rgb = (226, 230, 236)
+DARK_ISOLINE: Rgb = (60, 68, 80)
+
+
+def ghost_dashes(picture: LivePicture) -> Array:
+    """Dash the edges of the nominal box, [S, 2, 3], mm."""
+    nominal = picture.grid.nominal_mm.reshape(-1, 3)
+    edges = [(nominal[edge[0]], nominal[edge[-1]]) for edge in box_edges(picture.grid.shape)]
+    longest = picture.size_mm
+    return dashes(np.array(edges).reshape(-1, 2, 3), DASH * longest, GAP * longest)
+
+
+def surface_glb(picture: LivePicture) -> bytes:
+    """Write the coloured map of a picture, or its lines alone, vertices in mm."""
+    mesh = line_mesh(picture) if picture.state.look.surface == "grid" else map_mesh(picture)
+    colours = vertex_colours(picture.scale, mesh.values)
+    return _template(Identity(mesh.triangles), len(mesh.vertices_mm)).fill(
+        mesh.vertices_mm, colours
+    )
+
+
+@lru_cache(maxsize=32)
+def _template(triangles: Identity, count: int) -> GltfTemplate:
+    return GltfTemplate("surface", triangles.thing, count)
+
+
+def box(picture: LivePicture) -> Shapes:
+    """Draw surface, grid lines, edges and isolines, and the nominal box around them."""
+    colours, look, shown = palette(picture), picture.state.look, picture.state.shown
+    surface = Shape("add_glb", UNLIT, {"glb_data": surface_glb(picture)})
+    shapes: dict[str, Shape | None] = {SURFACE: surface}
+    if look.surface != "grid":
+        shapes["/box/edges"] = lines(edge_pieces(picture), colours.edge, 1.8)
+        if shown.grid_lines:
+            shapes["/box/grid"] = lines(grid_pieces(picture), colours.grid, 0.7)
+        if look.isolines or look.pass_fail:
+            # seen on every colour of the scale
+            colour = DARK_ISOLINE if picture.scale.diverging else LIGHT_ISOLINE
+            shapes["/box/isolines"] = lines(isoline_pieces(picture), colour, 1.4)
+    if shown.ghost:
+        shapes["/ghost"] = lines(ghost_dashes(picture), colours.ghost, 1.5)
+    return shapes
+
+
+class BoxLayer:
+    """The box as it is drawn.
+
+    While only errors change, points and colours alone are sent (`browser/mesh.js`); what viser
+    holds follows with `rest`.
+    """
+
+    def __init__(self, scene: SceneApi, page: Page, picture: LivePicture) -> None:
+        self._page, self._nodes = page, Nodes(scene)
+        self._opened: tuple[object, ...] = ()
+        self._show_all(picture)
+
+    def show(self, picture: LivePicture) -> None:
+        if not only_bent(self._full, picture):
+            self._show_all(picture)
+            return
+        mesh, scale = map_mesh(picture), picture.scale
+        opened = Identity(mesh.triangles), scale.diverging, Identity(picture.grid.nominal_mm)
+        if opened != self._opened:
+            self._opened = opened
+            self._page.run_script(_open_script(picture, mesh.vertices_mm))
+        points = packed(mesh.vertices_mm.astype("<f4"))
+        self._page.run_script(
+            f'warpspaceMesh.bend("{points}","{packed(colour_levels(scale, mesh.values))}");'
+        )
+        self._behind = True
+
+    def rest(self, picture: LivePicture) -> None:
+        """Have viser hold what is drawn."""
+        if self._behind:
+            self._show_all(picture)
+
+    def _show_all(self, picture: LivePicture) -> None:
+        self._full, self._behind = picture, False  # what viser holds
+        self._nodes.draw(box(picture))
+
+
+def only_bent(held: LivePicture, picture: LivePicture) -> bool:
+    """Tell whether pictures differ in points and colours of the surface alone."""
+    before, after = held.state, picture.state
+    return (
+        not (picture.slices or held.slices or is_thin(picture.shape))
+        and picture.compared is None and held.compared is None
+        and picture.grid.nominal_mm is held.grid.nominal_mm
+        and after.look == before.look and after.shown == before.shown
+        and not after.look.isolines and not after.look.pass_fail
+        and after.look.surface in ("surface", "cut")
+        and palette(picture) == palette(held)
+    )  # fmt: skip
+
+
+def _open_script(picture: LivePicture, vertices_mm: Array) -> str:
+    """Write the script that tells a page which points its lines end at, and the colours."""
+    nodes, of = picture.drawn_mm.reshape(-1, 3), picture.topology
+    number = np.zeros(len(nodes), "<u4")
+    number[of.surface.nodes] = np.arange(len(of.surface.nodes))
+    lines: dict[str, tuple[str, str]] = {}
+    for name, segments, ends in (
+        ("/box/grid", of.grid_segments, grid_pieces(picture)),
+        ("/box/edges", of.edge_segments, edge_pieces(picture)),
+    ):
+        points = number[segments]
+        lifts = ends.reshape(-1, 3) - vertices_mm[points.reshape(-1)]
+        lines[name] = (packed(points), packed(lifts.astype("<f4")))
+    colours = packed(level_colours(diverging=picture.scale.diverging))
+    facts = {"count": len(vertices_mm), "palette": colours, "lines": lines}
+    return f"warpspaceMesh.open({json.dumps(facts)});"
+
+
+def packed(values: NDArray[Any]) -> str:
+    """Spell numbers as they lie in memory, for a script."""
+    return b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")

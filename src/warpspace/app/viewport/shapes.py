@@ -1,0 +1,152 @@
+"""What is drawn in 3-D, as data: functions give shapes by name, `Nodes` keeps viser's scene so.
+
+All points are in mm and all nodes have a scale of `SCENE_PER_MM`: one scene unit is 100 mm, since
+viser clips beyond 1000 units.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from viser import SceneApi
+
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.viewport.colours import Rgb, line_colour
+from warpspace.units import Array
+
+SCENE_PER_MM = 0.01
+UNLIT = {"scale": SCENE_PER_MM, "cast_shadow": False, "receive_shadow": False}
+Pieces = NDArray[np.float32]  # [S, 2, 3], mm; ends of pieces of line
+
+
+class Layer(Protocol):
+    """Something drawn that follows the picture."""
+
+    def show(self, picture: LivePicture) -> None:
+        """Draw a picture by changing nodes in place."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """One node of the scene."""
+
+    add: str  # method of viser's scene that adds it
+    stays: Mapping[str, Any]  # another value adds it anew
+    follows: Mapping[str, Any]  # assigned in place; arrays are not changed afterwards
+
+
+Shapes = Mapping[str, Shape | None]
+
+
+class Nodes:
+    """Nodes of a scene, by name: added when first drawn, then changed in place or hidden."""
+
+    def __init__(self, scene: SceneApi) -> None:
+        self._scene = scene
+        self._drawn: dict[str, tuple[Any, Shape]] = {}
+
+    def draw(self, shapes: Shapes) -> None:
+        """Draw these shapes and hide all others; what has not changed is not sent."""
+        for name, (handle, _) in self._drawn.items():
+            if shapes.get(name) is None and handle.visible:
+                handle.visible = False
+        for name, shape in shapes.items():
+            if shape is not None:
+                self._drawn[name] = self._handle(name, shape), shape
+
+    def _handle(self, name: str, shape: Shape) -> Any:
+        known = self._drawn.get(name)
+        if known is None or not _same(known[1].stays, shape.stays):
+            return getattr(self._scene, shape.add)(name, **shape.stays, **shape.follows)
+        handle, held = known
+        for word, value in shape.follows.items():
+            if value is not held.follows[word]:
+                setattr(handle, word, value)
+        if not handle.visible:
+            handle.visible = True
+        return handle
+
+
+def _same(held: Mapping[str, Any], wanted: Mapping[str, Any]) -> bool:
+    return all(
+        np.array_equal(value, held[word]) if isinstance(value, np.ndarray) else value == held[word]
+        for word, value in wanted.items()
+    )
+
+
+def lines(pieces: Array | Pieces, rgb: Rgb, width_px: float) -> Shape | None:
+    """Give pieces of line, [S, 2, 3], in one colour, as thick on screen from near and far."""
+    stays = {"thickness": width_px, "thickness_units": "screen", "scale": SCENE_PER_MM}
+    follows = {"points": pieces.astype(np.float32), "colors": line_colour(rgb)}
+    return Shape("add_line_segments", stays, follows) if len(pieces) else None
+
+
+def mesh(vertices_mm: Array, triangles: NDArray[Any], rgb: Rgb, **more: object) -> Shape:
+    """Give a lit body; `more` goes to viser as it is."""
+    stays = {"faces": triangles.astype(np.uint32), **UNLIT, **more}
+    follows = {"vertices": vertices_mm.astype(np.float32), "color": rgb}
+    return Shape("add_mesh_simple", stays, follows)
+
+
+def ball(at_mm: Array, radius_mm: float, rgb: Rgb) -> Shape:
+    """Give the marker of a point, [3]."""
+    stays = {**UNLIT, "scale": radius_mm * SCENE_PER_MM}
+    return Shape("add_icosphere", stays, {"position": at_mm * SCENE_PER_MM, "color": rgb})
+
+
+def dots(at_mm: Array, size_mm: float, rgb: Rgb) -> Shape | None:
+    """Give points, [n, 3], as flat circles."""
+    stays = {
+        "point_size": size_mm, "point_shape": "circle", "point_shading": "flat",
+        "precision": "float32", "scale": SCENE_PER_MM,
+    }  # fmt: skip
+    follows = {"points": at_mm.astype(np.float32), "colors": np.array(rgb, dtype=np.uint8)}
+    return Shape("add_point_cloud", stays, follows) if len(at_mm) else None
+
+
+# --- Pieces of line -------------------------------------------------------------------------------
+
+
+def polylines(points: Sequence[Array]) -> Array:
+    """Cut polylines, [n, 3] each, into pieces, [S, 2, 3]."""
+    cut = [np.stack([line[:-1], line[1:]], axis=1) for line in points]
+    return np.concatenate([np.zeros((0, 2, 3)), *cut])
+
+
+def dashes(pieces: Array, dash: float, gap: float) -> Array:
+    """Cut straight lines, [S, 2, 3], into dashes."""
+    parts = [np.zeros((0, 2, 3))]
+    for start, end in pieces:
+        length = float(np.linalg.norm(end - start))
+        if length == 0.0:
+            continue
+        count = max(1, round((length + gap) / (dash + gap)))
+        period = (length + gap) / count
+        begin = np.arange(count) * period / length
+        ends = np.minimum(begin + (period - gap) / length, 1.0)
+        at = np.stack([begin, ends], axis=1)[..., None]
+        parts.append(start + at * (end - start))
+    return np.concatenate(parts)
+
+
+# --- The light of the scene: plain lamps, and no picture of a surrounding -------------------------
+
+AMBIENT = 1.2
+LAMP = 3.2
+LAMP_FROM = (-2.0, -5.0, 10.0)
+
+
+def light_scene(scene: SceneApi) -> None:
+    """Light what is not coloured by numbers: bodies of the machine, markers.
+
+    viser's own lights are a photograph of a surrounding and lamps with shadows. A page stays nearly
+    invisible until the photograph has been worked into the materials, which takes seconds where
+    there is no graphics card, and shadows cost every picture. The map itself needs no light.
+    """
+    scene.configure_environment_map(None)
+    scene.configure_default_lights(enabled=False)
+    scene.add_light_ambient("/lights/all_round", intensity=AMBIENT)
+    scene.add_light_directional("/lights/lamp", intensity=LAMP, position=LAMP_FROM)
