@@ -61,7 +61,7 @@ class Page:
     """What a page knows: each function of its scripts that is called leaves its values here."""
 
     def __init__(self) -> None:
-        self.facts: dict[str, Any] = {}  # carrier of events, uploads, keys
+        self.facts: dict[str, Any] = {}  # carrier of events, keys
         self.pieces: dict[str, str] = {}  # HTML by the name of its place
         self.toasts: list[list[str]] = []
         self.stage = ""

@@ -1,6 +1,7 @@
 """Clients of bad will: messages that mean nothing, events for nobody, floods, files in pieces."""
 
 import asyncio
+import base64
 import contextlib
 import json
 import secrets
@@ -25,7 +26,7 @@ PATHS = (
 WORDS = (
     "open", "close", "fold", "task", "undo", "redo", "toggle", "run", "cancel", "apply", "preview",
     "save", "report", "share", "link", "export", "view", "row", "only", "exclude", "find",
-    "refused", "set.value", "set.EXX", "set.QQQ", "set.__class__", "set.", "", ":", TAG,
+    "file", "set.value", "set.EXX", "set.QQQ", "set.__class__", "set.", "", ":", TAG,
 )  # fmt: skip
 
 
@@ -73,7 +74,7 @@ def nonsense(widgets: list[str]) -> list[bytes]:
     return [
         *known,
         *(set_(uuid, {"value": 1.0}) for uuid in ([], {}, None, 7, "unknown", "x" * 99_999)),
-        *(set_(widgets[0], updates) for updates in ([], None, "x", {"value": "x" * 2_000_000})),
+        *(set_(widgets[0], updates) for updates in ([], None, "x", {"value": "x" * 7_000_000})),
         *(camera(position=value) for value in ((NAN,) * 3, (1e300,) * 3, (0.0,) * 9, "x", None)),
         camera(fov=NAN), camera(image_width=HUGE), camera(image_height=-5), camera(extra=1),
         pack({"type": "ScenePointerMessage", "event_type": "click"}),
@@ -98,15 +99,10 @@ def nonsense(widgets: list[str]) -> list[bytes]:
     ]  # fmt: skip
 
 
-def upload(button: str, name: str, content: bytes) -> list[bytes]:
-    """Give the messages by which a page uploads a file."""
-    return [
-        pack({"type": "FileTransferStartUpload", "source_component_uuid": button,
-              "transfer_uuid": name, "filename": f"{name}.toml", "mime_type": "",
-              "part_count": 1, "size_bytes": len(content)}),
-        pack({"type": "FileTransferPart", "source_component_uuid": button, "transfer_uuid": name,
-              "part_index": 0, "content": content}),
-    ]  # fmt: skip
+def upload(name: str, content: bytes) -> tuple[str, str]:
+    """Give the event by which a page sends a file."""
+    coded = base64.b64encode(content).decode()
+    return "files:file", f"{len(content)}\n{name}\n{coded}"
 
 
 @contextlib.asynccontextmanager

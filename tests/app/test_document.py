@@ -11,7 +11,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from warpspace.app.documents.files import pack, safe_file_name, safe_name, unpack, upload_text
+from app.hostile import upload
+from warpspace.app.documents.files import (
+    pack,
+    read_upload,
+    safe_file_name,
+    safe_name,
+    unpack,
+    upload_text,
+)
 from warpspace.app.documents.scene_file import (
     MAX_PACKED_TEXT,
     MOST_OPENED,
@@ -201,7 +209,7 @@ def test_names_from_a_browser_are_made_safe(safe, given, kept):
 
 def test_uploads_that_are_no_scene_are_refused_with_every_problem():
     with pytest.raises(OptionError, match="at most 4 MB"):
-        upload_text(b"x" * (4 * 2**20 + 1), "big.toml")
+        read_upload(upload("big.toml", b"x" * (4 * 2**20 + 1))[1])
     with pytest.raises(OptionError, match="not UTF-8"):
         upload_text(b"\xff\xfe\x00", "x.toml")
     with pytest.raises(SceneError) as caught:

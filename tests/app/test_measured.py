@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from markupsafe import escape
 
+from app.hostile import upload
 from app.parts import Nobody
 from warpspace.analysis.catalogue import entries
 from warpspace.app.documents.scene_file import with_settings
@@ -61,7 +62,6 @@ class Column:
             page=SimpleNamespace(is_open=True), store=self,
         )  # fmt: skip
         self.part = build(context)
-        self.part._upload._listens = True
         page = replace(state.page, task="measure", open=frozenset({self.part.name}))
         self.state = replace(state, page=page)
         self.part.context.shown = LIVE.evaluate(self.state)
@@ -70,6 +70,10 @@ class Column:
         self.state = self.part.take(self.state, word, value)
         self.part.context.shown = LIVE.evaluate(self.state)
         return self.html()
+
+    def give(self, name, content):
+        """Send a file."""
+        self.do(*(word.removeprefix("files:") for word in upload(name, content)))
 
     def html(self):
         (html,) = self.part.pieces(LIVE.evaluate(self.state)).values()
@@ -138,7 +142,7 @@ def test_measured_readings_stand_beside_the_model_and_go_into_the_report():
     rows = [f"{run},{way},{at},{0.02 * at}" for run in (1, 2) for way in "+-"
             for at in range(-250, 251, 50)]  # fmt: skip
     text = "run,direction,target_mm,deviation_um\n" + "\n".join(rows) + "\n"
-    column.part._upload.receive(f"../{HOSTILE}.csv", text.encode())
+    column.give(f"../{HOSTILE}.csv", text.encode())
     html = column.html()
     assert "RMS of measured − model" in html
     assert "<img" not in html
@@ -146,7 +150,7 @@ def test_measured_readings_stand_beside_the_model_and_go_into_the_report():
     ((_, result),) = column.reported
     assert result.rms_difference > 0.1
     assert "RMS of measured" not in column.do("remove")
-    column.part._upload.receive("x.csv", b"a,b\n1,2\n")
+    column.give("x.csv", b"a,b\n1,2\n")
     assert "ws-problem" in column.html()
 
 
@@ -217,18 +221,18 @@ def test_preview_changes_no_error_and_one_undo_takes_an_applied_fit_back(fitted)
 
 def test_a_page_gives_only_known_words_and_small_readable_files():
     column = calibrate()
-    receive = column.part._upload.receive
+    receive = column.give
     receive("../../<b>.csv", b"\xff\xfe")
     assert "b.csv is not UTF-8" in column.html()
     receive("../../etc/passwd", b"x" * (2 * 2**20 + 1))
     assert "2.0 MB" in column.html()
-    assert "9.5 MB" in column.do("refused", f"10000000:{HOSTILE}")
+    assert "9.5 MB" in column.do("file", f"10000000\n{HOSTILE}\n")
     receive("../../tcp<b>.csv", BUNDLED)
     assert [one.name for one in column.part._files] == ["tcp_b.csv"]
     for word, value in (
         ("remove", "9"), ("remove", "-1"), ("remove", ""), ("bundled", "../tcp_on.csv"),
         ("bundled", HOSTILE), ("kind", HOSTILE), ("arrows", HOSTILE), ("x" * 100, ""),
-        ("refused", ""), ("preview", "0"), ("test-options", HOSTILE),
+        ("file", ""), ("preview", "0"), ("test-options", HOSTILE),
     ):  # fmt: skip
         assert "<img" not in column.do(word, value)
     assert len(column.part._files) == 1
@@ -280,7 +284,7 @@ def test_files_have_names_of_their_own_and_are_few():
 def test_bad_parameters_and_hostile_sessions_are_said_escaped(keys):
     column = calibrate()
     assert "no readings yet" in column.run()
-    column.part._upload.receive("x.csv", BUNDLED.replace(b"c1", b"<img src=x>"))
+    column.give("x.csv", BUNDLED.replace(b"c1", b"<img src=x>"))
     column.do("set.fit", keys)
     column.part._problem = None
     html = column.run()
@@ -311,7 +315,7 @@ def test_readings_of_a_standard_test_come_with_its_options():
     column = calibrate()
     column.do("kind", "positioning")
     column.do("test-options", "axis=X")
-    column.part._upload.receive("x.csv", text.encode())
+    column.give("x.csv", text.encode())
     column.do("set.fit", "EXX")
     column.run()
     found = column.part._answer[1]

@@ -15,7 +15,7 @@ import pytest
 import viser
 from viser import _messages as messages
 
-from app.hostile import camera, connected, events, nonsense
+from app.hostile import camera, connected, events, nonsense, upload
 from app.wire import Wire, opened
 from app.wire import dial as dial_viewer
 from page_client import CAMERA, App, dial, pack, until, update
@@ -61,8 +61,6 @@ USED = {
     "server": "_websock_server.register_handler _websock_server.queue_message",
     "client": "_websock_connection.queue_message _websock_connection.register_handler"
     " _websock_connection.unregister_handler _websock_connection.get_message_buffer"
-    " gui._handle_file_transfer_start"
-    " gui._handle_file_transfer_part gui._current_file_upload_states"
     " gui._websock_interface.register_handler gui._websock_interface.unregister_handler"
     " gui._handle_gui_updates gui._gui_input_handle_from_uuid",
     "_gui_api": "print_threadpool_errors",
@@ -72,9 +70,6 @@ USED = {
 FIELDS = {
     "RunJavascriptMessage": "source",
     "GuiUpdateMessage": "uuid updates",
-    "FileTransferStartUpload": "source_component_uuid transfer_uuid filename part_count size_bytes",
-    "FileTransferPart": "transfer_uuid content",
-    "FileTransferPartAck": "source_component_uuid transfer_uuid transferred_bytes total_bytes",
     "ReplayDoneMessage": "",
 }
 
@@ -183,17 +178,13 @@ def test_what_a_page_really_says_passes():
         {"type": "GuiUpdateMessage", "uuid": "a", "updates": {"value": "t", "width": 1280}},
         {"type": "ScenePointerMessage", "event_type": "click", "ray_origin": [1, 2, 3.5],
          "ray_direction": [0, 0, 1], "screen_pos": [[0.5, 0.5]], "modifier": None},
-        {"type": "FileTransferStartUpload", "source_component_uuid": "a", "transfer_uuid": "b",
-         "filename": "s.toml", "mime_type": "", "part_count": 1, "size_bytes": 900},
-        {"type": "FileTransferPart", "source_component_uuid": "a", "transfer_uuid": "b",
-         "part_index": 0, "content": b"title"},
     ):  # fmt: skip
         assert may_pass(pack(message)), message
 
 
 def test_what_makes_no_sense_does_not_pass():
     fine = [message for message in nonsense(["a"]) if may_pass(message)]
-    # what kind a widget has is known later, and so is which widgets and uploads there are
+    # what kind a widget has is known later, and so is which widgets there are
     assert len(fine) < 10
     assert all(b"GuiUpdateMessage" in message and b"\xa5value" in message for message in fine)
 
@@ -252,6 +243,7 @@ def test_events_are_numbered_and_at_most_so_many():
     found = read_events(json.dumps([[n, f"state:set.a:{n}", "x"] for n in range(1, 100)]))
     assert len(found) == MOST_EVENTS
     assert found[0] == (1, Event("state", "set.a:1", "x"))
+    assert len(read_events(json.dumps([[1, *upload("x.csv", b"1" * 100_000)]]))) == 1
 
 
 def test_events_that_no_page_sends_are_refused_in_words_and_the_page_goes_on(caplog):

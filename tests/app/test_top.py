@@ -33,15 +33,12 @@ class Window:
     def __init__(self, kind, state=STATE, services=None):
         self.said, self.sent, self.saved, self.called = [], [], [], []
         self.store = StateStore(state)
-        button = SimpleNamespace(_impl=SimpleNamespace(uuid="upload"))
         self.context = Nobody(
             act=lambda do: do(), renew=lambda _: None, store=self.store, shown=LIVE.evaluate(state),
             notify=lambda *words: self.said.append(words), services=services or Services(),
             send=lambda *event: self.sent.append(event), reported=[],
             save_file=lambda *file: self.saved.append(file),
             scenes=SceneList({FIRST.title: FIRST, SECOND.title: SECOND}),
-            gui=SimpleNamespace(add_upload_button=lambda *_, **__: button),
-            uploads=SimpleNamespace(watch=lambda *_: None),
             page=SimpleNamespace(
                 is_open=True, tell=lambda **_: None, call=lambda *what: self.called.append(what)
             ),
@@ -152,7 +149,9 @@ def test_a_link_says_what_it_holds_and_asks_before_it_holds_the_token():
 
 def test_files_that_a_page_refuses_or_invents_are_said_or_left():
     window = Window(FilesWindow)
-    window.do("refused", "²:" + HOSTILE)
+    window.do("file", f"²\n{HOSTILE}\n")
+    assert "has not arrived whole" in window.said[-1][1]
+    window.do("file", f"{10**9}\n{HOSTILE}\n")
     assert "expected a scene file of at most" in window.said[-1][1]
     window.do("export", "../../etc/passwd")
     window.do("link", "no link")

@@ -128,8 +128,7 @@ async def _exhaust(app: App, count: int, tally: Tally) -> None:
         await honest.answer_s(20.0)
         before = app.memory_mb
         for number, content in enumerate(itertools.islice(itertools.cycle(bombs()), count)):
-            for message in upload(other.facts["uploads"]["files"][0], f"bomb{number}", content):
-                await other.socket.send(message)
+            await other.send(other.event(upload(f"bomb{number}.toml", content)))
             waited = await honest.answer_s(number % 9 + 0.5)
             tally.slowest_s = max(tally.slowest_s, waited)
             tally.done["upload"] += 1

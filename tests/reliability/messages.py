@@ -53,10 +53,7 @@ def run(count: int) -> Outcome:
 async def _attack(app: App, count: int, lag: Lag) -> tuple[int, list[float], float]:
     chance = random.Random(14)
     async with Tab(app) as honest, Tab(app) as hostile:
-        widgets = [
-            hostile.facts["carrier"],
-            *(found[0] for found in hostile.facts["uploads"].values()),
-        ]
+        widgets = [hostile.facts["carrier"]]
         known = PARTS.findall("".join(hostile.pieces.values()))
         mixed = nonsense(widgets) + carried(widgets[0]) + events(sorted({*known, "page", "state"}))
         chance.shuffle(mixed)

@@ -2,6 +2,7 @@
 
 One invisible text widget of viser carries them. A message holds the latest ones, should an earlier
 message have got lost or been put together with a later one; each is passed on once, in order.
+A file comes alone, as the value of ``part:file``: its size, its name, and what is in it in base64.
 """
 
 from collections.abc import Callable
@@ -16,6 +17,7 @@ LONGEST_NAME = 160
 LONGEST_VALUE = 20_000
 LONGEST_INDEX = 8  # digits
 MOST_EVENTS = 16
+FILE = ":file"  # what the name of an event ends with that brings a file
 _READER = msgspec.json.Decoder(list[tuple[int, str, str]])
 
 
@@ -43,7 +45,10 @@ class Events:
 
         async def listen(event: object) -> None:  # in order, which a plain function would not be
             if getattr(event, "client", None) is not None:
-                for number, found in read_events(str(self._carrier.value)):
+                text = str(self._carrier.value)
+                if len(text) > MOST_EVENTS * LONGEST_VALUE:
+                    self._carrier.value = "[]"  # a file is not kept until the next event
+                for number, found in read_events(text):
                     if number > self._last:
                         self._last = number
                         take(found)
@@ -71,5 +76,8 @@ def read_events(text: str) -> tuple[tuple[int, Event], ...]:
     return tuple(
         (number, event_of(name, value))
         for number, name, value in found[:MOST_EVENTS]
-        if number > 0 and ":" in name and len(name) <= LONGEST_NAME and len(value) <= LONGEST_VALUE
+        if number > 0
+        and ":" in name
+        and len(name) <= LONGEST_NAME
+        and (len(value) <= LONGEST_VALUE or name.endswith(FILE))
     )

@@ -66,6 +66,16 @@ def button(
     )  # fmt: skip
 
 
+def upload_button(
+    words: str, part: str, most_bytes: int, endings: str, *, hint: str, kind: str = ""
+) -> Markup:
+    """Give a button that opens a chooser of files, which come as events ``part:file``."""
+    return tag(
+        "button", words, type="button", class_=f"ws-button {kind}".strip(), data_upload=part,
+        data_most=most_bytes, data_accept=endings, title=hint,
+    )  # fmt: skip
+
+
 def number(value: float, digits: int = 1) -> str:
     """Spell a number for people: a true minus, no minus before a zero."""
     text = f"{value:.{digits}f}"

@@ -20,13 +20,12 @@ from warpspace.app.browser.viser_private import check_messages, check_updates, l
 logger = logging.getLogger(__name__)
 LARGEST_NUMBER = 1e9
 LONGEST_NAME = 1_000
-LONGEST_TEXT = 1_000_000  # of the value of a text field, characters
+LONGEST_TEXT = 6_000_000  # of the value of a text field, characters: a file of 4 MiB in base64
 LARGEST_SIDE_PX = 16_384  # of the page's picture, and of a picture that it renders
 PNG_START = b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR"
 
 Number = Annotated[float, Meta(ge=-LARGEST_NUMBER, le=LARGEST_NUMBER)]  # NaN is neither
 Side = Annotated[float, Meta(ge=0, le=LARGEST_SIDE_PX)]
-Count = Annotated[int, Meta(ge=0, le=2**40)]
 Name = Annotated[str, Meta(max_length=LONGEST_NAME)]
 Text = Annotated[str, Meta(max_length=LONGEST_TEXT)]
 Vector = tuple[Number, Number, Number]
@@ -72,28 +71,6 @@ class DrawingClicked(
     modifier: Annotated[str, Meta(max_length=40)] | None
 
 
-class UploadStarted(
-    Struct, tag_field="type", tag="FileTransferStartUpload", forbid_unknown_fields=True
-):
-    """A file is about to be sent; `uploads.py` bounds its size."""
-
-    source_component_uuid: Name
-    transfer_uuid: Name
-    filename: Name
-    mime_type: Name
-    part_count: Count
-    size_bytes: Count
-
-
-class UploadContinued(Struct, tag_field="type", tag="FileTransferPart", forbid_unknown_fields=True):
-    """A part of a file."""
-
-    source_component_uuid: Name | None
-    transfer_uuid: Name
-    part_index: Count
-    content: bytes
-
-
 class PictureRendered(
     Struct, tag_field="type", tag="GetRenderResponseMessage", forbid_unknown_fields=True
 ):
@@ -103,9 +80,7 @@ class PictureRendered(
     render_uuid: Name
 
 
-_READER = msgspec.msgpack.Decoder(
-    WidgetChanged | CameraMoved | DrawingClicked | UploadStarted | UploadContinued | PictureRendered
-)
+_READER = msgspec.msgpack.Decoder(WidgetChanged | CameraMoved | DrawingClicked | PictureRendered)
 
 
 def guard_server() -> None:

@@ -3,10 +3,10 @@
 // numbered events. Nothing here knows what a piece is about.
 (() => {
   if (window.warpspacePage) return;
-  const MOST_EVENTS = 16, SEND_MS = 30, PART_BYTES = 512 * 1024, TOAST_MS = 8000, MOST_FILES = 16;
+  const MOST_EVENTS = 16, SEND_MS = 30, TOAST_MS = 8000, MOST_FILES = 16;
   const sent = [], pending = [];
   const texts = new Map();  // of all pieces, also while their place is not there
-  const known = { carrier: "", uploads: {}, keys: {} };
+  const known = { carrier: "", keys: {} };
   let count = 0, timer = 0, last = 0;
 
   const shell = document.createElement("div");
@@ -93,12 +93,13 @@
   };
 
   // --- events: numbered, the latest ones together, since messages are put together on their way -----
+  const say = events => window.__viserMutable?.sendMessage(
+    { type: "GuiUpdateMessage", uuid: known.carrier, updates: { value: JSON.stringify(events) } });
   const flush = () => {
     timer = 0; last = performance.now();
     for (const event of pending.splice(0)) sent.push([++count, ...event]);
     sent.splice(0, sent.length - MOST_EVENTS);
-    window.__viserMutable?.sendMessage({ type: "GuiUpdateMessage", uuid: known.carrier,
-      updates: { value: JSON.stringify(sent) } });
+    say(sent);
   };
   const send = (name, value = "") => {
     const same = pending.findIndex(([other]) => other === name);
@@ -119,7 +120,7 @@
     const number = event.target.closest("[data-box]");
     if (number && event.target.tagName !== "INPUT") typeInto(number).select();
     const upload = event.target.closest("[data-upload]");
-    if (upload) chooseFiles(upload.dataset.upload, upload.dataset.value);
+    if (upload) chooseFiles(upload);
     const copy = event.target.closest("[data-copy]");
     if (copy) copyText(copy.dataset.copy);
     const go = event.target.closest("[data-go]");
@@ -233,7 +234,7 @@
     event.preventDefault();
     event.stopImmediatePropagation();
     if (name === "find") document.querySelector("#ws-find")?.focus();
-    else if (name === "upload") chooseFiles(value);
+    else if (name === "upload") chooseFiles(buttonOf(value));
     else send(name, value);
   }, true);
   // a box with data-enter sends it with Enter only; arrows go from it through the list below it
@@ -250,26 +251,21 @@
     if (event.target.id === "ws-window") { event.preventDefault(); closeWindow(); }
   }, true);
 
-  // --- files: refused here when too large, sent in parts ------------------------------------------
-  const sendFile = async (purpose, file, word) => {
-    const [uuid, most] = known.uploads[purpose];
-    if (file.size > most) { send(`${purpose}:refused`, `${file.size}:${file.name}`); return; }
-    if (word) send(`${purpose}:sending`, word);
-    const bytes = new Uint8Array(await file.arrayBuffer());
-    const parts = Math.max(1, Math.ceil(bytes.length / PART_BYTES));
-    const transfer = crypto.randomUUID?.() ?? `${Date.now()}-${Math.random()}`;
-    const say = message => window.__viserMutable.sendMessage(
-      { source_component_uuid: uuid, transfer_uuid: transfer, ...message });
-    say({ type: "FileTransferStartUpload", filename: file.name, mime_type: file.type || "text/plain",
-      part_count: parts, size_bytes: bytes.length });
-    for (let part = 0; part < parts; part++)
-      say({ type: "FileTransferPart", part_index: part,
-        content: bytes.slice(part * PART_BYTES, (part + 1) * PART_BYTES) });
+  // --- files: each an event of its own, with nothing in it where it is too large -------------------
+  const sendFile = async ({ upload, most }, file) => {
+    const reader = new FileReader();
+    if (file.size <= Number(most))
+      await new Promise(done => { reader.onload = done; reader.readAsDataURL(file); });
+    const held = reader.result?.split(",")[1] ?? "";
+    say([[++count, `${upload}:file`, `${file.size}\n${file.name}\n${held}`]]);
   };
-  const chooseFiles = (purpose, word) => {
+  const sendFiles = (button, files) =>
+    [...files].slice(0, MOST_FILES).forEach(file => sendFile(button.dataset, file));
+  const buttonOf = part => document.querySelector(`[data-upload="${part}"][data-most]`);
+  const chooseFiles = button => {
     const input = document.createElement("input");
-    input.type = "file"; input.multiple = true; input.accept = known.uploads[purpose]?.[2] ?? "";
-    input.onchange = () => [...input.files].slice(0, MOST_FILES).forEach(f => sendFile(purpose, f, word));
+    input.type = "file"; input.multiple = true; input.accept = button.dataset.accept;
+    input.onchange = () => sendFiles(button, input.files);
     input.click();
   };
   const hasFiles = event => [...(event.dataTransfer?.types ?? [])].includes("Files");
@@ -285,8 +281,7 @@
       });
       return;
     }
-    const purpose = event.target.closest?.("[data-drop]")?.dataset.drop ?? "files";
-    [...event.dataTransfer.files].slice(0, MOST_FILES).forEach(file => sendFile(purpose, file));
+    sendFiles(buttonOf("files"), event.dataTransfer.files);
   });
 
   // above a window that is open, too
@@ -358,10 +353,9 @@
       if (token) address.searchParams.set("token", token);
       copyText(address.href, "Link copied", words);
     },
-    // the widget that carries events, the uploads ({purpose: [widget, bytes, endings]}), the keys
-    open({ uploads, ...facts }) {
+    // the widget that carries events, the keys
+    open(facts) {
       Object.assign(known, facts);
-      Object.assign(known.uploads, uploads);
       count = Math.max(count, 0);
       if (!shell.isConnected) {
         document.body.append(shell);

@@ -16,8 +16,6 @@ import websockets.asyncio.server
 from viser import ClientHandle, ViserServer
 from viser import _messages as messages
 
-StartUpload: TypeAlias = messages.FileTransferStartUpload
-UploadPart: TypeAlias = messages.FileTransferPart
 Take: TypeAlias = Callable[[int, str, Any], None]
 """Takes the number of a client, the id of a widget and what a page says its properties are."""
 
@@ -109,56 +107,6 @@ def wake_sender_on_its_thread(client: ClientHandle) -> None:
         original()
 
     event.set = set_on_loop
-
-
-class UploadMessages:
-    """The messages of one client's uploads, which checks of our own see before viser does.
-
-    `on_upload` is called when all of a file is in memory. A limit of size for uploads, checked
-    while they arrive, would replace this.
-    """
-
-    def __init__(self, client: ClientHandle) -> None:
-        self._gui: Any = client.gui
-        self._connection: Any = client._websock_connection  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
-        self._start = self._gui._handle_file_transfer_start  # noqa: SLF001
-        self._part = self._gui._handle_file_transfer_part  # noqa: SLF001
-
-    def check(
-        self, may_start: Callable[[StartUpload], bool], may_keep: Callable[[UploadPart], bool]
-    ) -> None:
-        """Pass on to viser only what is allowed to start, and to be kept."""
-
-        def start(client_id: int, message: StartUpload) -> None:
-            if may_start(message):
-                self._start(client_id, message)
-
-        def part(client_id: int, message: UploadPart) -> None:
-            if may_keep(message):
-                self._part(client_id, message)
-
-        for kind, theirs, ours in (
-            (StartUpload, self._start, start),
-            (UploadPart, self._part, part),
-        ):
-            self._connection.unregister_handler(kind, theirs)
-            self._connection.register_handler(kind, ours)
-
-    @property
-    def under_way(self) -> dict[str, Any]:
-        """Uploads that have started, by their identifier."""
-        return self._gui._current_file_upload_states  # noqa: SLF001
-
-    def acknowledge(self, message: StartUpload) -> None:
-        """Let the page's progress bar of an upload end."""
-        self._connection.queue_message(
-            messages.FileTransferPartAck(
-                source_component_uuid=message.source_component_uuid,
-                transfer_uuid=message.transfer_uuid,
-                transferred_bytes=message.size_bytes,
-                total_bytes=message.size_bytes,
-            )
-        )
 
 
 def check_messages(may_pass: Callable[[bytes], bool]) -> None:

@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from warpspace.app.browser.uploads import size_message
 from warpspace.app.documents.conditions import state_conditions
 from warpspace.app.documents.services import Beside, Request
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -48,6 +47,7 @@ def unpack(word: str) -> str:
 
 _UNSAFE = re.compile(r"[^A-Za-z0-9._ -]+")
 LONGEST_NAME = 60
+LONGEST_SIZE = 16  # digits
 
 
 def safe_name(name: str, fallback: str = "scene") -> str:
@@ -65,12 +65,28 @@ def safe_file_name(name: str) -> str:
     return f"{safe_name(last, 'file')}.{safe_name(ending, 'txt')}"
 
 
-def upload_text(
-    content: bytes, source: str, most_bytes: int = MAX_SCENE_BYTES, what: str = "scene file"
-) -> str:
+def read_upload(
+    value: str, most_bytes: int = MAX_SCENE_BYTES, what: str = "scene file"
+) -> tuple[str, bytes]:
+    """Give name and bytes of a file that a page has sent; it sends none of one too large."""
+    told, _, rest = value.partition("\n")
+    name, _, coded = rest.rpartition("\n")
+    name = safe_file_name(name)
+    try:
+        content = base64.b64decode(coded)
+        size = max(int(told[:LONGEST_SIZE]), len(content))
+    except ValueError:
+        raise OptionError(f"{name} has not arrived whole; try again") from None
+    if size > most_bytes:
+        raise OptionError(
+            f"{name} is {size / 2**20:.1f} MB large; expected a {what} of at most"
+            f" {most_bytes / 2**20:g} MB"
+        )
+    return name, content
+
+
+def upload_text(content: bytes, source: str, what: str = "scene file") -> str:
     """Read the bytes of an uploaded file."""
-    if len(content) > most_bytes:
-        raise OptionError(size_message(source, len(content), most_bytes, what))
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -39,7 +39,7 @@ class Limits:
     """How much is taken at once."""
 
     sessions: int = 64  # tabs that are open at the same time
-    # largest message of a page: a picture of the view. A part of an upload has 0.5 MB.
+    # largest message of a page: a picture of the view. A file has 6 MB at most.
     message_bytes: int = 16 * 2**20
     # of one connection, on average. A page sends 20 a second for each group of widgets in use.
     messages_per_second: float = 400.0

@@ -10,7 +10,6 @@ import socket
 import sys
 import threading
 import time
-import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -192,8 +191,6 @@ class RepeatedLines(logging.Filter):
 
 def limit_log() -> None:
     """Have all that the program logs to the terminal limited."""
-    # names the file that a page has sent: another line, and another entry of a register, each time
-    warnings.filterwarnings("ignore", message=r"\[viser\] Dropping upload")
     limit = RepeatedLines()
     for handler in (logging.lastResort, *logging.getLogger().handlers):
         if handler is not None:

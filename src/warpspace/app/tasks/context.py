@@ -15,7 +15,6 @@ from viser import ClientHandle, GuiApi, ViserServer
 
 from warpspace.app.browser.events import Event, Events, event_of
 from warpspace.app.browser.page import Page
-from warpspace.app.browser.uploads import Uploads
 from warpspace.app.documents.scene_file import SceneList
 from warpspace.app.documents.services import Services
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -42,7 +41,6 @@ class Context:
         services: Services,
     ) -> None:
         self.client, self.page, self.camera = client, Page(server, client), TabCamera(client)
-        self.uploads = Uploads(client)
         self.events: deque[Event] = deque()
         self.page.open(Events(client.gui, self._take_event))
         self.store, self.scenes, self.services = store, scenes, services

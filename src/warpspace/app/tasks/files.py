@@ -10,16 +10,14 @@ from markupsafe import Markup
 
 from warpspace.app.browser.html import button, choice, field, join, tag
 from warpspace.app.browser.page import error_words
-from warpspace.app.browser.uploads import size_message
-from warpspace.app.browser.viser_private import dom_id
 from warpspace.app.documents import scene_file
 from warpspace.app.documents.files import (
     build_request,
     exported_words,
     file_stem,
     pack,
+    read_upload,
     robot_text,
-    safe_file_name,
     safe_name,
     unpack,
     upload_text,
@@ -36,7 +34,6 @@ from warpspace.app.tasks.window import Window, actions
 from warpspace.app.viewport.camera import CameraMemory
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.formats.registry import formats
-from warpspace.machine.limits import MAX_SCENE_BYTES
 
 FIGURE_S, VIEW_S, EXPORT_S = 5.0, 1.5, 1.0  # what a file usually takes
 RENDER_TIMEOUT_S = 30.0
@@ -105,14 +102,6 @@ class FilesWindow(JobWindow):
         super().__init__(context)
         self._figures = {name: name.replace("-", " ") for name, _ in context.services.figures}
         self._figure = ""
-        upload = context.gui.add_upload_button("", visible=False)
-        context.uploads.watch(
-            upload,
-            MAX_SCENE_BYTES,
-            lambda name, content: self.attempt(partial(self._open, name, content)),
-            lambda text: context.act(partial(context.notify, "Not opened", text, "problem")),
-        )
-        context.page.tell(uploads={"files": [dom_id(upload), MAX_SCENE_BYTES, accepted_endings()]})
 
     def depends(self, picture: LivePicture) -> tuple[object, ...]:
         """Follow what exports show, and how far a file is."""
@@ -149,15 +138,11 @@ class FilesWindow(JobWindow):
         if word == "set.figure":
             self._figure = value if value in self._figures else ""
             self.context.act(partial(self.context.renew, self))
-        elif word == "refused":
-            size, _, name = value.partition(":")
-            words = size_message(safe_file_name(name), float(size) if size.isdecimal() else 0.0,
-                                 MAX_SCENE_BYTES)  # fmt: skip
-            self.context.notify("Not opened", words, "problem")
         elif word == "share" and self.context.services.token and not value:
             return replace(state, page=replace(state.page, window="share"))
         else:
             doing: dict[str, Callable[[], None]] = {
+                "file": partial(self._open, value),
                 "save": self._save,
                 "share": partial(self._share, with_token=value == "token"),
                 "link": partial(self._follow, value),
@@ -172,8 +157,9 @@ class FilesWindow(JobWindow):
 
     # --- what is opened --------------------------------------------------------------------------
 
-    def _open(self, name: str, content: bytes) -> None:
+    def _open(self, value: str) -> None:
         """Open a scene or a machine, or show what a file of measured data would bring."""
+        name, content = read_upload(value)
         if b"<robot" in content[:4096]:
             text, notes = robot_text(name, content)
             opened, camera = scene_file.open_text(text, safe_name(name), name)

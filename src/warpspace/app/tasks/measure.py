@@ -1,6 +1,6 @@
 """Measuring: standard tests that follow the errors, and calibrations out of uploaded readings."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -21,12 +21,11 @@ from warpspace.app.browser.html import (
     switch,
     tag,
     text_box,
+    upload_button,
 )
 from warpspace.app.browser.html import field as labelled
 from warpspace.app.browser.page import error_words
-from warpspace.app.browser.uploads import size_message
-from warpspace.app.browser.viser_private import dom_id
-from warpspace.app.documents.files import safe_name, upload_text
+from warpspace.app.documents.files import read_upload, upload_text
 from warpspace.app.evaluation.bench import BenchPicture, standing
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -54,53 +53,17 @@ from warpspace.units import UM_PER_MM, Array
 
 MOST_BYTES = 2 * 2**20  # of a file of readings
 WHAT = "CSV file of readings"
-Take = Callable[[str, str], None]
-"""Takes name and text of a file."""
 
 
-class Uploaded:
-    """Files of readings that a page gives to one section; their text is kept, never a path."""
-
-    def __init__(self, part: Section, take: Take, refuse: Callable[[str], None]) -> None:
-        self._part, self._take, self._refuse = part, take, refuse
-        self._listens = False
-
-    def button(self, words: str) -> Markup:
-        """Give the button that opens a chooser of files; from then on they are listened for."""
-        self._listen()
-        return tag("button", words, type="button", class_="ws-button", data_upload=self._part.name,
-                   title=f"A CSV file with a header, at most {MOST_BYTES >> 20} MB")  # fmt: skip
-
-    def _listen(self) -> None:
-        if self._listens:
-            return
-        self._listens = True
-        context, act = self._part.context, self._part.context.act
-        upload = context.gui.add_upload_button("", visible=False)
-        context.uploads.watch(
-            upload, MOST_BYTES,
-            lambda name, content: act(partial(self.receive, name, content)),
-            lambda words: act(partial(self._refuse, words)), WHAT,
-        )  # fmt: skip
-        context.page.tell(uploads={self._part.name: [dom_id(upload), MOST_BYTES, ".csv"]})
-
-    def receive(self, name: str, content: bytes) -> None:
-        """Take a file as it has arrived."""
-        spelled = _spelled(name)
-        try:
-            self._take(spelled, upload_text(content, spelled, MOST_BYTES, WHAT))
-        except WarpspaceError as error:
-            self._refuse(error_words(error))
-
-    def refused(self, told: str) -> None:
-        """Say that the page has not even sent a file: ``size:name``."""
-        size, _, name = told.partition(":")
-        large = float(size) if size.isdecimal() and len(size) < 16 else 0.0
-        self._refuse(size_message(_spelled(name), large, MOST_BYTES, WHAT))
+def _received(value: str) -> tuple[str, str]:
+    """Give name and text of a file of readings; a page never says a path."""
+    name, content = read_upload(value, MOST_BYTES, WHAT)
+    return name, upload_text(content, name, WHAT)
 
 
-def _spelled(name: str) -> str:
-    return f"{safe_name(name, 'readings')}.csv"
+def _upload_button(words: str, part: str) -> Markup:
+    hint = f"A CSV file with a header, at most {MOST_BYTES >> 20} MB"
+    return upload_button(words, part, MOST_BYTES, ".csv", hint=hint)
 
 
 # --- Standard tests -------------------------------------------------------------------------------
@@ -119,7 +82,6 @@ class TestsPart(Section):
         self._problem = ""
         self._version = 0
         self._measured: tuple[tuple[object, ...], BenchResult | str] | None = None
-        self._upload = Uploaded(self, self._keep, self._refuse)
 
     def concerns(self, picture: LivePicture) -> tuple[object, ...]:
         """Follow the errors, the test and the file."""
@@ -156,7 +118,7 @@ class TestsPart(Section):
 
     def _readings_html(self) -> Markup:
         if self._file is None:
-            parts = [self._upload.button("Measured readings …")]
+            parts = [_upload_button("Measured readings …", self.name)]
         else:
             parts = [tag("span", self._file[0]),
                      button("✕", "bench:remove", kind="link",
@@ -215,18 +177,17 @@ class TestsPart(Section):
         elif word == "remove":
             self._file = None
             self.context.act(self._again)
-        elif word == "refused":
-            self._upload.refused(value)
+        elif word == "file":
+            self.context.act(partial(self._receive, value))
         elif word == "report":
             self.context.act(self._into_report)
         return state if look == state.bench else replace(state, bench=look)
 
-    def _keep(self, name: str, text: str) -> None:
-        self._file, self._problem = (name, text), ""
-        self._again()
-
-    def _refuse(self, words: str) -> None:
-        self._problem = words
+    def _receive(self, value: str) -> None:
+        try:
+            self._file, self._problem = _received(value), ""
+        except WarpspaceError as error:
+            self._problem = error_words(error)
         self._again()
 
     def _again(self) -> None:
@@ -317,7 +278,6 @@ class CalibratePart(AnalysisPart):
         self._trouble = ""
         self._kind_of_file, self._test_options, self._arrows = "", "", ""
         self._drawn: Nodes | None = None
-        self._upload = Uploaded(self, self._add, self._say)
 
     def options(self) -> Sequence[Option]:
         """List what is fitted; files and their kinds stand above."""
@@ -362,7 +322,7 @@ class CalibratePart(AnalysisPart):
         )  # fmt: skip
         kind = choice("calibrate:kind", self._kind_of_file, kinds)
         parts += [
-            tag("div", self._upload.button("Add readings …"), class_="ws-actions"),
+            tag("div", _upload_button("Add readings …", self.name), class_="ws-actions"),
             choice("calibrate:bundled", "", bundled, label="Bundled readings"),
             labelled("Kind", kind, "calibrate:kind", hint="Kind of readings that are added next"),
             own,
@@ -417,8 +377,8 @@ class CalibratePart(AnalysisPart):
             at = int(value)
             self._files = (*self._files[:at], *self._files[at + 1 :])
             again()
-        elif word == "refused":
-            self._upload.refused(value)
+        elif word == "file":
+            self.context.act(partial(self._receive, value))
         elif word == "arrows":
             self._arrows = value if value in ARROWS else ""
             again()
@@ -429,6 +389,12 @@ class CalibratePart(AnalysisPart):
 
     def _add_bundled(self, name: str) -> None:
         self._add(name, read_text(find_data(name), MAX_CSV_BYTES))
+
+    def _receive(self, value: str) -> None:
+        try:
+            self._add(*_received(value))
+        except WarpspaceError as error:
+            self._say(error_words(error))
 
     def _add(self, name: str, text: str) -> None:
         kind = self._kind_of_file or None

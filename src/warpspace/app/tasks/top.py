@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from markupsafe import Markup
 
-from warpspace.app.browser.html import EMPTY, button, join, tag
+from warpspace.app.browser.html import EMPTY, button, join, tag, upload_button
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
@@ -15,8 +15,10 @@ from warpspace.app.state.store import change_words
 from warpspace.app.state.tree import put, toggled
 from warpspace.app.tasks.commands import key_events
 from warpspace.app.tasks.context import Context
+from warpspace.app.tasks.files import accepted_endings
 from warpspace.app.tasks.parts import Part
 from warpspace.app.tasks.window import Window
+from warpspace.machine.limits import MAX_SCENE_BYTES
 
 LONGEST_SENTENCE = 110
 
@@ -55,14 +57,15 @@ class TopPart(Part):
             for word, sign, what, keys in (("Undo", "↶", history.undoes, "Ctrl+Z"),
                                            ("Redo", "↷", history.redoes, "Ctrl+Shift+Z")) if what
         )  # fmt: skip
+        hint = "Open a scene, measured errors, or a controller's table (Ctrl+O)"
         title = picture.state.origin.title or picture.state.origin.name
         return {
             "top": join((
                 tag("strong", "warpspace", class_="ws-brand"),
                 button(title, "page:open", "scenes", kind="ws-scene",
                        hint="Choose another scene"),
-                tag("button", "Open", type="button", class_="ws-button quiet", data_upload="files",
-                    title="Open a scene, measured errors, or a controller's table (Ctrl+O)"),
+                upload_button("Open", "files", MAX_SCENE_BYTES, accepted_endings(), kind="quiet",
+                              hint=hint),
                 button("Save", "page:open", "files", kind="quiet",
                        hint="Save the scene, pictures, exports"),
                 button("Share", "files:share", kind="quiet", hint="Copy a link to what is shown"),
