@@ -147,7 +147,7 @@ def test_a_click_asks_why_and_a_saved_scene_holds_what_was_changed(tab):
         tab.press("Control+s")
     text = saved.value.path().read_text("utf-8")
     assert parse_scene(text, "saved", "saved").errors.amplitude("EXX") == 3.25
-    tab.send("errors:reset")
+    tab.send("page:reset")
     tab.until(lambda: tab.state.amplitudes["EXX"] == 0.0)
     tab.give(
         "mine.toml",

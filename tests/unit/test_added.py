@@ -23,7 +23,7 @@ from warpspace.app.evaluation.conventions import choices, chosen, effects_of, wi
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.edits import with_curve
-from warpspace.app.tasks.error_curve import convert_shape, kind_titles, read_curve, spell_rows
+from warpspace.app.tasks.error_curve import kind_titles, read_curve, spell_rows
 from warpspace.app.tasks.machine import ConventionsSection
 from warpspace.bench.base import BenchTest, bench_names, register_test, unregister_test
 from warpspace.bench.data import DataColumn
@@ -267,13 +267,13 @@ def test_first_order_of_a_convention_is_the_derivative_of_the_exact_chain(loop):
 
 def test_the_app_offers_a_curve_reads_converts_and_stores_it():
     assert kind_titles()[-1] == "half sine"
-    curve = read_curve("half sine", "2.5  # in the middle", SPAN).function
+    curve, _ = read_curve(HalfSine, "2.5  # in the middle", SPAN)
     assert curve == HalfSine(SPAN, 2.5)
     assert spell_rows(curve) == "2.5"
     with pytest.raises(OptionError, match="one number: the value in the middle"):
-        read_curve("half sine", "", SPAN)
-    assert convert_shape(Constant(SPAN, 7.0), "half sine", SPAN) == HalfSine(SPAN, 7.0)
-    assert isinstance(convert_shape(curve, "polynomial", SPAN), Poly)
+        read_curve(HalfSine, "", SPAN)
+    assert HalfSine.from_curve(Constant(SPAN, 7.0), SPAN) == HalfSine(SPAN, 7.0)
+    assert isinstance(Poly.from_curve(curve, SPAN), Poly)
     assert "half_sine along X" in curve.slider_words("X")
     state = with_curve(start_state(FIRST, nodes=3), "EYX", curve)
     back, _ = open_text(state_to_toml(state), "dvf5000_first", "x.toml")

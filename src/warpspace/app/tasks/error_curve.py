@@ -1,7 +1,5 @@
 """The curve of one error in its row: drawn, said where it comes from, and edited as numbers."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from markupsafe import Markup
 
@@ -24,32 +22,17 @@ CHART_SAMPLES = 181
 MAX_KINKS = 500  # kinks of a curve that are drawn where they are
 
 
-@dataclass(frozen=True, slots=True)
-class EnteredCurve:
-    """A curve that a user has entered."""
-
-    function: ErrorFunction
-    remarks: tuple[str, ...] = ()  # what was left out or put in order, a sentence each
-
-
-def kind_titles() -> tuple[str, ...]:
+def kind_titles() -> list[str]:
     """List what the kinds of curve are called that people can write, simplest first."""
-    return tuple(kind.title for kind in curve_kinds() if kind.edited_as_rows)
+    return [kind.title for kind in curve_kinds() if kind.edited_as_rows]
 
 
-def shape_kind(function: ErrorFunction | None) -> str:
-    """Give the title of the kind of a function; an absent one is a constant."""
-    return Constant.title if function is None else function.title
-
-
-def spell_rows(function: ErrorFunction | None) -> str:
+def spell_rows(function: ErrorFunction) -> str:
     """Write the numbers of a function as the rows that `read_curve` reads.
 
     A measured table with more rows than may be edited is thinned out; of a kind that cannot be
     written as rows it is said where it comes from.
     """
-    if function is None:
-        return "0"
     if not function.edited_as_rows:
         return function.row_words
     rows = function.rows()
@@ -58,21 +41,27 @@ def spell_rows(function: ErrorFunction | None) -> str:
     return "\n".join("  ".join(map(spell_typed, row)) for row in rows)
 
 
-def read_curve(kind: str, text: str, span: tuple[float, float]) -> EnteredCurve:
-    """Read the rows that a user has edited, or pasted from a spreadsheet."""
-    chosen = _kind(kind)
+def read_curve(
+    kind: CurveKind, text: str, span: tuple[float, float]
+) -> tuple[ErrorFunction, tuple[str, ...]]:
+    """Read the rows that a user has edited, or pasted from a spreadsheet.
+
+    Gives with the curve what was left out or put in order, a sentence each.
+    """
     if len(text) > MAX_CURVE_TEXT:
         raise OptionError(f"{len(text):,} characters; expected at most {MAX_CURVE_TEXT:,}")
     try:
-        return _read(chosen, text, span)
+        return _read(kind, text, span)
     except OptionError:
         with_commas = comma_rows(text)
         if with_commas is None:
             raise
-    return _read(chosen, with_commas, span)
+    return _read(kind, with_commas, span)
 
 
-def _read(kind: CurveKind, text: str, span: tuple[float, float]) -> EnteredCurve:
+def _read(
+    kind: CurveKind, text: str, span: tuple[float, float]
+) -> tuple[ErrorFunction, tuple[str, ...]]:
     rows, left_out = read_rows(text)
     if not rows:
         raise OptionError(f"no numbers; expected {kind.row_words}")
@@ -81,33 +70,14 @@ def _read(kind: CurveKind, text: str, span: tuple[float, float]) -> EnteredCurve
     peak = function.amplitude
     if not abs(peak) <= MAX_ERROR:
         raise OptionError(f"the curve reaches {peak:.3g}; expected at most ±{MAX_ERROR:g}")
-    return EnteredCurve(function, (*left_out, *tidied))
+    return function, (*left_out, *tidied)
 
 
-def convert_shape(
-    function: ErrorFunction | None, kind: str, span: tuple[float, float]
-) -> ErrorFunction:
-    """Give a first curve of another kind with the amplitude of a present one."""
-    present = function or Constant(span)
-    return present if shape_kind(function) == kind else _kind(kind).from_curve(present, span)
-
-
-def sample_curve(function: ErrorFunction | None, span: tuple[float, float]) -> tuple[Array, Array]:
+def sample_curve(function: ErrorFunction, span: tuple[float, float]) -> tuple[Array, Array]:
     """Sample a curve along the travel for a chart."""
-    at = np.linspace(*span, CHART_SAMPLES)
-    kinks = () if function is None else function.kinks
-    if inside := [q for q in kinks if span[0] < q < span[1]][:MAX_KINKS]:
-        at = np.unique(np.concatenate([at, inside]))
-    value = np.zeros(at.shape) if function is None else function.evaluate(at)
-    return at, np.where(np.isfinite(value), value, np.nan)
-
-
-def _kind(title: str) -> CurveKind:
-    try:
-        return curve_kind(title)
-    except UnknownNameError as error:
-        expected = f"expected one of {', '.join(error.known)}"
-        raise OptionError(f"shape {title!r}; {expected}") from None
+    inside = [q for q in function.kinks if span[0] < q < span[1]][:MAX_KINKS]
+    at = np.unique(np.concatenate([np.linspace(*span, CHART_SAMPLES), inside]))
+    return at, _finite(function.evaluate(at))
 
 
 # --- The row of an error --------------------------------------------------------------------------
@@ -119,71 +89,66 @@ TYPING = (
 )
 
 
-class CurveEditor:
-    """Draws and edits the curve of the error whose row is unfolded."""
+Said = tuple[str, str, bool]
+"""The rows as typed or read, what is said of them, and whether that is a problem."""
 
-    def __init__(self) -> None:
-        self.version = 0
-        self._said: dict[str, tuple[str, str, bool]] = {}  # text, what is said of it, whether wrong
 
-    def html(self, state: AppState, key: str) -> Markup:
-        """Give chart, origin and editor of an error."""
-        row, function = parameter(key), edits.curve_of(state, key)
-        only, excluded = key in state.exclusions.only, key in state.exclusions.excluded
-        own, edited = origin_words(state, key)
-        back = button("Undo the edit", f"errors:own.{key}", kind="link",
-                      hint="Value and curve of the scene")  # fmt: skip
-        return tag("div", join((
-            _chart(state, row, function),
-            rows([("Origin", own + (back if edited else EMPTY))], "ws-origin"),
-            self._editor(row, function),
-            tag("div", join((
-                button("Only this error", "errors:only", key, pressed=only,
-                       hint="Draw the machine with the errors chosen so, and no other"),
-                button("Exclude", "errors:exclude", key, pressed=excluded,
-                       hint="Draw the machine without this error; its value is kept"),
-            )), class_="ws-actions"),
-        )), class_="ws-error-more", data_key=f"more-{key}")  # fmt: skip
+def curve_html(state: AppState, key: str, said: Said | None) -> Markup:
+    """Give chart, origin and editor of an error."""
+    row, function = parameter(key), edits.curve_of(state, key)
+    only, excluded = key in state.exclusions.only, key in state.exclusions.excluded
+    own, edited = origin_words(state, key)
+    back = button("Undo the edit", f"errors:own.{key}", kind="link",
+                  hint="Value and curve of the scene")  # fmt: skip
+    return tag("div", join((
+        _chart(state, row, function),
+        rows([("Origin", own + (back if edited else EMPTY))], "ws-origin"),
+        _editor(row, function, said or (spell_rows(function), "", False)),
+        tag("div", join((
+            button("Only this error", "state:set.exclusions.only", f"{'-' if only else '+'}{key}",
+                   pressed=only, hint="Draw the machine with the errors chosen so, and no other"),
+            button("Exclude", "state:set.exclusions.excluded", f"{'-' if excluded else '+'}{key}",
+                   pressed=excluded, hint="Draw the machine without this error; its value is kept"),
+        )), class_="ws-actions"),
+    )), class_="ws-error-more", data_key=f"more-{key}")  # fmt: skip
 
-    def _editor(self, row: Parameter, function: ErrorFunction) -> Markup:
-        kind, name, key = shape_kind(function), f"errors:rows.{row.key}", row.key
-        kinds = (Constant.title,) if row.is_constant else kind_titles()
-        kinds = kinds if function.edited_as_rows else (*kinds, kind)
-        chosen = choice(f"errors:kind.{key}", kind, {title: title for title in kinds})
-        text, said, wrong = self._said.get(key, (spell_rows(function), "", False))
-        words = curve_kind(kind).row_words
-        fields = field("Curve", chosen, f"errors:kind.{key}")
-        if not function.edited_as_rows:
-            return fields + tag("p", words[0].upper() + words[1:] + ".", class_="ws-tiny")
-        return fields + fill(
-            '<textarea id="{id}" class="ws-box ws-rows-box" data-set="{name}" rows="{count}"'
-            ' spellcheck="false" aria-label="{label}" aria-invalid="{wrong}" title="{hint}">'
-            '\n{text}</textarea><p class="ws-tiny">{words}</p>{said}',
-            id=ident(name), name=name, count=min(max(text.count("\n") + 1, 2), 8), text=text,
-            label=f"Numbers of {key}: {words}", hint=TYPING, wrong=str(wrong).lower(),
-            words=f"{words}, in {row.unit}",
-            said=tag("p", said, class_="ws-problem" if wrong else "ws-quiet",
-                     role="alert" if wrong else "status") if said else EMPTY,
-        )  # fmt: skip
 
-    def take(self, state: AppState, what: str, key: str, value: str) -> AppState:
-        """Change kind or numbers of a curve, or go back to the scene's."""
-        self.version += 1
-        self._said.pop(key, None)
-        if what == "own":
-            function = state.own_curves.get(key) or Constant(edits.axis_span(state, key))
-            return edits.with_curve(state, key, function)
-        span, present = edits.axis_span(state, key), edits.curve_of(state, key)
-        try:
-            if what == "kind":
-                return edits.with_curve(state, key, convert_shape(present, value, span))
-            entered = read_curve(shape_kind(present), value, span)
-        except OptionError as error:
-            self._said[key] = (value if what == "rows" else spell_rows(present), str(error), True)
-            return state
-        if entered.remarks:
-            self._said[key] = (spell_rows(entered.function), " ".join(entered.remarks), False)
-        return edits.with_curve(state, key, entered.function)
+def _editor(row: Parameter, function: ErrorFunction, told: Said) -> Markup:
+    name, kind, words = f"errors:rows.{row.key}", f"errors:kind.{row.key}", function.row_words
+    titles = [Constant.title] if row.is_constant else kind_titles()
+    titles += [] if function.edited_as_rows else [function.title]
+    fields = field("Curve", choice(kind, function.title, {title: title for title in titles}), kind)
+    if not function.edited_as_rows:
+        return fields + tag("p", words[0].upper() + words[1:] + ".", class_="ws-tiny")
+    text, said, wrong = told
+    return fields + fill(
+        '<textarea id="{id}" class="ws-box ws-rows-box" data-set="{name}" rows="{count}"'
+        ' spellcheck="false" aria-label="{label}" aria-invalid="{wrong}" title="{hint}">'
+        '\n{text}</textarea><p class="ws-tiny">{words}</p>{said}',
+        id=ident(name), name=name, count=min(max(text.count("\n") + 1, 2), 8), text=text,
+        label=f"Numbers of {row.key}: {words}", hint=TYPING, wrong=str(wrong).lower(),
+        words=f"{words}, in {row.unit}",
+        said=tag("p", said, class_="ws-problem" if wrong else "ws-quiet",
+                 role="alert" if wrong else "status") if said else EMPTY,
+    )  # fmt: skip
+
+
+def edit_curve(state: AppState, what: str, key: str, value: str) -> tuple[AppState, Said | None]:
+    """Change kind or numbers of a curve, or go back to the scene's; say what there is to say."""
+    span, present = edits.axis_span(state, key), edits.curve_of(state, key)
+    said: Said | None = None
+    try:
+        if what == "rows":
+            function, remarks = read_curve(type(present), value, span)
+            said = (spell_rows(function), " ".join(remarks), False) if remarks else None
+        elif what == "kind":
+            kind = curve_kind(value)
+            function = present if type(present) is kind else kind.from_curve(present, span)
+        else:
+            function = state.own_curves.get(key) or Constant(span)
+    except (OptionError, UnknownNameError) as error:
+        return state, (value if what == "rows" else spell_rows(present), str(error), True)
+    return edits.with_curve(state, key, function), said
 
 
 def origin_words(state: AppState, key: str) -> tuple[str, bool]:

@@ -2,7 +2,7 @@
 
 import unicodedata
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from functools import lru_cache
@@ -15,11 +15,11 @@ from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.ranges import Exclusions, Span, amplitude_span
-from warpspace.app.state.tree import toggled
-from warpspace.app.state.typed_numbers import read_typed, spell_typed
+from warpspace.app.state.ranges import Span, amplitude_span
+from warpspace.app.state.tree import put
+from warpspace.app.state.typed_numbers import spell_typed
 from warpspace.app.tasks.context import Context
-from warpspace.app.tasks.error_curve import CurveEditor
+from warpspace.app.tasks.error_curve import Said, curve_html, edit_curve
 from warpspace.app.tasks.parts import Part
 from warpspace.machine.axes import ErrorKind, Parameter, parameter
 from warpspace.scene.model import grid_basis
@@ -32,7 +32,7 @@ OF_ALL = {
     "zero": ("Set all to zero", "The nominal machine"),
     "include": ("Include all", "End every “only” and “exclude”"),
 }
-"""What can be done with all errors: words and hint by event."""
+"""What can be done with all errors: words and hint by event of the page."""
 
 
 class ErrorsPart(Part):
@@ -48,58 +48,53 @@ class ErrorsPart(Part):
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
-        self._curves = CurveEditor()
+        self._said: Mapping[str, Said | None] = {}  # of the rows of curves
         self._gains: Mapping[str, float] = {}
         self._gains_for: tuple[object, ...] = ()
         self._sorted_for: tuple[object, ...] = ()
         self._sorted_at: Mapping[str, float] = {}  # amplitudes when the rows were last sorted
         self._own: set[str] = set()  # errors that this column has changed since then
         self._order: tuple[str, ...] = ()
-        self._used: frozenset[str] = frozenset()
+        self._used: tuple[str, ...] = ()
         self._largest = 1.0
         self._spans: dict[str, Span] = {}
-        self._rows: dict[str, tuple[object, ...]] = {}
+        self._more: tuple[object, Markup] = (None, EMPTY)
 
     def depends(self, picture: LivePicture) -> tuple[object, ...]:
-        """Follow the errors, and what is unfolded or searched for."""
         state = picture.state
         return (
             Identity(state.amplitudes), Identity(state.exclusions), Identity(state.scene),
             state.page.query, state.page.row, FOLDED in state.page.open, state.seen,
-            Identity(state.positions), self._sorted_for, self._curves.version,
+            Identity(state.positions), self._sorted_for, Identity(self._said),
         )  # fmt: skip
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
-        """Write the list where it has changed, and the rows that have."""
         state = picture.state
         made_for = (Identity(state.scene), state.seen, tuple(state.positions.items()))
-        others = made_for != self._gains_for and not self._own
         if made_for != self._gains_for:
             self._gains, self._gains_for = _gains(picture, state), made_for
+            self._sorted_for = self._sorted_for if self._own else ()
         sorted_for = (Identity(state.origin), tuple(state.amplitudes), *made_for[1:])
         before = self._sorted_at
         changed = {key for key, value in state.amplitudes.items() if value != before.get(key)}
-        if others or sorted_for != self._sorted_for or changed - self._own:
-            self._sort(state, sorted_for)
-        return {**self._list(state), **self._changed_rows(state)}
+        if sorted_for != self._sorted_for or changed - self._own:
+            self._sort(state)
+            self._sorted_for, self._sorted_at, self._own = sorted_for, state.amplitudes, set()
+        return {**self._list(state), **self._rows(state)}
 
-    def _sort(self, state: AppState, sorted_for: tuple[object, ...]) -> None:
-        effects = self._effects(state)
-        order = tuple(sorted(effects, key=lambda key: -effects[key]))
-        used = frozenset(used_keys(state))
-        if (order, used) != (self._order, self._used):
-            self._rows = {}  # their places are new
-        self._order, self._used = order, used
+    def _effect(self, state: AppState, key: str) -> float:
+        return self._gains.get(key, 0.0) * abs(state.amplitudes[key])
+
+    def _sort(self, state: AppState) -> None:
+        effects = {key: self._effect(state, key) for key in state.amplitudes}
+        self._order = tuple(sorted(effects, key=lambda key: -effects[key]))
+        self._used = used_keys(state)
         self._largest = max(effects.values(), default=0.0) or 1.0
         self._spans = _spans(state)
-        self._sorted_for, self._sorted_at, self._own = sorted_for, state.amplitudes, set()
-
-    def _effects(self, state: AppState) -> dict[str, float]:
-        return {key: self._gains.get(key, 0.0) * abs(v) for key, v in state.amplitudes.items()}
 
     def _list(self, state: AppState) -> dict[str, str]:
-        query = state.page.query
-        found = set(find_parameters(query, self._order)) if query.strip() else self._used
+        query, used = state.page.query, self._used
+        found = find_parameters(query, self._order) if query.strip() else used
         listed = [key for key in self._order if key in found]
         zero = [] if query.strip() else [key for key in self._order if key not in found]
         opened = FOLDED in state.page.open or not listed
@@ -116,52 +111,56 @@ class ErrorsPart(Part):
             places += _places(zero, state.page.row) if opened else EMPTY
         if listed or zero:  # for the keyboard: arrows go along it, Enter unfolds
             places = tag("div", places, role="tree", aria_label="Errors by effect")
-        left_out = ""
+        left_out: tuple[object, ...] = ()
         if state.exclusions:
-            count = sum(not state.exclusions.active(key) for key in self._used)
-            left_out = f"{count} of {len(self._used)} errors left out. "
-        note = tag("p", join((left_out, button("Include all", "errors:include", kind="link")))
-                   if left_out else "", class_="ws-quiet")  # fmt: skip
+            count = sum(not state.exclusions.active(key) for key in used)
+            left_out = (f"{count} of {len(used)} errors left out. ",
+                        button("Include all", "page:include", kind="link"))  # fmt: skip
         find = text_box(
             "errors:find", query, placeholder="Find an error  /", live=True, label="Find an error",
             id="ws-find",
         )  # fmt: skip
         menu = tag("details", tag("summary", "⋯", aria_label="All errors", title="All errors")
-                   + tag("div", join(button(words, f"errors:{word}", kind="quiet", hint=hint)
+                   + tag("div", join(button(words, f"page:{word}", kind="quiet", hint=hint)
                                      for word, (words, hint) in OF_ALL.items())),
                    class_="ws-menu")  # fmt: skip
         touched = state.exclusions or state.changed_keys or FOLDED in state.page.open
         head = tag("div", find + (menu if touched else ""), class_="ws-find")
         body = tag("div", places, class_="ws-errors", data_leave="errors:sort")
-        return {"errors": head + note + body}
+        return {"errors": head + tag("p", join(left_out), class_="ws-quiet") + body}
 
-    def _changed_rows(self, state: AppState) -> dict[str, str]:
+    def _rows(self, state: AppState) -> dict[str, str]:
         pieces: dict[str, str] = {}
         for key in self._order:
-            value, span = state.amplitudes[key], self._spans[key]
+            row, value, span = parameter(key), state.amplitudes[key], self._spans[key]
             if abs(value) > span.high:  # typed
                 span = self._spans[key] = amplitude_span(key, value, None)
-            effect, opened = self._gains.get(key, 0.0) * abs(value), key == state.page.row
-            made = (
-                value, effect, self._largest, span, state.exclusions.active(key), opened,
-                (Identity(state.scene), Identity(state.exclusions), self._curves.version)
-                if opened else None,
-            )  # fmt: skip
-            if self._rows.get(key) != made:
-                self._rows[key] = made
-                more = self._curves.html(state, key) if opened else EMPTY
-                share = min(effect / self._largest, 1.0)
-                pieces[f"error.{key}"] = _row(state, parameter(key), span, effect, share, more)
+            effect = self._effect(state, key)
+            share = min(effect / self._largest, 1.0)
+            hint = edits.curve_of(state, key).slider_words(row.axis)
+            pieces[f"error.{key}"] = _row(
+                row, value, span, effect, share, hint, active=state.exclusions.active(key)
+            )
+            if key == state.page.row:
+                pieces[f"error.{key}"] += self._curve(state, key)
         return pieces
 
+    def _curve(self, state: AppState, key: str) -> Markup:
+        made = (key, state.amplitudes[key], Identity(state.scene), Identity(state.exclusions),
+                Identity(self._said))  # fmt: skip
+        if made != self._more[0]:
+            self._more = made, curve_html(state, key, self._said.get(key))
+        return self._more[1]
+
     def take(self, state: AppState, word: str, value: str) -> AppState:
-        """Set an error or its curve, search, unfold a row, only, exclude, reset."""
         what, _, key = word.partition(".")
         if what in ("set", "kind", "rows", "own") and key in state.amplitudes:
             self._own.add(key)
-            return self._set(state, key, value) if what == "set" else self._curves.take(
-                state, what, key, value
-            )  # fmt: skip
+            if what == "set":
+                return put(state, f"errors.{key}", value)
+            state, said = edit_curve(state, what, key, value)
+            self._said = {**self._said, key: said}
+            return state
         if what in ("sort", "find"):
             self._sorted_for = ()
         if what == "sort":
@@ -171,24 +170,6 @@ class ErrorsPart(Part):
         if what == "row":
             row = value if value in state.amplitudes and value != state.page.row else ""
             return replace(state, page=replace(state.page, row=row))
-        if what == "only":
-            return toggled(state, "exclusions.only", value)
-        if what == "exclude":
-            return toggled(state, "exclusions.excluded", value)
-        if what == "include":
-            return replace(state, exclusions=Exclusions())
-        if what == "zero":
-            return state.zeroed()
-        return state.reset() if what == "reset" else state
-
-    def _set(self, state: AppState, key: str, value: str) -> AppState:
-        unit = parameter(key).unit
-        typed = read_typed(value, unit)
-        if typed is not None:
-            return state.with_amplitude(key, typed)
-        kept = spell_typed(state.amplitudes[key]).replace("-", MINUS)
-        words = f"{key}: “{value[:40]}” is no number; it stays {kept} {unit}."
-        self.context.notify("Not a number", words, "warning")
         return state
 
 
@@ -203,30 +184,35 @@ def _places(keys: list[str], row: str) -> Markup:
     )  # fmt: skip
 
 
+@lru_cache(maxsize=512)
 def _row(
-    state: AppState, row: Parameter, span: Span, effect: float, share: float, more: Markup
-) -> Markup:
-    key, value, name = row.key, state.amplitudes[row.key], f"errors:set.{row.key}"
-    active, text = state.exclusions.active(key), spell_typed(value).replace("-", MINUS)
+    row: Parameter, value: float, span: Span, effect: float, share: float, hint: str, *,
+    active: bool,
+) -> Markup:  # fmt: skip
+    key, name, text = row.key, f"errors:set.{row.key}", _shown(value)
     head = fill(
         '<div class="{kind}" id="ws-error-{key}" data-do="errors:row" data-value="{key}"'
         ' title="{symbol}, {words}: {of}"><span>{effect} µm</span><b>{key}</b> {words}</div>',
         kind="ws-error-head" if active else "ws-error-head off", key=key, symbol=row.symbol,
         of=row.kind.value, words=row.name, effect=number(effect) if active else "–",
     )  # fmt: skip
-    function = edits.curve_of(state, key)
-    setting = fill(
+    return head + fill(
         '<div class="ws-effect"><i style="width:{share}%"></i></div>'
         '<div class="ws-error-set" title="{hint}">{slider}'
         '<span class="ws-edit" id="ws-box-{key}" data-box="{name}" data-text="{typed}"'
         ' data-label="{key} in {unit}">{text}</span><span class="ws-unit">{unit}</span></div>',
         share=f"{100.0 * share:.1f}", key=key, name=name, typed=spell_typed(value), text=text,
-        hint=f"{row.name}: {function.slider_words(row.axis)}. Drag, or type a number.",
+        hint=f"{row.name}: {hint}. Drag, or type a number.",
         slider=slider(name, value, span.low, span.high, span.step, twin=f"box-{key}",
                       label=f"{key} {row.name}", text=f"{text} {row.unit}"),
         unit=row.unit,
     )  # fmt: skip
-    return head + setting + more
+
+
+def _shown(value: float) -> str:
+    """Spell a value as a row has room for: four digits, and all before the point."""
+    short = float(f"{value:.4g}") if abs(value) < 1000.0 else round(value, 1)
+    return spell_typed(short).replace("-", MINUS)
 
 
 def _spans(state: AppState) -> dict[str, Span]:
@@ -236,11 +222,7 @@ def _spans(state: AppState) -> dict[str, Span]:
     for key, start in state.start.items():
         kinds[parameter(key).kind].append(amplitude_span(key, start, scene.tolerances.get(key)))
     widest = {kind: max(spans, key=lambda span: span.high) for kind, spans in kinds.items()}
-    found: dict[str, Span] = {}
-    for key, value in state.amplitudes.items():
-        common = widest[parameter(key).kind]
-        found[key] = common if abs(value) <= common.high else amplitude_span(key, value, None)
-    return found
+    return {key: widest[parameter(key).kind] for key in state.amplitudes}
 
 
 def _gains(picture: LivePicture, state: AppState) -> dict[str, float]:
@@ -250,8 +232,6 @@ def _gains(picture: LivePicture, state: AppState) -> dict[str, float]:
     rms = np.sqrt(squares @ picture.grid.weights.reshape(-1))
     return dict(zip(basis.keys, rms.tolist(), strict=True))
 
-
-# --- Finding errors by what people call them ------------------------------------------------------
 
 # --- Finding error parameters by what people call them --------------------------------------------
 # Key, symbol, plain name, axis, kind.
@@ -270,9 +250,9 @@ def find_parameters(query: str, keys: Sequence[str]) -> tuple[str, ...]:
     exact = tuple(row.key for row in rows if all(_fits(token, row) for token in tokens))
     if exact:
         return exact
-    known = {word for row in rows for word in _words(row) if len(word) > 2}
-    corrected = [_corrected(token, known) for token in tokens]
-    return tuple(row.key for row in rows if all(_fits(token, row) for token in corrected))
+    known = list({word for row in rows for word in _words(row) if len(word) > 2})
+    meant = [get_close_matches(token, known, n=1, cutoff=_NEAR) or [token] for token in tokens]
+    return tuple(row.key for row in rows if all(_fits(token, row) for (token,) in meant))
 
 
 def _tokens(query: str) -> list[str]:
@@ -292,20 +272,8 @@ def fold(text: str) -> str:
 @lru_cache(maxsize=256)
 def _words(row: Parameter) -> tuple[str, ...]:
     symbol = fold(row.symbol)
-    return tuple(
-        dict.fromkeys(
-            (
-                row.key.casefold(),
-                *symbol.split(),
-                symbol.replace(" ", ""),
-                *fold(row.name).split(),
-                *fold(row.kind.value).split(),
-                row.axis.casefold(),
-                row.unit.casefold(),
-                fold(row.unit).strip(),
-            )
-        )
-    )
+    said = fold(f"{row.key} {row.name} {row.kind.value} {row.axis} {row.unit}")
+    return (*said.split(), *symbol.split(), symbol.replace(" ", ""))
 
 
 def _fits(token: str, row: Parameter) -> bool:
@@ -317,11 +285,6 @@ def _fits(token: str, row: Parameter) -> bool:
     if len(token) == 1:
         return token == row.axis.casefold() or token in fold(row.name).split()
     return any(word.startswith(token) for word in words) or token in row.key.casefold()
-
-
-def _corrected(token: str, known: Iterable[str]) -> str:
-    close = get_close_matches(token, list(known), n=1, cutoff=_NEAR)
-    return close[0] if close else token
 
 
 def used_keys(state: AppState) -> tuple[str, ...]:
