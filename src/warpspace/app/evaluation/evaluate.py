@@ -90,7 +90,7 @@ class LiveModel:
                 group,
                 basis.nominal_mm,
                 (
-                    self._compensated.trace(state, group)
+                    self._compensated.field(state, group)
                     or basis.evaluate(amplitudes, orientation=False)
                 ).error_um,
                 factor,
