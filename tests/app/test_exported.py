@@ -14,14 +14,16 @@ import pytest
 from PIL import Image
 
 from app.frames import pixels_of_the_map
-from warpspace.app.documents.files import build_request, exported_words, file_stem
+from warpspace.app.documents.files import exported_words, file_stem, shown_machines
+from warpspace.app.documents.legend import words_in_view
 from warpspace.app.documents.offline_page import build_offline_html, offline_picture
-from warpspace.app.documents.view_image import BAND_PX, HEAD_PX, view_png
+from warpspace.app.documents.services import Shot
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.comparison import Side
-from warpspace.cli.services import draw_figure, write_export
+from warpspace.app.viewport.camera import fit_camera
+from warpspace.cli.services import draw_figure, draw_shot, write_export
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop
 from warpspace.outputs.drawing.settings import FigureSettings
@@ -49,7 +51,7 @@ def read_glb(data):
 
 def rows_of(picture):
     """Rows of the exported CSV, once their errors are those that are drawn."""
-    text = write_export(build_request(picture), ".csv").decode()
+    text = write_export(picture, ".csv").decode()
     rows = list(csv.DictReader(StringIO(text)))
     # three components, whatever loop and frame their columns name
     names = [name for name in rows[0] if re.fullmatch(r"error_.*[xyz]_um", name)]
@@ -68,7 +70,7 @@ def test_csv_holds_the_numbers_that_are_drawn(shown):
 @pytest.mark.parametrize("shown", WORDS)
 def test_glb_has_the_title_the_factor_and_the_shared_colours(shown):
     picture = picture_of(shown)
-    extras = read_glb(write_export(build_request(picture), ".glb"))["asset"]["extras"]
+    extras = read_glb(write_export(picture, ".glb"))["asset"]["extras"]
     assert extras["settings"]["exaggeration"] == picture.exaggeration
     assert extras["colours"]["low"] == picture.scale.low
     assert extras["colours"]["high"] == picture.scale.high
@@ -81,26 +83,21 @@ def test_glb_has_the_title_the_factor_and_the_shared_colours(shown):
 
 
 @pytest.mark.parametrize("shown", WORDS)
-def test_the_offline_page_and_pictures_of_the_view_say_what_they_show(shown):
+def test_the_offline_page_says_what_it_shows(shown):
     picture = picture_of(shown)
     page = build_offline_html(picture)
     assert WORDS[shown] in page.partition("<main>")[0]
     errors = page.partition("<aside>")[2]
     assert ("A +6, B 0 µm" in errors) == (shown == "difference")
     assert ("+6 µm" in errors) == (shown == "a")
-    content = view_png(np.zeros((200, 300, 3), np.uint8), picture)
-    assert Image.open(BytesIO(content)).info["Title"] == WORDS[shown]
 
 
 @pytest.mark.render
 def test_the_figure_is_a_sheet_of_both_and_the_difference_as_the_app_takes_it(renderer):
-    request = build_request(picture_of("a"))
-    assert [scene.title for scene in request.pair] == [
-        f"present errors: {FIRST.title}",
-        SECOND.title,
-    ]
-    settings = FigureSettings(grid=5, exaggeration=request.exaggeration)
-    drawing = draw("comparison", list(request.pair), settings)
+    pair = [one.scene for one in shown_machines(picture_of("a"), sheet=True)]
+    assert [scene.title for scene in pair] == [f"present errors: {FIRST.title}", SECOND.title]
+    settings = FigureSettings(grid=5, exaggeration=pair[0].exaggeration)
+    drawing = draw("comparison", pair, settings)
     difference = picture_of("difference")
     np.testing.assert_allclose(drawing.maps[2].picture.values, difference.values, atol=1e-6)
     np.testing.assert_allclose(drawing.maps[2].picture.drawn_mm, difference.drawn_mm, atol=1e-6)
@@ -118,7 +115,7 @@ def tilted(top=None):
 @pytest.mark.parametrize("top", [None, 7.0])
 def test_glb_has_the_tilts_and_the_range_that_are_coloured(top):
     picture = tilted(top)
-    extras = read_glb(write_export(build_request(picture), ".glb"))["asset"]["extras"]
+    extras = read_glb(write_export(picture, ".glb"))["asset"]["extras"]
     assert extras["settings"]["coloured"] == "tool-orientation error"
     assert extras["colours"]["high"] == (picture.scale.high if top is None else top)
     assert extras["colours"]["unit"] == "µrad"
@@ -127,7 +124,7 @@ def test_glb_has_the_tilts_and_the_range_that_are_coloured(top):
 
 @pytest.mark.render
 def test_the_figure_shows_what_is_coloured_in_the_range_that_is_fixed(renderer):
-    content = draw_figure(build_request(tilted(7.0)), threading.Event())
+    content = draw_figure(tilted(7.0), "", threading.Event())
     about = Image.open(BytesIO(content)).info
     assert about["Title"].startswith("Orientation error of the tool axis")
     said = dict(pair.split("=") for pair in about["Description"].partition(";")[0].split(", "))
@@ -137,7 +134,7 @@ def test_the_figure_shows_what_is_coloured_in_the_range_that_is_fixed(renderer):
 def test_two_loops_on_one_sheet_are_refused_in_words():
     picture = picture_of("difference", replace(with_pin(START), loop=Loop("relative")))
     with pytest.raises(OptionError, match="one loop"):
-        draw_figure(build_request(picture), threading.Event())
+        draw_figure(picture, "", threading.Event())
     # the other exports draw each side through its own
     assert rows_of(picture)[0]["loop"] == "relative − tool"
 
@@ -161,9 +158,7 @@ def test_volumes_that_differ_export_the_side_that_is_drawn():
     assert picture.compared.refused
     assert picture.compared.difference is None
     assert picture.compared.shown == "b"
-    request = build_request(picture)
-    assert request.pair is None
-    assert request.beside is None
+    assert len(shown_machines(picture, sheet=True)) == 1
     assert file_stem(picture) == "B_other"
     assert "sheet" not in exported_words(picture)
 
@@ -222,14 +217,28 @@ def test_opens_without_network_and_draws(browser, tmp_path):
     context.close()
 
 
-def test_the_view_is_framed_by_heading_and_colour_bar():
-    picture = LiveModel().evaluate(start_state(load_scene("dvf5000_first"), nodes=5))
-    pixels = np.zeros((300, 400, 4), np.uint8)
-    drawn = Image.open(BytesIO(view_png(pixels, picture)))
-    assert drawn.size == (400 + BAND_PX, 300 + HEAD_PX)
-    assert "1" in drawn.info["Description"]
-    column = np.asarray(drawn)[:, 400 + 30]
-    ends = picture.scale.colours(np.array([picture.scale.high, picture.scale.low]))
-    for colour in ends:
-        assert (column == colour).all(axis=-1).any()
-    assert (np.asarray(drawn)[:HEAD_PX] < 128).any()
+def test_a_picture_of_the_screen_says_what_it_shows_beside_its_pixels():
+    picture = picture_of("difference")
+    pose = fit_camera(picture.drawn_mm.reshape(-1, 3), 1.5, margins=(0.2, 0.2, 0.2, 0.2))
+    pixels = np.zeros((400, 600, 4), np.uint8)
+    pixels[180:220, 250:350] = (90, 10, 200, 255)
+    words = words_in_view(picture, Shot(pixels, pose, None))
+    bare, barred = (
+        Image.open(BytesIO(draw_shot(picture, Shot(pixels, pose, px), threading.Event())))
+        for px in (None, 0.7)
+    )
+    assert barred.info["Title"] == WORDS["difference"]
+    assert f"exaggeration ×{picture.exaggeration:g}" in barred.info["Description"]
+    drawn, without = (np.asarray(one.convert("RGB")).astype(int) for one in (barred, bare))
+    scene, without = drawn[-400:, :600], without[-400:, :600]
+    assert (scene == without).all()
+    assert (scene[185:215, 255:345] == (90, 10, 200)).mean() > 0.9
+    beside = drawn[-400:, 600:]
+    for value in (picture.scale.high, picture.scale.low):
+        close = np.abs(beside - picture.scale.colours(np.array(value))).sum(axis=-1) < 12
+        assert close.any()
+    # words stand beside their points, of which the worst is named
+    (worst,) = [spot for text, spot in words if text.startswith("max ")]
+    left, top = np.round(worst - (90, 0)).astype(int)[0], 400 - round(worst[1])
+    assert (scene[max(top - 90, 0) : top + 90, max(left, 0) : left + 180] < 128).any()
+    assert any(text == "0" for text, _ in words)

@@ -147,6 +147,11 @@ def test_a_click_asks_why_and_a_saved_scene_holds_what_was_changed(tab):
         tab.press("Control+s")
     text = saved.value.path().read_text("utf-8")
     assert parse_scene(text, "saved", "saved").errors.amplitude("EXX") == 3.25
+    with tab.page.expect_download(timeout=60_000) as saved:
+        tab.send("files:view")
+    assert (
+        Image.open(BytesIO(saved.value.path().read_bytes())).info["Title"] == tab.state.scene.title
+    )
     tab.send("page:reset")
     tab.until(lambda: tab.state.amplitudes["EXX"] == 0.0)
     tab.give(

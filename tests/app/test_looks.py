@@ -1,16 +1,13 @@
 """From a state to a picture: field, views, slices, machine, traces, colours, camera, room."""
 
 from dataclasses import replace
-from io import BytesIO
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from PIL import Image
 
 from warpspace.app.browser.room import Room, read_room
-from warpspace.app.documents.view_image import HEAD_PX, view_png
 from warpspace.app.evaluation.cache import Cache
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.machine import drawn_bodies, tool_point
@@ -290,21 +287,6 @@ COARSE = replace(START, nodes=9)
 )
 def test_a_room_that_cannot_be_is_none(text):
     assert read_room(text) is None
-
-
-def test_the_bars_of_a_picture_have_their_length():
-    picture = LIVE.evaluate(COARSE)
-    pixels = np.zeros((300, 600, 4), np.uint8)
-    plain, drawn = (
-        np.asarray(Image.open(BytesIO(view_png(pixels, picture, px)))).astype(int)
-        for px in (None, 0.7)
-    )
-    # at most 150 px: 200 mm at 0.7 px, and 200 µm drawn ×1000, 140 px each, from 16 px on
-    assert picture.exaggeration == 1000.0
-    for line in (HEAD_PX + 300 - 18, HEAD_PX + 300 - 42):
-        inked = np.flatnonzero(np.abs(drawn[line] - plain[line]).sum(axis=-1) > 300)
-        row = inked[inked < 16 + 145]
-        assert (row.min(), row.max()) == (pytest.approx(16, abs=1), pytest.approx(156, abs=1))
 
 
 def test_labels_of_isolines_stand_on_lines_of_their_value():

@@ -2,23 +2,20 @@
 
 import re
 from dataclasses import replace
-from io import BytesIO
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from app.parts import LIVE, lone_part
 from warpspace import load_scene
 from warpspace.app.documents.legend import kept_words, legend_html, marks
-from warpspace.app.documents.view_image import HEAD_PX, view_png
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
 from warpspace.app.evaluation.resulting_scene import scene_of
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.comparison import NOBODY, Side
 from warpspace.app.tasks.controls import ComparePart, ControlsPart, chosen_map
 from warpspace.app.tasks.over import ComparedPart, HeadPart
-from warpspace.app.viewport.camera import CameraSetup, fit_camera
+from warpspace.app.viewport.camera import CameraSetup
 from warpspace.app.viewport.colours import colour_levels
 from warpspace.app.viewport.labels import axes, point_labels
 from warpspace.exceptions import SceneError
@@ -145,18 +142,3 @@ def test_titles_are_escaped_wherever_they_lie_over_the_drawing():
     for kind in (HeadPart, ComparedPart, ComparePart):
         html = "".join(pieces(kind, state).values())
         assert "<img" not in html
-
-
-def test_a_picture_of_the_view_has_words_where_the_camera_saw_their_points():
-    picture = LIVE.evaluate(START)
-    camera = fit_camera(picture.drawn_mm, 1.4, margins=(0.2, 0.2, 0.2, 0.2))
-    pixels = np.full((500, 700, 4), 255, np.uint8)
-    plain, worded = (
-        np.asarray(Image.open(BytesIO(view_png(pixels, picture, None, seen)))).astype(int)
-        for seen in (None, camera)
-    )
-    changed = np.abs(plain - worded).sum(axis=-1)[HEAD_PX:, :700]
-    # below the worst corner, which is the lowest one in sight; at the left of the vertical axis
-    assert changed[420:, 350:600].any()
-    assert changed[100:400, :200].any()
-    assert not changed[150:300, 300:400].any()

@@ -170,7 +170,7 @@ def test_a_saved_scene_opens_to_the_same_errors():
 def test_the_report_has_author_questions_and_every_result_under_a_name_of_its_own():
     asked = []
 
-    def write(request, _cancelled):
+    def write(_picture, request, _cancelled):
         asked.append(request)
         return b"%PDF", ()
 

@@ -215,7 +215,6 @@ DRAWING_VIEW = """
 import threading, time, sys
 import warpspace.app.server.run as viewer
 from warpspace.cli.services import build_services
-from warpspace.app.documents.services import Request
 from warpspace.scene.library import load_scene
 serve = viewer.run_viewer
 def run(scene, scenes, *, services, **options):

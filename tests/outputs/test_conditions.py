@@ -6,14 +6,12 @@ import json
 import struct
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from PIL import Image
 
-from warpspace.app.documents.conditions import picture_conditions
-from warpspace.app.documents.files import build_request
+from warpspace.app.documents.files import shown_machines
+from warpspace.app.documents.legend import look_words, picture_conditions
 from warpspace.app.documents.offline_page import build_offline_html
-from warpspace.app.documents.view_image import view_png
 from warpspace.app.evaluation.compare import scene_side, with_sides
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import start_state
@@ -56,18 +54,16 @@ def test_conditions_name_what_is_excluded_and_the_range():
 
 def test_exports_of_the_app_say_the_conditions():
     picture = fixed(without("EA0Z"))
-    request = build_request(picture)
-    rows = list(csv.DictReader(io.StringIO(write_export(request, ".csv").decode())))
+    rows = list(csv.DictReader(io.StringIO(write_export(picture, ".csv").decode())))
     assert rows[0]["conditions"] == "excluded: EA0Z; range fixed 0–50 µm"
-    data = write_export(request, ".glb")
+    data = write_export(picture, ".glb")
     extras = json.loads(data[20 : 20 + struct.unpack("<I", data[12:16])[0]])["asset"]["extras"]
     assert extras["settings"]["conditions"] == ["excluded: EA0Z", "range fixed 0–50 µm"]
     assert extras["statistics"]["max_at_axes"]["Z"] in (-480.0, -80.0)
     page = build_offline_html(picture)
     assert "excluded: EA0Z" in page.partition("<footer>")[2]
     assert "range fixed 0–50 µm" in page.partition("<footer>")[2]
-    view = Image.open(io.BytesIO(view_png(np.zeros((200, 300, 3), np.uint8), picture)))
-    assert "excluded: EA0Z" in view.info["Description"]
+    assert "excluded: EA0Z" in look_words(picture)  # of pictures of the screen
 
 
 def test_a_comparison_says_the_conditions_of_each_side():
@@ -76,9 +72,10 @@ def test_a_comparison_says_the_conditions_of_each_side():
         replace(state, comparison=replace(state.comparison, shown="difference"))
     )
     assert picture_conditions(picture) == ("A excluded: EA0Z",)
-    rows = list(csv.DictReader(io.StringIO(write_export(build_request(picture), ".csv").decode())))
+    rows = list(csv.DictReader(io.StringIO(write_export(picture, ".csv").decode())))
     assert rows[0]["conditions"] == "A excluded: EA0Z"
-    assert build_request(picture).pair_conditions == ("A excluded: EA0Z",)
+    conditions = [one.conditions for one in shown_machines(picture)]
+    assert conditions == [("excluded: EA0Z",), ()]
 
 
 def test_a_page_keeps_the_camera_and_the_point():

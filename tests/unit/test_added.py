@@ -16,7 +16,6 @@ from chains import central_differences
 from cli.conftest import warpspace
 from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.options import option
-from warpspace.app.documents.files import build_request
 from warpspace.app.documents.scene_file import open_text, state_to_toml
 from warpspace.app.evaluation.bench import BenchPicture
 from warpspace.app.evaluation.conventions import choices, chosen, effects_of, with_choice
@@ -342,6 +341,6 @@ def test_a_format_is_written_by_the_command_and_for_the_app(warpspace, tmp_path)
     wanted = f"{evaluate_picture(FIRST, grid=3).statistics.mean_um:.6f}"
     assert zipfile.ZipFile(target).read("mean.txt").decode() == wanted
     picture = LiveModel().evaluate(start_state(FIRST, nodes=3))
-    content = write_export(build_request(picture), ".zip")
+    content = write_export(picture, ".zip")
     found = float(zipfile.ZipFile(io.BytesIO(content)).read("mean.txt"))
     assert found == pytest.approx(picture.statistics.mean_um, abs=1e-6)

@@ -6,8 +6,7 @@ Figures are drawn in a process of their own. All is imported when it is done, as
 import threading
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from warpspace.cli.options import write_text
 from warpspace.exceptions import OptionError, RenderError, WorkersLostError
@@ -20,11 +19,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from warpspace.analysis.concepts import Concepts
-    from warpspace.app.documents.services import (
-        ReportRequest,
-        Request,
-        Services,
-    )
+    from warpspace.app.documents.services import Report, Services, Shot
+    from warpspace.app.evaluation.live_picture import LivePicture
     from warpspace.formats.compensation.compensate import Compensation
     from warpspace.outputs.drawing.settings import FigureSettings
     from warpspace.picture.model import ScenePicture
@@ -40,6 +36,7 @@ def build_services() -> "Services":
 
     return Services(
         draw_figure,
+        draw_shot,
         write_export,
         draw_concepts,
         draw_compensation,
@@ -49,40 +46,63 @@ def build_services() -> "Services":
     )
 
 
-def draw_figure(request: "Request", cancelled: threading.Event) -> bytes:
-    """Draw the map of a request as a PNG; of a comparison both sides and the difference."""
-    from warpspace.outputs.drawing.settings import FigureSettings
+def draw_figure(picture: "LivePicture", figure: str, cancelled: threading.Event) -> bytes:
+    """Draw a figure of what a page shows as a PNG; of a comparison both sides and the difference.
 
-    settings = FigureSettings(
-        component=request.component,
-        exaggeration=request.exaggeration,
-        dark=request.dark,
-        loop=request.loop,
-        grid=request.nodes,
-        range_top=None if request.colours is None else request.colours.high,
-        range_fixed=request.range_fixed,
-        conditions=request.conditions,
-    )
-    name, scenes = request.figure or "error-map", [request.scene]
-    if request.figure and request.beside is not None:
-        raise OptionError(f"figure {name!r} is of one machine; show A or B in the tab Compare")
-    if not request.figure and request.pair is not None:
-        settings = replace(settings, conditions=request.pair_conditions)
-        # the change has colours of its own, whichever of the three is drawn on the page
-        if request.tilts or not request.range_fixed:
-            settings = replace(settings, range_top=None)
-        name, scenes = "comparison", list(request.pair)
-    elif request.beside is not None:
+    Where tilts are coloured it is the orientation map; a comparison is always of position errors.
+    """
+    from warpspace.app.documents.files import shown_machines
+    from warpspace.outputs.drawing.settings import FigureSettings
+    from warpspace.picture.comparison import conditions_of_both
+
+    machines = shown_machines(picture, sheet=not figure)
+    loops = [machine.loop for machine in machines]
+    if figure and len(machines) == 2:
+        raise OptionError(f"figure {figure!r} is of one machine; show A or B in the tab Compare")
+    if len(set(loops)) > 1:
         raise OptionError(
-            f"A is seen through the {request.loop} loop, B through the {request.beside.loop} loop;"
+            f"A is seen through the {loops[0]} loop, B through the {loops[1]} loop;"
             " a figure of both needs one loop. GLB, CSV and HTML show their difference."
         )
-    elif request.tilts and not request.figure:
-        name = "orientation-map"
-    if name == "orientation-map":
+    state, tilts = picture.state, picture.tilts
+    name = figure or ("orientation-map" if tilts else "error-map")
+    conditions, fixed = machines[0].conditions, state.look.range_mode == "fixed"
+    top: float | None = picture.scale.high
+    if len(machines) == 2:
+        name, conditions = "comparison", conditions_of_both(*(one.conditions for one in machines))
+        # the change has colours of its own, whichever of the three is drawn on the page
+        top = top if fixed and not tilts else None
+    settings = FigureSettings(
+        component=state.component,
         # the lean of the needles has a factor of its own
-        settings = replace(settings, exaggeration="auto")
-    return _render(name, scenes, settings, cancelled)
+        exaggeration="auto" if name == "orientation-map" else picture.exaggeration,
+        dark=state.shown.dark,
+        loop=loops[0],
+        grid=state.nodes,
+        range_top=top,
+        range_fixed=fixed,
+        conditions=conditions,
+    )
+    return _render(name, [machine.scene for machine in machines], settings, cancelled)
+
+
+def draw_shot(picture: "LivePicture", shot: "Shot", cancelled: threading.Event) -> bytes:
+    """Draw what a page has drawn as a PNG that says what it shows."""
+    from warpspace.app.documents.legend import look_words, marked, words_in_view
+    from warpspace.outputs.shot import draw_shot as draw
+    from warpspace.picture.words import spell_factor
+    from warpspace.units import spell
+
+    found, factor = picture.statistics, picture.exaggeration
+    numbers = {"mean": found.mean_um, "P95": found.p95_um, "max": found.max_um}
+    return _apart(
+        "picture was", cancelled, draw, shot.pixels, picture.title,
+        [f"exaggeration {spell_factor(factor)}", *look_words(picture)], picture.scale,
+        marked(picture),
+        [(f"{n} {picture.length_words}", f"{spell(v)} µm") for n, v in numbers.items()],
+        None if shot.px_per_mm is None else (shot.px_per_mm, factor),
+        words_in_view(picture, shot), dark=picture.state.shown.dark,
+    )  # fmt: skip
 
 
 def draw_concepts(
@@ -98,16 +118,23 @@ def draw_concepts(
 def draw_compensation(
     found: "Compensation", dark: bool, narrow: bool, cancelled: threading.Event
 ) -> bytes:
-    from warpspace.outputs.processes import ProcessPool
     from warpspace.outputs.save import draw_maps
+
+    return _apart("maps were", cancelled, draw_maps, found, dark=dark, narrow=narrow)
+
+
+def _apart(
+    what: str, cancelled: threading.Event, draw: Callable[..., bytes], *given: Any, **named: Any
+) -> bytes:
+    """Draw in a process of its own, which ends when it is cancelled."""
+    from warpspace.outputs.processes import ProcessPool
 
     with _turn(cancelled):
         pool = ProcessPool(1)
         try:
-            drawn = pool.submit(draw_maps, found, dark=dark, narrow=narrow)
-            return _wait(drawn, cancelled, pool.kill, "maps were")
+            return _wait(pool.submit(draw, *given, **named), cancelled, pool.kill, what)
         except WorkersLostError:
-            raise RenderError("the maps could not be drawn: their process has ended") from None
+            raise RenderError(f"the {what} not drawn: their process has ended") from None
         finally:
             pool.kill()
 
@@ -155,55 +182,53 @@ def _wait(
     return drawn.result()
 
 
-def write_export(request: "Request", ending: str) -> bytes:
+def write_export(picture: "LivePicture", ending: str) -> bytes:
+    """Write an export of what a page shows."""
+    from warpspace.app.documents.files import shown_machines
+    from warpspace.app.documents.legend import range_conditions
     from warpspace.outputs.files import temporary_folder
     from warpspace.picture.comparison import scene_change
     from warpspace.picture.model import evaluate_picture
-    from warpspace.picture.words import range_words
 
-    scale = request.colours
-    fixed = (
-        (range_words(scale.low, scale.high, scale.unit),)
-        if request.range_fixed and scale is not None
-        else ()
-    )
-    picture, *subtracted = (
+    found, *subtracted = (
         evaluate_picture(
-            part.scene,
-            exaggeration=request.exaggeration,
-            grid=request.nodes,
-            loop=part.loop,
-            component=request.component,
-            quantity="orientation" if request.tilts else "position",
-            colours=request.colours,
-            conditions=(*part.conditions, *fixed),
+            machine.scene,
+            exaggeration=picture.exaggeration,
+            grid=picture.state.nodes,
+            loop=machine.loop,
+            component=picture.component,
+            quantity=picture.quantity,
+            colours=picture.scale,
+            conditions=(*machine.conditions, *range_conditions(picture)),
         )
-        for part in (request, request.beside)
-        if part is not None
+        for machine in shown_machines(picture)
     )
     if subtracted:
-        picture = scene_change(picture, subtracted[0])
+        found = scene_change(found, subtracted[0])
     with temporary_folder() as folder:
         target = folder / f"export{ending}"
-        write(picture, target, overwrite=False)
+        write(found, target, overwrite=False)
         return target.read_bytes()
 
 
 def write_report(
-    request: "ReportRequest", cancelled: threading.Event
+    picture: "LivePicture", about: "Report", cancelled: threading.Event
 ) -> tuple[bytes, tuple[str, ...]]:
     """Write a report; give the file, and which figures are missing."""
+    from warpspace.app.documents.files import shown_machines
     from warpspace.outputs.files import temporary_folder
     from warpspace.outputs.report import ReportSettings
     from warpspace.outputs.report import write_report as write
 
+    state, machines = picture.state, shown_machines(picture, sheet=True)
     settings = ReportSettings(
-        loop=request.loop, grid=request.nodes, exaggeration=request.exaggeration,
-        spec_um=request.limit_um, author=request.author, questions=request.questions,
+        loop=machines[0].loop, grid=state.nodes, exaggeration=picture.exaggeration,
+        spec_um=state.specification.limit_um, author=about.author, questions=about.questions,
     )  # fmt: skip
+    scenes = [one.scene for one in machines if one.loop == machines[0].loop]
     with _turn(cancelled), temporary_folder() as folder:
-        target = folder / f"report{request.ending}"
-        written = write(request.scenes, target, settings, embed=embed_view, results=request.results)
+        target = folder / f"report{about.ending}"
+        written = write(scenes, target, settings, embed=embed_view, results=about.results)
         return target.read_bytes(), written.missing
 
 

@@ -3,20 +3,19 @@
 import base64
 import binascii
 import re
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from warpspace.app.documents.conditions import state_conditions
-from warpspace.app.documents.services import Beside, Request
+from warpspace.app.documents.legend import state_conditions
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.comparison import AFTER, BEFORE, Side
+from warpspace.app.state.comparison import AFTER, BEFORE
 from warpspace.app.state.table import drawn_tables, without_words
 from warpspace.exceptions import OptionError
+from warpspace.kinematics.model import Loop
 from warpspace.machine.limits import MAX_SCENE_BYTES
-from warpspace.picture.comparison import conditions_of_both
 from warpspace.scene.model import Scene
 
 # --- Links: a state as one word in the page's address ---------------------------------------------
@@ -116,87 +115,62 @@ def robot_text(name: str, content: bytes) -> tuple[str, list[str]]:
 AS_DRAWN = "View and HTML show what is drawn."
 
 
-def build_request(picture: LivePicture) -> Request:
-    """Say what a figure or an export of a picture is made of."""
-    found, drawn = picture.compared, picture.drawn_state
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """A machine as files show it."""
+
+    scene: Scene  # its active errors only, with the factor of the picture
+    loop: Loop
+    conditions: tuple[str, ...]  # which of its errors are excluded
+
+
+def shown_machines(picture: LivePicture, *, sheet: bool = False) -> list[Shown]:
+    """Give the machine that is drawn; A and B of a difference, on a sheet of any comparison."""
+
+    def shown(state: AppState, **named: str) -> Shown:
+        scene = replace(active_scene(state), exaggeration=picture.exaggeration, **named)
+        return Shown(scene, state.loop, state_conditions(state))
+
+    found = picture.compared
     if found is None:
-        return _request(picture, drawn, _scene(drawn, picture))
-    a, b = (
-        replace(_scene(side, picture), name=f"{name}: {title}", title=title)
+        return [shown(picture.drawn_state)]
+    both = [
+        shown(side, name=f"{name}: {title}", title=title)
         for name, title, side in zip("AB", found.titles, found.sides, strict=True)
-    )
-    side, scene = (found.sides[1], b) if found.shown == "b" else (found.sides[0], a)
-    request = _request(picture, side, scene)
-    loops = [side.loop for side in found.sides]
-    return replace(
-        request,
-        beside=Beside(b, loops[1].value, state_conditions(found.sides[1]))
-        if found.shown == "difference"
-        else None,
-        pair_conditions=conditions_of_both(*map(state_conditions, found.sides)),
-        pair=(a, b) if not found.refused and loops[0] == loops[1] else None,
-    )
+    ]
+    if found.shown == "difference" or (sheet and has_sheet(picture)):
+        return both
+    return [both["ab".index(found.shown)]]
 
 
-def _scene(state: AppState, picture: LivePicture) -> Scene:
-    """Give the scene of a state, its active errors only, with the factor of the picture."""
-    return replace(active_scene(state), exaggeration=picture.exaggeration)
-
-
-def _request(picture: LivePicture, state: AppState, scene: Scene) -> Request:
-    return Request(
-        scene,
-        state.loop.value,
-        picture.state.component,
-        picture.state.nodes,
-        picture.exaggeration,
-        picture.state.shown.dark,
-        picture.state.look.tilts,
-        picture.scale,
-        conditions=state_conditions(state),
-        range_fixed=picture.state.look.range_mode == "fixed",
-    )
+def has_sheet(picture: LivePicture) -> bool:
+    """Tell whether two machines are compared that fit on one sheet, with their difference."""
+    found = picture.compared
+    return found is not None and not found.refused and found.sides[0].loop == found.sides[1].loop
 
 
 def file_stem(picture: LivePicture) -> str:
     """Name the files of a picture, without an ending; of one with a table say so."""
-    found, plain = picture.compared, safe_name(picture.state.scene.name)
-    if drawn_tables(picture.state):
-        return f"{plain}_with_table"
-    if found is None:
-        return plain
+    found, chosen = picture.compared, picture.state.comparison
+    if found is None or drawn_tables(picture.state):
+        tail = "_with_table" if drawn_tables(picture.state) else ""
+        return safe_name(picture.state.scene.name) + tail
     a, b = (
-        _side_stem(side, picture.state.comparison.pinned)
-        for side in (picture.state.comparison.a, picture.state.comparison.b)
-        if side is not None
-    )
-    words = {"a": f"A_{a}", "b": f"B_{b}", "difference": f"{b}_minus_{a}"}
-    return safe_name(words[found.shown])
-
-
-def _side_stem(side: Side[AppState], pinned: Side[AppState] | None) -> str:
-    """Name one side of a comparison in the name of a file."""
-    if side.state is None:
-        return AFTER if pinned is not None else "present"
-    return side.state.scene.name if side.is_scene else BEFORE
+        (AFTER if chosen.pinned else "present") if side is None or side.state is None
+        else side.state.scene.name if side.is_scene
+        else BEFORE
+        for side in (chosen.a, chosen.b)
+    )  # fmt: skip
+    return safe_name({"a": f"A_{a}", "b": f"B_{b}"}.get(found.shown, f"{b}_minus_{a}"))
 
 
 def exported_words(picture: LivePicture) -> str:
     """Say what pictures and exports show, where that is not simply what is steered."""
-    found = picture.compared
+    found, tilts = picture.compared, picture.state.look.tilts
     if without := without_words(picture.state):
         return f"Figure, exports, Save and Link: {without[0].lower()}{without[1:]} {AS_DRAWN}"
     if found is None:
-        tilts = picture.state.look.tilts
         return "The figure shows the tilts of the tool axis as needles on the box." if tilts else ""
-    sheet = build_sheet_words(picture)
+    what = "the position errors of " if tilts else ""
+    sheet = f" The figure shows {what}A, B and B − A on one sheet." if has_sheet(picture) else ""
     return f"Pictures and exports show {found.title}.{sheet} Save and Link keep the comparison."
-
-
-def build_sheet_words(picture: LivePicture) -> str:
-    """Say what the figure shows beyond what is drawn."""
-    found = picture.compared
-    if found is None or found.refused or found.sides[0].loop != found.sides[1].loop:
-        return ""
-    what = "the position errors of " if picture.state.look.tilts else ""
-    return f" The figure shows {what}A, B and B − A on one sheet."

@@ -1,84 +1,82 @@
-"""What is said of a picture wherever it goes: title, numbers, place of the max, colour bar."""
+"""What is said of a picture wherever it goes: numbers, place of the max, colour bar, conditions."""
 
-from dataclasses import dataclass
-from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from markupsafe import Markup
 
 from warpspace.analysis.statistics import share_below, volume_statistics
 from warpspace.app.browser.html import fill, join, lowered, number, tag
+from warpspace.app.documents.services import Shot
 from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.table import table_words
-from warpspace.field.evaluate import ErrorField
-from warpspace.geometry.colour import ColourScale, colour_table
-from warpspace.picture.words import direction_words, list_axes, own_axes
-from warpspace.units import MICROMETRE, spell_short
-
-APART = 15.5 / 240.0  # least distance of two names beside the colour bar, as a part of its height
-_STOPS = 32
-
-
-@cache
-def colour_stops(*, diverging: bool) -> str:
-    """Spell the colours of a scale from the bottom up as the stops of a CSS gradient."""
-    table = colour_table(diverging=diverging)
-    last = len(table) - 1
-    stops = [table[round(i * last / _STOPS)] for i in range(_STOPS + 1)]
-    return ",".join(f"rgb({r},{g},{b})" for r, g, b in stops)
-
+from warpspace.app.viewport.labels import axis_labels, point_labels
+from warpspace.app.viewport.shapes import SCENE_PER_MM
+from warpspace.field.evaluate import ErrorField, placed_words, second_order_words
+from warpspace.geometry.colour import ColourScale
+from warpspace.picture.comparison import conditions_of_both
+from warpspace.picture.words import (
+    convention_words,
+    direction_words,
+    list_axes,
+    own_axes,
+    range_words,
+    reference_words,
+)
+from warpspace.scene.model import second_order
+from warpspace.units import MICROMETRE, Array, spell_short
 
 # --- The colour bar -------------------------------------------------------------------------------
 
+APART = 15.5 / 240.0  # least distance of two names beside the colour bar, as a part of its height
+_STOPS = 33
 
-@dataclass(frozen=True, slots=True)
-class Mark:
+
+class Mark(NamedTuple):
     """What is named beside the colour bar; heights are parts of its own."""
 
     name: str  # empty at the ends
-    value: float
+    words: str
     at: float
     name_at: float  # away from others
 
-    @property
-    def words(self) -> str:
-        """Name and value."""
-        if self.name in ("", "limit"):
-            return f"{self.name} {spell_short(self.value)}".strip()
-        return f"{self.name} {number(self.value)}"
 
-
-def marks(picture: LivePicture, apart: float = APART) -> list[Mark]:
+def marks(picture: LivePicture) -> list[Mark]:
     """Name ends, limit and statistics of what is coloured, from the lowest up."""
-    scale = picture.scale
-    ends = [("", scale.low), ("", scale.high)]
-    named = sorted([*ends, *_marked(picture).items()], key=lambda mark: mark[1])
-    at = [min(max((value - scale.low) / (scale.high - scale.low), 0.0), 1.0) for _, value in named]
-    placed, beyond = list(at), sum(value > scale.high for _, value in named)
+    low, high = picture.scale.low, picture.scale.high
+    named = sorted([("", low), ("", high), *marked(picture).items()], key=lambda mark: mark[1])
+    values = np.array([value for _, value in named])
+    at: list[float] = ((np.clip(values, low, high) - low) / (high - low)).tolist()
+    placed, beyond = list(at), int((values > high).sum())
     for i in range(1, len(placed)):
-        placed[i] = max(placed[i], placed[i - 1] + apart)
+        placed[i] = max(placed[i], placed[i - 1] + APART)
     for i in reversed(range(len(placed))):
-        placed[i] = min(placed[i], 1.0 - apart * (len(placed) - 1 - beyond - i))
-    return [Mark(*pair, *places) for pair, *places in zip(named, at, placed, strict=True)]
+        placed[i] = min(placed[i], 1.0 - APART * (len(placed) - 1 - beyond - i))
+    spelt = [
+        f"{name} {spell_short(value) if name in ('', 'limit') else number(value)}".strip()
+        for name, value in named
+    ]
+    return list(map(Mark, [name for name, _ in named], spelt, at, placed))
 
 
-def _marked(picture: LivePicture) -> dict[str, float]:
+def marked(picture: LivePicture) -> dict[str, float]:
+    """Name what is marked on the colours: statistics of what is coloured, and the limit."""
     found, values = picture.statistics, picture.values
     if picture.component != "norm":
         # the length of the error says nothing of a signed component: its own ends do
-        return {
-            "min": float(values.min()),
-            "mean": float(np.sum(picture.grid.weights * values.reshape(picture.shape))),
-            "max": float(values.max()),
-        }
+        mean = float(np.sum(picture.grid.weights * values.reshape(picture.shape)))
+        return {"min": float(values.min()), "mean": mean, "max": float(values.max())}
+    limit = {"limit": picture.state.specification.limit_um}
     if picture.scale.unit != MICROMETRE:
         # the length of the tilt is summarised as that of the position error is
         tilt = picture.field.orientation_urad
         found = volume_statistics(ErrorField(picture.field.nominal_mm, tilt, tilt), picture.grid)
-    limit = {"limit": picture.state.specification.limit_um}
-    beside = {} if picture.scale.unit != MICROMETRE or picture.is_difference else limit
-    return {"mean": found.mean_um, "P95": found.p95_um, "max": found.max_um, **beside}
+        limit = {}
+    elif picture.is_difference:
+        limit = {}
+    return {"mean": found.mean_um, "P95": found.p95_um, "max": found.max_um, **limit}
 
 
 def legend_html(picture: LivePicture) -> Markup:
@@ -96,24 +94,23 @@ def legend_html(picture: LivePicture) -> Markup:
     )  # fmt: skip
     return fill(
         '<b>{label} [{unit}]</b><div class="ws-scale" role="img" aria-label="{words}">'
-        '<i class="ws-colours" style="background:{colours}"></i><svg viewBox="0 0 10 100"'
-        ' preserveAspectRatio="none">{leads}</svg>{names}</div>',
+        '<i class="ws-colours" style="background:linear-gradient(to top,{colours})"></i>'
+        '<svg viewBox="0 0 10 100" preserveAspectRatio="none">{leads}</svg>{names}</div>',
         label=lowered(scale.label), unit=scale.unit, leads=leads, names=names,
         words=f"Colours from {spell_short(scale.low)} to {spell_short(scale.high)} {scale.unit}: "
         + ", ".join(mark.words for mark in named if mark.name),
-        colours=_background(scale),
+        colours=",".join(_stops(scale)),
     )  # fmt: skip
 
 
-def _background(scale: ColourScale) -> str:
+def _stops(scale: ColourScale) -> list[str]:
     limit = getattr(scale, "limit", None)
     if limit is None:
-        return f"linear-gradient(to top,{colour_stops(diverging=scale.diverging)})"
-    kept, missed = (
-        f"rgb({r},{g},{b})" for r, g, b in scale.colours(np.array([0.0, 2.0 * limit])).tolist()
-    )
-    at = 100.0 * min(limit / scale.high, 1.0)
-    return f"linear-gradient(to top,{kept} {at:.1f}%,{missed} {at:.1f}%)"
+        colours = scale.colours(np.linspace(scale.low, scale.high, _STOPS)).tolist()
+        return [f"rgb({r},{g},{b})" for r, g, b in colours]
+    at = 100.0 * min(limit / scale.high, 1.0)  # two colours that meet there
+    colours = scale.colours(np.array([0.0, 2.0 * limit])).tolist()
+    return [f"rgb({r},{g},{b}) {at:.1f}%" for r, g, b in colours]
 
 
 # --- The heading ----------------------------------------------------------------------------------
@@ -151,12 +148,88 @@ def subject_words(picture: LivePicture) -> list[str]:
     table = "" if picture.is_difference else table_words(state)
     if table and not (words and table in words[0]):
         words.append(table)
-    return words + _changed_words(state) + list(direction_words(state.scene))
+    if edited := len(state.changed_keys):
+        words.append(f"{edited} error{'s' if edited > 1 else ''} changed")
+    if excluded := len(_left_out(state)):
+        words.append(f"{excluded} excluded")
+    return [*words, *direction_words(state.scene)]
 
 
-def _changed_words(state: AppState) -> list[str]:
+# --- Conditions: what a reader must know who takes a picture for all of its scene -----------------
+
+
+def _left_out(state: AppState) -> list[str]:
     active = state.active
-    edited = len(state.changed_keys)
-    excluded = sum(value != active[key] for key, value in state.amplitudes.items())
-    found = [f"{edited} error{'s' if edited > 1 else ''} changed"] if edited else []
-    return found + ([f"{excluded} excluded"] if excluded else [])
+    return [key for key, value in state.amplitudes.items() if value != active[key]]
+
+
+def state_conditions(state: AppState) -> tuple[str, ...]:
+    """Say which errors of a state are excluded; nothing where that changes nothing."""
+    chosen, left_out = state.exclusions, _left_out(state)
+    only = [key for key in state.amplitudes if key in chosen.only and key not in chosen.excluded]
+    if left_out and chosen.only:
+        return (f"only: {', '.join(only or ['no error'])}",)
+    return (f"excluded: {', '.join(left_out)}",) if left_out else ()
+
+
+def order_conditions(picture: LivePicture) -> tuple[str, ...]:
+    """Say where the first order is not enough; with a table the exact chain is drawn."""
+    both = picture.compared.sides if picture.compared and picture.is_difference else ()
+    states = [one for one in both or (picture.drawn_state,) if one.controller is None]
+    return second_order_words(*(second_order(active_scene(one), one.loop) for one in states))
+
+
+def picture_conditions(picture: LivePicture) -> tuple[str, ...]:
+    """Say all that a file of a picture must say; of a difference for both sides."""
+
+    def of(state: AppState) -> tuple[str, ...]:
+        view = (*direction_words(state.scene), *placed_words(state.view()))
+        return (*view, *state_conditions(state), *filter(None, [table_words(state)]))
+
+    if picture.is_difference and picture.compared is not None:
+        found = conditions_of_both(*map(of, picture.compared.sides))
+    else:
+        found = of(picture.drawn_state)
+    return (*found, *order_conditions(picture), *range_conditions(picture))
+
+
+def range_conditions(picture: LivePicture) -> tuple[str, ...]:
+    """Say where a user has fixed the range of the colours."""
+    scale = picture.scale
+    fixed = picture.state.look.range_mode == "fixed"
+    return (range_words(scale.low, scale.high, scale.unit),) if fixed else ()
+
+
+def look_words(picture: LivePicture) -> list[str]:
+    """Say how the scene is looked at; of a difference for both sides."""
+    return [
+        f"{picture.both_words(lambda state: state.loop.value)} loop",
+        picture.both_words(lambda state: reference_words(state.scene)),
+        *picture_conditions(picture),
+        picture.both_words(lambda state: convention_words(state.scene)),
+        picture.both_words(
+            lambda state: "exact chain" if state.controller else "first-order model"
+        ),
+        "error = actual − nominal",
+    ]
+
+
+def words_in_view(picture: LivePicture, shot: Shot) -> list[tuple[str, Array]]:
+    """Give what is written beside points, and where the camera saw those, px from left bottom."""
+    labels = [*axis_labels(picture), *point_labels(picture)]
+    camera, (height, width) = shot.camera, shot.pixels.shape[:2]
+    position = np.array(camera.position)
+    forth = np.array(camera.look_at) - position
+    forth = forth / np.linalg.norm(forth)
+    right = np.cross(forth, camera.up)
+    right = right / np.linalg.norm(right)
+    found: list[tuple[str, Array]] = []
+    for label in labels:
+        across, up, away = np.stack([right, np.cross(right, forth), forth]) @ (
+            label.at_mm * SCENE_PER_MM - position
+        )
+        px = height / 2.0 / np.tan(camera.fov_rad / 2.0) / away
+        spot = np.array([width / 2.0 + across * px, height / 2.0 + up * px])
+        if away > 0.0 and (spot > 0.0).all() and (spot < (width, height)).all():
+            found.append((label.text, spot))
+    return found

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 import viser
-from markupsafe import Markup, escape
+from markupsafe import escape
 
 from warpspace.app.browser.html import (
     attributes,
@@ -27,11 +27,12 @@ from warpspace.app.browser.html import (
     tag,
     thousands,
 )
-from warpspace.app.documents.conditions import picture_conditions
 from warpspace.app.documents.legend import (
     kept_words,
     legend_html,
+    look_words,
     numbers_words,
+    picture_conditions,
     place_words,
     subject_words,
 )
@@ -45,15 +46,12 @@ from warpspace.app.viewport.camera import CameraMemory, fit_camera
 from warpspace.app.viewport.labels import axes_room_mm
 from warpspace.app.viewport.shapes import Nodes, light_scene
 from warpspace.field.grid import MIN_NODES
-from warpspace.geometry.surfaces import is_thin
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
 from warpspace.machine.errors import ErrorFunction
 from warpspace.picture.model import choose_scale
 from warpspace.picture.words import (
-    convention_words,
     own_axes,
-    reference_words,
     spell_factor,
     spell_point,
 )
@@ -68,7 +66,6 @@ POLICY = (
 """What the browser may load: what is in the file, and nothing else."""
 FEW = 12  # errors that are listed at once
 ASPECT = 1.5
-MARGIN = 1.3  # room around the box, for the axes beside it
 
 
 def offline_picture(
@@ -80,7 +77,7 @@ def offline_picture(
     component: str = "norm",
     largest: float | None = None,
 ) -> LivePicture:
-    """Evaluate a scene for a page."""
+    """Evaluate a scene for a page; `largest` is where its colours end, for several alike."""
     state = replace(
         start_state(scene),
         exaggeration=exaggeration,
@@ -89,33 +86,25 @@ def offline_picture(
         component=component,
     )
     picture = LiveModel().evaluate(state)
-    return (
-        picture
-        if largest is None
-        else replace(picture, colours=choose_scale([np.array(largest)], component))
-    )
+    colours = None if largest is None else choose_scale([np.array(largest)], component)
+    return replace(picture, colours=colours or picture.colours)
 
 
 def build_scene_html(picture: LivePicture, camera: CameraMemory | None = None) -> str:
     """Export the 3-D scene of a picture as a page of its own, without a word around it."""
+    drawn = np.concatenate([axes_room_mm(picture), picture.drawn_mm.reshape(-1, 3)])
+    kept = camera or fit_camera(drawn, ASPECT)
     with contextlib.redirect_stdout(io.StringIO()):  # the server says hello and goodbye
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         try:
             light_scene(server.scene)
             Nodes(server.scene).draw({**box(picture), **around(picture), **words(picture)})
-            kept, first = camera or _fitted(picture), server.initial_camera
+            first = server.initial_camera
             first.up, first.fov = kept.up, kept.fov_rad
             first.position, first.look_at = kept.position, kept.look_at
             return server.scene.as_html(dark_mode=picture.state.shown.dark)
         finally:
             server.stop()
-
-
-def _fitted(picture: LivePicture) -> CameraMemory:
-    drawn = np.concatenate([picture.grid.nominal_mm, picture.drawn_mm]).reshape(-1, 3)
-    if is_thin(picture.shape):
-        drawn = np.concatenate([drawn, axes_room_mm(picture)])
-    return fit_camera(drawn, ASPECT, margin=MARGIN)
 
 
 def build_offline_html(
@@ -129,45 +118,39 @@ def build_offline_html(
     conditions = list(picture_conditions(picture))
     about = {**(provenance or {}), **({"conditions": conditions} if conditions else {})}
     stored = json.dumps(about, ensure_ascii=False, allow_nan=False)
-    template = Template(
-        files("warpspace.app.documents").joinpath("offline.html").read_text("utf-8")
-    )
-    errors = parameter_rows(picture)
+    template = files("warpspace.app.documents").joinpath("offline.html").read_text("utf-8")
+    errors = _error_rows(picture)
     counted = "unlike in A and B" if picture.is_difference else "not zero"
-    point = point_words(picture)
     found = picture.statistics
     numbers = {"mean": found.mean_um, "RMS": found.rms_um, "P95": found.p95_um, "max": found.max_um}
-    return template.substitute(
+    remarks = (*look_words(picture), "drag to turn, wheel to zoom", f"warpspace {__version__}")
+    return Template(template).substitute(
         title=escape(picture.title),
         program=f"warpspace {__version__}",
         policy=POLICY,
-        heading=join(tag("p", words) for words in heading_words(picture)),
+        heading=join(tag("p", words) for words in _heading(picture)),
         legend=legend_html(picture),
         numbers=tag("b", lowered(f"{picture.length_words} over the volume"))
         + rows((name, f"{number(value, 2)} µm") for name, value in numbers.items()),
         scene=inner,
-        point=tag("p", point, class_="point") if point else "",
+        point=tag("p", point_words(picture), class_="point"),
         errors=fill(
             "<details{open}><summary>{count} {counted}</summary><table>{rows}</table></details>",
             open=attributes(open=len(errors) <= FEW),
             count=f"{len(errors)} error{'' if len(errors) == 1 else 's'}", counted=counted,
-            rows=join(tag("tr", join(map(_cell, row.values()))) for row in errors),
+            rows=join(tag("tr", join(tag("td", cell) for cell in row)) for row in errors),
         ),
-        remarks=join(tag("span", words) for words in remarks(picture)),
+        remarks=join(tag("span", words) for words in remarks),
         provenance=stored.replace("<", "\\u003c"),
     )  # fmt: skip
 
 
-def _cell(text: str) -> Markup:
-    return tag("td", text)
-
-
-def heading_words(picture: LivePicture) -> list[str]:
+def _heading(picture: LivePicture) -> list[str]:
     """Say numbers, place of the max, limit, machine, factor, and what is unlike the scene."""
-    state, grid = picture.drawn_state, picture.grid
+    machine, grid = picture.drawn_state.scene.machine, picture.grid
     size = " × ".join(f"{edge:.0f}" for edge in grid.extent_mm)
     kept = "" if picture.is_difference else f" · {kept_words(picture)[0]}"
-    machine, nodes = state.scene.machine, thousands(picture.field.norm_um.size)
+    nodes = thousands(picture.field.norm_um.size)
     about = f"{machine.title}, chain {machine.chain} · {size} mm · {nodes} nodes"
     return [
         f"{numbers_words(picture)} {place_words(picture)}{kept}",
@@ -176,20 +159,23 @@ def heading_words(picture: LivePicture) -> list[str]:
     ]
 
 
-def parameter_rows(picture: LivePicture) -> list[dict[str, str]]:
-    """Spell the errors that are drawn: key, plain name, value with unit.
+def _error_rows(picture: LivePicture) -> list[tuple[str, str, str]]:
+    """Spell the errors that are not zero, or unlike in A and B: key, plain name, value and unit."""
+    if picture.compared is not None and picture.is_difference:
+        a, b = (active_errors(side).functions for side in picture.compared.sides)
+        values = {
+            key: f"A {_amplitude(a.get(key))}, B {_amplitude(b.get(key))}"
+            for key in {**a, **b}
+            if a.get(key) != b.get(key)
+        }
+    else:
+        values = {key: f"{v:+g}" for key, v in picture.drawn_state.active.items() if v != 0.0}
+    named = ((parameter(key), value) for key, value in values.items())
+    return [(row.key, row.name, f"{v} {row.unit}".replace("-", "−")) for row, v in named]
 
-    Those that are not zero; of a difference those that are unlike on both sides.
-    """
-    drawn = picture.drawn_state
-    if picture.compared is None or not picture.is_difference:
-        return [_row(key, f"{value:+g}") for key, value in drawn.active.items() if value != 0.0]
-    a, b = (active_errors(side).functions for side in picture.compared.sides)
-    return [
-        _row(key, f"A {_amplitude(a.get(key))}, B {_amplitude(b.get(key))}")
-        for key in {**a, **b}
-        if a.get(key) != b.get(key)
-    ]
+
+def _amplitude(function: ErrorFunction | None) -> str:
+    return "0" if function is None else f"{function.amplitude:+g}"
 
 
 def point_words(picture: LivePicture) -> str:
@@ -202,28 +188,3 @@ def point_words(picture: LivePicture) -> str:
     axes = own_axes(picture.drawn_state.scene, found.at)
     place = spell_point(axes, found.explanation.nominal_mm)
     return f"marked point: {place} mm, |E| {length:.1f} µm"
-
-
-def _row(key: str, value: str) -> dict[str, str]:
-    row = parameter(key)
-    return {"key": key, "name": row.name, "value": f"{value} {row.unit}".replace("-", "−")}
-
-
-def _amplitude(function: ErrorFunction | None) -> str:
-    return "0" if function is None else f"{function.amplitude:+g}"
-
-
-def remarks(picture: LivePicture) -> list[str]:
-    """Spell how the scene is looked at; of a difference for both sides."""
-    return [
-        f"{picture.both_words(lambda state: state.loop.value)} loop",
-        picture.both_words(lambda state: reference_words(state.scene)),
-        *picture_conditions(picture),
-        picture.both_words(lambda state: convention_words(state.scene)),
-        picture.both_words(
-            lambda state: "exact chain" if state.controller else "first-order model"
-        ),
-        "error = actual − nominal",
-        "drag to turn, wheel to zoom",
-        f"warpspace {__version__}",
-    ]

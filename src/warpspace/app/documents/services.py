@@ -3,10 +3,14 @@
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from warpspace.exceptions import WarpspaceError
-from warpspace.geometry.colour import ColourScale
+import numpy as np
+from numpy.typing import NDArray
+
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.viewport.camera import CameraMemory
+from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.scene.model import Scene
 
 if TYPE_CHECKING:
@@ -20,74 +24,52 @@ class CancelledError(WarpspaceError):
 
 
 @dataclass(frozen=True, slots=True)
-class Beside:
-    """The other side of a comparison."""
+class Shot:
+    """What a page has drawn: pixels, the camera that saw them, and its scale."""
 
-    scene: Scene
-    loop: str
-    conditions: tuple[str, ...] = ()  # errors that are excluded there, in words
-
-
-@dataclass(frozen=True, slots=True)
-class Request:
-    """What is to be drawn or written."""
-
-    scene: Scene  # with all changes made in the app
-    loop: str
-    component: str
-    nodes: int  # grid nodes per axis
-    exaggeration: float  # display factor in force
-    dark: bool  # light ink on a dark ground
-    tilts: bool = False  # whether the tool-orientation error is coloured, not the position error
-    # the colours that are shown, where they are not those of the request's own map: fixed by the
-    # user, or shared with other maps
-    colours: ColourScale | None = None
-    beside: Beside | None = None  # B, where the change from the scene (A) to B is wanted: B − A
-    # or None; both sides of a comparison where they can be drawn on one sheet, with their
-    # difference
-    pair: tuple[Scene, Scene] | None = None
-    figure: str = ""  # name of the figure; empty for the one that suits what is coloured
-    conditions: tuple[str, ...] = ()  # errors that are excluded, in words
-    # the same of both sides of a pair, with the letter of the side
-    pair_conditions: tuple[str, ...] = ()
-    range_fixed: bool = False  # whether the user has fixed the range of the colours
+    pixels: NDArray[np.uint8]  # [height, width, 4]
+    camera: CameraMemory
+    px_per_mm: float | None  # across the line of sight in the middle; None for no scale bars
 
 
 @dataclass(frozen=True, slots=True)
-class ReportRequest:
-    """The report that is to be written."""
+class Report:
+    """What stands in a report beside what is drawn."""
 
-    scenes: tuple[Scene, ...]  # one, or two that are compared
-    loop: str
-    nodes: int  # grid nodes per axis
-    exaggeration: float
-    limit_um: float
     author: str
     questions: tuple[str, ...]
     results: "Mapping[str, Result]"  # of analyses, by heading
     ending: str  # ".html" or ".pdf"
 
 
+def _nobody(*_: object) -> Any:
+    raise OptionError("this app was started without what draws figures and writes files")
+
+
 @dataclass(frozen=True, slots=True)
 class Services:
-    """Work the app cannot do itself; None where nobody does it."""
+    """Work the app cannot do itself.
 
-    # takes a request and an event that cancels; gives a PNG. Raises `CancelledError` when
-    # cancelled, another `WarpspaceError` where it cannot be drawn.
-    draw_figure: Callable[[Request, threading.Event], bytes] | None = None
-    # takes a request and an ending (".glb", ".csv"); gives the file's content
-    write_export: Callable[[Request, str], bytes] | None = None
-    # as `draw_figure`, of machines side by side: how they are sampled, and whether in dark colours
+    What takes an event gives up once that is set, with `CancelledError`; it raises another
+    `WarpspaceError` where it cannot be done. All but reports and exports give a PNG.
+    """
+
+    # takes a picture and the name of a figure, empty for the one that suits what is coloured
+    draw_figure: Callable[[LivePicture, str, threading.Event], bytes] = _nobody
+    draw_shot: Callable[[LivePicture, Shot, threading.Event], bytes] = _nobody
+    # takes a picture and an ending (".glb", ".csv"); gives the file's content
+    write_export: Callable[[LivePicture, str], bytes] = _nobody
+    # draws machines side by side: how they are sampled, and whether in dark colours
     draw_concepts: Callable[[Sequence[Scene], "Concepts", bool, threading.Event], bytes] | None = (
         None
     )
-    # as `draw_figure`, of the maps of a compensation: whether in dark colours, and whether for a
-    # column of the page, without title and numbers
+    # draws the maps of a compensation: whether in dark colours, and whether for a column of the
+    # page, without title and numbers
     draw_compensation: Callable[["Compensation", bool, bool, threading.Event], bytes] | None = None
     # gives a report, and what is missing of it
-    write_report: (
-        Callable[[ReportRequest, threading.Event], tuple[bytes, tuple[str, ...]]] | None
-    ) = None
+    write_report: Callable[
+        [LivePicture, Report, threading.Event], tuple[bytes, tuple[str, ...]]
+    ] = _nobody
     # names of the figures of one scene, and what each shows
     figures: tuple[tuple[str, str], ...] = ()
     exports: tuple[tuple[str, str], ...] = ()  # endings of the formats, and what each is for

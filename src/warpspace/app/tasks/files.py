@@ -1,18 +1,17 @@
 """Files of a page: scenes and data that are opened, scenes, links, pictures and exports."""
 
-import threading
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
+import numpy as np
 from markupsafe import Markup
 
 from warpspace.app.browser.html import button, choice, field, join, tag
 from warpspace.app.browser.page import error_words
 from warpspace.app.documents import scene_file
 from warpspace.app.documents.files import (
-    build_request,
     exported_words,
     file_stem,
     pack,
@@ -22,24 +21,23 @@ from warpspace.app.documents.files import (
     unpack,
     upload_text,
 )
-from warpspace.app.documents.services import CancelledError
+from warpspace.app.documents.services import CancelledError, Shot
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.comparison import Comparison
 from warpspace.app.state.table import drawn_tables, without_table
 from warpspace.app.tasks.context import Context
-from warpspace.app.tasks.jobs import Jobs
+from warpspace.app.tasks.jobs import Job, Jobs
 from warpspace.app.tasks.window import Window, actions
 from warpspace.app.viewport.camera import CameraMemory
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.formats.registry import formats
 
-FIGURE_S, VIEW_S, EXPORT_S = 5.0, 1.5, 1.0  # what a file usually takes
+FIGURE_S, VIEW_S, EXPORT_S = 5.0, 4.0, 1.0  # what a file usually takes
 RENDER_TIMEOUT_S = 30.0
-LARGEST_VIEW_PX = 4096
+VIEW_PX = 64, 4096
 AS_COLOURED = "as the drawing is coloured"
-Make = Callable[[threading.Event], tuple[str, bytes]]
 PLAIN = LiveModel()  # evaluates what files show, for all tabs and beside their sessions
 
 
@@ -56,32 +54,32 @@ class JobWindow(Window):
         super().__init__(context)
         self._jobs = Jobs(context, self.name, lambda: context.renew(self), self._failed)
 
-    def make(self, name: str, ending: str, usual_s: float, make: Make) -> None:
-        """Make a file beside the session, and have the browser save it."""
+    def make(
+        self,
+        name: str,
+        ending: str,
+        usual_s: float,
+        write: Callable[[LivePicture, Job], bytes],
+        *,
+        as_drawn: bool = False,
+    ) -> None:
+        """Make a file of what is drawn beside the session, and have the browser save it."""
+        drawn = self.context.shown
+        if drawn is None:
+            return
 
-        def work(cancelled: threading.Event) -> None:
-            stem, content = make(cancelled)
-            if not cancelled.is_set():
-                self.context.save_file(f"{stem}{ending}", content)
+        def work(job: Job) -> None:
+            picture = drawn if as_drawn else without_tables(drawn)
+            content = write(picture, job)
+            if not job.is_set():
+                self.context.save_file(f"{file_stem(picture)}{ending}", content)
 
         if not self._jobs.start(name, work, usual_s):
             self.context.notify(
                 "One file at a time", "Wait for the other one, or cancel it", "warning"
             )
 
-    def attempt(self, action: Callable[[], None]) -> None:
-        """Do something in the session; say what it raises."""
-
-        def guarded() -> None:
-            try:
-                action()
-            except WarpspaceError as error:
-                self._failed(self.title, error)
-
-        self.context.act(guarded)
-
     def take(self, state: AppState, word: str, value: str) -> AppState:
-        """Cancel what is being made."""
         if word == "cancel":
             self._jobs.cancel()
         return state
@@ -103,30 +101,20 @@ class FilesWindow(JobWindow):
         self._figures = {name: name.replace("-", " ") for name, _ in context.services.figures}
         self._figure = ""
 
-    def depends(self, picture: LivePicture) -> tuple[object, ...]:
-        """Follow what exports show, and how far a file is."""
-        return (object(),)
-
     def body(self, picture: LivePicture) -> Markup:
-        """Offer the files."""
-        services = self.context.services
-        figure: list[Markup] = []
-        if services.draw_figure is not None:
-            kinds = choice("files:set.figure", self._figure, {"": AS_COLOURED, **self._figures})
-            figure = [
-                field("Figure", kinds, "files:set.figure"),
-                actions(button("Save figure (PNG)", "files:figure")),
-            ]
+        kinds = choice("files:set.figure", self._figure, {"": AS_COLOURED, **self._figures})
         exports = (
             button(f"{end[1:].upper()}", "files:export", end, hint=words)
-            for end, words in (services.exports if services.write_export else ())
+            for end, words in self.context.services.exports
         )
         return join((
             tag("h3", "Scene"),
             tag("p", "Errors, tolerances and machine as they are now, with view and camera."),
             actions(button("Save scene (TOML)", "files:save", kind="main", hint="Ctrl+S")),
             tag("h3", "Picture"), tag("p", exported_words(picture), class_="ws-quiet"),
-            actions(button("Save what is on the screen (PNG)", "files:view")), *figure,
+            actions(button("Save what is on the screen (PNG)", "files:view")),
+            field("Figure", kinds, "files:set.figure"),
+            actions(button("Save figure (PNG)", "files:figure")),
             tag("h3", "Export"),
             actions(button("Interactive page (HTML)", "files:page",
                            hint="One file that needs no network"), *exports),
@@ -134,26 +122,31 @@ class FilesWindow(JobWindow):
         ))  # fmt: skip
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
-        """Save, share, or make a file of what is drawn."""
+        services = self.context.services
+        if word == "share" and services.token and not value:
+            return replace(state, page=replace(state.page, window="share"))
         if word == "set.figure":
             self._figure = value if value in self._figures else ""
             self.context.act(partial(self.context.renew, self))
-        elif word == "share" and self.context.services.token and not value:
-            return replace(state, page=replace(state.page, window="share"))
-        else:
-            doing: dict[str, Callable[[], None]] = {
-                "file": partial(self._open, value),
-                "save": self._save,
-                "share": partial(self._share, with_token=value == "token"),
-                "link": partial(self._follow, value),
-                "figure": self._draw,
-                "view": self._view,
-                "page": self._page,
-                "export": partial(self._export, value),
-            }
-            if word in doing:
-                self.attempt(doing[word])
+        doing: dict[str, Callable[[], None]] = {
+            "file": partial(self._open, value),
+            "save": self._save,
+            "share": partial(self._share, with_token=value == "token"),
+            "link": partial(self._follow, value),
+            "figure": partial(self._draw, self._figure),
+            "view": self._view,
+            "page": self._page,
+            "export": partial(self._export, value),
+        }
+        if word in doing:
+            self.context.act(partial(self._attempt, doing[word]))
         return super().take(state, word, value)
+
+    def _attempt(self, action: Callable[[], None]) -> None:
+        try:
+            action()
+        except WarpspaceError as error:
+            self._failed(self.title, error)
 
     # --- what is opened --------------------------------------------------------------------------
 
@@ -211,54 +204,41 @@ class FilesWindow(JobWindow):
             self.context.notify("Without the comparison", str(error), "warning")
             return text
 
-    def _draw(self) -> None:
-        draw, picture, kind = self.context.services.draw_figure, self.context.shown, self._figure
-        if draw is not None and picture is not None:
-
-            def make(cancelled: threading.Event) -> tuple[str, bytes]:
-                bare = without_tables(picture)
-                request = replace(build_request(bare), figure=kind)
-                return f"{file_stem(bare)}_{kind or 'figure'}", draw(request, cancelled)
-
-            self.make("Figure", ".png", FIGURE_S, make)
+    def _draw(self, kind: str) -> None:
+        draw = self.context.services.draw_figure
+        ending = f"_{kind or 'figure'}.png"
+        self.make("Figure", ending, FIGURE_S, lambda picture, job: draw(picture, kind, job))
 
     def _view(self) -> None:
-        from warpspace.app.documents.view_image import view_png
+        client, camera = self.context.client, self.context.camera
 
-        client, picture = self.context.client, self.context.shown
-        if picture is None:
-            return
-        width = min(max(client.camera.image_width, 64), LARGEST_VIEW_PX)
-        height = min(max(client.camera.image_height, 64), LARGEST_VIEW_PX)
-        bars = self.context.camera.px_per_mm(picture, height)
-        camera = self.context.camera.remember()
-
-        def make(_: threading.Event) -> tuple[str, bytes]:
+        def draw(picture: LivePicture, job: Job) -> bytes:
+            seen = client.camera
+            height, width = np.clip((seen.image_height, seen.image_width), *VIEW_PX).tolist()
             pixels: Any = client.get_render(
                 height, width, transport_format="png", timeout=RENDER_TIMEOUT_S
             )
-            return f"{file_stem(picture)}_view", view_png(pixels, picture, bars, camera)
+            shot = Shot(pixels, camera.remember(), camera.px_per_mm(picture, height))
+            return self.context.services.draw_shot(picture, shot, job)
 
-        self.make("Picture of the screen", ".png", VIEW_S, make)
+        self.make("Picture of the screen", "_view.png", VIEW_S, draw, as_drawn=True)
 
     def _page(self) -> None:
         from warpspace.app.documents.offline_page import build_offline_html
 
-        if (picture := self.context.shown) is not None:
-            toml = {"scene_toml": self._alone_if_large(scene_file.state_to_toml)}
-            page = partial(build_offline_html, picture, toml, self.context.camera.remember())
-            self.make("Page", ".html", EXPORT_S, lambda _: (file_stem(picture), page().encode()))
+        camera = self.context.camera.remember()
+        toml = {"scene_toml": self._alone_if_large(scene_file.state_to_toml)}
+
+        def write(picture: LivePicture, _: Job) -> bytes:
+            return build_offline_html(picture, toml, camera).encode()
+
+        self.make("Page", ".html", EXPORT_S, write, as_drawn=True)
 
     def _export(self, ending: str) -> None:
-        write, picture = self.context.services.write_export, self.context.shown
-        known = {end for end, _ in self.context.services.exports}
-        if write is not None and picture is not None and ending in known:
-
-            def make(_: threading.Event) -> tuple[str, bytes]:
-                bare = without_tables(picture)
-                return file_stem(bare), write(build_request(bare), ending)
-
-            self.make(ending[1:].upper(), ending, EXPORT_S, make)
+        services = self.context.services
+        if ending in dict(services.exports):
+            self.make(ending[1:].upper(), ending, EXPORT_S,
+                      lambda picture, _: services.write_export(picture, ending))  # fmt: skip
 
 
 def _held(state: AppState) -> list[str]:
@@ -283,12 +263,7 @@ class ShareWindow(Window):
 
     name, title = "share", "Share a link"
 
-    def depends(self, picture: LivePicture) -> tuple[object, ...]:
-        """Depend on nothing: it says the same every time."""
-        return ()
-
     def body(self, picture: LivePicture) -> Markup:
-        """Offer both."""
         words = (
             "This app asks for a token. A link without it opens for those who have the token;"
             " a link with it lets whoever has the link use this app."

@@ -7,11 +7,11 @@ from markupsafe import Markup
 
 from warpspace.app.browser.html import EMPTY, button, fill, join, menu, tag, text_box
 from warpspace.app.browser.room import read_room
-from warpspace.app.documents.conditions import order_conditions
 from warpspace.app.documents.legend import (
     kept_words,
     legend_html,
     numbers_words,
+    order_conditions,
     place_words,
     subject_words,
 )

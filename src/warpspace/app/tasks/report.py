@@ -1,18 +1,19 @@
 """The report's window: author and open questions, what stands in it, and the file."""
 
-import threading
 from functools import partial
 
 from markupsafe import Markup
 
+from warpspace.analysis.description import Result
 from warpspace.app.browser.events import index_of
 from warpspace.app.browser.html import button, field, join, tag, text_box
-from warpspace.app.documents.files import build_request, file_stem
-from warpspace.app.documents.services import ReportRequest
+from warpspace.app.documents.files import has_sheet
+from warpspace.app.documents.services import Report
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.tasks.context import Context
-from warpspace.app.tasks.files import JobWindow, without_tables
+from warpspace.app.tasks.files import JobWindow
+from warpspace.app.tasks.jobs import Job
 from warpspace.app.tasks.window import actions
 
 REPORT_S = 12.0  # what it usually takes
@@ -36,18 +37,13 @@ class ReportWindow(JobWindow):
         super().__init__(context)
         self._author, self._questions = "", ""
 
-    def depends(self, picture: LivePicture) -> tuple[object, ...]:
-        """Follow what stands in it, and how far it is."""
-        return (object(),)
-
-    def _subject(self, picture: LivePicture) -> str:
-        found = picture.compared
-        if found is None or found.refused:
-            return f"It is about {picture.title}, as drawn now."
-        return f"It compares A, {found.titles[0]}, with B, {found.titles[1]}."
-
     def body(self, picture: LivePicture) -> Markup:
-        """Ask for author and questions; list what stands in it."""
+        found = picture.compared
+        subject = (
+            f"It compares A, {found.titles[0]}, with B, {found.titles[1]}."
+            if found is not None and has_sheet(picture)
+            else f"It is about {picture.title}, as drawn now."
+        )
         limit = f"{picture.state.specification.limit_um:g} µm"
         author = text_box("report:set.author", self._author, placeholder="Name")
         questions = tag("textarea", self._questions, id="ws-report-set-questions", class_="ws-box",
@@ -58,7 +54,7 @@ class ReportWindow(JobWindow):
         ]
         hint = "More results are added with the button “Add to report” below each of them."
         return join((
-            tag("p", f"{self._subject(picture)} Limit: {limit}."),
+            tag("p", f"{subject} Limit: {limit}."),
             field("Author", author, "report:set.author"),
             field("Open questions", questions, "report:set.questions"),
             actions(button("Write HTML", "report:write", ".html", kind="main",
@@ -71,7 +67,6 @@ class ReportWindow(JobWindow):
         ))  # fmt: skip
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
-        """Take what is typed, leave a result out, or write it."""
         if word == "set.author":
             self._author = value[:LONGEST_AUTHOR]
         elif word == "set.questions":
@@ -82,31 +77,20 @@ class ReportWindow(JobWindow):
                 del self.context.reported[index]
                 self.context.act(partial(self.context.renew, self))
         elif word == "write" and value in (".html", ".pdf"):
-            self.attempt(partial(self._write, value))
+            self.context.act(partial(self._write, value))
         return super().take(state, word, value)
 
     def _write(self, ending: str) -> None:
-        write, picture = self.context.services.write_report, self.context.shown
-        if write is None or picture is None:
-            return
         asked = [line.strip() for line in self._questions.splitlines() if line.strip()]
-        results = {
-            f"{title} ({index + 1})" if title in [name for name, _ in self.context.reported[:index]]
-            else title: found
-            for index, (title, found) in enumerate(self.context.reported)
-        }  # fmt: skip
-        author = self._author.strip()
+        results: dict[str, Result] = {}
+        for index, (title, found) in enumerate(self.context.reported):
+            results[f"{title} ({index + 1})" if title in results else title] = found
+        about = Report(self._author.strip(), tuple(asked), results, ending)
 
-        def make(cancelled: threading.Event) -> tuple[str, bytes]:
-            bare = without_tables(picture)
-            about = build_request(bare)
-            request = ReportRequest(
-                about.pair or (about.scene,), about.loop, about.nodes, about.exaggeration,
-                picture.state.specification.limit_um, author, tuple(asked), results, ending,
-            )  # fmt: skip
-            content, missing = write(request, cancelled)
-            if missing and not cancelled.is_set():
+        def write(picture: LivePicture, job: Job) -> bytes:
+            content, missing = self.context.services.write_report(picture, about, job)
+            if missing and not job.is_set():
                 self.context.notify("Some figures are missing", "\n".join(missing), "warning")
-            return f"{file_stem(bare)}_report", content
+            return content
 
-        self.make("Report", ending, REPORT_S, make)
+        self.make("Report", f"_report{ending}", REPORT_S, write)

@@ -17,19 +17,20 @@ class Window(Part):
     title = ""
 
     def is_seen(self, state: AppState) -> bool:
-        """Only while it is open."""
         return state.page.window == self.name
 
     def closed(self, state: AppState) -> AppState:
         """Close it."""
         return replace(state, page=replace(state.page, window=""))
 
+    def depends(self, picture: LivePicture) -> tuple[object, ...]:
+        return (object(),)  # written anew each time; what stands there already is not sent
+
     def body(self, picture: LivePicture) -> Markup:
         """Give what stands in it."""
         raise NotImplementedError
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
-        """Write it, with its title and its cross."""
         cross = button("✕", "page:close", kind="quiet", hint="Close (Esc)", aria_label="Close")
         head = tag("header", tag("h2", self.title, id="ws-window-title") + cross)
         body = tag("div", self.body(picture), class_="ws-body", data_key=f"window-{self.name}")

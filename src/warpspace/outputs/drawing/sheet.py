@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from warpspace.geometry.colour import ColourScale, colour_table
+from warpspace.geometry.colour import LEVELS, ColourScale
 from warpspace.geometry.surfaces import round_down
 from warpspace.machine.axes import parameter
 from warpspace.outputs.drawing.canvas import Canvas
@@ -116,9 +116,8 @@ def draw_colour_bar(
     """Draw a colour bar with numbers on its right and marked values on its left."""
     left, low, right, high = rect
     theme = canvas.theme
-    table = colour_table(diverging=scale.diverging)[::-1, None, :]
-    opaque = np.concatenate([table, np.full((len(table), 1, 1), 255, np.uint8)], -1)
-    canvas.image(opaque, (left, low, right, high), zorder=2.0)
+    colours = scale.colours(np.linspace(scale.high, scale.low, LEVELS))[:, None, :]
+    canvas.image(colours, (left, low, right, high), zorder=2.0)
     canvas.rectangle(
         left, low, right - left, high - low, fill=False, edgecolor=theme.muted,
         linewidth=canvas.px(1.0) * 0.72, zorder=2.6,
@@ -379,12 +378,12 @@ class Sheet:
         heading: str,
         marks: Sequence[tuple[str, float]],
         rows: Sequence[Row],
-        bars: tuple[float, float | None],
+        bars: tuple[float, float | None] | None,
     ) -> None:
         """Draw colour bar, statistics and scale bars beside the content."""
         canvas, rect = self.canvas, self.panel
         left, _, right, top = rect
-        y = draw_scale_bars(canvas, rect, *bars) + canvas.px(24.0)
+        y = (rect[1] if bars is None else draw_scale_bars(canvas, rect, *bars)) + canvas.px(24.0)
         step = canvas.px(27.0)
         room = top - y - canvas.px(150.0)
         shown = rows[: max(1, int(room / step))]

@@ -1,0 +1,68 @@
+"""What a page has drawn, as a figure: its pixels with heading, colours, scale bars and words."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpspace.geometry.colour import ColourScale
+from warpspace.outputs.drawing.canvas import (
+    LEADER_FROM,
+    Canvas,
+    Occupancy,
+    draw_leader,
+    write_label,
+)
+from warpspace.outputs.drawing.settings import DARK, LIGHT, FigureSettings, factor
+from warpspace.outputs.drawing.sheet import Row, Sheet, draw_heading
+from warpspace.outputs.save import encode_figure
+from warpspace.resources import __version__
+from warpspace.units import Array
+
+HEAD, PANEL = 190.0, 330.0
+"""Room above and beside the pixels, px of a 1600 × 1200 figure."""
+
+
+def draw_shot(
+    pixels: NDArray[np.uint8],
+    title: str,
+    facts: Sequence[str],
+    scale: ColourScale,
+    marks: Mapping[str, float],
+    rows: Sequence[Row],
+    bars: tuple[float, float] | None,
+    words: Sequence[tuple[str, Array]],
+    *,
+    dark: bool,
+) -> bytes:
+    """Draw it as a PNG.
+
+    Parameters
+    ----------
+    pixels : ndarray of uint8, [height, width, 3 or 4]
+    bars : tuple of float, optional
+        Pixels of a millimetre, and the display factor; None for no scale bars.
+    words : sequence of (str, ndarray)
+        What is written, and beside which point, [2], px from the left bottom of the pixels.
+    """
+    height, width = pixels.shape[:2]
+    unit = factor(width, height)
+    canvas = Canvas(
+        width + round(PANEL * unit), height + round(HEAD * unit), DARK if dark else LIGHT
+    )
+    drawn = (0.0, 0.0, float(width), float(height))
+    canvas.image(pixels, drawn)
+    draw_heading(canvas, title, facts)
+    column = (width + 0.3 * canvas.margin, 0.6 * canvas.margin, canvas.width - 0.6 * canvas.margin,
+              float(height))  # fmt: skip
+    sheet = Sheet("shot", canvas, title, drawn, column, (), FigureSettings(dark=dark))
+    sheet.draw_panel(scale, f"{scale.label} [{scale.unit}]", list(marks.items()), rows, bars)
+    taken = Occupancy(canvas.width, canvas.height, 2.0 * canvas.factor)
+    if pixels.shape[2] == 4:
+        taken.add_mask(pixels[..., 3] > 127, drawn)
+    for text, spot in words:
+        placed = write_label(canvas, text, [spot], drawn, taken)
+        if placed is not None and placed.distance > canvas.px(LEADER_FROM):
+            draw_leader(canvas, placed, canvas.theme.ink)
+    said = {"Title": title, "Software": f"warpspace {__version__}", "Description": "; ".join(facts)}
+    return encode_figure(canvas.figure, "png", said)
