@@ -131,10 +131,10 @@ def test_an_error_is_found_set_and_undone_without_a_mouse(tab):
         keys(key)
         tab.until(holds)
     page.wait_for_selector("html.ws-dark")
-    page.locator("[data-key=bench] > summary").focus()
+    page.locator("[data-key=test] > summary").focus()
     for opened in (1, 0):
         keys("Enter" if opened else "Space")
-        tab.until(lambda opened=opened: page.locator("[data-key=bench][open]").count() == opened)
+        tab.until(lambda opened=opened: page.locator("[data-key=test][open]").count() == opened)
     # a window keeps the focus, and gives it back
     keys("Control+k")
     page.get_by_label("Find a command").wait_for()
@@ -145,7 +145,7 @@ def test_an_error_is_found_set_and_undone_without_a_mouse(tab):
             " || document.getElementById('ws-window').contains(document.activeElement)"
         )
     keys("Escape")
-    page.wait_for_selector("[data-key=bench] > summary:focus")
+    page.wait_for_selector("[data-key=test] > summary:focus")
     while tab.state.amplitudes != START.amplitudes:
         before = tab.state
         keys("Control+z")

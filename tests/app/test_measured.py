@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import replace
+from html import unescape
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +12,7 @@ from markupsafe import escape
 from app.hostile import upload
 from app.parts import Nobody
 from warpspace.analysis.catalogue import entries
-from warpspace.app.documents.scene_file import with_settings
+from warpspace.app.documents.scene_file import settings_line, with_settings
 from warpspace.app.evaluation import cache
 from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.evaluate import LiveModel
@@ -29,7 +30,7 @@ from warpspace.app.tasks.importing import (
 from warpspace.app.tasks.measure import (
     MOST_FILES,
     CalibratePart,
-    Measured,
+    Held,
     TestsPart,
     arrows_of,
     take_file,
@@ -81,8 +82,17 @@ class Column:
 
     def run(self):
         self.do("run")
-        while self.part._jobs.busy or not (self.part._answer or self.part._problem):
+        return self.settle()
+
+    def settle(self):
+        """Wait until what is asked now is answered."""
+        self.html()
+        question = self.part.question(self.state)
+        while self.part._jobs.busy or not any(
+            found and found[0] == question for found in (self.part._answer, self.part._problem)
+        ):
             time.sleep(0.01)
+            self.html()
         return self.html()
 
 
@@ -92,27 +102,29 @@ def calibrate(state=START):
 
 
 def chosen(name, state=STATE, **options):
-    look = state.bench.with_test(name)
-    for option, text in options.items():
-        look = look.with_option(option, text)
-    return replace(state, bench=look)
+    forms = {"test": name, **{f"test.{option}": text for option, text in options.items()}}
+    return replace(state, forms=forms)
 
 
 @pytest.mark.parametrize("name", bench_names())
 def test_figure_and_path_follow_the_errors(name):
     column = Column(TestsPart, STATE)
-    html = column.do("test", name)
-    found = LIVE.evaluate(column.state).bench
+    column.do("choose", name)
+    html = column.settle()
+    result = column.part._answer[1]
     assert "<svg" in html
     assert "nan" not in html
-    for quantity in found.run.outcome.quantities:
-        assert str(escape(quantity.name)) in html
+    for quantity in result.model.outcome.quantities:
+        assert quantity.name in unescape(html)
+    found = LIVE.evaluate(column.state).bench
     moved = LIVE.evaluate(column.state.with_amplitude("EC0Y", 150.0)).bench
     assert moved.prepared is found.prepared
     assert np.abs(moved.error_um - found.error_um).max() > 1.0
     ((nominal, actual), *_) = moved.lines_mm(1000.0)
-    rows = moved.prepared.plan.path[0]
+    rows = moved.prepared.path[0]
     np.testing.assert_allclose(actual - nominal, moved.error_um[rows], atol=1e-9)
+    column.do("path", "0")
+    assert LIVE.evaluate(column.state).bench is None
 
 
 @pytest.mark.parametrize(
@@ -126,44 +138,66 @@ def test_figure_and_path_follow_the_errors(name):
 )
 def test_what_cannot_be_run_is_said_in_its_place(name, options, message):
     column = Column(TestsPart, STATE)
-    column.do("test", name)
+    column.do("choose", name)
+    column.settle()
     for option, text in options.items():
-        html = column.do(f"set.{option}", text)
+        column.do(f"set.{option}", text)
+    html = column.settle()
     assert str(escape(message)) in html
     assert "ws-problem" in html
-    other = start_state(load_scene("machine_c_frame_mill"), nodes=3)
-    assert "no rotary axis" in str(LIVE.evaluate(chosen("sphere", other)).bench)
+    assert LIVE.evaluate(column.state).bench is None
+
+
+def test_a_test_that_the_machine_cannot_do_says_why():
+    column = Column(TestsPart, start_state(load_scene("machine_c_frame_mill"), nodes=3))
+    column.do("choose", "sphere")
+    assert "no rotary axis" in column.settle()
 
 
 def test_measured_readings_stand_beside_the_model_and_go_into_the_report():
     column = Column(TestsPart, STATE)
-    column.do("test", "positioning")
-    assert column.do("test", HOSTILE) == column.do("set.nothing", HOSTILE)
+    column.do("choose", "positioning")
+    column.do("choose", HOSTILE)
+    column.do("set.nothing", HOSTILE)
+    assert column.state.forms == {"test": "positioning"}
     rows = [f"{run},{way},{at},{0.02 * at}" for run in (1, 2) for way in "+-"
             for at in range(-250, 251, 50)]  # fmt: skip
     text = "run,direction,target_mm,deviation_um\n" + "\n".join(rows) + "\n"
     column.give(f"../{HOSTILE}.csv", text.encode())
-    html = column.html()
+    html = column.settle()
     assert "RMS of measured − model" in html
     assert "<img" not in html
     column.do("report")
     ((_, result),) = column.reported
     assert result.rms_difference > 0.1
-    assert "RMS of measured" not in column.do("remove")
+    column.do("remove", "0")
+    assert "RMS of measured" not in column.settle()
     column.give("x.csv", b"a,b\n1,2\n")
-    assert "ws-problem" in column.html()
+    assert "ws-problem" in column.settle()
 
 
 def test_tables_turn_where_the_axes_stand():
-    there = LIVE.evaluate(chosen("sphere", STATE.with_position("B", -20.0))).bench
-    assert there.prepared.plan.coordinates["B"][0] == -20.0
+    column = Column(TestsPart, chosen("sphere", STATE.with_position("B", -20.0)))
+    column.settle()
+    assert column.part._answer[1].model.plan.coordinates["B"][0] == -20.0
 
 
 def test_link_refuses_what_is_no_test_and_no_option():
-    hostile = with_settings(STATE, "test=nothing&test.radius_mm=" + "9" * 500 + "&test.foo=1")
-    assert hostile.bench.name == ""
-    assert len(hostile.bench.options.get("radius_mm", "")) <= 80
-    assert any("test.foo" in note for note in hostile.notes)
+    line = "test=nothing&test.radius_mm=" + "9" * 5000 + "&test.F=1&nobody.x=1&gains.loop=tool"
+    hostile = with_settings(STATE, line)
+    assert hostile.forms == {"test.radius_mm": "9" * 1000, "gains.loop": "tool"}
+    for name in ("test=nothing", "test.F", "nobody.x"):
+        assert any(name in note for note in hostile.notes)
+    many = with_settings(STATE, "&".join(f"test.{'a' * (n % 40)}_{'b' * (n // 40)}=1"
+                                         for n in range(1, 390)))  # fmt: skip
+    assert len(many.forms) <= 100
+
+
+def test_what_forms_were_told_is_linked_and_kept_with_another_scene():
+    told = chosen("circular", radius_mm="120")
+    assert with_settings(STATE, settings_line(told)).forms == told.forms
+    assert told.with_scene(SCENE).forms == told.forms
+    assert settings_line(replace(STATE, forms={"import.axes": "X"})) == settings_line(STATE)
 
 
 def test_compared_states_run_the_same_test():
@@ -174,7 +208,7 @@ def test_compared_states_run_the_same_test():
         state = replace(changed, comparison=replace(changed.comparison, shown=side))
         shown[side] = LIVE.evaluate(state).bench
     assert shown["difference"] is None
-    assert np.abs(shown["a"].readings - shown["b"].readings).max() > 1.0
+    assert np.abs(shown["a"].error_um - shown["b"].error_um).max() > 1.0
 
 
 @pytest.fixture(scope="module")
@@ -272,7 +306,7 @@ def test_nothing_of_a_browser_becomes_a_path(tmp_path, monkeypatch):
 
 
 def test_files_have_names_of_their_own_and_are_few():
-    files: tuple[Measured, ...] = ()
+    files: tuple[Held, ...] = ()
     for _ in range(MOST_FILES):
         files = (*files, take_file(SCENE, BUNDLED.decode(), "a.csv", None, files))
     assert len({one.name for one in files}) == MOST_FILES

@@ -106,7 +106,6 @@ def test_a_leaf_takes_what_people_type_and_says_what_it_does_not(path, text, kep
 def test_what_follows_a_leaf_follows_it_and_members_come_and_go():
     assert put(FIRST, "look.range_top", "33").look.range_mode == "fixed"
     assert not put(put(FIRST, "look.follow", "1"), "look.slices_mm.X", "1").look.follow
-    assert put(FIRST, "bench.name", "circular").look.surface == "grid"
     some = put(put(FIRST, "exclusions.only", "EXX,EYX"), "exclusions.only", "-EXX,+EZX")
     assert some.exclusions.only == {"EYX", "EZX"}
     assert put(FIRST, "look.evil", "1").notes

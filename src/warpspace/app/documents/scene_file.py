@@ -20,6 +20,7 @@ from warpspace.app.evaluation.resulting_scene import scene_of
 from warpspace.app.evaluation.scene_edits import same_shape
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.comparison import BEFORE, NOBODY, PRESENT, SHOWN, Comparison, Side
+from warpspace.app.state.forms import linked_forms, with_form
 from warpspace.app.state.leaf import Leaf, Unreadable
 from warpspace.app.state.tree import leaves, set_leaf, spell_value, stored
 from warpspace.app.viewport.camera import CameraMemory
@@ -287,6 +288,7 @@ def settings_line(state: AppState, camera: CameraMemory | None = None) -> str:
         for leaf in leaves(state).values()
         if leaf.linked and (now := stored(state, leaf.path)) != stored(opened, leaf.path)
     ]
+    pairs += linked_forms(state)
     if camera is not None:
         numbers = (*camera.position, *camera.look_at, *camera.up, camera.fov_rad)
         pairs.append((CAMERA, ",".join(f"{number:.6g}" for number in numbers)))
@@ -301,10 +303,11 @@ def with_settings(state: AppState, line: str) -> AppState:
         if name == CAMERA:
             continue
         try:
-            state = set_leaf(state, named[name], value)
-        except (KeyError, Unreadable):
+            leaf = named.get(name)
+            state = with_form(state, name, value) if leaf is None else set_leaf(state, leaf, value)
+        except Unreadable:
             unread.append(f"{name}={value}"[:60])
-        if leaves(state) is not known:  # for instance the options of a test
+        if leaves(state) is not known:  # for instance the components of a quantity
             known, named = leaves(state), _linked(state)
     if unread:
         more = f" and {len(unread) - 4} more" if len(unread) > 4 else ""

@@ -41,7 +41,7 @@ def side_state(now: AppState, side: Side[AppState]) -> AppState:
         machine=now.machine,
         shown=now.shown,
         rotary=now.rotary if _turns_alike(base, now) else RotaryLook(),
-        bench=now.bench,
+        forms=now.forms,
         comparison=Comparison(),
         picked=now.picked,
         lever=now.lever,
@@ -70,8 +70,8 @@ def pinned_side(state: AppState) -> Side[AppState]:
 
 
 def plain_state(state: AppState) -> AppState:
-    """Give a state as the side of a comparison: with none of its own, and nothing asked about."""
-    return replace(state, comparison=Comparison(), picked=None, lever="")
+    """Give a state as the side of a comparison: with none of its own, and nothing asked."""
+    return replace(state, comparison=Comparison(), picked=None, lever="", forms={})
 
 
 def compare_pictures(single: Callable[[AppState], LivePicture], state: AppState) -> LivePicture:
@@ -132,7 +132,6 @@ def _difference(a: LivePicture, b: LivePicture) -> LivePicture:
         change = replace(change, colours=replace(change.scale, low=b.scale.low, high=b.scale.high))
     return replace(
         change,
-        bench=None,
         traces=subtract_traces(b.traces, a.traces),
         slices=tuple(
             subtract_pictures(one, other)

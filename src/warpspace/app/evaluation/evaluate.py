@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpspace.app.evaluation.bench import BenchSource
 from warpspace.app.evaluation.cache import Cache, Identity
 from warpspace.app.evaluation.compare import compare_pictures
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -58,7 +57,6 @@ class LiveModel:
         self._responses: Cache[Response] = Cache(CACHE_BYTES)
         self._compensated = CompensatedSource()
         self._slices = SliceSource(self._compensated)
-        self._bench = BenchSource()
 
     def response(self, state: AppState) -> Response:
         """Give grid and responses of a state, kept from an earlier one where possible."""
@@ -110,7 +108,6 @@ class LiveModel:
             slices=self._slices.slices(state, amplitudes, factor, colours),
             state=state,
             traces=traces,
-            bench=self._bench.picture(state, amplitudes),
         )
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from warpspace.analysis.statistics import Statistics
-from warpspace.app.evaluation.bench import BenchPicture
+from warpspace.app.evaluation.bench import BenchPicture, bench_picture
 from warpspace.app.state.app_state import AppState
 from warpspace.picture.model import Picture, picture_size_mm
 from warpspace.picture.traces import TraceLines
@@ -44,13 +44,16 @@ class LivePicture(Picture):
     # what is drawn, where that is another state than the one steered; else None
     subject: AppState | None = None
     compared: Compared | None = None  # the comparison it belongs to
-    # str or None; the standard test that is run, or why it cannot be; None where none is
-    bench: BenchPicture | str | None = None
 
     @cached_property
     def size_mm(self) -> float:
         """Length that marks are sized by, mm, for a single point too."""
         return picture_size_mm(self.state.scene, self.grid)
+
+    @cached_property
+    def bench(self) -> BenchPicture | None:
+        """The path of the standard test that is run; None where none is, or cannot be."""
+        return None if self.is_difference else bench_picture(self.drawn_state)
 
     @property
     def drawn_state(self) -> AppState:

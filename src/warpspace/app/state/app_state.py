@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from warpspace.app.state.bench import BenchLook
 from warpspace.app.state.comparison import Comparison
 from warpspace.app.state.leaf import described, error_names, said
 from warpspace.app.state.look import Look, MachineLook, RotaryLook
@@ -147,12 +146,10 @@ class AppState:
     # title of the scene whose errors a machine chosen from the library left behind; empty for none,
     # and after the next change of scene
     left_behind: str = field(default="", metadata=said("Scene"))
-    # MachineLook, RotaryLook, BenchLook; what is shown of the field and of the schematic machine,
-    # traced, and run as a test
+    # MachineLook, RotaryLook; what is shown of the field and of the schematic machine, and traced
     look: Look = field(default_factory=Look)
     machine: MachineLook = field(default_factory=MachineLook)
     rotary: RotaryLook = field(default_factory=RotaryLook)
-    bench: BenchLook = field(default_factory=BenchLook)
     # the point whose error is explained
     picked: Picked | None = field(default=None, metadata=said("Point"))
     lever: str = described(
@@ -167,7 +164,7 @@ class AppState:
     )
     # whose table corrects the machine that is drawn; never saved or linked
     controller: "Controller | None" = field(default=None, metadata=said("Table of compensation"))
-    # what of the page is open, and what its forms were told; undo leaves both
+    # what of the page is open, and what its forms were told (`state/forms.py`); undo leaves both
     page: PageLook = field(default_factory=PageLook, compare=False)
     forms: Mapping[str, str] = field(default_factory=dict[str, str], compare=False)
     notes: tuple[str, ...] = ()  # what the latest change had to clamp
@@ -240,7 +237,7 @@ class AppState:
             look=self.look,
             machine=self.machine,
             rotary=replace(self.rotary, off=frozenset()),
-            bench=self.bench,
+            forms=self.forms,
             page=self.page,
         )
 

@@ -14,7 +14,6 @@ from typing import Any, cast
 
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.bench import option_leaves
 from warpspace.app.state.leaf import (
     Leaf,
     Unreadable,
@@ -50,7 +49,6 @@ OTHERS_DEPEND_ON = (
     "scene.workspace",
     "scene.trace_points_mm",
     "look.quantity",
-    "bench.name",
 )
 ALL_DEPEND_ON = tuple(dict.fromkeys((*sum(DEPENDENCIES.values(), ()), *OTHERS_DEPEND_ON)))
 READ = {name: attrgetter(name) for name in ALL_DEPEND_ON}
@@ -91,8 +89,6 @@ def _leaves(known: _Known) -> Mapping[str, Leaf]:
 def _group(known: _Known, name: str) -> Mapping[str, Leaf]:
     entry = next(entry for entry in fields(AppState) if entry.name == name)
     found = _described(known.state, entry, "")
-    if name == "bench":
-        found = (*found, *option_leaves(known.state.bench, tuple(known.state.scene.machine.axes)))
     if name == "picked":
         found = _picked_leaves(known.state)
     return {leaf.path: leaf for leaf in found}
@@ -214,7 +210,6 @@ def toggled(state: AppState, path: str, word: str) -> AppState:
 AFTER: Mapping[str, Callable[[AppState], AppState]] = {
     "look.range_top": lambda s: replace(s, look=replace(s.look, range_mode="fixed")),
     "look.slices_mm": lambda s: replace(s, look=replace(s.look, follow=False)),
-    "bench.name": lambda s: edits.with_sight(s, inside=bool(s.bench.name)),
 }
 """What follows where somebody sets a leaf; not where a link or a file does."""
 
@@ -258,17 +253,6 @@ def _with_costs(state: AppState, _leaf: Leaf, _key: str, text: str) -> AppState:
     return replace(state, specification=replace(state.specification, costs=costs))
 
 
-def _with_test(state: AppState, leaf: Leaf, _key: str, text: str) -> AppState:
-    check_choice(leaf, text)
-    return replace(state, bench=state.bench.with_test(text))
-
-
-def _with_option(state: AppState, leaf: Leaf, option: str, text: str) -> AppState:
-    if leaf.kind == "choice":
-        check_choice(leaf, text)
-    return replace(state, bench=state.bench.with_option(option, text))
-
-
 def _with_asked(state: AppState, leaf: Leaf, axis: str, text: str) -> AppState:
     """Ask about a point, one axis position at a time, mm or degrees."""
     picked = state.picked or Picked({})
@@ -286,8 +270,6 @@ OWN: Mapping[str, Callable[[AppState, Leaf, str, str], AppState]] = {
     "rotary.off": _with_points_off,
     "rotary.held": _with_held,
     "specification.costs": _with_costs,
-    "bench.name": _with_test,
-    "bench.options": _with_option,
     "picked": lambda s, _leaf, _key, text: with_typed_point(s, text),
     "picked.trace": lambda s, _leaf, _key, text: replace(s, picked=read_trace(text)),
     "picked.at": _with_asked,

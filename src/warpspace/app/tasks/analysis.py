@@ -24,13 +24,14 @@ from warpspace.app.evaluation.cache import Identity, taken_turn
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.state.app_state import AppState
+from warpspace.app.state.forms import read_form
 from warpspace.app.tasks.cards import Card, Seen, make_cards
 from warpspace.app.tasks.charts import block_html
 from warpspace.app.tasks.context import Context
-from warpspace.app.tasks.forms import form_html, read_form
+from warpspace.app.tasks.forms import form_html
 from warpspace.app.tasks.jobs import Job, Jobs
 from warpspace.app.tasks.parts import Section
-from warpspace.exceptions import OptionError
+from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.scene.model import Scene
 
 TITLES = {
@@ -254,8 +255,8 @@ class AnalysisPart(Section):
         self._asked = question
         try:
             asked = self.ask(state, values, scenes)
-        except OptionError as error:
-            self._refuse(question, error.said(self._label))
+        except WarpspaceError as error:
+            self._fail(self.title, error)
             return
 
         def work(job: Job) -> None:

@@ -1,15 +1,11 @@
-"""Forms out of analyses: one control an option, with unit, range and help, and the way back."""
+"""Forms out of analyses: one control an option, with unit, range and help."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from markupsafe import Markup
 
-from warpspace.analysis.description import Analysis
 from warpspace.analysis.options import Option
 from warpspace.app.browser.html import choice, field, join, switch, text_box
-from warpspace.app.state.typed_numbers import read_typed
-from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 
 OWN = ""  # what stands for an option that is left to the analysis
@@ -49,30 +45,3 @@ def _control(part: str, one: Option, given: str | None, scene: Scene) -> Markup:
         size="" if one.grammar else "short",
     )  # fmt: skip
     return field(one.label, box, name, one.unit, f"{hint}{span}")
-
-
-def read_form(
-    kind: type[Analysis], options: Sequence[Option], values: Mapping[str, str], scene: Scene
-) -> Analysis:
-    """Build an analysis from what was typed.
-
-    Raises
-    ------
-    OptionError
-        If a value means nothing; it names the option as ``{name}``.
-    """
-    given: dict[str, Any] = {}
-    for one in options:
-        text = values.get(one.name)
-        if text is None or (not text.strip() and one.kind is not bool):
-            continue
-        if one.kind is bool:
-            given[one.name] = text == "1"
-        elif one.kind in (int, float) and one.grammar is None:
-            number = read_typed(text, one.unit)
-            if number is None:
-                raise OptionError(f"{{{one.name}}} {text!r}; expected a number")
-            given[one.name] = one.kind(number)
-        else:
-            given[one.name] = one.read(text, scene)
-    return kind(**given)

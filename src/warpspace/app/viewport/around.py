@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from warpspace.app.evaluation.bench import BenchPicture
 from warpspace.app.evaluation.budget import answer
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.rotation import chosen_trace, moved_traces, points_on_traces
@@ -74,7 +73,7 @@ def _traces(picture: LivePicture) -> Shapes:
 def _path(picture: LivePicture) -> Shapes:
     """Draw the path of the standard test that is run, with the factor of the box."""
     found = picture.bench
-    if not isinstance(found, BenchPicture) or not picture.state.bench.path:
+    if found is None:
         return {}
     nominal, actual = zip(*found.lines_mm(picture.exaggeration), strict=True)
     return _pair(picture, "/test", polylines(nominal), polylines(actual))

@@ -9,7 +9,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from warpspace.app.evaluation.bench import BenchPicture
 from warpspace.app.evaluation.budget import answer
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -168,9 +167,9 @@ def _asked(picture: LivePicture) -> Iterator[Label]:
 
 def _names(picture: LivePicture) -> Iterator[Label]:
     state, found = picture.state, picture.bench
-    if isinstance(found, BenchPicture) and state.bench.path:
+    if found is not None:
         ends = np.concatenate([other for _, other in found.lines_mm(picture.exaggeration)])
-        words = f"{found.prepared.test.title}: max {_spell(found.largest_um)}"
+        words = f"{found.prepared.title}: max {_spell(found.largest_um)}"
         factor = spell_factor(picture.exaggeration)
         yield Label(f"{words}, drawn {factor}", ends[np.argmax(ends[:, 2])])
     moved = moved_traces(picture)
