@@ -86,7 +86,7 @@ def test_the_machine_moves_bends_and_carries_the_tool_point(tab):
     tab.send("state:set.positions.B", -30)
     state = replace(state, machine=machine).with_position("B", -30.0)
     tab.until(lambda: stands(state))
-    point = tool_point(LIVE.evaluate(state)).drawn_mm
+    point = tool_point(LIVE.evaluate(state))[0]
     tab.until(lambda: np.allclose(tab.place("/machine/tool_point"), point, atol=0.01))
     tab.send("state:set.machine.bent", 0)
     straight = replace(state, machine=replace(state.machine, bent=False))

@@ -19,7 +19,6 @@ from warpspace.app.documents.services import CancelledError
 from warpspace.app.evaluation import budget
 from warpspace.app.evaluation.budget import pick_worst, with_picked
 from warpspace.app.evaluation.compare import with_pin
-from warpspace.app.evaluation.conventions import with_reference
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.machine import tool_point
 from warpspace.app.evaluation.machine_edits import with_changed_scene
@@ -28,6 +27,7 @@ from warpspace.app.server.tab_keeper import NO_TABLE, kept_text, read_kept
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.table import without_table, without_words
 from warpspace.app.state.tree import put
+from warpspace.app.tasks.conventions import with_reference
 from warpspace.app.tasks.files import without_tables
 from warpspace.app.tasks.improve import BOTH, LEFT, CompensatePart, holds_for, packed, with_box
 from warpspace.cli.services import draw_compensation
@@ -138,7 +138,7 @@ def test_slices_traces_and_the_tool_point_have_the_table_too(controller):
     # the table moves linear axes on the tool side: points of the turning table stay where they are
     for plain, line in zip(bare.traces, picture.traces, strict=True):
         assert np.abs(plain.error_um - line.error_um).max() < 0.01
-    assert np.linalg.norm(tool_point(picture).error_um) < np.linalg.norm(tool_point(bare).error_um)
+    assert np.linalg.norm(tool_point(picture)[1]) < np.linalg.norm(tool_point(bare)[1])
 
 
 def test_other_loops_and_directions_of_travel_are_evaluated_as_they_are(left):

@@ -36,7 +36,6 @@ from warpspace.app.documents.scene_file import (
     with_settings,
 )
 from warpspace.app.evaluation.compare import pinned_side, scene_side, with_pin, with_sides
-from warpspace.app.evaluation.conventions import with_choice, with_reference
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.resulting_scene import scene_of
 from warpspace.app.server.tab_keeper import (
@@ -52,6 +51,7 @@ from warpspace.app.state import edits
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.comparison import Comparison, Side
 from warpspace.app.state.picked import Picked
+from warpspace.app.tasks.conventions import with_choice, with_reference
 from warpspace.app.viewport.camera import CameraMemory
 from warpspace.exceptions import OptionError, SceneError, WarpspaceError
 from warpspace.kinematics.model import Loop

@@ -3,9 +3,9 @@
 import pytest
 
 from app.parts import LIVE, lone_part
-from warpspace.app.evaluation.conventions import with_reference
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.tree import toggled
+from warpspace.app.tasks.conventions import with_reference
 from warpspace.app.tasks.errors import ErrorsPart
 from warpspace.scene.library import load_scene
 

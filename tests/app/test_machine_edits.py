@@ -9,7 +9,7 @@ from warpspace.app.documents.scene_file import open_text, state_to_toml
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.machine_edits import (
     guide_errors,
-    machine_types,
+    library,
     with_own_machine,
     with_word,
 )
@@ -33,6 +33,10 @@ LIVE = LiveModel()
 @pytest.fixture
 def state():
     return start_state(load_scene("dvf5000_first"))
+
+
+def guides(state, axis):
+    return guide_errors(state, state.scene.machine.gantries[axis])
 
 
 def test_another_chain_keeps_changed_errors_and_drops_those_of_axes_that_go(state):
@@ -129,18 +133,16 @@ def test_words_that_are_none_change_nothing(state, word):
 def test_every_machine_of_the_library_starts_with_its_own_scene(state):
     state = state.with_amplitude("EAX", 33.0)
     window = lone_part(MachinesWindow)
-    names = [entry.name for entry in machine_types()]
-    assert "dvf5000" in names
-    assert len(names) == len(set(names))
-    for entry in machine_types():
-        changed = window.take(state, "choose", entry.name)
+    assert "dvf5000" in library()
+    for name, scene in library().items():
+        changed = window.take(state, "choose", name)
         LIVE.evaluate(changed)
-        if entry.name == "dvf5000":  # as it was opened, with all that has been entered
+        if name == "dvf5000":  # as it was opened, with all that has been entered
             assert changed == state
             continue
-        assert changed.scene == changed.origin == entry.scene
-        assert changed.amplitudes == start_state(entry.scene).amplitudes
-        assert entry.scene.title in changed.notes[0]
+        assert changed.scene == changed.origin == scene
+        assert changed.amplitudes == start_state(scene).amplitudes
+        assert scene.title in changed.notes[0]
         assert state.scene.title in changed.notes[0]
 
 
@@ -165,16 +167,16 @@ def test_a_gantry_is_made_its_guides_are_set_and_their_distance_keeps_them(state
     # by hand: the second guide, at +225 mm in y, is 9 µm ahead, which turns X about −z
     assert one.amplitudes["EXX"] == pytest.approx(8.5)
     assert one.amplitudes["ECX"] == pytest.approx(-9.0 / 450.0 * 1000.0)
-    assert guide_errors(one, "X") == pytest.approx((4.0, 13.0))
+    assert guides(one, "X") == pytest.approx((4.0, 13.0))
     nearer = with_word(one, "span X 0 225")
-    assert guide_errors(nearer, "X") == pytest.approx((4.0, 13.0))
+    assert guides(nearer, "X") == pytest.approx((4.0, 13.0))
     assert nearer.amplitudes["ECX"] == pytest.approx(-40.0)
     turned = with_word(one, "across X")
     assert turned.scene.machine.gantries["X"].across == "z"
     assert with_word(one, "gantry X").scene.machine.gantries == {}
     opened, _ = open_text(state_to_toml(nearer), "own", "own.toml")
     assert opened.scene.machine.gantries == nearer.scene.machine.gantries
-    assert guide_errors(opened, "X") == pytest.approx((4.0, 13.0))
+    assert guides(opened, "X") == pytest.approx((4.0, 13.0))
 
 
 def test_guides_share_the_curve_of_the_axis_and_other_curves_are_said(state):
@@ -182,13 +184,13 @@ def test_guides_share_the_curve_of_the_axis_and_other_curves_are_said(state):
     ramp = Ramp(edits.axis_span(made, "EYY"), 8.0)
     made = with_curve(made.with_amplitude("ECY", 0.0), "EYY", ramp)
     pair = with_word(made, "guide Y 1 12")
-    assert guide_errors(pair, "Y") == pytest.approx((8.0, 12.0))
+    assert guides(pair, "Y") == pytest.approx((8.0, 12.0))
     assert edits.curve_of(pair, "ECY").evaluate(np.array([-225.0])) == pytest.approx(0.0)
     other = with_curve(pair, "ECY", Constant(ramp.span, 5.0))
-    assert guide_errors(other, "Y") is None
+    assert guides(other, "Y") is None
     there, back = (Ramp(ramp.span, value) for value in (8.0, 6.0))
     by_direction = with_curve(pair, "ECY", Directional(ramp.span, there, back))
-    assert guide_errors(by_direction, "Y") is None
+    assert guides(by_direction, "Y") is None
     refused = with_word(other, "guide Y 0 1")
     assert "different curves" in refused.notes[-1]
     assert refused.amplitudes == other.amplitudes

@@ -1,6 +1,7 @@
 """Positions of the axes, and how traced points run round rotary ones."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
@@ -8,8 +9,7 @@ from app.parts import LIVE, body_of, lone_part
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.edits import axis_span, with_curve
 from warpspace.app.state.tree import put
-from warpspace.app.tasks.machine import PositionsSection
-from warpspace.app.tasks.rotary import RotarySection
+from warpspace.app.tasks.machine import PositionsSection, RotarySection
 from warpspace.machine.errors import Ramp
 from warpspace.scene.library import load_scene
 
@@ -42,10 +42,7 @@ def test_traces_are_drawn_in_numbers_where_an_error_moves_them():
 def test_a_table_that_is_paused_can_stand_there_and_axes_be_held_at_quarters():
     section = lone_part(RotarySection)
     state = replace(STATE, page=replace(STATE.page, task="machine", open=frozenset({"rotary"})))
-    section.context.store = section.context
-    section.context.state, section.context.page = state, section.context
-    section.context.put = lambda pieces: None
-    section._follow({"C": 89.7})
+    section.context.stage = SimpleNamespace(playing=False, position={"C": 89.7})
     assert "Stand here" in section.body(LIVE.evaluate(state))
     assert section.take(state, "stand", "").positions["C"] == 90.0
     held = dict(section.take(state, "quarters", "").rotary.held)

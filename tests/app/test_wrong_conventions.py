@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from warpspace.app.evaluation.conventions import convention_costs
+from warpspace.app.tasks.conventions import convention_costs
 from warpspace.field.evaluate import View, evaluate_first_order
 from warpspace.field.grid import Workspace, build_grid
 from warpspace.kinematics.conversion import move_measuring_line
@@ -11,6 +11,7 @@ from warpspace.kinematics.model import Model
 from warpspace.machine.description import build_machine
 from warpspace.machine.errors import Constant, ErrorSet, Ramp, Table
 from warpspace.scene.library import load_scene
+from warpspace.scene.model import Scene
 
 SPAN = (-100.0, 100.0)
 VOLUME = Workspace({"X": SPAN, "Y": (0.0, 0.0), "Z": (0.0, 0.0)})
@@ -18,8 +19,7 @@ VOLUME = Workspace({"X": SPAN, "Y": (0.0, 0.0), "Z": (0.0, 0.0)})
 
 def costs(errors, offset=0.0):
     machine = build_machine("wFXYZt", offset_mm={"t": (0.0, 0.0, offset)})
-    found = convention_costs(Model(machine), errors, VOLUME)
-    return {cost.choice: (cost.mean_um, cost.max_um) for cost in found}
+    return convention_costs(Scene("own", "", Model(machine), VOLUME, errors), View())
 
 
 def test_a_pitch_on_an_arm():
@@ -71,6 +71,5 @@ def test_it_is_the_difference_to_what_the_translation_gives():
             for errors in (scene.errors, moved)
         )
         largest = float(np.linalg.norm(b - a, axis=-1).max())
-        found = convention_costs(model, scene.errors, scene.workspace, view, 5)
-        cost = next(cost for cost in found if cost.choice == "measuring_line")
-        assert cost.max_um == pytest.approx(largest, abs=0.01)
+        found = convention_costs(scene, view, 5)
+        assert found["measuring_line"][1] == pytest.approx(largest, abs=0.01)

@@ -18,12 +18,11 @@ from warpspace.app.documents.offline_page import build_offline_html, offline_pic
 from warpspace.app.evaluation.budget import pick, with_picked
 from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.evaluation.rotation import circle_rows
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.look import QUANTITIES, SURFACES
 from warpspace.app.state.picked import Picked
-from warpspace.app.tasks.machine import ConventionsSection
-from warpspace.app.tasks.rotary import circles
+from warpspace.app.tasks.conventions import ConventionsSection
+from warpspace.app.tasks.machine import RotarySection
 from warpspace.app.tasks.understand import WorstPart
 from warpspace.app.viewport.around import around, words
 from warpspace.app.viewport.box import box, ghost_dashes
@@ -124,7 +123,7 @@ def test_every_panel_has_words_for_it(state):
     said = [
         legend_html(picture),
         " ".join((numbers_words(picture), kept_words(picture)[0], *subject_words(picture))),
-        circles(circle_rows(picture)),
+        lone_part(RotarySection).body(picture),
         lone_part(ConventionsSection).body(picture),
         *WorstPart(None).pieces(asked).values(),
     ]

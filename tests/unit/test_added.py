@@ -18,12 +18,17 @@ from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.options import option
 from warpspace.app.documents.scene_file import open_text, state_to_toml
 from warpspace.app.evaluation.bench import BenchPicture
-from warpspace.app.evaluation.conventions import choices, chosen, effects_of, with_choice
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.edits import with_curve
+from warpspace.app.tasks.conventions import (
+    ConventionsSection,
+    choices,
+    chosen,
+    effects_of,
+    with_choice,
+)
 from warpspace.app.tasks.error_curve import kind_titles, read_curve, spell_rows
-from warpspace.app.tasks.machine import ConventionsSection
 from warpspace.bench.base import BenchTest, bench_names, register_test, unregister_test
 from warpspace.bench.data import DataColumn
 from warpspace.bench.plan import Outcome, Quantity, build_plan
@@ -282,10 +287,10 @@ def test_the_app_offers_a_curve_reads_converts_and_stores_it():
 def test_the_app_offers_a_convention_says_what_it_changes_and_stores_it():
     fixed = scene_to_toml(FIRST).replace("after_motion", "before_motion")
     start = start_state(parse_scene(fixed, "dvf5000_first"), nodes=3)
-    assert "component_errors=split" in choices(start)
+    assert "component_errors=split" in choices(start.scene)
     state = with_choice(start, "component_errors=split")
-    assert "component_errors=split" in chosen(state)
-    assert effects_of(state)["component_errors=split"].max_um > 0.0
+    assert "component_errors=split" in chosen(state.scene)
+    assert effects_of(state)["component_errors=split"][1] > 0.0
     text = body_of(ConventionsSection, state)
     assert 'value="component_errors=split" checked' in text
     assert "shifts before, turns after motion" in text

@@ -1,10 +1,9 @@
-"""Error motions and circle deviations against bodies and circles that were moved by hand."""
+"""Error motions against bodies that were moved by hand."""
 
 import numpy as np
 import pytest
 
 from warpspace.analysis.axis_motion import LEVER_MM, axis_motion, fit_circle, times_a_turn
-from warpspace.app.evaluation.rotation import circle_deviation
 
 ANGLE = np.linspace(0.0, 360.0, 73)
 THETA = np.deg2rad(ANGLE)
@@ -65,25 +64,6 @@ def test_arc_has_no_times_a_turn():
     )
     assert found.radial.times_a_turn is None
     assert found.radial.values == pytest.approx(np.cos(THETA[part]))
-
-
-def test_displaced_and_tilted_circle_is_taken_apart():
-    error = np.tile([3.0, -4.0, 7.0], (73, 1))
-    error[:, 2] += 25e-6 * CIRCLE[:, 1] * 1e3  # 25 µrad about x
-    found = circle_deviation(CIRCLE, error)
-    assert found.radius_mm == pytest.approx(200.0)
-    assert found.centre_um == pytest.approx(5.0)
-    assert found.axial_offset_um == pytest.approx(7.0)
-    assert found.tilt_urad == pytest.approx(25.0)
-    assert found.radial_um == pytest.approx(0.0, abs=1e-9)
-    assert found.axial_um == pytest.approx(0.0, abs=1e-9)
-
-
-def test_runout_twice_a_turn_is_its_peak_to_valley():
-    error = 2.0 * np.cos(2 * THETA)[:, None] * CIRCLE * [1, 1, 0] / 200.0
-    found = circle_deviation(CIRCLE, error)
-    assert found.radial_um == pytest.approx(4.0, rel=2e-2)
-    assert found.centre_um == pytest.approx(0.0, abs=0.1)
 
 
 def test_arc_in_a_tilted_plane_is_fitted():

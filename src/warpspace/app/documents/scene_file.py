@@ -16,8 +16,8 @@ from urllib.parse import parse_qsl, urlencode
 
 from warpspace.app.documents.files import LONGEST_NAME, safe_name
 from warpspace.app.evaluation.compare import plain_state, scene_side
+from warpspace.app.evaluation.machine_edits import known_alike
 from warpspace.app.evaluation.resulting_scene import scene_of
-from warpspace.app.evaluation.scene_edits import same_shape
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.comparison import BEFORE, NOBODY, PRESENT, SHOWN, Comparison, Side
 from warpspace.app.state.forms import linked_forms, with_form
@@ -29,7 +29,6 @@ from warpspace.machine.limits import MAX_PACKED_TEXT
 from warpspace.resources import __version__
 from warpspace.scene.files import parse_number
 from warpspace.scene.library import load_scene, parse_scene, scene_names
-from warpspace.scene.machines import load_machine, machine_names
 from warpspace.scene.model import Scene
 from warpspace.scene.save import scene_to_toml
 
@@ -99,17 +98,16 @@ def _bundled(name: str) -> Scene | None:
 def _recognised(scene: Scene) -> Scene:
     """Give a machine written inline its bodies back where only its axes' ends and ways differ."""
     machine = scene.machine
-    for name in machine_names():
-        known = load_machine(name)
-        if same_shape(known, machine):
-            same = replace(
-                known,
-                axes=machine.axes,
-                bodies=machine.bodies or known.bodies,
-                gantries=machine.gantries or known.gantries,
-            )
-            return replace(scene, model=replace(scene.model, machine=same))
-    return scene
+    known = known_alike(machine)
+    if known is None:
+        return scene
+    same = replace(
+        known,
+        axes=machine.axes,
+        bodies=machine.bodies or known.bodies,
+        gantries=machine.gantries or known.gantries,
+    )
+    return replace(scene, model=replace(scene.model, machine=same))
 
 
 def state_to_link(state: AppState, camera: CameraMemory | None, known: Iterable[Scene]) -> str:

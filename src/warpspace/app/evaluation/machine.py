@@ -1,9 +1,6 @@
 """The schematic machine of a picture: where its bodies and its tool point are drawn."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-
-import numpy as np
 
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.resulting_scene import active_scene
@@ -12,60 +9,36 @@ from warpspace.app.state.look import linear_positions
 from warpspace.bodies.placed import PlacedBody, place_bodies, scene_motions
 from warpspace.field.evaluate import evaluate_first_order
 from warpspace.geometry.surfaces import deform
-from warpspace.kinematics import transforms
-from warpspace.kinematics.chain import BodyMotion, nominal_point
+from warpspace.kinematics.chain import nominal_point
 from warpspace.kinematics.model import Loop, complete_coordinates
-from warpspace.picture.model import coloured_values
 from warpspace.units import Array
 
-
-@dataclass(frozen=True, slots=True)
-class ToolPoint:
-    """The tool point at the machine's positions."""
-
-    nominal_mm: Array  # [3]; where it should be and where the deformed grid has it
-    drawn_mm: Array
-    value: float  # what the map colours there, in the unit of the scale
-    error_um: Array  # [3]
+HERE: Mapping[str, float] = {}
 
 
-def machine_positions(
-    state: AppState, turned: Mapping[str, float] | None = None
-) -> dict[str, float]:
-    """Give where all axes stand, mm and degrees."""
-    linear = linear_positions(state.scene, state.machine)
-    return {**state.scene.workspace.positions, **linear, **state.positions, **(turned or {})}
-
-
-def standing(state: AppState, at: Mapping[str, float]) -> tuple[dict[str, float], Array]:
-    """Tell where the tool point is while some axes stand somewhere, nominally."""
+def standing(state: AppState, at: Mapping[str, float] = HERE) -> tuple[dict[str, float], Array]:
+    """Tell where all axes stand, mm and degrees, some of them elsewhere; and the tool point."""
     scene = state.scene
-    stands = {**scene.workspace.positions, **state.positions, **at}
+    linear = linear_positions(scene, state.machine)
+    stands = {**scene.workspace.positions, **linear, **state.positions, **at}
     axes = {name: float(stands.get(name, 0.0)) for name in scene.machine.axes}
     coordinates = complete_coordinates(scene.machine, axes)
     return axes, nominal_point(scene.model, Loop.TOOL, coordinates)
 
 
-def machine_motions(
-    state: AppState, turned: Mapping[str, float] | None = None
-) -> dict[str, BodyMotion]:
-    """Find place and small motion of every frame, as the state's loop and reference see it."""
-    return scene_motions(
-        state.scene,
-        state.view(),
-        amplitudes=state.active,
-        positions=machine_positions(state, turned),
-    )
-
-
 def drawn_bodies(
-    picture: LivePicture, turned: Mapping[str, float] | None = None
+    picture: LivePicture, turned: Mapping[str, float] = HERE, *, nominal: bool = False
 ) -> tuple[PlacedBody, ...]:
-    """Place the bodies of a picture's machine, bent where that is chosen."""
-    state = picture.state
-    factor = picture.exaggeration if state.machine.bent else 0.0
-    only = None if state.machine.shown else _turning_frames(state, turned or {})
-    return place_bodies(state.scene, machine_motions(state, turned), factor, only)
+    """Place the bodies of a picture's machine, bent where that is chosen.
+
+    While an axis is turned its table is drawn also where the machine is not.
+    """
+    state, scene = picture.state, picture.state.scene
+    positions, _ = standing(state, turned)
+    motions = scene_motions(scene, state.view(), amplitudes=state.active, positions=positions)
+    factor = picture.exaggeration if state.machine.bent and not nominal else 0.0
+    only = None if state.machine.shown or nominal else _turning_frames(state, turned)
+    return place_bodies(scene, motions, factor, only)
 
 
 def _turning_frames(state: AppState, turned: Mapping[str, float]) -> tuple[str, ...]:
@@ -76,32 +49,13 @@ def _turning_frames(state: AppState, turned: Mapping[str, float]) -> tuple[str, 
     return ()
 
 
-def nominal_bodies(picture: LivePicture) -> tuple[PlacedBody, ...]:
-    """Place the bodies of a picture's machine where they nominally are."""
-    return place_bodies(picture.state.scene, machine_motions(picture.state), 0.0)
-
-
-def tool_point(picture: LivePicture) -> ToolPoint:
-    """Find the tool point in the deformed grid of a picture."""
+def tool_point(picture: LivePicture) -> tuple[Array, Array]:
+    """Find the tool point in the deformed grid, [3], mm, and its error, [3], µm."""
     state, scene = picture.state, picture.state.scene
-    coordinates = complete_coordinates(scene.machine, machine_positions(state))
-    motion = machine_motions(state)["t"]
-    nominal = transforms.apply(motion.nominal, scene.model.tool_point_mm)
-    now = active_scene(state)
+    axes, nominal = standing(state)
+    coordinates, now = complete_coordinates(scene.machine, axes), active_scene(state)
     if state.controller is not None:
         field = state.controller.field(coordinates, nominal, now, state.loop)
     else:
         field = evaluate_first_order(scene.model, now.errors, coordinates, state.view(), nominal)
-    return ToolPoint(
-        nominal,
-        deform(nominal, field.error_um, picture.exaggeration),
-        float(coloured_values(field, state.component, state.look.quantity)),
-        field.error_um,
-    )
-
-
-def machine_room_mm(picture: LivePicture) -> Array:
-    """Give the points of the nominal machine and the corners of the grid, [n, 3], mm."""
-    state = picture.state
-    placed = place_bodies(state.scene, machine_motions(state), 0.0)
-    return np.concatenate([picture.grid.bounds_mm, *(part.nominal_mm for part in placed)])
+    return deform(nominal, field.error_um, picture.exaggeration), field.error_um

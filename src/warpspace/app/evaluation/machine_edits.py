@@ -1,28 +1,398 @@
-"""The machine of a state while it is being changed: pure updates, and the library to start from."""
+"""The machine of a scene or a state changed, by words of the editor; machines to start from.
 
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, replace
+The changed machine lives in the state's scene; `AppState.origin` keeps the scene's own one. What
+belongs to axes that stay is kept.
+"""
+
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import replace
 from functools import cache
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
-from warpspace.app.evaluation import scene_edits
-from warpspace.app.evaluation.scene_edits import Edited
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.edits import curve_of
-from warpspace.app.state.look import linear_spans
-from warpspace.app.state.ranges import Span, position_spans
+from warpspace.app.state.ranges import position_spans
 from warpspace.app.state.typed_numbers import read_typed
-from warpspace.exceptions import WarpspaceError
-from warpspace.machine.axes import parameter
+from warpspace.exceptions import OptionError, UnknownNameError, WarpspaceError
+from warpspace.field.grid import Workspace, find_volume_axes
+from warpspace.machine.axes import direction_index, is_linear, parameter
 from warpspace.machine.curves.curve import OWN, ErrorFunction
-from warpspace.machine.description import Gantry
-from warpspace.machine.errors import ErrorSet, ToleranceSet
-from warpspace.scene.library import load_scene, scene_names
+from warpspace.machine.description import (
+    ACROSS,
+    BODY_FRAMES,
+    FIXED_FRAMES,
+    ORIGIN,
+    BodySource,
+    Chain,
+    Gantry,
+    Machine,
+    build_machine,
+    default_across,
+    parse_chain,
+)
+from warpspace.machine.errors import ErrorSet
+from warpspace.scene.library import load_scene, parse_scene, scene_names
+from warpspace.scene.machines import body_notes, load_machine, machine_names
 from warpspace.scene.model import Scene
+from warpspace.scene.save import scene_to_toml
+from warpspace.scene.starter import starter_scene
 from warpspace.units import MICROMETRE
+
+# --- A machine as tables: what one word of the editor changes is an entry of one of them ----------
+
+Tables = dict[str, dict[str, Any]]
+T = TypeVar("T")
+UNITS = {"offset": "mm", "rotation": "°", "span": "mm", "travel": "", "volume": ""}
+"""Tables of numbers; without a unit it is that of the axis."""
+NOUNS = {"span": "gantry", "across": "gantry", "mesh": "body"}
+START_SPAN_MM = 1000.0  # of guides where no travel across says how far apart they are
+MOST_CHAIN_TEXT = 101  # characters of a chain that are read: one more than in a file
+FRAME = "F"
+
+
+def tables_of(scene: Scene) -> Tables:
+    """Give all that can be changed frame by frame."""
+    machine, fixed = scene.machine, dict.fromkeys(FIXED_FRAMES, ORIGIN)
+    axes = machine.axes.values()
+    return {
+        "offset": {axis.name: axis.offset_mm for axis in axes} | fixed | dict(machine.fixed_mm),
+        "rotation": {axis.name: axis.rotation_deg for axis in axes}
+        | fixed
+        | dict(machine.fixed_deg),
+        "travel": {axis.name: axis.travel for axis in axes},
+        "volume": dict(scene.workspace.ranges),
+        "turn": {axis.name: axis.direction for axis in axes},
+        "span": {name: (gantry.span_mm,) for name, gantry in machine.gantries.items()},
+        "across": {name: gantry.across for name, gantry in machine.gantries.items()},
+        "mesh": own_bodies(machine),
+    }
+
+
+def own_bodies(machine: Machine) -> dict[str, BodySource]:
+    """Give the bodies that a description names, without those of its machine in the library."""
+    known = load_machine(machine.name).bodies if machine.name in machine_names() else {}
+    return {frame: source for frame, source in machine.bodies.items() if known.get(frame) != source}
+
+
+def edited(scene: Scene, word: str) -> tuple[Scene, tuple[str, ...]]:
+    """Give the scene with its machine changed as a page spells it, and what was left out.
+
+    A word that is none changes nothing; what a file could not hold is refused.
+    """
+    what, _, rest = word.partition(" ")
+    tables, chain = tables_of(scene), scene.machine.chain
+    match what, rest.split(" ", maxsplit=2):
+        case "chain", _:
+            chain = parse_chain(rest[:MOST_CHAIN_TEXT])
+        case "left" | "right" | "side" | "remove", [axis]:
+            chain = _moved(scene.machine, what, axis)
+        case "turn", [axis]:
+            tables[what][axis] = -_entry(tables, what, axis)
+        case "gantry", [axis]:
+            _switch_guides(scene.machine, tables, axis)
+        case "across", [axis]:
+            taken = (_entry(tables, what, axis), ACROSS[direction_index(axis)])
+            tables[what][axis] = next(name for name in ACROSS if name not in taken)
+        case "mesh", [frame]:
+            _entry(tables, what, frame)
+            del tables[what][frame]
+        case "sizes", [""]:
+            return _with_machine(scene, starter_scene(chain))
+        case _, [frame, ("0" | "1" | "2") as index, typed] if what in UNITS:
+            row = list(_entry(tables, what, frame))
+            if int(index) >= len(row):
+                raise OptionError(f"{what} of {frame} has {len(row)} numbers")
+            unit = UNITS[what] or scene.machine.axes[frame].unit
+            row[int(index)] = read_number(f"{what} of {frame}", typed, unit)
+            tables[what][frame] = tuple(row)
+        case _:
+            return scene, ()
+    changed = _built(scene, chain, tables)
+    return (scene, ()) if changed == scene else _with_machine(scene, changed)
+
+
+def read_number(what: str, typed: str, unit: str) -> float:
+    value = read_typed(typed, unit)
+    if value is None:
+        text = typed if len(typed) <= SHOWN else f"{typed[:SHOWN]}…"
+        raise OptionError(f"{what} = “{text}”; expected a number in {unit}")
+    return value
+
+
+def _entry(tables: Tables, what: str, frame: str) -> Any:
+    if frame not in tables[what]:
+        raise UnknownNameError(NOUNS.get(what, "frame"), frame, tables[what])
+    return tables[what][frame]
+
+
+def _moved(machine: Machine, what: str, axis: str) -> Chain:
+    """Move an axis along the written chain, across the frame too; or next to it; or away."""
+    machine.axis(axis)
+    places = [*reversed(machine.chain.workpiece), FRAME, *machine.chain.tool]
+    at = places.index(axis)
+    places.remove(axis)
+    if what == "side":
+        at = places.index(FRAME) + (axis not in machine.chain.tool)
+    if what != "remove":
+        step = {"left": -1, "right": 1}.get(what, 0)
+        places.insert(max(at + step, 0), axis)
+    elif len(places) == 1:
+        raise OptionError(f"axis {axis} is the only one; expected a machine with at least one")
+    frame = places.index(FRAME)
+    return Chain(tuple(reversed(places[:frame])), tuple(places[frame + 1 :]))
+
+
+def _switch_guides(machine: Machine, tables: Tables, axis: str) -> None:
+    """Let a linear axis stand on two guides, or on one again."""
+    if not machine.axis(axis).is_linear:
+        raise OptionError(f"{axis} is a rotary axis; expected a linear one for two guides")
+    if tables["span"].pop(axis, None) is None:
+        across = default_across(axis)
+        others = [one for one in machine.axes.values() if one.is_linear]
+        spans = [one.travel[1] - one.travel[0] for one in others if ACROSS[one.index] == across]
+        tables["span"][axis], tables["across"][axis] = (max(spans, default=START_SPAN_MM),), across
+
+
+def _built(scene: Scene, chain: Chain, tables: Tables) -> Scene:
+    """Give a scene the machine and working volume of tables, axes that are new their default."""
+    machine, own = scene.machine, own_bodies(scene.machine)
+    for axis in filter(is_linear, chain.axes):  # the tool moves over the workpiece as before
+        carries = axis in chain.tool
+        if axis in machine.axes and carries != (axis in machine.chain.tool):
+            tables["turn"][axis] *= -1
+        elif axis not in machine.axes and not carries:
+            tables["turn"][axis] = -1
+    frames = {*chain.axes, *BODY_FRAMES}
+    kept = {
+        what: {frame: entry for frame, entry in table.items() if frame in frames}
+        for what, table in tables.items()
+    }
+    given = {name for name, axis in machine.axes.items() if axis.direction_given}
+    built = build_machine(
+        chain,
+        offset_mm=kept["offset"],
+        rotation_deg=kept["rotation"],
+        travel=kept["travel"],
+        direction={a: way for a, way in kept["turn"].items() if way != 1 or a in given},
+        gantry={axis: (span[0], kept["across"][axis]) for axis, span in kept["span"].items()},
+        name=machine.name,
+        title=machine.title,
+        body_dir=machine.body_dir,
+        source=machine.source,
+    )
+    bodies = {
+        frame: source
+        for frame, source in machine.bodies.items()
+        if frame in frames and (frame in kept["mesh"] or frame not in own)
+    }
+    volume = kept["volume"]
+    spanned = find_volume_axes(volume) if chain != machine.chain else ("", "", "")
+    for axis in chain.axes:  # of what is missing a file says no more than one in place of another
+        if axis not in volume and is_linear(axis) and spanned[direction_index(axis)]:
+            volume[axis] = (0.0, 0.0)
+    model = replace(scene.model, machine=replace(built, bodies=bodies))
+    return replace(scene, model=model, workspace=Workspace(volume))
+
+
+# --- A scene with another machine, checked as its file would be -----------------------------------
+
+
+def _with_machine(scene: Scene, other: Scene) -> tuple[Scene, tuple[str, ...]]:
+    """Give a scene the machine, the working volume and the points of another one."""
+    machine, axes = other.machine, other.machine.axes
+    if not machine.body_dir:  # it stands in a scene, and comes to stand in this one
+        machine = replace(machine, name=scene.name)
+    gone = {a: at for a, at in scene.workspace.positions.items() if a not in axes}
+    errors = of_axes(scene.errors.functions, axes)
+    own = tuple(one for one in scene.model.own_component_errors if one[0] in axes)
+    held = {axis: at for axis, at in (scene.reference or {}).items() if axis in axes}
+    changed = replace(
+        scene,
+        model=replace(
+            other.model,
+            machine=_dressed(scene, machine),
+            component_errors=scene.model.component_errors,
+            own_component_errors=own,
+            direction=scene.model.direction,
+        ),
+        workspace=other.workspace,
+        trace_points_mm=other.trace_points_mm,
+        errors=ErrorSet({key: one.without_axes(gone) for key, one in errors.items()}),
+        tolerances=replace(scene.tolerances, own=of_axes(scene.tolerances.own, axes)),
+        reference=held or None,
+        uncertainty=of_axes(scene.uncertainty, axes),
+        measured=of_axes(scene.measured, axes),
+    )
+    return _checked(changed), tuple(_left_out(scene, gone))
+
+
+def _checked(scene: Scene) -> Scene:
+    """Check a scene by writing it down and reading it again."""
+    read, machine = parse_scene(scene_to_toml(scene), scene.name, "machine"), scene.machine
+    # the text is read without its folder: what that says of meshes is true of others only
+    unread = body_notes(read.machine)
+    notes = (*(note for note in read.notes if note not in unread), *body_notes(machine))
+    machine = replace(
+        read.machine, name=machine.name, body_dir=machine.body_dir, bodies=machine.bodies
+    )
+    return replace(read, model=replace(read.model, machine=machine), notes=notes)
+
+
+def of_axes(table: Mapping[str, T], axes: Collection[str]) -> dict[str, T]:
+    """Keep the entries of a table of parameters that belong to some axes."""
+    return {key: value for key, value in table.items() if parameter(key).axis in axes}
+
+
+def known_alike(machine: Machine) -> Machine | None:
+    """Find the machine of the library with the same frames, whatever their travels and ways."""
+    known = map(load_machine, machine_names())
+    return next((one for one in known if _frames(one) == _frames(machine)), None)
+
+
+def _frames(machine: Machine) -> tuple[object, ...]:
+    places = [(axis.offset_mm, axis.rotation_deg) for axis in machine.axes.values()]
+    return machine.chain, places, machine.fixed_mm, machine.fixed_deg
+
+
+def _dressed(scene: Scene, machine: Machine) -> Machine:
+    """Name a machine after its frames: that of the library with the same ones, else its scene's.
+
+    Bodies that were made for other frames suit it no more.
+    """
+    before = scene.machine
+    another = machine.name != before.name or machine.body_dir != before.body_dir
+    if another or _frames(before) == _frames(machine):
+        return machine
+    if known := known_alike(machine):
+        return replace(machine, name=known.name, title=known.title, body_dir=known.body_dir)
+    same_chain = machine.chain == before.chain
+    title = machine.title if same_chain and not before.body_dir else f"Machine {machine.chain}"
+    return replace(machine, name=scene.name, title=title, body_dir="")
+
+
+def _left_out(scene: Scene, gone: Collection[str]) -> Iterator[str]:
+    """Name what goes with axes."""
+    for axis in gone:
+        depend = [key for key in scene.errors if axis in scene.errors.arguments(key)]
+        parts = {
+            "its errors {}": of_axes(scene.errors.functions, [axis]),
+            "its tolerances {}": of_axes(scene.tolerances.own, [axis]),
+            "how {} depends on it": [k for k in depend if parameter(k).axis not in gone],
+            "its position at the reference": {axis} & (scene.reference or {}).keys(),
+        }
+        said = "; ".join(words.format(", ".join(keys)) for words, keys in parts.items() if keys)
+        yield f"axis {axis} left out{f' and with it {said}' if said else ''}"
+
+
+# --- The machine of a state: errors and tolerances that were changed stay, undo takes all back ----
+
+SHOWN = 30  # characters of what was typed that a message repeats
+UNCHANGED = "the machine stays as it was"
+
+
+def with_word(state: AppState, word: str) -> AppState:
+    """Change the machine as a page spells it; what cannot be is refused with a note."""
+    try:
+        return _with_word(state, word)
+    except WarpspaceError as problem:
+        return _noted(state, f"{str(problem).removeprefix('machine: ')}; {UNCHANGED}")
+
+
+def _with_word(state: AppState, word: str) -> AppState:
+    gantries = state.scene.machine.gantries
+    match word.split(" ", maxsplit=3):
+        case ["own"]:
+            return with_own_machine(state)
+        case ["guide", axis, ("0" | "1") as guide, typed] if axis in gantries:
+            value = read_number(f"guide {int(guide) + 1} of {axis}", typed, MICROMETRE)
+            return with_guide_error(state, gantries[axis], int(guide), value)
+        case [what, axis, *_]:
+            scene, notes = edited(state.scene, word)
+        case _:
+            what, axis = "", ""
+            scene, notes = edited(state.scene, word)
+    if scene is state.scene:
+        return state
+    changed = _noted(with_changed_scene(state, scene), *notes)
+    if what != "span":
+        return changed
+    was, now = gantries[axis], scene.machine.gantries[axis]  # the errors of both guides stay
+    turned = changed.amplitudes[now.rotation_key] * now.rotation_weight / was.rotation_weight
+    return changed.with_amplitude(now.rotation_key, turned)
+
+
+def with_changed_scene(state: AppState, scene: Scene) -> AppState:
+    """Show a scene whose machine or working volume has been changed."""
+    own, before = state.origin, state.scene
+    same = scene == own
+    keys = scene.parameter_keys
+    was, stands = before.workspace.positions, scene.workspace.positions
+    # an axis whose position in the working volume was changed goes there
+    kept = {axis: at for axis, at in state.positions.items() if was.get(axis) == stands.get(axis)}
+    positions = {
+        axis: span.clamp(kept.get(axis, stands[axis]), span.low)
+        for axis, span in position_spans(scene).items()
+    }
+    tolerances = of_axes(state.tolerances.own, scene.machine.axes)
+    fixed = state.specification.fixed & frozenset(keys)
+    changed = replace(
+        state,
+        scene=own if same else scene,
+        loaded=None if same else own,
+        amplitudes={key: _amplitude(state, scene, key) for key in keys},
+        positions=positions,
+        exclusions=state.exclusions.within(keys),
+        tolerances=replace(state.tolerances, own=tolerances),
+        specification=replace(state.specification, fixed=fixed),
+        picked=state.picked if scene.machine.chain == before.machine.chain else None,
+        lever=state.lever if state.lever in keys else "",
+        # the table of another machine would correct nothing here
+        controller=state.controller if scene.model == before.model else None,
+    )
+    curves = changed.own_curves
+    return replace(changed, start={k: curves[k].amplitude if k in curves else 0.0 for k in keys})
+
+
+def _amplitude(state: AppState, scene: Scene, key: str) -> float:
+    """Give an amplitude in a changed scene: in a larger volume the same curve may reach further."""
+    if key not in state.amplitudes:
+        return scene.errors.amplitude(key)
+    present = state.amplitudes[key]
+    was, now = (one.errors.functions.get(key) for one in (state.scene, scene))
+    if was is None or now is None or was == now or was.amplitude == 0.0:
+        return present
+    return now.amplitude * (present / was.amplitude)
+
+
+def with_own_machine(state: AppState) -> AppState:
+    """Go back to machine, working volume and points of the scene as it was opened."""
+    own, scene, own_curves = state.origin, state.scene, state.own_curves
+    if own.machine == scene.machine and own.workspace == scene.workspace:
+        return state
+    returned = own.machine.axes.keys() - scene.machine.axes.keys()
+    functions = {
+        # curves that are the scene's own, but for the working volume, become those again
+        key: own.errors.functions[key] if own_curves.get(key) == function else function
+        for key, function in scene.errors.functions.items()
+    }
+    orders = {**dict(own.model.own_component_errors), **dict(scene.model.own_component_errors)}
+    tolerances = {**of_axes(own.tolerances.own, returned), **state.tolerances.own}
+    joined = replace(
+        scene,
+        model=replace(scene.model, own_component_errors=tuple(orders.items())),
+        errors=ErrorSet({**of_axes(own.errors.functions, returned), **functions}),
+        tolerances=replace(scene.tolerances, own=tolerances),
+    )
+    back, notes = _with_machine(joined, own)
+    kept = replace(state, tolerances=replace(state.tolerances, own=tolerances))
+    return _noted(with_changed_scene(kept, back), *notes)
+
+
+def _noted(state: AppState, *notes: str) -> AppState:
+    return replace(state, notes=(*state.notes, *notes)) if notes else state
+
 
 # --- The two guides of a gantry: their errors, which the axis has as mean and rotation ------------
 
@@ -30,306 +400,73 @@ SAMPLES = 65
 ALIKE = 1e-9  # by how much two curves of amplitude 1 may differ that count as one
 
 
-def guide_errors(state: AppState, axis: str) -> tuple[float, float] | None:
-    """Give the positioning errors of both guides of a gantry."""
-    gantry = state.scene.machine.gantries.get(axis)
-    if gantry is None or not _one_curve(state, gantry):
+def guide_errors(state: AppState, gantry: Gantry) -> tuple[float, float] | None:
+    """Give the positioning errors of both guides, µm; None where their curves differ."""
+    if not _alike(*_curves(state, gantry)):
         return None
     mean = state.amplitudes[gantry.positioning_key]
     half = 0.5 * state.amplitudes[gantry.rotation_key] / gantry.rotation_weight
     return mean - half, mean + half
 
 
-def with_guide_error(state: AppState, axis: str, index: int, value_um: float) -> AppState:
+def with_guide_error(state: AppState, gantry: Gantry, guide: int, value_um: float) -> AppState:
     """Set the positioning error of one guide; the other one stays."""
-    present = guide_errors(state, axis)
-    if present is None or index not in (0, 1):
-        note = f"guides of {axis}: their errors have different curves; use the sliders"
-        return replace(state, notes=(*state.notes, note))
-    gantry = state.scene.machine.gantries[axis]
-    first, second = (value_um, present[1]) if index == 0 else (present[0], value_um)
-    mean, rotation = (first + second) / 2.0, (second - first) * gantry.rotation_weight
-    shape = _shape(state, gantry)
-    for key, amplitude in ((gantry.positioning_key, mean), (gantry.rotation_key, rotation)):
-        if edits.curve_of(state, key).amplitude == 0.0:  # it takes the curve of the other one
+    present = guide_errors(state, gantry)
+    if present is None:
+        raise OptionError(
+            f"guides of {gantry.axis}: their errors have different curves; use the sliders"
+        )
+    other = present[1 - guide]
+    rotation = (value_um - other) * (1.0 if guide else -1.0) * gantry.rotation_weight
+    curves = _curves(state, gantry)
+    shape = next((curve for curve in curves if curve.amplitude != 0.0), curves[0])
+    keys, values = (gantry.positioning_key, gantry.rotation_key), ((value_um + other) / 2, rotation)
+    for key, curve, amplitude in zip(keys, curves, values, strict=True):
+        if curve.amplitude == 0.0:  # it takes the curve of the other one
             state = edits.with_curve(state, key, shape)
         state = state.with_amplitude(key, amplitude)
     return state
 
 
-def with_same_guides(before: AppState, state: AppState, axis: str) -> AppState:
-    """Keep the errors of both guides where the distance between them has been changed."""
-    was, now = (one.scene.machine.gantries.get(axis) for one in (before, state))
-    if was is None or now is None or was.rotation_key != now.rotation_key:
-        return state
-    turned = state.amplitudes[now.rotation_key] * now.rotation_weight / was.rotation_weight
-    return state.with_amplitude(now.rotation_key, turned)
+def _curves(state: AppState, gantry: Gantry) -> tuple[ErrorFunction, ErrorFunction]:
+    along, about = gantry.positioning_key, gantry.rotation_key
+    return edits.curve_of(state, along), edits.curve_of(state, about)
 
 
-def _shape(state: AppState, gantry: Gantry) -> ErrorFunction:
-    """Give the curve that both errors of a pair have: that of the one that is not zero."""
-    curves = [edits.curve_of(state, key) for key in (gantry.positioning_key, gantry.rotation_key)]
-    return next((curve for curve in curves if curve.amplitude != 0.0), curves[0])
-
-
-def _one_curve(state: AppState, gantry: Gantry) -> bool:
-    curves = [edits.curve_of(state, key) for key in (gantry.positioning_key, gantry.rotation_key)]
+def _alike(*curves: ErrorFunction) -> bool:
     if any(curve.amplitude == 0.0 for curve in curves):
         return True
+    one, other = (curve.with_amplitude(1.0) for curve in curves)
     if any(curve.has_directions or {*curve.arguments} - {OWN} for curve in curves):
-        first, second = (curve.with_amplitude(1.0) for curve in curves)
-        return first == second
-    at = np.linspace(*edits.axis_span(state, gantry.positioning_key), SAMPLES)
-    one, other = (curve.evaluate(at) / curve.amplitude for curve in curves)
-    return bool(np.abs(one - other).max() <= ALIKE)
+        return one == other
+    at = np.linspace(*one.span, SAMPLES)
+    return bool(np.abs(one.evaluate(at) - other.evaluate(at)).max() <= ALIKE)
 
 
 # --- The machines to start from: those of the bundled scenes, each once ---------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class MachineType:
-    """A machine to start from."""
-
-    name: str  # of the machine, or of its scene where it is written there
-    scene: Scene  # brings its working volume and points
-
-    @property
-    def title(self) -> str:
-        """Full name of the machine."""
-        return self.scene.machine.title
-
-
 @cache
-def machine_types() -> tuple[MachineType, ...]:
-    """List the machines of the bundled scenes, in the order of the scenes."""
-    found: dict[str, MachineType] = {}
+def library() -> Mapping[str, Scene]:
+    """Give a scene of each machine, by the machine's name: it brings its volume and points."""
+    found: dict[str, Scene] = {}
     for name in scene_names():
         try:
             scene = load_scene(name)
         except WarpspaceError:  # a scene that was put beside the others is no reason to fail
             continue
-        found.setdefault(scene.machine.name, MachineType(scene.machine.name, scene))
-    return tuple(found.values())
+        found.setdefault(scene.machine.name, scene)
+    return found
 
 
-def library_scene(name: str) -> Scene | None:
-    """Give the scene of a machine of the library; None for a name that is none."""
-    return next((entry.scene for entry in machine_types() if entry.name == name), None)
-
-
-# --- Changes of a state's machine -----------------------------------------------------------------
-# Everything of the axes that stay is kept, undo takes them back.
-#
-# The changed machine lives in the state's scene; `AppState.origin` keeps the scene's own one.
-
-T = TypeVar("T")
-Edit = Callable[[Scene], Edited]
-SHOWN = 30  # characters of what was typed that a message repeats
-NUMBERS = frozenset({"offset", "rotation", "travel", "volume", "span"})
-OF_FRAME: Mapping[str, Callable[[Scene, str], Edited]] = {
-    "left": lambda scene, axis: scene_edits.move_axis(scene, axis, -1),
-    "right": lambda scene, axis: scene_edits.move_axis(scene, axis, 1),
-    "side": scene_edits.switch_side,
-    "remove": scene_edits.remove_axis,
-    "turn": scene_edits.reverse,
-    "gantry": scene_edits.switch_gantry,
-    "across": scene_edits.turn_gantry,
-    "mesh": scene_edits.remove_mesh,
-}
-"""What can be done with a frame of a machine, by its word."""
-UNCHANGED = "the machine stays as it was"
-
-
-def with_edit(state: AppState, edit: Edit) -> AppState:
-    """Change the machine of a state."""
-    try:
-        edited = edit(state.scene)
-    except WarpspaceError as problem:
-        return _noted(state, f"{str(problem).removeprefix('machine: ')}; {UNCHANGED}")
-    if edited.scene == state.scene:
-        return _noted(state, *edited.notes)
-    try:
-        changed = with_changed_scene(state, edited.scene)
-    except WarpspaceError as problem:
-        return _noted(state, f"{str(problem).removeprefix('machine: ')}; {UNCHANGED}")
-    return _noted(changed, *edited.notes)
-
-
-def with_changed_scene(state: AppState, scene: Scene) -> AppState:
-    """Show a scene whose machine or working volume has been changed."""
-    own = state.origin
-    if scene == own:
-        scene, loaded = own, None
-    else:
-        loaded = own
-    keys = scene.parameter_keys
-    amplitudes = {key: _amplitude(state, scene, key) for key in keys}
-    kept = _of(state.tolerances.own, scene.machine.axes)
-    ranges = position_spans(scene)
-    stands = scene.workspace.positions
-    # an axis whose position in the working volume was changed goes there
-    before = state.scene.workspace.positions
-    positions = {
-        axis: span.clamp(
-            state.positions[axis]
-            if axis in state.positions and before.get(axis) == stands[axis]
-            else stands[axis],
-            span.low,
-        )
-        for axis, span in ranges.items()
-    }
-    same_axes = scene.machine.chain == state.scene.machine.chain
-    changed = replace(
-        state,
-        scene=scene,
-        loaded=loaded,
-        amplitudes=amplitudes,
-        positions=positions,
-        exclusions=state.exclusions.within(keys),
-        tolerances=ToleranceSet(state.tolerances.default, kept),
-        specification=replace(
-            state.specification, fixed=state.specification.fixed & frozenset(keys)
-        ),
-        picked=state.picked if same_axes else None,
-        lever=state.lever if state.lever in keys else "",
-        # the table of another machine would correct nothing here
-        controller=state.controller if scene.model == state.scene.model else None,
-    )
-    own_curves = changed.own_curves
-    start = {key: own_curves[key].amplitude if key in own_curves else 0.0 for key in keys}
-    return _looked_at(replace(changed, start=start))
-
-
-def _looked_at(state: AppState) -> AppState:
-    linear, turning = linear_spans(state.scene), state.position_spans
-    look, machine, rotary = state.look, state.machine, state.rotary
-    spanning = state.scene.workspace.volume_axes
-    look = replace(look, slices_mm={a: at for a, at in look.slices_mm.items() if a in spanning})
-    machine = replace(
-        machine, linear_mm={a: at for a, at in machine.linear_mm.items() if a in linear}
-    )
-    held = tuple(
-        (axis, kept)
-        for axis, at in rotary.held
-        if axis in turning and (kept := tuple(p for p in at if _within(p, turning[axis])))
-    )
-    return replace(state, look=look, machine=machine, rotary=replace(rotary, held=held))
-
-
-def _within(value: float, span: Span) -> bool:
-    return span.low <= value <= span.high
-
-
-def _amplitude(state: AppState, scene: Scene, key: str) -> float:
-    """Give the amplitude of a parameter in a changed scene, µm or µrad.
-
-    Where the working volume has grown the same curve may reach further.
-    """
-    present = state.amplitudes.get(key)
-    if present is None:
-        return scene.errors.amplitude(key)
-    was, now = state.scene.errors.functions.get(key), scene.errors.functions.get(key)
-    if was is None or now is None or was == now or present == 0.0 or was.amplitude == 0.0:
-        return present
-    if present == was.amplitude:
-        return now.amplitude
-    return now.amplitude * curve_of(state, key).amplitude / was.amplitude
-
-
-def with_own_machine(state: AppState) -> AppState:
-    """Go back to machine, working volume and points of the scene as it was opened."""
-    own = state.origin
-    if own.machine == state.scene.machine and own.workspace == state.scene.workspace:
-        return state
-    returned = own.machine.axes.keys() - state.scene.machine.axes.keys()
-    changed = with_edit(state, lambda _: scene_edits.take_machine(_joined(state, returned), own))
-    if changed.scene is state.scene:
-        return changed
-    tolerances = {**_of(own.tolerances.own, returned), **changed.tolerances.own}
-    return replace(changed, tolerances=replace(changed.tolerances, own=tolerances))
-
-
-def with_library_scene(state: AppState, library: Scene) -> AppState:
+def with_library_scene(state: AppState, scene: Scene) -> AppState:
     """Start anew with a machine of the library: what was measured on one says nothing of another.
 
     The machine of the scene as it was opened comes back with all that is shown.
     """
-    if state.origin.machine == library.machine:
+    if state.origin.machine == scene.machine:
         return with_own_machine(state)
     left = state.scene.title
-    note = f"{library.title}, with its own errors: those of {left} are left behind"
-    changed = replace(state.with_scene(library), left_behind=left)
+    note = f"{scene.title}, with its own errors: those of {left} are left behind"
+    changed = replace(state.with_scene(scene), left_behind=left)
     return _noted(changed, f"{note}; undo brings them back")
-
-
-def _joined(state: AppState, returned: Collection[str]) -> Scene:
-    """Give the scene of a state the errors, tolerances and component errors of axes that return.
-
-    Curves that are the scene's own, but for the working volume, become those again.
-    """
-    scene, own, own_curves = state.scene, state.origin, state.own_curves
-    functions = {
-        key: own.errors.functions[key] if own_curves.get(key) == function else function
-        for key, function in scene.errors.functions.items()
-    }
-    orders = {**dict(own.model.own_component_errors), **dict(scene.model.own_component_errors)}
-    tolerances = {**_of(own.tolerances.own, returned), **scene.tolerances.own}
-    return replace(
-        scene,
-        model=replace(scene.model, own_component_errors=tuple(orders.items())),
-        errors=ErrorSet({**_of(own.errors.functions, returned), **functions}),
-        tolerances=replace(scene.tolerances, own=tolerances),
-    )
-
-
-def _of(table: Mapping[str, T], axes: Collection[str]) -> dict[str, T]:
-    return {key: value for key, value in table.items() if parameter(key).axis in axes}
-
-
-def with_word(state: AppState, word: str) -> AppState:
-    """Change the machine as a page spells it; a word that is none changes nothing."""
-    what, _, rest = word.partition(" ")
-    words = rest.split(" ", maxsplit=2)
-    match what, words:
-        case "chain", _:
-            return with_edit(state, lambda scene: scene_edits.change_chain(scene, rest))
-        case _, [frame] if what in OF_FRAME:
-            return with_edit(state, lambda scene: OF_FRAME[what](scene, frame))
-        case "guide", [axis, ("0" | "1") as guide, typed] if axis in state.scene.machine.gantries:
-            return _with_guide(state, axis, int(guide), typed)
-        case "sizes", [""]:
-            return with_edit(state, scene_edits.take_sizes)
-        case "own", [""]:
-            return with_own_machine(state)
-        case _, [frame, entry, typed] if what in NUMBERS and entry in ("0", "1", "2"):
-            return _with_number(state, what, frame, int(entry), typed)
-        case _:
-            return state
-
-
-def _with_number(state: AppState, what: str, frame: str, entry: int, typed: str) -> AppState:
-    axis = state.scene.machine.axes.get(frame)
-    unit = {"offset": "mm", "rotation": "°"}.get(what) or ("mm" if axis is None else axis.unit)
-    value = read_typed(typed, unit)
-    if value is None:
-        return _no_number(state, f"{what} of {frame}", typed, unit)
-    change = scene_edits.change_number
-    changed = with_edit(state, lambda scene: change(scene, what, frame, entry, value))
-    return with_same_guides(state, changed, frame) if what == "span" else changed
-
-
-def _with_guide(state: AppState, axis: str, guide: int, typed: str) -> AppState:
-    value = read_typed(typed, MICROMETRE)
-    if value is None:
-        return _no_number(state, f"guide {guide + 1} of {axis}", typed, MICROMETRE)
-    return with_guide_error(state, axis, guide, value)
-
-
-def _no_number(state: AppState, what: str, typed: str, unit: str) -> AppState:
-    text = typed if len(typed) <= SHOWN else f"{typed[:SHOWN]}…"
-    return _noted(state, f"{what} = “{text}”; expected a number in {unit}")
-
-
-def _noted(state: AppState, *notes: str) -> AppState:
-    return replace(state, notes=(*state.notes, *notes)) if notes else state

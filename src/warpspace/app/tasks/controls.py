@@ -23,7 +23,6 @@ from warpspace.app.browser.html import (
 )
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
-from warpspace.app.evaluation.conventions import with_travel
 from warpspace.app.evaluation.live_picture import Compared, LivePicture
 from warpspace.app.state.app_state import COMPONENT_NAMES, LOOP_NAMES, AppState
 from warpspace.app.state.comparison import NOBODY, PRESENT, SHOWN, Side
@@ -35,6 +34,7 @@ from warpspace.app.state.look import (
     slice_spans,
 )
 from warpspace.app.state.tree import leaves, put, value
+from warpspace.app.tasks.conventions import with_travel
 from warpspace.app.tasks.parts import Part
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import DIRECTION_WORDS, TravelDirection

@@ -342,10 +342,10 @@ class ConceptsPart(AnalysisPart):
 
     def offers(self, state: AppState) -> dict[str, tuple[str, Scene]]:
         """Give title and scene of each machine that can be compared, by what its choice sends."""
-        from warpspace.app.evaluation.machine_edits import machine_types
+        from warpspace.app.evaluation.machine_edits import library
 
         found = {PRESENT: (f"{state.scene.title} (as it stands)", scene_of(state))}
-        scenes = [(one.title, one.scene) for one in machine_types()]
+        scenes = [(one.machine.title, one) for one in library().values()]
         for title, scene in (*scenes, *self.context.scenes.items()):
             if not any(scene is other or scene == other for _, other in found.values()):
                 found[title] = (title, scene)

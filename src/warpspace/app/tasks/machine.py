@@ -1,239 +1,227 @@
-"""The task Machine: where the axes stand, and the conventions its errors are drawn with."""
+"""The task Machine: where the axes stand, and how points run while a rotary axis turns."""
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import replace
-from itertools import groupby
 
 from markupsafe import Markup
 
+from warpspace.analysis.axis_motion import AxisMotion, Motion, assemble_motion
+from warpspace.analysis.blocks import Column, Table
 from warpspace.app.browser.html import (
-    EMPTY,
-    attributes,
     button,
+    choice,
     field,
     fill,
     join,
-    number,
     slider,
+    switch,
     tag,
     text_box,
 )
-from warpspace.app.evaluation.cache import Identity
-from warpspace.app.evaluation.conventions import (
-    Effect,
-    choices,
-    chosen,
-    costs_of,
-    effects_of,
-    own_state,
-    reference_spans,
-    with_choice,
-    with_own_conventions,
-    with_reference,
-)
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.machine import machine_positions, standing
+from warpspace.app.evaluation.machine import HERE, standing
+from warpspace.app.evaluation.resulting_scene import active_scene
+from warpspace.app.evaluation.rotation import chosen_trace, moved_traces, played_axis
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.look import linear_spans
-from warpspace.app.state.picked import Picked
-from warpspace.app.state.tree import leaves, value
-from warpspace.app.state.typed_numbers import read_typed
-from warpspace.app.tasks.context import Context
+from warpspace.app.state.look import linear_spans, quarters
+from warpspace.app.state.tree import leaves, spell, toggled, value
+from warpspace.app.tasks.charts import block_html
 from warpspace.app.tasks.parts import Section
 from warpspace.bodies.own_meshes import check_meshes
-from warpspace.kinematics.model import find_convention
-from warpspace.machine.axes import is_linear
+from warpspace.picture.traces import TraceLine, evaluate_axis_motion, motion_lines, turn_words
 from warpspace.picture.words import spell_at, spell_point
+from warpspace.units import MINUS
 
 OPEN_MESH = "The surface of a mesh of this machine is not closed; it is drawn as it is."
 
 
-def setting(state: AppState, path: str, label: str) -> Markup:
-    """Give a slider with a number box for a field of the state."""
-    leaf, at, name = leaves(state)[path], float(value(state, path)), f"state:set.{path}"
-    if leaf.span is None:
-        return EMPTY
-    bar = slider(name, at, leaf.span.low, leaf.span.high, leaf.span.step, twin=name, label=label,
-                 text=f"{at:g} {leaf.unit}")  # fmt: skip
+def setting(state: AppState, path: str, placeholder: str = "") -> Markup:
+    """Give a box for a field of the state, with a slider for a position of an axis."""
+    leaf, name = leaves(state)[path], f"state:set.{path}"
+    if leaf.kind != "number" or leaf.span is None:
+        box = text_box(name, spell(state, path), placeholder=placeholder)
+        return field(leaf.label, box, name, leaf.unit, leaf.hint)
+    at, span, label = float(value(state, path)), leaf.span, path.rpartition(".")[2]
+    words = f"{at:g} {leaf.unit}"
+    bar = slider(name, at, span.low, span.high, span.step, twin=name, label=label, text=words)
     box = text_box(name, f"{at:g}", size="short", inputmode="decimal")
     return field(label, bar + box, name, leaf.unit, leaf.hint)
 
 
 class PositionsSection(Section):
-    """Where the axes stand: the volume is drawn at the rotary ones, the bodies at all of them."""
-
     name, task, title = "positions", "machine", "Axis positions"
     sentence = "Move the axes: rotary axes carry the working volume, linear ones the tool point"
 
-    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
-        """Follow positions and machine."""
-        state = picture.state
-        return Identity(state.scene), Identity(state.positions), Identity(state.machine)
-
     def body(self, picture: LivePicture) -> Markup:
-        """Write a slider an axis, and the tool point."""
         state = picture.state
-        axes, point_mm = standing(state, machine_positions(state))
+        axes, point_mm = standing(state)
         copied = button("Copy", "positions:none", kind="link", hint="Copy the positions",
                         data_copy=spell_at(axes))  # fmt: skip
-        said = tag("p", join(("Tool point: ", spell_point(axes, point_mm), " ", copied)),
-                   class_="ws-tiny")  # fmt: skip
-        is_open = state.machine.shown and bool(check_meshes(state.scene.machine))
-        return join((
-            *(setting(state, f"positions.{axis}", axis) for axis in state.positions),
-            *(setting(state, f"machine.linear_mm.{axis}", axis)
-              for axis in linear_spans(state.scene)),
-            said, tag("p", OPEN_MESH, class_="ws-tiny") if is_open else EMPTY,
-        ))  # fmt: skip
+        said: list[object] = [
+            join(("Tool point: ", spell_point(axes, point_mm), " ", copied)),
+        ]
+        if state.machine.shown and check_meshes(state.scene.machine):
+            said.append(OPEN_MESH)
+        linear = (f"machine.linear_mm.{axis}" for axis in linear_spans(state.scene))
+        paths = (*(f"positions.{axis}" for axis in state.positions), *linear)
+        bars = [setting(state, path) for path in paths]
+        return join((*bars, *(tag("p", words, class_="ws-tiny") for words in said)))
 
 
-# --- Conventions: what the map is drawn with, and what each choice changes ------------------------
+# --- Rotary axes: play, one trace as polar plots, all of them in numbers --------------------------
 
-GROUPS = {
-    "component_errors": ("Component errors", "Where the errors of a motion act"),
-    "reference": ("Reference", "What is held still"),
-    "rotary": ("Rotary axes", "+1 turns with the name of the axis, −1 against it"),
-    "linear": ("Linear axes", "+1 moves with the name of the axis, −1 against it"),
-}
-WORDS = {"reference=absolute": "absolute", "reference=point": "a point is held still"}
-COST_GROUPS = {
-    "squareness": ("Sign of squareness", "the scene's: by the right-hand rule"),
-    "measuring_line": ("Measuring line", "the scene's: at the origin of each axis"),
-    "straightness": ("Reference line of straightness", "the scene's: with its tilt"),
-    "zero_at": ("Zero of the curves", "the scene's: as given"),
-}
-COST_WORDS = {
-    "squareness=over_90": "positive where the angle is over 90°",
-    "squareness=under_90": "positive where it is under 90°",
-    "measuring_line": "through the middle of the volume",
-    "straightness=end_point": "end points taken out",
-    "straightness=least_squares": "least squares taken out",
-    "straightness=minimum_zone": "minimum zone taken out",
-    "zero_at": "zero in the middle of each axis",
-}
-NOTE = (
-    "Change of the error vector over the nodes of the grid: each choice alone, against the"
-    " conventions of the scene."
+NOTHING_MOVED = (
+    "No error moves the traced points: all errors of the axes that carry them are zero or"
+    " excluded. Set one, for instance a translation error of a rotary axis, and the traces appear."
 )
-COST_NOTE = "What a wrong assumption about the measured data would cost, to first order."
+ON_THE_AXIS = "The point lies on the axis: it has no direction that deviations could be taken in."
+ABOUT = (
+    "Error motion of the axis at the height of the point and in its direction, which turns with it:"
+    " peak to valley, and about the axis average line. A tilt or run-out once per turn also results"
+    " from a tilted or displaced axis average line."
+)
+KEY = (
+    '<p class="ws-key ws-tiny"><span class="ws-s0">actual − nominal</span>'
+    '<span class="ws-s1">dashed: about the axis average line</span></p>'
+)
+MOST_ROWS = 24  # traces in the table
 
 
-def _group(choice: str) -> str:
-    what, _, axis = choice.split("=", maxsplit=1)[0].partition(" ")
-    return what if not axis else "linear" if is_linear(axis) else "rotary"
-
-
-def _spell(choice: str) -> str:
-    what, _, given = choice.partition("=")
-    if what == "component_errors":
-        return find_convention(given).title
-    axis = what.removeprefix("direction ")
-    return WORDS.get(choice, f"{axis} {'+1' if given == '1' else '−1'}")
-
-
-class ConventionsSection(Section):
-    """Conventions to choose from with what each changes, and the point that is held still."""
-
-    name, task, title = "conventions", "machine", "Conventions"
-    sentence = "Choose what the errors mean, and see what another convention would change"
-
-    def __init__(self, context: Context) -> None:
-        super().__init__(context)
-        self._known_for: tuple[object, ...] = ()
-        self._effects: Mapping[str, Effect] = {}
-        self._costs: tuple[Effect, ...] = ()
+class RotarySection(Section):
+    name, task, title = "rotary", "machine", "Rotary axes"
+    sentence = "See how traced points run while a rotary axis turns (ISO 230-7)"
 
     def concerns(self, picture: LivePicture) -> tuple[object, ...]:
-        """Follow all that the effects depend on."""
-        state = picture.state
-        return (
-            Identity(state.origin), Identity(state.scene), tuple(state.active.items()),
-            tuple(state.positions.items()), state.seen, state.nodes,
-            self.context.next_click is None,
-        )  # fmt: skip
+        return (id(picture), *self._played())
+
+    def _played(self) -> tuple[bool, bool]:
+        """Tell whether an axis turns, and whether it is where it stands not."""
+        stage = self.context.stage
+        return (False, False) if stage is None else (stage.playing, bool(stage.position))
 
     def body(self, picture: LivePicture) -> Markup:
-        """Write choices, reference and costs."""
+        if self.context.stage is not None:
+            self.context.stage.moved = self._follow
         state = picture.state
-        asked = self.concerns(picture)[:-1]
-        if asked != self._known_for:
-            self._known_for = asked
-            self._effects, self._costs = effects_of(state), costs_of(state)
-        own, in_force = chosen(own_state(state)), chosen(state)
-        head = "<tr><th>µm</th><th class=number>mean</th><th class=number>max</th></tr>"
-        lines: list[Markup] = [fill(head)]
-        listed = [choice for choice in choices(state) if _group(choice) in GROUPS]
-        for group, members in groupby(listed, _group):
-            title, hint = GROUPS[group]
-            lines.append(fill('<tr><th colspan="3" title="{hint}"><b>{title}</b></th></tr>',
-                              title=title, hint=hint))  # fmt: skip
-            for choice in members:
-                radio = fill("<input{rest}>", rest=attributes(
-                    type="radio", name=choice.split("=")[0], value=choice,
-                    checked=choice in in_force, data_set="conventions:choose",
-                ))  # fmt: skip
-                words = _spell(choice) + (" (scene)" if choice in own else "")
-                effect = None if choice in own else self._effects.get(choice)
-                lines.append(_line(fill("<label>{} {}</label>", radio, words), effect))
-        lines.append(_line("all choices together", self._effects.get("all")))
-        back = button("Back to the scene's", "conventions:own", disabled=in_force == own)
+        axis = played_axis(state)
+        if axis is None:
+            return tag("p", "This machine has no rotary axis.", class_="ws-quiet")
+        playing, away = self._played()
+        buttons = {
+            "play": ("Pause" if playing else f"Turn {axis}", "The points run along their circles"),
+            "stop": ("Stop", "Stop and return to the position of the axis"),
+            "stand": ("Stand here", "Move the axis to the paused position"),
+        }
+        shown = ("play", "stop")[: 1 + (playing or away)] + ("stand",) * (away and not playing)
+        found = (button(buttons[do][0], f"rotary:{do}", hint=buttons[do][1]) for do in shown)
         return join((
-            tag("table", join(lines), class_="ws-choices-table"), tag("p", NOTE, class_="ws-tiny"),
-            self._reference(state), tag("div", back, class_="ws-actions"), self._wrong(),
+            tag("div", join(found), class_="ws-actions"),
+            fill('<p data-piece="rotary.angle" class="ws-tiny"></p>'),
+            _trace(picture), _points(state),
         ))  # fmt: skip
 
-    def _reference(self, state: AppState) -> Markup:
-        held, middle = state.scene.reference, state.scene.workspace.positions
-        if held is None:
-            return EMPTY
-        boxes: list[Markup] = []
-        for axis in reference_spans(state.scene):
-            name, at = f"conventions:set.{axis}", held.get(axis, middle.get(axis, 0.0))
-            unit = state.scene.machine.axes[axis].unit
-            boxes.append(field(f"Held at {axis}", text_box(name, f"{at:g}", size="short"), name,
-                               unit))  # fmt: skip
-        waits = self.context.next_click is not None
-        pick = button("Click a point of the box …" if waits else "Pick it in the drawing",
-                      "conventions:pick", pressed=waits)  # fmt: skip
-        return join((*boxes, tag("div", pick, class_="ws-actions")))
-
-    def _wrong(self) -> Markup:
-        lines: list[Markup] = []
-        for group, members in groupby(self._costs, lambda cost: cost.choice.partition("=")[0]):
-            title, hint = COST_GROUPS[group]
-            lines.append(fill('<tr><th colspan="3"><b>{}</b> {}</th></tr>', title, hint))
-            lines += [_line(COST_WORDS[cost.choice], cost) for cost in members]
-        summary = tag("summary", "If the data were measured in another convention")
-        note = tag("p", COST_NOTE, class_="ws-tiny")
-        return tag("details", summary + note + tag("table", join(lines)), class_="ws-options")
+    def _follow(self) -> None:
+        state, stage = self.context.state, self.context.stage
+        if stage is not None and self.is_seen(state) and self.is_open(state):
+            text = ", ".join(f"{axis} = {at:.0f}°" for axis, at in stage.position.items())
+            self.context.page.put({"rotary.angle": str(tag("span", text.replace("-", MINUS)))})
+            self.context.renew(self)
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
-        """Choose a convention or a reference point."""
-        if word == "choose":
-            return with_choice(state, value)
-        if word == "own":
-            return replace(with_own_conventions(state), loop=state.loop)
-        if word == "pick":
-            self.context.act(self._toggle_picking)
-        axis = word.removeprefix("set.")
-        if axis in reference_spans(state.scene) and state.scene.reference is not None:
-            typed = read_typed(value, state.scene.machine.axes[axis].unit)
-            return state if typed is None else with_reference(state, {axis: typed})
+        axis, stage = played_axis(state), self.context.stage
+        what, _, index = word.partition(".")
+        if what == "point" and index.isdecimal() and int(index) < len(state.scene.trace_points_mm):
+            return toggled(state, "rotary.off", str(int(index)))
+        if word == "quarters" and axis is not None:
+            held = state.rotary.with_held(axis, quarters(state.scene, axis))
+            return replace(state, rotary=held)
+        if word == "stand":
+            for turned, at in (HERE if stage is None else stage.position).items():
+                state = state.with_position(turned, float(round(at)))
+        if word in ("play", "stop") and stage is not None:
+            on = None if word == "stop" else not stage.playing
+            self.context.act(lambda: stage.play(on))
         return state
 
-    def _toggle_picking(self) -> None:
-        self._wait(waiting=self.context.next_click is None)
 
-    def _wait(self, *, waiting: bool) -> None:
-        self.context.next_click = self._choose if waiting else None
-        self.context.renew(self)
+def _trace(picture: LivePicture) -> Markup:
+    if not picture.state.shown.traces:
+        turn_on = button("Draw the traces", "state:set.shown.traces", "1", kind="main")
+        return tag("div", turn_on, class_="ws-actions")
+    moved = moved_traces(picture)
+    if not moved:
+        return tag("p", NOTHING_MOVED, class_="ws-quiet")
+    name, path = chosen_trace(picture, moved), "state:set.rotary.chosen"
+    chosen = field("Trace", choice(path, name, {one: one for one in moved}), path)
+    motions = {one: motion_of(picture, moved[one]) for one in [*moved][:MOST_ROWS]}
+    motion = motions[name] if name in motions else motion_of(picture, moved[name])
+    shown = _motion(motion, name) if motion else tag("p", ON_THE_AXIS, class_="ws-quiet")
+    heads = (("trace", ""), ("radius", "mm"), ("radial", "µm"), ("axial", "µm"), ("tilt", "µrad"))
+    columns = tuple(Column(head, unit=unit) for head, unit in heads)
+    rows = [(one, *_numbers(found)) for one, found in motions.items()]
+    table = tag("summary", "All traces in numbers") + block_html(Table(columns, rows))
+    return chosen + shown + tag("details", table, class_="ws-options")
 
-    def _choose(self, picked: Picked) -> None:
-        self._wait(waiting=False)
-        self.context.post(lambda state: with_reference(state, picked.at))
+
+def _numbers(motion: AxisMotion | None) -> Sequence[str]:
+    if motion is None:
+        return "on the axis", "", "", ""
+    return f"{motion.radius_mm:.1f}", *(_values(part) for part in motion.motions)
 
 
-def _line(words: object, effect: Effect | None) -> Markup:
-    cells = ("–", "–") if effect is None else (number(effect.mean_um), number(effect.max_um))
-    return fill('<tr><td>{}</td><td class="number">{}</td><td class="number">{}</td></tr>',
-                words, *cells)  # fmt: skip
+def _values(part: Motion) -> str:
+    return f"{part.peak_to_valley:.2f} / {part.motion_value:.2f}"
+
+
+def motion_of(picture: LivePicture, line: TraceLine) -> AxisMotion | None:
+    """Evaluate how the axis of a trace runs, with the errors that take part."""
+    if picture.compared is None or not picture.is_difference:
+        return _of_state(picture.drawn_state, line)
+    one, other = (_of_state(side, line) for side in picture.compared.sides)
+    if one is None or other is None:
+        return None
+    radial, axial, tilt = (
+        b.values - a.values for a, b in zip(one.motions, other.motions, strict=True)
+    )
+    turn = other.angle_deg, other.radius_mm
+    return assemble_motion(*turn, (radial, axial, tilt), closed=other.closed)
+
+
+def _of_state(state: AppState, line: TraceLine) -> AxisMotion | None:
+    points = (line.trace.point_mm,)
+    return evaluate_axis_motion(replace(active_scene(state), trace_points_mm=points), line)
+
+
+def _motion(motion: AxisMotion, name: str) -> Markup:
+    plots = join(
+        block_html(replace(motion_lines(part.name, motion, part), title=part.name, note=""))
+        for part in motion.motions
+    )
+    columns = tuple(map(Column, ("", "peak to valley", "about average line", "mostly")))
+    rows = [
+        (
+            part.iso,
+            f"{part.peak_to_valley:.2f} {part.unit}",
+            f"{part.motion_value:.2f} {part.unit}",
+            turn_words(part.times_a_turn) if motion.closed else "an arc",
+        )
+        for part in motion.motions
+    ]
+    return join((
+        tag("div", plots, class_="ws-plots", role="group", aria_label=f"Error motion of {name}"),
+        fill(KEY), block_html(Table(columns, rows)), tag("p", ABOUT, class_="ws-tiny"),
+    ))  # fmt: skip
+
+
+def _points(state: AppState) -> Markup:
+    parts: list[Markup] = []
+    for index, words in leaves(state)["rotary.off"].choices.items():
+        on = int(index) not in state.rotary.off
+        parts.append(switch(f"rotary:point.{index}", f"Trace {words}", on=on))
+    parts.append(setting(state, "rotary.own_mm", "150, 0, 100"))
+    if len(state.positions) > 1:
+        parts += [setting(state, f"rotary.held.{axis}") for axis in state.position_spans]
+        hint = "Turn the axis at every quarter turn of the table"
+        parts.append(button("Hold at every 90°", "rotary:quarters", hint=hint))
+    summary = tag("summary", "Traced points and positions")
+    return tag("details", summary + join(parts), class_="ws-options")

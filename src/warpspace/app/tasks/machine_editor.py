@@ -2,41 +2,33 @@
 
 import base64
 import io
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 
-import numpy as np
 from markupsafe import Markup
 from PIL import Image
 
-from warpspace.app.browser.html import (
-    EMPTY,
-    button,
-    field,
-    fill,
-    ident,
-    join,
-    tag,
-    text_box,
-)
-from warpspace.app.evaluation.cache import Identity
+from warpspace.app.browser.html import EMPTY, button, field, fill, ident, join, tag, text_box
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine_edits import (
     UNCHANGED,
+    UNITS,
+    Tables,
     guide_errors,
-    library_scene,
-    machine_types,
+    library,
+    tables_of,
     with_library_scene,
     with_word,
 )
-from warpspace.app.evaluation.scene_edits import own_bodies
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.typed_numbers import spell_typed
 from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.parts import Section
 from warpspace.app.tasks.window import Window
-from warpspace.machine.description import FIXED_FRAMES, ORIGIN, Axis, BodySource, Machine
+from warpspace.machine.description import BodySource, Gantry
 from warpspace.scene.machines import machine_picture
+from warpspace.units import MICROMETRE
 
 FIXED = {
     "w": "workpiece, on the last axis of its side",
@@ -44,7 +36,14 @@ FIXED = {
     "t": "tool, in the spindle",
 }
 """What the frames are that do not move."""
-CHAIN = "chain"
+ROWS = {
+    "offset": ("Offset", "xyz"),
+    "rotation": ("Rotation", "xyz"),
+    "travel": ("Travel", ("from", "to")),
+    "volume": ("Volume", ("from", "to")),
+    "span": ("Guides", ("apart",)),
+}
+"""Numbers of a frame: label and what each is."""
 CHAIN_HINT = (
     "w, axes, F, axes, t: from the workpiece over the frame F to the tool. An axis is a letter of"
     " X Y Z U V W A B C and an optional digit."
@@ -53,176 +52,135 @@ BODIES = (
     "A mesh of your own (STL, OBJ, PLY, GLB) lies beside the scene file, which names it:"
     ' [bodies] X = "column.stl".'
 )
-ENDS = ("from", "to")
+WHOLE = (
+    ("Another machine …", "page:open", "machines",
+     "Machines of the library, each with its own errors"),
+    ("Default dimensions", "editor:do", "sizes",
+     "Offsets, travels, directions and working volume that fit the chain"),
+    ("Back to the scene's", "editor:do", "own",
+     "The machine as it was opened, with the errors of its axes"),
+)  # fmt: skip
 
 
 class EditorSection(Section):
-    """Chain, order, sides, offsets, rotations, travels, directions and working volume."""
-
     name, task, title = "editor", "machine", "Edit the machine"
     sentence = "Change axes, their order, places and travels, or start from another machine"
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
-        self._refused: tuple[str, str] | None = None  # chain that was typed, and what is wrong
+        self._refused = ("", "")  # chain that was typed, and what is wrong
 
     def concerns(self, picture: LivePicture) -> tuple[object, ...]:
-        """Follow machine, working volume, and the errors of guides."""
-        state = picture.state
-        return (Identity(state.scene.machine), Identity(state.scene.workspace), self._refused,
-                *_guides(state).items())  # fmt: skip
+        return (id(picture), self._refused)
 
     def body(self, picture: LivePicture) -> Markup:
-        """Write the chain, a part to unfold a frame, and what concerns the whole machine."""
-        state = picture.state
-        machine, name = state.scene.machine, f"editor:set.{CHAIN}"
-        typed, problem = self._refused or (str(machine.chain), "")
+        state, name = picture.state, "editor:set.chain"
+        chain, tables = state.scene.machine.chain, tables_of(state.scene)
+        typed, problem = self._refused if self._refused[1] else (str(chain), "")
         box = text_box(name, typed, aria_invalid=str(bool(problem)).lower())
-        whole = (
-            button("Another machine …", "page:open", MachinesWindow.name,
-                   hint="Machines of the library, each with its own errors"),
-            button("Default dimensions", "editor:do", "sizes",
-                   hint="Offsets, travels, directions and working volume that fit the chain"),
-            button("Back to the scene's", "editor:do", "own",
-                   hint="The machine as it was opened, with the errors of its axes"),
-        )  # fmt: skip
-        frames = (
-            _fixed(machine, "w"),
-            *(_axis(state, axis, "workpiece") for axis in reversed(machine.chain.workpiece)),
-            *(_axis(state, axis, "tool") for axis in machine.chain.tool),
-            *(_fixed(machine, frame) for frame in FIXED_FRAMES if frame != "w"),
-        )
+        whole = (button(*words, hint=hint) for *words, hint in WHOLE)
         return join((
             field("Chain", box, name, hint=CHAIN_HINT),
             tag("p", problem, class_="ws-problem", role="alert") if problem else EMPTY,
-            *frames, _bodies(machine),
+            *(_frame(state, tables, frame)
+              for frame in ("w", *reversed(chain.workpiece), *chain.tool, "S", "t")),
+            _bodies(tables["mesh"]),
             *(tag("p", note, class_="ws-tiny") for note in state.scene.notes),
             tag("div", join(whole), class_="ws-actions"),
         ))  # fmt: skip
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
-        """Change the machine; what cannot be is refused with a note."""
-        self._refused = None
+        self._refused = ("", "")
         if word == "do":
-            return with_word(state, value if " " in value else f"{value} ")
-        if not word.startswith("set."):
-            return state
+            return with_word(state, value)
         what = word.removeprefix("set.")
         changed = with_word(state, f"{what} {value}")
         notes = changed.notes[len(state.notes) :]
-        if what == CHAIN and notes and changed.scene is state.scene:
-            problem = "\n".join(notes).removesuffix(f"; {UNCHANGED}")
-            self._refused = (value[:200], problem)
+        if what == "chain" and notes and changed.scene is state.scene:
+            self._refused = (value[:200], "\n".join(notes).removesuffix(f"; {UNCHANGED}"))
             self.context.act(lambda: self.context.renew(self))
             return state
         return changed
 
 
-def _guides(state: AppState) -> dict[str, tuple[float, float] | None]:
-    """Give the errors of the guides of each gantry, µm."""
-    return {axis: guide_errors(state, axis) for axis in state.scene.machine.gantries}
+def _frame(state: AppState, tables: Tables, name: str) -> Markup:
+    machine = state.scene.machine
+    axis, gantry = machine.axes.get(name), machine.gantries.get(name)
+    lines = [
+        _numbers(f"{what} {name}", label, UNITS[what] or unit, tables[what][name], letters)
+        for what, (label, letters) in ROWS.items()
+        if name in tables[what] and (unit := axis.unit if axis else "mm")
+    ]
+    about = FIXED.get(name, "")
+    if axis is not None:
+        side, other = "workpiece", "tool"
+        if name in machine.chain.tool:
+            side, other = other, side
+        way = "moves along" if axis.is_linear else "turns about"
+        about = f"{way} {'xyz'[axis.index]}, carries the {side}"
+        sense = "with" if axis.direction == 1 else "against"
+        buttons = {
+            "left": ("Nearer to the workpiece", "", None),
+            "right": ("Nearer to the tool", "", None),
+            "side": (f"Carry the {other}", "", None),
+            "turn": ("Reverse direction", f"Moves {sense} its name now", None),
+            "gantry": ("Two guides", "A gantry: two guides, each with an error", bool(gantry)),
+            "remove": (f"Remove {name}", "", None),
+        }
+        if not axis.is_linear:
+            del buttons["gantry"]
+        found = (
+            button(words, "editor:do", f"{do} {name}", hint=hint, pressed=pressed)
+            for do, (words, hint, pressed) in buttons.items()
+        )
+        lines += [*_guides(state, gantry), tag("div", join(found), class_="ws-actions")]
+    summary = fill("<summary><b>{}</b> {}</summary>", name, about)
+    return tag("details", summary + join(lines), class_="ws-frame", data_key=f"frame-{name}")
 
 
 def _numbers(
-    label: str,
-    unit: str,
-    what: str,
-    values: tuple[float, ...],
-    letters: tuple[str, ...],
-    about: str,
+    what: str, label: str, unit: str, values: Sequence[float], letters: Sequence[str]
 ) -> Markup:
     """Give a line of number boxes, each with its letter; `what` is the word that they send."""
-    boxes = join(
-        fill('<label for="{id}">{letter}</label>{box}', id=ident(name), letter=letter,
-             box=text_box(name, spell_typed(value), label=f"{label} of {about}, {letter} in {unit}",
-                          inputmode="decimal"))
-        for index, (value, letter) in enumerate(zip(values, letters, strict=True))
-        if (name := f"editor:set.{what} {index}")
-    )  # fmt: skip
+    about = what.partition(" ")[2]
+    boxes: list[Markup] = []
+    for index, (value, letter) in enumerate(zip(values, letters, strict=True)):
+        name, words = f"editor:set.{what} {index}", f"{label} of {about}, {letter} in {unit}"
+        box = text_box(name, spell_typed(value), label=words, inputmode="decimal")
+        boxes.append(fill('<label for="{}">{}</label>{}', ident(name), letter, box))
     head = fill("<span>{} <small>{}</small></span>", label, unit)
-    return tag("div", head + boxes, class_="ws-numbers-line")
+    return tag("div", head + join(boxes), class_="ws-numbers-line")
 
 
-def _placing(name: str, offset: tuple[float, ...], turn: tuple[float, ...]) -> Markup:
-    letters = ("x", "y", "z")
-    return _numbers("Offset", "mm", f"offset {name}", offset, letters, name) + _numbers(
-        "Rotation", "°", f"rotation {name}", turn, letters, name
-    )
-
-
-def _frame(name: str, about: str, body: Markup) -> Markup:
-    summary = fill("<summary><b>{}</b> {}</summary>", name, about)
-    return tag("details", summary + body, class_="ws-frame", data_key=f"frame-{name}")
-
-
-def _fixed(machine: Machine, name: str) -> Markup:
-    offset, turn = machine.fixed_mm.get(name, ORIGIN), machine.fixed_deg.get(name, ORIGIN)
-    return _frame(name, FIXED[name], _placing(name, offset, turn))
-
-
-def _axis(state: AppState, name: str, carries: str) -> Markup:
-    scene = state.scene
-    axis, volume = scene.machine.axes[name], scene.workspace.ranges[name]
-    way = "moves along" if axis.is_linear else "turns about"
-    lines = join((
-        _placing(name, axis.offset_mm, axis.rotation_deg),
-        _numbers("Travel", axis.unit, f"travel {name}", axis.travel, ENDS, name),
-        _numbers("Volume", axis.unit, f"volume {name}", volume, ENDS, name),
-        _gantry(state, name),
-    ))  # fmt: skip
-    return _frame(name, f"{way} {'xyz'[axis.index]}, carries the {carries}",
-                  lines + _buttons(axis, carries, name in scene.machine.gantries))  # fmt: skip
-
-
-def _buttons(axis: Axis, carries: str, has_guides: bool) -> Markup:
-    name, other = axis.name, "tool" if carries == "workpiece" else "workpiece"
-    sense = "with" if axis.direction == 1 else "against"
-    found = [
-        button("Nearer to the workpiece", "editor:do", f"left {name}"),
-        button("Nearer to the tool", "editor:do", f"right {name}"),
-        button(f"Carry the {other}", "editor:do", f"side {name}"),
-        button(
-            "Reverse direction", "editor:do", f"turn {name}", hint=f"Moves {sense} its name now"
-        ),
-    ]
-    if axis.is_linear:
-        found.append(button("Two guides", "editor:do", f"gantry {name}", pressed=has_guides,
-                            hint="A gantry: two guides, each with an error"))  # fmt: skip
-    found.append(button(f"Remove {name}", "editor:do", f"remove {name}"))
-    return tag("div", join(found), class_="ws-actions")
-
-
-def _gantry(state: AppState, name: str) -> Markup:
-    gantry = state.scene.machine.gantries.get(name)
+def _guides(state: AppState, gantry: Gantry | None) -> list[Markup]:
     if gantry is None:
-        return EMPTY
-    errors = guide_errors(state, name)
+        return []
+    name, errors = gantry.axis, guide_errors(state, gantry)
     words = (
         f"{gantry.positioning_key} is the mean of the guides, {gantry.rotation_key} follows from"
         " their difference."
     )
+    lines: list[Markup] = []
     if errors is None:
         words += " Their curves differ: set both errors in the column at the left."
-    lines = [_numbers("Guides", "mm", f"span {name}", (gantry.span_mm,), ("apart",), name)]
-    if errors is not None:
-        rounded = tuple(round(value, 9) for value in errors)
-        lines.append(_numbers("Each off by", "µm", f"guide {name}", rounded, ("1", "2"), name))
-    lines.append(button(f"Apart along {gantry.across}", "editor:do", f"across {name}", kind="link",
-                        hint="Click for the other direction"))  # fmt: skip
-    return join((*lines, tag("p", words, class_="ws-tiny")))
+    else:
+        values = [round(value, 9) for value in errors]
+        lines.append(_numbers(f"guide {name}", "Each off by", MICROMETRE, values, "12"))
+    hint = "Click for the other direction"
+    across = button(f"Apart along {gantry.across}", "editor:do", f"across {name}", kind="link",
+                    hint=hint)  # fmt: skip
+    return [*lines, across, tag("p", words, class_="ws-tiny")]
 
 
-def _bodies(machine: Machine) -> Markup:
-    lines = [
-        tag("p", join((tag("b", frame), " ", _source(source), " ",
-                       button("Remove", "editor:do", f"mesh {frame}", kind="link",
-                              aria_label=f"Remove the body of {frame}"))))
-        for frame, source in own_bodies(machine).items()
-    ]  # fmt: skip
-    if not lines:
-        lines = [tag("p", "All bodies are generated.")]
+def _bodies(own: dict[str, BodySource]) -> Markup:
+    lines: list[Markup] = []
+    for frame, source in own.items():
+        remove = button("Remove", "editor:do", f"mesh {frame}", kind="link",
+                        aria_label=f"Remove the body of {frame}")  # fmt: skip
+        lines.append(tag("p", join((tag("b", frame), " ", _source(source), " ", remove))))
+    lines = lines or [tag("p", "All bodies are generated.")]
     summary = tag("summary", "Bodies given by the scene")
-    return tag("details", summary + join((*lines, tag("p", BODIES, class_="ws-tiny"))),
+    return tag("details", join((summary, *lines, tag("p", BODIES, class_="ws-tiny"))),
                class_="ws-frame", data_key="frame-bodies")  # fmt: skip
 
 
@@ -243,7 +201,6 @@ def _source(source: BodySource) -> str:
 # --- The machines to start from: a small picture, a title and a chain each ------------------------
 
 WIDTH_PX = 240  # of a small picture: it is shown smaller, sharp on fine screens too
-QUALITY = 80
 DRAWING = (0.02, 0.16, 0.55, 0.875)
 """Part of a picture in which the machine is: left, upper, right and lower end."""
 
@@ -253,29 +210,23 @@ class MachinesWindow(Window):
 
     name, title = "machines", "Start from a machine"
 
-    def depends(self, picture: LivePicture) -> tuple[object, ...]:
-        """Follow which machine is shown."""
-        return (picture.state.scene.machine.name,)
-
     def body(self, picture: LivePicture) -> Markup:
-        """List them."""
         present = picture.state.scene.machine.name
         return tag("div", join(
             tag("button", join((
                 fill('<img src="{}" alt="" width="150">', found)
-                if (found := small_picture(entry.name)) else tag("i", "no picture"),
-                tag("b", entry.title), tag("small", str(entry.scene.machine.chain)),
-            )), type="button", data_do="machines:choose", data_value=entry.name,
-                aria_current="true" if entry.name == present else None)
-            for entry in machine_types()
+                if (found := small_picture(name)) else tag("i", "no picture"),
+                tag("b", scene.machine.title), tag("small", str(scene.machine.chain)),
+            )), type="button", data_do="machines:choose", data_value=name,
+                aria_current="true" if name == present else None)
+            for name, scene in library().items()
         ), class_="ws-gallery", data_list=True)  # fmt: skip
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
-        """Start anew with a machine and its own errors."""
-        library = library_scene(value) if word == "choose" else None
-        if library is None:
+        scene = library().get(value)
+        if word != "choose" or scene is None:
             return state
-        found = with_library_scene(state, library)
+        found = with_library_scene(state, scene)
         self.context.act(lambda: self.context.scenes.add(found.origin) and None)
         return self.closed(replace(found, page=state.page))
 
@@ -287,9 +238,11 @@ def small_picture(name: str) -> str:
     if path is None:
         return ""
     with Image.open(path) as picture:
-        ends = np.array(DRAWING) * np.tile(picture.size, 2)
-        small = picture.convert("RGB").crop(tuple(ends.round().astype(int).tolist()))
+        left, top, right, bottom = (
+            round(part * size) for part, size in zip(DRAWING, picture.size * 2, strict=True)
+        )
+        small = picture.convert("RGB").crop((left, top, right, bottom))
     small.thumbnail((WIDTH_PX, WIDTH_PX))
     buffer = io.BytesIO()
-    small.save(buffer, "JPEG", quality=QUALITY)
+    small.save(buffer, "JPEG", quality=80)
     return f"data:image/jpeg;base64,{base64.b64encode(buffer.getvalue()).decode()}"

@@ -9,7 +9,7 @@ from viser import ClientHandle
 from warpspace.app.browser.room import PHONE_PX, PHONE_SHARE, TOP_PX, Room, column_widths
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.machine import machine_room_mm
+from warpspace.app.evaluation.machine import drawn_bodies
 from warpspace.app.state.app_state import AppState
 from warpspace.app.viewport.labels import axes_room_mm
 from warpspace.app.viewport.shapes import SCENE_PER_MM
@@ -140,9 +140,11 @@ class TabCamera:
 
     def _room_mm(self, picture: LivePicture) -> Array:
         """Give points around all that is to be seen, mm."""
-        shown = picture.state.machine.shown
-        room = machine_room_mm(picture) if shown else axes_room_mm(picture)
-        return np.concatenate([room, picture.drawn_mm.reshape(-1, 3)])
+        room = [axes_room_mm(picture)]
+        if picture.state.machine.shown:
+            bodies = drawn_bodies(picture, nominal=True)
+            room = [picture.grid.bounds_mm, *(part.vertices_mm for part in bodies)]
+        return np.concatenate([*room, picture.drawn_mm.reshape(-1, 3)])
 
     @property
     def room(self) -> Room:

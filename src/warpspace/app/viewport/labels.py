@@ -180,6 +180,6 @@ def _names(picture: LivePicture) -> Iterator[Label]:
         words = f"{name}: max {_spell(float(lengths[worst]))}"
         yield Label(words, moved[name].actual_mm[worst])
     if state.machine.shown:
-        point = tool_point(picture)
-        length = float(np.linalg.norm(point.error_um))
-        yield Label(f"tool point: {_spell(length)}", point.drawn_mm, "asked")
+        drawn_mm, error_um = tool_point(picture)
+        length = float(np.linalg.norm(error_um))
+        yield Label(f"tool point: {_spell(length)}", drawn_mm, "asked")

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.machine import drawn_bodies, nominal_bodies, tool_point
+from warpspace.app.evaluation.machine import drawn_bodies, tool_point
 from warpspace.app.viewport.colours import Rgb, palette
 from warpspace.app.viewport.shapes import Shape, Shapes, ball, lines, mesh
 from warpspace.bodies.placed import PlacedBody
@@ -29,7 +29,7 @@ def machine(picture: LivePicture, turned: Mapping[str, float]) -> Shapes:
         for part in drawn_bodies(picture, turned):
             shapes |= _body("/machine", part, part.body.colour, edge)
     if shown:
-        at, size = tool_point(picture).drawn_mm, BALL * picture.size_mm
+        at, size = tool_point(picture)[0], BALL * picture.size_mm
         shapes["/machine/tool_point"] = ball(at, size, palette(picture).edge)
     return shapes
 
@@ -39,7 +39,7 @@ def ghost_machine(picture: LivePicture) -> Shapes:
     dark = picture.state.shown.dark
     colour, edge = (DARK_GHOST, DARK_GHOST_EDGE) if dark else (GHOST, GHOST_EDGE)
     shapes: dict[str, Shape | None] = {}
-    for part in nominal_bodies(picture):
+    for part in drawn_bodies(picture, nominal=True):
         shapes |= _body("/ghost_machine", part, colour, edge, opacity=OPACITY)
     return shapes
 

@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 from viser import ClientHandle
 
@@ -13,8 +13,6 @@ from warpspace.app.viewport.around import around, turned_points
 from warpspace.app.viewport.machine import ghost_machine, machine
 from warpspace.app.viewport.shapes import Nodes
 
-Tell = Callable[[Mapping[str, float]], None]
-"""Takes the position of the played axis, degrees; none where the play is over."""
 RATE_HZ = 8.0  # pictures a second: modest, since each is sent to the page
 SPEED_DEG_S = 30.0
 FULL_TURN_DEG = 360.0
@@ -76,8 +74,8 @@ class MovingLayer:
         self._picture = picture
         self._around, self._ghost, self._turning = (Nodes(client.scene) for _ in range(3))
         self._ghost_of: object = None
-        self._listeners: list[Tell] = []
-        self._position: dict[str, float] = {}
+        self.position: dict[str, float] = {}  # of the played axis, degrees; none where it stands
+        self.moved: Callable[[], None] = lambda: None
         self._due = False
         self._player = Player(self._ask)
         self.show(picture)
@@ -107,12 +105,8 @@ class MovingLayer:
             self._ghost.draw(ghost_machine(picture) if on else {})
 
     def _draw_turning(self) -> None:
-        picture, position = self._picture, self._position
+        picture, position = self._picture, self.position
         self._turning.draw({**turned_points(picture, position), **machine(picture, position)})
-
-    def listen(self, tell: Tell) -> None:
-        """Have somebody told where the played axis is."""
-        self._listeners.append(tell)
 
     def play(self, on: bool | None) -> None:
         """Play (True), pause (False), or go back to where the axis stands (None)."""
@@ -120,20 +114,18 @@ class MovingLayer:
             self._player.play()
         elif on is False:
             self._player.pause()
-            for tell in self._listeners:
-                tell(self._position)
+            self.moved()
         elif self._player.rewind():
             self._stand({}, drawn=True)
 
     def _stand(self, position: dict[str, float], *, drawn: bool = False) -> None:
         """Have the played axis at a position; none where it stands."""
-        self._position = position
+        self.position = position
         if drawn:
             with self._client.atomic():
                 self._draw_turning()
             self._client.flush()
-        for tell in self._listeners:
-            tell(position)
+        self.moved()
 
     @property
     def playing(self) -> bool:

@@ -1,0 +1,408 @@
+"""The conventions a map is drawn with: changing them, and what each choice does to the map.
+
+Changed conventions live in the state's scene, so that everything drawn from it (map, traces, why,
+exports) has them; `AppState.origin` keeps the scene's own ones.
+"""
+
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import replace
+from itertools import groupby
+
+import numpy as np
+from markupsafe import Markup
+
+from warpspace.app.browser.html import (
+    EMPTY,
+    attributes,
+    button,
+    field,
+    fill,
+    join,
+    number,
+    tag,
+    text_box,
+)
+from warpspace.app.evaluation.cache import Identity
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.evaluation.resulting_scene import active_scene
+from warpspace.app.state.app_state import AppState
+from warpspace.app.state.picked import Picked
+from warpspace.app.state.ranges import Span
+from warpspace.app.state.typed_numbers import read_typed
+from warpspace.app.tasks.parts import Section
+from warpspace.exceptions import OptionError
+from warpspace.field.evaluate import View, evaluate_first_order
+from warpspace.field.grid import build_grid
+from warpspace.kinematics import transforms
+from warpspace.kinematics.chain import branch_frames, nominal_point
+from warpspace.kinematics.conversion import (
+    ReferenceLine,
+    SquarenessSign,
+    angle_sign,
+    fit_line,
+    move_measuring_line,
+    squareness_keys,
+)
+from warpspace.kinematics.model import Loop, Model, convention_names, find_convention
+from warpspace.machine.axes import TravelDirection, is_linear, parameter
+from warpspace.machine.description import Vector
+from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet, Poly, Table
+from warpspace.scene.model import Scene, evaluate_grid
+from warpspace.scene.save import covered_spans
+from warpspace.units import Array
+
+Effect = tuple[float, float]
+"""Mean over the volume and largest length of the change of the error vector, µm."""
+
+
+def with_travel(state: AppState, direction: str) -> AppState:
+    """Look at errors for another direction of travel; an unknown one changes nothing."""
+    if direction not in [*TravelDirection]:
+        return state
+    return _with_scene(state, replace(state.scene.model, direction=TravelDirection(direction)))
+
+
+def reference_spans(scene: Scene) -> dict[str, Span]:
+    """Give the ranges of a reference point, mm: the working volume's, by linear axis."""
+    spanning = scene.workspace.volume_axes
+    return {
+        name: Span(*scene.workspace.ranges[name], 1.0)
+        for name in scene.machine.axes
+        if is_linear(name) or name in spanning
+    }
+
+
+def with_reference(state: AppState, at: Mapping[str, float] | None) -> AppState:
+    """Hold a point still, mm in axis coordinates; None shows absolute errors.
+
+    Coordinates outside the working volume are clamped and noted; what is no number stays.
+    """
+    scene = state.scene
+    if at is None:
+        return _with_scene(state, scene.model, None)
+    kept = {**scene.workspace.positions, **(scene.reference or {})}
+    notes = state.notes
+    spans = reference_spans(scene)
+    for name in filter(spans.__contains__, at):
+        kept[name] = spans[name].clamp(at[name], kept[name])
+        if kept[name] != at[name]:
+            unit = scene.machine.axes[name].unit
+            what = f"reference {name}"
+            notes = (*notes, spans[name].clamped_words(at[name], kept[name], what, unit))
+    held = {name: kept[name] for name in spans}
+    return replace(_with_scene(state, scene.model, held), notes=notes)
+
+
+def _with_scene(state: AppState, model: Model, *reference: Mapping[str, float] | None) -> AppState:
+    scene, own = replace(state.scene, model=model), state.origin
+    if reference:
+        scene = replace(scene, reference=reference[0])
+    if scene == state.scene:
+        return state
+    same = scene == own
+    return replace(state, scene=own if same else scene, loaded=None if same else own)
+
+
+def choices(scene: Scene) -> list[str]:
+    """List what can be chosen, in the order shown."""
+    axes = sorted(scene.machine.axes.values(), key=lambda axis: (axis.is_linear, axis.name))
+    return [
+        *(f"component_errors={order}" for order in convention_names()),
+        "reference=absolute",
+        "reference=point",
+        *(f"direction {axis.name}={sign}" for axis in axes for sign in (1, -1)),
+    ]
+
+
+def chosen(scene: Scene) -> set[str]:
+    """Tell which choices are in force."""
+    return {
+        f"component_errors={scene.model.component_errors}",
+        "reference=absolute" if scene.reference is None else "reference=point",
+        *(f"direction {axis.name}={axis.direction}" for axis in scene.machine.axes.values()),
+    }
+
+
+def with_choice(state: AppState, choice: str) -> AppState:
+    """Apply a choice as a page spells it; what is none changes nothing."""
+    model, (what, _, given) = state.scene.model, choice.partition("=")
+    if choice not in choices(state.scene):
+        return state
+    if what == "reference":
+        held = state.scene.reference or state.origin.reference or {}
+        return with_reference(state, held if given == "point" else None)
+    if what == "component_errors":
+        changed = replace(model, component_errors=given, own_component_errors=())
+        return _with_scene(state, changed)
+    axis = model.machine.axes[what.removeprefix("direction ")]
+    turned = replace(axis, direction=int(given), direction_given=True)
+    machine = replace(model.machine, axes={**model.machine.axes, axis.name: turned})
+    return _with_scene(state, replace(model, machine=machine))
+
+
+def with_own_conventions(state: AppState) -> AppState:
+    """Go back to the conventions of the scene."""
+    own, machine = state.origin, state.scene.machine
+    said = {**machine.axes, **own.machine.axes}
+    axes = {
+        name: replace(axis, direction=said[name].direction,
+                      direction_given=said[name].direction_given)
+        for name, axis in machine.axes.items()
+    }  # fmt: skip
+    # an edited machine may not have all axes of the scene's
+    held = {name: at for name, at in (own.reference or {}).items() if name in axes}
+    model = replace(
+        state.scene.model,
+        component_errors=own.model.component_errors,
+        own_component_errors=own.model.own_component_errors,
+        direction=own.model.direction,
+        machine=replace(machine, axes=axes),
+    )
+    return _with_scene(state, model, held or None)
+
+
+def effects_of(state: AppState) -> dict[str, Effect]:
+    """Work out what each choice, taken alone, does to the map; "all" is what is in force."""
+    own = with_own_conventions(state)
+    looks = {choice: with_choice(own, choice) for choice in choices(own.scene)} | {"all": state}
+    if state.scene.reference is not None:
+        looks["reference=point"] = with_reference(own, state.scene.reference)
+    (weights, before), known = _error(own), chosen(own.scene)
+    return {
+        choice: (0.0, 0.0) if choice in known else _effect(weights, _error(look)[1] - before)
+        for choice, look in looks.items()
+    }
+
+
+def _error(state: AppState) -> tuple[Array, Array]:
+    workspace = state.scene.workspace.moved(state.positions)
+    grid = build_grid(state.scene.model, workspace, state.nodes)
+    return grid.weights, evaluate_grid(active_scene(state), grid, state.view()).error_um
+
+
+def _effect(weights: Array, change_um: Array) -> Effect:
+    length = np.linalg.norm(change_um, axis=-1)
+    return float(np.sum(weights * length)), float(length.max())
+
+
+# --- What it would cost if errors had been measured in another convention than is read ------------
+
+EVENLY = 101  # positions that a line is laid through where a curve has no points of its own
+
+
+def convention_costs(scene: Scene, view: View, nodes: int = 21) -> dict[str, Effect]:
+    """Find what each wrong convention would cost over the working volume, to first order.
+
+    The numbers stay as they are and are read in the convention of the scene and in another one.
+    What cannot be converted has no cost.
+    """
+    grid = build_grid(scene.model, scene.workspace, nodes)
+
+    def field(model: Model, errors: ErrorSet) -> Array:
+        at = grid.coordinates, view, grid.point_mm
+        return evaluate_first_order(model, errors, *at).error_um
+
+    mean = replace(scene.model, direction=TravelDirection.MEAN)
+    changes = {name: field(mean, ErrorSet(one)) for name, one in _readings(scene).items()}
+    with suppress(OptionError):
+        moved = field(scene.model, _measured_in_the_middle(scene))
+        changes["measuring_line"] = moved - field(scene.model, scene.errors)
+    return {name: _effect(grid.weights, change) for name, change in changes.items()}
+
+
+def _readings(scene: Scene) -> dict[str, dict[str, ErrorFunction]]:
+    """Give the change of the numbers that each reading is."""
+    errors, machine = scene.errors, scene.machine
+    middle = {axis: np.asarray(at) for axis, at in scene.workspace.positions.items()}
+    spans = {key: scene.axis_span(parameter(key).axis) for key in errors}
+    there = {key: float(errors.evaluate_at(key, middle, scene.model.direction)) for key in errors}
+    angles = [key for key in squareness_keys(machine) if key in errors]
+    moving = [parameter(key) for key in errors if not parameter(key).is_constant]
+    straight = [
+        row.key
+        for row in moving
+        if not row.is_rotation
+        and machine.axes[row.axis].is_linear
+        and row.direction != machine.axes[row.axis].index
+    ]
+    found: dict[str, dict[str, ErrorFunction]] = {
+        f"squareness={sign}": {
+            key: Constant(spans[key], -2.0 * there[key]) for key in angles if angle_sign(key) == way
+        }
+        for sign, way in ((SquarenessSign.OVER_90, -1), (SquarenessSign.UNDER_90, 1))
+    }
+    for line in ReferenceLine:
+        found[f"straightness={line}"] = {
+            key: _taken_out(errors, key, spans[key], line) for key in straight
+        }
+    found["zero_at"] = {row.key: Constant(spans[row.key], -there[row.key]) for row in moving}
+    return found
+
+
+def _taken_out(errors: ErrorSet, key: str, span: tuple[float, float], line: str) -> Poly:
+    """Give what takes the reference line out of a curve."""
+    function = errors.functions[key]
+    points = np.array(function.kinks if isinstance(function, Table) else ())
+    points = points[(points >= span[0]) & (points <= span[1])]
+    at = points if len(points) > 1 else np.linspace(*span, EVENLY)
+    offset, slope = fit_line(at, errors.evaluate(key, at), line)
+    return Poly(span, (-offset, -slope))
+
+
+def _measured_in_the_middle(scene: Scene) -> ErrorSet:
+    """Read translations as measured along lines through the middle of the volume."""
+    model = scene.model
+    middle = {axis: np.asarray(at) for axis, at in scene.workspace.positions.items()}
+    point = nominal_point(model, Loop.TOOL, middle)
+    lines: dict[str, Vector] = {}
+    for frames in (
+        *branch_frames(model, "tool", middle),
+        *branch_frames(model, "workpiece", middle),
+    ):
+        if frames.axis.is_linear:
+            x, y, z = transforms.apply(transforms.inverse(frames.after), point).tolist()
+            lines[frames.axis.name] = (x, y, z)
+    spans = covered_spans(model, scene.workspace)
+    return move_measuring_line(model, scene.errors, spans, lines, to_origin=True)
+
+
+# --- The section ----------------------------------------------------------------------------------
+
+GROUPS = {
+    "component_errors": ("Component errors", "Where the errors of a motion act"),
+    "reference": ("Reference", "What is held still"),
+    "rotary": ("Rotary axes", "+1 turns with the name of the axis, −1 against it"),
+    "linear": ("Linear axes", "+1 moves with the name of the axis, −1 against it"),
+}
+WORDS = {"reference=absolute": "absolute", "reference=point": "a point is held still"}
+COSTS = {
+    ("Sign of squareness", "the scene's: by the right-hand rule"): {
+        "squareness=over_90": "positive where the angle is over 90°",
+        "squareness=under_90": "positive where it is under 90°",
+    },
+    ("Measuring line", "the scene's: at the origin of each axis"): {
+        "measuring_line": "through the middle of the volume",
+    },
+    ("Reference line of straightness", "the scene's: with its tilt"): {
+        "straightness=end_point": "end points taken out",
+        "straightness=least_squares": "least squares taken out",
+        "straightness=minimum_zone": "minimum zone taken out",
+    },
+    ("Zero of the curves", "the scene's: as given"): {
+        "zero_at": "zero in the middle of each axis",
+    },
+}
+NOTE = (
+    "Change of the error vector over the nodes of the grid: each choice alone, against the"
+    " conventions of the scene."
+)
+COST_NOTE = "What a wrong assumption about the measured data would cost, to first order."
+
+
+def _group(choice: str) -> str:
+    what, _, axis = choice.partition("=")[0].partition(" ")
+    return what if not axis else "linear" if is_linear(axis) else "rotary"
+
+
+def _spell(choice: str) -> str:
+    what, _, given = choice.partition("=")
+    if what == "component_errors":
+        return find_convention(given).title
+    axis = what.removeprefix("direction ")
+    return WORDS.get(choice, f"{axis} {'+1' if given == '1' else '−1'}")
+
+
+class ConventionsSection(Section):
+    name, task, title = "conventions", "machine", "Conventions"
+    sentence = "Choose what the errors mean, and see what another convention would change"
+
+    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
+        state = picture.state
+        return (
+            Identity(state.origin), Identity(state.scene), tuple(state.active.items()),
+            tuple(state.positions.items()), state.seen, state.nodes,
+            self.context.next_click is None,
+        )  # fmt: skip
+
+    def body(self, picture: LivePicture) -> Markup:
+        state = picture.state
+        effects, in_force = effects_of(state), chosen(state.scene)
+        own = chosen(with_own_conventions(state).scene)
+        head = "<tr><th>µm</th><th class=number>mean</th><th class=number>max</th></tr>"
+        lines: list[Markup] = [fill(head)]
+        for group, members in groupby(choices(state.scene), _group):
+            lines.append(_head(*GROUPS[group]))
+            for choice in members:
+                radio = attributes(type="radio", name=choice.split("=")[0], value=choice,
+                                   checked=choice in in_force,
+                                   data_set="conventions:choose")  # fmt: skip
+                words = _spell(choice) + (" (scene)" if choice in own else "")
+                label = fill("<label><input{}> {}</label>", radio, words)
+                lines.append(_line(label, None if choice in own else effects[choice]))
+        lines.append(_line("all choices together", effects["all"]))
+        back = button("Back to the scene's", "conventions:own", disabled=in_force == own)
+        return join((
+            tag("table", join(lines), class_="ws-choices-table"), tag("p", NOTE, class_="ws-tiny"),
+            self._reference(state), tag("div", back, class_="ws-actions"), _wrong(state),
+        ))  # fmt: skip
+
+    def _reference(self, state: AppState) -> Markup:
+        if state.scene.reference is None:
+            return EMPTY
+        boxes: list[Markup] = []
+        held = {**state.scene.workspace.positions, **state.scene.reference}
+        for axis in reference_spans(state.scene):
+            name, unit = f"conventions:set.{axis}", state.scene.machine.axes[axis].unit
+            box = text_box(name, f"{held[axis]:g}", size="short")
+            boxes.append(field(f"Held at {axis}", box, name, unit))
+        waits = self.context.next_click is not None
+        words = "Click a point of the box …" if waits else "Pick it in the drawing"
+        pick = button(words, "conventions:pick", pressed=waits)
+        return join((*boxes, tag("div", pick, class_="ws-actions")))
+
+    def take(self, state: AppState, word: str, value: str) -> AppState:
+        if word == "choose":
+            return with_choice(state, value)
+        if word == "own":
+            return with_own_conventions(state)
+        if word == "pick":
+            waits = self.context.next_click is not None
+            self.context.act(lambda: self._wait(None if waits else self._choose))
+        axis = word.removeprefix("set.")
+        if axis in reference_spans(state.scene) and state.scene.reference is not None:
+            typed = read_typed(value, state.scene.machine.axes[axis].unit)
+            return state if typed is None else with_reference(state, {axis: typed})
+        return state
+
+    def _wait(self, choose: Callable[[Picked], None] | None) -> None:
+        self.context.next_click = choose
+        self.context.renew(self)
+
+    def _choose(self, picked: Picked) -> None:
+        self._wait(None)
+        self.context.post(lambda state: with_reference(state, picked.at))
+
+
+def _wrong(state: AppState) -> Markup:
+    scene = active_scene(state)
+    costs = convention_costs(scene, scene.view(state.loop), state.nodes)
+    lines: list[Markup] = []
+    for group, members in COSTS.items():
+        lines.append(_head(*group))
+        lines += [_line(words, costs.get(name)) for name, words in members.items()]
+    summary = tag("summary", "If the data were measured in another convention")
+    note = tag("p", COST_NOTE, class_="ws-tiny")
+    return tag("details", summary + note + tag("table", join(lines)), class_="ws-options")
+
+
+def _head(title: str, hint: str) -> Markup:
+    return fill(
+        '<tr><th colspan="3" title="{hint}"><b>{title}</b></th></tr>', title=title, hint=hint
+    )
+
+
+def _line(words: object, effect: Effect | None) -> Markup:
+    cells = ("–", "–") if effect is None else map(number, effect)
+    line = '<tr><td>{}</td><td class="number">{}</td><td class="number">{}</td></tr>'
+    return fill(line, words, *cells)
