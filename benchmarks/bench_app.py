@@ -36,8 +36,8 @@ from timing import cheapest, python
 from viser.infra import WebsockClientConnection
 from websockets.asyncio.server import ServerConnection
 
-from warpspace.app.browser.page import style_sheets
-from warpspace.app.browser.viser_private import dom_id, send_script_to_all
+from warpspace.app.browser.page import page_script
+from warpspace.app.browser.viser_private import send_script_to_all
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
@@ -170,10 +170,16 @@ def is_picture(message: Any) -> bool:
     return hasattr(message, "owner") or type(message).__name__.startswith("SetCamera")
 
 
-def is_text(message: Any) -> bool:
-    """Whether a message writes pieces of the page, or moves what is drawn, by a script of ours."""
-    source = getattr(message, "source", "")
-    return source.startswith(("//", "warpspacePage.show(", "warpspaceRoom.", "warpspaceMesh."))
+def replayed(messages: list[Any]) -> Iterator[Any]:
+    """Give what belongs to the drawing, writes pieces of the page, or moves what is drawn."""
+    ours = ("warpspacePage.show(", "warpspaceRoom.", "warpspaceMesh.")
+    for message in messages:
+        lines = getattr(message, "source", "").split("\n")
+        script = "\n".join(line for line in lines if line.startswith(ours))
+        if is_picture(message):
+            yield message
+        elif script:
+            yield type(message)(source=script)
 
 
 class BarePage:
@@ -184,13 +190,13 @@ class BarePage:
             self.server = viser.ViserServer(host="127.0.0.1", port=8580, verbose=False)
         self.url = f"http://127.0.0.1:{self.server.get_port()}"
         light_scene(self.server.scene)
-        send_script_to_all(self.server, style_sheets("page.css"))
+        send_script_to_all(self.server, page_script())
         self.server.on_client_connect(lambda client: self.build(client, start, moves))
 
     def build(self, client: viser.ClientHandle, start: list[Any], moves: list[list[Any]]) -> None:
         """Replay the page and the first picture."""
         text = client.gui.add_text("EAX", "0")
-        self.carrier = dom_id(text)
+        self.carrier = text._impl.uuid  # noqa: SLF001
 
         def replay(messages: list[Any]) -> None:
             with client.atomic():
@@ -201,7 +207,7 @@ class BarePage:
                     client._websock_connection.queue_message(again)  # noqa: SLF001
             client.flush()
 
-        replay([message for message in start if is_picture(message) or is_text(message)])
+        replay(list(replayed(start)))
 
         @text.on_update
         async def _(_: object) -> None:
@@ -298,7 +304,7 @@ def browser_part(
             with recorder.into() as sent:
                 timed_move(ours, None, value)
                 ours.wait_for_timeout(30)
-                recorded.append([m for m in sent if is_picture(m) or is_text(m)])
+                recorded.append(list(replayed(sent)))
         recorder.recording = False
         bare = BarePage(start, recorded)
         plain = open_page(browser, bare.url, BARE_READY)

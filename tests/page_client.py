@@ -21,8 +21,6 @@ import viser
 import websockets
 import zstandard
 
-from warpspace.app.browser.arrivals import CARRIER
-
 PROTOCOL = f"viser-v{viser.__version__}"
 HOW: dict[str, Any] = {"subprotocols": [PROTOCOL], "max_size": None, "compression": None}
 """How a page connects: arguments of `connect` of the package `websockets`."""
@@ -39,7 +37,7 @@ CAMERA = {
     "up_direction": (0.0, 0.0, 1.0),
 }
 """What a page says first, once it is connected: where its camera stands."""
-CALL = re.compile(r"(warpspace\w+\.[\w.]+)\((.*)\);", re.DOTALL)
+CALL = re.compile(r"warpspace(\w+\.[\w.]+)\((.*)\);")
 SLIDER = re.compile(r'data-set="(errors:set\.\w+)"')
 pack = msgspec.msgpack.encode
 
@@ -52,43 +50,36 @@ def unpack(raw: str | bytes) -> list[dict[str, Any]]:
     return msgspec.msgpack.decode(text)["messages"]
 
 
-def update(uuid: object, updates: object) -> dict[str, Any]:
-    """Write the message by which a page changes a widget."""
-    return {"type": "GuiUpdateMessage", "uuid": uuid, "updates": updates}
+def said(*events: tuple[str, object]) -> dict[str, Any]:
+    """Write the message of events: ``part:word`` and a value."""
+    return {"type": "WarpspaceEvents", "events": events}
 
 
 class Page:
     """What a page knows: each function of its scripts that is called leaves its values here."""
 
     def __init__(self) -> None:
-        self.facts: dict[str, Any] = {}  # carrier of events, keys
+        self.facts: dict[str, Any] = {}  # keys
         self.pieces: dict[str, str] = {}  # HTML by the name of its place
         self.toasts: list[list[str]] = []
         self.stage = ""
-        self.question: tuple[str, str] | None = None  # whether all is drawn: widget, number
+        self.asked = 0  # how often it was asked whether all is drawn
         self.points = ""  # of the surface that is shown, as they are packed
-        self.events = 0
-
-    def event(self, *events: tuple[str, object]) -> dict[str, Any]:
-        """Write the message of events: ``part:word`` and a value."""
-        numbered = [[self.events + at, *event] for at, event in enumerate(events, start=1)]
-        self.events += len(events)
-        return update(self.facts["carrier"], {"value": json.dumps(numbered)})
 
     @property
     def sliders(self) -> list[str]:
         """Events of the sliders of errors that are listed."""
         return [*dict.fromkeys(SLIDER.findall("".join(self.pieces.values())))]
 
-    def take(self, message: dict[str, Any]) -> str:
-        """Take note of a message; give the name of the function that it calls, if it calls one."""
+    def take(self, message: dict[str, Any]) -> list[str]:
+        """Take note of a message; give the names of the functions that it calls."""
         source = message["source"] if message["type"] == "RunJavascriptMessage" else ""
-        call = CALL.fullmatch(source)
-        if call is None:
-            return ""
-        name, values = call[1].removeprefix("warpspace"), json.loads(f"[{call[2]}]")
+        calls = [call for line in source.split("\n") if (call := CALL.fullmatch(line))]
+        return [self._take(call[1], json.loads(f"[{call[2]}]")) for call in calls]
+
+    def _take(self, name: str, values: list[Any]) -> str:
         match name:
-            case "Page.open":
+            case "Page.tell":
                 self.facts |= values[0]
             case "Page.show":
                 self.pieces |= values[0]
@@ -97,7 +88,7 @@ class Page:
             case "Page.stage":
                 (self.stage,) = values
             case "Page.drawn":
-                self.question = values[0], str(values[1])
+                self.asked += 1
             case "Mesh.bend":
                 self.points = values[0]
             case _:
@@ -210,9 +201,9 @@ class Tab(Page):
         self.socket = await dial(self._app, **patience)
         self._reader = asyncio.create_task(self._read())
         try:
-            await self.send(update(CARRIER, {"value": self.token}))
+            await self.send(said(("tab:here", f"{self.token},1600")))
             await self.send(CAMERA)
-            await until(lambda: self.stage == "open" and "carrier" in self.facts, patience_s)
+            await until(lambda: self.stage == "open", patience_s)
         except BaseException:
             await self.close()
             raise
@@ -229,7 +220,7 @@ class Tab(Page):
 
     async def drag(self, key: str, value: float) -> None:
         """Move the slider of an error."""
-        await self.send(self.event((f"errors:set.{key}", f"{value:g}")))
+        await self.send(said((f"errors:set.{key}", f"{value:g}")))
 
     async def answer_s(self, value: float, key: str = "EAX") -> float:
         """Move a slider; give how long it takes until the row of its error is another."""
@@ -247,8 +238,8 @@ class Tab(Page):
                     await self._hear(message)
 
     async def _hear(self, message: dict[str, Any]) -> None:
-        name = self.take(message)
-        if name == "Mesh.bend":
-            self.seen.append((time.perf_counter(), self.points))
-        elif name == "Page.drawn" and self.question is not None:
-            await self.send(update(self.question[0], {"value": self.question[1]}))
+        for name in self.take(message):
+            if name == "Mesh.bend":
+                self.seen.append((time.perf_counter(), self.points))
+            elif name == "Page.drawn":
+                await self.send(said(("tab:drawn", "")))

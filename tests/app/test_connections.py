@@ -2,13 +2,15 @@
 
 import errno
 import socket
+import threading
+from collections import deque
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from viser import _messages as messages
 
-from warpspace.app.browser.arrivals import CARRIER, MOST_KNOWN, Arrivals
+from app.wire import Wire, dial, end_work
+from warpspace.app.browser.incoming import LONGEST_VALUE, Events
 from warpspace.app.server import network, viewer
 from warpspace.app.server.network import free_port, is_local, page_url, resolve_host
 from warpspace.app.server.tab_memory import (
@@ -21,6 +23,7 @@ from warpspace.app.server.tab_memory import (
 )
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.store import StateStore
+from warpspace.app.tasks.context import MOST_FILES, Context
 from warpspace.exceptions import OptionError
 from warpspace.scene.library import load_scene
 
@@ -93,73 +96,20 @@ def test_a_connection_that_is_gone_takes_nothing_from_the_tab_that_comes_back():
         assert running._memory.take(token) is left
 
 
-class Connections:
-    """Stands for viser's connections."""
-
-    def __init__(self):
-        self.handler: Any = None
-        self.sent: list[Any] = []
-
-    def register_handler(self, _, handler):
-        self.handler = handler
-
-    def queue_message(self, message):
-        self.sent.append(message)
-
-    def say(self, client, uuid, value):
-        self.handler(client, messages.GuiUpdateMessage(uuid, {"value": value}))
-
-
-@pytest.fixture
-def connections():
-    return Connections()
-
-
-@pytest.fixture
-def arrivals(connections):
-    return Arrivals(SimpleNamespace(_websock_server=connections))
-
-
-def test_a_token_is_known_before_and_after_a_page_is_expected(arrivals, connections):
-    assert CARRIER in connections.sent[0].source
-    connections.say(3, CARRIER, "early")
-    woken: list[int] = []
-    early, late = arrivals.expect(3), arrivals.expect(4)
-    assert early.wait(0.0, lambda: woken.append(3))
-    assert early.token == "early"
-    assert not late.wait(0.0, lambda: woken.append(4))
-    connections.say(4, CARRIER, "late")
-    connections.say(4, CARRIER, "later")  # only the first counts
-    assert late.is_there
-    assert late.token == "late"
-    assert woken == [4]
-
-
-@pytest.mark.parametrize("value", [None, 1, ["a"], {"a": 1}])
-def test_what_is_no_text_is_not_taken(arrivals, connections, value):
-    connections.say(1, CARRIER, value)
-    connections.say(1, "some-widget", "text")
-    connections.handler(1, messages.GuiUpdateMessage(CARRIER, [1]))
-    assert not arrivals.expect(1).is_there
-
-
 @pytest.mark.parametrize(
     ("width", "believed"),
-    [(1280, 1280.0), (911.5, 911.5), (None, None), ("wide", None), (-1, None), (1e9, None)],
+    [("1280", 1280.0), ("wide", None), ("-1", None), ("9" * 12, None), ("", None)],
 )
-def test_a_page_says_how_wide_it_is(arrivals, connections, width, believed):
-    said = {"value": "token", "width": width}
-    connections.handler(1, messages.GuiUpdateMessage(CARRIER, said))
-    assert arrivals.expect(1).width == believed
-
-
-def test_pages_that_never_show_anything_are_forgotten(arrivals, connections):
-    first = arrivals.expect(0)
-    for client in range(1, MOST_KNOWN + 1):
-        connections.say(client, CARRIER, "x")
-    assert arrivals.expect(0) is not first
-    arrivals.forget(5)
-    assert not arrivals.expect(5).is_there
+def test_a_page_says_which_tab_it_is_and_how_wide(width, believed):
+    token = new_token()
+    with viewer.Viewer(load_scene("dvf5000_nominal")) as running, dial(running) as socket:
+        wire = Wire(socket, f"{token},{width}")
+        wire.say("tab:here", f"{new_token()},1600")  # only the first counts
+        assert wire.read_until(lambda: wire.is_open, seconds=60.0)
+        (session,) = running.sessions
+        assert session.token == token
+        assert session.context.camera.page_width == believed
+        end_work(running)
 
 
 STATE = start_state(load_scene("dvf5000_first"))
@@ -188,3 +138,16 @@ def test_what_is_no_token_is_refused(text):
     memory = TabMemory()
     memory.keep(text, TabRecord(StateStore(STATE), None))
     assert len(memory) == 0
+
+
+def test_only_so_many_files_wait_at_once():
+    context: Any = object.__new__(Context)
+    said: list[tuple[str, ...]] = []
+    context.events, context._wake = deque(), threading.Event()
+    context.notify = lambda *words: said.append(words)
+    file = Events([("files:file", "x" * (LONGEST_VALUE + 1))])
+    for _ in range(MOST_FILES + 3):
+        context.take(file)
+        context.take(Events([("errors:set.EXX", "1")]))
+    assert len(context.events) == 2 * MOST_FILES + 3
+    assert "at once" in said[0][1]

@@ -8,14 +8,13 @@ from contextlib import closing, contextmanager, nullcontext, suppress
 from pathlib import Path
 from types import SimpleNamespace
 
-import msgspec.msgpack
 import pytest
 from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosedError
 from websockets.protocol import State
 
 from app.wire import dial
-from page_client import PROTOCOL
+from page_client import PROTOCOL, pack, said
 from reliability.doors import GUESSES, HOSTS, ORIGINS, PATHS, TOKEN
 from warpspace.app.server import guard, network, run, viewer
 from warpspace.app.server.doors import Access, Asked, Doors, Place, read_place
@@ -304,9 +303,7 @@ def test_sessions_are_limited(monkeypatch, caplog):
 
 
 def test_the_rate_of_messages_is_limited(monkeypatch, caplog):
-    message = msgspec.msgpack.encode(
-        {"type": "GuiUpdateMessage", "uuid": "none", "updates": {"value": 1}}
-    )
+    message = pack(said(("nobody:none", "")))
     limits = Limits(messages_per_second=0.001, burst=20)
     with limited(monkeypatch, limits) as running, dial(running) as honest, dial(running) as flood:
         for _ in range(20):

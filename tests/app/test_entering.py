@@ -1,12 +1,9 @@
 """Numbers, curves and clicks as people enter them."""
 
-import json
-
 import numpy as np
 import pytest
 
 from warpspace import load_scene
-from warpspace.app.browser.events import MOST_EVENTS, Event, read_events
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.ranges import Exclusions
@@ -202,19 +199,3 @@ def test_each_switch_is_a_step_however_fast_they_follow_each_other():
     history = history.undo()
     assert history.present.exclusions == Exclusions(frozenset({"EAX", "EBX"}))
     assert history.undo().undo().present == START
-
-
-def test_events_are_read_in_order_with_their_numbers():
-    found = read_events('[[7, "errors:set.EAX", "1:2"], [8, "page:undo", ""]]')
-    assert found == ((7, Event("errors", "set.EAX", "1:2")), (8, Event("page", "undo", "")))
-    assert len(read_events(json.dumps([[i, "a:b", ""] for i in range(1, 999)]))) == MOST_EVENTS
-
-
-@pytest.mark.parametrize(
-    "text",
-    ["", "{}", "[[1]]", '[[0, "a:b", ""]]', '[["1", "a:b", ""]]', '[[1, "no colon", ""]]',
-     json.dumps([[1, "a:" + "b" * 999, ""]]), json.dumps([[1, "a:b", "c" * 999_999]]),
-     "[" * 99_999],
-)  # fmt: skip
-def test_what_is_no_event_is_left_out(text):
-    assert read_events(text) == ()

@@ -1,34 +1,26 @@
 """Messages of clients, honest or hostile, and the private parts of viser they pass."""
 
 import asyncio
-import importlib
-import json
 import logging
 import threading
 import time
 from types import SimpleNamespace
 from typing import Any
 
-import msgspec.msgpack
 import psutil
 import pytest
 import viser
 from viser import _messages as messages
 
-from app.hostile import camera, connected, events, nonsense, upload
+from app.hostile import camera, events, nonsense, upload
 from app.wire import Wire, opened
 from app.wire import dial as dial_viewer
-from page_client import CAMERA, App, dial, pack, until, update
+from page_client import CAMERA, App, dial, pack, said, until
 from reliability.outcome import Lag
-from warpspace.app.browser.events import MOST_EVENTS, Event, read_events
-from warpspace.app.browser.incoming import may_pass, may_set
+from warpspace.app.browser.incoming import MOST_EVENTS, Event, event_of, read_message
 from warpspace.app.browser.page import Page
-from warpspace.app.browser.viser_private import (
-    dom_id,
-    listen_to_all,
-    serve_with,
-    wake_sender_on_its_thread,
-)
+from warpspace.app.browser.viser_private import connection_of, send_at_once, serve_with
+from warpspace.app.server.guard import TabConnection
 from warpspace.app.server.network import RepeatedLines
 from warpspace.app.server.session import Turns
 from warpspace.app.server.viewer import Viewer
@@ -58,41 +50,20 @@ def client():
 
 
 USED = {
-    "server": "_websock_server.register_handler _websock_server.queue_message",
-    "client": "_websock_connection.queue_message _websock_connection.register_handler"
-    " _websock_connection.unregister_handler _websock_connection.get_message_buffer"
-    " gui._websock_interface.register_handler gui._websock_interface.unregister_handler"
-    " gui._handle_gui_updates gui._gui_input_handle_from_uuid",
-    "_gui_api": "print_threadpool_errors",
-    "_scene_api": "print_threadpool_errors print_awaited_callback_error",
-    "_viser": "print_threadpool_errors",
-}
-FIELDS = {
-    "RunJavascriptMessage": "source",
-    "GuiUpdateMessage": "uuid updates",
-    "ReplayDoneMessage": "",
+    "server": "_websock_server.queue_message _websock_server._live_connections",
+    "client": "_websock_connection.queue_message _websock_connection.get_message_buffer",
 }
 
 
-@pytest.mark.parametrize("owner", USED)
-def test_viser_has_what_is_used_of_it(client, owner):
-    owners = dict(zip(("server", "client"), client, strict=True))
-    found = owners.get(owner) or importlib.import_module(f"viser.{owner}")
-    for path in USED[owner].split():
-        look_up(found, path)
-
-
-@pytest.mark.parametrize("name", FIELDS)
-def test_messages_have_the_fields_that_are_used(name):
-    missing = set(FIELDS[name].split()) - set(look_up(messages, name).__annotations__)
-    assert not missing, f"viser {viser.__version__}: {name} lacks {sorted(missing)}"
-
-
-def test_widgets_have_ids_and_a_connection_an_event_that_wakes_its_sender(client):
-    widget = client[1].gui.add_text("", "")
-    assert look_up(widget, "_impl.uuid") == dom_id(widget)
-    buffer = look_up(client[1], "_websock_connection.get_message_buffer")()
+def test_viser_has_what_is_used_of_it(client):
+    for owner, paths in zip(client, USED.values(), strict=True):
+        for path in paths.split():
+            look_up(owner, path)
+    buffer = client[1]._websock_connection.get_message_buffer()
     look_up(buffer, "message_event.set")
+    assert look_up(buffer, "window_duration_sec") == 0.0
+    assert "source" in look_up(messages, "RunJavascriptMessage").__annotations__
+    assert isinstance(connection_of(*client), TabConnection)
 
 
 def test_a_server_starts_with_the_options_that_are_changed():
@@ -114,23 +85,6 @@ def test_a_server_starts_with_the_options_that_are_changed():
     assert seen[0].keys().isdisjoint({"process_response", "create_connection", "origins"})
 
 
-def test_messages_of_a_page_are_checked_before_they_are_read(client):
-    assert look_up(client[0], "_websock_server._message_class") is messages.Message
-    raw = msgspec.msgpack.encode({"type": "GuiFormDirtyMessage", "uuid": "a"})
-    assert type(messages.Message.deserialize(raw)) is messages.ReplayDoneMessage
-    assert type(messages.Message.deserialize(msgspec.msgpack.encode(CAMERA))) is (
-        messages.ViewerCameraMessage
-    )
-    handlers = look_up(client[0], "_websock_server._incoming_handlers")
-    assert messages.ReplayDoneMessage not in handlers
-
-
-def test_updates_of_widgets_are_checked_on_server_and_client(client):
-    for owner in client:
-        handlers = owner.gui._websock_interface._incoming_handlers[messages.GuiUpdateMessage]
-        assert owner.gui._handle_gui_updates not in handlers
-
-
 def test_only_its_own_thread_wakes_a_sender():
     """viser does it from ours, too, where it may meet the sender itself."""
 
@@ -138,7 +92,7 @@ def test_only_its_own_thread_wakes_a_sender():
         event = asyncio.Event()
         buffer = SimpleNamespace(message_event=event)
         connection = SimpleNamespace(get_message_buffer=lambda: buffer)
-        wake_sender_on_its_thread(SimpleNamespace(_websock_connection=connection))
+        send_at_once(SimpleNamespace(_websock_connection=connection))
         other = threading.Thread(target=event.set)
         other.start()
         other.join()
@@ -175,84 +129,45 @@ def test_clients_that_read_nothing_do_not_hold_up_the_end():
 def test_what_a_page_really_says_passes():
     for message in (
         CAMERA,
-        {"type": "GuiUpdateMessage", "uuid": "a", "updates": {"value": "t", "width": 1280}},
         {"type": "ScenePointerMessage", "event_type": "click", "ray_origin": [1, 2, 3.5],
          "ray_direction": [0, 0, 1], "screen_pos": [[0.5, 0.5]], "modifier": None},
+        said(("a:b", ""), ("errors:find", "x")),
+        said(upload("x.csv", b"1" * 100_000)),
     ):  # fmt: skip
-        assert may_pass(pack(message)), message
+        assert read_message(pack(message)) is not None, message
 
 
 def test_what_makes_no_sense_does_not_pass():
-    fine = [message for message in nonsense(["a"]) if may_pass(message)]
-    # what kind a widget has is known later, and so is which widgets there are
-    assert len(fine) < 10
-    assert all(b"GuiUpdateMessage" in message and b"\xa5value" in message for message in fine)
+    assert [message for message in nonsense() if read_message(message) is not None] == []
+    assert read_message("text") is None
 
 
-@pytest.mark.parametrize(
-    ("present", "updates", "fine"),
-    [
-        ("a", {"value": "b"}, True),
-        ("a", {"value": 1.0}, False),
-        (1.5, {"value": 2.0}, False),
-        (None, {"value": "a"}, False),
-        ("a", {"value": "b", "uuid": "c"}, False),
-        ("a", {"uuid": "c"}, False),
-        ("a", {}, False),
-    ],
-)
-def test_only_the_value_of_a_widget_may_be_set_and_only_to_a_text(present, updates, fine):
-    assert may_set(present, updates) is fine
+def test_only_what_viser_is_to_know_reaches_it(monkeypatch):
+    seen: list[bytes] = []
+    read = messages.Message.deserialize
+    monkeypatch.setattr(messages.Message, "deserialize", lambda raw: seen.append(raw) or read(raw))
+    with opened(load_scene("dvf5000_nominal")) as (wire, session):
+        seen.clear()
+        for message in (*nonsense(), pack(said(("errors:set.EXX", "7"))), camera(fov=0.5)):
+            wire._socket.send(message)
+        assert wire.read_until(lambda: session.state.amplitudes["EXX"] == 7.0)
+        assert wire.read_until(lambda: bool(seen))
+    assert seen == [camera(fov=0.5)]
 
 
-def test_of_a_page_in_haste_the_last_camera_counts_and_every_text():
-    seen: list[tuple[str, object]] = []
-    with Viewer(load_scene("dvf5000_nominal")) as viewer:
-        listen_to_all(viewer._server, lambda _, uuid, said: seen.append((uuid, said["value"])))
-        app = App(viewer.url.replace("http", "ws", 1), psutil.Process())
-
-        async def run():
-            async with connected(app) as socket:
-                for number in range(600):
-                    await socket.send(camera(fov=0.3 + number / 1e4))
-                    if number % 100 == 99:
-                        await socket.send(pack(update("carrier", {"value": str(number)})))
-                await until(lambda: ("carrier", "599") in seen, 60.0)
-
-                (client,) = viewer._server.get_clients().values()
-                return client.camera.fov
-
-        assert asyncio.run(run()) == pytest.approx(0.3 + 599 / 1e4)
-    assert [value for _, value in seen] == [f"{number}99" for number in ("", *range(1, 6))]
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "", "{}", "null", "[[]]", '[["1", "a:b", ""]]', '[[1, "a:b", null]]', '[[NaN, "a:b", ""]]',
-        '[[-1, "a:b", ""]]', '[[0, "a:b", ""]]', '[[1, "no colon", ""]]', "[" * 100_000,
-        json.dumps([[1, "a:" + "b" * 200, ""]]), json.dumps([[1, "a:b", "9" * 20_001]]),
-    ],
-    ids=range(13),
-)  # fmt: skip
-def test_what_is_no_event_is_left_out(text):
-    assert read_events(text) == ()
-
-
-def test_events_are_numbered_and_at_most_so_many():
-    found = read_events(json.dumps([[n, f"state:set.a:{n}", "x"] for n in range(1, 100)]))
-    assert len(found) == MOST_EVENTS
-    assert found[0] == (1, Event("state", "set.a:1", "x"))
-    assert len(read_events(json.dumps([[1, *upload("x.csv", b"1" * 100_000)]]))) == 1
+def test_events_are_read_in_order():
+    found = read_message(pack(said(("state:set.a:1", "x"), ("page:undo", ""))))
+    assert found.events == [("state:set.a:1", "x"), ("page:undo", "")]
+    assert event_of(*found.events[0]) == Event("state", "set.a:1", "x")
 
 
 def test_events_that_no_page_sends_are_refused_in_words_and_the_page_goes_on(caplog):
     with opened(load_scene("dvf5000_first"), services=build_services()) as (wire, session):
         sent = events(sorted(session.display.parts))
         for at in range(0, len(sent), MOST_EVENTS):
-            wire.say_all(sent[at : at + MOST_EVENTS])
+            wire.send(said(*sent[at : at + MOST_EVENTS]))
             time.sleep(0.01)  # no faster than a page may
-        wire.say_all([("page:reset", ""), ("errors:set.EAX", "17"), ("page:close", "")])
+        wire.send(said(("page:reset", ""), ("errors:set.EAX", "17"), ("page:close", "")))
         assert wire.read_until(lambda: session.state.amplitudes["EAX"] == 17.0, 60.0)
         assert wire.read_until(lambda: 'data-text="17"' in wire.pieces["error.EAX"])
         assert wire.toasts
@@ -265,7 +180,7 @@ def test_texts_stay_texts_within_a_script():
     page, sent, evil = object.__new__(Page), list[str](), 'x"</script><script>alert(1)//\u2028'
     page._sent, page.run_script = {}, sent.append
     page.notify(evil, evil)
-    page.set_title(evil)
+    page.call("title", evil)
     page.put({"head": evil})
     for script in sent:
         assert "</script>" not in script

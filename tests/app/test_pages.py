@@ -16,8 +16,7 @@ from warpspace.analysis.catalogue import register, unregister
 from warpspace.analysis.description import Analysis, Result
 from warpspace.app.documents.services import CancelledError, Services
 from warpspace.app.evaluation import cache
-from warpspace.app.server import page_steps
-from warpspace.app.server.page_steps import PageSteps
+from warpspace.app.server import session
 from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import start_state
@@ -51,15 +50,14 @@ def wire(viewer):
 
 
 def test_what_lies_around_the_map_comes_when_that_is_drawn(wire, monkeypatch):
-    monkeypatch.setattr(page_steps, "ANSWER_S", 1e6)
-    assert wire.read_until(lambda: wire.stage == "opening" and wire.question is not None)
+    monkeypatch.setattr(session, "ANSWER_S", 1e6)
+    assert wire.read_until(lambda: wire.stage == "opening" and wire.asked == 1)
     assert "GlbMessage" in wire.kinds
     assert {name.rpartition(".")[2] for name in wire.sliders} >= KEYS
     lines = wire.kinds.count("LineSegmentsMessage")
-    wire.update(wire.question[0], "0")  # no answer to this question
     assert not wire.read_until(lambda: wire.is_open, seconds=0.5)
     assert wire.kinds.count("LineSegmentsMessage") == lines
-    wire.answer()
+    wire.say("tab:drawn")
     assert wire.read_until(lambda: wire.is_open)
     assert wire.kinds.count("LineSegmentsMessage") > lines
 
@@ -69,17 +67,17 @@ def test_a_broken_update_is_said_and_takes_nothing_else_with_it(wire, viewer, ca
         raise RuntimeError("a wheel came off")
 
     assert wire.read_until(lambda: wire.is_open)
-    session = viewer.sessions[-1]
-    session.context.post(broken)
-    session.context.post(lambda state: state.with_amplitude("EXX", 4.0))
+    own = viewer.sessions[-1]
+    own.context.post(broken)
+    own.context.post(lambda state: state.with_amplitude("EXX", 4.0))
     assert wire.read_until(lambda: bool(wire.toasts))
-    assert wire.read_until(lambda: session.state.amplitudes["EXX"] == 4.0)
+    assert wire.read_until(lambda: own.state.amplitudes["EXX"] == 4.0)
     assert "a wheel came off" in str(wire.toasts)
     assert "a wheel came off" in caplog.text
 
 
 def test_pages_that_open_at_once_get_all_of_it(viewer, monkeypatch, caplog):
-    monkeypatch.setattr(page_steps, "ANSWER_S", 0.0)
+    monkeypatch.setattr(session, "ANSWER_S", 0.0)
     with ExitStack() as stack:
         wires = [Wire(stack.enter_context(dial(viewer))) for _ in range(8)]
         for wire in wires:
@@ -90,61 +88,62 @@ def test_pages_that_open_at_once_get_all_of_it(viewer, monkeypatch, caplog):
 
 
 def test_a_page_that_leaves_while_it_is_built_ends_its_session(viewer, monkeypatch):
-    reached, left, build = threading.Event(), threading.Event(), PageSteps._draw_around
+    reached, left, build = threading.Event(), threading.Event(), Session._draw_around
 
-    def build_late(steps, picture):
+    def build_late(own, picture):
         reached.set()
         assert left.wait(20.0)
-        return build(steps, picture)
+        return build(own, picture)
 
-    monkeypatch.setattr(PageSteps, "_draw_around", build_late)
-    monkeypatch.setattr(page_steps, "ANSWER_S", 0.0)
+    monkeypatch.setattr(Session, "_draw_around", build_late)
+    monkeypatch.setattr(session, "ANSWER_S", 0.0)
     with dial(viewer) as socket:
         Wire(socket)
         assert reached.wait(20.0)
-        (session,) = viewer.sessions
+        (own,) = viewer.sessions
     while viewer.sessions:
         time.sleep(0.01)
     left.set()
-    session._worker.join(20.0)
-    assert not session._worker.is_alive()
+    own._worker.join(20.0)
+    assert not own._worker.is_alive()
 
 
 def test_what_comes_just_as_a_wait_ends_is_not_lost(wire, viewer, monkeypatch):
     assert wire.read_until(lambda: bool(viewer.sessions))
-    session = viewer.sessions[-1]
+    own = viewer.sessions[-1]
     assert wire.read_until(lambda: "GlbMessage" in wire.kinds)  # its worker runs
-    session.stop()
-    session._worker.join(20.0)
+    own.stop()
+    own._worker.join(20.0)
+    own.context._actions.clear()
     done: list[str] = []
 
     class Late(threading.Event):
         def wait(self, timeout=None):
             if super().wait(0.0):
                 return True
-            session.context.act(lambda: done.append("upload"))
+            own.context.act(lambda: done.append("upload"))
             return False
 
-    session.context._wake, session._stopped = Late(), threading.Event()
+    own.context._wake, own._stopped = Late(), threading.Event()
 
     def follow():
-        action = session.context.take_action()
+        action = own.context.take_action()
         assert action is not None
         action()
 
-    monkeypatch.setattr(session, "_follow", follow)
-    session._turn()
+    monkeypatch.setattr(own, "_follow", follow)
+    own._turn()
     assert done == []
-    session._turn()
+    own._turn()
     assert done == ["upload"]
 
 
 def test_what_fails_because_a_page_has_just_gone_is_no_error(viewer, monkeypatch, caplog):
     told, stop = threading.Event(), Session.stop
 
-    def stop_late(session):
+    def stop_late(own):
         assert told.wait(20.0)
-        stop(session)
+        stop(own)
 
     def fail():
         raise RuntimeError("Cannot assign to a removed handle")
@@ -152,13 +151,13 @@ def test_what_fails_because_a_page_has_just_gone_is_no_error(viewer, monkeypatch
     monkeypatch.setattr(Session, "stop", stop_late)
     with dial(viewer) as socket:
         Wire(socket).read_until(lambda: bool(viewer.sessions))
-        (session,) = viewer.sessions
-        session._guarded(fail)
+        (own,) = viewer.sessions
+        own._guarded(fail)
         assert "Cannot assign" in caplog.text
         caplog.clear()
     while viewer._server.get_clients():
         time.sleep(0.01)
-    session._guarded(fail)
+    own._guarded(fail)
     told.set()
     assert not caplog.records
 
@@ -274,7 +273,7 @@ def test_one_piece_of_work_waits_for_another_and_may_be_given_up():
 
 @pytest.mark.parametrize("name", TEXTS)
 def test_a_page_opens_with_its_map_and_without_a_problem(name, monkeypatch):
-    monkeypatch.setattr(page_steps, "ANSWER_S", 0.0)
+    monkeypatch.setattr(session, "ANSWER_S", 0.0)
     with opened(still_scene(name)) as (wire, _):
         assert "GlbMessage" in wire.kinds
         assert wire.toasts == []

@@ -8,8 +8,7 @@ from typing import Any
 
 from websockets.sync.client import ClientConnection, connect
 
-from page_client import CAMERA, HOW, Page, pack, unpack, update
-from warpspace.app.browser.arrivals import CARRIER
+from page_client import CAMERA, HOW, Page, pack, said, unpack
 from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
 from warpspace.scene.model import Scene
@@ -23,31 +22,19 @@ def dial(viewer: Viewer) -> ClientConnection:
 class Wire(Page):
     """A page that shows nothing and remembers what it was sent."""
 
-    def __init__(self, socket: ClientConnection) -> None:
+    def __init__(self, socket: ClientConnection, tab: str = "") -> None:
         super().__init__()
         self._socket = socket
         self.kinds: list[str] = []
-        self.update(CARRIER, secrets.token_hex(16))
+        self.say("tab:here", tab or f"{secrets.token_hex(16)},1600")
         self.send(CAMERA)
 
     def send(self, message: dict[str, Any]) -> None:
         self._socket.send(pack(message))
 
-    def update(self, uuid: str, value: object) -> None:
-        self.send(update(uuid, {"value": value}))
-
     def say(self, name: str, value: object = "") -> None:
         """Send an event."""
-        self.say_all([(name, value)])
-
-    def say_all(self, events: list[tuple[str, Any]]) -> None:
-        """Send events at once."""
-        self.send(self.event(*events))
-
-    def answer(self) -> None:
-        """Say that all is drawn that was asked about last."""
-        assert self.question is not None
-        self.update(*self.question)
+        self.send(said((name, value)))
 
     def read_until(self, fine: Callable[[], bool], seconds: float = 20.0) -> bool:
         """Read until something holds; tell whether it did before nothing came any more."""

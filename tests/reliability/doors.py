@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from app.hostile import upload
-from page_client import App, Tab, running_app
+from page_client import App, Tab, running_app, said
 from reliability.outcome import Lag, Outcome
 
 TOKEN = "kp3Zq8vN2xT7wR5yLd0m"
@@ -128,7 +128,7 @@ async def _exhaust(app: App, count: int, tally: Tally) -> None:
         await honest.answer_s(20.0)
         before = app.memory_mb
         for number, content in enumerate(itertools.islice(itertools.cycle(bombs()), count)):
-            await other.send(other.event(upload(f"bomb{number}.toml", content)))
+            await other.send(said(upload(f"bomb{number}.toml", content)))
             waited = await honest.answer_s(number % 9 + 0.5)
             tally.slowest_s = max(tally.slowest_s, waited)
             tally.done["upload"] += 1

@@ -7,8 +7,8 @@ import re
 import tempfile
 from pathlib import Path
 
-from app.hostile import carried, connected, events, nonsense, send_all, steadily
-from page_client import CAMERA, App, Tab, pack, running_app
+from app.hostile import connected, events, nonsense, send_all, steadily
+from page_client import CAMERA, App, Tab, pack, running_app, said
 from reliability.outcome import Lag, Outcome
 from reliability.reading import mutate
 
@@ -53,11 +53,10 @@ def run(count: int) -> Outcome:
 async def _attack(app: App, count: int, lag: Lag) -> tuple[int, list[float], float]:
     chance = random.Random(14)
     async with Tab(app) as honest, Tab(app) as hostile:
-        widgets = [hostile.facts["carrier"]]
         known = PARTS.findall("".join(hostile.pieces.values()))
-        mixed = nonsense(widgets) + carried(widgets[0]) + events(sorted({*known, "page", "state"}))
+        mixed = nonsense() + events(sorted({*known, "page", "state"}))
         chance.shuffle(mixed)
-        kinds = [one if isinstance(one, bytes) else pack(hostile.event(one)) for one in mixed]
+        kinds = [one if isinstance(one, bytes) else pack(said(one)) for one in mixed]
         await honest.answer_s(20.0)
         slow = [asyncio.create_task(_read_nothing(app, chance)) for _ in range(SLOW)]
         steady = count // 10
@@ -73,7 +72,7 @@ async def _attack(app: App, count: int, lag: Lag) -> tuple[int, list[float], flo
             asyncio.create_task(steadily(hostile.socket, cycle(kinds, steady))),
             *(asyncio.create_task(_move_all(app, steady // TABS)) for _ in range(TABS)),
             asyncio.create_task(send_all(app, shuffled)),
-            asyncio.create_task(_flood(app, hostile, floods, counts)),
+            asyncio.create_task(_flood(app, floods, counts)),
         ]
         taken: list[float] = []
         for value in itertools.count(1):
@@ -96,12 +95,12 @@ def cycle(kinds: list[bytes], count: int) -> list[bytes]:
     return list(itertools.islice(itertools.cycle(kinds), count))
 
 
-async def _flood(app: App, tab: Tab, times: int, counts: dict[str, int]) -> None:
+async def _flood(app: App, times: int, counts: dict[str, int]) -> None:
     for _ in range(times):
         async with connected(app) as socket:
             await socket.send(pack(CAMERA))
             for number in range(FLOOD):
-                await socket.send(pack(tab.event(("errors:set.EAX", str(number % 20 / 2.0)))))
+                await socket.send(pack(said(("errors:set.EAX", str(number % 20 / 2.0)))))
                 counts["flood"] += 1
 
 
@@ -116,7 +115,7 @@ async def _read_nothing(app: App, chance: random.Random) -> None:
 async def _move_all(app: App, count: int) -> None:
     async with Tab(app) as tab:
         moves = (
-            pack(tab.event((name, f"{20.0 * (number * 0.377 % 1.0) - 10.0:g}")))
+            pack(said((name, f"{20.0 * (number * 0.377 % 1.0) - 10.0:g}")))
             for number, name in enumerate(itertools.cycle(tab.sliders))
         )
         await steadily(tab.socket, list(itertools.islice(moves, count)))

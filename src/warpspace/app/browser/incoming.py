@@ -1,48 +1,43 @@
-"""What a page may say: every message of a client is checked here before viser acts on it.
+"""What a page may say: each message of a connection is read here before anybody acts on it.
 
-viser builds an object of whatever kind a message names and sets whatever attribute of a widget it
-names. Here only the kinds the app has a use for pass, with fields of the right type and size; of
-a widget a page sets nothing but `value`, which is a text.
-What is refused is left out and the connection stays open, since a new one would cost the server
-more than a message that is dropped.
+What the page's own scripts say (`page.js`) goes to the session as events, ``part:word`` with a
+value; a file is the value of ``part:file``: its size, its name, and what is in it in base64. viser
+is given what its part of the page says of camera, clicks and rendered pictures.
+viser would build an object of whatever kind a message names and set whatever attribute it names;
+here only these kinds pass, with fields of the right type and size. What is refused is left out and
+the connection stays open, since a new one would cost the server more than a message that is
+dropped.
 """
 
 import logging
 import struct
-from typing import Annotated, Any
+from dataclasses import dataclass
+from typing import Annotated
 
 import msgspec
 from msgspec import Meta, Struct
-from viser import ClientHandle, ViserServer
-
-from warpspace.app.browser.viser_private import check_messages, check_updates, log_failures
 
 logger = logging.getLogger(__name__)
 LARGEST_NUMBER = 1e9
-LONGEST_NAME = 1_000
-LONGEST_TEXT = 6_000_000  # of the value of a text field, characters: a file of 4 MiB in base64
 LARGEST_SIDE_PX = 16_384  # of the page's picture, and of a picture that it renders
 PNG_START = b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR"
+MOST_EVENTS = 16
+LONGEST_VALUE = 20_000  # of an event, but for those that may be as long as a file in base64
+LONG = (":file", ":kept")
+LONGEST_INDEX = 8  # digits
 
 Number = Annotated[float, Meta(ge=-LARGEST_NUMBER, le=LARGEST_NUMBER)]  # NaN is neither
 Side = Annotated[float, Meta(ge=0, le=LARGEST_SIDE_PX)]
-Name = Annotated[str, Meta(max_length=LONGEST_NAME)]
-Text = Annotated[str, Meta(max_length=LONGEST_TEXT)]
+Name = Annotated[str, Meta(max_length=1000)]
+EventName = Annotated[str, Meta(max_length=160, pattern=":")]
+EventValue = Annotated[str, Meta(max_length=6_000_000)]
 Vector = tuple[Number, Number, Number]
 
 
-class Update(Struct, forbid_unknown_fields=True):
-    """What is set: the value and, where a page says who it is, its width."""
+class Events(Struct, tag_field="type", tag="WarpspaceEvents", forbid_unknown_fields=True):
+    """What a user has done, in order."""
 
-    value: Text
-    width: Number | None = None
-
-
-class WidgetChanged(Struct, tag_field="type", tag="GuiUpdateMessage", forbid_unknown_fields=True):
-    """A script of ours says something: events, an answer, what it has kept."""
-
-    uuid: Name
-    updates: Update
+    events: Annotated[list[tuple[EventName, EventValue]], Meta(max_length=MOST_EVENTS)]
 
 
 class CameraMoved(Struct, tag_field="type", tag="ViewerCameraMessage", forbid_unknown_fields=True):
@@ -80,52 +75,50 @@ class PictureRendered(
     render_uuid: Name
 
 
-_READER = msgspec.msgpack.Decoder(WidgetChanged | CameraMoved | DrawingClicked | PictureRendered)
+Message = Events | CameraMoved | DrawingClicked | PictureRendered
+_READER = msgspec.msgpack.Decoder(Message)
 
 
-def guard_server() -> None:
-    """Have all that servers are sent from now on checked, and what fails logged, not printed."""
-    check_messages(may_pass)
-    log_failures(lambda error: logger.error("a callback failed", exc_info=error))
-
-
-def guard_widgets(owner: ViserServer | ClientHandle) -> None:
-    """Have what a page sets of widgets checked; before there are any."""
-    check_updates(owner, may_set)
-
-
-def may_pass(raw: bytes) -> bool:
-    """Tell whether a message of a page may reach viser."""
-    try:
-        message = _READER.decode(raw)
-    except ValueError:  # not msgpack, another kind, other fields, other types, not finite
-        fine = False
-    else:
-        fine = not isinstance(message, PictureRendered) or _is_picture(message.payload)
-    if not fine:
-        logger.warning("a page has sent a message that the app has no use for; it is left out")
-    return fine
-
-
-def moved(raw: object) -> str | None:
-    """Name what a message moves where the last move says all: the camera; None for all others."""
+def read_message(raw: object) -> Message | None:
+    """Read a message of a page; None where the app has no use for it."""
     try:
         message = _READER.decode(raw) if isinstance(raw, bytes) else None
-    except ValueError:
+    except ValueError:  # not msgpack, another kind, other fields, other types, not finite
+        message = None
+    if message is None or not _is_fine(message):
+        logger.warning("a page has sent a message that the app has no use for; it is left out")
         return None
-    return "camera" if isinstance(message, CameraMoved) else None
+    return message
 
 
-def may_set(present: object, updates: dict[str, Any]) -> bool:
-    """Tell whether a page may update a widget: one that holds a text."""
-    fine = updates.keys() == {"value"} and isinstance(present, str)
-    fine = fine and isinstance(updates["value"], str)
-    if not fine:
-        logger.warning("a page has sent a value that its widget cannot have; it is left out")
-    return fine
+def _is_fine(message: Message) -> bool:
+    if isinstance(message, Events):
+        return all(len(v) <= LONGEST_VALUE or name.endswith(LONG) for name, v in message.events)
+    return not isinstance(message, PictureRendered) or _is_picture(message.payload)
 
 
 def _is_picture(payload: bytes) -> bool:
     if not payload.startswith(PNG_START) or len(payload) < len(PNG_START) + 8:
         return False
     return max(struct.unpack_from(">II", payload, len(PNG_START))) <= LARGEST_SIDE_PX
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something a user did; all of it comes from a browser and may be anything."""
+
+    part: str  # name of the part of the page
+    word: str  # what is to be done, or the path of what is set behind ``set.``
+    value: str
+
+
+def event_of(name: str, value: str) -> Event:
+    """Give the event of a name, ``part:word``."""
+    part, _, word = name.partition(":")
+    return Event(part, word, value)
+
+
+def index_of(value: str, count: int) -> int | None:
+    """Read which of so many things an event means; None where it is none of them."""
+    known = value.isdecimal() and len(value) < LONGEST_INDEX and int(value) < count
+    return int(value) if known else None

@@ -1,13 +1,13 @@
 // The page around the drawing: bar at the top, errors at the left, tasks at the right, what lies over
 // the drawing. The server writes pieces of HTML into named places; what a user does goes back as
-// numbered events. Nothing here knows what a piece is about.
+// events. Nothing here knows what a piece is about.
 (() => {
   if (window.warpspacePage) return;
   const MOST_EVENTS = 16, SEND_MS = 30, TOAST_MS = 8000, MOST_FILES = 16;
-  const sent = [], pending = [];
+  const pending = [];  // events
   const texts = new Map();  // of all pieces, also while their place is not there
-  const known = { carrier: "", keys: {} };
-  let count = 0, timer = 0, last = 0;
+  const known = { keys: {} };
+  let timer = 0, last = 0;
 
   const shell = document.createElement("div");
   shell.id = "ws-page";
@@ -92,20 +92,19 @@
     send("page:close");
   };
 
-  // --- events: numbered, the latest ones together, since messages are put together on their way -----
-  const say = events => window.__viserMutable?.sendMessage(
-    { type: "GuiUpdateMessage", uuid: known.carrier, updates: { value: JSON.stringify(events) } });
+  // --- events, in order: the first goes at once, those that follow quickly go together ------------
+  const say = events => window.__viserMutable.sendMessage({ type: "WarpspaceEvents", events });
   const flush = () => {
-    timer = 0; last = performance.now();
-    for (const event of pending.splice(0)) sent.push([++count, ...event]);
-    sent.splice(0, sent.length - MOST_EVENTS);
-    say(sent);
+    clearTimeout(timer);
+    timer = window.__viserMutable ? 0 : setTimeout(flush, SEND_MS);
+    if (timer || !pending.length) return;
+    last = performance.now();
+    say(pending.splice(0, MOST_EVENTS));
   };
   const send = (name, value = "") => {
     const same = pending.findIndex(([other]) => other === name);
     if (same >= 0 && name.includes(":set.")) pending.splice(same, 1);
     pending.push([name, String(value)]);
-    // the first goes at once, those that follow quickly go together
     if (pending.length >= MOST_EVENTS || !timer && performance.now() - last >= SEND_MS) flush();
     else timer ||= setTimeout(flush, Math.max(0, SEND_MS - (performance.now() - last)));
   };
@@ -257,7 +256,7 @@
     if (file.size <= Number(most))
       await new Promise(done => { reader.onload = done; reader.readAsDataURL(file); });
     const held = reader.result?.split(",")[1] ?? "";
-    say([[++count, `${upload}:file`, `${file.size}\n${file.name}\n${held}`]]);
+    say([[`${upload}:file`, `${file.size}\n${file.name}\n${held}`]]);
   };
   const sendFiles = (button, files) =>
     [...files].slice(0, MOST_FILES).forEach(file => sendFile(button.dataset, file));
@@ -328,19 +327,46 @@
     showAddress(parameters);
   };
 
+  // --- which tab it is ------------------------------------------------------------------------------
+  const TAB_KEY = "warpspace-tab";
+  const rename = name => {
+    window.__warpspaceTab = name;
+    try { sessionStorage.setItem(TAB_KEY, name); } catch { /* it lives as long as the page */ }
+  };
+  const tabName = () => {
+    try { return sessionStorage.getItem(TAB_KEY) || window.__warpspaceTab; }
+    catch { return window.__warpspaceTab; }
+  };
+
+  document.body.append(shell);
+  document.getElementById("root").setAttribute("role", "main");
+  document.getElementById("root").setAttribute("aria-label", "Drawing of the bent volume");
   window.warpspacePage = {
-    send, toast, copyText, over: shell.querySelector("#ws-over"),
+    send, rename, toast, copyText, over: shell.querySelector("#ws-over"),
     // whether it was opened with a link that has just been taken
     hasLink: () => known.hasLink,
+    style(css) {
+      document.head.append(Object.assign(document.createElement("style"), { textContent: css }));
+    },
+    // connected, for the first time or again: its tab, how wide it is, the link it was opened with
+    arrive() {
+      rename(tabName() || [...crypto.getRandomValues(new Uint8Array(16))]
+        .map(byte => byte.toString(16).padStart(2, "0")).join(""));
+      pending.splice(0);
+      send("tab:here", `${window.__warpspaceTab},${innerWidth}`);
+      tidyAddress();
+      const link = linkOf();
+      known.hasLink = Boolean(link) && link !== (stored() || window.__warpspaceLink);
+      if (known.hasLink) { store(link); send("files:link", link); }
+    },
     // how far the page is, for whoever drives it from outside
     stage(word) {
       document.documentElement.dataset.warpspace = word;
       if (word === "open") this.tour();
     },
     // says when all before it is drawn
-    drawn(uuid, number) {
-      const tell = () => window.__viserMutable?.sendMessage(
-        { type: "GuiUpdateMessage", uuid, updates: { value: String(number) } });
+    drawn() {
+      const tell = () => send("tab:drawn");
       if (document.hidden) setTimeout(tell, 0);
       else requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(tell, 0)));
     },
@@ -353,22 +379,10 @@
       if (token) address.searchParams.set("token", token);
       copyText(address.href, "Link copied", words);
     },
-    // the widget that carries events, the keys
-    open(facts) {
-      Object.assign(known, facts);
-      count = Math.max(count, 0);
-      if (!shell.isConnected) {
-        document.body.append(shell);
-        document.getElementById("root").setAttribute("role", "main");
-        document.getElementById("root").setAttribute("aria-label", "Drawing of the bent volume");
-      }
-      tidyAddress();
-      if (!facts.carrier) return;
-      const link = linkOf();
-      known.hasLink = Boolean(link) && link !== (stored() || window.__warpspaceLink);
-      if (known.hasLink) { store(link); send("files:link", link); }
-    },
+    // the keys
+    tell(facts) { Object.assign(known, facts); },
     show(pieces) { for (const [name, html] of Object.entries(pieces)) write(name, html); },
+    title(words) { document.title = `${words} · warpspace`; },
     dark(on) { document.documentElement.classList.toggle("ws-dark", on); },
   };
 })();

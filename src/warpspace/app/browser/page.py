@@ -1,17 +1,15 @@
-"""What a page is sent beside its widgets: scripts of our own, its title, messages."""
+"""What a page is sent beside its drawing: scripts of our own, pieces of HTML, messages."""
 
 import json
-from collections.abc import Mapping
+import threading
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
 from functools import cache
 from importlib.resources import files
 
 from viser import ClientHandle, ViserServer
 
-from warpspace.app.browser.events import Events
-from warpspace.app.browser.viser_private import (
-    send_script,
-    wake_sender_on_its_thread,
-)
+from warpspace.app.browser.viser_private import send_at_once, send_script
 from warpspace.exceptions import WarpspaceError
 
 SCRIPTS = ("page.js", "room.js", "mesh.js", "server.js", "tour.js")
@@ -23,23 +21,33 @@ class Page:
     def __init__(self, server: ViserServer, client: ClientHandle) -> None:
         self._server, self._client = server, client
         self._sent: dict[str, str] = {}
-        wake_sender_on_its_thread(client)
+        self._held: list[str] | None = None
+        self._lock = threading.Lock()
+        send_at_once(client)
 
-    def open(self, events: Events) -> None:
-        """Lay out the page."""
-        self.run_script("\n".join(map(script_source, SCRIPTS)))
-        self.tell(carrier=events.carrier)
+    @contextmanager
+    def as_one(self) -> Generator[None]:
+        """Send what is drawn and written meanwhile in one go; for the session."""
+        with self._client.atomic():
+            self._held = []
+            try:
+                yield
+            finally:
+                with self._lock:
+                    held, self._held = self._held, None
+                if held:
+                    send_script(self._client, "\n".join(held))
 
     def tell(self, **facts: object) -> None:
-        """Tell the page its carrier of events, uploads and keys."""
-        self.run_script(f"warpspacePage.open({_spelt(facts)});")
+        """Tell the page its uploads and keys."""
+        self.call("tell", facts)
 
     def put(self, pieces: Mapping[str, str]) -> None:
         """Write pieces of HTML by the name of their place; what stands there is not sent again."""
         changed = {name: text for name, text in pieces.items() if self._sent.get(name) != text}
         if changed:
             self._sent |= changed
-            self.run_script(f"warpspacePage.show({_spelt(changed)});")
+            self.call("show", changed)
 
     def forget(self, place: str) -> None:
         """Write a place again next time, whatever stands there."""
@@ -47,10 +55,8 @@ class Page:
 
     def call(self, name: str, *values: object) -> None:
         """Call a function of the page: of `warpspacePage`, or ``room.NAME`` of the drawing's."""
-        home, _, function = f"warpspacePage.{name}".replace(
-            "warpspacePage.room.", "warpspaceRoom."
-        ).rpartition(".")
-        self.run_script(f"{home}.{function}({', '.join(map(_spelt, values))});")
+        home = f"warpspacePage.{name}".replace("warpspacePage.room.", "warpspaceRoom.")
+        self.run_script(f"{home}({', '.join(map(_spelt, values))});")
 
     @property
     def is_open(self) -> bool:
@@ -59,15 +65,14 @@ class Page:
 
     def run_script(self, source: str) -> None:
         """Run JavaScript of our own in the page; no word of a user's may be in it unescaped."""
-        send_script(self._client, source)
-
-    def set_title(self, title: str) -> None:
-        """Name the browser tab."""
-        spelt = json.dumps(f"{title} · warpspace").replace("<", "\\u003c")
-        self.run_script(f"document.title = {spelt};")
+        with self._lock:
+            if self._held is None:
+                send_script(self._client, source)
+            else:
+                self._held.append(source)
 
     def notify(self, title: str, text: str = "", kind: str = "done") -> None:
-        """Show a message in this tab."""
+        """Show a message in this tab: "done", "warning", "problem", or one that "stays"."""
         self.call("toast", kind, title, text)
 
     def report(self, error: Exception) -> None:
@@ -87,24 +92,10 @@ def _spelt(value: object) -> str:
     return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
 
-def style_sheets(*names: str) -> str:
-    """Write the script that gives a page its style sheets."""
-    return style_script("page", "\n".join(map(script_source, names)))
-
-
-def style_script(name: str, css: str) -> str:
-    """Write the script that gives a page a style sheet.
-
-    It goes into the page's head: what `add_html` puts into a panel is gone while the panel is
-    collapsed.
-    """
-    return f"""(() => {{
-  const id = {json.dumps(f"warpspace-{name}")};
-  const sheet = document.getElementById(id) ?? document.createElement("style");
-  sheet.id = id;
-  sheet.textContent = {json.dumps(css)};
-  document.head.append(sheet);
-}})();"""
+def page_script() -> str:
+    """Write the script that lays out a page."""
+    sheet = f"warpspacePage.style({json.dumps(script_source('page.css'))});"
+    return "\n".join((*map(script_source, SCRIPTS), sheet))
 
 
 def error_words(error: Exception) -> str:

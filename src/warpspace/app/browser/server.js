@@ -65,7 +65,7 @@
       } catch { try { sessionStorage.removeItem(KEPT_KEY); } catch { /* nothing is kept there */ } }
     },
     // the page is connected, for the first time or again; to a server that knows its tab or not
-    back(uuid, known) {
+    back(known) {
       const was = window.__warpspaceLost;
       window.__warpspaceLost = false;
       document.getElementById("warpspace-server")?.remove();
@@ -75,8 +75,7 @@
       }
       const kept = read();
       if (kept?.text && !window.warpspacePage.hasLink())
-        window.__viserMutable.sendMessage(
-          { type: "GuiUpdateMessage", uuid, updates: { value: String(kept.text) } });
+        window.warpspacePage.send("keeper:kept", kept.text);
       else if (was)
         say(BACK, ["Its server was restarted, or has forgotten this tab, and nothing was kept here:"
           + " it begins anew."]);

@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 
-from warpspace.app.browser.events import Event
+from warpspace.app.browser.incoming import Event
 from warpspace.app.browser.page import Page
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState

@@ -5,7 +5,6 @@ import contextlib
 import logging
 import time
 import weakref
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from http import HTTPStatus
@@ -16,7 +15,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.frames import CloseCode
 from websockets.http11 import Request, Response
 
-from warpspace.app.browser.incoming import moved
+from warpspace.app.browser.incoming import Events, read_message
 from warpspace.app.server.doors import Asked, Doors, Refusal, plain_address
 
 logger = logging.getLogger(__name__)
@@ -44,12 +43,10 @@ class Limits:
     # of one connection, on average. A page sends 20 a second for each group of widgets in use.
     messages_per_second: float = 400.0
     burst: int = 2000  # messages that may come at once
-    # more than that on average, and a page is listened to only once in a pause
-    usual_per_second: float = 60.0
-    pause_s: float = 0.5
 
 
 LIMITS = Limits()
+MOST_EARLY = 4  # messages of a page that are kept until its session is there
 
 
 class Rate:
@@ -85,27 +82,25 @@ class OnceLog:
             logger.warning("refused %s: %s (further ones are not logged)", who, text)
 
 
-class LimitedConnection(ServerConnection):
-    """A websocket whose moves are put together, closed with a reason when too much comes by it.
+class TabConnection(ServerConnection):
+    """A websocket that reads what a page says, and is closed with a reason when that is too much.
 
-    Of the moves of a widget that have come meanwhile, the last is what counts. A page that sends
-    more than a hand can is listened to only now and then.
+    What the page's own scripts say goes to its session; viser gets the rest of what may be said.
     """
-
-    _reader: "asyncio.Task[None] | None" = None
-    _closing: "asyncio.Task[None] | None" = None
-    _closed: ConnectionClosed | None = None
-    _due = 0.0
 
     def limit(self, limits: Limits, log: OnceLog) -> None:
         """Set what is too much."""
-        self._rate = Rate(limits.messages_per_second, limits.burst)
-        self._usual = Rate(limits.usual_per_second, int(limits.usual_per_second))
-        self._pause_s, self._log = limits.pause_s, log
+        self._rate, self._log = Rate(limits.messages_per_second, limits.burst), log
         self._words = f"more than {limits.messages_per_second:g} messages a second"
-        self._waiting: dict[object, Any] = {}
-        self._ready: deque[Any] = deque()
-        self._there = asyncio.Event()
+        self._closing: asyncio.Task[None] | None = None
+        self._early: list[Events] = []
+        self._take: Callable[[Events], None] | None = None
+
+    def listen(self, take: Callable[[Events], None]) -> None:
+        """Have somebody take what the page's scripts say, and have said so far."""
+        self._take = take
+        for said in self._early:
+            take(said)
 
     def abort(self) -> None:
         """Cut the connection: nothing more is sent, and nothing is waited for."""
@@ -113,47 +108,30 @@ class LimitedConnection(ServerConnection):
             self.transport.abort()
 
     async def recv(self, decode: bool | None = None) -> Any:
-        """Receive a message; what comes by then of a page in haste is put together."""
-        if self._reader is None:
-            self._reader = asyncio.create_task(self._read(decode))
-        while not self._ready:
-            await self._there.wait()
-            if (pause_s := self._due - self.loop.time()) > 0.0:
-                await asyncio.sleep(pause_s)
-            self._ready.extend(self._waiting.values())
-            self._waiting.clear()
-            if self._reader.done():
-                self._reader.result()
-                if self._closed is not None and not self._ready:
-                    raise self._closed
-            else:
-                self._there.clear()
-        return self._ready.popleft()
-
-    async def _read(self, decode: bool | None) -> None:
-        try:
-            while True:
-                message = await super().recv(decode)
-                if self._closing is not None:
-                    continue  # until the other side has closed as well
-                if not self._rate.take():
-                    self._log.warn("rate", self._words, self.remote_address)
-                    self._closing = asyncio.ensure_future(
-                        self.close(CloseCode.POLICY_VIOLATION, self._words)
-                    )
-                    continue
-                if not self._usual.take() and not self._waiting:
-                    self._due = self.loop.time() + self._pause_s
-                key = moved(message) or object()
-                self._waiting.pop(key, None)  # the last stands where it came
-                self._waiting[key] = message
-                self._there.set()
-        except ConnectionClosed as closed:
-            self._closed = closed
-            if closed.sent is not None and closed.sent.code == CloseCode.MESSAGE_TOO_BIG:
-                self._log.warn("size", f"a message too large, {closed.sent}", self.remote_address)
-        finally:
-            self._there.set()
+        """Receive the next message for viser."""
+        while True:
+            try:
+                raw = await super().recv(decode)
+            except ConnectionClosed as closed:
+                if closed.sent is not None and closed.sent.code == CloseCode.MESSAGE_TOO_BIG:
+                    words = f"a message too large, {closed.sent}"
+                    self._log.warn("size", words, self.remote_address)
+                raise
+            if self._closing is not None:
+                continue  # until the other side has closed as well
+            if not self._rate.take():
+                self._log.warn("rate", self._words, self.remote_address)
+                closing = self.close(CloseCode.POLICY_VIOLATION, self._words)
+                self._closing = asyncio.ensure_future(closing)
+                continue
+            message = read_message(raw)
+            if not isinstance(message, Events):
+                if message is not None:
+                    return raw
+            elif self._take is not None:
+                self._take(message)
+            elif len(self._early) < MOST_EARLY:
+                self._early.append(message)
 
 
 class Guard:
@@ -162,7 +140,7 @@ class Guard:
     def __init__(self, doors: Doors, limits: Limits = LIMITS) -> None:
         self._doors, self._limits = doors, limits
         self._log = OnceLog()
-        self._connections = weakref.WeakSet[LimitedConnection]()
+        self._connections = weakref.WeakSet[TabConnection]()
 
     def cut(self) -> None:
         """Cut the connections that there are; to be called from another thread than theirs."""
@@ -191,8 +169,8 @@ class Guard:
                 if cookie is not None:
                     response.headers["Set-Cookie"] = cookie
 
-        def create_connection(*args: Any, **kwargs: Any) -> LimitedConnection:
-            connection = LimitedConnection(*args, **kwargs)
+        def create_connection(*args: Any, **kwargs: Any) -> TabConnection:
+            connection = TabConnection(*args, **kwargs)
             connection.limit(self._limits, self._log)
             self._connections.add(connection)
             return connection

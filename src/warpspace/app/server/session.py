@@ -2,7 +2,7 @@
 
 The way of a slider move:
 
-1. `browser/page.js` sends an event, `browser/events.py` queues it and wakes the session;
+1. `browser/page.js` sends an event, the tab's connection (`server/guard.py`) queues it;
 2. here, `_follow`: the event's part (`tasks/parts.py`) says what it does to the state,
 3. which is applied (`state/store.py`) and
 4. evaluated (`evaluation/evaluate.py`);
@@ -20,25 +20,34 @@ import time
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from functools import partial
+from typing import Any
 
+import numpy as np
 from viser import ClientHandle, ViserServer
 
-from warpspace.app.browser.arrivals import Arrival, rename_script
+from warpspace.app.browser.incoming import Event
 from warpspace.app.documents.scene_file import SceneList
 from warpspace.app.documents.services import Services
+from warpspace.app.evaluation.budget import pick, with_picked
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.server.display import Display
-from warpspace.app.server.page_steps import PageSteps
 from warpspace.app.server.tab_keeper import TabKeeper
 from warpspace.app.server.tab_memory import TabRecord, new_token
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.store import StateStore, apply_each
+from warpspace.app.state.store import StateStore, Update, apply_each
+from warpspace.app.tasks.catalogue import build_parts
 from warpspace.app.tasks.context import Context
+from warpspace.app.viewport.box import BoxLayer
 from warpspace.app.viewport.camera import focus
+from warpspace.app.viewport.moving import MovingLayer
+from warpspace.app.viewport.shapes import SCENE_PER_MM
 
 logger = logging.getLogger(__name__)
+TAB = "tab"  # events of the page itself begin with it
+LEAST_WIDTH, MOST_WIDTH = 200, 20_000  # of a page, CSS pixels, that are believed
 TOKEN_WAIT_S = 0.25  # how long the first picture waits for a tab that may have been here before
+ANSWER_S = 1.0  # how long a page may take to draw the map; one that does not say gets the rest
 USE_FADES_S = 2.0  # how long a tab that has kept the server busy stands back behind the others
 
 
@@ -98,22 +107,19 @@ class Session:
         live: LiveModel,
         scenes: SceneList,
         store: StateStore,
-        arrival: Arrival,
-        claim: "Callable[[Session, str], TabRecord | None] | None" = None,
-        services: Services | None = None,
+        claim: "Callable[[Session, str], TabRecord | None]",
+        services: Services,
         *,
         shared: bool = False,
     ) -> None:
-        self._client, self._live = client, live
-        self.context = Context(server, client, store, scenes, services or Services())
+        self._client, self._live, self._claim = client, live, claim
+        self.context = Context(server, client, store, scenes, services)
         self.token = new_token()
-        self._arrival: Arrival | None = arrival
-        self._claim = claim
-        self._shared = shared
-        self._keeper: TabKeeper | None = None
+        self._keeper = TabKeeper(self.context, shared=shared)
         self.display = Display(self.context.page)
         self.context.renew, self.context.closed = self.display.renew, self.display.closed
-        self.steps = PageSteps(self.context, self.display)
+        self._is_known = False  # whether the page has said which tab it is
+        self._around_at: float | None = None  # when what lies around the map is drawn at the latest
         self._stopped = threading.Event()
         self._worker = threading.Thread(
             target=self._run, name=f"warpspace-session-{client.client_id}", daemon=True
@@ -132,13 +138,14 @@ class Session:
         """End the worker; nothing is sent any more."""
         self._stopped.set()
         self.context.wake()
-        self.steps.stop()
+        if self.context.stage is not None:
+            self.context.stage.stop()
         self.context.store.unsubscribe(self.context.changed)
 
     def rename(self, token: str) -> None:
         """Give page and session another token, since two tabs came with one."""
         self.token = token
-        self.context.page.run_script(rename_script(token))
+        self.context.page.call("rename", token)
 
     def record(self) -> TabRecord:
         """Give what is worth keeping of the tab."""
@@ -161,14 +168,17 @@ class Session:
             TURNS.forget(self)
 
     def _turn(self) -> None:
-        waits = (self.display.pause_s, self.steps.remaining_s())
-        changed = self.context.wait(min((wait for wait in waits if wait is not None), default=None))
+        left = None if self._around_at is None else max(0.0, self._around_at - time.monotonic())
+        waits = [wait for wait in (self.display.pause_s, left) if wait is not None]
+        changed = self.context.wait(min(waits, default=None))
         if changed and not self._stopped.is_set():
             self._guarded(self._follow)
         picture = self.context.shown
-        if picture is not None and self.steps.is_due:
-            self._guarded(partial(self.steps.advance, picture))
-        if picture is not None and self.display.is_due(paused=not changed):
+        if picture is None:
+            return
+        if self._around_at is not None and time.monotonic() >= self._around_at:
+            self._guarded(partial(self._draw_around, picture))
+        if self.display.is_due(paused=not changed):
             self._guarded(partial(self._settle, picture))
 
     def _guarded(self, step: Callable[[], object]) -> None:
@@ -181,36 +191,78 @@ class Session:
             self.context.page.report(error)
 
     def _build(self) -> None:
-        """Show map, sliders and numbers; all else follows step by step."""
-        self._keeper = keeper = TabKeeper(self.context, shared=self._shared)
-        if self._arrival is not None and self._arrival.wait(TOKEN_WAIT_S, self.context.wake):
-            self._recognize(self._arrival)
-        picture = self._live.evaluate(self.state)
-        with self._client.atomic():
-            self._darken(picture)
-            self.context.page.set_title(picture.state.scene.title)
-            self.context.camera.place(picture)
-            self.steps.begin(picture)
-            self.display.add(picture, parts=[keeper])
-        self._client.flush()
-        self.context.shown = picture
+        """Show map and all that is written; the rest follows when the page has drawn that.
 
-    def _recognize(self, arrival: Arrival) -> None:
-        self._arrival = None
-        self.context.camera.page_width = arrival.width
-        record = self._claim(self, arrival.token) if self._claim is not None else None
+        A page draws what it gets in one go before it answers anybody.
+        """
+        context = self.context
+        if not context.events:
+            context.wait(TOKEN_WAIT_S)
+        if context.events and context.events[0].part == TAB:
+            self._hear(context.events.popleft())
+        context.wake()  # what else has come
+        picture = self._live.evaluate(self.state)
+        with context.page.as_one():
+            self._darken(picture)
+            context.page.call("title", picture.state.scene.title)
+            context.camera.place(picture)
+            context.page.call("stage", "opening")
+            layers = [BoxLayer(self._client.scene, context.page, picture)]
+            self.display.add(picture, layers, [*build_parts(context), self._keeper])
+            context.page.call("drawn")
+        self._around_at = time.monotonic() + ANSWER_S
+        context.shown = picture
+
+    def _draw_around(self, picture: LivePicture) -> None:
+        self._around_at = None
+        context = self.context
+        with context.page.as_one():
+            context.stage = MovingLayer(self._client, picture, context.act)
+            self.display.add(picture, [context.stage])
+            context.page.call("stage", "open")
+
+        @self._client.scene.on_click()
+        def _(event: Any) -> None:
+            context.act(partial(self._clicked, event.ray_origin, event.ray_direction))
+
+    def _clicked(self, origin: object, direction: object) -> None:
+        """Ask why a point is off, or choose a reference point."""
+        context, picture = self.context, self.context.shown
+        if picture is None:
+            return
+        ray = np.array([origin, direction], dtype=float)
+        picked = pick(picture, ray[0] / SCENE_PER_MM, ray[1])
+        if picked is None:
+            return
+        if context.next_click is not None and picked.point_mm is None:
+            context.next_click(picked)
+        else:
+            context.post(lambda state: with_picked(state, picked))
+
+    def _hear(self, event: Event) -> None:
+        """Take note of what a page says of itself."""
+        if event.word == "drawn" and self._around_at is not None:
+            self._around_at = 0.0
+        if event.word != "here" or self._is_known:
+            return
+        self._is_known = True
+        token, _, width = event.value[:100].partition(",")
+        if width.isdecimal() and LEAST_WIDTH <= int(width) <= MOST_WIDTH:
+            self.context.camera.page_width = float(width)
+        record = self._claim(self, token)
         if record is not None:
             self.use(record.store)
             self.context.camera.wanted = record.camera
-        if self._keeper is not None:
-            self._keeper.begin(known=record is not None)
+        self._keeper.begin(known=record is not None)
 
     def _follow(self) -> None:
         context = self.context
-        if self._arrival is not None and self._arrival.is_there:
-            self._recognize(self._arrival)
-        events = [context.events.popleft() for _ in range(len(context.events))]
-        updates = [found for event in events if (found := self.display.update(event))]
+        updates: list[Update] = []
+        for event in [context.events.popleft() for _ in range(len(context.events))]:
+            if event.part == TAB:
+                self._hear(event)
+            elif (found := self.display.update(event)) is not None:
+                updates.append(found)
         updates += context.take_updates()
         notes = context.apply(lambda state: apply_each(state, updates, self._guarded))
         while action := context.take_action():
@@ -224,14 +276,13 @@ class Session:
 
     def _show(self, picture: LivePicture, notes: tuple[str, ...]) -> None:
         context, before = self.context, self.context.shown
-        with self._client.atomic():
+        with context.page.as_one():
             self.display.show(picture, anew=bool(notes))
             if before is not None and focus(before.state) != focus(picture.state):
-                context.page.set_title(picture.state.scene.title)
+                context.page.call("title", picture.state.scene.title)
                 context.camera.place(picture)
             if before is None or before.state.shown.dark != picture.state.shown.dark:
                 self._darken(picture)
-        self._client.flush()
         context.shown = picture
         if notes:
             context.notify("Clamped", "\n".join(notes), "warning")
@@ -242,6 +293,5 @@ class Session:
         self.context.page.call("dark", dark)
 
     def _settle(self, picture: LivePicture) -> None:
-        with TURNS.take(self), self._client.atomic():
+        with TURNS.take(self), self.context.page.as_one():
             self.display.settle(picture, self._guarded)
-        self._client.flush()

@@ -5,9 +5,8 @@ import threading
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
 
-from warpspace.app.browser.viser_private import dom_id
 from warpspace.app.documents.files import safe_name
 from warpspace.app.documents.scene_file import (
     MAX_LINK,
@@ -128,13 +127,6 @@ class TabKeeper(Part):
         self._kept: AppState | None = None
         self._may_keep, self._asked = False, False
         self._due = threading.Lock()
-        self._carrier: Any = context.gui.add_text("", "", visible=False)
-
-        @self._carrier.on_update
-        async def _(event: Any) -> None:  # a plain function would take a thread of a pool
-            if event.client is not None:
-                text = str(self._carrier.value)
-                context.act(lambda: self._restore(text))
 
         @context.client.camera.on_update
         async def _(_: object) -> None:
@@ -145,7 +137,7 @@ class TabKeeper(Part):
     def begin(self, *, known: bool) -> None:
         """Find out what the page has kept, once the server knows whether it knows the tab."""
         self._may_keep, self._asked = True, not known
-        self._context.page.call("server.back", dom_id(self._carrier), known)
+        self._context.page.call("server.back", known)
 
     def depends(self, picture: LivePicture) -> tuple[object, ...]:
         """Keep every state."""
@@ -176,6 +168,11 @@ class TabKeeper(Part):
         self._due.release()
         if self._context.shown is not None and self._context.page.is_open:
             self._keep(self._context.shown.state)
+
+    def take(self, state: AppState, word: str, value: str) -> AppState:
+        if word == "kept":
+            self._context.act(partial(self._restore, value))
+        return state
 
     def _restore(self, text: str) -> None:
         if not self._asked:

@@ -12,15 +12,13 @@ from typing import Self
 
 import viser
 
-from warpspace.app.browser.arrivals import Arrivals
-from warpspace.app.browser.incoming import guard_server, guard_widgets
-from warpspace.app.browser.page import style_sheets
-from warpspace.app.browser.viser_private import send_script_to_all, serve_with
+from warpspace.app.browser.page import page_script
+from warpspace.app.browser.viser_private import connection_of, send_script_to_all, serve_with
 from warpspace.app.documents.scene_file import SceneList
 from warpspace.app.documents.services import Services
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.server.doors import Access, Doors
-from warpspace.app.server.guard import Guard
+from warpspace.app.server.guard import Guard, TabConnection
 from warpspace.app.server.network import (
     free_port,
     is_everywhere,
@@ -40,7 +38,6 @@ from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 
 logger = logging.getLogger(__name__)
-WATCH_S = 2.0  # how often sessions are looked for whose connection is gone
 FAREWELL_S = 0.5
 """How long the end waits for pages to close their connection; some read nothing any more."""
 
@@ -81,16 +78,12 @@ class Viewer:
         self._guard = Guard(doors)
         self._server = _serve(self.address, self.port, self._guard)
         light_scene(self._server.scene)
-        self._arrivals = Arrivals(self._server)
-        send_script_to_all(self._server, style_sheets("page.css"))
+        send_script_to_all(self._server, f"{page_script()}\nwarpspacePage.arrive();")
         self._server.on_client_connect(self._connect)
         self._server.on_client_disconnect(self._disconnect)
         # the first tab need not wait for it
         self._warming = threading.Thread(target=self._warm, name="warpspace-warm", daemon=True)
         self._warming.start()
-        self._ended = threading.Event()
-        self._watch = threading.Thread(target=self._end_left, name="warpspace-watch", daemon=True)
-        self._watch.start()
 
     @property
     def url(self) -> str:
@@ -126,25 +119,24 @@ class Viewer:
         surface_glb(self._live.evaluate(self._start))
         importlib.import_module("warpspace.app.tasks.design")
 
-    def _connect(self, client: viser.ClientHandle) -> None:
-        guard_widgets(client)
-        store = self._shared or StateStore(self._start)
+    async def _connect(self, client: viser.ClientHandle) -> None:
+        connection = connection_of(self._server, client)
+        if not isinstance(connection, TabConnection):
+            return  # it has gone meanwhile
         session = Session(
             self._server,
             client,
             self._live,
             SceneList(self._scenes),
-            store,
-            self._arrivals.expect(client.client_id),
+            self._shared or StateStore(self._start),
             self._claim,
             self._services,
             shared=self._shared is not None,
         )
         with self._lock:
             self._sessions[client.client_id] = session
+        connection.listen(session.context.take)
         session.start()
-        if client.client_id not in self._server.get_clients():
-            self._end(client.client_id)
 
     def _claim(self, session: Session, token: str) -> TabRecord | None:
         if not is_token(token):
@@ -164,21 +156,9 @@ class Viewer:
             return TabRecord(self._shared, left.camera)
         return left
 
-    def _disconnect(self, client: viser.ClientHandle) -> None:
-        self._end(client.client_id)
-
-    def _end_left(self) -> None:
-        while not self._ended.wait(WATCH_S):
-            with self._lock:
-                known = set(self._sessions)
-            # asked for afterwards: a tab that connects meanwhile is no known one
-            for client_id in known - self._server.get_clients().keys():
-                self._end(client_id)
-
-    def _end(self, client_id: int) -> None:
-        self._arrivals.forget(client_id)
+    async def _disconnect(self, client: viser.ClientHandle) -> None:
         with self._lock:
-            session = self._sessions.pop(client_id, None)
+            session = self._sessions.pop(client.client_id, None)
             if session is None:
                 return
             try:
@@ -188,7 +168,6 @@ class Viewer:
 
     def stop(self) -> None:
         """End all sessions and the server."""
-        self._ended.set()
         for session in self.sessions:
             session.stop()
         cut = threading.Timer(FAREWELL_S, self._guard.cut)
@@ -220,7 +199,6 @@ def _with(scene: Scene, scenes: Mapping[str, Scene]) -> dict[str, Scene]:
 
 
 def _serve(address: str, port: int, guard: Guard) -> viser.ViserServer:
-    guard_server()
     with contextlib.redirect_stdout(io.StringIO()), serve_with(guard.options) as guarded:
         server = viser.ViserServer(host=address, port=port, verbose=False)
     if not guarded:
@@ -232,7 +210,6 @@ def _serve(address: str, port: int, guard: Guard) -> viser.ViserServer:
     if server.get_port() != port:
         server.stop()
         raise OptionError(f"--port {port} has just been taken by another program; try again")
-    guard_widgets(server)
     # any tab could ask for a tunnel through a public relay
     server.request_share_url = lambda *_args, **_kwargs: None
     return server

@@ -15,8 +15,8 @@ from warpspace.analysis.blocks import Bars, Block, Table
 from warpspace.analysis.catalogue import Entry, entries
 from warpspace.analysis.description import Analysis, Change, Result
 from warpspace.analysis.options import Option
-from warpspace.app.browser.events import index_of
 from warpspace.app.browser.html import EMPTY, button, join, tag
+from warpspace.app.browser.incoming import index_of
 from warpspace.app.browser.page import error_words
 from warpspace.app.documents.services import CancelledError
 from warpspace.app.evaluation.applying import with_applied, with_proposal

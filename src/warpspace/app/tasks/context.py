@@ -1,7 +1,7 @@
-"""What the parts of one page share: its page, camera and state, and a queue for callbacks.
+"""What the parts of one page share: its page, camera and state, and queues for the session.
 
-A callback runs on a thread of viser's. It only takes note (`changed`, `post`, `act`); the one
-thread of the tab's session takes everything in.
+Other threads only take note (`take`, `post`, `act`); the one thread of the tab's session takes
+everything in.
 """
 
 import threading
@@ -11,9 +11,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from viser import ClientHandle, GuiApi, ViserServer
+from viser import ClientHandle, ViserServer
 
-from warpspace.app.browser.events import Event, Events, event_of
+from warpspace.app.browser.incoming import LONGEST_VALUE, Event, Events, event_of
 from warpspace.app.browser.page import Page
 from warpspace.app.documents.scene_file import SceneList
 from warpspace.app.documents.services import Services
@@ -27,6 +27,8 @@ from warpspace.app.viewport.moving import MovingLayer
 if TYPE_CHECKING:
     from warpspace.analysis.description import Result
     from warpspace.app.tasks.parts import Part
+
+MOST_FILES = 16  # that may wait for the session
 
 
 class Context:
@@ -42,7 +44,6 @@ class Context:
     ) -> None:
         self.client, self.page, self.camera = client, Page(server, client), TabCamera(client)
         self.events: deque[Event] = deque()
-        self.page.open(Events(client.gui, self._take_event))
         self.store, self.scenes, self.services = store, scenes, services
         self.shown: LivePicture | None = None
         self.stage: MovingLayer | None = None
@@ -57,11 +58,6 @@ class Context:
         self._wake = threading.Event()
         self._updates: deque[Update] = deque()
         self._actions: deque[Callable[[], None]] = deque()
-
-    @property
-    def gui(self) -> GuiApi:
-        """Widgets, private to this tab."""
-        return self.client.gui
 
     @property
     def state(self) -> AppState:
@@ -91,8 +87,13 @@ class Context:
         """Have the session look what there is to be done; returns at once."""
         self._wake.set()
 
-    def _take_event(self, event: Event) -> None:
-        self.events.append(event)
+    def take(self, message: Events) -> None:
+        """Take note of what the page says; returns at once."""
+        found = [event_of(*event) for event in message.events]
+        if len([*filter(_is_file, self.events), *filter(_is_file, found)]) > MOST_FILES:
+            self.notify("Not taken", f"more than {MOST_FILES} files at once; try again", "problem")
+            return
+        self.events.extend(found)
         self.changed()
 
     def changed(self) -> None:
@@ -102,7 +103,7 @@ class Context:
 
     def send(self, event: str, value: str = "") -> None:
         """Do what an event of the page does; returns at once."""
-        self._take_event(event_of(event, value))
+        self.take(Events([(event, value)]))
 
     def post(self, update: Update) -> None:
         """Queue a pure update of the state; returns at once."""
@@ -140,7 +141,6 @@ class Context:
         """Have the browser save a file."""
         data = content.encode() if isinstance(content, str) else content
         self.client.send_file_download(name, data, save_immediately=True)
-        self.client.flush()
 
     def look_from(self, memory: CameraMemory) -> None:
         """Put the camera somewhere with what is shown next."""
@@ -167,4 +167,7 @@ class Context:
         """Put the camera to a named view (the last one by default), or change its lens."""
         if self.shown is not None:
             self.camera.choose(self.shown, view, lens)
-            self.client.flush()
+
+
+def _is_file(event: Event) -> bool:
+    return len(event.value) > LONGEST_VALUE

@@ -12,7 +12,6 @@ from warpspace.analysis.blocks import Lines, Table
 from warpspace.analysis.catalogue import Entry
 from warpspace.analysis.description import Analysis, Result, Watch
 from warpspace.analysis.options import Option
-from warpspace.app.browser.events import index_of
 from warpspace.app.browser.html import (
     EMPTY,
     button,
@@ -26,6 +25,7 @@ from warpspace.app.browser.html import (
     upload_button,
 )
 from warpspace.app.browser.html import field as labelled
+from warpspace.app.browser.incoming import index_of
 from warpspace.app.browser.page import error_words
 from warpspace.app.documents.files import read_upload, upload_text
 from warpspace.app.evaluation.bench import chosen_test, plan_test

@@ -1,7 +1,7 @@
 """What a part of the page is: pieces of HTML that follow the picture, and what its events do.
 
 The server writes pieces into named places; the page sends back events, ``part:word`` with a value
-(`browser/events.py`). A part knows neither widgets nor threads, and no other part.
+(`browser/incoming.py`). A part knows neither widgets nor threads, and no other part.
 """
 
 from collections.abc import Mapping

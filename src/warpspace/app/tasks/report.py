@@ -5,8 +5,8 @@ from functools import partial
 from markupsafe import Markup
 
 from warpspace.analysis.description import Result
-from warpspace.app.browser.events import index_of
 from warpspace.app.browser.html import button, field, join, tag, text_box
+from warpspace.app.browser.incoming import index_of
 from warpspace.app.documents.files import has_sheet
 from warpspace.app.documents.services import Report
 from warpspace.app.evaluation.live_picture import LivePicture
