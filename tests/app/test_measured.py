@@ -109,7 +109,9 @@ def chosen(name, state=STATE, **options):
 @pytest.mark.parametrize("name", bench_names())
 def test_figure_and_path_follow_the_errors(name):
     column = Column(TestsPart, STATE)
+    depends = column.part.depends(LIVE.evaluate(column.state))
     column.do("choose", name)
+    assert column.part.depends(LIVE.evaluate(column.state)) != depends
     html = column.settle()
     result = column.part._answer[1]
     assert "<svg" in html

@@ -143,6 +143,9 @@ class TestsPart(FilesPart):
     def kind(self) -> type[BenchTest]:
         return chosen_test(self.context.state) or BenchTest
 
+    def question(self, state: AppState) -> Question:
+        return (*super().question(state), state.forms.get(TEST))
+
     def concerns(self, picture: LivePicture) -> tuple[object, ...]:
         return (self.question(picture.drawn_state), picture.is_difference, self._version)
 
@@ -180,6 +183,9 @@ class TestsPart(FilesPart):
         rms = found.rms_difference
         apart = EMPTY if rms is None else tag("p", f"RMS of measured − model: {number(rms)}")
         return apart + tag("p", found.model.plan.place, class_="ws-tiny")
+
+    def result_html(self, found: Result) -> Markup:
+        return join(map(block_html, (*found.blocks_of(Lines), *found.blocks_of(Table))))
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
         if word == "choose" and value in ("", *bench_names()):
