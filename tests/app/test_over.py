@@ -13,8 +13,9 @@ from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
 from warpspace.app.evaluation.resulting_scene import scene_of
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.comparison import NOBODY, Side
+from warpspace.app.state.tree import put
 from warpspace.app.tasks.controls import ComparePart, ControlsPart, chosen_map
-from warpspace.app.tasks.over import ComparedPart, HeadPart
+from warpspace.app.tasks.over import HeadPart
 from warpspace.app.viewport.camera import CameraSetup
 from warpspace.app.viewport.colours import colour_levels
 from warpspace.app.viewport.labels import axes, point_labels
@@ -119,17 +120,16 @@ def test_controls_set_what_is_coloured_and_how_the_machine_is_drawn():
 
 
 def test_comparing_is_shown_and_left_by_one_switch():
-    assert pieces(ComparedPart, START)["compared"] == ""
+    assert pieces(ComparePart, START)["compared"] == ""
     pinned = with_pin(START).with_amplitude("EXX", 9.0)
-    html = pieces(ComparedPart, pinned)["compared"]
+    html = pieces(ComparePart, pinned)["compared"]
     assert html.count('aria-pressed="true"') == 1
     part = lone_part(ComparePart)
     part.context.scenes = {}
     assert part.take(pinned, "leave", "").comparison.b is None
     assert part.take(pinned, "set.b", NOBODY).comparison.b is None
     assert part.take(pinned, "set.a", "no such scene") is pinned
-    assert part.take(pinned, "shown", "difference").comparison.shown == "difference"
-    change = replace(pinned, comparison=replace(pinned.comparison, shown="difference"))
+    change = put(pinned, "comparison.shown", "difference")
     head = pieces(HeadPart, change)
     assert "change: mean" in head["head"]
     assert "volume within" not in head["head"]
@@ -139,6 +139,6 @@ def test_comparing_is_shown_and_left_by_one_switch():
 def test_titles_are_escaped_wherever_they_lie_over_the_drawing():
     evil = replace(SCENE, title="<img src=x onerror=alert(1)>")
     state = with_sides(START, Side(), scene_side(evil))
-    for kind in (HeadPart, ComparedPart, ComparePart):
+    for kind in (HeadPart, ComparePart):
         html = "".join(pieces(kind, state).values())
         assert "<img" not in html

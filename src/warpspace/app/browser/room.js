@@ -127,7 +127,7 @@
       return { x, y, w: node.offsetWidth, h: node.offsetHeight };
     });
   const WAYS = [0, 25, -25, 50, -50, 80, -80, 120, -120].map(degrees => degrees * Math.PI / 180);
-  const FAR = [20, 34, 52, 76];
+  const FAR = [20, 34, 52, 76], BESIDE = [...FAR, 110, 150, 200, 260];
 
   const drawWords = (camera, world, rect) => {
     const home = part("words"), lines = part("leaders");
@@ -152,7 +152,7 @@
       const away = 3 + reach + (kind === "axis" ? beyond.get(axis) ?? 0 : 0);
       if (kind === "tick") beyond.set(axis, Math.max(beyond.get(axis) ?? 0, 2 * reach + 2));
       // a name that would lie on something is moved along its axis and further out
-      for (const along of kind === "axis" ? [0, 40, -40, 80, -80] : [0])
+      for (const along of kind === "axis" ? [0, 20, -20, 40, -40, 60, -60, 80, -80] : [0])
         for (const more of kind === "axis" ? [0, 14] : [0]) {
           const box = { x: p.x + u * (away + more) - v * along - w / 2,
             y: p.y + v * (away + more) + u * along - h / 2, w, h };
@@ -172,7 +172,8 @@
       const w = widthOf(text, kind === "worst"), h = 17;
       const own = Math.atan2(p.y - middle.y, p.x - middle.x);
       let best = null;
-      for (const far of FAR) for (const turn of WAYS) {
+      // the name of a path within the box would hide the map there
+      for (const far of kind === "name" ? BESIDE : FAR) for (const turn of WAYS) {
         const u = Math.cos(own + turn), v = Math.sin(own + turn);
         const box = { x: p.x + u * (far + w / 2) - w / 2, y: p.y + v * (far + h / 2) - h / 2, w, h };
         let cost = far + 12 * Math.abs(turn);

@@ -12,7 +12,7 @@ from warpspace.app.tasks.improve import BestPart
 from warpspace.app.tasks.machine import PositionsSection, RotarySection
 from warpspace.app.tasks.machine_editor import EditorSection, MachinesWindow
 from warpspace.app.tasks.measure import TestsPart
-from warpspace.app.tasks.over import ComparedPart, HeadPart, OrderPart, RoomPart
+from warpspace.app.tasks.over import HeadPart, OrderPart, RoomPart
 from warpspace.app.tasks.parts import Part
 from warpspace.app.tasks.report import ReportWindow
 from warpspace.app.tasks.tasks import TASKS, TasksPart
@@ -44,7 +44,6 @@ def build_parts(context: Context) -> list[Part]:
         HeadPart(context),
         OrderPart(context),
         ControlsPart(context),
-        ComparedPart(context),
         ComparePart(context),
         ErrorsPart(context),
         tasks,

@@ -6,6 +6,7 @@ from dataclasses import replace
 from markupsafe import Markup
 
 from warpspace.app.browser.html import (
+    EMPTY,
     button,
     choice,
     field,
@@ -24,16 +25,10 @@ from warpspace.app.browser.html import (
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
 from warpspace.app.evaluation.live_picture import Compared, LivePicture
-from warpspace.app.state.app_state import COMPONENT_NAMES, LOOP_NAMES, AppState
+from warpspace.app.state.app_state import COMPONENT_NAMES, AppState
 from warpspace.app.state.comparison import NOBODY, PRESENT, SHOWN, Side
-from warpspace.app.state.look import (
-    QUANTITIES,
-    RANGES,
-    SURFACES,
-    slice_positions,
-    slice_spans,
-)
-from warpspace.app.state.tree import leaves, put, value
+from warpspace.app.state.look import QUANTITIES, SURFACES, slice_positions
+from warpspace.app.state.tree import leaves, put, spell, value
 from warpspace.app.tasks.conventions import with_travel
 from warpspace.app.tasks.parts import Part
 from warpspace.kinematics.model import Loop
@@ -49,11 +44,32 @@ SWITCHES = (
 )  # fmt: skip
 
 
+def setting(state: AppState, path: str, *, shown: str = "", bar: bool = False) -> Markup:
+    """Give the control of a leaf of the state: a switch, a list, or a box, with a slider or not."""
+    leaf, at, name = leaves(state)[path], value(state, path), f"state:set.{path}"
+    if leaf.kind == "switch":
+        return switch(name, leaf.label, on=bool(at), hint=leaf.hint)
+    if leaf.kind == "choice":
+        return field(leaf.label, choice(name, str(at), leaf.choices), name, leaf.unit, leaf.hint)
+    shown = shown or f"{at:.6g}"
+    control = text_box(name, shown, size="short", inputmode="decimal")
+    if bar and leaf.span is not None:
+        span, words = leaf.span, f"{shown} {leaf.unit}"
+        control = slider(name, at, span.low, span.high, span.step, label=leaf.label, twin=name,
+                         text=words) + control  # fmt: skip
+    label = path.rpartition(".")[2] if bar else leaf.label
+    return field(label, control, name, leaf.unit, leaf.hint)
+
+
 def _picks(do: str, words: Mapping[str, object], chosen: str, prefix: str = "") -> Markup:
     return tag("div", join(
         button(text, do, prefix + key, pressed=prefix + key == chosen, kind="choice")
         for key, text in words.items()
     ), class_="ws-choices")  # fmt: skip
+
+
+def _leaf_picks(state: AppState, path: str) -> Markup:
+    return _picks(f"state:set.{path}", leaves(state)[path].choices, spell(state, path))
 
 
 def chosen_map(state: AppState) -> str:
@@ -70,7 +86,6 @@ class ControlsPart(Part):
     name = "controls"
 
     def depends(self, picture: LivePicture) -> tuple[object, ...]:
-        """Follow what the controls show."""
         state = picture.state
         return (picture.exaggeration, picture.scale.high, state.exaggeration, state.component,
                 Identity(state.look), Identity(state.shown), Identity(state.machine), state.loop,
@@ -78,61 +93,53 @@ class ControlsPart(Part):
                 self.context.camera.stand)  # fmt: skip
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
-        """Write them."""
-        state = picture.state
-        kept = self.context.camera.stand
-        views = tag("div", join(
-            button(words, "controls:view", key, pressed=kept.view == key, kind="choice")
-            for key, words in VIEWS.items()
-        ), class_="ws-choices")  # fmt: skip
-        lens = switch("controls:set.lens", "Orthographic", on=kept.orthographic,
+        stand = self.context.camera.stand
+        lens = switch("controls:set.lens", "Orthographic", on=stand.orthographic,
                       hint="Parallel edges stay parallel")  # fmt: skip
         triad = fill(
             '<svg data-piece="triad.axes" viewBox="-46 -46 92 92" aria-hidden="true"></svg>'
         )
+        menus = (_exaggeration(picture), _colours(picture), _surface(picture.state),
+                 _machine(picture.state))  # fmt: skip
         return {
-            "controls": join((_exaggeration(picture), _colours(picture), _surface(picture),
-                              _machine(state))),
-            "triad": menu(triad, views + lens, key="view", label="View from", kind="up",
+            "controls": join(menus),
+            "triad": menu(triad, _picks("controls:view", VIEWS, stand.view) + lens, key="view",
+                          label="View from", kind="up",
                           hint="The machine's axes; click to look from another side"),
         }  # fmt: skip
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
-        """Choose what is not one field of the state."""
         context = self.context
         if word == "map":
             quantity, _, component = value.partition(".")
-            look = replace(state.look, pass_fail=value == "limit")
             if value == "limit":
                 quantity, component = "position", "norm"
-            look = look.with_choice(quantity=quantity)
+            look = replace(state.look, pass_fail=value == "limit").with_choice(quantity=quantity)
             return put(replace(state, look=look), "component", component)
         if word == "machine" and value in MACHINES:
             machine = replace(state.machine, shown=value == "solid", ghost=value != "off")
             return replace(state, machine=machine)
         if word == "set.travel":
             return with_travel(state, value)
-        if word == "view" and value in VIEWS:
-            context.act(lambda: self._look(view=value))
-        if word == "set.lens":
-            context.act(lambda: self._look(lens=value == "1"))
+        view = value if word == "view" and value in VIEWS else None
+        lens = value == "1" if word == "set.lens" else None
+        if view is not None or lens is not None:
+            context.act(lambda: context.fit_view(view, lens))
+            context.act(lambda: context.renew(self))
         return state
-
-    def _look(self, view: str | None = None, *, lens: bool | None = None) -> None:
-        self.context.fit_view(view, lens)
-        self.context.renew(self)
 
 
 def _exaggeration(picture: LivePicture) -> Markup:
-    state, name = picture.state, "state:set.exaggeration"
+    state = picture.state
     factors = {"auto": "auto", **{str(n): spell_factor(n) for n in FACTORS}}
     chosen = "auto" if state.exaggeration is None else f"{state.exaggeration:g}"
-    box = text_box(name, f"{picture.exaggeration:.4g}", size="short")
-    hint = "How much larger than true the errors are drawn, 0.001 to 1 000 000"
     words = "true scale" if picture.exaggeration == 1.0 else spell_factor(picture.exaggeration)
+    name = "state:set.exaggeration"
+    box = text_box(name, f"{picture.exaggeration:.4g}", size="short")
     body = field("Errors drawn ×", box, name) + _picks(name, factors, chosen)
-    return menu(words, body, key="exaggeration", label=f"Exaggeration: {words}",
-                hint=hint, kind="up")  # fmt: skip
+    return menu(words, body, key="exaggeration", label=f"Exaggeration: {words}", kind="up",
+                hint="How much larger than true the errors are drawn, 0.001 to 1 000 000",
+                )  # fmt: skip
 
 
 def _colours(picture: LivePicture) -> Markup:
@@ -147,43 +154,26 @@ def _colours(picture: LivePicture) -> Markup:
             words = names[state.component]
     body.insert(2, _picks("controls:map", {"limit": limit}, chosen))
     top = look.range_top if look.range_mode == "fixed" else picture.scale.high
-    body += [
-        tag("h3", "Colour range"),
-        _picks("state:set.look.range_mode", RANGES, look.range_mode),
-        _typed(state, "look.range_top", f"{top:.4g}"),
-    ]
-    return menu(
-        words,
-        join(body),
-        key="map",
-        kind="up",
-        hint="What the colours mean",
-    )
+    body += [tag("h3", "Colour range"), _leaf_picks(state, "look.range_mode"),
+             setting(state, "look.range_top", shown=f"{top:.4g}")]  # fmt: skip
+    return menu(words, join(body), key="map", kind="up", hint="What the colours mean")
 
 
-def _typed(state: AppState, path: str, value: str) -> Markup:
-    leaf, name = leaves(state)[path], f"state:set.{path}"
-    return field(leaf.label, text_box(name, value, size="short"), name, leaf.unit, leaf.hint)
-
-
-def _switch(state: AppState, path: str) -> Markup:
-    leaf = leaves(state)[path]
-    return switch(f"state:set.{path}", leaf.label, on=bool(value(state, path)), hint=leaf.hint)
-
-
-def _surface(picture: LivePicture) -> Markup:
-    state, look = picture.state, picture.state.look
-    body = [_picks("state:set.look.surface", SURFACES, look.surface)]
-    if look.surface == "slices":
-        spans = slice_spans(state.scene)
-        for axis, at in slice_positions(state.scene, look, state.machine).items():
-            name, span = f"state:set.look.slices_mm.{axis}", spans[axis]
-            bar = slider(name, at, span.low, span.high, span.step, label=f"Slice at {axis}",
-                         twin=name)  # fmt: skip
-            body.append(field(axis, bar + text_box(name, f"{at:g}", size="short"), name, "mm"))
-        body.append(_switch(state, "look.follow"))
-    body += _more(state)
-    return menu(SURFACES[look.surface], join(body), key="surface", kind="up",
+def _surface(state: AppState) -> Markup:
+    body = [_leaf_picks(state, "look.surface")]
+    if state.look.surface == "slices":
+        axes = slice_positions(state.scene, state.look, state.machine)
+        body += [setting(state, f"look.slices_mm.{axis}", bar=True) for axis in axes]
+        body.append(setting(state, "look.follow"))
+    body += [tag("h3", "Shown too"), *(setting(state, path) for path in (*SWITCHES, "loop"))]
+    if state.loop is Loop.RELATIVE:
+        body.append(setting(state, "placed"))
+    direction, name = state.scene.model.direction, "controls:set.travel"
+    if state.scene.errors.has_directions or direction != TravelDirection.MEAN:
+        ways = {str(way): words for way, words in DIRECTION_WORDS.items()}
+        body.append(field("Direction of travel", choice(name, str(direction), ways), name))
+    body.append(setting(state, "nodes"))
+    return menu(SURFACES[state.look.surface], join(body), key="surface", kind="up",
                 hint="How the volume is drawn")  # fmt: skip
 
 
@@ -191,59 +181,43 @@ def _machine(state: AppState) -> Markup:
     look = state.machine
     chosen = "solid" if look.shown else "ghost" if look.ghost else "off"
     body = _picks("controls:machine", MACHINES, chosen)
-    if look.shown:
-        body += _switch(state, "machine.bent")
+    body += setting(state, "machine.bent") if look.shown else EMPTY
     return menu(f"machine: {chosen}", body, key="machine", kind="up",
                 hint="The machine around the volume")  # fmt: skip
-
-
-def _more(state: AppState) -> list[Markup]:
-    body = [tag("h3", "Shown too"), *(_switch(state, path) for path in SWITCHES)]
-    loop = leaves(state)["loop"]
-    chosen = choice("state:set.loop", str(state.loop), LOOP_NAMES)
-    body.append(field(loop.label, chosen, "state:set.loop", hint=loop.hint))
-    if state.loop is Loop.RELATIVE:
-        body.append(_switch(state, "placed"))
-    direction = state.scene.model.direction
-    if state.scene.errors.has_directions or direction != TravelDirection.MEAN:
-        ways = {str(way): words for way, words in DIRECTION_WORDS.items()}
-        travel = "controls:set.travel"
-        body.append(field("Direction of travel", choice(travel, str(direction), ways), travel))
-    body.append(_typed(state, "nodes", str(state.nodes)))
-    return body
 
 
 # --- Comparing ------------------------------------------------------------------------------------
 
 
 class ComparePart(Part):
-    """Which two are compared, and the numbers of both."""
+    """Which two are compared and which of them is drawn, and the numbers of both."""
 
     name = "compare"
+    follows = "at once"
 
     def depends(self, picture: LivePicture) -> tuple[object, ...]:
-        """Follow the comparison, its numbers, and the scenes there are."""
         return (Identity(picture.state.comparison), Identity(picture.compared),
                 *self.context.scenes)  # fmt: skip
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
-        """Write the menu."""
-        chosen, found = picture.state.comparison, picture.compared
-        known = {title: title for title in (*_own_sides(picture.state), *self.context.scenes)}
-        a, b = chosen.a.title, NOBODY if chosen.b is None else chosen.b.title
-        sides = {"a": (a, {PRESENT: PRESENT, **known}),
-                 "b": (b, {NOBODY: NOBODY, PRESENT: PRESENT, **known})}  # fmt: skip
+        state, found = picture.state, picture.compared
+        chosen = state.comparison
+        known = {title: title for title in (PRESENT, *_own_sides(state), *self.context.scenes)}
+        b = NOBODY if chosen.b is None else chosen.b.title
         body = [
-            field(side.upper(), choice(f"compare:set.{side}", title, words), f"compare:set.{side}")
-            for side, (title, words) in sides.items()
+            field(title, choice(name, side, words), name)
+            for title, name, side, words in (
+                ("A", "compare:set.a", chosen.a.title, known),
+                ("B", "compare:set.b", b, {NOBODY: NOBODY, **known}),
+            )
         ]
         body.append(button("Keep the present errors as A", "compare:pin",
                            hint="What is changed from then on is B"))  # fmt: skip
         if found is not None:
-            body.append(switch("compare:set.ghost", "Outline of the other one", on=chosen.ghost))
-            body.append(comparison_html(found))
+            body += [setting(state, "comparison.ghost"), comparison_html(found)]
         words = "compare" if found is None else SHOWN[found.shown]
-        return {"compare": menu(words, join(body), key="compare", kind="up wide",
+        return {"compared": "" if found is None else _sides(found),
+                "compare": menu(words, join(body), key="compare", kind="up wide",
                                 hint="Two scenes, or the errors before and after")}  # fmt: skip
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
@@ -251,19 +225,13 @@ class ComparePart(Part):
         chosen = state.comparison
         if word == "pin":
             return with_pin(state)
-        if word == "shown":
-            return put(state, "comparison.shown", value)
-        if word == "leave":
-            return replace(state, comparison=chosen.off())
-        if word == "set.ghost":
-            return replace(state, comparison=replace(chosen, ghost=value == "1"))
-        if word == "set.a":
-            side = self._side(state, value)
-            return state if side is None else with_sides(state, side, chosen.b or Side())
-        if word == "set.b":
-            side = self._side(state, value)
-            return state if side is None and value != NOBODY else with_sides(state, chosen.a, side)
-        return state
+        if word == "leave" or (word == "set.b" and value == NOBODY):
+            return with_sides(state, chosen.a, None)
+        side = self._side(state, value)
+        if side is None or word not in ("set.a", "set.b"):
+            return state
+        a, b = (side, chosen.b or Side()) if word == "set.a" else (chosen.a, side)
+        return with_sides(state, a, b)
 
     def _side(self, state: AppState, title: str) -> Side[AppState] | None:
         if title == PRESENT:
@@ -279,6 +247,20 @@ def _own_sides(state: AppState) -> dict[str, Side[AppState]]:
     chosen = state.comparison
     used = (chosen.pinned, chosen.a, chosen.b)
     return {side.title: side for side in used if side is not None and side.state is not None}
+
+
+def _sides(found: Compared) -> Markup:
+    """Give the switch that lies over the drawing while two are compared."""
+    change = found.refused or "The change from A to B, node by node, with colours of its own"
+    hints = {"a": found.titles[0], "b": found.titles[1], "difference": change}
+    choices = (
+        button(words, "state:set.comparison.shown", key, kind="chip", hint=hints[key],
+               pressed=found.shown == key, disabled=bool(found.refused) and key == "difference")
+        for key, words in SHOWN.items()
+    )  # fmt: skip
+    leave = button("✕", "compare:leave", kind="chip", hint="End the comparison",
+                   aria_label="End the comparison")  # fmt: skip
+    return tag("div", join((*choices, leave)), role="group", aria_label="What is drawn")
 
 
 ROWS = {"mean": "mean_um", "RMS": "rms_um", "P95": "p95_um", "max": "max_um"}
@@ -297,7 +279,7 @@ def comparison_html(found: Compared) -> Markup:
         )))  # fmt: skip
     head = join(tag("th", words) for words in (
         "µm", "A", "B", "change", lowered("|E_B − E_A|")))  # fmt: skip
-    titles = rows([("A", found.titles[0]), ("B", found.titles[1])], kind="ws-titles")
+    titles = rows(zip("AB", found.titles, strict=True), kind="ws-titles")
     note = found.refused or "change: B − A of each number. |E_B − E_A|: node by node."
     return (
         titles

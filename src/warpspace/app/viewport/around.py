@@ -35,7 +35,10 @@ RESIDUALS = {True: (138, 143, 152), False: (47, 116, 192)}
 """Before the calibration, and after; those of the chart."""
 MOST_RESIDUALS = 400
 HEAD_PART = 0.7  # longest head, as a part of its arrow
-STROKES, SLANT = 8, 0.3  # of a head: how many, and how far they stand away, as a part of its length
+STROKES, SLANT = (
+    12,
+    0.3,
+)  # of a head: how many, and how far they stand away, as a part of its length
 
 
 def around(picture: LivePicture) -> Shapes:
@@ -125,7 +128,7 @@ def _marks(picture: LivePicture) -> Shapes:
         start, end = (
             at.reshape(-1, 3)[chosen] for at in (picture.grid.nominal_mm, picture.drawn_mm)
         )
-        shapes["/marks/arrows"] = lines(arrows(start, end, HEAD * size), colour, 2.0)
+        shapes["/marks/arrows"] = lines(arrows(start, end, HEAD * size), colour, 1.5)
     worst = worst_node(picture)
     if look.worst and picture.values.flat[worst]:
         at = picture.drawn_mm.reshape(-1, 3)[worst]

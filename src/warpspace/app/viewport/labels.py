@@ -124,7 +124,12 @@ def _spell(value: float, unit: str = MICROMETRE) -> str:
 
 def point_labels(picture: LivePicture) -> list[Label]:
     """Give what is written beside points of the volume, what matters most first."""
-    return [*_worst(picture), *_asked(picture), *_names(picture), *_corners(picture)]
+    worst, asked = [*_worst(picture)], [*_asked(picture)]
+    for one, other in zip(worst, asked, strict=False):
+        apart = np.linalg.norm(one.at_mm - other.at_mm)
+        if apart < TICK * picture.size_mm and other.text.startswith(one.text.removeprefix("max ")):
+            worst = []  # one place, said once
+    return [*worst, *asked, *_names(picture), *_corners(picture)]
 
 
 def _worst(picture: LivePicture) -> Iterator[Label]:
