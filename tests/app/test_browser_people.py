@@ -180,7 +180,7 @@ def test_a_screen_reader_finds_landmarks_headings_and_names(tab):
                                            state="attached")  # fmt: skip
             tab.page.evaluate(UNFOLD)
             assert serious(tab) == [], task
-        for window in ("scenes", "files", "report", "help", "palette", "share", "machines"):
+        for window in ("scenes", "files", "report", "help", "machines"):
             tab.send("page:open", window)
             tab.page.wait_for_selector(f"[data-key=window-{window}]")
             assert serious(tab) == [], window

@@ -215,7 +215,7 @@ def test_cancelling_frees_the_place_at_once_and_what_a_job_raises_is_handed_over
 def test_what_is_made_for_a_page_that_has_gone_is_given_up():
     begun, given_up = threading.Event(), threading.Event()
 
-    def draw(_, cancelled):
+    def draw(_picture, _figure, cancelled):
         begun.set()
         if cancelled.wait(10):
             given_up.set()

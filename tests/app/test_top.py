@@ -12,11 +12,17 @@ from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.resulting_scene import scene_of
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.store import StateStore
-from warpspace.app.tasks.commands import COMMANDS, PaletteWindow, key_events
-from warpspace.app.tasks.files import FilesWindow, ShareWindow
+from warpspace.app.tasks.files import FilesWindow, ReportWindow
 from warpspace.app.tasks.importing import ImportWindow
-from warpspace.app.tasks.report import ReportWindow
-from warpspace.app.tasks.top import PagePart, ScenesWindow, StatePart, TopPart
+from warpspace.app.tasks.top import (
+    COMMANDS,
+    HelpWindow,
+    PagePart,
+    ScenesWindow,
+    StatePart,
+    TopPart,
+    key_events,
+)
 from warpspace.exceptions import SceneError
 from warpspace.scene.library import load_scene
 
@@ -43,7 +49,7 @@ class Window:
                 is_open=True, tell=lambda **_: None, call=lambda *what: self.called.append(what)
             ),
             camera=SimpleNamespace(remember=lambda: None), fit_view=lambda: None,
-            client=SimpleNamespace(flush=lambda: None),
+            client=SimpleNamespace(flush=lambda: None), closed=lambda: None,
         )  # fmt: skip
         self.part = kind(self.context)
 
@@ -89,10 +95,10 @@ def test_every_key_is_there_once_and_none_without_ctrl_changes_the_model():
             assert scene_of(replace(after, exaggeration=None)) == before, command.label
 
 
-def test_the_palette_finds_by_words_and_runs_the_first():
-    window = Window(PaletteWindow)
+def test_commands_are_found_by_words_and_enter_runs_the_first():
+    window = Window(HelpWindow)
     window.do("find", "zero err")
-    assert window.html.count('data-do="palette:run"') == 1
+    assert window.html.count('data-do="help:run"') == 1
     window.do("first", "whatever")
     assert window.sent == [("page:zero", "")]
     window.do("run", HOSTILE)
@@ -140,11 +146,12 @@ def test_a_link_says_what_it_holds_and_asks_before_it_holds_the_token():
     assert (name, token) == ("share", None)
     assert "1 changed error" in words
     asking = Window(FilesWindow, services=Services(token="secret"))
-    assert asking.do("share").page.window == "share"
+    assert asking.do("share").page.window == "files"
     assert asking.called == []
     asking.do("share", "token")
     assert asking.called[-1][2] == "secret"
-    assert "secret" not in Window(ShareWindow).html
+    assert "Copy link with token" in asking.html
+    assert "secret" not in asking.html
 
 
 def test_files_that_a_page_refuses_or_invents_are_said_or_left():

@@ -1,12 +1,11 @@
 """The parts that a page consists of, in the order in which they are written."""
 
 from warpspace.app.tasks.analysis import sections
-from warpspace.app.tasks.commands import HelpWindow, PaletteWindow
 from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.controls import ComparePart, ControlsPart
 from warpspace.app.tasks.conventions import ConventionsSection
 from warpspace.app.tasks.errors import ErrorsPart
-from warpspace.app.tasks.files import FilesWindow, ShareWindow
+from warpspace.app.tasks.files import FilesWindow, ReportWindow
 from warpspace.app.tasks.importing import ImportSection, ImportWindow
 from warpspace.app.tasks.improve import BestPart
 from warpspace.app.tasks.machine import PositionsSection, RotarySection
@@ -14,9 +13,8 @@ from warpspace.app.tasks.machine_editor import EditorSection, MachinesWindow
 from warpspace.app.tasks.measure import TestsPart
 from warpspace.app.tasks.over import HeadPart, OrderPart, RoomPart
 from warpspace.app.tasks.parts import Part
-from warpspace.app.tasks.report import ReportWindow
 from warpspace.app.tasks.tasks import TASKS, TasksPart
-from warpspace.app.tasks.top import PagePart, ScenesWindow, StatePart, TopPart
+from warpspace.app.tasks.top import HelpWindow, PagePart, ScenesWindow, StatePart, TopPart
 from warpspace.app.tasks.understand import VolumePart, WorstPart
 
 FIRST = ("compensate", "concepts", "allocate")
@@ -55,10 +53,8 @@ def build_parts(context: Context) -> list[Part]:
         ScenesWindow(context),
         MachinesWindow(context),
         FilesWindow(context),
-        ShareWindow(context),
         ImportSection(context),
         ImportWindow(context),
         ReportWindow(context),
-        PaletteWindow(context),
         HelpWindow(context),
     ]

@@ -1,4 +1,4 @@
-"""Files of a page: scenes and data that are opened, scenes, links, pictures and exports."""
+"""Files of a page: scenes and data that are opened; scenes, links, pictures, exports, reports."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -8,12 +8,15 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from warpspace.app.browser.html import button, choice, field, join, tag
+from warpspace.analysis.description import Result
+from warpspace.app.browser.html import button, choice, field, join, tag, text_box
+from warpspace.app.browser.incoming import index_of
 from warpspace.app.browser.page import error_words
 from warpspace.app.documents import scene_file
 from warpspace.app.documents.files import (
     exported_words,
     file_stem,
+    has_sheet,
     pack,
     read_upload,
     robot_text,
@@ -21,7 +24,7 @@ from warpspace.app.documents.files import (
     unpack,
     upload_text,
 )
-from warpspace.app.documents.services import CancelledError, Shot
+from warpspace.app.documents.services import CancelledError, Report, Shot
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
@@ -34,7 +37,8 @@ from warpspace.app.viewport.camera import CameraMemory
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.formats.registry import formats
 
-FIGURE_S, VIEW_S, EXPORT_S = 5.0, 4.0, 1.0  # what a file usually takes
+FIGURE_S, VIEW_S, EXPORT_S, REPORT_S = 5.0, 4.0, 1.0, 12.0  # what a file usually takes
+LONGEST = 4000  # characters of what is set in a window
 RENDER_TIMEOUT_S = 30.0
 VIEW_PX = 64, 4096
 AS_COLOURED = "as the drawing is coloured"
@@ -53,6 +57,7 @@ class JobWindow(Window):
     def __init__(self, context: Context) -> None:
         super().__init__(context)
         self._jobs = Jobs(context, self.name, lambda: context.renew(self), self._failed)
+        self.said: dict[str, str] = dict.fromkeys(("figure", "author", "questions"), "")
 
     def make(
         self,
@@ -82,6 +87,9 @@ class JobWindow(Window):
     def take(self, state: AppState, word: str, value: str) -> AppState:
         if word == "cancel":
             self._jobs.cancel()
+        elif word.startswith("set.") and word[4:] in self.said:
+            self.said[word[4:]] = value[:LONGEST]
+            self.context.act(partial(self.context.renew, self))
         return state
 
     def _failed(self, name: str, error: Exception) -> None:
@@ -96,21 +104,26 @@ class FilesWindow(JobWindow):
 
     name, title = "files", "Save and export"
 
-    def __init__(self, context: Context) -> None:
-        super().__init__(context)
-        self._figures = {name: name.replace("-", " ") for name, _ in context.services.figures}
-        self._figure = ""
-
     def body(self, picture: LivePicture) -> Markup:
-        kinds = choice("files:set.figure", self._figure, {"": AS_COLOURED, **self._figures})
+        services = self.context.services
+        figures = {"": AS_COLOURED, **{one: one.replace("-", " ") for one, _ in services.figures}}
+        kinds = choice("files:set.figure", self.said["figure"], figures)
         exports = (
             button(f"{end[1:].upper()}", "files:export", end, hint=words)
-            for end, words in self.context.services.exports
+            for end, words in services.exports
         )
+        link = (
+            tag("h3", "Link"),
+            tag("p", "This app asks for a token. A link without it opens for those who have the"
+                " token; a link with it lets whoever has the link use this app."),
+            actions(button("Copy link", "files:share", "plain"),
+                    button("Copy link with token", "files:share", "token")),
+        )  # fmt: skip
         return join((
             tag("h3", "Scene"),
             tag("p", "Errors, tolerances and machine as they are now, with view and camera."),
             actions(button("Save scene (TOML)", "files:save", kind="main", hint="Ctrl+S")),
+            *(link if services.token else ()),
             tag("h3", "Picture"), tag("p", exported_words(picture), class_="ws-quiet"),
             actions(button("Save what is on the screen (PNG)", "files:view")),
             field("Figure", kinds, "files:set.figure"),
@@ -124,16 +137,13 @@ class FilesWindow(JobWindow):
     def take(self, state: AppState, word: str, value: str) -> AppState:
         services = self.context.services
         if word == "share" and services.token and not value:
-            return replace(state, page=replace(state.page, window="share"))
-        if word == "set.figure":
-            self._figure = value if value in self._figures else ""
-            self.context.act(partial(self.context.renew, self))
+            return replace(state, page=replace(state.page, window=self.name))
         doing: dict[str, Callable[[], None]] = {
             "file": partial(self._open, value),
             "save": self._save,
             "share": partial(self._share, with_token=value == "token"),
             "link": partial(self._follow, value),
-            "figure": partial(self._draw, self._figure),
+            "figure": self._draw,
             "view": self._view,
             "page": self._page,
             "export": partial(self._export, value),
@@ -188,7 +198,10 @@ class FilesWindow(JobWindow):
         scenes, camera = context.scenes.fixed, context.camera.remember()
         link = self._alone_if_large(lambda one: scene_file.state_to_link(one, camera, scenes))
         token = context.services.token if with_token else None
-        held = ", ".join(_held(context.state))
+        edited = len(context.state.changed_keys)
+        edits = f" {edited} changed error{'s' if edited > 1 else ''}," if edited else ""
+        compared = " the comparison," if context.state.comparison.b is not None else ""
+        held = f"the scene {context.state.scene.title},{edits}{compared} view and camera"
         warned = " Whoever has it can use this app." if token else ""
         context.page.call("share", pack(link), token, f"It holds {held}.{warned}")
         context.client.flush()
@@ -204,8 +217,9 @@ class FilesWindow(JobWindow):
             self.context.notify("Without the comparison", str(error), "warning")
             return text
 
-    def _draw(self, kind: str) -> None:
-        draw = self.context.services.draw_figure
+    def _draw(self) -> None:
+        draw, kind = self.context.services.draw_figure, self.said["figure"]
+        kind = kind if kind in dict(self.context.services.figures) else ""
         ending = f"_{kind or 'figure'}.png"
         self.make("Figure", ending, FIGURE_S, lambda picture, job: draw(picture, kind, job))
 
@@ -241,16 +255,6 @@ class FilesWindow(JobWindow):
                       lambda picture, _: services.write_export(picture, ending))  # fmt: skip
 
 
-def _held(state: AppState) -> list[str]:
-    edited = len(state.changed_keys)
-    return [
-        f"the scene {state.scene.title}",
-        *([f"{edited} changed {'error' if edited == 1 else 'errors'}"] if edited else []),
-        *(["the comparison"] if state.comparison.b is not None else []),
-        "view and camera",
-    ]
-
-
 def without_tables(picture: LivePicture) -> LivePicture:
     """Give a picture without the tables of a controller, which files do not hold."""
     if not drawn_tables(picture.state):
@@ -258,17 +262,74 @@ def without_tables(picture: LivePicture) -> LivePicture:
     return PLAIN.evaluate(without_table(picture.state))
 
 
-class ShareWindow(Window):
-    """Asks whether a link is to hold the token, where the app asks for one."""
+# --- The report -----------------------------------------------------------------------------------
 
-    name, title = "share", "Share a link"
+ALWAYS = (
+    "the verdict with the limit, and the error map",
+    "statistics, sections and slices of the volume",
+    "the contribution of each error at the worst point",
+    "the adjustments that help most",
+    "errors, tolerances, and the errors that the tolerances allow",
+    "error gains, conventions, provenance",
+)
+
+
+class ReportWindow(JobWindow):
+    """Writes the design review of what is drawn."""
+
+    name, title = "report", "Report"
 
     def body(self, picture: LivePicture) -> Markup:
-        words = (
-            "This app asks for a token. A link without it opens for those who have the token;"
-            " a link with it lets whoever has the link use this app."
+        found = picture.compared
+        subject = (
+            f"It compares A, {found.titles[0]}, with B, {found.titles[1]}."
+            if found is not None and has_sheet(picture)
+            else f"It is about {picture.title}, as drawn now."
         )
-        return tag("p", words) + actions(
-            button("Copy link", "files:share", "plain", kind="main"),
-            button("Copy link with token", "files:share", "token"),
-        )
+        limit = f"{picture.state.specification.limit_um:g} µm"
+        author = text_box("report:set.author", self.said["author"], placeholder="Name")
+        questions = tag("textarea", self.said["questions"], class_="ws-box",
+                        id="ws-report-set-questions", data_set="report:set.questions",
+                        placeholder="One per line")  # fmt: skip
+        put = [
+            tag("li", join((f"{title} ", button("remove", "report:remove", index, kind="link"))))
+            for index, (title, _) in enumerate(self.context.reported)
+        ]
+        hint = "More results are added with the button “Add to report” below each of them."
+        return join((
+            tag("p", f"{subject} Limit: {limit}."),
+            field("Author", author, "report:set.author"),
+            field("Open questions", questions, "report:set.questions"),
+            actions(button("Write HTML", "report:write", ".html", kind="main",
+                           hint="One page with a rotatable view; needs no network"),
+                    button("Write PDF", "report:write", ".pdf", hint="For paper")),
+            self._jobs.html(),
+            tag("h3", "Contents"),
+            tag("ul", join((*(tag("li", words) for words in ALWAYS), *put))),
+            tag("p", hint, class_="ws-quiet"),
+        ))  # fmt: skip
+
+    def take(self, state: AppState, word: str, value: str) -> AppState:
+        if word == "remove":
+            index = index_of(value, len(self.context.reported))
+            if index is not None:
+                del self.context.reported[index]
+                self.context.act(partial(self.context.renew, self))
+        elif word == "write" and value in (".html", ".pdf"):
+            self.context.act(partial(self._write, value))
+        return super().take(state, word, value)
+
+    def _write(self, ending: str) -> None:
+        results: dict[str, Result] = {}
+        for index, (title, found) in enumerate(self.context.reported):
+            results[f"{title} ({index + 1})" if title in results else title] = found
+        questions = tuple(filter(None, map(str.strip, self.said["questions"].splitlines())))
+        about = Report(self.said["author"].strip(), questions, results, ending)
+
+        def write(picture: LivePicture, job: Job) -> bytes:
+            content, missing = self.context.services.write_report(picture, about, job)
+            if missing and not job.is_set():
+                self.context.notify("Some figures are missing", "\n".join(missing), "warning")
+            return content
+
+        self.make("Report", f"_report{ending}", REPORT_S, write)

@@ -1,19 +1,18 @@
-"""The bar at the top, the scenes, and what all parts share: what is set, undone, opened, closed."""
+"""The bar at the top, the scenes, all commands with their keys, and what all parts share."""
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import partial
 
 from markupsafe import Markup
 
-from warpspace.app.browser.html import EMPTY, button, join, tag, upload_button
-from warpspace.app.evaluation.cache import Identity
+from warpspace.app.browser.html import EMPTY, button, join, rows, tag, text_box, upload_button
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.ranges import Exclusions
 from warpspace.app.state.store import change_words
 from warpspace.app.state.tree import put, toggled
-from warpspace.app.tasks.commands import key_events
 from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.files import accepted_endings
 from warpspace.app.tasks.parts import Part
@@ -28,12 +27,7 @@ class StatePart(Part):
 
     name = "state"
 
-    def is_seen(self, state: AppState) -> bool:
-        """Give no: it shows nothing itself."""
-        return False
-
     def take(self, state: AppState, word: str, value: str) -> AppState:
-        """Set it, within its range."""
         return put(state, word.removeprefix("set."), value)
 
 
@@ -42,14 +36,7 @@ class TopPart(Part):
 
     name = "top"
 
-    def depends(self, picture: LivePicture) -> tuple[object, ...]:
-        """Follow the scene, and what can be undone."""
-        history = self.context.store.history
-        return (Identity(picture.state.origin), tuple(self.context.scenes), history.undoes,
-                history.redoes)  # fmt: skip
-
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
-        """Write the bar."""
         history = self.context.store.history
         travel = (
             button(sign, f"page:{word.lower()}", kind="quiet", aria_label=word, data_key=word,
@@ -82,13 +69,8 @@ class ScenesWindow(Window):
 
     name, title = "scenes", "Choose a scene"
 
-    def depends(self, picture: LivePicture) -> tuple[object, ...]:
-        """Follow the list, and which one is shown."""
-        return (Identity(picture.state.origin), tuple(self.context.scenes))
-
     def body(self, picture: LivePicture) -> Markup:
-        """List them."""
-        rows = (
+        found = (
             tag("button", join((
                 tag("b", title),
                 tag("small", scene.machine.title) if scene.machine.title != title else EMPTY,
@@ -98,14 +80,14 @@ class ScenesWindow(Window):
             for title, scene in self.context.scenes.items()
         )  # fmt: skip
         words = "A file is opened with Open at the top, or dropped anywhere on the page."
-        return tag("div", join(rows), class_="ws-list", data_list=True) + tag(
+        return tag("div", join(found), class_="ws-list", data_list=True) + tag(
             "p", words, class_="ws-quiet"
         )
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
-        """Show another scene; what is chosen again is reset."""
         if word != "choose" or value not in self.context.scenes:
             return state
+        # what is chosen again is reset
         return self.closed(replace(state.with_scene(self.context.scenes[value]), page=state.page))
 
 
@@ -114,6 +96,126 @@ def _first_sentence(text: str) -> str:
     if len(found) > LONGEST_SENTENCE:
         found = re.split(r":| \(", found, maxsplit=1)[0]
     return found if len(found) <= LONGEST_SENTENCE else f"{found[:LONGEST_SENTENCE]} …"
+
+
+# --- All commands in one table: the page's keys, and the help ------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """Something that a key or the palette does: an event of the page, with its value."""
+
+    label: str
+    event: str
+    value: str = ""
+    keys: tuple[str, ...] = ()  # as page.js spells them, the usual one first
+
+    @property
+    def spelt(self) -> str:
+        """Spell its usual keys for people."""
+        if not self.keys:
+            return ""
+        *held, key = self.keys[0].split("+")
+        return "+".join((*(word.capitalize() for word in held), key.upper()))
+
+
+# What changes the model needs a modifier. A S D Q E belong to viser's camera.
+COMMANDS = (
+    Command("Undo", "page:undo", keys=("ctrl+z",)),
+    Command("Redo", "page:redo", keys=("ctrl+shift+z", "ctrl+y")),
+    Command("Open a file", "upload", "files", ("ctrl+o",)),
+    Command("Choose a scene", "page:open", "scenes"),
+    Command("Save the scene", "files:save", keys=("ctrl+s",)),
+    Command("Save and export", "page:open", "files"),
+    Command("Copy a link to what is shown", "files:share"),
+    Command("Write a report", "page:open", "report"),
+    Command("Find an error", "find", keys=("/",)),
+    Command("Fit the view", "page:fit", keys=("f",)),
+    Command("Component: length of the error", "state:set.component", "norm", ("1",)),
+    Command("Component: along x", "state:set.component", "x", ("2",)),
+    Command("Component: along y", "state:set.component", "y", ("3",)),
+    Command("Component: along z", "state:set.component", "z", ("4",)),
+    Command("Exaggeration: automatic", "state:set.exaggeration", "auto", ("x",)),
+    Command("Exaggeration: true scale", "state:set.exaggeration", "1", ("t",)),
+    Command("Grid lines on or off", "page:toggle", "grid_lines", ("g",)),
+    Command("Nominal box on or off", "page:toggle", "ghost", ("b",)),
+    Command("Rotary traces on or off", "page:toggle", "traces", ("c",)),
+    Command("Dark or light page", "page:toggle", "dark", ("m",)),
+    Command("Set all errors to zero", "page:zero", keys=("ctrl+alt+0",)),
+    Command("Reset all errors to the scene", "page:reset", keys=("ctrl+alt+r",)),
+    Command("Include all errors again", "page:include", keys=("ctrl+alt+l",)),
+    Command("Help, and all commands", "page:open", "help", ("ctrl+k", "h", "?", "shift+?")),
+    Command("First steps", "page:tour"),
+)
+
+
+def key_events() -> Mapping[str, str]:
+    """Give the event, and its value, that the page sends for each key."""
+    return {key: f"{one.event}={one.value}".rstrip("=") for one in COMMANDS for key in one.keys}
+
+
+FIRST_HELP = (
+    ("Turn, move, zoom", "drag, drag with the right button, wheel"),
+    ("Why is a point off", "click it on the volume"),
+    ("Type an exact number", "type digits while a slider has the focus"),
+    ("Next control, press it", "Tab, then Enter or Space"),
+    ("Fly through the drawing", "A S D Q E"),
+)
+MEANINGS = (
+    ("Solid box", "the working volume, each point moved by its error × exaggeration"),
+    ("Dashed box", "the nominal working volume, without errors"),
+    ("Exaggeration", "how much larger than true errors are drawn; numbers stay true"),
+    ("Colours", "the error, or its part along x, y or z, in the unit of the colour bar"),
+    ("Error", "actual − nominal; a correction has the opposite sign"),
+    ("Mean, P95, max", "of the length of the error over the whole working volume"),
+)
+
+
+class HelpWindow(Window):
+    """All commands, found by their words; what the mouse does, and what is drawn."""
+
+    name, title = "help", "Help"
+    _query = ""
+
+    def is_seen(self, state: AppState) -> bool:
+        if not super().is_seen(state):
+            self._query = ""
+        return super().is_seen(state)
+
+    def _found(self) -> list[Command]:
+        words = self._query.lower().split()
+        return [one for one in COMMANDS if all(word in one.label.lower() for word in words)]
+
+    def body(self, picture: LivePicture) -> Markup:
+        box = text_box("help:find", self._query, label="Find a command", data_enter="help:first",
+                       placeholder="Find a command", live=True, autofocus=True)  # fmt: skip
+        found = join(
+            tag("button", tag("kbd", one.spelt) + one.label, type="button", data_do="help:run",
+                data_value=one.label)
+            if ":" in one.event else tag("p", tag("kbd", one.spelt) + one.label)
+            for one in self._found()
+        )  # fmt: skip
+        scene = picture.state.scene
+        about = " ".join(scene.description.split())
+        return join((
+            tag("div", box + tag("div", found, class_="ws-list"), data_list=True),
+            tag("h3", "Mouse and keyboard"), rows(FIRST_HELP, "ws-keys"),
+            tag("h3", "What is drawn"), rows(MEANINGS, "ws-keys"),
+            tag("p", "Keys act everywhere except in a text box. After a dropped connection the tab"
+                " finds its state again for ten minutes.", class_="ws-quiet"),
+            *((tag("h3", scene.title), tag("p", about)) if about else ()),
+        ))  # fmt: skip
+
+    def take(self, state: AppState, word: str, value: str) -> AppState:
+        if word == "find":
+            self._query = value[:80]
+            self.context.act(partial(self.context.renew, self))
+        found = [one for one in self._found() if ":" in one.event]
+        runs = found[:1] if word == "first" else [one for one in found if one.label == value]
+        if word not in ("first", "run") or not runs:
+            return state
+        self.context.send(runs[0].event, runs[0].value)
+        return self.closed(state)
 
 
 class PagePart(Part):
@@ -126,49 +228,36 @@ class PagePart(Part):
         super().__init__(context)
         context.page.tell(keys=key_events())
 
-    def depends(self, picture: LivePicture) -> tuple[object, ...]:
-        """Follow the window that is open."""
-        return (picture.state.page.window,)
-
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
-        """Take the window away where none is open; its own part fills it."""
+        # the part of a window that is open fills it
         return {} if picture.state.page.window else {"window": ""}
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
-        """Do it."""
-        if word == "task":
-            return put(state, "page.task", value)
-        if word == "fold":
-            return toggled(state, "page.open", value)
-        if word == "open":
-            return put(state, "page.window", value)
-        if word == "close":
-            self.context.act(self.context.closed)
-            return put(state, "page.window", "")
-        if word == "toggle" and isinstance(on := getattr(state.shown, value, None), bool):
-            return replace(state, shown=replace(state.shown, **{value: not on}))
-        if word == "include":
-            return replace(state, exclusions=Exclusions())
-        if word in ("zero", "reset"):
-            return state.zeroed() if word == "zero" else state.reset()
+        context = self.context
         actions: dict[str, Callable[[], None]] = {
-            "undo": self._undo,
-            "redo": self._redo,
-            "fit": self.context.fit_view,
-            "tour": lambda: self.context.page.call("tour", True),
+            "undo": partial(self._travel, "Undone", context.store.undo),
+            "redo": partial(self._travel, "Done again", context.store.redo),
+            "fit": context.fit_view,
+            "tour": partial(context.page.call, "tour", True),
+            "close": context.closed,
         }
         if word in actions:
-            self.context.act(actions[word])
-        if word == "tour":
-            return put(state, "page.window", "")
-        return state
+            context.act(actions[word])
+        updates: dict[str, Callable[[], AppState]] = {
+            "task": partial(put, state, "page.task", value),
+            "fold": partial(toggled, state, "page.open", value),
+            "open": partial(put, state, "page.window", value),
+            "close": partial(put, state, "page.window", ""),
+            "tour": partial(put, state, "page.window", ""),
+            "include": partial(replace, state, exclusions=Exclusions()),
+            "zero": state.zeroed,
+            "reset": state.reset,
+        }
+        if word == "toggle" and isinstance(on := getattr(state.shown, value, None), bool):
+            return replace(state, shown=replace(state.shown, **{value: not on}))
+        return updates[word]() if word in updates else state
 
-    def _undo(self) -> None:
-        self._say("Undone", self.context.store.undo())
-
-    def _redo(self) -> None:
-        self._say("Done again", self.context.store.redo())
-
-    def _say(self, done: str, what: str) -> None:
+    def _travel(self, done: str, travel: Callable[[], str]) -> None:
+        what = travel()
         words = f"{done}: {change_words(what)}" if what else f"Nothing to be {done.lower()}"
         self.context.notify(words)
