@@ -118,5 +118,6 @@ def test_the_table_turns_until_the_page_is_left(tab):
     tab.until(lambda: tab.drawn("/rotation/actual") is None)
     turn.click()
     tab.until(lambda: stage.playing)
+    worker = tab.session._worker
     tab.page.goto("about:blank")
-    tab.until(lambda: not stage.playing)
+    tab.until(lambda: not worker.is_alive())

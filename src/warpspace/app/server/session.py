@@ -138,8 +138,6 @@ class Session:
         """End the worker; nothing is sent any more."""
         self._stopped.set()
         self.context.wake()
-        if self.context.stage is not None:
-            self.context.stage.stop()
         self.context.store.unsubscribe(self.context.changed)
 
     def rename(self, token: str) -> None:
@@ -169,10 +167,14 @@ class Session:
 
     def _turn(self) -> None:
         left = None if self._around_at is None else max(0.0, self._around_at - time.monotonic())
-        waits = [wait for wait in (self.display.pause_s, left) if wait is not None]
+        stage = self.context.stage
+        turns = None if stage is None else stage.wait_s
+        waits = [wait for wait in (self.display.pause_s, left, turns) if wait is not None]
         changed = self.context.wait(min(waits, default=None))
         if changed and not self._stopped.is_set():
             self._guarded(self._follow)
+        if stage is not None and stage.wait_s == 0.0:
+            self._guarded(stage.turn)
         picture = self.context.shown
         if picture is None:
             return
@@ -217,7 +219,7 @@ class Session:
         self._around_at = None
         context = self.context
         with context.page.as_one():
-            context.stage = MovingLayer(self._client, picture, context.act)
+            context.stage = MovingLayer(self._client, picture)
             self.display.add(picture, [context.stage])
             context.page.call("stage", "open")
 
