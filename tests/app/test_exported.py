@@ -15,15 +15,14 @@ from PIL import Image
 
 from app.frames import pixels_of_the_map
 from warpspace.app.documents.files import exported_words, file_stem, shown_machines
-from warpspace.app.documents.legend import words_in_view
+from warpspace.app.documents.legend import seen_words
 from warpspace.app.documents.offline_page import build_offline_html, offline_picture
-from warpspace.app.documents.services import Shot
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.comparison import Side
 from warpspace.app.viewport.camera import fit_camera
-from warpspace.cli.services import draw_figure, draw_shot, write_export
+from warpspace.cli.services import draw_figure, draw_view, write_export
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop
 from warpspace.outputs.drawing.settings import FigureSettings
@@ -222,10 +221,17 @@ def test_a_picture_of_the_screen_says_what_it_shows_beside_its_pixels():
     pose = fit_camera(picture.drawn_mm.reshape(-1, 3), 1.5, margins=(0.2, 0.2, 0.2, 0.2))
     pixels = np.zeros((400, 600, 4), np.uint8)
     pixels[180:220, 250:350] = (90, 10, 200, 255)
-    words = words_in_view(picture, Shot(pixels, pose, None))
+    words, px_per_mm = seen_words(picture, pose, 400, 600)
+    unbarred = replace(picture, state=replace(BOTH, look=replace(BOTH.look, bars=False)))
+    assert seen_words(unbarred, pose, 400, 600)[1] is None
+    # a millimetre of the middle of the picture, seen from as far
+    assert px_per_mm == pytest.approx(
+        200.0 / np.tan(pose.fov_rad / 2.0)
+        / (np.linalg.norm(np.subtract(pose.position, pose.look_at)) * 100.0), rel=0.2
+    )  # fmt: skip
     bare, barred = (
-        Image.open(BytesIO(draw_shot(picture, Shot(pixels, pose, px), threading.Event())))
-        for px in (None, 0.7)
+        Image.open(BytesIO(draw_view(one, pixels, pose, threading.Event())))
+        for one in (unbarred, picture)
     )
     assert barred.info["Title"] == WORDS["difference"]
     assert f"exaggeration ×{picture.exaggeration:g}" in barred.info["Description"]

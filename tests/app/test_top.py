@@ -177,8 +177,8 @@ def test_a_saved_scene_opens_to_the_same_errors():
 def test_the_report_has_author_questions_and_every_result_under_a_name_of_its_own():
     asked = []
 
-    def write(_picture, request, _cancelled):
-        asked.append(request)
+    def write(_picture, *about):
+        asked.append(about)
         return b"%PDF", ()
 
     window = Window(ReportWindow, services=Services(write_report=write))
@@ -193,7 +193,7 @@ def test_the_report_has_author_questions_and_every_result_under_a_name_of_its_ow
     window.do("write", ".pdf")
     while window.part._jobs.busy:
         pass
-    (request,) = asked
-    assert (request.author, request.questions) == (HOSTILE, ("one", "two"))
-    assert list(request.results) == ["Gains", "Gains (2)"]
+    ((author, questions, results, *_),) = asked
+    assert (author, questions) == (HOSTILE, ("one", "two"))
+    assert list(results) == ["Gains", "Gains (2)"]
     assert window.saved == [("dvf5000_first_report.pdf", b"%PDF")]

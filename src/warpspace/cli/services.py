@@ -4,7 +4,7 @@ Figures are drawn in a process of their own. All is imported when it is done, as
 """
 
 import threading
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -18,9 +18,14 @@ if TYPE_CHECKING:
     from concurrent.futures import Future
     from pathlib import Path
 
+    import numpy as np
+    from numpy.typing import NDArray
+
     from warpspace.analysis.concepts import Concepts
-    from warpspace.app.documents.services import Report, Services, Shot
+    from warpspace.analysis.description import Result
+    from warpspace.app.documents.services import Services
     from warpspace.app.evaluation.live_picture import LivePicture
+    from warpspace.app.viewport.camera import CameraMemory
     from warpspace.formats.compensation.compensate import Compensation
     from warpspace.outputs.drawing.settings import FigureSettings
     from warpspace.picture.model import ScenePicture
@@ -36,7 +41,7 @@ def build_services() -> "Services":
 
     return Services(
         draw_figure,
-        draw_shot,
+        draw_view,
         write_export,
         draw_concepts,
         draw_compensation,
@@ -86,22 +91,26 @@ def draw_figure(picture: "LivePicture", figure: str, cancelled: threading.Event)
     return _render(name, [machine.scene for machine in machines], settings, cancelled)
 
 
-def draw_shot(picture: "LivePicture", shot: "Shot", cancelled: threading.Event) -> bytes:
+def draw_view(
+    picture: "LivePicture",
+    pixels: "NDArray[np.uint8]",
+    camera: "CameraMemory",
+    cancelled: threading.Event,
+) -> bytes:
     """Draw what a page has drawn as a PNG that says what it shows."""
-    from warpspace.app.documents.legend import look_words, marked, words_in_view
-    from warpspace.outputs.shot import draw_shot as draw
-    from warpspace.picture.words import spell_factor
+    from warpspace.app.documents.legend import look_words, marked, seen_words
+    from warpspace.outputs.view import draw_view as draw
     from warpspace.units import spell
 
-    found, factor = picture.statistics, picture.exaggeration
+    found = picture.statistics
     numbers = {"mean": found.mean_um, "P95": found.p95_um, "max": found.max_um}
+    words, px_per_mm = seen_words(picture, camera, *pixels.shape[:2])
     return _apart(
-        "picture was", cancelled, draw, shot.pixels, picture.title,
-        [f"exaggeration {spell_factor(factor)}", *look_words(picture)], picture.scale,
+        "picture was", cancelled, draw, pixels, picture.title, look_words(picture), picture.scale,
         marked(picture),
         [(f"{n} {picture.length_words}", f"{spell(v)} µm") for n, v in numbers.items()],
-        None if shot.px_per_mm is None else (shot.px_per_mm, factor),
-        words_in_view(picture, shot), dark=picture.state.shown.dark,
+        None if px_per_mm is None else (px_per_mm, picture.exaggeration), words,
+        dark=picture.state.shown.dark,
     )  # fmt: skip
 
 
@@ -212,7 +221,12 @@ def write_export(picture: "LivePicture", ending: str) -> bytes:
 
 
 def write_report(
-    picture: "LivePicture", about: "Report", cancelled: threading.Event
+    picture: "LivePicture",
+    author: str,
+    questions: Sequence[str],
+    results: "Mapping[str, Result]",
+    ending: str,
+    cancelled: threading.Event,
 ) -> tuple[bytes, tuple[str, ...]]:
     """Write a report; give the file, and which figures are missing."""
     from warpspace.app.documents.files import shown_machines
@@ -223,12 +237,12 @@ def write_report(
     state, machines = picture.state, shown_machines(picture, sheet=True)
     settings = ReportSettings(
         loop=machines[0].loop, grid=state.nodes, exaggeration=picture.exaggeration,
-        spec_um=state.specification.limit_um, author=about.author, questions=about.questions,
+        spec_um=state.specification.limit_um, author=author, questions=tuple(questions),
     )  # fmt: skip
     scenes = [one.scene for one in machines if one.loop == machines[0].loop]
     with _turn(cancelled), temporary_folder() as folder:
-        target = folder / f"report{about.ending}"
-        written = write(scenes, target, settings, embed=embed_view, results=about.results)
+        target = folder / f"report{ending}"
+        written = write(scenes, target, settings, embed=embed_view, results=results)
         return target.read_bytes(), written.missing
 
 

@@ -6,12 +6,12 @@ import numpy as np
 from markupsafe import Markup
 
 from warpspace.analysis.statistics import share_below, volume_statistics
-from warpspace.app.browser.html import fill, join, lowered, number, tag
-from warpspace.app.documents.services import Shot
+from warpspace.app.browser.html import fill, join, lowered, number, tag, thousands
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.table import table_words
+from warpspace.app.viewport.camera import CameraMemory
 from warpspace.app.viewport.labels import axis_labels, point_labels
 from warpspace.app.viewport.shapes import SCENE_PER_MM
 from warpspace.field.evaluate import ErrorField, placed_words, second_order_words
@@ -24,9 +24,10 @@ from warpspace.picture.words import (
     own_axes,
     range_words,
     reference_words,
+    spell_factor,
 )
 from warpspace.scene.model import second_order
-from warpspace.units import MICROMETRE, Array, spell_short
+from warpspace.units import Array, spell_short
 
 # --- The colour bar -------------------------------------------------------------------------------
 
@@ -68,15 +69,13 @@ def marked(picture: LivePicture) -> dict[str, float]:
         # the length of the error says nothing of a signed component: its own ends do
         mean = float(np.sum(picture.grid.weights * values.reshape(picture.shape)))
         return {"min": float(values.min()), "mean": mean, "max": float(values.max())}
-    limit = {"limit": picture.state.specification.limit_um}
-    if picture.scale.unit != MICROMETRE:
-        # the length of the tilt is summarised as that of the position error is
+    if picture.tilts:  # summarised as the length of the position error is
         tilt = picture.field.orientation_urad
         found = volume_statistics(ErrorField(picture.field.nominal_mm, tilt, tilt), picture.grid)
-        limit = {}
-    elif picture.is_difference:
-        limit = {}
-    return {"mean": found.mean_um, "P95": found.p95_um, "max": found.max_um, **limit}
+    marks = {"mean": found.mean_um, "P95": found.p95_um, "max": found.max_um}
+    if not picture.tilts and not picture.is_difference:
+        marks["limit"] = picture.state.specification.limit_um
+    return marks
 
 
 def legend_html(picture: LivePicture) -> Markup:
@@ -201,35 +200,44 @@ def range_conditions(picture: LivePicture) -> tuple[str, ...]:
 
 
 def look_words(picture: LivePicture) -> list[str]:
-    """Say how the scene is looked at; of a difference for both sides."""
+    """Say what is looked at, and how; of a difference for both sides."""
+    machine, both = picture.drawn_state.scene.machine, picture.both_words
+    size = " × ".join(f"{edge:.0f}" for edge in picture.grid.extent_mm)
+    nodes = thousands(picture.field.norm_um.size)
     return [
-        f"{picture.both_words(lambda state: state.loop.value)} loop",
-        picture.both_words(lambda state: reference_words(state.scene)),
+        f"exaggeration {spell_factor(picture.exaggeration)}",
+        f"{both(lambda state: state.loop.value)} loop",
+        both(lambda state: reference_words(state.scene)),
         *picture_conditions(picture),
-        picture.both_words(lambda state: convention_words(state.scene)),
-        picture.both_words(
-            lambda state: "exact chain" if state.controller else "first-order model"
-        ),
+        f"{machine.title}, chain {machine.chain}",
+        f"{size} mm, {nodes} nodes",
+        both(lambda state: convention_words(state.scene)),
+        both(lambda state: "exact chain" if state.controller else "first-order model"),
         "error = actual − nominal",
     ]
 
 
-def words_in_view(picture: LivePicture, shot: Shot) -> list[tuple[str, Array]]:
-    """Give what is written beside points, and where the camera saw those, px from left bottom."""
+def seen_words(
+    picture: LivePicture, camera: CameraMemory, height: int, width: int
+) -> tuple[list[tuple[str, Array]], float | None]:
+    """Give words and where a camera saw their points, px from the left bottom; and its scale.
+
+    That is px of a millimetre in the middle of the volume; None where it has no scale bars.
+    """
     labels = [*axis_labels(picture), *point_labels(picture)]
-    camera, (height, width) = shot.camera, shot.pixels.shape[:2]
+    points = np.array([*(label.at_mm for label in labels), picture.grid.bounds_mm.mean(axis=0)])
     position = np.array(camera.position)
     forth = np.array(camera.look_at) - position
     forth = forth / np.linalg.norm(forth)
     right = np.cross(forth, camera.up)
     right = right / np.linalg.norm(right)
-    found: list[tuple[str, Array]] = []
-    for label in labels:
-        across, up, away = np.stack([right, np.cross(right, forth), forth]) @ (
-            label.at_mm * SCENE_PER_MM - position
-        )
-        px = height / 2.0 / np.tan(camera.fov_rad / 2.0) / away
-        spot = np.array([width / 2.0 + across * px, height / 2.0 + up * px])
-        if away > 0.0 and (spot > 0.0).all() and (spot < (width, height)).all():
-            found.append((label.text, spot))
-    return found
+    way = np.stack([right, np.cross(right, forth), forth], axis=1)
+    across, up, away = ((points * SCENE_PER_MM - position) @ way).T
+    px = height / 2.0 / np.tan(camera.fov_rad / 2.0) / away
+    spots = np.stack([width / 2.0 + across * px, height / 2.0 + up * px], axis=-1)
+    inside = (away > 0.0) & (spots > 0.0).all(axis=-1) & (spots < (width, height)).all(axis=-1)
+    words = [
+        (one.text, spot) for one, spot, here in zip(labels, spots, inside, strict=False) if here
+    ]
+    has_bars = picture.state.look.bars and away[-1] > 0.0
+    return words, float(px[-1]) * SCENE_PER_MM if has_bars else None

@@ -25,7 +25,6 @@ from warpspace.app.browser.html import (
     number,
     rows,
     tag,
-    thousands,
 )
 from warpspace.app.documents.legend import (
     kept_words,
@@ -52,7 +51,6 @@ from warpspace.machine.errors import ErrorFunction
 from warpspace.picture.model import choose_scale
 from warpspace.picture.words import (
     own_axes,
-    spell_factor,
     spell_point,
 )
 from warpspace.resources import __version__
@@ -123,12 +121,18 @@ def build_offline_html(
     counted = "unlike in A and B" if picture.is_difference else "not zero"
     found = picture.statistics
     numbers = {"mean": found.mean_um, "RMS": found.rms_um, "P95": found.p95_um, "max": found.max_um}
-    remarks = (*look_words(picture), "drag to turn, wheel to zoom", f"warpspace {__version__}")
+    kept = "" if picture.is_difference else f" · {kept_words(picture)[0]}"
+    factor, *looks = look_words(picture)
+    heading = (
+        f"{numbers_words(picture)} {place_words(picture)}{kept} · {factor}",
+        *(one for one in subject_words(picture) if one != picture.title),
+    )
+    remarks = (*looks, "drag to turn, wheel to zoom", f"warpspace {__version__}")
     return Template(template).substitute(
         title=escape(picture.title),
         program=f"warpspace {__version__}",
         policy=POLICY,
-        heading=join(tag("p", words) for words in _heading(picture)),
+        heading=join(tag("p", words) for words in heading),
         legend=legend_html(picture),
         numbers=tag("b", lowered(f"{picture.length_words} over the volume"))
         + rows((name, f"{number(value, 2)} µm") for name, value in numbers.items()),
@@ -143,20 +147,6 @@ def build_offline_html(
         remarks=join(tag("span", words) for words in remarks),
         provenance=stored.replace("<", "\\u003c"),
     )  # fmt: skip
-
-
-def _heading(picture: LivePicture) -> list[str]:
-    """Say numbers, place of the max, limit, machine, factor, and what is unlike the scene."""
-    machine, grid = picture.drawn_state.scene.machine, picture.grid
-    size = " × ".join(f"{edge:.0f}" for edge in grid.extent_mm)
-    kept = "" if picture.is_difference else f" · {kept_words(picture)[0]}"
-    nodes = thousands(picture.field.norm_um.size)
-    about = f"{machine.title}, chain {machine.chain} · {size} mm · {nodes} nodes"
-    return [
-        f"{numbers_words(picture)} {place_words(picture)}{kept}",
-        f"{about} · exaggeration {spell_factor(picture.exaggeration)}",
-        *(word for word in subject_words(picture) if word != picture.title),
-    ]
 
 
 def _error_rows(picture: LivePicture) -> list[tuple[str, str, str]]:

@@ -23,25 +23,6 @@ class CancelledError(WarpspaceError):
     """Work that somebody has cancelled."""
 
 
-@dataclass(frozen=True, slots=True)
-class Shot:
-    """What a page has drawn: pixels, the camera that saw them, and its scale."""
-
-    pixels: NDArray[np.uint8]  # [height, width, 4]
-    camera: CameraMemory
-    px_per_mm: float | None  # across the line of sight in the middle; None for no scale bars
-
-
-@dataclass(frozen=True, slots=True)
-class Report:
-    """What stands in a report beside what is drawn."""
-
-    author: str
-    questions: tuple[str, ...]
-    results: "Mapping[str, Result]"  # of analyses, by heading
-    ending: str  # ".html" or ".pdf"
-
-
 def _nobody(*_: object) -> Any:
     raise OptionError("this app was started without what draws figures and writes files")
 
@@ -56,7 +37,10 @@ class Services:
 
     # takes a picture and the name of a figure, empty for the one that suits what is coloured
     draw_figure: Callable[[LivePicture, str, threading.Event], bytes] = _nobody
-    draw_shot: Callable[[LivePicture, Shot, threading.Event], bytes] = _nobody
+    # frames what a page has drawn, [height, width, 4], as a camera saw it
+    draw_view: Callable[[LivePicture, NDArray[np.uint8], CameraMemory, threading.Event], bytes] = (
+        _nobody
+    )
     # takes a picture and an ending (".glb", ".csv"); gives the file's content
     write_export: Callable[[LivePicture, str], bytes] = _nobody
     # draws machines side by side: how they are sampled, and whether in dark colours
@@ -66,9 +50,11 @@ class Services:
     # draws the maps of a compensation: whether in dark colours, and whether for a column of the
     # page, without title and numbers
     draw_compensation: Callable[["Compensation", bool, bool, threading.Event], bytes] | None = None
+    # takes a picture, author, open questions, results by heading, and the ending (".html", ".pdf");
     # gives a report, and what is missing of it
     write_report: Callable[
-        [LivePicture, Report, threading.Event], tuple[bytes, tuple[str, ...]]
+        [LivePicture, str, Sequence[str], Mapping[str, "Result"], str, threading.Event],
+        tuple[bytes, tuple[str, ...]],
     ] = _nobody
     # names of the figures of one scene, and what each shows
     figures: tuple[tuple[str, str], ...] = ()

@@ -24,7 +24,7 @@ from warpspace.app.documents.files import (
     unpack,
     upload_text,
 )
-from warpspace.app.documents.services import CancelledError, Report, Shot
+from warpspace.app.documents.services import CancelledError
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
@@ -232,8 +232,7 @@ class FilesWindow(JobWindow):
             pixels: Any = client.get_render(
                 height, width, transport_format="png", timeout=RENDER_TIMEOUT_S
             )
-            shot = Shot(pixels, camera.remember(), camera.px_per_mm(picture, height))
-            return self.context.services.draw_shot(picture, shot, job)
+            return self.context.services.draw_view(picture, pixels, camera.remember(), job)
 
         self.make("Picture of the screen", "_view.png", VIEW_S, draw, as_drawn=True)
 
@@ -324,10 +323,10 @@ class ReportWindow(JobWindow):
         for index, (title, found) in enumerate(self.context.reported):
             results[f"{title} ({index + 1})" if title in results else title] = found
         questions = tuple(filter(None, map(str.strip, self.said["questions"].splitlines())))
-        about = Report(self.said["author"].strip(), questions, results, ending)
+        about = self.said["author"].strip(), questions, results, ending
 
         def write(picture: LivePicture, job: Job) -> bytes:
-            content, missing = self.context.services.write_report(picture, about, job)
+            content, missing = self.context.services.write_report(picture, *about, job)
             if missing and not job.is_set():
                 self.context.notify("Some figures are missing", "\n".join(missing), "warning")
             return content

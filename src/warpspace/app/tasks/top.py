@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from textwrap import shorten
 
 from markupsafe import Markup
 
@@ -74,7 +75,9 @@ class ScenesWindow(Window):
             tag("button", join((
                 tag("b", title),
                 tag("small", scene.machine.title) if scene.machine.title != title else EMPTY,
-                tag("small", _first_sentence(scene.description)) if scene.description else EMPTY,
+                tag("small", shorten(re.split(r"\.\s", scene.description)[0].rstrip(" .\n"),
+                                     LONGEST_SENTENCE, placeholder=" …"))
+                if scene.description else EMPTY,
             )), type="button", data_do="scenes:choose", data_value=title,
                 aria_current="true" if scene is picture.state.origin else None)
             for title, scene in self.context.scenes.items()
@@ -89,13 +92,6 @@ class ScenesWindow(Window):
             return state
         # what is chosen again is reset
         return self.closed(replace(state.with_scene(self.context.scenes[value]), page=state.page))
-
-
-def _first_sentence(text: str) -> str:
-    found = " ".join(text.split()).split(". ", 1)[0].rstrip(".")
-    if len(found) > LONGEST_SENTENCE:
-        found = re.split(r":| \(", found, maxsplit=1)[0]
-    return found if len(found) <= LONGEST_SENTENCE else f"{found[:LONGEST_SENTENCE]} …"
 
 
 # --- All commands in one table: the page's keys, and the help ------------------------------------

@@ -183,16 +183,6 @@ class TabCamera:
         self._stand_at(found, points)
         self._put = self.remember()
 
-    def px_per_mm(self, picture: LivePicture, height: float) -> float | None:
-        """Give how long a millimetre across the line of sight is, in the middle of the volume."""
-        camera = self._camera
-        sight = camera.look_at - camera.position
-        away = picture.grid.bounds_mm.mean(axis=0) * SCENE_PER_MM - camera.position
-        depth = float(away @ sight) / float(np.linalg.norm(sight))
-        if depth <= 0.0 or not picture.state.look.bars:
-            return None
-        return height / (2.0 * float(np.tan(camera.fov / 2.0)) * depth) * SCENE_PER_MM
-
     def remember(self) -> CameraMemory:
         """Give where it stands."""
         camera = self._camera

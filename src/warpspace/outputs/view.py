@@ -23,7 +23,7 @@ HEAD, PANEL = 190.0, 330.0
 """Room above and beside the pixels, px of a 1600 × 1200 figure."""
 
 
-def draw_shot(
+def draw_view(
     pixels: NDArray[np.uint8],
     title: str,
     facts: Sequence[str],
@@ -55,7 +55,7 @@ def draw_shot(
     draw_heading(canvas, title, facts)
     column = (width + 0.3 * canvas.margin, 0.6 * canvas.margin, canvas.width - 0.6 * canvas.margin,
               float(height))  # fmt: skip
-    sheet = Sheet("shot", canvas, title, drawn, column, (), FigureSettings(dark=dark))
+    sheet = Sheet("view", canvas, title, drawn, column, (), FigureSettings(dark=dark))
     sheet.draw_panel(scale, f"{scale.label} [{scale.unit}]", list(marks.items()), rows, bars)
     taken = Occupancy(canvas.width, canvas.height, 2.0 * canvas.factor)
     if pixels.shape[2] == 4:
