@@ -40,7 +40,7 @@ def test_a_tilt_that_is_lost_with_the_reference_line():
     tilted = Table(SPAN, ((-100.0, 0.0), (100.0, 8.0)))
     found = costs(ErrorSet({"EYX": tilted}))
     for line in ("end_point", "least_squares", "minimum_zone"):
-        mean, largest = found[f"straightness={line}"]
+        mean, largest = found[line]
         assert mean == pytest.approx(4.0)
         assert largest == pytest.approx(8.0)
 

@@ -7,22 +7,11 @@ exports) has them; `AppState.origin` keeps the scene's own ones.
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
-from itertools import groupby
 
 import numpy as np
 from markupsafe import Markup
 
-from warpspace.app.browser.html import (
-    EMPTY,
-    attributes,
-    button,
-    field,
-    fill,
-    join,
-    number,
-    tag,
-    text_box,
-)
+from warpspace.app.browser.html import EMPTY, button, field, fill, join, number, tag, text_box
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.resulting_scene import active_scene
@@ -39,10 +28,9 @@ from warpspace.kinematics.chain import branch_frames, nominal_point
 from warpspace.kinematics.conversion import (
     ReferenceLine,
     SquarenessSign,
-    angle_sign,
+    convert_squareness,
     fit_line,
     move_measuring_line,
-    squareness_keys,
 )
 from warpspace.kinematics.model import Loop, Model, convention_names, find_convention
 from warpspace.machine.axes import TravelDirection, is_linear, parameter
@@ -104,15 +92,34 @@ def _with_scene(state: AppState, model: Model, *reference: Mapping[str, float] |
     return replace(state, scene=own if same else scene, loaded=None if same else own)
 
 
+Choices = Mapping[tuple[str, str], Mapping[str, str]]
+"""Words of choices, in groups with a title and a hint."""
+
+
+def choices_of(scene: Scene) -> Choices:
+    """Give what can be chosen."""
+    found = {
+        ("Component errors", "Where the errors of a motion act"): {
+            f"component_errors={name}": find_convention(name).title for name in convention_names()
+        },
+        ("Reference", "What is held still"): {
+            "reference=absolute": "absolute",
+            "reference=point": "a point is held still",
+        },
+    }
+    for kind, moves in (("Rotary", "turns"), ("Linear", "moves")):
+        hint = f"+1 {moves} with the name of the axis, −1 against it"
+        found[f"{kind} axes", hint] = {
+            f"direction {axis}={sign}": f"{axis} {words}"
+            for axis in sorted(scene.machine.axes)
+            if is_linear(axis) == (kind == "Linear")
+            for sign, words in ((1, "+1"), (-1, "−1"))
+        }
+    return found
+
+
 def choices(scene: Scene) -> list[str]:
-    """List what can be chosen, in the order shown."""
-    axes = sorted(scene.machine.axes.values(), key=lambda axis: (axis.is_linear, axis.name))
-    return [
-        *(f"component_errors={order}" for order in convention_names()),
-        "reference=absolute",
-        "reference=point",
-        *(f"direction {axis.name}={sign}" for axis in axes for sign in (1, -1)),
-    ]
+    return [choice for group in choices_of(scene).values() for choice in group]
 
 
 def chosen(scene: Scene) -> set[str]:
@@ -199,44 +206,36 @@ def convention_costs(scene: Scene, view: View, nodes: int = 21) -> dict[str, Eff
     """
     grid = build_grid(scene.model, scene.workspace, nodes)
 
-    def field(model: Model, errors: ErrorSet) -> Array:
+    def field_of(errors: ErrorSet, way: str = scene.model.direction) -> Array:
         at = grid.coordinates, view, grid.point_mm
-        return evaluate_first_order(model, errors, *at).error_um
+        return evaluate_first_order(replace(scene.model, direction=way), errors, *at).error_um
 
-    mean = replace(scene.model, direction=TravelDirection.MEAN)
-    changes = {name: field(mean, ErrorSet(one)) for name, one in _readings(scene).items()}
-    with suppress(OptionError):
-        moved = field(scene.model, _measured_in_the_middle(scene))
-        changes["measuring_line"] = moved - field(scene.model, scene.errors)
-    return {name: _effect(grid.weights, change) for name, change in changes.items()}
-
-
-def _readings(scene: Scene) -> dict[str, dict[str, ErrorFunction]]:
-    """Give the change of the numbers that each reading is."""
-    errors, machine = scene.errors, scene.machine
-    middle = {axis: np.asarray(at) for axis, at in scene.workspace.positions.items()}
-    spans = {key: scene.axis_span(parameter(key).axis) for key in errors}
-    there = {key: float(errors.evaluate_at(key, middle, scene.model.direction)) for key in errors}
-    angles = [key for key in squareness_keys(machine) if key in errors]
-    moving = [parameter(key) for key in errors if not parameter(key).is_constant]
-    straight = [
-        row.key
-        for row in moving
-        if not row.is_rotation
-        and machine.axes[row.axis].is_linear
-        and row.direction != machine.axes[row.axis].index
-    ]
-    found: dict[str, dict[str, ErrorFunction]] = {
-        f"squareness={sign}": {
-            key: Constant(spans[key], -2.0 * there[key]) for key in angles if angle_sign(key) == way
-        }
-        for sign, way in ((SquarenessSign.OVER_90, -1), (SquarenessSign.UNDER_90, 1))
+    own = field_of(scene.errors)
+    found = {
+        name: field_of(ErrorSet(changes), TravelDirection.MEAN)
+        for name, changes in _changes(scene).items()
     }
-    for line in ReferenceLine:
-        found[f"straightness={line}"] = {
-            key: _taken_out(errors, key, spans[key], line) for key in straight
-        }
-    found["zero_at"] = {row.key: Constant(spans[row.key], -there[row.key]) for row in moving}
+    for sign in SquarenessSign:
+        read = convert_squareness(scene.machine, scene.errors, sign)
+        found[f"squareness={sign}"] = field_of(read) - own
+    with suppress(OptionError):
+        found["measuring_line"] = field_of(_measured_in_the_middle(scene)) - own
+    return {name: _effect(grid.weights, change) for name, change in found.items()}
+
+
+def _changes(scene: Scene) -> dict[str, dict[str, ErrorFunction]]:
+    """Give by how much curves differ whose lines or values in the middle were taken out."""
+    errors, axes = scene.errors, scene.machine.axes
+    middle = {axis: np.asarray(at) for axis, at in scene.workspace.positions.items()}
+    found = {name: dict[str, ErrorFunction]() for name in ("zero_at", *map(str, ReferenceLine))}
+    for row in map(parameter, errors):
+        axis, span = axes[row.axis], scene.axis_span(row.axis)
+        if not row.is_constant:
+            there = errors.evaluate_at(row.key, middle, scene.model.direction)
+            found["zero_at"][row.key] = Constant(span, -float(there))
+            if axis.is_linear and not row.is_rotation and row.direction != axis.index:
+                for line in ReferenceLine:
+                    found[line][row.key] = _taken_out(errors, row.key, span, line)
     return found
 
 
@@ -269,14 +268,7 @@ def _measured_in_the_middle(scene: Scene) -> ErrorSet:
 
 # --- The section ----------------------------------------------------------------------------------
 
-GROUPS = {
-    "component_errors": ("Component errors", "Where the errors of a motion act"),
-    "reference": ("Reference", "What is held still"),
-    "rotary": ("Rotary axes", "+1 turns with the name of the axis, −1 against it"),
-    "linear": ("Linear axes", "+1 moves with the name of the axis, −1 against it"),
-}
-WORDS = {"reference=absolute": "absolute", "reference=point": "a point is held still"}
-COSTS = {
+COSTS: Choices = {
     ("Sign of squareness", "the scene's: by the right-hand rule"): {
         "squareness=over_90": "positive where the angle is over 90°",
         "squareness=under_90": "positive where it is under 90°",
@@ -285,32 +277,20 @@ COSTS = {
         "measuring_line": "through the middle of the volume",
     },
     ("Reference line of straightness", "the scene's: with its tilt"): {
-        "straightness=end_point": "end points taken out",
-        "straightness=least_squares": "least squares taken out",
-        "straightness=minimum_zone": "minimum zone taken out",
+        "end_point": "end points taken out",
+        "least_squares": "least squares taken out",
+        "minimum_zone": "minimum zone taken out",
     },
-    ("Zero of the curves", "the scene's: as given"): {
-        "zero_at": "zero in the middle of each axis",
-    },
+    ("Zero of the curves", "the scene's: as given"): {"zero_at": "zero in the middle of each axis"},
 }
 NOTE = (
     "Change of the error vector over the nodes of the grid: each choice alone, against the"
     " conventions of the scene."
 )
+RADIO = (
+    '<label><input type="radio" name="{}" value="{}"{} data-set="conventions:choose"> {}</label>'
+)
 COST_NOTE = "What a wrong assumption about the measured data would cost, to first order."
-
-
-def _group(choice: str) -> str:
-    what, _, axis = choice.partition("=")[0].partition(" ")
-    return what if not axis else "linear" if is_linear(axis) else "rotary"
-
-
-def _spell(choice: str) -> str:
-    what, _, given = choice.partition("=")
-    if what == "component_errors":
-        return find_convention(given).title
-    axis = what.removeprefix("direction ")
-    return WORDS.get(choice, f"{axis} {'+1' if given == '1' else '−1'}")
 
 
 class ConventionsSection(Section):
@@ -329,18 +309,15 @@ class ConventionsSection(Section):
         state = picture.state
         effects, in_force = effects_of(state), chosen(state.scene)
         own = chosen(with_own_conventions(state).scene)
-        head = "<tr><th>µm</th><th class=number>mean</th><th class=number>max</th></tr>"
-        lines: list[Markup] = [fill(head)]
-        for group, members in groupby(choices(state.scene), _group):
-            lines.append(_head(*GROUPS[group]))
-            for choice in members:
-                radio = attributes(type="radio", name=choice.split("=")[0], value=choice,
-                                   checked=choice in in_force,
-                                   data_set="conventions:choose")  # fmt: skip
-                words = _spell(choice) + (" (scene)" if choice in own else "")
-                label = fill("<label><input{}> {}</label>", radio, words)
-                lines.append(_line(label, None if choice in own else effects[choice]))
-        lines.append(_line("all choices together", effects["all"]))
+
+        def radio(choice: str, words: str) -> Markup:
+            checked = Markup(" checked") if choice in in_force else ""
+            told = words + (" (scene)" if choice in own else "")
+            return fill(RADIO, choice.partition("=")[0], choice, checked, told)
+
+        alone = {name: one for name, one in effects.items() if name not in own}
+        lines = _rows(choices_of(state.scene), alone, radio)
+        lines.append(_row("all choices together", effects["all"]))
         back = button("Back to the scene's", "conventions:own", disabled=in_force == own)
         return join((
             tag("table", join(lines), class_="ws-choices-table"), tag("p", NOTE, class_="ws-tiny"),
@@ -387,22 +364,23 @@ class ConventionsSection(Section):
 def _wrong(state: AppState) -> Markup:
     scene = active_scene(state)
     costs = convention_costs(scene, scene.view(state.loop), state.nodes)
-    lines: list[Markup] = []
-    for group, members in COSTS.items():
-        lines.append(_head(*group))
-        lines += [_line(words, costs.get(name)) for name, words in members.items()]
     summary = tag("summary", "If the data were measured in another convention")
     note = tag("p", COST_NOTE, class_="ws-tiny")
-    return tag("details", summary + note + tag("table", join(lines)), class_="ws-options")
+    table = tag("table", join(_rows(COSTS, costs, lambda _, words: words)))
+    return tag("details", summary + note + table, class_="ws-options")
 
 
-def _head(title: str, hint: str) -> Markup:
-    return fill(
-        '<tr><th colspan="3" title="{hint}"><b>{title}</b></th></tr>', title=title, hint=hint
-    )
+def _rows(
+    groups: Choices, effects: Mapping[str, Effect], label: Callable[[str, str], object]
+) -> list[Markup]:
+    lines = [fill("<tr><th>µm</th><th class=number>mean</th><th class=number>max</th></tr>")]
+    for head, members in groups.items():
+        lines.append(fill('<tr><th colspan="3"><b>{}</b> {}</th></tr>', *head))
+        lines += [_row(label(name, words), effects.get(name)) for name, words in members.items()]
+    return lines
 
 
-def _line(words: object, effect: Effect | None) -> Markup:
+def _row(words: object, effect: Effect | None) -> Markup:
     cells = ("–", "–") if effect is None else map(number, effect)
     line = '<tr><td>{}</td><td class="number">{}</td><td class="number">{}</td></tr>'
     return fill(line, words, *cells)

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from markupsafe import Markup
 
-from warpspace.analysis.axis_motion import AxisMotion, Motion, assemble_motion
+from warpspace.analysis.axis_motion import AxisMotion, assemble_motion
 from warpspace.analysis.blocks import Column, Table
 from warpspace.app.browser.html import (
     button,
@@ -28,7 +28,7 @@ from warpspace.app.state.tree import leaves, spell, toggled, value
 from warpspace.app.tasks.charts import block_html
 from warpspace.app.tasks.parts import Section
 from warpspace.bodies.own_meshes import check_meshes
-from warpspace.picture.traces import TraceLine, evaluate_axis_motion, motion_lines, turn_words
+from warpspace.picture.traces import TraceLine, evaluate_axis_motion, motion_lines
 from warpspace.picture.words import spell_at, spell_point
 from warpspace.units import MINUS
 
@@ -57,15 +57,13 @@ class PositionsSection(Section):
         axes, point_mm = standing(state)
         copied = button("Copy", "positions:none", kind="link", hint="Copy the positions",
                         data_copy=spell_at(axes))  # fmt: skip
-        said: list[object] = [
-            join(("Tool point: ", spell_point(axes, point_mm), " ", copied)),
-        ]
-        if state.machine.shown and check_meshes(state.scene.machine):
-            said.append(OPEN_MESH)
+        words = join(("Tool point: ", spell_point(axes, point_mm), " ", copied))
+        is_open = state.machine.shown and check_meshes(state.scene.machine)
         linear = (f"machine.linear_mm.{axis}" for axis in linear_spans(state.scene))
         paths = (*(f"positions.{axis}" for axis in state.positions), *linear)
         bars = [setting(state, path) for path in paths]
-        return join((*bars, *(tag("p", words, class_="ws-tiny") for words in said)))
+        said = (words, OPEN_MESH) if is_open else (words,)
+        return join((*bars, *(tag("p", one, class_="ws-tiny") for one in said)))
 
 
 # --- Rotary axes: play, one trace as polar plots, all of them in numbers --------------------------
@@ -156,8 +154,8 @@ def _trace(picture: LivePicture) -> Markup:
     motions = {one: motion_of(picture, moved[one]) for one in [*moved][:MOST_ROWS]}
     motion = motions[name] if name in motions else motion_of(picture, moved[name])
     shown = _motion(motion, name) if motion else tag("p", ON_THE_AXIS, class_="ws-quiet")
-    heads = (("trace", ""), ("radius", "mm"), ("radial", "µm"), ("axial", "µm"), ("tilt", "µrad"))
-    columns = tuple(Column(head, unit=unit) for head, unit in heads)
+    heads = {"trace": "", "radius": "mm", "radial": "µm", "axial": "µm", "tilt": "µrad"}
+    columns = tuple(Column(head, unit=unit) for head, unit in heads.items())
     rows = [(one, *_numbers(found)) for one, found in motions.items()]
     table = tag("summary", "All traces in numbers") + block_html(Table(columns, rows))
     return chosen + shown + tag("details", table, class_="ws-options")
@@ -166,11 +164,8 @@ def _trace(picture: LivePicture) -> Markup:
 def _numbers(motion: AxisMotion | None) -> Sequence[str]:
     if motion is None:
         return "on the axis", "", "", ""
-    return f"{motion.radius_mm:.1f}", *(_values(part) for part in motion.motions)
-
-
-def _values(part: Motion) -> str:
-    return f"{part.peak_to_valley:.2f} / {part.motion_value:.2f}"
+    pairs = (f"{one.peak_to_valley:.2f} / {one.motion_value:.2f}" for one in motion.motions)
+    return f"{motion.radius_mm:.1f}", *pairs
 
 
 def motion_of(picture: LivePicture, line: TraceLine) -> AxisMotion | None:
@@ -193,24 +188,14 @@ def _of_state(state: AppState, line: TraceLine) -> AxisMotion | None:
 
 
 def _motion(motion: AxisMotion, name: str) -> Markup:
-    plots = join(
-        block_html(replace(motion_lines(part.name, motion, part), title=part.name, note=""))
-        for part in motion.motions
-    )
-    columns = tuple(map(Column, ("", "peak to valley", "about average line", "mostly")))
-    rows = [
-        (
-            part.iso,
-            f"{part.peak_to_valley:.2f} {part.unit}",
-            f"{part.motion_value:.2f} {part.unit}",
-            turn_words(part.times_a_turn) if motion.closed else "an arc",
-        )
-        for part in motion.motions
-    ]
-    return join((
-        tag("div", plots, class_="ws-plots", role="group", aria_label=f"Error motion of {name}"),
-        fill(KEY), block_html(Table(columns, rows)), tag("p", ABOUT, class_="ws-tiny"),
-    ))  # fmt: skip
+    plots, said = list[Markup](), list[Markup]()
+    for part in motion.motions:
+        chart = motion_lines(part.name, motion, part)
+        plots.append(block_html(replace(chart, title=part.name, note="")))
+        said.append(tag("p", f"{part.iso}: {chart.note}.", class_="ws-tiny"))
+    label = f"Error motion of {name}"
+    drawn = tag("div", join(plots), class_="ws-plots", role="group", aria_label=label)
+    return join((drawn, fill(KEY), *said, tag("p", ABOUT, class_="ws-tiny")))
 
 
 def _points(state: AppState) -> Markup:
