@@ -192,7 +192,7 @@ def _built(scene: Scene, chain: Chain, tables: Tables) -> Scene:
     for axis in chain.axes:  # of what is missing a file says no more than one in place of another
         if axis not in volume and is_linear(axis) and spanned[direction_index(axis)]:
             volume[axis] = (0.0, 0.0)
-    model = replace(scene.model, machine=replace(built, bodies=bodies))
+    model = replace(scene.model, machine=_dressed(scene, replace(built, bodies=bodies)))
     return replace(scene, model=model, workspace=Workspace(volume))
 
 
@@ -211,11 +211,11 @@ def _with_machine(scene: Scene, other: Scene) -> tuple[Scene, tuple[str, ...]]:
     changed = replace(
         scene,
         model=replace(
-            other.model,
-            machine=_dressed(scene, machine),
-            component_errors=scene.model.component_errors,
+            scene.model,
+            machine=machine,
+            tool_point_mm=other.model.tool_point_mm,
+            workpiece_point_mm=other.model.workpiece_point_mm,
             own_component_errors=own,
-            direction=scene.model.direction,
         ),
         workspace=other.workspace,
         trace_points_mm=other.trace_points_mm,
@@ -262,8 +262,7 @@ def _dressed(scene: Scene, machine: Machine) -> Machine:
     Bodies that were made for other frames suit it no more.
     """
     before = scene.machine
-    another = machine.name != before.name or machine.body_dir != before.body_dir
-    if another or _frames(before) == _frames(machine):
+    if _frames(before) == _frames(machine):
         return machine
     if known := known_alike(machine):
         return replace(machine, name=known.name, title=known.title, body_dir=known.body_dir)
@@ -294,33 +293,24 @@ UNCHANGED = "the machine stays as it was"
 
 def with_word(state: AppState, word: str) -> AppState:
     """Change the machine as a page spells it; what cannot be is refused with a note."""
+    what, *rest = word.split(" ", maxsplit=3)
+    gantry = state.scene.machine.gantries.get(rest[0]) if rest else None
     try:
-        return _with_word(state, word)
+        if word == "own":
+            return with_own_machine(state)
+        if what == "guide" and gantry is not None and len(rest) == 3 and rest[1] in ("0", "1"):
+            what = f"guide {int(rest[1]) + 1} of {rest[0]}"
+            value = read_number(what, rest[2], MICROMETRE)
+            return with_guide_error(state, gantry, int(rest[1]), value)
+        scene, notes = edited(state.scene, word)
+        changed = state if scene is state.scene else with_changed_scene(state, scene)
     except WarpspaceError as problem:
         return _noted(state, f"{str(problem).removeprefix('machine: ')}; {UNCHANGED}")
-
-
-def _with_word(state: AppState, word: str) -> AppState:
-    gantries = state.scene.machine.gantries
-    match word.split(" ", maxsplit=3):
-        case ["own"]:
-            return with_own_machine(state)
-        case ["guide", axis, ("0" | "1") as guide, typed] if axis in gantries:
-            value = read_number(f"guide {int(guide) + 1} of {axis}", typed, MICROMETRE)
-            return with_guide_error(state, gantries[axis], int(guide), value)
-        case [what, axis, *_]:
-            scene, notes = edited(state.scene, word)
-        case _:
-            what, axis = "", ""
-            scene, notes = edited(state.scene, word)
-    if scene is state.scene:
-        return state
-    changed = _noted(with_changed_scene(state, scene), *notes)
-    if what != "span":
-        return changed
-    was, now = gantries[axis], scene.machine.gantries[axis]  # the errors of both guides stay
-    turned = changed.amplitudes[now.rotation_key] * now.rotation_weight / was.rotation_weight
-    return changed.with_amplitude(now.rotation_key, turned)
+    if what == "span" and gantry is not None:  # the errors of both guides stay
+        now = scene.machine.gantries[gantry.axis]
+        turned = changed.amplitudes[now.rotation_key] * now.rotation_weight
+        changed = changed.with_amplitude(now.rotation_key, turned / gantry.rotation_weight)
+    return _noted(changed, *notes)
 
 
 def with_changed_scene(state: AppState, scene: Scene) -> AppState:
@@ -416,15 +406,12 @@ def with_guide_error(state: AppState, gantry: Gantry, guide: int, value_um: floa
         raise OptionError(
             f"guides of {gantry.axis}: their errors have different curves; use the sliders"
         )
-    other = present[1 - guide]
+    other, curves = present[1 - guide], _curves(state, gantry)
     rotation = (value_um - other) * (1.0 if guide else -1.0) * gantry.rotation_weight
-    curves = _curves(state, gantry)
     shape = next((curve for curve in curves if curve.amplitude != 0.0), curves[0])
-    keys, values = (gantry.positioning_key, gantry.rotation_key), ((value_um + other) / 2, rotation)
-    for key, curve, amplitude in zip(keys, curves, values, strict=True):
-        if curve.amplitude == 0.0:  # it takes the curve of the other one
-            state = edits.with_curve(state, key, shape)
-        state = state.with_amplitude(key, amplitude)
+    values = {gantry.positioning_key: (value_um + other) / 2.0, gantry.rotation_key: rotation}
+    for key, amplitude in values.items():
+        state = edits.with_curve(state, key, shape).with_amplitude(key, amplitude)
     return state
 
 
@@ -450,11 +437,7 @@ def _alike(*curves: ErrorFunction) -> bool:
 def library() -> Mapping[str, Scene]:
     """Give a scene of each machine, by the machine's name: it brings its volume and points."""
     found: dict[str, Scene] = {}
-    for name in scene_names():
-        try:
-            scene = load_scene(name)
-        except WarpspaceError:  # a scene that was put beside the others is no reason to fail
-            continue
+    for scene in map(load_scene, scene_names()):
         found.setdefault(scene.machine.name, scene)
     return found
 

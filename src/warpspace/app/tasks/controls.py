@@ -51,6 +51,8 @@ def setting(state: AppState, path: str, *, shown: str = "", bar: bool = False) -
         return switch(name, leaf.label, on=bool(at), hint=leaf.hint)
     if leaf.kind == "choice":
         return field(leaf.label, choice(name, str(at), leaf.choices), name, leaf.unit, leaf.hint)
+    if leaf.kind != "number":
+        return field(leaf.label, text_box(name, spell(state, path)), name, leaf.unit, leaf.hint)
     shown = shown or f"{at:.6g}"
     control = text_box(name, shown, size="short", inputmode="decimal")
     if bar and leaf.span is not None:

@@ -92,12 +92,8 @@ def _with_scene(state: AppState, model: Model, *reference: Mapping[str, float] |
     return replace(state, scene=own if same else scene, loaded=None if same else own)
 
 
-Choices = Mapping[tuple[str, str], Mapping[str, str]]
-"""Words of choices, in groups with a title and a hint."""
-
-
-def choices_of(scene: Scene) -> Choices:
-    """Give what can be chosen."""
+def choices_of(scene: Scene) -> dict[tuple[str, str], dict[str, str]]:
+    """Give what can be chosen and its words, in groups with a title and a hint."""
     found = {
         ("Component errors", "Where the errors of a motion act"): {
             f"component_errors={name}": find_convention(name).title for name in convention_names()
@@ -268,20 +264,14 @@ def _measured_in_the_middle(scene: Scene) -> ErrorSet:
 
 # --- The section ----------------------------------------------------------------------------------
 
-COSTS: Choices = {
-    ("Sign of squareness", "the scene's: by the right-hand rule"): {
-        "squareness=over_90": "positive where the angle is over 90°",
-        "squareness=under_90": "positive where it is under 90°",
-    },
-    ("Measuring line", "the scene's: at the origin of each axis"): {
-        "measuring_line": "through the middle of the volume",
-    },
-    ("Reference line of straightness", "the scene's: with its tilt"): {
-        "end_point": "end points taken out",
-        "least_squares": "least squares taken out",
-        "minimum_zone": "minimum zone taken out",
-    },
-    ("Zero of the curves", "the scene's: as given"): {"zero_at": "zero in the middle of each axis"},
+COSTS = {
+    "squareness=over_90": "squareness: positive where the angle is over 90°",
+    "squareness=under_90": "squareness: positive where the angle is under 90°",
+    "measuring_line": "measuring line: through the middle of the volume",
+    "end_point": "straightness: end points taken out",
+    "least_squares": "straightness: least squares taken out",
+    "minimum_zone": "straightness: minimum zone taken out",
+    "zero_at": "curves: zero in the middle of each axis",
 }
 NOTE = (
     "Change of the error vector over the nodes of the grid: each choice alone, against the"
@@ -290,7 +280,11 @@ NOTE = (
 RADIO = (
     '<label><input type="radio" name="{}" value="{}"{} data-set="conventions:choose"> {}</label>'
 )
-COST_NOTE = "What a wrong assumption about the measured data would cost, to first order."
+COST_NOTE = (
+    "What a wrong assumption about the measured data would cost, to first order. The scene's:"
+    " squareness by the right-hand rule, measuring lines at the origin of each axis, straightness"
+    " with its tilt, curves as given."
+)
 
 
 class ConventionsSection(Section):
@@ -310,13 +304,14 @@ class ConventionsSection(Section):
         effects, in_force = effects_of(state), chosen(state.scene)
         own = chosen(with_own_conventions(state).scene)
 
-        def radio(choice: str, words: str) -> Markup:
-            checked = Markup(" checked") if choice in in_force else ""
-            told = words + (" (scene)" if choice in own else "")
-            return fill(RADIO, choice.partition("=")[0], choice, checked, told)
-
-        alone = {name: one for name, one in effects.items() if name not in own}
-        lines = _rows(choices_of(state.scene), alone, radio)
+        lines = [fill("<tr><th>µm</th><th class=number>mean</th><th class=number>max</th></tr>")]
+        for head, members in choices_of(state.scene).items():
+            lines.append(fill('<tr><th colspan="3"><b>{}</b> {}</th></tr>', *head))
+            for choice, words in members.items():
+                checked = Markup(" checked") if choice in in_force else ""
+                told = f"{words} (scene)" if choice in own else words
+                radio = fill(RADIO, choice.partition("=")[0], choice, checked, told)
+                lines.append(_row(radio, None if choice in own else effects[choice]))
         lines.append(_row("all choices together", effects["all"]))
         back = button("Back to the scene's", "conventions:own", disabled=in_force == own)
         return join((
@@ -361,26 +356,16 @@ class ConventionsSection(Section):
         self.context.post(lambda state: with_reference(state, picked.at))
 
 
-def _wrong(state: AppState) -> Markup:
-    scene = active_scene(state)
-    costs = convention_costs(scene, scene.view(state.loop), state.nodes)
-    summary = tag("summary", "If the data were measured in another convention")
-    note = tag("p", COST_NOTE, class_="ws-tiny")
-    table = tag("table", join(_rows(COSTS, costs, lambda _, words: words)))
-    return tag("details", summary + note + table, class_="ws-options")
-
-
-def _rows(
-    groups: Choices, effects: Mapping[str, Effect], label: Callable[[str, str], object]
-) -> list[Markup]:
-    lines = [fill("<tr><th>µm</th><th class=number>mean</th><th class=number>max</th></tr>")]
-    for head, members in groups.items():
-        lines.append(fill('<tr><th colspan="3"><b>{}</b> {}</th></tr>', *head))
-        lines += [_row(label(name, words), effects.get(name)) for name, words in members.items()]
-    return lines
-
-
 def _row(words: object, effect: Effect | None) -> Markup:
     cells = ("–", "–") if effect is None else map(number, effect)
     line = '<tr><td>{}</td><td class="number">{}</td><td class="number">{}</td></tr>'
     return fill(line, words, *cells)
+
+
+def _wrong(state: AppState) -> Markup:
+    scene = active_scene(state)
+    costs = convention_costs(scene, scene.view(state.loop), state.nodes)
+    rows = [_row(words, costs.get(name)) for name, words in COSTS.items()]
+    summary = tag("summary", "If the data were measured in another convention")
+    note = tag("p", COST_NOTE, class_="ws-tiny")
+    return tag("details", join((summary, note, tag("table", join(rows)))), class_="ws-options")

@@ -7,25 +7,16 @@ from markupsafe import Markup
 
 from warpspace.analysis.axis_motion import AxisMotion, assemble_motion
 from warpspace.analysis.blocks import Column, Table
-from warpspace.app.browser.html import (
-    button,
-    choice,
-    field,
-    fill,
-    join,
-    slider,
-    switch,
-    tag,
-    text_box,
-)
+from warpspace.app.browser.html import button, choice, field, fill, join, switch, tag
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import HERE, standing
 from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.evaluation.rotation import chosen_trace, moved_traces, played_axis
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import linear_spans, quarters
-from warpspace.app.state.tree import leaves, spell, toggled, value
+from warpspace.app.state.tree import leaves, toggled
 from warpspace.app.tasks.charts import block_html
+from warpspace.app.tasks.controls import setting
 from warpspace.app.tasks.parts import Section
 from warpspace.bodies.own_meshes import check_meshes
 from warpspace.picture.traces import TraceLine, evaluate_axis_motion, motion_lines
@@ -33,19 +24,6 @@ from warpspace.picture.words import spell_at, spell_point
 from warpspace.units import MINUS
 
 OPEN_MESH = "The surface of a mesh of this machine is not closed; it is drawn as it is."
-
-
-def setting(state: AppState, path: str, placeholder: str = "") -> Markup:
-    """Give a box for a field of the state, with a slider for a position of an axis."""
-    leaf, name = leaves(state)[path], f"state:set.{path}"
-    if leaf.kind != "number" or leaf.span is None:
-        box = text_box(name, spell(state, path), placeholder=placeholder)
-        return field(leaf.label, box, name, leaf.unit, leaf.hint)
-    at, span, label = float(value(state, path)), leaf.span, path.rpartition(".")[2]
-    words = f"{at:g} {leaf.unit}"
-    bar = slider(name, at, span.low, span.high, span.step, twin=name, label=label, text=words)
-    box = text_box(name, f"{at:g}", size="short", inputmode="decimal")
-    return field(label, bar + box, name, leaf.unit, leaf.hint)
 
 
 class PositionsSection(Section):
@@ -61,7 +39,7 @@ class PositionsSection(Section):
         is_open = state.machine.shown and check_meshes(state.scene.machine)
         linear = (f"machine.linear_mm.{axis}" for axis in linear_spans(state.scene))
         paths = (*(f"positions.{axis}" for axis in state.positions), *linear)
-        bars = [setting(state, path) for path in paths]
+        bars = [setting(state, path, bar=True) for path in paths]
         said = (words, OPEN_MESH) if is_open else (words,)
         return join((*bars, *(tag("p", one, class_="ws-tiny") for one in said)))
 
@@ -203,7 +181,7 @@ def _points(state: AppState) -> Markup:
     for index, words in leaves(state)["rotary.off"].choices.items():
         on = int(index) not in state.rotary.off
         parts.append(switch(f"rotary:point.{index}", f"Trace {words}", on=on))
-    parts.append(setting(state, "rotary.own_mm", "150, 0, 100"))
+    parts.append(setting(state, "rotary.own_mm"))
     if len(state.positions) > 1:
         parts += [setting(state, f"rotary.held.{axis}") for axis in state.position_spans]
         hint = "Turn the axis at every quarter turn of the table"

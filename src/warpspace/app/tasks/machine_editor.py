@@ -117,22 +117,20 @@ def _frame(state: AppState, tables: Tables, name: str) -> Markup:
         if name in machine.chain.tool:
             side, other = other, side
         way = "moves along" if axis.is_linear else "turns about"
-        about = f"{way} {'xyz'[axis.index]}, carries the {side}"
-        sense = "with" if axis.direction == 1 else "against"
-        buttons = {
-            "left": ("Nearer to the workpiece", "", None),
-            "right": ("Nearer to the tool", "", None),
-            "side": (f"Carry the {other}", "", None),
-            "turn": ("Reverse direction", f"Moves {sense} its name now", None),
-            "gantry": ("Two guides", "A gantry: two guides, each with an error", bool(gantry)),
-            "remove": (f"Remove {name}", "", None),
+        sense = "" if axis.direction == 1 else " against its name"
+        about = f"{way} {'xyz'[axis.index]}{sense}, carries the {side}"
+        words = {
+            "left": "Nearer to the workpiece",
+            "right": "Nearer to the tool",
+            "side": f"Carry the {other}",
+            "turn": "Reverse direction",
+            "remove": f"Remove {name}",
         }
-        if not axis.is_linear:
-            del buttons["gantry"]
-        found = (
-            button(words, "editor:do", f"{do} {name}", hint=hint, pressed=pressed)
-            for do, (words, hint, pressed) in buttons.items()
-        )
+        found = [button(said, "editor:do", f"{do} {name}") for do, said in words.items()]
+        if axis.is_linear:
+            hint, pressed = "A gantry: two guides, each with an error", gantry is not None
+            guides = button("Two guides", "editor:do", f"gantry {name}", hint=hint, pressed=pressed)
+            found.insert(-1, guides)
         lines += [*_guides(state, gantry), tag("div", join(found), class_="ws-actions")]
     summary = fill("<summary><b>{}</b> {}</summary>", name, about)
     return tag("details", summary + join(lines), class_="ws-frame", data_key=f"frame-{name}")
@@ -201,8 +199,6 @@ def _source(source: BodySource) -> str:
 # --- The machines to start from: a small picture, a title and a chain each ------------------------
 
 WIDTH_PX = 240  # of a small picture: it is shown smaller, sharp on fine screens too
-DRAWING = (0.02, 0.16, 0.55, 0.875)
-"""Part of a picture in which the machine is: left, upper, right and lower end."""
 
 
 class MachinesWindow(Window):
@@ -238,10 +234,9 @@ def small_picture(name: str) -> str:
     if path is None:
         return ""
     with Image.open(path) as picture:
-        left, top, right, bottom = (
-            round(part * size) for part, size in zip(DRAWING, picture.size * 2, strict=True)
-        )
-        small = picture.convert("RGB").crop((left, top, right, bottom))
+        wide, high = picture.size  # the machine stands at the left, below the title
+        box = (wide // 50, high // 6, wide * 11 // 20, high * 7 // 8)
+        small = picture.convert("RGB").crop(box)
     small.thumbnail((WIDTH_PX, WIDTH_PX))
     buffer = io.BytesIO()
     small.save(buffer, "JPEG", quality=80)
