@@ -13,7 +13,6 @@ from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.machine import drawn_bodies, tool_point
 from warpspace.app.evaluation.rotation import (
     chosen_trace,
-    moved_traces,
     played_axis,
     played_position,
     points_on_traces,
@@ -65,21 +64,17 @@ def test_exaggeration_auto_number_and_true_scale(picture):
 
 def test_traces_that_no_error_moves_are_not_drawn():
     assert LIVE.evaluate(START).traces
-    assert moved_traces(LIVE.evaluate(START)) == {}
+    assert LIVE.evaluate(START).moved_traces == {}
     moved = LIVE.evaluate(replace(START.with_amplitude("EXC", 2.0), nodes=3))
-    assert set(moved_traces(moved)) == {
+    assert set(moved.moved_traces) == {
         *(f"C at B {b}°, point (275, 0, 0) mm" for b in ("−30", "0", "30")),
         "B at C 0°, point (275, 0, 0) mm",
         *(f"C at B {b}°, point (0, 275, 450) mm" for b in ("−30", "0", "30")),
         "B at C 0°, point (0, 275, 450) mm",
     }
-    assert chosen_trace(moved, moved_traces(moved)) == "C at B 0°, point (275, 0, 0) mm"
-    assert (
-        moved_traces(
-            LIVE.evaluate(replace(moved.state, shown=replace(moved.state.shown, traces=False)))
-        )
-        == {}
-    )
+    assert chosen_trace(moved) == "C at B 0°, point (275, 0, 0) mm"
+    hidden = replace(moved.state, shown=replace(moved.state.shown, traces=False))
+    assert LIVE.evaluate(hidden).moved_traces == {}
 
 
 def test_kept_results_are_dropped_oldest_first():

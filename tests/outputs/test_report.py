@@ -49,7 +49,7 @@ def test_verdict_on_a_limit_that_is_missed():
     text, (within,) = page_one(scene, grid=11, spec_um=40.0, author="me", questions=("Why?",))
     assert "The limit of 40 µm is missed: 90.6 % of the working volume of 550 × 450 × 400" in text
     assert "the worst is 51.7 µm at X 275 Y −225 Z −480." in text
-    assert within == share_below(evaluate(scene, grid=11).norm_um, 40.0)
+    assert within == share_below(evaluate(scene, grid=11), 40.0)
     for number in ("30.9 µm", "41.3 µm", "'within the limit', '90.6 %'"):
         assert number in text
     assert "Adjust EA0Z (squareness of Z to Y) from +33.9 to +30.0 µrad" in text

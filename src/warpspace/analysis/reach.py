@@ -45,12 +45,12 @@ class Reach(Analysis):
         from warpspace.scene.model import choose_view, evaluate_grid
 
         grid = build_grid(scene.model, scene.workspace, self.nodes)
-        norm = evaluate_grid(scene, grid, choose_view(scene, self.loop)).norm_um
+        field = evaluate_grid(scene, grid, choose_view(scene, self.loop))
         watch(0.3)
         axes = scene.workspace.volume_axes
         if not any(axes):
             raise OptionError("{limit_um}: the working volume of the scene is a point")
-        keeps = norm <= self.limit_um
+        keeps = field.norm_um <= self.limit_um
         found = largest_box(keeps, [_lengths(scene.workspace.ranges, axis) for axis in axes])
         watch(0.9)
         box = None
@@ -62,9 +62,9 @@ class Reach(Analysis):
             }
         return ReachResult(
             limit_um=self.limit_um,
-            percent=100.0 * share_below(norm, self.limit_um),
+            percent=100.0 * share_below(field, self.limit_um),
             box=box,
-            keeps_um={f"{part:.0%}": share_within(norm, part) for part in SHARES},
+            keeps_um={f"{part:.0%}": share_within(field, part) for part in SHARES},
             title=scene.title,
             ranges={axis: scene.workspace.ranges[axis] for axis in axes if axis},
         )

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from dataclasses import field as attribute
-from functools import cache
 
 import numpy as np
 
@@ -13,7 +12,6 @@ from warpspace.field.grid import Grid
 from warpspace.units import Array
 
 P95 = 0.95
-CELLS = 40  # about as many cells per axis a percentile is read from; a coarse grid is subdivided
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +40,7 @@ class Statistics(Summary):
 def volume_statistics(field: ErrorField, grid: Grid) -> Statistics:
     """Summarise the volume that a grid fills, whatever the number of its nodes."""
     norm, weights = field.norm_um.reshape(grid.shape), grid.weights
-    cells = _cell_values(norm).reshape(-1)
+    cells = field.cells_um.reshape(-1)
     return _summed_up(
         norm,
         float(np.sum(weights * norm)),
@@ -73,33 +71,18 @@ def _summed_up(
     return Statistics(mean, rms, p95, float(norm[worst]), (x, y, z), at)
 
 
-def share_within(norm_um: Array, share: float) -> float:
-    """Limit, µm, that a share of the volume keeps; |E| interpolated between nodes, [x, y, z]."""
-    cells = _cell_values(norm_um).reshape(-1)
-    return float(norm_um.max()) if share >= 1.0 else _percentile(cells, share * cells.size - 0.5)
+def share_within(field: ErrorField, share: float) -> float:
+    """Limit, µm, that a share of the volume keeps; |E| interpolated between nodes."""
+    cells = field.cells_um.reshape(-1)
+    within = _percentile(cells, share * cells.size - 0.5)
+    return float(field.norm_um.max()) if share >= 1.0 else within
 
 
-def share_below(norm_um: Array, limit_um: float) -> float:
+def share_below(field: ErrorField, limit_um: float) -> float:
     """Share of the volume whose |E| is at most a limit; |E| interpolated between nodes."""
-    return 1.0 if norm_um.max() <= limit_um else float(np.mean(_cell_values(norm_um) <= limit_um))
-
-
-def _cell_values(values: Array) -> Array:
-    for nodes in values.shape:
-        values = np.tensordot(values, _to_cells(nodes), axes=(0, 1))
-    return values
-
-
-@cache
-def _to_cells(nodes: int) -> Array:
-    if nodes == 1:
-        return np.ones((1, 1))
-    parts = max(1, round(CELLS / (nodes - 1)))
-    share = (np.arange(parts) + 0.5) / parts
-    weights = np.zeros((nodes - 1, parts, nodes))
-    for cell in range(nodes - 1):
-        weights[cell, :, cell], weights[cell, :, cell + 1] = 1.0 - share, share
-    return weights.reshape(-1, nodes)
+    if field.norm_um.max() <= limit_um:
+        return 1.0
+    return np.count_nonzero(field.cells_um <= limit_um) / field.cells_um.size
 
 
 def _percentile(values: Array, place: float) -> float:

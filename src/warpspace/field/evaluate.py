@@ -13,7 +13,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from warpspace.field.grid import Grid, Workspace, build_grid, cut, cut_all, is_small, pieces
+from warpspace.field.grid import (
+    Grid,
+    Workspace,
+    build_grid,
+    cell_values,
+    cut,
+    cut_all,
+    is_small,
+    pieces,
+)
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import (
     LoopLinks,
@@ -59,6 +68,14 @@ class ErrorField:
         squared += y * y  # in place: a volume of points is larger than what a processor keeps near
         squared += z * z
         return np.sqrt(squared)
+
+    @cached_property
+    def cells_um(self) -> Array:
+        """Length of the position error in cells of a volume, [X, Y, Z], µm; linear between nodes.
+
+        Percentiles and shares of the volume are read from it, whatever the number of its nodes.
+        """
+        return cell_values(self.norm_um)
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from math import prod
 from operator import index as whole_number
 from typing import Any, TypeAlias, TypeVar, cast
@@ -269,3 +269,27 @@ def build_slice(
         grid,
         nominal_mm=transforms.apply(home @ transforms.inverse(here), grid.nominal_mm),
     )
+
+
+# --- Values in cells of a volume ------------------------------------------------------------------
+
+CELLS = 40  # about as many cells per axis; a coarse grid is subdivided
+
+
+def cell_values(values: Array) -> Array:
+    """Interpolate values at nodes, [x, y, z], to the middles of cells that are equally large."""
+    for nodes in values.shape:
+        values = np.tensordot(values, _to_cells(nodes), axes=(0, 1))
+    return values
+
+
+@cache
+def _to_cells(nodes: int) -> Array:
+    if nodes == 1:
+        return np.ones((1, 1))
+    parts = max(1, round(CELLS / (nodes - 1)))
+    share = (np.arange(parts) + 0.5) / parts
+    weights = np.zeros((nodes - 1, parts, nodes))
+    for cell in range(nodes - 1):
+        weights[cell, :, cell], weights[cell, :, cell + 1] = 1.0 - share, share
+    return weights.reshape(-1, nodes)

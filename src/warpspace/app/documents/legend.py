@@ -134,7 +134,7 @@ def kept_words(picture: LivePicture) -> tuple[str, bool]:
     What is not kept everywhere is never said to be, however little is missing.
     """
     limit = picture.state.specification.limit_um
-    percent = 100.0 * share_below(picture.field.norm_um, limit)
+    percent = 100.0 * share_below(picture.field, limit)
     kept = picture.statistics.max_um <= limit
     shown = number(min(percent, 99.9), 0 if percent < 99.0 else 1)
     return f"{'all' if kept else f'{shown} %'} of the volume within {limit:g} µm", kept

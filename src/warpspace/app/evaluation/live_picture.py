@@ -1,14 +1,16 @@
 """The picture of a state: what the app draws, with the comparison it belongs to."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+
+import numpy as np
 
 from warpspace.analysis.statistics import Statistics
 from warpspace.app.evaluation.bench import BenchPicture, bench_picture
 from warpspace.app.state.app_state import AppState
 from warpspace.picture.model import Picture, picture_size_mm
-from warpspace.picture.traces import TraceLines
+from warpspace.picture.traces import TraceLine, TraceLines, is_moved, name_trace, trace_lines
 from warpspace.units import Array
 
 
@@ -54,6 +56,18 @@ class LivePicture(Picture):
     def bench(self) -> BenchPicture | None:
         """The path of the standard test that is run; None where none is, or cannot be."""
         return None if self.is_difference else bench_picture(self.drawn_state)
+
+    @cached_property
+    def worst_node(self) -> int:
+        """Flat number of the node where what is coloured is largest in magnitude."""
+        return int(np.argmax(np.abs(self.values)))
+
+    @cached_property
+    def moved_traces(self) -> Mapping[str, TraceLine]:
+        """The traces that an error moves, by name."""
+        if not self.state.shown.traces:
+            return {}
+        return {name_trace(one.trace): one for one in trace_lines(self.traces) if is_moved(one)}
 
     @property
     def drawn_state(self) -> AppState:

@@ -6,7 +6,6 @@ import numpy as np
 
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
-from warpspace.picture.traces import TraceLine, is_moved, name_trace, trace_lines
 from warpspace.units import Array
 
 
@@ -48,16 +47,9 @@ def points_on_traces(picture: LivePicture, position: Mapping[str, float]) -> tup
     return points[:, :3], points[:, 3:]
 
 
-def moved_traces(picture: LivePicture) -> dict[str, TraceLine]:
-    """Give the traces that an error moves, by name."""
-    if not picture.state.shown.traces:
-        return {}
-    return {name_trace(line.trace): line for line in trace_lines(picture.traces) if is_moved(line)}
-
-
-def chosen_trace(picture: LivePicture, moved: Mapping[str, TraceLine]) -> str:
+def chosen_trace(picture: LivePicture) -> str:
     """Name the trace that is looked at, as long as an error moves it; empty where none does."""
-    state = picture.state
+    state, moved = picture.state, picture.moved_traces
     if state.rotary.chosen in moved:
         return state.rotary.chosen
     played = played_axis(state)

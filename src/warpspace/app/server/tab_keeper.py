@@ -121,6 +121,7 @@ class TabKeeper(Part):
     """The memory of a tab that is in its page."""
 
     name = "keeper"
+    follows = "at rest"
 
     def __init__(self, context: Context, *, shared: bool) -> None:
         self._context, self._shared = context, shared

@@ -120,6 +120,7 @@ def _differences(old: object, new: object) -> list[str]:
     return [
         f"{name}.{rest}" if rest else name
         for name, before, after in parts
+        if before is not after
         for rest in _differences(before, after)
     ]
 

@@ -59,6 +59,8 @@ class ErrorsPart(Part):
         self._largest = 1.0
         self._spans: dict[str, Span] = {}
         self._more: tuple[object, Markup] = (None, EMPTY)
+        self._listed: object = None  # what the list was written for
+        self._made: dict[str, tuple[object, ...]] = {}  # what the rows were written for
 
     def depends(self, picture: LivePicture) -> tuple[object, ...]:
         state = picture.state
@@ -80,7 +82,10 @@ class ErrorsPart(Part):
         if sorted_for != self._sorted_for or changed - self._own:
             self._sort(state)
             self._sorted_for, self._sorted_at, self._own = sorted_for, state.amplitudes, set()
-        return {**self._list(state), **self._rows(state)}
+        listed = (self._order, self._used, state.page, state.exclusions, bool(state.changed_keys))
+        found = {} if listed == self._listed else self._list(state)
+        self._listed = listed
+        return {**found, **self._rows(state)}
 
     def _effect(self, state: AppState, key: str) -> float:
         return self._gains.get(key, 0.0) * abs(state.amplitudes[key])
@@ -132,16 +137,19 @@ class ErrorsPart(Part):
     def _rows(self, state: AppState) -> dict[str, str]:
         pieces: dict[str, str] = {}
         for key in self._order:
-            row, value, span = parameter(key), state.amplitudes[key], self._spans[key]
+            value, span = state.amplitudes[key], self._spans[key]
             if abs(value) > span.high:  # typed
                 span = self._spans[key] = amplitude_span(key, value, None)
-            effect = self._effect(state, key)
-            share = min(effect / self._largest, 1.0)
+            effect, opened = self._effect(state, key), key == state.page.row
+            active = state.exclusions.active(key)
+            made = (value, span, effect, self._largest, active, opened, Identity(state.scene))
+            if made == self._made.get(key) and not opened:
+                continue
+            self._made[key] = made
+            row, share = parameter(key), min(effect / self._largest, 1.0)
             hint = edits.curve_of(state, key).slider_words(row.axis)
-            pieces[f"error.{key}"] = _row(
-                row, value, span, effect, share, hint, active=state.exclusions.active(key)
-            )
-            if key == state.page.row:
+            pieces[f"error.{key}"] = _row(row, value, span, effect, share, hint, active=active)
+            if opened:
                 pieces[f"error.{key}"] += self._curve(state, key)
         return pieces
 
@@ -184,7 +192,6 @@ def _places(keys: list[str], row: str) -> Markup:
     )  # fmt: skip
 
 
-@lru_cache(maxsize=512)
 def _row(
     row: Parameter, value: float, span: Span, effect: float, share: float, hint: str, *,
     active: bool,

@@ -11,7 +11,7 @@ from warpspace.app.browser.html import button, choice, field, fill, join, switch
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import HERE, standing
 from warpspace.app.evaluation.resulting_scene import active_scene
-from warpspace.app.evaluation.rotation import chosen_trace, moved_traces, played_axis
+from warpspace.app.evaluation.rotation import chosen_trace, played_axis
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import linear_spans, quarters
 from warpspace.app.state.tree import leaves, toggled
@@ -124,10 +124,10 @@ def _trace(picture: LivePicture) -> Markup:
     if not picture.state.shown.traces:
         turn_on = button("Draw the traces", "state:set.shown.traces", "1", kind="main")
         return tag("div", turn_on, class_="ws-actions")
-    moved = moved_traces(picture)
+    moved = picture.moved_traces
     if not moved:
         return tag("p", NOTHING_MOVED, class_="ws-quiet")
-    name, path = chosen_trace(picture, moved), "state:set.rotary.chosen"
+    name, path = chosen_trace(picture), "state:set.rotary.chosen"
     chosen = field("Trace", choice(path, name, {one: one for one in moved}), path)
     motions = {one: motion_of(picture, moved[one]) for one in [*moved][:MOST_ROWS]}
     motion = motions[name] if name in motions else motion_of(picture, moved[name])

@@ -1,6 +1,7 @@
 """What lies over the drawing in every state: heading, colour bar, words and scale bars."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 from markupsafe import Markup
@@ -36,19 +37,20 @@ class HeadPart(Part):
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
         words = subject_words(picture)
-        limit = EMPTY if picture.is_difference else _limit(picture)
-        said = filter(None, (place_words(picture), limit))
+        said: list[str] = [place_words(picture)]
+        if not picture.is_difference:
+            limit = f"{picture.state.specification.limit_um:g}"
+            said.append(_limit(*kept_words(picture), limit))
         head = fill(
             '<h1>{numbers}</h1><div>{said}</div>{words}<div data-piece="head.order"></div>',
-            numbers=numbers_words(picture), said=Markup(" · ").join(said),
+            numbers=numbers_words(picture), said=Markup(" · ").join(filter(None, said)),
             words=tag("p", " · ".join(words), class_="ws-subject") if words else EMPTY,
         )  # fmt: skip
         return {"head": head, "legend": legend_html(picture)}
 
 
-def _limit(picture: LivePicture) -> Markup:
-    words, kept = kept_words(picture)
-    limit = f"{picture.state.specification.limit_um:g}"
+@lru_cache(maxsize=64)
+def _limit(words: str, kept: bool, limit: str) -> Markup:
     box = text_box("state:set.specification.limit_um", limit, size="short", label="Limit")
     body = tag("div", join(("Limit ", box, " µm")), class_="ws-field")
     kind = "ws-kept" if kept else "ws-missed"

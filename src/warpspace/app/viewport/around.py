@@ -4,9 +4,9 @@ import numpy as np
 
 from warpspace.app.evaluation.budget import answer
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.rotation import chosen_trace, moved_traces, points_on_traces
+from warpspace.app.evaluation.rotation import chosen_trace, points_on_traces
 from warpspace.app.viewport.colours import palette
-from warpspace.app.viewport.labels import TICK, axes, axis_labels, point_labels, worst_node
+from warpspace.app.viewport.labels import TICK, axes, axis_labels, point_labels
 from warpspace.app.viewport.shapes import (
     SCENE_PER_MM,
     Shape,
@@ -61,8 +61,8 @@ def _traces(picture: LivePicture) -> Shapes:
 
     What no error moves is not drawn, nor what the actual trace covers of the nominal one.
     """
-    moved = moved_traces(picture)
-    name = chosen_trace(picture, moved)
+    moved = picture.moved_traces
+    name = chosen_trace(picture)
     others = [line.actual_mm for other, line in moved.items() if other != name]
     faint = lines(polylines(others), palette(picture).trace_elsewhere, 1.0)
     if not name:
@@ -129,7 +129,7 @@ def _marks(picture: LivePicture) -> Shapes:
             at.reshape(-1, 3)[chosen] for at in (picture.grid.nominal_mm, picture.drawn_mm)
         )
         shapes["/marks/arrows"] = lines(arrows(start, end, HEAD * size), colour, 1.5)
-    worst = worst_node(picture)
+    worst = picture.worst_node
     if look.worst and picture.values.flat[worst]:
         at = picture.drawn_mm.reshape(-1, 3)[worst]
         shapes["/marks/ball"] = ball(at, BALL * size, colour)

@@ -13,7 +13,7 @@ from warpspace.app.evaluation.budget import answer
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import tool_point
-from warpspace.app.evaluation.rotation import chosen_trace, moved_traces
+from warpspace.app.evaluation.rotation import chosen_trace
 from warpspace.field.grid import Grid
 from warpspace.geometry.colour import tick_values
 from warpspace.geometry.surfaces import corners, is_thin
@@ -110,11 +110,6 @@ def axis_labels(picture: LivePicture) -> list[Label]:
     return found
 
 
-def worst_node(picture: LivePicture) -> int:
-    """Give the flat number of the node where what is coloured is largest in magnitude."""
-    return int(np.argmax(np.abs(picture.values)))
-
-
 def _spell(value: float, unit: str = MICROMETRE) -> str:
     """Spell an error: ``23.6 µm``, from 10 mm up ``12.3 mm``."""
     if unit == MICROMETRE and abs(value) >= 1e4:
@@ -133,7 +128,7 @@ def point_labels(picture: LivePicture) -> list[Label]:
 
 
 def _worst(picture: LivePicture) -> Iterator[Label]:
-    worst = worst_node(picture)
+    worst = picture.worst_node
     value = float(picture.values.flat[worst])
     if picture.state.look.worst and value != 0.0:
         text = f"max {_spell(value, picture.scale.unit)}"
@@ -146,7 +141,7 @@ def _corners(picture: LivePicture) -> Iterator[Label]:
         return
     says_max = look.worst and not look.tilts and picture.state.component == "norm"
     for node in corners(picture.shape):
-        if not (says_max and node == worst_node(picture)):
+        if not (says_max and node == picture.worst_node):
             text = _spell(float(picture.field.norm_um.flat[node]))
             yield Label(text, picture.drawn_mm.reshape(-1, 3)[node], "corner")
 
@@ -177,8 +172,8 @@ def _names(picture: LivePicture) -> Iterator[Label]:
         words = f"{found.prepared.title}: max {_spell(found.largest_um)}"
         factor = spell_factor(picture.exaggeration)
         yield Label(f"{words}, drawn {factor}", ends[np.argmax(ends[:, 2])])
-    moved = moved_traces(picture)
-    name = chosen_trace(picture, moved)
+    moved = picture.moved_traces
+    name = chosen_trace(picture)
     if name:
         lengths = np.linalg.norm(moved[name].error_um, axis=-1)
         worst = int(np.argmax(lengths))

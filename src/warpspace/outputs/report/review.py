@@ -184,7 +184,7 @@ def _review_scene(letter: str, picture: ScenePicture, settings: ReportSettings) 
 
 def _within(picture: ScenePicture) -> float:
     limit = picture.scene.limit_um
-    return 0.0 if limit is None else share_below(picture.field.norm_um, limit)
+    return 0.0 if limit is None else share_below(picture.field, limit)
 
 
 def _ask(analysis: Analysis, scene: Scene) -> Result | str:
