@@ -68,24 +68,6 @@ def test_what_no_model_holds_for_is_clamped_and_said(value, kept):
     assert START.with_amplitude("QQQ", 1.0).notes == ("QQQ: no parameter of this machine",)
 
 
-WANTED = Table(SPAN, ((-275.0, -1.5), (0.0, 2.0), (275.0, 0.25)))
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "X [mm]\tEXX [µm]\n-275\t-1,5\n0\t2\n275\t0,25",
-        "Position;Wert 1\r\n−275;−1,5\r\n0;2,0\r\n275;2,5e-1\r\n",
-        '"X","EXX"\n-275.0,-1.5\n0.0,2.0\n275.0,0.25',
-        "-275  -1.5\n\n0 2 # middle\n275 .25",
-        "275\t0.25\n-275\t-1.5\n0\t2",
-        "-275 -1.5\n0 1\n275 0.25\n0 3",
-    ],
-)
-def test_a_table_is_pasted_from_a_spreadsheet(text):
-    assert read("table", text) == WANTED
-
-
 @pytest.mark.parametrize("order", [0.65, 2.0, 8.0, 30.0])
 def test_harmonics_become_a_table_of_the_same_shape(order):
     span = (0.0, 360.0)
@@ -96,6 +78,7 @@ def test_harmonics_become_a_table_of_the_same_shape(order):
     assert apart <= 0.0025 * abs(wave.amplitude)
 
 
+PASTED = Table(SPAN, ((-275.0, -1.5), (0.0, 2.0), (275.0, 0.25)))
 EXAMPLES = [
     Constant(SPAN, 23.1),
     Ramp(SPAN, -43.7),
@@ -106,12 +89,8 @@ EXAMPLES = [
 
 
 @pytest.mark.parametrize("function", EXAMPLES, ids=lambda function: function.title)
-def test_rows_read_back_to_the_function(function):
+def test_rows_read_back_to_the_function_and_an_error_taken_to_zero_keeps_it(function):
     assert read(function.title, spell_rows(function)) == function
-
-
-@pytest.mark.parametrize("function", EXAMPLES, ids=lambda function: function.title)
-def test_an_error_that_is_taken_to_zero_keeps_its_curve(function):
     entered = edits.with_curve(START, "EXX", function)
     zeroed = entered.with_amplitude("EXX", 0.0)
     assert type(edits.curve_of(zeroed, "EXX")) is type(function)
@@ -130,9 +109,15 @@ def test_an_error_that_is_taken_to_zero_keeps_its_curve(function):
         ("harmonics", "1 3", Harmonics(SPAN, ((1.0, 3.0, 0.0),))),
         ("table", "-275, 0\n275, 4.1", Table(SPAN, ((-275.0, 0.0), (275.0, 4.1)))),
         ("table", "-275\t0\n\n275\t4,1", Table(SPAN, ((-275.0, 0.0), (275.0, 4.1)))),
+        ("table", "X [mm]\tEXX [µm]\n-275\t-1,5\n0\t2\n275\t0,25", PASTED),
+        ("table", "Position;Wert 1\r\n−275;−1,5\r\n0;2,0\r\n275;2,5e-1\r\n", PASTED),
+        ("table", '"X","EXX"\n-275.0,-1.5\n0.0,2.0\n275.0,0.25', PASTED),
+        ("table", "-275  -1.5\n\n0 2 # middle\n275 .25", PASTED),
+        ("table", "275\t0.25\n-275\t-1.5\n0\t2", PASTED),
+        ("table", "-275 -1.5\n0 1\n275 0.25\n0 3", PASTED),
     ],
 )
-def test_spellings(kind, text, function):
+def test_curves_are_read_as_typed_and_as_pasted_from_a_spreadsheet(kind, text, function):
     assert read(kind, text) == function
 
 

@@ -6,10 +6,12 @@ from app.parts import LIVE, lone_part
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.tree import toggled
 from warpspace.app.tasks.conventions import with_reference
-from warpspace.app.tasks.errors import ErrorsPart
+from warpspace.app.tasks.errors import ErrorsPart, find_parameters
+from warpspace.machine.axes import parameter
 from warpspace.scene.library import load_scene
 
 STATE = start_state(load_scene("dvf5000_first"))
+KEYS = STATE.scene.parameter_keys
 
 
 class Column:
@@ -96,3 +98,33 @@ def test_what_is_no_number_is_said_and_exclusions_are_counted():
     assert column.state.amplitudes == STATE.amplitudes
     column.state = toggled(column.state, "exclusions.only", "EAY")
     assert "6 of 7 errors left out" in column.do("none")["errors"]
+
+
+@pytest.mark.parametrize(
+    ("query", "found"),
+    [
+        ("roll x", ["EAX"]),
+        ("eax", ["EAX"]),
+        ("c0y", ["EC0Y"]),
+        ("squareness", ["EC0Y", "EA0Z", "EB0Z"]),
+        ("squarness", ["EC0Y", "EA0Z", "EB0Z"]),
+        ("γ", ["EC0Y", "EC0B"]),
+        ("ε_xX", ["EAX"]),
+        ("tilt c", ["EAC", "EBC"]),
+        ("positioning z", ["EZZ"]),
+        ("no such thing", []),
+        ("<script>", []),
+    ],
+)
+def test_errors_are_found_by_what_people_call_them(query, found):
+    assert list(find_parameters(query, KEYS)) == found
+
+
+def test_every_parameter_is_found_by_its_key_symbol_and_name():
+    for key in KEYS:
+        row = parameter(key)
+        assert find_parameters(key, KEYS) == (key,)
+        assert key in find_parameters(row.symbol, KEYS)
+        assert key in find_parameters(row.name, KEYS)
+    assert find_parameters("   ", KEYS) == KEYS
+    assert find_parameters("x" * 1_000_000, KEYS) == ()

@@ -50,8 +50,6 @@ class CompensatedSource:
 
 
 class SliceSource:
-    """Slices of states; usable from any thread."""
-
     def __init__(self, compensated: CompensatedSource) -> None:
         self._compensated = compensated
         self._bases: Cache[tuple[Grid, ErrorBasis]] = Cache(CACHE_BYTES)
@@ -59,7 +57,6 @@ class SliceSource:
     def slices(
         self, state: AppState, amplitudes: Array, exaggeration: float, colours: ColourScale | None
     ) -> tuple[Slice, ...]:
-        """Evaluate the slices of a state; none where it does not show any."""
         if state.look.surface != "slices":
             return ()
         found: list[Slice] = []

@@ -83,8 +83,6 @@ def chosen_map(state: AppState) -> str:
 
 
 class ControlsPart(Part):
-    """How the volume is drawn: exaggeration, component, surface, machine, and what is rarer."""
-
     name = "controls"
 
     def depends(self, picture: LivePicture) -> tuple[object, ...]:
@@ -252,7 +250,6 @@ def _own_sides(state: AppState) -> dict[str, Side[AppState]]:
 
 
 def _sides(found: Compared) -> Markup:
-    """Give the switch that lies over the drawing while two are compared."""
     change = found.refused or "The change from A to B, node by node, with colours of its own"
     hints = {"a": found.titles[0], "b": found.titles[1], "difference": change}
     choices = (
@@ -269,7 +266,6 @@ ROWS = {"mean": "mean_um", "RMS": "rms_um", "P95": "p95_um", "max": "max_um"}
 
 
 def comparison_html(found: Compared) -> Markup:
-    """Spell the numbers of a comparison."""
     change, lines = found.difference, list[Markup]()
     for words, name in ROWS.items():
         a, b = getattr(found.a, name), getattr(found.b, name)

@@ -74,7 +74,6 @@ def _read(
 
 
 def sample_curve(function: ErrorFunction, span: tuple[float, float]) -> tuple[Array, Array]:
-    """Sample a curve along the travel for a chart."""
     inside = [q for q in function.kinks if span[0] < q < span[1]][:MAX_KINKS]
     at = np.unique(np.concatenate([np.linspace(*span, CHART_SAMPLES), inside]))
     return at, _finite(function.evaluate(at))
@@ -152,7 +151,6 @@ def edit_curve(state: AppState, what: str, key: str, value: str) -> tuple[AppSta
 
 
 def origin_words(state: AppState, key: str) -> tuple[str, bool]:
-    """Say where an error comes from, and whether it has been edited since."""
     scene = state.origin
     own = state.own_curves.get(key)
     uncertainty, measurement = scene.uncertainty.get(key), scene.measured.get(key)

@@ -182,7 +182,6 @@ class ErrorsPart(Part):
 
 
 def _places(keys: list[str], row: str) -> Markup:
-    """Give the places of rows; the first, or the unfolded one, is the keyboard's way in."""
     start = row if row in keys else next(iter(keys), "")
     return join(
         tag("div", "", data_piece=f"error.{key}", class_="ws-error", role="treeitem",
@@ -249,7 +248,6 @@ _NEAR = 0.75
 
 
 def find_parameters(query: str, keys: Sequence[str]) -> tuple[str, ...]:
-    """Find the parameters that a user asks for."""
     tokens = _tokens(query)
     if not tokens:
         return tuple(keys)

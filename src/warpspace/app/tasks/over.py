@@ -97,7 +97,6 @@ class RoomPart(Part):
         return state
 
     def _fill(self, room: Any) -> None:
-        """Have the camera fill a drawing whose size has changed."""
         picture = self.context.shown
         if picture is not None and self.context.camera.take_room(room, picture):
             self.context.client.flush()

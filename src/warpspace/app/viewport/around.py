@@ -74,7 +74,6 @@ def _traces(picture: LivePicture) -> Shapes:
 
 
 def _path(picture: LivePicture) -> Shapes:
-    """Draw the path of the standard test that is run, with the factor of the box."""
     found = picture.bench
     if found is None:
         return {}
@@ -91,16 +90,14 @@ def _pair(picture: LivePicture, root: str, nominal: Array, actual: Array) -> Sha
 
 
 def _other_side(picture: LivePicture) -> Shapes:
-    """Draw the edges of the side of a comparison that is not drawn, every second piece: dotted."""
     other = None if picture.compared is None else picture.compared.other_mm
     if other is None or not picture.state.comparison.ghost:
         return {}
-    edges = outline_pieces(picture, other)[::2]
+    edges = outline_pieces(picture, other)[::2]  # dotted
     return {"/compare/other": lines(edges, palette(picture).edge, 2.0)}
 
 
 def _asked(picture: LivePicture) -> Shapes:
-    """Mark the point that was asked about, its displacement, axis and lever of the chosen error."""
     picked, size = picture.state.picked, picture.size_mm
     if picked is None or picture.is_difference:
         return {}
@@ -120,7 +117,6 @@ def _asked(picture: LivePicture) -> Shapes:
 
 
 def _marks(picture: LivePicture) -> Shapes:
-    """Mark the worst node, and the displacement of the corners; their numbers are words."""
     look, size, colour = picture.state.look, picture.size_mm, palette(picture).edge
     shapes: dict[str, Shape | None] = {}
     if look.arrows:

@@ -39,7 +39,6 @@ DARK_ISOLINE: Rgb = (60, 68, 80)
 
 
 def ghost_dashes(picture: LivePicture) -> Array:
-    """Dash the edges of the nominal box, [S, 2, 3], mm."""
     nominal = picture.grid.nominal_mm.reshape(-1, 3)
     edges = [(nominal[edge[0]], nominal[edge[-1]]) for edge in box_edges(picture.grid.shape)]
     longest = picture.size_mm
@@ -61,7 +60,6 @@ def _template(triangles: Identity, count: int) -> GltfTemplate:
 
 
 def box(picture: LivePicture) -> Shapes:
-    """Draw surface, grid lines, edges and isolines, and the nominal box around them."""
     colours, look, shown = palette(picture), picture.state.look, picture.state.shown
     surface = Shape("add_glb", UNLIT, {"glb_data": surface_glb(picture)})
     shapes: dict[str, Shape | None] = {SURFACE: surface}
@@ -148,5 +146,4 @@ def _open_script(picture: LivePicture, vertices_mm: Array) -> str:
 
 
 def packed(values: NDArray[Any]) -> str:
-    """Spell numbers as they lie in memory, for a script."""
     return b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")

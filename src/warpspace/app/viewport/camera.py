@@ -35,14 +35,11 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class CameraSetup:
-    """How the camera is set up."""
-
     view: str = "iso"  # A key of `VIEWS`
     orthographic: bool = False  # whether it is the telephoto
 
     @property
     def fov_deg(self) -> float:
-        """Vertical field of view, degrees."""
         return TELEPHOTO_DEG if self.orthographic else FOV_DEG
 
 
@@ -131,7 +128,6 @@ class TabCamera:
             self._change_lens(picture)
 
     def _change_lens(self, picture: LivePicture) -> None:
-        """Move along the line of sight so that what is looked at keeps its size."""
         now, fov = self.remember(), float(np.deg2rad(self.stand.fov_deg))
         ratio = float(np.tan(now.fov_rad / 2.0) / np.tan(fov / 2.0))
         look_at = np.array(now.look_at)
@@ -139,7 +135,6 @@ class TabCamera:
         self._stand_at(CameraMemory((x, y, z), now.look_at, now.up, fov), self._room_mm(picture))
 
     def _room_mm(self, picture: LivePicture) -> Array:
-        """Give points around all that is to be seen, mm."""
         room = [axes_room_mm(picture)]
         if picture.state.machine.shown:
             bodies = drawn_bodies(picture, nominal=True)
@@ -184,7 +179,6 @@ class TabCamera:
         self._put = self.remember()
 
     def remember(self) -> CameraMemory:
-        """Give where it stands."""
         camera = self._camera
         return CameraMemory(
             tuple(camera.position.tolist()),

@@ -59,12 +59,10 @@ def level_colours(*, diverging: bool) -> Floats:
 
 
 def vertex_colours(scale: ColourScale, values: Array) -> Floats:
-    """Map values to vertex colours that arrive on screen as the scale's colours, [..., 3]."""
     return level_colours(diverging=scale.diverging)[colour_levels(scale, values)]
 
 
 def colour_levels(scale: ColourScale, values: Array) -> NDArray[np.uint8]:
-    """Give the level of each value on the scale, 0 to LEVELS − 1."""
     return np.rint(scale.fraction(values) * (LEVELS - 1)).astype(np.uint8)
 
 
@@ -106,5 +104,4 @@ DARK = Palette(
 
 
 def palette(picture: LivePicture) -> Palette:
-    """Choose the colours for the ground a picture is drawn on."""
     return DARK if picture.state.shown.dark else LIGHT

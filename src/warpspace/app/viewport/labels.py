@@ -97,7 +97,6 @@ def axes_room_mm(picture: LivePicture) -> Array:
 
 
 def axis_labels(picture: LivePicture) -> list[Label]:
-    """Give names and numbers of the axes."""
     state = picture.state
     if not state.shown.axes or state.machine.shown:  # their numbers would cover the machine
         return []

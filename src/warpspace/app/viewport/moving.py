@@ -61,7 +61,6 @@ class MovingLayer:
 
     @property
     def playing(self) -> bool:
-        """Whether the table turns."""
         return self._turned_at is not None
 
     def play(self, on: bool | None) -> None:
@@ -83,14 +82,12 @@ class MovingLayer:
         return None if at is None else max(0.0, at + STEP_S - time.monotonic())
 
     def turn(self) -> None:
-        """Turn the table on."""
         now = time.monotonic()
         since = min(now - (self._turned_at or now), LONGEST_STEP_S)
         self._turned_deg, self._turned_at = (self._turned_deg + SPEED_DEG_S * since) % 360.0, now
         self._stand(played_position(self._picture.state, self._turned_deg), drawn=True)
 
     def _stand(self, position: dict[str, float], *, drawn: bool = False) -> None:
-        """Have the played axis at a position; none where it stands."""
         self.position = position
         if drawn:
             with self._client.atomic():

@@ -24,9 +24,7 @@ Pieces = NDArray[np.float32]  # [S, 2, 3], mm; ends of pieces of line
 class Layer(Protocol):
     """Something drawn that follows the picture."""
 
-    def show(self, picture: LivePicture) -> None:
-        """Draw a picture by changing nodes in place."""
-        ...
+    def show(self, picture: LivePicture) -> None: ...
 
 
 @dataclass(frozen=True, slots=True)
