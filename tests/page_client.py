@@ -201,7 +201,7 @@ class Tab(Page):
         self.socket = await dial(self._app, **patience)
         self._reader = asyncio.create_task(self._read())
         try:
-            await self.send(said(("tab:here", f"{self.token},1600")))
+            await self.send(said(("tab:here", self.token)))
             await self.send(CAMERA)
             await until(lambda: self.stage == "open", patience_s)
         except BaseException:

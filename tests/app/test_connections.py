@@ -96,19 +96,14 @@ def test_a_connection_that_is_gone_takes_nothing_from_the_tab_that_comes_back():
         assert running._memory.take(token) is left
 
 
-@pytest.mark.parametrize(
-    ("width", "believed"),
-    [("1280", 1280.0), ("wide", None), ("-1", None), ("9" * 12, None), ("", None)],
-)
-def test_a_page_says_which_tab_it_is_and_how_wide(width, believed):
+def test_a_page_says_once_which_tab_it_is():
     token = new_token()
     with viewer.Viewer(load_scene("dvf5000_nominal")) as running, dial(running) as socket:
-        wire = Wire(socket, f"{token},{width}")
-        wire.say("tab:here", f"{new_token()},1600")  # only the first counts
+        wire = Wire(socket, token)
+        wire.say("tab:here", new_token())  # only the first counts
         assert wire.read_until(lambda: wire.is_open, seconds=60.0)
         (session,) = running.sessions
         assert session.token == token
-        assert session.context.camera.page_width == believed
         end_work(running)
 
 

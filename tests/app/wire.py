@@ -26,7 +26,7 @@ class Wire(Page):
         super().__init__()
         self._socket = socket
         self.kinds: list[str] = []
-        self.say("tab:here", tab or f"{secrets.token_hex(16)},1600")
+        self.say("tab:here", tab or secrets.token_hex(16))
         self.send(CAMERA)
 
     def send(self, message: dict[str, Any]) -> None:

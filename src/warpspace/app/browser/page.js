@@ -353,7 +353,7 @@
       rename(tabName() || [...crypto.getRandomValues(new Uint8Array(16))]
         .map(byte => byte.toString(16).padStart(2, "0")).join(""));
       pending.splice(0);
-      send("tab:here", `${window.__warpspaceTab},${innerWidth}`);
+      send("tab:here", window.__warpspaceTab);
       tidyAddress();
       const link = linkOf();
       known.hasLink = Boolean(link) && link !== (stored() || window.__warpspaceLink);

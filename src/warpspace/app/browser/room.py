@@ -6,7 +6,7 @@ The page says so (`room.js`) as soon as it is laid out and whenever that changes
 from dataclasses import dataclass
 
 TOP_PX = 46  # height of the bar at the top; the style sheet has it too
-PHONE_PX, NARROW_PX, WIDE_PX = 700, 1200, 2400
+PHONE_PX, COLUMNS_PX = 700, 558  # width of a phone at most, and of both columns elsewhere
 PHONE_SHARE = 0.52  # of a phone's height, that the drawing has
 MOST_PX = 16_384
 LEAST_PX = 120
@@ -17,15 +17,6 @@ WORDS_PX, PHONE_WORDS_PX = 46, 22
 """Kept free at the sides, for the words at axes and corners."""
 MOST_SHARE, LEAST_SHARE = 0.4, 0.3
 """Parts that what is written keeps free at most, and that the drawing has at least."""
-
-
-def column_widths(page_width: float) -> tuple[int, int]:
-    """Give the widths of the columns, left and right, on a page, CSS pixels; as the style sheet."""
-    if page_width <= PHONE_PX:
-        return 0, 0
-    if page_width <= NARROW_PX:
-        return 226, 250
-    return (268, 290) if page_width < WIDE_PX else (335, 362)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +42,14 @@ class Room:
         top = min((self.top + words / 2.0) / self.height, MOST_SHARE)
         bottom = min((self.bottom + words / 2.0) / self.height, 1.0 - LEAST_SHARE - top)
         return min(words / self.width, MOST_SHARE), right, top, bottom
+
+
+def first_room(page_width: float, page_height: float) -> Room:
+    """Guess it, until the page has said it."""
+    phone = page_width <= PHONE_PX
+    width = page_width - (0 if phone else COLUMNS_PX)
+    height = page_height * (PHONE_SHARE if phone else 1.0) - TOP_PX
+    return Room(max(width, LEAST_PX), max(height, LEAST_PX))
 
 
 def read_room(text: str) -> Room | None:

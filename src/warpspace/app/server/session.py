@@ -45,7 +45,6 @@ from warpspace.app.viewport.shapes import SCENE_PER_MM
 
 logger = logging.getLogger(__name__)
 TAB = "tab"  # events of the page itself begin with it
-LEAST_WIDTH, MOST_WIDTH = 200, 20_000  # of a page, CSS pixels, that are believed
 TOKEN_WAIT_S = 0.25  # how long the first picture waits for a tab that may have been here before
 ANSWER_S = 1.0  # how long a page may take to draw the map; one that does not say gets the rest
 USE_FADES_S = 2.0  # how long a tab that has kept the server busy stands back behind the others
@@ -248,10 +247,7 @@ class Session:
         if event.word != "here" or self._is_known:
             return
         self._is_known = True
-        token, _, width = event.value[:100].partition(",")
-        if width.isdecimal() and LEAST_WIDTH <= int(width) <= MOST_WIDTH:
-            self.context.camera.page_width = float(width)
-        record = self._claim(self, token)
+        record = self._claim(self, event.value[:100])
         if record is not None:
             self.use(record.store)
             self.context.camera.wanted = record.camera

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from viser import ClientHandle
 
-from warpspace.app.browser.room import PHONE_PX, PHONE_SHARE, TOP_PX, Room, column_widths
+from warpspace.app.browser.room import Room, first_room
 from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import drawn_bodies
@@ -26,7 +26,6 @@ STEEPEST = 1e-3
 """How far the view from above leans to the front: exactly above, an orbiting camera has no up."""
 VIEWS: Mapping[str, Direction] = {**model.VIEWS, "top": (0.0, -STEEPEST, 1.0)}
 """From what is looked at towards the camera."""
-LEAST_SIZE = 120  # CSS pixels of a picture that is taken to be one
 MOVED = 1e-3
 """How far from where it was put, as a part of its distance, a camera has been moved by hand."""
 _ROUNDS = 8
@@ -110,7 +109,6 @@ class TabCamera:
     def __init__(self, client: ClientHandle) -> None:
         self._camera = client.camera
         self.wanted: CameraMemory | None = None
-        self.page_width: float | None = None
         self.stand = CameraSetup()  # named view and lens that were chosen last
         self._told: Room | None = None
         self._put: CameraMemory | None = None
@@ -144,12 +142,8 @@ class TabCamera:
     @property
     def room(self) -> Room:
         """The room of the drawing: as the page has said, until then as its panels will leave it."""
-        if self._told is not None:
-            return self._told
         camera = self._camera
-        width = self.page_width or camera.image_width
-        high = camera.image_height * (PHONE_SHARE if width <= PHONE_PX else 1.0) - TOP_PX
-        return Room(max(width - sum(column_widths(width)), LEAST_SIZE), max(high, LEAST_SIZE))
+        return self._told or first_room(camera.image_width, camera.image_height)
 
     def take_room(self, room: Room, picture: LivePicture) -> bool:
         """Take note of the drawing's room; a camera that nobody has moved fills it again."""
