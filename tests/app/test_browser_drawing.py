@@ -10,6 +10,7 @@ from app.page_tab import SCENES
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.machine import drawn_bodies, tool_point
 from warpspace.app.state.app_state import start_state
+from warpspace.app.state.tree import put
 from warpspace.picture.mesh import isoline_pieces, map_mesh
 
 LIVE = LiveModel()
@@ -84,7 +85,8 @@ def test_the_machine_moves_bends_and_carries_the_tool_point(tab):
         tab.send(f"state:set.machine.linear_mm.{axis}", value)
         machine = replace(machine, linear_mm={**machine.linear_mm, axis: value})
     tab.send("state:set.positions.B", -30)
-    state = replace(state, machine=machine).with_position("B", -30.0)
+    state = replace(state, machine=machine)
+    state = put(state, "positions.B", "-30.0")
     tab.until(lambda: stands(state))
     point = tool_point(LIVE.evaluate(state))[0]
     tab.until(lambda: np.allclose(tab.place("/machine/tool_point"), point, atol=0.01))

@@ -7,8 +7,7 @@ import pytest
 
 from warpspace.app.evaluation.compare import pinned_side, scene_side, with_pin, with_sides
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.state.app_state import start_state
-from warpspace.app.state.comparison import Side
+from warpspace.app.state.app_state import Side, start_state
 from warpspace.app.state.tree import put
 from warpspace.geometry.colour import component_values
 from warpspace.geometry.surfaces import deform
@@ -53,7 +52,7 @@ def test_a_change_has_colours_of_its_own(component, label):
     assert change.scale.high <= 2.5 * largest < 0.1 * picture_of(state, "b").scale.high
     fixed = replace(
         state,
-        look=replace(state.look.with_choice(range_mode="fixed"), range_top=7.5, range_mode="fixed"),
+        look=replace(replace(state.look, range_mode="fixed"), range_top=7.5, range_mode="fixed"),
     )
     assert picture_of(fixed, "difference").scale.high == 7.5
 
@@ -78,10 +77,10 @@ def test_a_pinned_state_holds_no_comparison_and_unknown_words_draw_nothing_else(
 
 
 def test_the_difference_is_cut_into_slices_evaluated_where_they_lie():
-    look = replace(START.look.with_choice(surface="slices"), slices_mm={"X": 31.0})
+    look = replace(replace(START.look, surface="slices"), slices_mm={"X": 31.0})
     for component, quantity in (("norm", "position"), ("y", "position"), ("norm", "orientation")):
         state = replace(
-            START, look=look.with_choice(quantity=quantity), component=component
+            START, look=replace(look, quantity=quantity), component=component
         ).with_amplitude("EAX", 9.0)
         state = with_sides(state, Side(), scene_side(SECOND))
         a, b, difference = (picture_of(state, shown) for shown in ("a", "b", "difference"))

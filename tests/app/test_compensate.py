@@ -22,7 +22,6 @@ from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.machine import tool_point
 from warpspace.app.evaluation.machine_edits import with_changed_scene
-from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.server.tab_keeper import NO_TABLE, kept_text, read_kept
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.table import without_table, without_words
@@ -103,7 +102,7 @@ def test_the_box_has_the_field_of_the_command(name, points, loop, orientation):
 def test_the_machine_may_drift_under_its_table(left, controller):
     drifted = left.with_amplitude("EXX", 7.0).with_amplitude("EA0Z", -12.0)
     grid = build_grid(SCENE.model, SCENE.workspace, 9)
-    shifted = active_scene(drifted)
+    shifted = drifted.active_scene()
     wanted = controller.field(grid.coordinates, grid.nominal_mm, shifted)
     picture = LIVE.evaluate(drifted)
     assert np.abs(picture.field.error_um - wanted.error_um).max() < 1e-9
@@ -155,7 +154,8 @@ def test_other_loops_and_directions_of_travel_are_evaluated_as_they_are(left):
 
 
 def test_an_empty_table_leaves_what_is_drawn_without_one(controller):
-    held = with_reference(START, {"X": 100.0, "Y": -50.0, "Z": -280.0}).with_position("B", 20.0)
+    held = with_reference(START, {"X": 100.0, "Y": -50.0, "Z": -280.0})
+    held = put(held, "positions.B", "20")
     empty = controller.without()
     for loop in Loop:
         plain = replace(

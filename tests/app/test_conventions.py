@@ -16,9 +16,8 @@ from warpspace.app.documents.scene_file import (
     with_settings,
 )
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.evaluation.resulting_scene import scene_of
-from warpspace.app.state.app_state import start_state
-from warpspace.app.state.picked import Picked
+from warpspace.app.state.app_state import Picked, start_state
+from warpspace.app.state.tree import put
 from warpspace.app.tasks.conventions import (
     ConventionsSection,
     choices,
@@ -161,7 +160,7 @@ def test_the_drawn_field_is_that_of_the_command():
 def test_files_and_links_keep_it():
     assert "placed=1" in settings_line(PLACED)
     assert with_settings(start_state(SECOND), settings_line(PLACED)).placed
-    scene = scene_of(PLACED)
+    scene = PLACED.resulting_scene()
     assert start_state(parse_scene(scene_to_toml(scene), "x")).placed
     (shown,) = shown_machines(LIVE.evaluate(PLACED))
     exported = evaluate_picture(shown.scene, grid=PLACED.nodes, loop=shown.loop)
@@ -172,8 +171,11 @@ def test_files_and_links_keep_it():
 
 
 def test_turned_axes_carry_the_volume_that_is_fitted():
-    turned = PLACED.with_position("C", 90.0).with_position("B", -40.0)
-    shown, exported = LIVE.evaluate(turned), evaluate(scene_of(turned), grid=5, loop="relative")
+    turned = put(put(PLACED, "positions.C", "90"), "positions.B", "-40")
+    shown, exported = (
+        LIVE.evaluate(turned),
+        evaluate(turned.resulting_scene(), grid=5, loop="relative"),
+    )
     np.testing.assert_allclose(shown.field.error_um, exported.error_um, atol=1e-9)
 
 

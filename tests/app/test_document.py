@@ -23,8 +23,8 @@ from warpspace.app.documents.files import (
 from warpspace.app.documents.scene_file import (
     MAX_PACKED_TEXT,
     MOST_OPENED,
-    NAMES,
     PREFIX,
+    SIDES,
     SceneList,
     camera_of,
     is_looked_at,
@@ -37,7 +37,6 @@ from warpspace.app.documents.scene_file import (
 )
 from warpspace.app.evaluation.compare import pinned_side, scene_side, with_pin, with_sides
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.evaluation.resulting_scene import scene_of
 from warpspace.app.server.tab_keeper import (
     COMPARISON,
     FILE,
@@ -48,9 +47,8 @@ from warpspace.app.server.tab_keeper import (
     read_kept,
 )
 from warpspace.app.state import edits
-from warpspace.app.state.app_state import start_state
-from warpspace.app.state.comparison import Comparison, Side
-from warpspace.app.state.picked import Picked
+from warpspace.app.state.app_state import Comparison, Picked, Side, start_state
+from warpspace.app.state.tree import leaves, put
 from warpspace.app.tasks.conventions import with_choice, with_reference
 from warpspace.app.viewport.camera import CameraMemory
 from warpspace.exceptions import OptionError, SceneError, WarpspaceError
@@ -72,7 +70,7 @@ def test_conventions_curves_camera_and_what_is_compared_come_back_identical(way)
     opened = replace(SECOND, name="shop floor", title="Shop floor, machine 7")
     compared = with_sides(pinned, scene_side(opened), pinned.comparison.a).comparison
     state = with_reference(with_choice(START, "component_errors=before_motion"), {"X": 5.0})
-    state = edits.with_curve(state, "EYY", Ramp(edits.axis_span(state, "EYY"), 2.5))
+    state = edits.with_curve(state, "EYY", Ramp(state.axis_span("EYY"), 2.5))
     state = replace(state.without_notes(), comparison=replace(compared, shown="difference"))
     if way == "file":
         back, camera = open_text(state_to_toml(state, CAMERA), "dvf5000_first", "x.toml")
@@ -82,8 +80,8 @@ def test_conventions_curves_camera_and_what_is_compared_come_back_identical(way)
     assert camera == CAMERA
     assert back.scene.model == state.scene.model
     assert back.scene.reference == state.scene.reference
-    assert {k: edits.curve_of(back, k) for k in back.amplitudes} == {
-        k: edits.curve_of(state, k) for k in state.amplitudes
+    assert {k: back.curve(k) for k in back.amplitudes} == {
+        k: state.curve(k) for k in state.amplitudes
     }
     assert back.comparison.a == state.comparison.a
     assert back.comparison.pinned is back.comparison.b
@@ -94,8 +92,8 @@ def test_conventions_curves_camera_and_what_is_compared_come_back_identical(way)
 
 
 def test_every_part_of_a_comparison_is_written():
-    named = {name for name in NAMES if "." not in name}
-    assert {field.name for field in fields(Comparison)} == named
+    written = {*SIDES, *(leaf.linked for leaf in leaves(START).values())}
+    assert {f"compare.{field.name}" for field in fields(Comparison)} <= written
     assert {field.name for field in fields(Side)} == {"title", "state", "is_scene"}
 
 
@@ -160,11 +158,11 @@ def test_hostile_settings_are_clamped_or_left_out_and_named():
     assert back.component == "norm"
     assert back.loop == START.loop
     assert back.look.surface == "surface"
-    assert back.rotary.off == frozenset({0})
+    assert back.rotary.off == frozenset({"0"})
     assert back.exclusions.excluded == frozenset({"EXX"})
     assert abs(back.picked.at["X"]) <= 300.0
     assert any("left out" in note for note in back.notes)
-    assert with_settings(START, "x" * 20_000) == START
+    assert with_settings(START, "x" * 20_000).without_notes() == START
 
 
 @pytest.mark.parametrize(
@@ -222,7 +220,7 @@ def test_uploads_that_are_no_scene_are_refused_with_every_problem():
 
 
 def edited():
-    return replace(START.with_amplitude("EXX", 7.125).with_position("B", -20.0), component="z")
+    return replace(put(START.with_amplitude("EXX", 7.125), "positions.B", "-20"), component="z")
 
 
 @pytest.mark.parametrize(
@@ -236,7 +234,7 @@ def edited():
 )
 def test_a_tab_comes_back_whole_with_its_camera(state):
     found = read_kept(kept_text(state, CAMERA, KNOWN), KNOWN)
-    assert scene_of(found.state).errors == scene_of(state).errors
+    assert found.state.resulting_scene().errors == state.resulting_scene().errors
     if state.loaded is None:  # so that Reset goes where it went
         assert found.state == state
     assert found.camera == CAMERA
@@ -245,13 +243,13 @@ def test_a_tab_comes_back_whole_with_its_camera(state):
 
 def test_scene_that_the_server_has_no_more_comes_back_from_its_file():
     found = read_kept(kept_text(edited(), None, KNOWN), KNOWN[1:])
-    assert scene_of(found.state).errors == scene_of(edited()).errors
+    assert found.state.resulting_scene().errors == edited().resulting_scene().errors
     assert found.state.component == "z"
     assert found.missing == (*NEVER_KEPT, START_VALUES)
     # and so does one that has changed under its name
     other = replace(KNOWN[1], name="dvf5000_first")
     found = read_kept(kept_text(edited(), None, KNOWN), [other])
-    assert scene_of(found.state).errors == scene_of(edited()).errors
+    assert found.state.resulting_scene().errors == edited().resulting_scene().errors
 
 
 def test_comparison_that_is_too_large_is_left_out_and_named(monkeypatch):
@@ -310,7 +308,7 @@ EDITS = st.lists(st.tuples(KEYS, st.floats(-20.0, 20.0)), max_size=3)
 
 def saved(state):
     """The state as a scene of its own: what a file can hold of it."""
-    scene = scene_of(state)
+    scene = state.resulting_scene()
     return replace(
         state,
         scene=scene,
@@ -323,9 +321,9 @@ def saved(state):
 def plain_states(draw, scene=None):
     state = start_state(scene or draw(st.sampled_from(KNOWN_SCENES)))
     for key, value in draw(EDITS):
-        state = state.with_amplitude(key, value)
+        state = put(state, f"amplitudes.{key}", repr(value))
     for axis in state.positions:
-        state = state.with_position(axis, draw(st.floats(-90.0, 90.0)))
+        state = put(state, f"positions.{axis}", repr(draw(st.floats(-90.0, 90.0))))
     state = replace(
         state,
         loop=draw(st.sampled_from([*Loop])),
@@ -391,9 +389,6 @@ NESTED = "scene=dvf5000_first&" + urlencode({"compare.pinned": "scene=nobody"})
         {"b": "file=!!!"},
         {"b": BOMB},
         {"b": "file=" + packed('title = "x"')},
-        {"b": "now", "shown": "<script>"},
-        {"b": "now", "ghost": "maybe"},
-        {"b": "now", "evil": "1"},
         {"pinned": "&".join(f"a{n}=1" for n in range(1000))},
     ],
 )
@@ -415,6 +410,19 @@ def test_in_a_comparison_no_other_is_looked_at_and_wild_numbers_are_clamped_and_
     back, _ = open_link(f"scene=dvf5000_first&{line}", KNOWN_SCENES)
     assert back.comparison.b.state.amplitudes["EXX"] == MAX_ERROR
     assert any(note.startswith("before: EXX") for note in back.notes)
+
+
+@pytest.mark.parametrize("way", ["file", "link"])
+def test_what_means_nothing_in_a_comparison_is_left_out_and_named(way):
+    line = comparing(b="now", shown="<script>", ghost="maybe", evil="1")
+    text = f"# warpspace-compare: {line}\n{state_to_toml(START)}"
+    back, _ = (
+        open_text(text, "x", "x.toml")
+        if way == "file"
+        else open_link(f"scene=dvf5000_first&{line}", KNOWN_SCENES)
+    )
+    assert back.comparison == Comparison(b=Side())
+    assert all(name in back.notes[0] for name in ("shown", "ghost", "evil"))
 
 
 @pytest.mark.parametrize("title", ["now", "present errors", "nothing", "", "x" * 1_000])

@@ -19,8 +19,7 @@ from warpspace.app.documents.legend import seen_words
 from warpspace.app.documents.offline_page import build_offline_html, offline_picture
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.state.app_state import start_state
-from warpspace.app.state.comparison import Side
+from warpspace.app.state.app_state import Side, start_state
 from warpspace.app.viewport.camera import fit_camera
 from warpspace.cli.services import draw_figure, draw_view, write_export
 from warpspace.exceptions import OptionError
@@ -103,7 +102,7 @@ def test_the_figure_is_a_sheet_of_both_and_the_difference_as_the_app_takes_it(re
 
 
 def tilted(top=None):
-    look = START.look.with_choice(quantity="orientation")
+    look = replace(START.look, quantity="orientation")
     return LIVE.evaluate(
         replace(
             START, look=look if top is None else replace(look, range_top=top, range_mode="fixed")

@@ -18,8 +18,9 @@ from warpspace.app.evaluation.rotation import (
     points_on_traces,
 )
 from warpspace.app.state.app_state import start_state
-from warpspace.app.state.look import parse_positions
-from warpspace.app.state.ranges import Span
+from warpspace.app.state.leaf import Span
+from warpspace.app.state.tree import put
+from warpspace.app.state.typed_numbers import read_list
 from warpspace.app.viewport.around import arrows
 from warpspace.app.viewport.camera import VIEWS, CameraSetup, clipping, fit_camera
 from warpspace.app.viewport.colours import inverse_tone_map, line_colour, tone_map
@@ -173,12 +174,11 @@ def seen(pose, points):
         ("30 30 0", (0.0, 30.0), False),
         ("10, abc", (10.0,), True),
         ("500 nan inf", (), True),
-        ("-", (), False),
         (" ".join(map(str, range(20))), tuple(map(float, range(8))), True),
     ],
 )
 def test_positions_are_read_as_people_type_them(text, kept, noted):
-    found, note = parse_positions(text, Span(-120.0, 30.0, 1.0))
+    found, note = read_list(text, Span(-120.0, 30.0, 1.0))
     assert found == kept
     assert bool(note) == noted
 
@@ -187,7 +187,7 @@ def test_played_points_stay_on_their_circles():
     picture = LIVE.evaluate(START)
     assert played_axis(START) == "C"
     assert played_position(START, 90.0) == {"C": 90.0}
-    assert played_position(START.with_position("C", 350.0), 20.0) == {"C": 10.0}
+    assert played_position(put(START, "positions.C", "350.0"), 20.0) == {"C": 10.0}
     nominal, actual = points_on_traces(picture, {"C": 90.0})
     traces = [t for t in picture.traces[0].group.traces if t.axis == "C"]
     assert nominal.shape == actual.shape == (len(traces), 3)

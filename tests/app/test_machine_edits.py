@@ -13,13 +13,8 @@ from warpspace.app.evaluation.machine_edits import (
     with_own_machine,
     with_word,
 )
-from warpspace.app.state import edits
 from warpspace.app.state.app_state import start_state
-from warpspace.app.state.edits import (
-    with_curve,
-    with_half_width,
-    with_scene_tolerances,
-)
+from warpspace.app.state.edits import with_curve, with_scene_tolerances
 from warpspace.app.state.store import History
 from warpspace.app.state.tree import put
 from warpspace.app.tasks.machine_editor import EditorSection, MachinesWindow
@@ -42,8 +37,8 @@ def guides(state, axis):
 def test_another_chain_keeps_changed_errors_and_drops_those_of_axes_that_go(state):
     state = state.with_amplitude("EAX", 33.0)
     state = state.with_amplitude("EXC", 4.0)
-    state = with_half_width(state, "EAX", 7.0)
-    state = with_half_width(state, "EXC", 7.0)
+    state = put(state, "tolerances.EAX", repr(7.0))
+    state = put(state, "tolerances.EXC", repr(7.0))
     state = put(state, "exclusions.excluded", "+EAX,+EXC")
     changed = with_word(state, "chain wBFXYZt")
     assert str(changed.scene.machine.chain) == "wBFXYZt"
@@ -181,11 +176,11 @@ def test_a_gantry_is_made_its_guides_are_set_and_their_distance_keeps_them(state
 
 def test_guides_share_the_curve_of_the_axis_and_other_curves_are_said(state):
     made = with_word(state, "gantry Y")
-    ramp = Ramp(edits.axis_span(made, "EYY"), 8.0)
+    ramp = Ramp(made.axis_span("EYY"), 8.0)
     made = with_curve(made.with_amplitude("ECY", 0.0), "EYY", ramp)
     pair = with_word(made, "guide Y 1 12")
     assert guides(pair, "Y") == pytest.approx((8.0, 12.0))
-    assert edits.curve_of(pair, "ECY").evaluate(np.array([-225.0])) == pytest.approx(0.0)
+    assert pair.curve("ECY").evaluate(np.array([-225.0])) == pytest.approx(0.0)
     other = with_curve(pair, "ECY", Constant(ramp.span, 5.0))
     assert guides(other, "Y") is None
     there, back = (Ramp(ramp.span, value) for value in (8.0, 6.0))

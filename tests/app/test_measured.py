@@ -18,6 +18,7 @@ from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.store import StateStore
+from warpspace.app.state.tree import put
 from warpspace.app.tasks.importing import (
     LONGEST_AXES,
     LONGEST_PROBLEM,
@@ -179,7 +180,7 @@ def test_measured_readings_stand_beside_the_model_and_go_into_the_report():
 
 
 def test_tables_turn_where_the_axes_stand():
-    column = Column(TestsPart, chosen("sphere", STATE.with_position("B", -20.0)))
+    column = Column(TestsPart, chosen("sphere", put(STATE, "positions.B", "-20.0")))
     column.settle()
     assert column.part._answer[1].model.plan.coordinates["B"][0] == -20.0
 

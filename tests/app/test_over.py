@@ -10,9 +10,7 @@ from app.parts import LIVE, lone_part
 from warpspace import load_scene
 from warpspace.app.documents.legend import kept_words, legend_html, marks
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
-from warpspace.app.evaluation.resulting_scene import scene_of
-from warpspace.app.state.app_state import start_state
-from warpspace.app.state.comparison import NOBODY, Side
+from warpspace.app.state.app_state import NOBODY, Side, start_state
 from warpspace.app.state.tree import put
 from warpspace.app.tasks.controls import ComparePart, ControlsPart, chosen_map
 from warpspace.app.tasks.over import HeadPart
@@ -76,8 +74,8 @@ def test_a_scene_file_carries_the_limit():
     scene = replace(SCENE, limit_um=40.0)
     back = parse_scene(scene_to_toml(scene), "x")
     assert start_state(back).specification.limit_um == 40.0
-    assert scene_of(start_state(back)).limit_um == 40.0
-    assert scene_of(START).limit_um is None
+    assert start_state(back).resulting_scene().limit_um == 40.0
+    assert START.resulting_scene().limit_um is None
     text = scene_to_toml(scene).replace("limit_um = 40.0", "limit_um = -1")
     with pytest.raises(SceneError, match=r"view\.limit_um = -1: expected"):
         parse_scene(text, "x")

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from warpspace.app.evaluation.budget import answer, pick
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.state.app_state import start_state
-from warpspace.app.state.picked import Picked
-from warpspace.app.state.typed_numbers import LONGEST, read_positions, with_typed_point
+from warpspace.app.state.app_state import Picked, start_state
+from warpspace.app.state.tree import put
+from warpspace.app.state.typed_numbers import read_positions
 from warpspace.kinematics.model import Loop
 from warpspace.picture.words import spell_at, spell_axes, spell_point
 from warpspace.scene.library import load_scene, scene_names
@@ -28,7 +28,7 @@ def look_at(picture, target):
 
 @pytest.mark.parametrize("surface", ["surface", "cut", "slices"])
 def test_a_ray_through_a_drawn_node_finds_its_axis_positions(surface):
-    state = replace(START, look=START.look.with_choice(surface=surface), nodes=11)
+    state = replace(START, look=replace(START.look, surface=surface), nodes=11)
     picture = LIVE.evaluate(replace(state, shown=replace(state.shown, traces=False)))
     drawn = picture.slices[0].drawn_mm if picture.slices else picture.drawn_mm
     grid = picture.slices[0].grid if picture.slices else picture.grid
@@ -110,24 +110,24 @@ def test_a_point_is_spelt_in_both_coordinates():
 def test_a_point_is_read_in_every_way_it_is_spelt(text):
     found = read_positions(text)
     assert {axis: found[axis] for axis in "XYZ"} == WORST
-    assert with_typed_point(START, text).picked == Picked(WORST)
-    assert with_typed_point(START, text).notes == ()
+    assert put(START, "picked", text).picked == Picked(WORST)
+    assert put(START, "picked", text).notes == ()
 
 
 @pytest.mark.parametrize(
     "text", ["X", "275", "X 1 X 2", "X nan", "X 1e999", "X 1 2", "<b>", "X=1,Q=2", "A 5", "X - 5"]
 )
 def test_what_is_no_point_changes_nothing_and_is_said(text):
-    asked = with_typed_point(START, "X 1")
-    state = with_typed_point(asked, text)
+    asked = put(START, "picked", "X 1")
+    state = put(asked, "picked", text)
     assert state.without_notes() == asked
     (note,) = state.notes
     assert "expected positions of the axes X, Y, Z, B, C, for instance X 275" in note
 
 
-@given(st.text(max_size=2 * LONGEST))
+@given(st.text(max_size=400))
 def test_any_text_is_read_or_refused(text):
-    state = with_typed_point(START, text)
+    state = put(START, "picked", text)
     assert state.picked is None or all(map(np.isfinite, state.picked.at.values()))
 
 
@@ -144,21 +144,21 @@ def test_what_is_copied_is_read_back(at):
 
 def test_a_typed_point_is_clamped_to_the_travel_and_said():
     travel = FIRST.machine.axes["X"].travel
-    state = with_typed_point(START, "X 1e5 B 500")
+    state = put(START, "picked", "X 1e5 B 500")
     assert state.picked.at["X"] == travel[1]
     assert state.positions["B"] == START.position_spans["B"].high
     assert len(state.notes) == 2
-    assert "X = 100000 mm is outside the travel" in " ".join(state.notes)
+    assert "X of the point = 100000 is outside -275 to 275 mm" in " ".join(state.notes)
     middle = FIRST.workspace.positions
     assert (state.picked.at["Y"], state.picked.at["Z"]) == (middle["Y"], middle["Z"])
-    moved = with_typed_point(state.without_notes(), "Z -300")
+    moved = put(state.without_notes(), "picked", "Z -300")
     assert moved.picked.at == {**state.picked.at, "Z": -300.0}
-    assert with_typed_point(moved, "  ").picked is None
+    assert put(moved, "picked", "  ").picked is None
 
 
 @pytest.mark.parametrize("at", [AT, "X=0,Y=0,Z=-280,B=-30,C=45", "X=-275,Y=225,Z=-80"])
 def test_a_typed_point_has_the_error_of_the_exact_chain(at):
-    state = with_typed_point(START, at)
+    state = put(START, "picked", at)
     shown = answer(state, state.picked, 1.0)
     wanted = evaluate(FIRST, at=read_positions(at), exact=True)
     np.testing.assert_allclose(shown.explanation.error_um, wanted.error_um, atol=1e-9)

@@ -7,7 +7,7 @@ import pytest
 
 from app.parts import LIVE, body_of, lone_part
 from warpspace.app.state.app_state import start_state
-from warpspace.app.state.edits import axis_span, with_curve
+from warpspace.app.state.edits import with_curve
 from warpspace.app.state.tree import put
 from warpspace.app.tasks.machine import PositionsSection, RotarySection
 from warpspace.machine.errors import Ramp
@@ -26,7 +26,7 @@ def test_every_axis_has_a_slider_whose_event_moves_it():
 
 def test_traces_are_drawn_in_numbers_where_an_error_moves_them():
     assert "No error moves the traced points" in body_of(RotarySection, STATE)
-    rising = Ramp(axis_span(STATE, "EZC"), 8.0)  # by hand: 8 µm higher after a turn
+    rising = Ramp(STATE.axis_span("EZC"), 8.0)  # by hand: 8 µm higher after a turn
     state = with_curve(STATE, "EZC", rising)
     text = body_of(RotarySection, state)
     assert text.count("<svg") == 3
@@ -47,7 +47,7 @@ def test_a_table_that_is_paused_can_stand_there_and_axes_be_held_at_quarters():
     assert section.take(state, "stand", "").positions["C"] == 90.0
     held = dict(section.take(state, "quarters", "").rotary.held)
     assert held["C"] == (0.0, 90.0, 180.0, 270.0)
-    assert section.take(state, "point.1", "0").rotary.off == {1}
+    assert section.take(state, "point.1", "0").rotary.off == {"1"}
 
 
 @pytest.mark.parametrize("word", ["point.x", "point.99", "point.", "stand", "<b>"])

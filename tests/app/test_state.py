@@ -8,18 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.machine_edits import with_word
 from warpspace.app.state import edits
-from warpspace.app.state.app_state import start_state
-from warpspace.app.state.ranges import Exclusions
-from warpspace.app.state.store import (
-    SAME_STEP_S,
-    STEPS,
-    History,
-    StateStore,
-    change_words,
-    describe_change,
-)
+from warpspace.app.state.app_state import Exclusions, start_state
+from warpspace.app.state.store import SAME_STEP_S, STEPS, History, StateStore, changes
 from warpspace.app.state.tree import put, spell
 from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import Constant, Ramp, Table
@@ -49,7 +43,7 @@ def test_every_start_lies_within_the_ranges_of_its_controls(name):
 
 @given(ANY_NUMBER)
 def test_any_amplitude_is_brought_into_its_range(value):
-    state = FIRST.with_amplitude("EAX", value)
+    state = put(FIRST, "amplitudes.EAX", repr(value))
     kept = state.amplitudes["EAX"]
     assert -MAX_ERROR <= kept <= MAX_ERROR
     assert bool(state.notes) is (kept != value)
@@ -58,8 +52,8 @@ def test_any_amplitude_is_brought_into_its_range(value):
 @pytest.mark.parametrize(
     "state",
     [
-        FIRST.with_amplitude("QQQ", 1.0),
-        FIRST.with_position("A", 1.0),
+        put(FIRST, "amplitudes.QQQ", "1"),
+        put(FIRST, "positions.A", "1"),
         put(FIRST, "component", "w"),
         put(FIRST, "loop", "loop"),
     ],
@@ -72,10 +66,10 @@ def test_unknown_names_change_nothing_and_are_noted(state):
 @pytest.mark.parametrize(
     ("path", "text", "kept", "note"),
     [
-        ("errors.EAX", " 12,5 µrad", "12.5", ""),
-        ("errors.EAX", "120", "120.0", ""),  # the range of the slider grows
-        ("errors.EAX", "abc", "5.5", "EAX = 'abc'; expected a number, it stays as it was"),
-        ("errors.EXX", "−1e9", repr(-MAX_ERROR), "EXX = -1e+09 is outside"),
+        ("amplitudes.EAX", " 12,5 µrad", "12.5", ""),
+        ("amplitudes.EAX", "120", "120.0", ""),  # the range of the slider grows
+        ("amplitudes.EAX", "abc", "5.5", "EAX = 'abc'; expected a number, it stays as it was"),
+        ("amplitudes.EXX", "−1e9", repr(-MAX_ERROR), "EXX = -1e+09 is outside"),
         ("positions.B", "500°", "30.0", "B = 500 is outside -120 to 30 °; clamped to 30 °"),
         ("exaggeration", "×250", "250.0", ""),
         ("exaggeration", "auto", "auto", ""),
@@ -85,7 +79,7 @@ def test_unknown_names_change_nothing_and_are_noted(state):
         ("exclusions.excluded", "EXX,EYX,?", "EXX,EYX", "excluded errors: ? left out"),
         ("rotary.own_mm", "10; 20,5; -3e3", "10.0,20.5,-2000.0", "clamped to -2000 mm"),
         ("rotary.held.B", "-30 0 90", "-30.0,0.0", "B held at: 90 left out"),
-        ("tolerances.EAX", "-1", "0.0", "tolerance of EAX = -1: clamped to ±0"),
+        ("tolerances.EAX", "-1", "0.0", "tolerance of roll of X = -1 is outside 0 to 1000 µrad"),
         ("specification.costs", "EXX 4; EYX=1", "EXX=4", ""),
         ("picked", "X 1,5", "X 1.5 Y 0.0 Z -280.0", ""),
         ("page.open", "gains,budget", "budget,gains", ""),
@@ -98,7 +92,7 @@ def test_a_leaf_takes_what_people_type_and_says_what_it_does_not(path, text, kep
     assert spell(state, path) == kept
     assert note in "; ".join(state.notes)
     assert bool(note) is bool(state.notes)
-    assert bool(change_words(describe_change(FIRST, state.without_notes()))) is (
+    assert bool(changes(FIRST, state.without_notes())) is (
         spell(FIRST, path) != kept and not path.startswith("page")
     )
 
@@ -113,23 +107,25 @@ def test_what_follows_a_leaf_follows_it_and_members_come_and_go():
 
 
 @pytest.mark.parametrize(
-    ("what", "words"),
+    ("state", "words"),
     [
-        ("amplitudes.EAX", "roll of X"),
-        ("amplitudes.EAX, amplitudes.EBX", "roll of X and 1 more"),
-        ("positions.B", "position of B"),
-        ("exclusions.only.+EAX", "only roll of X"),
-        ("tolerances.own.EAX.half_width", "tolerance of roll of X"),
-        ("look.surface", "surface"),
-        ("rotary.held", "positions that rotary axes are held at"),
-        ("scene.errors.functions.EAX, loaded, amplitudes.EAX", "roll of X"),
-        ("scene.name, scene.workspace.ranges.X", "scene"),
-        ("scene.workspace.ranges.X", "machine"),
-        ("controller, comparison.b", "table of compensation"),
+        (put(FIRST, "amplitudes.EAX", "1"), "roll of X"),
+        (FIRST.with_amplitude("EAX", 1.0).with_amplitude("EBX", 1.0), "roll of X and 1 more"),
+        (put(FIRST, "positions.B", "1"), "position of B"),
+        (put(FIRST, "exclusions.only", "+EAX"), "only roll of X"),
+        (put(FIRST, "tolerances.EAX", "1"), "tolerance of roll of X"),
+        (put(FIRST, "look.surface", "cut"), "surface"),
+        (put(FIRST, "rotary.held.B", "1"), "B held at"),
+        (put(FIRST, "picked", "X 1"), "point"),
+        (edits.with_curve(FIRST, "EAX", Constant((-275.0, 275.0), 3.0)), "roll of X"),
+        (FIRST.with_scene(load_scene("teach_tilted_c")), "scene"),
+        (with_word(FIRST, "travel X 0 -200"), "machine"),
+        (replace(with_pin(FIRST), controller=object()), "table of compensation"),
+        (with_pin(FIRST), "comparison"),
     ],
 )
-def test_undo_says_what_it_takes_back(what, words):
-    assert change_words(what) == words
+def test_undo_says_what_it_takes_back(state, words):
+    assert History(FIRST).push(state.without_notes(), 0.0).undoes == words
 
 
 def test_reset_and_zero():
@@ -149,7 +145,7 @@ def test_another_scene_keeps_how_it_is_looked_at():
 
 
 def moved(key, value):
-    return lambda state: state.with_amplitude(key, value)
+    return lambda state: put(state, f"amplitudes.{key}", repr(value))
 
 
 def test_undo_and_redo_name_what_they_do_and_notes_are_not_kept():
@@ -158,9 +154,9 @@ def test_undo_and_redo_name_what_they_do_and_notes_are_not_kept():
     assert store.state.notes == ()
     assert store.state.amplitudes["EAX"] == MAX_ERROR
     assert FIRST.amplitudes["EAX"] != MAX_ERROR
-    assert store.undo() == "amplitudes.EAX"
+    assert store.undo() == "roll of X"
     assert store.state == FIRST
-    assert store.redo() == "amplitudes.EAX"
+    assert store.redo() == "roll of X"
     assert store.state.amplitudes["EAX"] == MAX_ERROR
     assert store.redo() == ""
 
@@ -241,13 +237,13 @@ def test_a_pause_and_another_slider_begin_another_step():
     later = history.push(FIRST.with_amplitude("EAX", 2.0), SAME_STEP_S + 0.1)
     assert len(later.past) == 2
     other = history.push(history.present.with_amplitude("EBX", 1.0), 0.01)
-    assert other.undoes == "amplitudes.EBX"
-    assert other.undo().undoes == "amplitudes.EAX"
+    assert other.undoes == "pitch of X"
+    assert other.undo().undoes == "roll of X"
 
 
 def test_a_change_after_undo_forgets_the_future():
     history = History(FIRST).push(FIRST.with_amplitude("EAX", 1.0), 0.0).undo()
-    assert history.redoes == "amplitudes.EAX"
+    assert history.redoes == "roll of X"
     history = history.push(FIRST.with_amplitude("EAX", 3.0), 0.1)
     assert history.redo() is history
     assert history.undo().present == FIRST
@@ -322,13 +318,13 @@ def test_a_curve_moves_amplitude_slider_and_picture():
     curve = Table(SPAN, ((-275.0, 0.0), (0.0, 30.0), (275.0, -4.0)))
     state = edits.with_curve(FIRST, "EXX", curve)
     assert state.amplitudes["EXX"] == 30.0
-    assert edits.curve_of(state, "EXX") == curve
+    assert state.curve("EXX") == curve
     before, after = LIVE.evaluate(FIRST), LIVE.evaluate(state)
     moved = (after.field.error_um - before.field.error_um)[:, 10, 10, 0]
     np.testing.assert_allclose(moved[[0, 10, 20]], [0.0, 30.0, -4.0], atol=1e-9)
     assert edits.with_curve(state, "EXX", curve) is state
     # and its slider scales it
-    assert edits.curve_of(state.with_amplitude("EXX", 8.0), "EXX").amplitude == pytest.approx(8.0)
+    assert state.with_amplitude("EXX", 8.0).curve("EXX").amplitude == pytest.approx(8.0)
 
 
 def test_a_constant_parameter_takes_constants_only():
@@ -343,7 +339,7 @@ def test_reset_brings_curves_back_and_forgets_that_any_was_edited():
     state = edits.with_curve(state, "EAY", Constant((-225.0, 225.0), 2.0))
     assert state.origin is FIRST.scene
     whole = state.reset()
-    assert edits.curve_of(whole, "EAX") == edits.curve_of(FIRST, "EAX")
+    assert whole.curve("EAX") == FIRST.curve("EAX")
     assert whole.scene is FIRST.scene
     assert whole.loaded is None
 
@@ -352,15 +348,15 @@ def test_reset_brings_curves_back_and_forgets_that_any_was_edited():
     ("given", "kept"), [(3.0, 3.0), (-5.0, 0.0), (1e9, 1000.0), (float("nan"), 20.0)]
 )
 def test_half_widths_are_clamped_and_the_centre_stays(given, kept):
-    state = edits.with_half_width(FIRST, "EAX", given)
+    state = put(FIRST, "tolerances.EAX", repr(given))
     assert edits.half_width_of(state, "EAX") == kept
     assert bool(state.notes) == (given != kept)
     assert edits.with_scene_tolerances(state).tolerances == FIRST.scene.tolerances
     proposed = start_state(load_scene("dvf5000_proposed"))
-    assert edits.with_half_width(proposed, "EAX", 1.0).tolerances.get("EAX").centre == -8.0
+    assert put(proposed, "tolerances.EAX", repr(1.0)).tolerances.get("EAX").centre == -8.0
 
 
 def test_unknown_keys_change_nothing():
     assert put(FIRST, "exclusions.excluded", "+EXA").without_notes() == FIRST
-    assert edits.with_half_width(FIRST, "EXA", 1.0).tolerances == FIRST.tolerances
+    assert put(FIRST, "tolerances.EXA", repr(1.0)).tolerances == FIRST.tolerances
     assert edits.with_curve(FIRST, "EXA", Constant(SPAN, 1.0)).amplitudes == FIRST.amplitudes

@@ -9,7 +9,6 @@ from app.parts import Nobody
 from warpspace.app.documents.scene_file import SceneList, open_text
 from warpspace.app.documents.services import Services
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.evaluation.resulting_scene import scene_of
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.store import StateStore
 from warpspace.app.tasks.files import FilesWindow, ReportWindow
@@ -90,9 +89,9 @@ def test_every_key_is_there_once_and_none_without_ctrl_changes_the_model():
         if part in ("state", "page") and command.keys and "ctrl" not in command.keys[0]:
             window = Window({"state": StatePart, "page": PagePart}[part])
             window.part.context.store.apply(lambda state: state.with_amplitude("EAX", 7.0))
-            before = scene_of(replace(window.store.state, exaggeration=None))
+            before = replace(window.store.state, exaggeration=None).resulting_scene()
             after = window.do(word, command.value)
-            assert scene_of(replace(after, exaggeration=None)) == before, command.label
+            assert replace(after, exaggeration=None).resulting_scene() == before, command.label
 
 
 def test_commands_are_found_by_words_and_enter_runs_the_first():

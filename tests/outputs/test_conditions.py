@@ -14,9 +14,7 @@ from warpspace.app.documents.legend import look_words, picture_conditions
 from warpspace.app.documents.offline_page import build_offline_html
 from warpspace.app.evaluation.compare import scene_side, with_sides
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.state.app_state import start_state
-from warpspace.app.state.comparison import Side
-from warpspace.app.state.picked import Picked
+from warpspace.app.state.app_state import Picked, Side, start_state
 from warpspace.app.state.tree import put
 from warpspace.app.viewport.camera import CameraMemory
 from warpspace.cli.services import write_export

@@ -18,9 +18,8 @@ from warpspace.app.documents.offline_page import build_offline_html, offline_pic
 from warpspace.app.evaluation.budget import pick, with_picked
 from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.state.app_state import start_state
+from warpspace.app.state.app_state import Picked, start_state
 from warpspace.app.state.look import QUANTITIES, SURFACES
-from warpspace.app.state.picked import Picked
 from warpspace.app.tasks.conventions import ConventionsSection
 from warpspace.app.tasks.machine import RotarySection
 from warpspace.app.tasks.understand import WorstPart

@@ -11,8 +11,9 @@ from warpspace.analysis.cases import Plan
 from warpspace.app.documents.scene_file import open_text, state_to_toml
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import EXAGGERATION, NODES, start_state
-from warpspace.app.state.edits import half_width_span, with_half_width
+from warpspace.app.state.edits import half_width_span
 from warpspace.app.state.look import RANGE_TOP
+from warpspace.app.state.tree import put
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.field.grid import node_counts
 from warpspace.machine import limits
@@ -120,11 +121,11 @@ def test_just_beyond_is_refused_in_one_line(name, value):
 def test_every_number_that_a_slider_gives_can_be_saved():
     text = 'machine = "dvf5000"\nerrors.EXX = 90000\ntolerances.EXX = 90000\n'
     state = start_state(parse_scene(text, "x"))
-    state = with_half_width(state.with_amplitude("EXX", 1e9), "EXX", 1e9)
+    state = put(put(state, "amplitudes.EXX", "1e9"), "tolerances.EXX", "1e9")
     opened, _ = open_text(state_to_toml(state), "x", "x.toml")
     assert opened.amplitudes["EXX"] == LARGE
     assert opened.tolerances.own["EXX"].half_width == LARGE
-    tiny = with_half_width(state, "EXX", HALF / 2.0)
+    tiny = put(state, "tolerances.EXX", repr(HALF / 2.0))
     assert open_text(state_to_toml(tiny), "x", "x.toml")[0].tolerances.own["EXX"].half_width == 0.0
 
 

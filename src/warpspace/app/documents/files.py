@@ -8,10 +8,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from warpspace.app.documents.legend import state_conditions
+from warpspace.app.evaluation.compare import AFTER, BEFORE
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.comparison import AFTER, BEFORE
 from warpspace.app.state.table import drawn_tables, without_words
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop
@@ -128,7 +127,7 @@ def shown_machines(picture: LivePicture, *, sheet: bool = False) -> list[Shown]:
     """Give the machine that is drawn; A and B of a difference, on a sheet of any comparison."""
 
     def shown(state: AppState, **named: str) -> Shown:
-        scene = replace(active_scene(state), exaggeration=picture.exaggeration, **named)
+        scene = replace(state.active_scene(), exaggeration=picture.exaggeration, **named)
         return Shown(scene, state.loop, state_conditions(state))
 
     found = picture.compared

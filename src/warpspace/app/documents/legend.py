@@ -8,7 +8,6 @@ from markupsafe import Markup
 from warpspace.analysis.statistics import share_below, volume_statistics
 from warpspace.app.browser.html import fill, join, lowered, number, tag, thousands
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.table import table_words
 from warpspace.app.viewport.camera import CameraMemory
@@ -175,7 +174,7 @@ def order_conditions(picture: LivePicture) -> tuple[str, ...]:
     """Say where the first order is not enough; with a table the exact chain is drawn."""
     both = picture.compared.sides if picture.compared and picture.is_difference else ()
     states = [one for one in both or (picture.drawn_state,) if one.controller is None]
-    return second_order_words(*(second_order(active_scene(one), one.loop) for one in states))
+    return second_order_words(*(second_order(one.active_scene(), one.loop) for one in states))
 
 
 def picture_conditions(picture: LivePicture) -> tuple[str, ...]:

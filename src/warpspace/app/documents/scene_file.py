@@ -1,8 +1,13 @@
 """A state as a scene file, and as a link; both read back to the same state.
 
-The file is an ordinary scene; comments at its head hold how it was looked at and what it was
-compared with, which only the app reads. A link holds the name of a scene the app knows and what
-differs from it, or the whole file, packed.
+Both hold one line of settings, a query string (``loop=relative&B=30&look.surface=cut``): what of
+the state differs from its scene as opened, the camera, and what it is compared with. In a file it
+is a comment at the head of an ordinary scene, in a link it stands behind the name of a scene that
+the app knows; any other link is the whole file, packed. A side of a comparison that is a scene, and
+what was pinned, are links of their own within that line.
+
+Reading trusts nothing: every value passes the pure updates of the state, what cannot be read is
+left out and named.
 """
 
 import base64
@@ -15,13 +20,11 @@ from dataclasses import replace
 from urllib.parse import parse_qsl, urlencode
 
 from warpspace.app.documents.files import LONGEST_NAME, safe_name
-from warpspace.app.evaluation.compare import plain_state, scene_side
+from warpspace.app.evaluation.compare import BEFORE, pinned_side, plain_state, scene_side
 from warpspace.app.evaluation.machine_edits import known_alike
-from warpspace.app.evaluation.resulting_scene import scene_of
-from warpspace.app.state.app_state import AppState, start_state
-from warpspace.app.state.comparison import BEFORE, NOBODY, PRESENT, SHOWN, Comparison, Side
+from warpspace.app.state.app_state import NOBODY, PRESENT, AppState, Side, start_state
 from warpspace.app.state.forms import linked_forms, with_form
-from warpspace.app.state.leaf import Leaf, Unreadable
+from warpspace.app.state.leaf import Unreadable
 from warpspace.app.state.tree import leaves, set_leaf, spell_value, stored
 from warpspace.app.viewport.camera import CameraMemory
 from warpspace.exceptions import OptionError
@@ -33,62 +36,43 @@ from warpspace.scene.model import Scene
 from warpspace.scene.save import scene_to_toml
 
 MARK = "# warpspace-view: "
-COMPARED = "# warpspace-compare: "
 MAX_LINK = 5_500  # characters of a link before it is packed: servers take request lines of 8 kB
-MAX_COMPARED = 400_000  # characters of a comparison in a file
-SCENE, PACKED, NAME = "scene", "file", "name"
+MAX_LINE = 400_000  # characters of a line of settings in a file
+MAX_FIELDS = 400
+SCENE, PACKED, NAME, CAMERA = "scene", "file", "name", "camera"
 _HEAD = re.compile(r"(?:[ \t]*+(?:#[^\n]*+)?\n)*+")
-_VIEW, _COMPARISON = (
-    re.compile(rf"^{re.escape(mark)}(\S*)\s*$", re.MULTILINE) for mark in (MARK, COMPARED)
-)
+# what was compared had a line of its own in files of earlier versions
+_LINES = re.compile(r"^# warpspace-(?:view|compare): (\S*)\s*$", re.MULTILINE)
 Find = Callable[[str], Scene | None]
 """Gives the scene that whoever opens a file or a link also has under a name."""
+Opened = tuple[AppState, CameraMemory | None]
 
 
 def state_to_toml(state: AppState, camera: CameraMemory | None = None) -> str:
     """Spell a state as a scene file."""
-    line = comparison_line(state.comparison, lambda side: _write(side, None, _bundled))
-    if len(line) > MAX_COMPARED:
+    scene = state.resulting_scene()
+    line = settings_line(replace(state, scene=scene, loaded=None), camera)
+    if len(line) > MAX_LINE:
         raise OptionError("what is compared is too large to be stored with the scene")
-    compared = f"{COMPARED}{line}\n" if line else ""
-    head = f"# Saved by warpspace {__version__}. Below stands how it was looked at.\n"
-    return f"{head}{_with_view(state, camera, compared)}"
+    head = f"# Saved by warpspace {__version__}. Below stands how it was looked at."
+    return f"{head}\n{MARK}{line}\n\n{scene_to_toml(scene)}"
 
 
-def _with_view(state: AppState, camera: CameraMemory | None, remarks: str = "") -> str:
-    """Spell a state without its comparison as a scene file."""
-    scene = scene_of(state)
-    saved = replace(state, scene=scene, loaded=None)
-    return f"{MARK}{settings_line(saved, camera)}\n{remarks}\n{scene_to_toml(scene)}"
-
-
-def open_text(text: str, name: str, source: str) -> tuple[AppState, CameraMemory | None]:
-    """Build the state of a scene file that somebody has uploaded."""
-    state, camera = _read_text(text, name, source)
-    found = _COMPARISON.search(_head(text))
-    if found is not None:
-        pairs = _pairs(found[1], MAX_COMPARED, "the comparison")
-        state = with_comparison(state, pairs, lambda link: _read_link(link, _bundled)[0])
-    return state, camera
-
-
-def _read_text(text: str, name: str, source: str) -> tuple[AppState, CameraMemory | None]:
-    """Build a state from a file without looking at a comparison in it."""
-    state = start_state(_recognised(parse_scene(text, name, source, folder=None)))
-    found = _VIEW.search(_head(text))
-    if found is None:
-        return state, None
-    return with_settings(state, found[1]), camera_of(found[1])
+def open_text(text: str, name: str, source: str, *, alone: bool = False) -> Opened:
+    """Build the state of a scene file that somebody has uploaded; `alone` with no comparison."""
+    scene = _recognised(parse_scene(text, name, source, folder=None))
+    line = "&".join(filter(None, _lines(text)))
+    return with_settings(start_state(scene), line, alone=alone), camera_of(line)
 
 
 def is_looked_at(text: str) -> bool:
     """Tell whether a scene file says how it was looked at."""
-    return _VIEW.search(_head(text)) is not None
+    return bool(_lines(text))
 
 
-def _head(text: str) -> str:
-    found = _HEAD.match(text)
-    return found[0] if found else ""
+def _lines(text: str) -> list[str]:
+    head = _HEAD.match(text)
+    return _LINES.findall(head[0] if head else "")
 
 
 def _bundled(name: str) -> Scene | None:
@@ -101,48 +85,39 @@ def _recognised(scene: Scene) -> Scene:
     known = known_alike(machine)
     if known is None:
         return scene
-    same = replace(
-        known,
-        axes=machine.axes,
-        bodies=machine.bodies or known.bodies,
-        gantries=machine.gantries or known.gantries,
-    )
+    bodies, gantries = machine.bodies or known.bodies, machine.gantries or known.gantries
+    same = replace(known, axes=machine.axes, bodies=bodies, gantries=gantries)
     return replace(scene, model=replace(scene.model, machine=same))
 
 
 def state_to_link(state: AppState, camera: CameraMemory | None, known: Iterable[Scene]) -> str:
     """Spell a state as a link."""
-    link = named_link(state, camera, known) or _packed(
-        state.scene.name, state_to_toml(state, camera)
-    )
+    link = _spell(state, camera, _among(known))
     if len(link) > MAX_LINK:
         raise OptionError("this is too large for a link; save it as a file instead")
     return link
 
 
 def named_link(state: AppState, camera: CameraMemory | None, known: Iterable[Scene]) -> str:
-    """Spell a state of a scene that others have as well as a link of any length, else as nothing.
+    """Spell a state of a scene that others have as a link of any length; any other as nothing."""
+    return _named(state, camera, _among(known))
 
-    See `state_to_link` for the parameters.
-    """
-    find = _among(known)
-    link = _write_named(state, camera, find)
-    if not link:
+
+def _spell(state: AppState, camera: CameraMemory | None, find: Find) -> str:
+    if link := _named(state, camera, find):
+        return link
+    text = zlib.compress(state_to_toml(state, camera).encode(), 9)
+    word = base64.urlsafe_b64encode(text).decode().rstrip("=")
+    return urlencode({NAME: state.scene.name, PACKED: word})
+
+
+def _named(state: AppState, camera: CameraMemory | None, find: Find) -> str:
+    scene = state.scene
+    plain = state.loaded is None and state.tolerances == scene.tolerances
+    if not plain or find(scene.name) != scene:
         return ""
-    return link + _behind(comparison_line(state.comparison, lambda side: _write(side, None, find)))
-
-
-def _write(state: AppState, camera: CameraMemory | None, find: Find) -> str:
-    """Spell a state without its comparison as a link of any length."""
-    return _write_named(state, camera, find) or _packed(state.scene.name, _with_view(state, camera))
-
-
-def _write_named(state: AppState, camera: CameraMemory | None, find: Find) -> str:
-    """Spell a state of a known scene by its name, without its comparison; any other as nothing."""
-    plain = state.loaded is None and state.tolerances == state.scene.tolerances
-    if not plain or find(state.scene.name) != state.scene:
-        return ""
-    return urlencode({SCENE: state.scene.name}) + _behind(settings_line(state, camera))
+    line = settings_line(state, camera, find)
+    return "&".join(filter(None, (urlencode({SCENE: scene.name}), line)))
 
 
 def _among(known: Iterable[Scene]) -> Find:
@@ -152,49 +127,26 @@ def _among(known: Iterable[Scene]) -> Find:
     return named.get
 
 
-def _behind(line: str) -> str:
-    return f"&{line}" if line else ""
-
-
-def open_link(link: str, known: Iterable[Scene]) -> tuple[AppState, CameraMemory | None]:
+def open_link(link: str, known: Iterable[Scene]) -> Opened:
     """Build the state that a link describes."""
-    pairs = _pairs(link, MAX_LINK, "the link")
-    find = _among(known)
+    if len(link) > MAX_LINK:
+        raise OptionError(
+            f"the link is {len(link):,} characters long; expected at most {MAX_LINK:,}"
+        )
+    return _read_link(link, _among(known))
+
+
+def _read_link(link: str, find: Find, *, alone: bool = False) -> Opened:
+    pairs = dict(_pairs(link))
     if PACKED in pairs:
-        return open_text(_unpack(pairs[PACKED]), *_named(pairs))
-    state, camera = _read_link(link, find)
-    return with_comparison(state, pairs, lambda part: _read_link(part, find)[0]), camera
-
-
-def _pairs(line: str, longest: int, what: str) -> dict[str, str]:
-    if len(line) > longest:
-        raise OptionError(f"{what} is {len(line):,} characters long; expected at most {longest:,}")
-    try:
-        return dict(parse_qsl(line, max_num_fields=MAX_FIELDS))
-    except ValueError:
-        raise OptionError(f"{what} has too many parts; it was not made by this program") from None
-
-
-def _read_link(link: str, find: Find) -> tuple[AppState, CameraMemory | None]:
-    """Build the state of a link without looking at a comparison in it."""
-    pairs = _pairs(link, MAX_COMPARED, "the link")
-    if PACKED in pairs:
-        return _read_text(_unpack(pairs[PACKED]), *_named(pairs))
-    name = pairs.get(SCENE, "")
+        name = safe_name(pairs.get(NAME, ""), "link")
+        return open_text(_unpack(pairs[PACKED]), name, "the scene in the link", alone=alone)
+    name = pairs.pop(SCENE, "")
     scene = find(name)
     if scene is None:
         raise OptionError(f"the link names the scene {name[:LONGEST_NAME]!r}, which is not here")
-    line = urlencode([(k, v) for k, v in pairs.items() if k != SCENE and not k.startswith(PREFIX)])
-    return with_settings(start_state(scene), line), camera_of(line)
-
-
-def _packed(name: str, text: str) -> str:
-    word = base64.urlsafe_b64encode(zlib.compress(text.encode(), 9)).decode().rstrip("=")
-    return urlencode({NAME: name, PACKED: word})
-
-
-def _named(pairs: Mapping[str, str]) -> tuple[str, str]:
-    return safe_name(pairs.get(NAME, ""), "link"), "the scene in the link"
+    line = urlencode(pairs)
+    return with_settings(start_state(scene), line, find, alone=alone), camera_of(line)
 
 
 def _unpack(packed: str) -> str:
@@ -207,6 +159,127 @@ def _unpack(packed: str) -> str:
         return text.decode("utf-8")
     except (binascii.Error, zlib.error, ValueError):
         raise OptionError("the scene in the link cannot be read; was the link cut?") from None
+
+
+# --- The line of settings -------------------------------------------------------------------------
+
+
+def settings_line(
+    state: AppState, camera: CameraMemory | None = None, find: Find = _bundled
+) -> str:
+    """Spell how a state is looked at, its amplitudes, and what it is compared with."""
+    opened = start_state(state.scene)
+    pairs = [
+        (leaf.linked, spell_value(leaf, now))
+        for leaf in leaves(state).values()
+        if leaf.linked and (now := stored(state, leaf.path)) != stored(opened, leaf.path)
+    ]
+    if camera is not None:
+        numbers = (*camera.position, *camera.look_at, *camera.up, camera.fov_rad)
+        pairs.append((CAMERA, ",".join(f"{number:.6g}" for number in numbers)))
+    return urlencode([*pairs, *linked_forms(state), *_sides(state, find)])
+
+
+def with_settings(
+    state: AppState, line: str, find: Find = _bundled, *, alone: bool = False
+) -> AppState:
+    """Apply a line of settings to a state; `alone` without a comparison."""
+    pairs = [pair for pair in _pairs(line) if not (alone and pair[0].startswith(PREFIX))]
+    state, unread = _with_sides(state, dict(pairs), find), list[str]()
+    for name, text in pairs:
+        if name == CAMERA or name in SIDES:
+            continue
+        # what there is depends on what was set before, such as the components of a quantity
+        leaf = {one.linked: one for one in leaves(state).values() if one.linked}.get(name)
+        try:
+            state = set_leaf(state, leaf, text) if leaf else with_form(state, name, text)
+        except Unreadable:
+            unread.append(f"{name}={text}"[:60])
+    if unread:
+        more = f" and {len(unread) - 4} more" if len(unread) > 4 else ""
+        named = ", ".join(unread[:4])
+        return state.noted(f"settings left out, since they mean nothing here: {named}{more}")
+    return state
+
+
+def _pairs(line: str) -> list[tuple[str, str]]:
+    if len(line) > MAX_LINE:
+        raise OptionError(f"{len(line):,} characters of settings; expected at most {MAX_LINE:,}")
+    try:
+        return parse_qsl(line, keep_blank_values=True, max_num_fields=MAX_FIELDS)
+    except ValueError:
+        raise OptionError("there are too many settings; this program did not write them") from None
+
+
+CAMERA_NUMBERS = 10
+FARTHEST = 1000.0  # farthest place of a camera, in units of the drawing
+FOV_RAD = (0.01, 2.5)
+
+
+def camera_of(line: str) -> CameraMemory | None:
+    """Read the camera of a line of settings; None where there is none that can be used."""
+    try:
+        numbers = [parse_number(word) for word in dict(_pairs(line)).get(CAMERA, "").split(",")]
+    except ValueError:
+        return None
+    if len(numbers) != CAMERA_NUMBERS:
+        return None
+    position, look_at, up = ((n[0], n[1], n[2]) for n in (numbers[:3], numbers[3:6], numbers[6:9]))
+    distance = math.dist(position, look_at)
+    usable = max(map(abs, numbers)) <= FARTHEST and distance > 1e-3 and math.hypot(*up) > 1e-3
+    if not usable or not FOV_RAD[0] <= numbers[9] <= FOV_RAD[1]:
+        return None
+    return CameraMemory(position, look_at, up, numbers[9])
+
+
+# --- The sides of a comparison in it --------------------------------------------------------------
+
+PREFIX = "compare."
+PINNED = "pinned"
+NOW = "now"  # what is steered, in files and links
+LONGEST_TITLE = 200
+SIDES = [PREFIX + name for name in ("pinned", "a", "b", "pinned.title", "a.title", "b.title")]
+
+
+def _sides(state: AppState, find: Find) -> Iterator[tuple[str, str]]:
+    chosen = state.comparison
+    for name, side in (("pinned", chosen.pinned), ("a", chosen.a), ("b", chosen.b)):
+        if side is None or (name == "a" and side.state is None):
+            continue
+        if side.state is None:
+            text, usual = NOW, side.title
+        elif name != PINNED and not side.is_scene:
+            text, usual = PINNED, side.title
+        else:
+            text = _spell(side.state, None, find)
+            usual = scene_side(side.state.scene).title if side.is_scene else ""
+        yield PREFIX + name, text
+        if side.title != usual:
+            yield f"{PREFIX}{name}.title", side.title
+
+
+def _with_sides(state: AppState, given: Mapping[str, str], find: Find) -> AppState:
+    sides: dict[str, Side | None] = {PINNED: None}
+    for name in (PINNED, "a", "b"):
+        text = given.get(PREFIX + name)
+        if text is None or text == NOW:
+            sides[name] = None if text is None else Side()
+        elif text == PINNED:
+            sides[name] = sides[PINNED]
+            if sides[PINNED] is None:
+                raise OptionError("the comparison is with a pinned state, but holds none")
+        else:
+            found, _ = _read_link(text, find, alone=True)
+            if name == PINNED:
+                state = state.noted(*(f"{BEFORE}: {note}" for note in found.notes))
+                side = pinned_side(plain_state(found.without_notes()))
+            else:
+                side = scene_side(found.scene)
+            title = given.get(f"{PREFIX}{name}.title", "")[:LONGEST_TITLE]
+            known = title in (NOW, PRESENT, NOBODY, "")
+            sides[name] = side if known else replace(side, title=title)
+    compared = replace(state.comparison, a=sides["a"] or Side(), b=sides["b"], pinned=sides[PINNED])
+    return replace(state, comparison=compared)
 
 
 # --- The scenes a tab can choose from -------------------------------------------------------------
@@ -238,11 +311,14 @@ class SceneList(Mapping[str, Scene]):
         return tuple(self._fixed.values())
 
     def add(self, scene: Scene) -> tuple[str, str]:
-        """Take in a scene that was opened from a file or a link."""
+        """Take in an opened scene; give its title, and that of one that has left for it."""
         for title, known in self.items():
             if known is scene or known == scene:
                 return title, ""
-        title = self._free_title(scene)
+        own = title = scene.title or scene.name
+        number = 2
+        while title in self or title in (PRESENT, NOBODY):
+            title, number = f"{own} ({number})", number + 1
         self._opened[title] = scene
         dropped = ""
         if len(self._opened) > MOST_OPENED:
@@ -250,178 +326,7 @@ class SceneList(Mapping[str, Scene]):
             del self._opened[dropped]
         return title, dropped
 
-    def _free_title(self, scene: Scene) -> str:
-        """Give a scene a title that nothing else in a list of scenes has."""
-        own = scene.title or scene.name
-        title, number = own, 2
-        while title in self or title in (PRESENT, NOBODY):
-            title = f"{own} ({number})"
-            number += 1
-        return title
-
 
 def dropped_words(title: str) -> str:
     """Say that a scene has left the list."""
     return f"The newest {MOST_OPENED} opened scenes are kept; {title} left the list."
-
-
-# --- How a scene is looked at as one line of text -------------------------------------------------
-# A query string (``loop=relative&B=30&look.surface=cut``) with only what differs from the scene as
-# opened. Reading it trusts nothing: every value passes the pure updates of the state, what cannot
-# be read is left out and named.
-
-MAX_LENGTH = 16_000
-MAX_FIELDS = 400
-CAMERA = "camera"
-CAMERA_NUMBERS = 10
-FARTHEST = 1000.0  # farthest place of a camera, in units of the drawing
-FOV_RAD = (0.01, 2.5)
-
-
-def settings_line(state: AppState, camera: CameraMemory | None = None) -> str:
-    """Spell how a state is looked at, and its amplitudes, as a query string."""
-    opened = start_state(state.scene)
-    pairs = [
-        (leaf.linked, spell_value(leaf, now))
-        for leaf in leaves(state).values()
-        if leaf.linked and (now := stored(state, leaf.path)) != stored(opened, leaf.path)
-    ]
-    pairs += linked_forms(state)
-    if camera is not None:
-        numbers = (*camera.position, *camera.look_at, *camera.up, camera.fov_rad)
-        pairs.append((CAMERA, ",".join(f"{number:.6g}" for number in numbers)))
-    return urlencode(pairs)
-
-
-def with_settings(state: AppState, line: str) -> AppState:
-    """Apply a line of settings to a state."""
-    unread: list[str] = []
-    known, named = leaves(state), _linked(state)
-    for name, value in _settings(line):
-        if name == CAMERA:
-            continue
-        try:
-            leaf = named.get(name)
-            state = with_form(state, name, value) if leaf is None else set_leaf(state, leaf, value)
-        except Unreadable:
-            unread.append(f"{name}={value}"[:60])
-        if leaves(state) is not known:  # for instance the components of a quantity
-            known, named = leaves(state), _linked(state)
-    if unread:
-        more = f" and {len(unread) - 4} more" if len(unread) > 4 else ""
-        note = f"settings left out, since they mean nothing here: {', '.join(unread[:4])}{more}"
-        state = replace(state, notes=(*state.notes, note))
-    return state
-
-
-def _linked(state: AppState) -> dict[str, Leaf]:
-    return {leaf.linked: leaf for leaf in leaves(state).values() if leaf.linked}
-
-
-def camera_of(line: str) -> CameraMemory | None:
-    """Read the camera of a line of settings; None where there is none that can be used."""
-    text = dict(_settings(line)).get(CAMERA)
-    if text is None:
-        return None
-    try:
-        numbers = [parse_number(word) for word in text.split(",")]
-    except ValueError:
-        return None
-    if len(numbers) != CAMERA_NUMBERS:
-        return None
-    position, look_at, up = ((n[0], n[1], n[2]) for n in (numbers[:3], numbers[3:6], numbers[6:9]))
-    distance = math.dist(position, look_at)
-    usable = max(map(abs, numbers)) <= FARTHEST and distance > 1e-3 and math.hypot(*up) > 1e-3
-    if not usable or not FOV_RAD[0] <= numbers[9] <= FOV_RAD[1]:
-        return None
-    return CameraMemory(position, look_at, up, numbers[9])
-
-
-def _settings(line: str) -> list[tuple[str, str]]:
-    if len(line) > MAX_LENGTH:
-        return []
-    try:
-        return parse_qsl(line, keep_blank_values=True, max_num_fields=MAX_FIELDS)
-    except ValueError:
-        return []
-
-
-# --- A comparison as one line of text -------------------------------------------------------------
-# What is compared, what is drawn, and what was pinned.
-#
-# A side that is a scene, and what was pinned, are spelt as links of their own, so that they come
-# back as they are seen: by the name of a scene that is known, or with all that is in them.
-
-PREFIX = "compare."
-PINNED = "pinned"
-NOW = "now"  # what is steered, in files and links
-TITLE = f"{BEFORE}: "  # what the title of a pinned state begins with
-LONGEST_TITLE = 200
-NAMES = frozenset({"a", "b", "shown", "ghost", PINNED, "a.title", "b.title", "pinned.title"})
-Write = Callable[[AppState], str]
-Read = Callable[[str], AppState]
-
-
-def comparison_line(comparison: Comparison[AppState], write: Write) -> str:
-    """Spell a comparison as a query string."""
-    pairs: list[tuple[str, str]] = []
-    for name, side in (("a", comparison.a), ("b", comparison.b)):
-        if side is None or (name == "a" and side.state is None):
-            continue
-        pairs.append((name, _side_text(side, write)))
-        if side.is_scene and side.state and side.title != scene_side(side.state.scene).title:
-            pairs.append((f"{name}.title", side.title))
-    if comparison.shown != Comparison().shown:
-        pairs.append(("shown", comparison.shown))
-    if not comparison.ghost:
-        pairs.append(("ghost", "0"))
-    pinned = comparison.pinned
-    if pinned is not None and pinned.state is not None:
-        pairs += [(PINNED, write(pinned.state)), ("pinned.title", pinned.title)]
-    return urlencode([(PREFIX + name, value) for name, value in pairs])
-
-
-def _side_text(side: Side[AppState], write: Write) -> str:
-    if side.state is None:
-        return NOW
-    return write(side.state) if side.is_scene else PINNED
-
-
-def with_comparison(state: AppState, pairs: Mapping[str, str], read: Read) -> AppState:
-    """Give a state the comparison that somebody has written down."""
-    given = {k.removeprefix(PREFIX): v for k, v in pairs.items() if k.startswith(PREFIX)}
-    if not given:
-        return state
-    for name in given:
-        if name not in NAMES:
-            raise OptionError(f"the comparison says {name[:30]!r}, which means nothing")
-    pinned = None
-    notes = state.notes
-    if PINNED in given:
-        before = read(given[PINNED])
-        notes = (*notes, *(f"{BEFORE}: {note}" for note in before.notes))
-        plain = replace(plain_state(before), notes=())
-        title = TITLE + given.get("pinned.title", "").removeprefix(TITLE)
-        pinned = Side(title[:LONGEST_TITLE], plain)
-    a, b = (_side(given, name, pinned, read) for name in "ab")
-    shown, ghost = given.get("shown", Comparison().shown), given.get("ghost", "1")
-    if shown not in SHOWN or ghost not in ("0", "1"):
-        raise OptionError("the comparison does not say what is drawn: expected a, b or difference")
-    found = Comparison(a or Side(), b, shown, ghost == "1", pinned)
-    return replace(state, comparison=found, notes=notes)
-
-
-def _side(
-    given: Mapping[str, str], name: str, pinned: Side[AppState] | None, read: Read
-) -> Side[AppState] | None:
-    """Read one side; None where there is none."""
-    text = given.get(name)
-    if text is None or text == NOW:
-        return None if text is None else Side()
-    if text == PINNED:
-        if pinned is None:
-            raise OptionError("the comparison is with a pinned state, but holds none")
-        return pinned
-    side = scene_side(read(text).scene)
-    title = given.get(f"{name}.title", side.title)[:LONGEST_TITLE]
-    return side if title in (NOW, PRESENT, NOBODY, "") else replace(side, title=title)

@@ -4,9 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpspace.app.evaluation.cache import Cache, Identity
+from warpspace.app.evaluation.cache import Cache
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.forms import TEST, read_form
+from warpspace.app.state.leaf import Identity
 from warpspace.bench.base import BenchTest, bench_names, find_test
 from warpspace.bench.plan import Plan, Whole, respond_sites
 from warpspace.exceptions import OptionError, WarpspaceError

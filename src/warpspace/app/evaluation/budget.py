@@ -8,10 +8,7 @@ from numpy.typing import NDArray
 
 from warpspace.analysis.contributions import Explanation, explain
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.resulting_scene import active_scene
-from warpspace.app.state.app_state import AppState
-from warpspace.app.state.edits import curve_of
-from warpspace.app.state.picked import Picked
+from warpspace.app.state.app_state import AppState, Picked
 from warpspace.field.grid import Grid, seen_from_workpiece
 from warpspace.geometry.surfaces import (
     Index,
@@ -139,7 +136,7 @@ def _denser(samples: Array) -> Array:
 
 def active_errors(state: AppState) -> ErrorSet:
     """Give the error set with the amplitudes that count in a state."""
-    return ErrorSet({key: curve_of(state, key) for key, value in state.active.items() if value})
+    return ErrorSet({key: state.curve(key) for key, value in state.active.items() if value})
 
 
 def answer(state: AppState, picked: Picked, exaggeration: float) -> Answer:
@@ -162,7 +159,7 @@ def answer(state: AppState, picked: Picked, exaggeration: float) -> Answer:
         shift = seen_from_workpiece(model, coordinates, volume, point) - point
     drawn_um = found.error_um
     if state.controller is not None:
-        now, nominal = active_scene(state), found.nominal_mm
+        now, nominal = state.active_scene(), found.nominal_mm
         drawn_um = state.controller.field(coordinates, nominal, now, loop, nominal).error_um
     drawn = deform(found.nominal_mm + shift, drawn_um, exaggeration)
     return Answer(at, loop, found, shift, drawn, drawn_um)

@@ -4,7 +4,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable, Generator, Hashable
 from contextlib import contextmanager
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 T = TypeVar("T")
 
@@ -30,19 +30,6 @@ class Cache(Generic[T]):
             while len(self._items) > 1 and sum(n for _, n in self._items.values()) > self._limit:
                 self._items.popitem(last=False)
         return value
-
-
-class Identity:
-    """An object as part of a key, compared by identity (and held, so that its id stays its own)."""
-
-    def __init__(self, thing: Any) -> None:
-        self.thing = thing
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Identity) and other.thing is self.thing
-
-    def __hash__(self) -> int:
-        return id(self.thing)
 
 
 # --- Slow work of all tabs together, whatever its kind --------------------------------------------

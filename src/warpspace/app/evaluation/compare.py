@@ -1,15 +1,15 @@
-"""Two states side by side: one grid, colours and display factor, and the change in its own colours.
+"""Two states side by side, and what results propose: drawn beside what is shown, or in its place.
 
-A difference is taken node by node, so the nominal volumes must coincide. Where they do not, the two
-sides are still shown and the reason stands in `Compared.refused`.
+Both are drawn with one grid, colours and display factor, their change in its own colours. It is
+taken node by node, so the nominal volumes must coincide. Where they do not, the two sides are still
+shown and the reason stands in `Compared.refused`.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from warpspace.app.evaluation.live_picture import Compared, LivePicture
-from warpspace.app.state.app_state import AppState, start_state
-from warpspace.app.state.comparison import AFTER, BEFORE, PRESENT, Comparison, Side
+from warpspace.app.state.app_state import PRESENT, AppState, Comparison, Side, start_state
 from warpspace.app.state.look import RotaryLook
 from warpspace.app.state.table import table_words
 from warpspace.geometry.colour import ColourScale
@@ -21,17 +21,19 @@ from warpspace.picture.model import (
 )
 from warpspace.scene.model import Scene
 
+BEFORE, AFTER = "before", "after"
+"""What was pinned, and what is steered beside it."""
+DIGITS = 3  # decimals of a proposed error, µm or µrad: a nanometre is nothing to be set
 REFUSED = "The working volumes are not the same, so there is no difference node by node."
 
 
-def side_state(now: AppState, side: Side[AppState]) -> AppState:
+def side_state(now: AppState, side: Side) -> AppState:
     """Give the state of one side, looked at as the present one."""
     base = side.state or now
     if side.is_scene:
-        base = replace(base, loop=now.loop, placed=now.placed)
-        for axis, position in now.positions.items():
-            if axis in base.positions:
-                base = base.with_position(axis, position).without_notes()
+        spans = base.position_spans
+        at = {a: spans[a].clamp(now.positions.get(a, p), p) for a, p in base.positions.items()}
+        base = replace(base, loop=now.loop, placed=now.placed, positions=at)
     return replace(
         base,
         component=now.component,
@@ -53,12 +55,12 @@ def _turns_alike(one: AppState, other: AppState) -> bool:
     return points and one.positions.keys() == other.positions.keys()
 
 
-def scene_side(scene: Scene) -> Side[AppState]:
+def scene_side(scene: Scene) -> Side:
     """Make a side of a scene as it is opened."""
     return Side(scene.title or scene.name, start_state(scene), is_scene=True)
 
 
-def pinned_side(state: AppState) -> Side[AppState]:
+def pinned_side(state: AppState) -> Side:
     """Make the side "before" of what is steered; it holds no comparison of its own."""
     edited = len(state.changed_keys)
     title = state.scene.title or state.scene.name
@@ -117,7 +119,7 @@ def _with_one_factor(
     return a, b
 
 
-def _title(state: AppState, side: Side[AppState], beside: Side[AppState]) -> str:
+def _title(state: AppState, side: Side, beside: Side) -> str:
     if side.state:
         return side.title
     pinned = beside.state is not None and not beside.is_scene
@@ -149,7 +151,7 @@ def _shared_scale(state: AppState, maps: Sequence[LivePicture]) -> ColourScale:
     return held if held.high > widest.high else widest
 
 
-def with_sides(state: AppState, a: Side[AppState], b: Side[AppState] | None) -> AppState:
+def with_sides(state: AppState, a: Side, b: Side | None) -> AppState:
     """Compare two sides; None for b ends it."""
     if b is None:
         return replace(state, comparison=state.comparison.off())
@@ -161,7 +163,43 @@ def with_pin(state: AppState) -> AppState:
     return with_before(state, pinned_side(state))
 
 
-def with_before(state: AppState, side: Side[AppState]) -> AppState:
+def with_before(state: AppState, side: Side) -> AppState:
     """Take a side as the state before (A); what is steered is B, after, and drawn."""
     comparison = replace(state.comparison, a=side, b=Side(), shown="b", pinned=side)
     return replace(state, comparison=comparison)
+
+
+def applied(state: AppState, scene: Scene) -> AppState:
+    """Give the state with the errors, tolerances and machine of a scene; the view stays."""
+    own = state.scene
+    if (
+        scene.machine.axes != own.machine.axes
+        or scene.workspace.volume_axes != own.workspace.volume_axes
+    ):
+        return state.with_scene(scene)
+    fresh = start_state(scene)
+    values = {key: round(value, DIGITS) for key, value in fresh.amplitudes.items()}
+    kept = {
+        key: value
+        for key, value in state.amplitudes.items()
+        if key in fresh.amplitudes and not state.exclusions.active(key)
+    }
+    start = {key: state.start.get(key, 0.0) for key in fresh.amplitudes}
+    return replace(
+        state, scene=replace(scene, title=own.title, name=own.name), loaded=state.origin,
+        amplitudes={**values, **kept}, start=start,
+        tolerances=scene.tolerances,
+    )  # fmt: skip
+
+
+def with_proposal(state: AppState, scene: Scene, title: str) -> AppState:
+    """Compare what is steered with a proposal, and draw the latter."""
+    after = Side(title, applied(plain_state(state), scene))
+    return replace(
+        state, comparison=replace(state.comparison, a=Side(), b=after, pinned=after, shown="b")
+    )
+
+
+def with_applied(state: AppState, scene: Scene, before: str) -> AppState:
+    """Apply a proposal; the state before it stays as A of a comparison."""
+    return applied(with_before(state, Side(before, plain_state(state))), scene)

@@ -4,15 +4,16 @@ Grids and first-order responses are kept, since they change only with the scene,
 rotary positions and the loop; a slider move is then one matrix-vector product.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from warpspace.app.evaluation.cache import Cache, Identity
+from warpspace.app.evaluation.cache import Cache
 from warpspace.app.evaluation.compare import compare_pictures
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.slices import CompensatedSource, SliceSource
 from warpspace.app.state.app_state import AppState
+from warpspace.app.state.leaf import Identity
 from warpspace.app.state.look import default_held
 from warpspace.field.evaluate import ErrorBasis, ErrorField, build_basis
 from warpspace.field.grid import Grid, build_grid
@@ -65,7 +66,9 @@ class LiveModel:
             state.nodes,
             tuple(state.positions.items()),
             state.seen,
-            replace(state.rotary, chosen=""),
+            state.rotary.off,
+            state.rotary.own_mm,
+            tuple(state.rotary.held.items()),
         )
         return self._responses.get(key, lambda: _build(state), lambda response: response.size)
 

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import linear_positions
 from warpspace.bodies.placed import PlacedBody, place_bodies, scene_motions
@@ -53,7 +52,7 @@ def tool_point(picture: LivePicture) -> tuple[Array, Array]:
     """Find the tool point in the deformed grid, [3], mm, and its error, [3], µm."""
     state, scene = picture.state, picture.state.scene
     axes, nominal = standing(state)
-    coordinates, now = complete_coordinates(scene.machine, axes), active_scene(state)
+    coordinates, now = complete_coordinates(scene.machine, axes), state.active_scene()
     if state.controller is not None:
         field = state.controller.field(coordinates, nominal, now, state.loop)
     else:

@@ -13,7 +13,7 @@ import numpy as np
 
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.ranges import position_spans
+from warpspace.app.state.look import position_spans
 from warpspace.app.state.typed_numbers import read_typed
 from warpspace.exceptions import OptionError, UnknownNameError, WarpspaceError
 from warpspace.field.grid import Workspace, find_volume_axes
@@ -305,12 +305,12 @@ def with_word(state: AppState, word: str) -> AppState:
         scene, notes = edited(state.scene, word)
         changed = state if scene is state.scene else with_changed_scene(state, scene)
     except WarpspaceError as problem:
-        return _noted(state, f"{str(problem).removeprefix('machine: ')}; {UNCHANGED}")
+        return state.noted(f"{str(problem).removeprefix('machine: ')}; {UNCHANGED}")
     if what == "span" and gantry is not None:  # the errors of both guides stay
         now = scene.machine.gantries[gantry.axis]
         turned = changed.amplitudes[now.rotation_key] * now.rotation_weight
         changed = changed.with_amplitude(now.rotation_key, turned / gantry.rotation_weight)
-    return _noted(changed, *notes)
+    return changed.noted(*notes)
 
 
 def with_changed_scene(state: AppState, scene: Scene) -> AppState:
@@ -377,11 +377,7 @@ def with_own_machine(state: AppState) -> AppState:
     )
     back, notes = _with_machine(joined, own)
     kept = replace(state, tolerances=replace(state.tolerances, own=tolerances))
-    return _noted(with_changed_scene(kept, back), *notes)
-
-
-def _noted(state: AppState, *notes: str) -> AppState:
-    return replace(state, notes=(*state.notes, *notes)) if notes else state
+    return with_changed_scene(kept, back).noted(*notes)
 
 
 # --- The two guides of a gantry: their errors, which the axis has as mean and rotation ------------
@@ -417,7 +413,7 @@ def with_guide_error(state: AppState, gantry: Gantry, guide: int, value_um: floa
 
 def _curves(state: AppState, gantry: Gantry) -> tuple[ErrorFunction, ErrorFunction]:
     along, about = gantry.positioning_key, gantry.rotation_key
-    return edits.curve_of(state, along), edits.curve_of(state, about)
+    return state.curve(along), state.curve(about)
 
 
 def _alike(*curves: ErrorFunction) -> bool:
@@ -452,4 +448,4 @@ def with_library_scene(state: AppState, scene: Scene) -> AppState:
     left = state.scene.title
     note = f"{scene.title}, with its own errors: those of {left} are left behind"
     changed = replace(state.with_scene(scene), left_behind=left)
-    return _noted(changed, f"{note}; undo brings them back")
+    return changed.noted(f"{note}; undo brings them back")

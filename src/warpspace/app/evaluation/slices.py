@@ -2,9 +2,9 @@
 
 from typing import TYPE_CHECKING
 
-from warpspace.app.evaluation.cache import Cache, Identity
-from warpspace.app.evaluation.resulting_scene import active_scene
+from warpspace.app.evaluation.cache import Cache
 from warpspace.app.state.app_state import AppState
+from warpspace.app.state.leaf import Identity
 from warpspace.app.state.look import slice_positions
 from warpspace.field.evaluate import ErrorBasis, ErrorField
 from warpspace.field.grid import Grid, build_slice
@@ -42,11 +42,11 @@ class CompensatedSource:
         kept = self._kept.get(
             key,
             lambda: controller.at(
-                of.coordinates, of.nominal_mm, active_scene(state), loop, point_mm
+                of.coordinates, of.nominal_mm, state.active_scene(), loop, point_mm
             ),
             lambda found: found.nbytes,
         )
-        return kept.field(active_scene(state).errors)
+        return kept.field(state.active_scene().errors)
 
 
 class SliceSource:

@@ -283,7 +283,7 @@ class Session:
                 self._darken(picture)
         context.shown = picture
         if notes:
-            context.notify("Clamped", "\n".join(notes), "warning")
+            context.notify("Not taken as typed", "\n".join(notes), "warning")
 
     def _darken(self, picture: LivePicture) -> None:
         dark = picture.state.shown.dark

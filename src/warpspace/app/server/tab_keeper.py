@@ -16,8 +16,7 @@ from warpspace.app.documents.scene_file import (
     state_to_toml,
 )
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.state.app_state import AppState
-from warpspace.app.state.comparison import Comparison
+from warpspace.app.state.app_state import AppState, Comparison
 from warpspace.app.state.table import without_table
 from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.parts import Part

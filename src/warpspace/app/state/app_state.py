@@ -1,26 +1,23 @@
 """What a session shows, as one frozen value. Every change of it is a pure function.
 
-Whatever comes from a browser passes through the methods here: they bring numbers into their range,
-keep the old value in place of what is none, and note in `AppState.notes` what they changed.
+Whatever comes from a browser passes through `warpspace.app.state.tree.put`: it brings numbers into
+their range, keeps the old value in place of what is none, and notes in `AppState.notes` what it
+changed.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from warpspace.app.state.comparison import Comparison
-from warpspace.app.state.leaf import described, error_names, said
-from warpspace.app.state.look import Look, MachineLook, RotaryLook
-from warpspace.app.state.page_look import PageLook
-from warpspace.app.state.picked import Picked
-from warpspace.app.state.ranges import Exclusions, Span, position_spans
-from warpspace.app.state.specification import Specification
+from warpspace.app.state.leaf import Span, described, error_names, said
+from warpspace.app.state.look import Look, MachineLook, RotaryLook, position_spans
 from warpspace.field.evaluate import View
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
-from warpspace.machine.errors import ErrorFunction, ErrorSet, ToleranceSet
+from warpspace.machine.description import Vector
+from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet, ToleranceSet
 from warpspace.machine.limits import EXAGGERATION as FACTORS
-from warpspace.machine.limits import LIVE_NODES, MAX_ERROR
+from warpspace.machine.limits import LIVE_NODES, MAX_ERROR, PROBABILITY
 from warpspace.scene.model import Scene
 
 if TYPE_CHECKING:
@@ -29,7 +26,18 @@ if TYPE_CHECKING:
 AMPLITUDE = Span(-MAX_ERROR, MAX_ERROR, 0.1)
 NODES = Span(*LIVE_NODES, 2.0)  # grid nodes per axis: odd numbers
 EXAGGERATION = Span(*FACTORS, 1.0)
-START_NODES = 21
+LIMIT_UM = Span(1.0, 300.0, 0.5)
+PERCENT = Span(100.0 * PROBABILITY[0], 100.0 * PROBABILITY[1], 0.1)
+START_NODES, START_UM = 21, 50.0
+MOST_COSTS_TEXT = 2000  # characters of a list of costs
+LONGEST_QUERY = 80
+TASKS = {
+    "understand": "Understand",
+    "measure": "Measure",
+    "improve": "Improve",
+    "design": "Design",
+    "machine": "Machine",
+}
 COMPONENT_NAMES = {
     "position": {"norm": "|E| length", "x": "E_x", "y": "E_y", "z": "E_z"},
     "orientation": {
@@ -45,6 +53,10 @@ LOOP_NAMES = {
     Loop.WORKPIECE.value: "workpiece point",
     Loop.RELATIVE.value: "tool relative to workpiece",
 }
+SHOWN = {"a": "A", "b": "B", "difference": "B − A"}
+"""What can be drawn of a comparison; the difference is the change from A to B."""
+PRESENT, NOBODY = "present errors", "nothing"
+"""Names of what is steered, and of no other side."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +75,135 @@ class Shown:
 
 
 @dataclass(frozen=True, slots=True)
+class Exclusions:
+    """Parameters that do not take part, and those that alone do."""
+
+    excluded: frozenset[str] = described(
+        frozenset[str](),
+        "Excluded errors",
+        one="Exclusion of {}",
+        choices=error_names,
+        linked="excluded",
+    )
+    # where there are any, all others are left out, and so are excluded ones among them
+    only: frozenset[str] = described(
+        frozenset[str](),
+        "Errors drawn alone",
+        one="Only {}",
+        choices=error_names,
+        linked="only",
+    )
+
+    def __bool__(self) -> bool:
+        return bool(self.excluded or self.only)
+
+    def active(self, key: str) -> bool:
+        """Tell whether a parameter takes part."""
+        return key not in self.excluded and (not self.only or key in self.only)
+
+    def effective(self, amplitudes: Mapping[str, float]) -> Mapping[str, float]:
+        """Give the amplitudes that count, µm or µrad: zero for what does not take part."""
+        if not self:
+            return amplitudes
+        return {key: value if self.active(key) else 0.0 for key, value in amplitudes.items()}
+
+    def within(self, keys: Collection[str]) -> "Exclusions":
+        """Keep what concerns the parameters of a machine."""
+        return Exclusions(self.excluded & frozenset(keys), self.only & frozenset(keys))
+
+
+@dataclass(frozen=True, slots=True)
+class Specification:
+    """What a design is held against: a limit, where it holds, how tolerances are filled, traded."""
+
+    limit_um: float = described(START_UM, "|E| allowed", span=LIMIT_UM, unit="µm")
+    # one random point of each machine (as in the thesis), or its worst point, which is the rule
+    over: str = described(
+        "max",
+        "Evaluated at",
+        choices={"max": "everywhere", "sampled": "a random point"},
+        hint="Where each sampled machine has to stay within the limit: everywhere in the volume, or"
+        " at one random point (as in the thesis).",
+    )
+    distribution: str = described(
+        "uniform",
+        "Errors in their tolerance",
+        choices={"uniform": "uniform", "normal": "normal, 3σ at the limits"},
+        hint="How the errors of the machines are spread over their tolerances.",
+    )
+    # share of the machines that is to stay within the limit once tolerances are allocated
+    percent: float = described(95.0, "Probability wanted", span=PERCENT, unit="%")
+    # tolerances that are neither allocated nor scaled
+    fixed: frozenset[str] = described(
+        frozenset[str](), "Fixed tolerances", one="Fixed tolerance of {}", choices=error_names
+    )
+    costs: str = described(
+        "",
+        "Costs of tolerances",
+        longest=MOST_COSTS_TEXT,
+        hint="Cost of a tolerance where it is not 1, for instance EA0Z=4, EXX=0.5.",
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Picked:
+    """A point somebody asks about; it stays where the axes stand while errors change."""
+
+    # mm or degrees; axis positions: those of the linear axes for a point of the surface (the rotary
+    # ones stand where the state has them), those of all axes for a point of a trace
+    at: Mapping[str, float]
+    # loop of a trace; None for a point of the surface, which follows the loop of the view
+    loop: Loop | None = None
+    # or None; the traced point in the workpiece (or tool) frame; None for the surface
+    point_mm: Vector | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class PageLook:
+    """What of the page is open. It is no part of the picture: neither linked nor undone."""
+
+    task: str = described("understand", "Task", choices=TASKS, linked="")
+    open: frozenset[str] = described(
+        frozenset({"worst", "compensate", "repair", "concepts", "allocate"}),
+        "Open sections",
+        linked="",
+    )
+    # error whose row is unfolded: chosen, or the one moved last; empty for none yet
+    row: str = described(
+        "", "Unfolded error", choices=lambda state: {"": "none", **error_names(state)}, linked=""
+    )
+    query: str = described("", "Search of errors", longest=LONGEST_QUERY, linked="")
+    window: str = described("", "Open window", longest=LONGEST_QUERY, linked="")
+
+
+@dataclass(frozen=True)
+class Side:
+    """One side of a comparison."""
+
+    title: str = PRESENT  # what it is called on the page
+    state: "AppState | None" = None  # what it is; None for what is steered
+    # whether it is a scene as opened, which is looked at as what is steered (rotary positions,
+    # loop), rather than what was pinned, which keeps its own
+    is_scene: bool = False
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What is compared."""
+
+    a: Side = field(default_factory=Side)
+    b: Side | None = None  # none while nothing is compared
+    shown: str = described("a", "Side that is drawn", choices=SHOWN, linked="compare.shown")
+    # whether the other side is drawn too, as a wireframe
+    ghost: bool = described(True, "Other side as a wireframe", linked="compare.ghost")
+    pinned: Side | None = None  # what was pinned last: the state before, or a proposal
+
+    def off(self) -> "Comparison":
+        """End it; what was pinned stays."""
+        return Comparison(pinned=self.pinned, ghost=self.ghost)
+
+
+@dataclass(frozen=True, slots=True)
 class AppState:
     """All that a picture depends on."""
 
@@ -75,7 +216,6 @@ class AppState:
             kind="number",
             each=lambda state: dict.fromkeys(state.amplitudes, AMPLITUDE),
             linked="{key}",
-            path="errors",
         )
     )
     # degrees; where the rotary axes stand
@@ -90,20 +230,12 @@ class AppState:
         )
     )
     start: Mapping[str, float]  # µm or µrad; amplitudes that reset goes back to: the scene's
-    # None chooses a round one
+    # how much larger than true the errors are drawn; None chooses a round number
     exaggeration: float | None = described(
-        None,
-        "Exaggeration",
-        choices={"auto": "auto"},
-        kind="number",
-        span=EXAGGERATION,
-        hint="How much larger than true the errors are drawn.",
+        None, "Exaggeration", choices={"auto": "auto"}, kind="number", span=EXAGGERATION
     )
     component: str = described(
-        "norm",
-        "Component",
-        choices=lambda state: COMPONENT_NAMES[state.look.quantity],
-        hint="What the colours mean: the length or one signed component of the quantity.",
+        "norm", "Component", choices=lambda state: COMPONENT_NAMES[state.look.quantity]
     )
     loop: Loop = described(
         Loop.TOOL,
@@ -136,7 +268,6 @@ class AppState:
             one="Tolerance of {}",
             each=lambda state: dict.fromkeys(state.amplitudes),
             linked="",
-            hint="Half width of the tolerance; 0 holds the error at its centre.",
         ),
     )
     # what the tolerances are held against
@@ -146,22 +277,14 @@ class AppState:
     # title of the scene whose errors a machine chosen from the library left behind; empty for none,
     # and after the next change of scene
     left_behind: str = field(default="", metadata=said("Scene"))
-    # MachineLook, RotaryLook; what is shown of the field and of the schematic machine, and traced
+    # what is shown of the field and of the schematic machine, and traced
     look: Look = field(default_factory=Look)
     machine: MachineLook = field(default_factory=MachineLook)
     rotary: RotaryLook = field(default_factory=RotaryLook)
-    # the point whose error is explained
+    # the point whose error is explained, and the error whose axis and lever are drawn
     picked: Picked | None = field(default=None, metadata=said("Point"))
-    lever: str = described(
-        "",
-        "Lever",
-        choices=lambda state: {"": "none", **error_names(state)},
-        hint="The error whose axis and lever are drawn.",
-    )
-    # what is compared
-    comparison: "Comparison[AppState]" = field(
-        default_factory=Comparison[Any], metadata=said("Comparison")
-    )
+    lever: str = described("", "Lever", choices=lambda state: {"": "none", **error_names(state)})
+    comparison: Comparison = field(default_factory=Comparison, metadata=said("Comparison"))
     # whose table corrects the machine that is drawn; never saved or linked
     controller: "Controller | None" = field(default=None, metadata=said("Table of compensation"))
     # what of the page is open, and what its forms were told (`state/forms.py`); undo leaves both
@@ -198,9 +321,43 @@ class AppState:
         return self.exclusions.effective(self.amplitudes)
 
     @property
+    def changed_keys(self) -> tuple[str, ...]:
+        """Parameters that differ from the scene's values."""
+        return tuple(key for key, value in self.amplitudes.items() if value != self.start[key])
+
+    @property
     def seen(self) -> tuple[Loop, bool]:
         """The loop, and whether the placement of the workpiece is left out: a key to keep by."""
         return self.loop, self.placed and self.loop is Loop.RELATIVE
+
+    def axis_span(self, key: str) -> tuple[float, float]:
+        """Give the range over which the curve of a parameter runs, mm or degrees."""
+        return self.scene.axis_span(parameter(key).axis)
+
+    def curve(self, key: str) -> ErrorFunction:
+        """Give the curve of a parameter with its present amplitude."""
+        function = self.scene.errors.functions.get(key) or Constant(self.axis_span(key))
+        return function.with_amplitude(self.amplitudes[key])
+
+    def resulting_scene(self) -> Scene:
+        """Give the scene that the state amounts to: what is saved, drawn and exported."""
+        scene, limit = self.scene, self.specification.limit_um
+        keys = [k for k, at in self.amplitudes.items() if at or k in scene.errors.functions]
+        known = scene.workspace.positions
+        moved = {axis: at for axis, at in self.positions.items() if at != known.get(axis)}
+        return replace(
+            scene,
+            errors=ErrorSet({key: self.curve(key) for key in keys}),
+            workspace=scene.workspace.moved(moved) if moved else scene.workspace,
+            tolerances=self.tolerances,
+            exaggeration=self.exaggeration,
+            placed=self.placed,
+            limit_um=None if scene.limit_um is None and limit == START_UM else limit,
+        )
+
+    def active_scene(self) -> Scene:
+        """Give the scene as it is drawn: what is excluded is left out."""
+        return replace(self, amplitudes=self.active).resulting_scene()
 
     def view(self, loop: Loop | None = None) -> View:
         """Give the view through a loop, the present one by default, at the present positions."""
@@ -208,21 +365,17 @@ class AppState:
         scene = replace(self.scene, placed=self.placed, workspace=workspace)
         return scene.view(loop or self.loop)
 
-    def with_amplitude(self, key: str, value: float) -> "AppState":
-        """Set the amplitude of one parameter, µm or µrad, as far as the model holds."""
-        if key not in self.amplitudes:
-            return self._noted(f"{key}: no parameter of this machine")
-        row = parameter(key)
-        kept, noted = self._clamped(value, self.amplitudes[key], AMPLITUDE, key, row.unit)
-        return replace(noted, amplitudes={**self.amplitudes, key: kept})
+    def noted(self, *notes: str) -> "AppState":
+        """Say what could not be taken as it was given; an empty note is none."""
+        found = tuple(filter(None, notes))
+        return replace(self, notes=(*self.notes, *found)) if found else self
 
-    def with_position(self, axis: str, value: float) -> "AppState":
-        """Set the position of one rotary axis, degrees, within its travel."""
-        if axis not in self.positions:
-            return self._noted(f"{axis}: no rotary axis of this machine")
-        span = self.position_spans[axis]
-        kept, noted = self._clamped(value, self.positions[axis], span, axis, "°")
-        return replace(noted, positions={**self.positions, axis: kept})
+    def without_notes(self) -> "AppState":
+        return replace(self, notes=()) if self.notes else self
+
+    def with_amplitude(self, key: str, value: float) -> "AppState":
+        """Give one parameter an amplitude that the program has worked out, µm or µrad."""
+        return replace(self, amplitudes={**self.amplitudes, key: value})
 
     def with_scene(self, scene: Scene) -> "AppState":
         """Show another scene, in its own loop; component, density and switches stay."""
@@ -232,7 +385,6 @@ class AppState:
             component=self.component,
             nodes=self.nodes,
             shown=self.shown,
-            exaggeration=fresh.exaggeration,
             specification=self.specification if scene.limit_um is None else fresh.specification,
             look=self.look,
             machine=self.machine,
@@ -250,28 +402,7 @@ class AppState:
         return replace(self, amplitudes=self.start, scene=scene, loaded=loaded)
 
     def zeroed(self) -> "AppState":
-        """Set all errors to zero."""
         return replace(self, amplitudes=dict.fromkeys(self.amplitudes, 0.0))
-
-    def without_notes(self) -> "AppState":
-        """Forget what was clamped."""
-        return replace(self, notes=()) if self.notes else self
-
-    @property
-    def changed_keys(self) -> tuple[str, ...]:
-        """Parameters that differ from the scene's values."""
-        return tuple(key for key, value in self.amplitudes.items() if value != self.start[key])
-
-    def _noted(self, note: str) -> "AppState":
-        return replace(self, notes=(*self.notes, note))
-
-    def _clamped(
-        self, value: float, fallback: float, span: Span, what: str, unit: str
-    ) -> tuple[float, "AppState"]:
-        kept = span.clamp(value, fallback)
-        if kept == value:
-            return kept, self
-        return kept, self._noted(span.clamped_words(value, kept, what, unit))
 
 
 def start_state(scene: Scene, **changes: Any) -> AppState:
@@ -287,15 +418,10 @@ def start_state(scene: Scene, **changes: Any) -> AppState:
         scene.exaggeration,
         loop=start_loop(scene),
         placed=scene.placed,
-        specification=start_specification(scene),
+        specification=Specification(START_UM if scene.limit_um is None else scene.limit_um),
         tolerances=scene.tolerances,
     )
     return replace(state, **changes)
-
-
-def start_specification(scene: Scene) -> Specification:
-    """Give what a design is held against: the limit of the scene, where it has one."""
-    return Specification() if scene.limit_um is None else Specification(scene.limit_um)
 
 
 def start_loop(scene: Scene) -> Loop:

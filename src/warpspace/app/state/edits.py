@@ -1,47 +1,50 @@
-"""Changes of a state: curves and tolerances of its scene, what of it is seen. Pure, clamped."""
+"""Ranges of sliders, and changes of a state: its curves, its tolerances, what of it is seen."""
 
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.ranges import Span, round_up
+from warpspace.app.state.leaf import Span
 from warpspace.machine.axes import parameter
 from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet, Tolerance
 from warpspace.machine.limits import MAX_ERROR, MAX_HALF_WIDTH, MIN_HALF_WIDTH
 
+LEAST_TRANSLATION_UM = 20.0
+LEAST_ROTATION_URAD = 50.0
 LEAST_HALF_WIDTH = 10.0
+FINE_STEP, FINE = 0.1, (5.0, 500.0)  # a slider that ends between has this step
 FINE_UP_TO = 100.0  # µm or µrad: sliders of tolerances that end below have a step of 0.01
 
 
-def axis_span(state: AppState, key: str) -> tuple[float, float]:
-    """Give the range over which the curve of a parameter runs, mm or degrees."""
-    return state.scene.axis_span(parameter(key).axis)
+def round_up(value: float) -> float:
+    """Give the smallest 1, 2 or 5 × 10ⁿ that is not below a positive value."""
+    decade = 10.0 ** math.floor(math.log10(value))
+    return next(step * decade for step in (1, 2, 5, 10) if step * decade >= value * (1.0 - 1e-9))
 
 
-def curve_of(state: AppState, key: str) -> ErrorFunction:
-    """Give the curve of a parameter with its present amplitude."""
-    function = state.scene.errors.functions.get(key) or Constant(axis_span(state, key))
-    return function.with_amplitude(state.amplitudes[key])
+def amplitude_span(key: str, value: float, tolerance: Tolerance | None) -> Span:
+    """Choose the slider range of a parameter."""
+    least = LEAST_ROTATION_URAD if parameter(key).is_rotation else LEAST_TRANSLATION_UM
+    if tolerance is not None:
+        reach = abs(tolerance.centre) + tolerance.half_width
+        least = reach if reach >= MIN_HALF_WIDTH else least
+    high = min(round_up(max(least, 2.0 * abs(value))), MAX_ERROR)
+    fine = FINE[0] <= high <= FINE[1]
+    return Span(-high, high, FINE_STEP if fine else 10.0 ** (math.ceil(math.log10(high)) - 3))
 
 
 def with_curve(state: AppState, key: str, function: ErrorFunction) -> AppState:
     """Give a parameter another curve and its amplitude."""
     if key not in state.amplitudes:
-        return replace(state, notes=(*state.notes, f"{key}: no parameter of this machine"))
-    row = parameter(key)
-    if row.is_constant and not isinstance(function, Constant):
-        note = f"{key} is constant along its axis; expected one number"
-        return replace(state, notes=(*state.notes, note))
-    if function == curve_of(state, key):
+        return state.noted(f"{key}: no parameter of this machine")
+    if parameter(key).is_constant and not isinstance(function, Constant):
+        return state.noted(f"{key} is constant along its axis; expected one number")
+    if function == state.curve(key):
         return state
-    amplitude = function.amplitude
     errors = ErrorSet({**state.scene.errors.functions, key: function})
-    return replace(
-        state,
-        scene=replace(state.scene, errors=errors),
-        loaded=state.origin,
-        amplitudes={**state.amplitudes, key: amplitude},
-    )
+    changed = replace(state, scene=replace(state.scene, errors=errors), loaded=state.origin)
+    return changed.with_amplitude(key, function.amplitude)
 
 
 def half_width_of(state: AppState, key: str) -> float:
@@ -57,25 +60,9 @@ def half_width_span(state: AppState, key: str) -> Span:
     """
     found = state.origin.tolerances.get(key)
     widest = max(2.0 * (found.half_width if found else 0.0), LEAST_HALF_WIDTH)
-    widest = max(widest, half_width_of(state, key))
-    high = min(round_up(widest), MAX_ERROR)
+    high = min(round_up(max(widest, half_width_of(state, key))), MAX_ERROR)
     # number boxes show as many decimals as the step has
     return Span(0.0, high, 0.01 if high <= FINE_UP_TO else 0.1)
-
-
-def with_half_width(state: AppState, key: str, half_width: float) -> AppState:
-    """Set the half width of one tolerance, µm or µrad; its centre stays."""
-    if key not in state.amplitudes:
-        return replace(state, notes=(*state.notes, f"{key}: no parameter of this machine"))
-    present = state.tolerances.get(key) or Tolerance(0.0, 0.0)
-    span = Span(0.0, max(MAX_HALF_WIDTH, half_width_span(state, key).high), 0.1)
-    kept = span.clamp(half_width, present.half_width)
-    kept = 0.0 if kept < MIN_HALF_WIDTH else kept
-    notes = state.notes
-    if kept != half_width:
-        notes = (*notes, f"tolerance of {key} = {half_width:g}: clamped to ±{kept:g}")
-    own = {**state.tolerances.own, key: Tolerance(present.centre, kept)}
-    return replace(state, tolerances=replace(state.tolerances, own=own), notes=notes)
 
 
 def with_scene_tolerances(state: AppState) -> AppState:
@@ -97,10 +84,7 @@ def with_scaled_tolerances(state: AppState, keys: Collection[str], factor: float
 
 
 def with_half_widths(state: AppState, half_widths: Mapping[str, float]) -> AppState:
-    """Set the half widths of several tolerances at once, µm or µrad; centres stay.
-
-    Only for numbers that the program has worked out itself: they are taken as they are.
-    """
+    """Set half widths of tolerances that the program has worked out, µm or µrad; centres stay."""
     return replace(state, tolerances=state.tolerances.with_half_widths(half_widths))
 
 
@@ -109,4 +93,4 @@ def with_sight(state: AppState, *, inside: bool) -> AppState:
     before, after = ("surface", "grid") if inside else ("grid", "surface")
     if state.look.surface != before:
         return state
-    return replace(state, look=state.look.with_choice(surface=after))
+    return replace(state, look=replace(state.look, surface=after))

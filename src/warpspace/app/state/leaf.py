@@ -3,16 +3,13 @@
 `warpspace.app.state.tree` makes leaves of it: for widgets, links, saved files and undo alike.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, Field, dataclass, field
-from functools import lru_cache
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
-from warpspace.exceptions import UnknownNameError
-from warpspace.machine.axes import parameter
-
-if TYPE_CHECKING:
-    from warpspace.app.state.ranges import Span
+from warpspace.machine.axes import PARAMETERS, parameter
+from warpspace.machine.limits import MIN_NUMBER
 
 T = TypeVar("T")
 MOST_TYPED = 200  # characters of a text
@@ -24,89 +21,89 @@ class Unreadable(ValueError):  # noqa: N818 - it is handled where text is read
     """A text that means nothing; it says what was expected."""
 
 
+class Identity:
+    """An object as part of a key, compared by identity (and held, so that its id stays its own)."""
+
+    def __init__(self, thing: Any) -> None:
+        self.thing = thing
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Identity) and other.thing is self.thing
+
+    def __hash__(self) -> int:
+        return id(self.thing)
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """Range of a control."""
+
+    low: float  # ends, in the unit of the control
+    high: float
+    step: float  # distance between two positions of a slider
+
+    def clamp(self, value: float, fallback: float) -> float:
+        """Bring a number that may be anything into the range; what is no number falls back."""
+        if math.isnan(value):
+            return fallback
+        kept = min(max(value, self.low), self.high)
+        return 0.0 if 0.0 < abs(kept) < MIN_NUMBER else kept
+
+    def clamped_words(self, value: float, kept: float, what: str, unit: str) -> str:
+        """Say that a number was brought into the range."""
+        allowed = f"{self.low:g} to {self.high:g} {unit}".rstrip()
+        shown = f"{kept:g} {unit}".rstrip()
+        return f"{what} = {value:g} is outside {allowed}; clamped to {shown}"
+
+
 @dataclass(frozen=True, slots=True)
 class Leaf:
     """One value of a state that somebody may set, or one entry of a mapping of them."""
 
-    path: str  # "look.surface", "errors.EA0Z"
+    path: str  # "look.surface", "amplitudes.EA0Z"; of a field that describes itself empty
     label: str  # what a user reads, also beside a step that is undone
     # "switch", "choice", "number", "text", "keys" (some of its choices), "names" (a set of any
-    # words), "point" (three numbers or none), "numbers"
-    kind: str
+    # words), "point" (three numbers or none), "numbers"; empty where only changes have a name
+    kind: str = ""
     # values with their words; of a number the one that stands in place of it, "auto"
     choices: Choices = field(default_factory=dict[str, str])
-    span: "Span | None" = None
+    span: Span | None = None
     unit: str = ""
     hint: str = ""
     linked: str = ""  # name in links and files; empty where it stands in none
     longest: int = MOST_TYPED  # characters of a text
-
-
-@dataclass(frozen=True, slots=True)
-class Description:
-    """What a field says; what depends on a state is a function of it."""
-
-    # with the path where that is not the name of the field; kind is empty where only changes of the
-    # field have a name
-    leaf: Leaf
-    one: str  # label of one entry or member; ``{}`` is its name
-    choices: Callable[[Any], Choices] | None
-    each: Callable[[Any], Mapping[str, "Span | None"]] | None  # entries of a mapping
+    one: str = "{}"  # label of one entry or member; ``{}`` is its name
+    # of a field whose choices, or whose entries with their ranges, depend on the state
+    choose: Callable[[Any], Choices] | None = None
+    each: Callable[[Any], Mapping[str, Span | None]] | None = None
 
 
 def said(
-    label: str,
-    *,
-    kind: str = "",
-    one: str = "{}",
-    choices: Choices | Callable[[Any], Choices] | None = None,
-    each: Callable[[Any], Mapping[str, "Span | None"]] | None = None,
-    linked: str = "{path}",
-    path: str = "",
-    **words: Any,
-) -> dict[str, Description]:
-    """Give the metadata of a field; in `linked`, ``{key}`` is the key of an entry. See `Leaf`."""
-    plain = {} if choices is None or callable(choices) else choices
-    leaf = Leaf(path, label, kind, plain, linked=linked, **words)
-    return {DESCRIBED: Description(leaf, one, choices if callable(choices) else None, each)}
+    label: str, *, choices: Choices | Callable[[Any], Choices] | None = None, **words: Any
+) -> dict[str, Leaf]:
+    """Give the metadata of a field; in `linked`, ``{path}`` and ``{key}`` (of an entry) are put."""
+    words = {"linked": "{path}", **words}
+    if choices is not None:
+        words["choose" if callable(choices) else "choices"] = choices
+    return {DESCRIBED: Leaf("", label, **words)}
 
 
 def described(default: T, label: str, **words: Any) -> T:
     """Give a field with a default; its kind follows from that where none is said."""
-    kind = words.pop("kind", None) or _kind(default, bool(words.get("choices")))
-    return field(default_factory=lambda: default, metadata=said(label, kind=kind, **words))
-
-
-def spell_numbers(numbers: Iterable[float]) -> str:
-    """Spell numbers with commas between, to the last bit."""
-    return ",".join(repr(float(number)) for number in numbers)
-
-
-def error_names(state: Any) -> dict[str, str]:
-    """Give the plain names of the errors of a state, by key."""
-    return {key: parameter(key).name for key in state.amplitudes}
-
-
-@lru_cache(maxsize=512)
-def name_of(key: str) -> str:
-    """Give the plain name of an error; anything else as it is."""
-    try:
-        return parameter(key).name
-    except UnknownNameError:
-        return key
-
-
-def _kind(default: object, has_choices: bool) -> str:
+    has_choices = bool(words.get("choices"))
     if isinstance(default, bool):
-        return "switch"
-    if isinstance(default, frozenset):
-        return "keys" if has_choices else "names"
-    if has_choices:
-        return "choice"
-    return "text" if isinstance(default, str) else "number"
+        kind = "switch"
+    elif isinstance(default, frozenset):
+        kind = "keys" if has_choices else "names"
+    elif has_choices:
+        kind = "choice"
+    else:
+        kind = "text" if isinstance(default, str) else "number"
+    words = {"kind": kind, **words}
+    return field(default_factory=lambda: default, metadata=said(label, **words))
 
 
-def description(entry: "Field[Any]") -> Description | None:
+def description(entry: "Field[Any]") -> Leaf | None:
     """Give what a field says of itself."""
     return entry.metadata.get(DESCRIBED)
 
@@ -118,10 +115,15 @@ def default_of(entry: "Field[Any]") -> Any:
     return None if entry.default is MISSING else entry.default
 
 
-def words_of(leaf: Leaf) -> str:
-    """Name a leaf within a sentence: an error by its key."""
-    group, _, key = leaf.path.rpartition(".")
-    return key if group in {"errors", "tolerances"} else lowered(leaf.label)
+def error_names(state: Any) -> dict[str, str]:
+    """Give the plain names of the errors of a state, by key."""
+    return {key: parameter(key).name for key in state.amplitudes}
+
+
+def name_of(key: str) -> str:
+    """Give the plain name of an error; anything else as it is."""
+    row = PARAMETERS.get(key)
+    return key if row is None else row.name
 
 
 def lowered(label: str) -> str:

@@ -1,22 +1,16 @@
-"""How the field, the machine and its traces are looked at: three frozen values, and pure updates.
+"""How the field, the machine and its traces are looked at, and where in a scene the axes stand."""
 
-Numbers from a browser pass through `Span.clamp` here; names that are none keep the old value.
-"""
+from collections.abc import Mapping
+from dataclasses import dataclass
 
-import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
-from typing import Any
-
-from warpspace.app.state.leaf import MOST_TYPED, described
-from warpspace.app.state.ranges import Span
+from warpspace.app.state.leaf import Span, described
 from warpspace.field.grid import slice_ranges
 from warpspace.geometry.traces import TILT_STEP_DEG
 from warpspace.machine import limits
 from warpspace.machine.axes import is_linear
 from warpspace.machine.description import Vector
-from warpspace.scene.files import parse_number
 from warpspace.scene.model import Scene
+from warpspace.units import spell_short
 
 SURFACES = {
     "surface": "surface",
@@ -32,26 +26,17 @@ RANGES = {"auto": "auto", "fixed": "fixed", "shared": "shared"}
 RANGE_TOP = Span(*limits.RANGE_TOP, 0.001)
 START_TOP = 50.0
 POINT_MM = Span(-2000.0, 2000.0, 1.0)
-MOST_HELD = 8  # positions that one axis can be held at while another one is turned
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
     """What is shown of the field, and how."""
 
-    surface: str = described(
-        "surface", "Surface", choices=SURFACES, hint="How the volume is drawn."
-    )
-    quantity: str = described(
-        "position", "Quantity", choices=QUANTITIES, hint="Which error the colours mean."
-    )
-    range_mode: str = described(
-        "auto",
-        "Colour range",
-        choices=RANGES,
-        hint="auto: round ends for what is shown. fixed: the number below. shared: one range for"
-        " all components, for now and for the scene as opened.",
-    )
+    surface: str = described("surface", "Surface", choices=SURFACES)
+    quantity: str = described("position", "Quantity", choices=QUANTITIES)
+    # round ends for what is shown; those of `range_top`; or one range for all components, for now
+    # and for the scene as opened
+    range_mode: str = described("auto", "Colour range", choices=RANGES)
     range_top: float = described(
         START_TOP,
         "End of the colour range",
@@ -68,16 +53,14 @@ class Look:
     bars: bool = described(
         True, "Scale bars", hint="Two lengths in the picture: geometry in mm, error in µm."
     )
-    pass_fail: bool = described(
-        False, "Pass or fail", hint="Which part of the volume keeps the limit, and which does not."
-    )
+    # which part of the volume keeps the limit, and which does not
+    pass_fail: bool = described(False, "Pass or fail")
     # an axis not given in the middle of its range
     slices_mm: Mapping[str, float] = described(
         dict[str, float](),
         "Slices",
         one="Slice across {}",
         each=lambda state: slice_spans(state.scene),
-        hint="Where the volume is cut.",
     )
     follow: bool = described(
         False,
@@ -90,36 +73,19 @@ class Look:
         """Whether the orientation error of the tool axis is coloured, not the position error."""
         return self.quantity == "orientation"
 
-    def with_choice(self, **names: str) -> "Look":
-        """Choose surface, quantity or range_mode; unknown names change nothing."""
-        allowed: Mapping[str, Iterable[str]] = {
-            "surface": SURFACES,
-            "quantity": QUANTITIES,
-            "range_mode": RANGES,
-        }
-        return replace(self, **{k: v for k, v in names.items() if v in allowed.get(k, ())})
-
 
 @dataclass(frozen=True, slots=True)
 class MachineLook:
-    """The schematic machine."""
+    """The schematic machine: its bodies, or these nearly transparent, around the volume."""
 
-    shown: bool = described(
-        False,
-        "Machine bodies",
-        hint="A schematic of the machine around the working volume, in true proportions.",
-    )
+    shown: bool = described(False, "Machine bodies")
     bent: bool = described(
         True,
         "Bodies deformed by the errors",
         hint="Each body is displaced by the errors before it in the chain, exaggerated as the"
         " box is. Off: nominal.",
     )
-    ghost: bool = described(
-        True,
-        "Ghost of the machine",
-        hint="The bodies, nearly transparent, around the working volume.",
-    )
+    ghost: bool = described(True, "Ghost of the machine")
     # an axis not given in the middle of its workspace
     linear_mm: Mapping[str, float] = described(
         dict[str, float](),
@@ -135,11 +101,13 @@ class RotaryLook:
     """Which points are traced, and where the axes stand that do not turn."""
 
     # by their numbers among the scene's trace points
-    off: frozenset[int] = described(
-        frozenset[int](),
+    off: frozenset[str] = described(
+        frozenset[str](),
         "Points that are not traced",
-        choices=lambda state: trace_point_words(state.scene),
-        hint="Points of the scene, in the workpiece frame.",
+        choices=lambda state: {
+            str(number): f"({', '.join(map(spell_short, point))}) mm"
+            for number, point in enumerate(state.scene.trace_points_mm)
+        },
     )
     own_mm: Vector | None = described(
         None,
@@ -150,9 +118,9 @@ class RotaryLook:
         linked="rotary.own",
         hint="x, y and z in the workpiece frame; empty for none.",
     )
-    # an axis not given where `warpspace.geometry.traces` puts it
-    held: tuple[tuple[str, tuple[float, ...]], ...] = described(
-        (),
+    # degrees; an axis not given where `default_held` puts it
+    held: Mapping[str, tuple[float, ...]] = described(
+        dict[str, tuple[float, ...]](),
         "Positions that rotary axes are held at",
         kind="numbers",
         one="{} held at",
@@ -160,31 +128,31 @@ class RotaryLook:
         hint="Positions while the other rotary axis turns, separated by commas; empty for a few"
         " around the present one.",
     )
-    # a name of none of them (`picture.traces.name_trace`) lets the app choose
-    chosen: str = described(
-        "", "Trace", hint="The trace in colour, with its name; the others are faint."
-    )
-
-    def with_held(self, axis: str, positions: tuple[float, ...]) -> "RotaryLook":
-        """Hold an axis at other positions, degrees; none for those by default."""
-        rest = tuple((name, at) for name, at in self.held if name != axis)
-        return replace(self, held=(*rest, (axis, positions)) if positions else rest)
+    # the trace in colour; a name of none of them (`picture.traces.name_trace`) lets the app choose
+    chosen: str = described("", "Trace")
 
     def points_mm(self, scene: Scene) -> tuple[Vector, ...]:
         """List the points that are traced, mm in the workpiece frame."""
-        own = () if self.own_mm is None else (self.own_mm,)
-        return (
-            *(p for number, p in enumerate(scene.trace_points_mm) if number not in self.off),
-            *own,
-        )
+        found = [p for n, p in enumerate(scene.trace_points_mm) if str(n) not in self.off]
+        return (*found, *(() if self.own_mm is None else (self.own_mm,)))
 
 
-def trace_point_words(scene: Scene) -> dict[str, str]:
-    """Spell the trace points of a scene by their numbers."""
-    return {
-        str(number): "(" + ", ".join(f"{value:g}" for value in point) + ") mm"
-        for number, point in enumerate(scene.trace_points_mm)
-    }
+# --- Where the axes of a scene can stand, and where they do ---------------------------------------
+
+
+def position_spans(scene: Scene) -> dict[str, Span]:
+    """Give the ranges of the rotary axes that the volume is drawn at, degrees, by axis.
+
+    They are the travels, widened where the scene itself stands beyond. Rotary axes that span the
+    volume are not among them.
+    """
+    found: dict[str, Span] = {}
+    for name, axis in scene.machine.axes.items():
+        if not axis.is_linear and name not in scene.workspace.volume_axes:
+            low, high = axis.travel
+            at = scene.workspace.positions.get(name, low)
+            found[name] = Span(min(low, at), max(high, at), 1.0)
+    return found
 
 
 def slice_spans(scene: Scene) -> dict[str, Span]:
@@ -199,66 +167,28 @@ def linear_spans(scene: Scene) -> dict[str, Span]:
     These are the linear axes, and rotary ones that span the volume; travels, widened by the
     workspace.
     """
-    spanning = scene.workspace.volume_axes
     found: dict[str, Span] = {}
-    for name in scene.machine.axes:
-        if not is_linear(name) and name not in spanning:
-            continue
-        low, high = scene.machine.axes[name].travel
-        first, last = scene.workspace.ranges.get(name, (low, high))
-        found[name] = Span(min(low, first), max(high, last), 1.0)
+    for name, axis in scene.machine.axes.items():
+        if is_linear(name) or name in scene.workspace.volume_axes:
+            low, high = axis.travel
+            first, last = scene.workspace.ranges.get(name, (low, high))
+            found[name] = Span(min(low, first), max(high, last), 1.0)
     return found
 
 
 def linear_positions(scene: Scene, look: MachineLook) -> dict[str, float]:
     """Give where the linear axes of a scene stand, mm, always within their ranges."""
-    middle = scene.workspace.positions
-    return {
-        axis: span.clamp(look.linear_mm.get(axis, middle.get(axis, 0.0)), 0.0)
-        for axis, span in linear_spans(scene).items()
-    }
+    at = {**scene.workspace.positions, **look.linear_mm}
+    return {axis: span.clamp(at.get(axis, 0.0), 0.0) for axis, span in linear_spans(scene).items()}
 
 
 def slice_positions(scene: Scene, look: Look, machine: MachineLook) -> dict[str, float]:
     """Give where the slices of a scene lie, mm."""
-    chosen: Mapping[str, Any] = linear_positions(scene, machine) if look.follow else look.slices_mm
+    chosen = linear_positions(scene, machine) if look.follow else look.slices_mm
     return {
         axis: span.clamp(chosen.get(axis, (span.low + span.high) / 2.0), span.low)
         for axis, span in slice_spans(scene).items()
     }
-
-
-def quarters(scene: Scene, axis: str) -> tuple[float, ...]:
-    """List the quarter turns within the travel of a rotary axis, degrees; a full turn once."""
-    low, high = scene.machine.axes[axis].travel
-    high = min(high, low + 359.0)
-    first, last = math.ceil(low / 90.0), math.floor(high / 90.0)
-    return tuple(90.0 * number for number in range(first, last + 1))[:MOST_HELD]
-
-
-def parse_positions(text: str, span: Span) -> tuple[tuple[float, ...], str]:
-    """Read a list of positions that a user has typed."""
-    spaced = text[:MOST_TYPED].replace("−", "-").replace("°", " ").replace(",", " ")
-    words = [word for word in spaced.replace(";", " ").split() if word not in {"-", "+", "."}]
-    found: set[float] = set()
-    wrong: list[str] = []
-    for word in words:
-        try:
-            value = parse_number(word)
-        except ValueError:
-            value = math.nan
-        if math.isfinite(value) and span.low <= value <= span.high:
-            found.add(value)
-        else:
-            wrong.append(word[:20])
-    kept = tuple(sorted(found)[:MOST_HELD])
-    notes: list[str] = []
-    if wrong:
-        allowed = f"expected numbers from {span.low:g} to {span.high:g}"
-        notes.append(f"{', '.join(wrong[:4])} left out; {allowed}")
-    if len(found) > MOST_HELD:
-        notes.append(f"{len(found)} positions; the first {MOST_HELD} are taken")
-    return kept, "; ".join(notes)
 
 
 def default_held(
@@ -273,11 +203,10 @@ def default_held(
     for side in ("workpiece", "tool"):
         turning = [axis for axis in scene.machine.branch(side) if not axis.is_linear]
         if len(turning) > 1:
-            last = turning[-1]
+            *_, tilting, last = turning
             found[last.name] = (positions.get(last.name, 0.0),)
-            tilting = turning[-2]
             low, high = tilting.travel
             middle = positions.get(tilting.name, 0.0)
             beside = {middle - TILT_STEP_DEG, middle + TILT_STEP_DEG}
             found[tilting.name] = (*sorted({middle, *(at for at in beside if low <= at <= high)}),)
-    return {**found, **dict(rotary.held)}
+    return {**found, **rotary.held}

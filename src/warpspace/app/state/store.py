@@ -6,170 +6,138 @@ overwrites what somebody else has just done with an older state of the whole.
 
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import Any, Generic, TypeAlias, TypeVar, cast
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, fields, replace
+from typing import TypeAlias
 
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.leaf import Description, default_of, description, lowered, name_of
+from warpspace.app.state.leaf import description, lowered, name_of
+from warpspace.app.state.tree import leaves, stored
 
-# --- Undo and redo of any frozen state, as one frozen value itself --------------------------------
+# --- What differs between two states --------------------------------------------------------------
+
+
+def changes(old: AppState, new: AppState) -> dict[str, str]:
+    """Say in words what differs between two states, each by its path; page and forms do not."""
+    found: dict[str, str] = {}
+    for entry in fields(AppState):
+        before, after = getattr(old, entry.name), getattr(new, entry.name)
+        if not entry.compare or _equal(before, after):
+            continue
+        own = description(entry)
+        # what differs within a scene, say, has no name
+        inner = {} if own and not own.kind else dict(_leaf_changes(old, new, entry.name))
+        found |= inner or {entry.name: lowered(own.label) if own else entry.name}
+    one, other = old.scene, new.scene
+    if one.name == other.name and not (
+        _equal(one.machine, other.machine) and _equal(one.workspace, other.workspace)
+    ):
+        return {"scene": "machine"}
+    # what it is compared with has changed with it
+    return {"controller": found["controller"]} if "controller" in found else found
+
+
+def _leaf_changes(old: AppState, new: AppState, group: str) -> Iterator[tuple[str, str]]:
+    for path, leaf in leaves(new).items():
+        if path.partition(".")[0] != group:
+            continue
+        before, after = stored(old, path), stored(new, path)
+        if isinstance(before, frozenset) and isinstance(after, frozenset):
+            for name in sorted(before ^ after):
+                sign = "+" if name in after else "-"
+                yield f"{path}.{sign}{name}", lowered(leaf.one.format(name_of(name)))
+        elif not _equal(before, after):
+            yield path, lowered(leaf.label)
+
+
+def _equal(old: object, new: object) -> bool:
+    try:
+        return old is new or bool(old == new)
+    except ValueError:  # arrays
+        return False
+
+
+# --- Undo and redo, as one frozen value -----------------------------------------------------------
 # What a slider drag sends in quick succession becomes one step. The number of steps kept is
 # bounded.
-
-S = TypeVar("S")
 
 STEPS = 100  # steps that can be undone; the oldest are forgotten
 SAME_STEP_S = 0.8  # changes of one thing that follow each other faster than this are one step
 
 
 @dataclass(frozen=True, slots=True)
-class Step(Generic[S]):
-    """A state that can be gone back to, and what was changed after it."""
+class Step:
+    """A state that can be gone back to, and what was changed after it, as `changes` says it."""
 
-    state: S
-    what: str  # the change between this state and the next one, for instance "amplitudes.EAX"
+    state: AppState
+    what: Mapping[str, str]
+
+    @property
+    def words(self) -> str:
+        found = list(dict.fromkeys(self.what.values()))
+        if "scene" in self.what:  # its curves change with an error
+            errors = {said for path, said in self.what.items() if path.startswith("amplitudes.")}
+            found = list(errors) if len(errors) == 1 else [self.what["scene"]]
+        return found[0] if len(found) == 1 else f"{found[0]} and {len(found) - 1} more"
+
+
+def _on_page(state: AppState, other: AppState) -> AppState:
+    """Give a state page and forms of another one, which undo leaves as they are."""
+    if (state.page, state.forms) == (other.page, other.forms):
+        return state
+    return replace(state, page=other.page, forms=other.forms)
 
 
 @dataclass(frozen=True, slots=True)
-class History(Generic[S]):
+class History:
     """A present state with its past and, after undoing, its future."""
 
-    present: S
-    past: tuple[Step[S], ...] = ()  # latest last
-    future: tuple[Step[S], ...] = ()
+    present: AppState
+    past: tuple[Step, ...] = ()  # latest last
+    future: tuple[Step, ...] = ()
     changed_at: float = float("-inf")  # when the present was last changed, s
     limit: int = STEPS  # steps of the past that are kept
 
-    def push(self, state: S, at: float) -> "History[S]":
+    def push(self, state: AppState, at: float) -> "History":
         """Take in a new present state."""
-        what = describe_change(self.present, state)
+        what = changes(self.present, state)
         if not what:
-            kept = _with_choices(self.present, state)
-            return self if kept is self.present else replace(self, present=kept)
+            present = _on_page(self.present, state)
+            return self if present is self.present else replace(self, present=present)
         same = (
             bool(self.past)
             and not self.future
             and self.past[-1].what == what
+            and "scene" not in what
             and at - self.changed_at < SAME_STEP_S
         )
         past = self.past if same else (*self.past, Step(self.present, what))[-self.limit :]
         return replace(self, present=state, past=past, future=(), changed_at=at)
 
-    def undo(self) -> "History[S]":
+    def undo(self) -> "History":
         """Go back one step; the same one where there is none."""
         if not self.past:
             return self
         *past, last = self.past
         future = (*self.future, Step(self.present, last.what))
-        state = _with_choices(last.state, self.present)
-        return History(state, tuple(past), future, limit=self.limit)
+        return History(_on_page(last.state, self.present), tuple(past), future, limit=self.limit)
 
-    def redo(self) -> "History[S]":
+    def redo(self) -> "History":
         """Go forward again one step; the same one where there is none."""
         if not self.future:
             return self
         *future, coming = self.future
         past = (*self.past, Step(self.present, coming.what))
-        state = _with_choices(coming.state, self.present)
-        return History(state, past, tuple(future), limit=self.limit)
+        return History(_on_page(coming.state, self.present), past, tuple(future), limit=self.limit)
 
     @property
     def undoes(self) -> str:
-        """What undo would take back; empty where there is nothing."""
-        return self.past[-1].what if self.past else ""
+        """What undo would take back, in words; empty where there is nothing."""
+        return self.past[-1].words if self.past else ""
 
     @property
     def redoes(self) -> str:
-        """What redo would do again; empty where there is nothing."""
-        return self.future[-1].what if self.future else ""
-
-
-def _with_choices(state: S, other: S) -> S:
-    """Give a state those fields of another one that count in no comparison; undo leaves them."""
-    if not is_dataclass(state) or isinstance(state, type) or type(state) is not type(other):
-        return state
-    names = [field.name for field in fields(state) if not field.compare]
-    changes = {n: getattr(other, n) for n in names if getattr(other, n) != getattr(state, n)}
-    return cast("S", replace(state, **changes)) if changes else state
-
-
-def describe_change(old: object, new: object) -> str:
-    """Name the fields in which two values differ."""
-    return ", ".join(_differences(old, new))
-
-
-def _differences(old: object, new: object) -> list[str]:
-    if old is new:
-        return []
-    if is_dataclass(old) and type(old) is type(new) and type(old).__eq__ is not object.__eq__:
-        parts: list[tuple[str, Any, Any]] = [
-            (field.name, getattr(old, field.name), getattr(new, field.name))
-            for field in fields(old)
-            if field.compare
-        ]
-    elif isinstance(old, Mapping) and isinstance(new, Mapping):
-        before, after = cast("Mapping[str, Any]", old), cast("Mapping[str, Any]", new)
-        keys = dict.fromkeys((*before, *after))
-        parts = [(str(key), before.get(key), after.get(key)) for key in keys]
-    elif isinstance(old, frozenset) and isinstance(new, frozenset):
-        gone, come = cast("frozenset[Any]", old - new), cast("frozenset[Any]", new - old)
-        return [*sorted(f"-{item}" for item in gone), *sorted(f"+{item}" for item in come)]
-    else:
-        return [] if _equal(old, new) else [""]
-    return [
-        f"{name}.{rest}" if rest else name
-        for name, before, after in parts
-        if before is not after
-        for rest in _differences(before, after)
-    ]
-
-
-def _equal(old: object, new: object) -> bool:
-    try:
-        return bool(old == new)
-    except ValueError:
-        return False
-
-
-PARTS_OF_MACHINE = ("scene.model.machine", "scene.workspace")
-
-
-def change_words(what: str) -> str:
-    """Say in words what `describe_change` has found."""
-    paths = what.split(", ")
-    if "scene.name" not in paths and any(path.startswith(PARTS_OF_MACHINE) for path in paths):
-        return "machine"
-    if "controller" in paths:  # what it is compared with has changed with it
-        paths = ["controller"]
-    found = {path: _change(path.split(".")) for path in paths}
-    unique = list(dict.fromkeys(found.values()))
-    if "scene" in unique:
-        errors = {words for path, words in found.items() if path.startswith("amplitudes.")}
-        unique = list(errors) if len(errors) == 1 else ["scene"]
-    return unique[0] if len(unique) == 1 else f"{unique[0]} and {len(unique) - 1} more"
-
-
-def _change(parts: list[str]) -> str:
-    """Say which field has changed, by the words of the innermost that has any."""
-    kind: type | None = AppState
-    words: Description | None = None
-    inner = parts
-    for depth, part in enumerate(parts, start=1):
-        entry = next((e for e in fields(kind) if e.name == part), None) if kind else None
-        if entry is None:
-            break
-        start, own = default_of(entry), description(entry)
-        if own is not None:
-            words, inner = own, parts[depth:]
-        kind = type(start) if is_dataclass(start) and not (own and own.leaf.kind) else None
-    names = [part.lstrip("+-") for part in inner]
-    error = next((name_of(name) for name in names if name_of(name) != name), "")
-    if words is None:
-        return error or names[-1].replace("_", " ")
-    if names and (words.each is not None or words.one != "{}"):
-        return lowered(words.one.format(error or names[-1]))
-    return lowered(words.leaf.label)
+        return self.future[-1].words if self.future else ""
 
 
 Update: TypeAlias = Callable[[AppState], AppState]
@@ -180,48 +148,49 @@ class StateStore:
     """A state with its history that any number of sessions share."""
 
     def __init__(self, state: AppState) -> None:
-        self._history = History(state)
+        self.history = History(state)
         self._listeners: list[Listener] = []
         self._lock = threading.Lock()
 
     @property
-    def history(self) -> History[AppState]:
-        """The present state, its past and its future."""
-        return self._history
-
-    @property
     def state(self) -> AppState:
         """What is shown, or about to be."""
-        return self._history.present
+        return self.history.present
 
     def apply(
         self, update: Update, by: Listener | None = None, at: float | None = None
     ) -> tuple[str, ...]:
-        """Apply a pure update to the present state."""
+        """Apply a pure update to the present state; give what it had to clamp."""
         with self._lock:
-            before = self._history
+            before = self.history
             state = update(before.present)
-            notes = state.notes
-            self._history = before.push(
-                state.without_notes(), time.monotonic() if at is None else at
-            )
-            changed = self._history is not before
-        if changed:
+            now = time.monotonic() if at is None else at
+            self.history = before.push(state.without_notes(), now)
+        if self.history is not before:
             self._notify(by)
-        return notes
+        return state.notes
 
     def undo(self) -> str:
         """Take the latest change back; give what it was."""
-        return self._travel(lambda history: (history.undo(), history.undoes))
+        with self._lock:
+            what, self.history = self.history.undoes, self.history.undo()
+        return self._told(what)
 
     def redo(self) -> str:
         """Do again what was undone; give what it was."""
-        return self._travel(lambda history: (history.redo(), history.redoes))
+        with self._lock:
+            what, self.history = self.history.redoes, self.history.redo()
+        return self._told(what)
+
+    def _told(self, what: str) -> str:
+        if what:
+            self._notify(None)
+        return what
 
     def copy(self) -> "StateStore":
         """Give a store of its own with the same state and history."""
         store = StateStore(self.state)
-        store._history = self._history
+        store.history = self.history
         return store
 
     def subscribe(self, listener: Listener) -> None:
@@ -230,16 +199,8 @@ class StateStore:
             self._listeners.append(listener)
 
     def unsubscribe(self, listener: Listener) -> None:
-        """Call a callable no more."""
         with self._lock:
             self._listeners = [known for known in self._listeners if known != listener]
-
-    def _travel(self, move: Callable[[History[AppState]], tuple[History[AppState], str]]) -> str:
-        with self._lock:
-            self._history, what = move(self._history)
-        if what:
-            self._notify(None)
-        return what
 
     def _notify(self, by: Listener | None) -> None:
         with self._lock:

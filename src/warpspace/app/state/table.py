@@ -2,8 +2,7 @@
 
 from dataclasses import replace
 
-from warpspace.app.state.app_state import AppState
-from warpspace.app.state.comparison import Side
+from warpspace.app.state.app_state import AppState, Side
 
 WITHOUT = "Of the machine without the table of compensation, which the box is drawn with: {}."
 """Said wherever numbers are worked out from the errors, not taken from what is drawn."""
@@ -16,7 +15,7 @@ def table_words(state: AppState) -> str:
 
 def drawn_tables(state: AppState) -> tuple[str, ...]:
     """Name the tables of a state and of what it is compared with, each once."""
-    sides: tuple[Side[AppState] | None, ...] = (state.comparison.a, state.comparison.b)
+    sides: tuple[Side | None, ...] = (state.comparison.a, state.comparison.b)
     held = (state, *(side.state for side in sides if side is not None))
     found = [one.controller.label for one in held if one is not None and one.controller is not None]
     return tuple(dict.fromkeys(found))

@@ -1,6 +1,6 @@
 """The state as one tree of described values: what widgets, links, saved files and undo walk.
 
-A leaf is named by its path, ``look.surface`` or ``errors.EA0Z``. `put` takes whatever a browser
+A leaf is named by its path, ``look.surface`` or ``amplitudes.EA0Z``. `put` takes whatever a browser
 sends for it; `spell` gives the text that is read back to the same value.
 """
 
@@ -9,113 +9,60 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import Field, fields, is_dataclass, replace
 from enum import StrEnum
 from functools import lru_cache
-from operator import attrgetter
 from typing import Any, cast
 
 from warpspace.app.state import edits
-from warpspace.app.state.app_state import AppState
+from warpspace.app.state.app_state import AppState, Picked, start_state
 from warpspace.app.state.leaf import (
+    Identity,
     Leaf,
+    Span,
     Unreadable,
     default_of,
     description,
+    lowered,
     name_of,
-    spell_numbers,
-    words_of,
 )
-from warpspace.app.state.look import (
-    linear_positions,
-    linear_spans,
-    parse_positions,
-    slice_positions,
-)
-from warpspace.app.state.picked import Picked, read_trace, spell_trace
-from warpspace.app.state.specification import read_costs, spell_costs
-from warpspace.app.state.typed_numbers import read_typed, with_typed_point
-from warpspace.machine.axes import parameter
+from warpspace.app.state.look import linear_positions, linear_spans, slice_positions
+from warpspace.app.state.typed_numbers import read_costs, read_list, read_positions, read_typed
+from warpspace.kinematics.model import Loop
+from warpspace.machine.axes import axis_order, parameter
+from warpspace.machine.limits import MAX_HALF_WIDTH, MIN_HALF_WIDTH
 
 LONGEST = 4000  # characters that are read
 SHOWN = 40  # characters of a text that a note shows
 
 # --- The leaves of a state ------------------------------------------------------------------------
 
-DEPENDENCIES = {
-    "amplitudes": ("scene.model",),
-    "tolerances": ("tolerances", "origin.tolerances", "scene.model"),
-}
-"""What leaves of a field depend on, where they do not on what stands below."""
-OTHERS_DEPEND_ON = (
-    "scene.model",
-    "scene.workspace",
-    "scene.trace_points_mm",
-    "look.quantity",
-)
-ALL_DEPEND_ON = tuple(dict.fromkeys((*sum(DEPENDENCIES.values(), ()), *OTHERS_DEPEND_ON)))
-READ = {name: attrgetter(name) for name in ALL_DEPEND_ON}
-
-
-class _Known:
-    """A state as a key: equal as long as the parts that leaves depend on are the same objects."""
-
-    def __init__(self, state: AppState, names: tuple[str, ...]) -> None:
-        self.state = state
-        self.parts = tuple([READ[name](state) for name in names])
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Known) and all(
-            one is two or (isinstance(one, str) and one == two)
-            for one, two in zip(self.parts, other.parts, strict=True)
-        )
-
-    def __hash__(self) -> int:
-        return hash(tuple([part if isinstance(part, str) else id(part) for part in self.parts]))
-
 
 def leaves(state: AppState) -> Mapping[str, Leaf]:
     """Give the leaves of a state by their paths; the same object until what they say changes."""
-    return _leaves(_Known(state, ALL_DEPEND_ON))
+    return _leaves(Identity(state.scene), state.look.quantity)
 
 
 @lru_cache(maxsize=32)
-def _leaves(known: _Known) -> Mapping[str, Leaf]:
-    found: dict[str, Leaf] = {}
-    for entry in fields(AppState):
-        names = DEPENDENCIES.get(entry.name, OTHERS_DEPEND_ON)
-        found |= _group(_Known(known.state, names), entry.name)
-    return found
+def _leaves(scene: Identity, quantity: str) -> Mapping[str, Leaf]:
+    state = start_state(scene.thing)
+    state = replace(state, look=replace(state.look, quantity=quantity))
+    found = [leaf for entry in fields(AppState) for leaf in _described(state, entry)]
+    return {leaf.path: leaf for leaf in (*found, *_picked_leaves(state))}
 
 
-@lru_cache(maxsize=512)
-def _group(known: _Known, name: str) -> Mapping[str, Leaf]:
-    entry = next(entry for entry in fields(AppState) if entry.name == name)
-    found = _described(known.state, entry, "")
-    if name == "picked":
-        found = _picked_leaves(known.state)
-    return {leaf.path: leaf for leaf in found}
-
-
-def _described(state: AppState, entry: "Field[Any]", prefix: str) -> Iterator[Leaf]:
-    words, start = description(entry), default_of(entry)
-    path = prefix + (words.leaf.path if words and words.leaf.path else entry.name)
-    if words is None or not words.leaf.kind:
+def _described(state: AppState, entry: "Field[Any]", prefix: str = "") -> Iterator[Leaf]:
+    leaf, start, path = description(entry), default_of(entry), prefix + entry.name
+    if leaf is None or not leaf.kind:
         if is_dataclass(start) and not isinstance(start, type):
             for inner in fields(start):
                 yield from _described(state, inner, f"{path}.")
-    elif words.each is None:
-        choices = words.leaf.choices if words.choices is None else words.choices(state)
-        linked = words.leaf.linked.format(path=path)
-        yield replace(words.leaf, path=path, choices=choices, linked=linked)
+    elif leaf.each is None:
+        choices = leaf.choices if leaf.choose is None else leaf.choose(state)
+        yield replace(leaf, path=path, choices=choices, linked=leaf.linked.format(path=path))
     else:
-        for key, span in words.each(state).items():
+        for key, span in leaf.each(state).items():
             at = f"{path}.{key}"
-            yield replace(
-                words.leaf,
-                path=at,
-                label=words.one.format(name_of(key)),
-                span=edits.half_width_span(state, key) if path == "tolerances" else span,
-                unit=_unit(state, key),
-                linked=words.leaf.linked.format(path=at, key=key),
-            )
+            label, linked = leaf.one.format(name_of(key)), leaf.linked.format(path=at, key=key)
+            unit = _unit(state, key)
+            yield replace(leaf, path=at, label=label, span=span, unit=unit, linked=linked)
 
 
 def _unit(state: AppState, key: str) -> str:
@@ -124,14 +71,11 @@ def _unit(state: AppState, key: str) -> str:
 
 
 def _picked_leaves(state: AppState) -> Iterator[Leaf]:
-    hint = "Positions of the axes, for instance X 275 Y -225 Z -480; empty for no point."
-    yield Leaf("picked", "Point", "text", hint=hint)
+    yield Leaf("picked", "Point", "text")
     yield Leaf("picked.trace", "Trace of the point", "text", linked="why.trace")
     for axis, span in {**linear_spans(state.scene), **state.position_spans}.items():
-        linked, unit = f"why.{axis}", _unit(state, axis)
-        yield Leaf(
-            f"picked.at.{axis}", f"{axis} of the point", "number", {}, span, unit, linked=linked
-        )
+        path, label, unit = f"picked.at.{axis}", f"{axis} of the point", _unit(state, axis)
+        yield Leaf(path, label, "number", span=span, unit=unit, linked=f"why.{axis}")
 
 
 # --- Values, and how they are spelt ---------------------------------------------------------------
@@ -150,17 +94,15 @@ def value(state: AppState, path: str) -> Any:
 def stored(state: AppState, path: str) -> Any:
     """Give what a state holds at a path; None for an entry that was not set."""
     group, _, key = path.rpartition(".")
-    if group == "errors":
-        return state.amplitudes.get(key)
     if group == "tolerances":
         return edits.half_width_of(state, key)
     if path == "picked.trace":
         picked = state.picked
-        return None if picked is None or picked.point_mm is None else spell_trace(picked)
+        if picked is None or picked.point_mm is None:
+            return None
+        return f"{picked.loop},{_spell_numbers(picked.point_mm)}"
     found: Any = state
     for name in path.split("."):
-        if isinstance(found, tuple):  # pairs
-            return dict(cast("Any", found)).get(name, ())
         found = found.get(name) if isinstance(found, Mapping) else getattr(found, name, None)
     return found
 
@@ -179,10 +121,20 @@ def spell_value(leaf: Leaf, found: Any) -> str:
     if isinstance(found, bool):
         return "1" if found else "0"
     if isinstance(found, frozenset):
-        return ",".join(sorted(map(str, cast("frozenset[Any]", found))))
+        return ",".join(sorted(cast("frozenset[str]", found)))
     if isinstance(found, tuple):
-        return spell_numbers(cast("tuple[float, ...]", found))
+        return _spell_numbers(cast("tuple[float, ...]", found))
     return repr(found) if isinstance(found, float) else str(found)
+
+
+def _spell_numbers(numbers: Sequence[float]) -> str:
+    return ",".join(repr(float(number)) for number in numbers)
+
+
+def words_of(leaf: Leaf) -> str:
+    """Name a leaf within a sentence: an error by its key."""
+    group, _, key = leaf.path.rpartition(".")
+    return key if group == "amplitudes" else lowered(leaf.label)
 
 
 # --- What a browser sends -------------------------------------------------------------------------
@@ -192,12 +144,11 @@ def put(state: AppState, path: str, text: str) -> AppState:
     """Set a leaf to what somebody has typed, clicked or sent; notes say what was not taken."""
     leaf = leaves(state).get(path)
     if leaf is None:
-        return _noted(state, f"{path[:SHOWN]!r}: nothing on this page goes by this name")
+        return state.noted(f"{path[:SHOWN]!r}: nothing on this page goes by this name")
     try:
         state = set_leaf(state, leaf, text)
     except Unreadable as problem:
-        said = f"{words_of(leaf)} = {text[:SHOWN]!r}; {problem}, it stays as it was"
-        return _noted(state, said)
+        return state.noted(f"{words_of(leaf)} = {text[:SHOWN]!r}; {problem}, it stays as it was")
     after = AFTER.get(path) or AFTER.get(path.rpartition(".")[0])
     return state if after is None else after(state)
 
@@ -217,67 +168,89 @@ AFTER: Mapping[str, Callable[[AppState], AppState]] = {
 def set_leaf(state: AppState, leaf: Leaf, text: str) -> AppState:
     """Set a leaf to what a text says and to nothing else; raises `Unreadable`."""
     text = text[:LONGEST].encode("utf-8", "replace").decode()
-    group, _, key = leaf.path.rpartition(".")
-    own = OWN.get(leaf.path) or OWN.get(group)
+    own = OWN.get(leaf.path) or OWN.get(leaf.path.rpartition(".")[0])
     if own is not None:
-        return own(state, leaf, key, text)
+        return own(state, leaf, text)
     found, note = read_value(leaf, text, stored(state, leaf.path))
-    state = _with(state, leaf.path.split("."), found)
-    return _noted(state, note) if note else state
+    return _with(state, leaf.path.split("."), found).noted(note)
 
 
 def _with(thing: Any, names: Sequence[str], found: Any) -> Any:
     name, *rest = names
     if isinstance(thing, Mapping):
-        return {**thing, name: found}
+        entries = {**cast("Mapping[str, Any]", thing), name: found}
+        return {key: entry for key, entry in entries.items() if entry != ()}
     return replace(thing, **{name: _with(getattr(thing, name), rest, found) if rest else found})
 
 
 # --- Leaves that are set in a way of their own ----------------------------------------------------
 
 
-def _with_points_off(state: AppState, leaf: Leaf, _key: str, text: str) -> AppState:
-    kept, note = read_keys(leaf, text, frozenset(map(str, state.rotary.off)))
-    state = replace(state, rotary=replace(state.rotary, off=frozenset(map(int, kept))))
-    return _noted(state, note) if note else state
+def _with_half_width(state: AppState, leaf: Leaf, text: str) -> AppState:
+    """Set the half width of one tolerance, µm or µrad; its centre stays."""
+    key = leaf.path.rpartition(".")[2]
+    widest = max(MAX_HALF_WIDTH, edits.half_width_span(state, key).high)
+    kept, note = _number(replace(leaf, span=Span(0.0, widest, 0.1)), text)
+    kept = 0.0 if kept < MIN_HALF_WIDTH else kept
+    return edits.with_half_widths(state, {key: kept}).noted(note)
 
 
-def _with_held(state: AppState, leaf: Leaf, axis: str, text: str) -> AppState:
-    found, note = parse_positions(text, state.position_spans[axis])
-    state = replace(state, rotary=state.rotary.with_held(axis, found))
-    return _noted(state, f"{leaf.label}: {note}") if note else state
+def _with_costs(state: AppState, _leaf: Leaf, text: str) -> AppState:
+    costs = read_costs(text, state.amplitudes.keys())
+    found = ",".join(f"{key}={cost:g}" for key, cost in costs.items() if cost != 1.0)
+    return replace(state, specification=replace(state.specification, costs=found))
 
 
-def _with_costs(state: AppState, _leaf: Leaf, _key: str, text: str) -> AppState:
-    costs = spell_costs(read_costs(text, state.amplitudes.keys()))
-    return replace(state, specification=replace(state.specification, costs=costs))
+FARTHEST_MM = 1e5  # farthest point of a workpiece that a link may ask about
+EXAMPLE = "X 275 Y -225 Z -480"
 
 
-def _with_asked(state: AppState, leaf: Leaf, axis: str, text: str) -> AppState:
+def _with_point(state: AppState, _leaf: Leaf, text: str) -> AppState:
+    """Ask about a point of the surface by the positions of the axes; empty for none."""
+    if not text.strip():
+        return replace(state, picked=None, lever="")
+    typed, spans = read_positions(text), linear_spans(state.scene)
+    known = {*spans, *state.positions}
+    if typed is None or not typed.keys() <= known:
+        expected = f"expected positions of the axes {', '.join(sorted(known, key=axis_order))}"
+        raise Unreadable(f"{expected}, for instance {EXAMPLE}")
+    before = {} if state.picked is None else state.picked.at
+    middle = state.scene.workspace.positions
+    at = {axis: before.get(axis, middle.get(axis, 0.0)) for axis in spans}
+    state = replace(state, picked=Picked(at))
+    for axis, position in typed.items():
+        group = "picked.at" if axis in spans else "positions"
+        state = set_leaf(state, leaves(state)[f"{group}.{axis}"], repr(position))
+    return state
+
+
+def _with_trace(state: AppState, _leaf: Leaf, text: str) -> AppState:
+    """Ask about a point of a trace: its loop and its place; where the axes stand is to come."""
+    loop, _, rest = text.partition(",")
+    point = [read_typed(word) for word in rest.split(",")]
+    near = [at for at in point if at is not None and abs(at) <= FARTHEST_MM]
+    if loop not in [*Loop] or len(point) != 3 or len(near) != 3:
+        raise Unreadable("expected a loop and a traced point")
+    x, y, z = near
+    return replace(state, picked=Picked({}, Loop(loop), (x, y, z)))
+
+
+def _with_asked(state: AppState, leaf: Leaf, text: str) -> AppState:
     """Ask about a point, one axis position at a time, mm or degrees."""
-    picked = state.picked or Picked({})
+    picked, axis = state.picked or Picked({}), leaf.path.rpartition(".")[2]
     if axis in state.positions and picked.point_mm is None:
         raise Unreadable("expected a point of a trace")
-    at, note = clamped(leaf, number_of(leaf, text))
-    state = replace(state, picked=replace(picked, at={**picked.at, axis: at}))
-    return _noted(state, note) if note else state
+    at, note = _number(leaf, text)
+    return replace(state, picked=replace(picked, at={**picked.at, axis: at})).noted(note)
 
 
-OWN: Mapping[str, Callable[[AppState, Leaf, str, str], AppState]] = {
-    "errors": lambda s, leaf, key, text: s.with_amplitude(key, number_of(leaf, text)),
-    "positions": lambda s, leaf, key, text: s.with_position(key, number_of(leaf, text)),
-    "tolerances": lambda s, leaf, key, text: edits.with_half_width(s, key, number_of(leaf, text)),
-    "rotary.off": _with_points_off,
-    "rotary.held": _with_held,
+OWN: Mapping[str, Callable[[AppState, Leaf, str], AppState]] = {
+    "tolerances": _with_half_width,
     "specification.costs": _with_costs,
-    "picked": lambda s, _leaf, _key, text: with_typed_point(s, text),
-    "picked.trace": lambda s, _leaf, _key, text: replace(s, picked=read_trace(text)),
+    "picked": _with_point,
+    "picked.trace": _with_trace,
     "picked.at": _with_asked,
 }
-
-
-def _noted(state: AppState, note: str) -> AppState:
-    return replace(state, notes=(*state.notes, note))
 
 
 # --- One text that somebody typed or sent into the value of a leaf --------------------------------
@@ -290,54 +263,51 @@ SWITCHES = {"0": False, "1": True}
 
 def read_value(leaf: Leaf, text: str, old: Any) -> tuple[Any, str]:
     """Read a value, and what had to be said about it; raises `Unreadable`."""
-    if leaf.kind == "number":
-        if text.strip() in leaf.choices:
+    plain = text.strip()
+    match leaf.kind:
+        case "number" if plain in leaf.choices:
             return None, ""
-        given = number_of(leaf, text)
-        kept, note = clamped(leaf, given)
-        if isinstance(old, int) and leaf.span is not None:
-            low, step = leaf.span.low, leaf.span.step
-            return int(low + step * math.floor((kept - low) / step + 0.5)), note
-        return kept, note
-    if leaf.kind == "point":
-        return _read_point(leaf, text)
-    if leaf.kind == "switch":
-        if text.strip() not in SWITCHES:
-            raise Unreadable("expected 0 or 1")
-        return SWITCHES[text.strip()], ""
-    if leaf.kind == "choice":
-        check_choice(leaf, text)
-        return (type(old)(text) if isinstance(old, StrEnum) else text), ""
-    if leaf.kind in {"keys", "names"}:
-        return read_keys(leaf, text, old)
-    return text[: leaf.longest], ""
+        case "number":
+            kept, note = _number(leaf, text)
+            if isinstance(old, int) and leaf.span is not None:
+                low, step = leaf.span.low, leaf.span.step
+                return int(low + step * math.floor((kept - low) / step + 0.5)), note
+            return kept, note
+        case "numbers" if leaf.span is not None:
+            found, note = read_list(text, leaf.span)
+            return found, f"{leaf.label}: {note}" if note else ""
+        case "point":
+            return _read_point(leaf, text) if plain else (None, "")
+        case "switch":
+            if plain not in SWITCHES:
+                raise Unreadable("expected 0 or 1")
+            return SWITCHES[plain], ""
+        case "choice":
+            check_choice(leaf, text)
+            return (type(old)(text) if isinstance(old, StrEnum) else text), ""
+        case "keys" | "names":
+            return _read_keys(leaf, text, old)
+        case _:
+            return text[: leaf.longest], ""
 
 
-def number_of(leaf: Leaf, text: str) -> float:
-    """Read a number, with or without its unit."""
-    found = read_typed(text.strip().removeprefix("×"), leaf.unit)
-    if found is None:
+def _number(leaf: Leaf, text: str) -> tuple[float, str]:
+    """Read a number, with or without its unit, and bring it into the range of its leaf."""
+    given = read_typed(text.strip().removeprefix("×"), leaf.unit)
+    if given is None:
         raise Unreadable("expected a number")
-    return found
-
-
-def clamped(leaf: Leaf, given: float) -> tuple[float, str]:
-    """Bring a number into the range of its leaf, and say so."""
-    if leaf.span is None:
-        return given, ""
-    kept = leaf.span.clamp(given, given)
-    note = "" if kept == given else leaf.span.clamped_words(given, kept, words_of(leaf), leaf.unit)
-    return kept, note
+    kept = given if leaf.span is None else leaf.span.clamp(given, given)
+    if leaf.span is None or kept == given:
+        return kept, ""
+    return kept, leaf.span.clamped_words(given, kept, words_of(leaf), leaf.unit)
 
 
 def _read_point(leaf: Leaf, text: str) -> tuple[Any, str]:
-    if not text.strip():
-        return None, ""
     parts = text.replace(";", " ").split()
     parts = parts if len(parts) == 3 else text.split(",")
     if len(parts) != 3:
         raise Unreadable("expected three numbers")
-    found = [clamped(leaf, number_of(leaf, part.strip().rstrip(","))) for part in parts]
+    found = [_number(leaf, part.strip().rstrip(",")) for part in parts]
     return tuple(kept for kept, _ in found), "; ".join(filter(None, (note for _, note in found)))
 
 
@@ -347,7 +317,7 @@ def check_choice(leaf: Leaf, text: str) -> None:
         raise Unreadable(f"expected one of {', '.join(filter(None, leaf.choices))}"[:LONGEST_NOTE])
 
 
-def read_keys(leaf: Leaf, text: str, old: frozenset[str]) -> tuple[frozenset[str], str]:
+def _read_keys(leaf: Leaf, text: str, old: frozenset[str]) -> tuple[frozenset[str], str]:
     """Read a list of words in place of a set, or words with + or - that come to it or leave it."""
     words = [word.strip()[:LONGEST_NAME] for word in text.split(",") if word.strip()]
     unknown: list[str] = []

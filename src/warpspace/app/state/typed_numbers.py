@@ -1,16 +1,12 @@
-"""Numbers as people type and paste them: decimal commas, exponents, other signs, whole tables."""
+"""Numbers as people type and paste them: decimal commas, other signs, tables, points, lists."""
 
 import math
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Collection, Sequence
 
-from warpspace.app.state.app_state import AppState
-from warpspace.app.state.look import linear_spans
-from warpspace.app.state.picked import Picked
+from warpspace.app.state.leaf import MOST_TYPED, Span, Unreadable
 from warpspace.exceptions import OptionError
-from warpspace.machine.axes import axis_order
-from warpspace.machine.limits import MAX_TYPED_NUMBER
+from warpspace.machine.limits import COST, MAX_TYPED_NUMBER
 from warpspace.picture.words import IN_R
 
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)(e[+-]?\d+)?", re.IGNORECASE | re.ASCII)
@@ -85,70 +81,55 @@ def _numbers(number: int, line: str) -> tuple[float, ...]:
     return found
 
 
-# --- A point that somebody types as positions of the axes -----------------------------------------
+# --- Positions of axes, and costs of tolerances ---------------------------------------------------
 
-LONGEST = 200  # characters that are read
-EXAMPLE = "X 275 Y -225 Z -480"
 _POINT_NUMBER = r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:e[-+]?\d+)?"
 # a digit belongs to the name where a number follows apart: C1 30, C1=30, but C30
 _NAME = r"[a-z][0-9](?=\s*[=:]|\s+[-+.,0-9])|[a-z]"
 _PAIR = re.compile(rf"({_NAME})\s*[=:]?\s*({_POINT_NUMBER})\s*(?:mm|°|deg)?", re.IGNORECASE)
 _BETWEEN = re.compile(r"[\s,;·]*")
+MOST_HELD = 8  # positions that one axis can be held at while another one is turned
 
 
 def read_positions(text: str) -> dict[str, float] | None:
     """Read positions of axes in any of the ways in which they are spelt on the page."""
-    plain = text[:LONGEST].replace("\N{MINUS SIGN}", "-").partition(IN_R)[0].strip()
+    plain = text[:MOST_TYPED].translate(_SIGNS).partition(IN_R)[0].strip()
     plain = plain.removeprefix("--at").lstrip(" =").removeprefix("axes")
+    pairs = _PAIR.findall(plain)
+    found = {name.upper(): float(value.replace(",", ".")) for name, value in pairs}
+    whole = len(found) == len(pairs) and _BETWEEN.fullmatch(_PAIR.sub("", plain))
+    return found if found and whole and all(map(math.isfinite, found.values())) else None
+
+
+def read_list(text: str, span: Span) -> tuple[tuple[float, ...], str]:
+    """Read positions that an axis is held at, in any order; what is none is left out and named."""
+    wrong: list[str] = []
+    found: set[float] = set()
+    for word in filter(None, re.split(r"[\s,;°]+", text[:MOST_TYPED])):
+        at = read_typed(word)
+        if at is None or not span.low <= at <= span.high:
+            wrong.append(word[:20])
+        else:
+            found.add(at)
+    allowed = f"expected numbers from {span.low:g} to {span.high:g}"
+    notes = [f"{', '.join(wrong[:4])} left out; {allowed}"] if wrong else []
+    if len(found) > MOST_HELD:
+        notes.append(f"{len(found)} positions; the first {MOST_HELD} are taken")
+    return tuple(sorted(found)[:MOST_HELD]), "; ".join(notes)
+
+
+def read_costs(text: str, known: Collection[str]) -> dict[str, float]:
+    """Read costs: pairs like ``EA0Z=4`` or ``EA0Z 4``, with commas or new lines between."""
     found: dict[str, float] = {}
-    at = 0
-    while at < len(plain):
-        between = _BETWEEN.match(plain, at)
-        at = between.end() if between else at
-        if at == len(plain):
-            break
-        pair = _PAIR.match(plain, at)
-        if pair is None or pair[1].upper() in found:
-            return None
-        found[pair[1].upper()] = float(pair[2].replace(",", "."))
-        at = pair.end()
-    return found if found and all(map(math.isfinite, found.values())) else None
-
-
-def with_typed_point(state: AppState, text: str) -> AppState:
-    """Ask about the point that somebody has typed."""
-    if not text.strip():
-        return replace(state, picked=None, lever="")
-    typed = read_positions(text)
-    spans = linear_spans(state.scene)
-    known = {*spans, *state.position_spans}
-    if typed is None or not typed.keys() <= known:
-        expected = f"expected positions of the axes {', '.join(_in_order(known))}"
-        note = f"point {text.strip()[:40]!r}: {expected}, for instance {EXAMPLE}"
-        return replace(state, notes=(*state.notes, note))
-    for axis, value in typed.items():
-        if axis in state.positions:
-            state = state.with_position(axis, value)
-    at = {axis: _present(state, axis) for axis in spans}
-    notes = state.notes
-    for axis, span in spans.items():
-        if axis in typed:
-            at[axis] = span.clamp(typed[axis], at[axis])
-            if at[axis] != typed[axis]:
-                unit = state.scene.machine.axes[axis].unit
-                note = (
-                    f"{axis} = {typed[axis]:g} {unit} is outside the travel, {span.low:g} to"
-                    f" {span.high:g} {unit}; clamped to {at[axis]:g} {unit}"
-                )
-                notes = (*notes, note)
-    return replace(state, picked=Picked(at), notes=notes)
-
-
-def _in_order(axes: "set[str]") -> list[str]:
-    return sorted(axes, key=axis_order)
-
-
-def _present(state: AppState, axis: str) -> float:
-    """Give where a linear axis stands at the point asked about, mm; else the middle."""
-    picked: Mapping[str, float] = state.picked.at if state.picked is not None else {}
-    return picked.get(axis, state.scene.workspace.positions.get(axis, 0.0))
+    for part in filter(str.strip, re.split(r"[,;\n]", text)):
+        key, _, number = part.replace("=", " ").strip().partition(" ")
+        cost = read_typed(number)
+        shown = part.strip()[:30]
+        if cost is None:
+            raise Unreadable(f"{shown!r}: expected an error and a number, for instance EA0Z=4")
+        if key.upper() not in known:
+            raise Unreadable(f"{shown!r}: no parameter of this machine")
+        if not COST[0] <= cost <= COST[1]:
+            raise Unreadable(f"{shown!r}: expected {COST[0]:g} to {COST[1]:g}")
+        found[key.upper()] = cost
+    return found

@@ -19,12 +19,12 @@ from warpspace.app.browser.html import EMPTY, button, join, tag
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.browser.page import error_words
 from warpspace.app.documents.services import CancelledError
-from warpspace.app.evaluation.applying import with_applied, with_proposal
-from warpspace.app.evaluation.cache import Identity, taken_turn
+from warpspace.app.evaluation.cache import taken_turn
+from warpspace.app.evaluation.compare import with_applied, with_proposal
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.forms import read_form
+from warpspace.app.state.leaf import Identity
 from warpspace.app.tasks.cards import Card, Seen, make_cards
 from warpspace.app.tasks.charts import block_html
 from warpspace.app.tasks.context import Context
@@ -95,7 +95,7 @@ class AnalysisPart(Section):
 
     def scenes(self, state: AppState) -> Sequence[Scene]:
         """Give what it is asked of: the machine as it is drawn."""
-        return [active_scene(state)]
+        return [state.active_scene()]
 
     def ask(
         self,

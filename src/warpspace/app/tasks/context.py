@@ -18,8 +18,7 @@ from warpspace.app.browser.page import Page
 from warpspace.app.documents.scene_file import SceneList
 from warpspace.app.documents.services import Services
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.state.app_state import AppState
-from warpspace.app.state.picked import Picked
+from warpspace.app.state.app_state import AppState, Picked
 from warpspace.app.state.store import StateStore, Update
 from warpspace.app.viewport.camera import CameraMemory, TabCamera
 from warpspace.app.viewport.moving import MovingLayer

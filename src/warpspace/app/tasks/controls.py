@@ -22,11 +22,10 @@ from warpspace.app.browser.html import (
     tag,
     text_box,
 )
-from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
 from warpspace.app.evaluation.live_picture import Compared, LivePicture
-from warpspace.app.state.app_state import COMPONENT_NAMES, AppState
-from warpspace.app.state.comparison import NOBODY, PRESENT, SHOWN, Side
+from warpspace.app.state.app_state import COMPONENT_NAMES, NOBODY, PRESENT, SHOWN, AppState, Side
+from warpspace.app.state.leaf import Identity
 from warpspace.app.state.look import QUANTITIES, SURFACES, slice_positions
 from warpspace.app.state.tree import leaves, put, spell, value
 from warpspace.app.tasks.conventions import with_travel
@@ -114,8 +113,9 @@ class ControlsPart(Part):
             quantity, _, component = value.partition(".")
             if value == "limit":
                 quantity, component = "position", "norm"
-            look = replace(state.look, pass_fail=value == "limit").with_choice(quantity=quantity)
-            return put(replace(state, look=look), "component", component)
+            state = put(state, "look.pass_fail", str(int(value == "limit")))
+            state = put(state, "look.quantity", quantity)
+            return put(state, "component", component)
         if word == "machine" and value in MACHINES:
             machine = replace(state.machine, shown=value == "solid", ghost=value != "off")
             return replace(state, machine=machine)
@@ -233,7 +233,7 @@ class ComparePart(Part):
         a, b = (side, chosen.b or Side()) if word == "set.a" else (chosen.a, side)
         return with_sides(state, a, b)
 
-    def _side(self, state: AppState, title: str) -> Side[AppState] | None:
+    def _side(self, state: AppState, title: str) -> Side | None:
         if title == PRESENT:
             return Side()
         scene = self.context.scenes.get(title)
@@ -243,7 +243,7 @@ class ComparePart(Part):
         return replace(scene_side(scene), title=title)
 
 
-def _own_sides(state: AppState) -> dict[str, Side[AppState]]:
+def _own_sides(state: AppState) -> dict[str, Side]:
     chosen = state.comparison
     used = (chosen.pinned, chosen.a, chosen.b)
     return {side.title: side for side in used if side is not None and side.state is not None}

@@ -12,12 +12,9 @@ import numpy as np
 from markupsafe import Markup
 
 from warpspace.app.browser.html import EMPTY, button, field, fill, join, number, tag, text_box
-from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.resulting_scene import active_scene
-from warpspace.app.state.app_state import AppState
-from warpspace.app.state.picked import Picked
-from warpspace.app.state.ranges import Span
+from warpspace.app.state.app_state import AppState, Picked
+from warpspace.app.state.leaf import Identity, Span
 from warpspace.app.state.typed_numbers import read_typed
 from warpspace.app.tasks.parts import Section
 from warpspace.exceptions import OptionError
@@ -181,7 +178,7 @@ def effects_of(state: AppState) -> dict[str, Effect]:
 def _error(state: AppState) -> tuple[Array, Array]:
     workspace = state.scene.workspace.moved(state.positions)
     grid = build_grid(state.scene.model, workspace, state.nodes)
-    return grid.weights, evaluate_grid(active_scene(state), grid, state.view()).error_um
+    return grid.weights, evaluate_grid(state.active_scene(), grid, state.view()).error_um
 
 
 def _effect(weights: Array, change_um: Array) -> Effect:
@@ -363,7 +360,7 @@ def _row(words: object, effect: Effect | None) -> Markup:
 
 
 def _wrong(state: AppState) -> Markup:
-    scene = active_scene(state)
+    scene = state.active_scene()
     costs = convention_costs(scene, scene.view(state.loop), state.nodes)
     rows = [_row(words, costs.get(name)) for name, words in COSTS.items()]
     summary = tag("summary", "If the data were measured in another convention")

@@ -28,13 +28,12 @@ from warpspace.app.browser.html import (
     text_box,
     thousands,
 )
-from warpspace.app.evaluation.cache import Cache, Identity
-from warpspace.app.evaluation.resulting_scene import scene_of
+from warpspace.app.evaluation.cache import Cache
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, start_state
-from warpspace.app.state.specification import read_costs
+from warpspace.app.state.leaf import Identity
 from warpspace.app.state.tree import leaves, put, toggled
-from warpspace.app.state.typed_numbers import read_typed, spell_typed
+from warpspace.app.state.typed_numbers import read_costs, spell_typed
 from warpspace.app.tasks.analysis import AnalysisPart, Question
 from warpspace.app.tasks.cards import Card
 from warpspace.app.tasks.charts import histogram_html
@@ -85,7 +84,7 @@ class TolerancesPart(AnalysisPart):
 
     def scenes(self, state: AppState) -> Sequence[Scene]:
         """Give the machine with all its tolerances; errors do not matter."""
-        return [scene_of(state)]
+        return [state.resulting_scene()]
 
     def question(self, state: AppState) -> Question:
         """Depend on the machine, the tolerances and the limit."""
@@ -113,7 +112,7 @@ class TolerancesPart(AnalysisPart):
         def update(state: AppState) -> AppState:
             if self.question(state) != question:
                 note = "tolerances or limit were changed meanwhile: allocate again"
-                return replace(state, notes=(*state.notes, note))
+                return state.noted(note)
             return edits.with_half_widths(state, found.tolerances)
 
         self.context.post(update)
@@ -243,13 +242,8 @@ class TolerancesPart(AnalysisPart):
     def take(self, state: AppState, word: str, value: str) -> AppState:
         """Set, fix, scale or allocate tolerances."""
         what, _, key = word.partition(".")
-        if what == "width" and key in state.amplitudes:
-            typed = read_typed(value, parameter(key).unit)
-            if typed is None:
-                words = f"{key}: “{value[:40]}”; it stays as it was"
-                self.context.notify("Not a number", words, "warning")
-                return state
-            return edits.with_half_width(state, key, typed)
+        if what == "width":
+            return put(state, f"tolerances.{key}", value)
         if what == "specification":
             return put(state, word, value)
         if word == "fix":
@@ -289,7 +283,7 @@ def sample_machines(state: AppState) -> "Ensemble":
     from warpspace.analysis.allocating import build_ensemble
     from warpspace.analysis.distribution import Distribution, Draws, loop_keys
 
-    scene, wanted = scene_of(state), state.specification
+    scene, wanted = state.resulting_scene(), state.specification
     keys = loop_keys(scene.model, state.loop, scene.parameter_keys)
     none = np.zeros(len(keys))
     draws = Draws(keys, none, none, Distribution(wanted.distribution))
@@ -344,7 +338,7 @@ class ConceptsPart(AnalysisPart):
         """Give title and scene of each machine that can be compared, by what its choice sends."""
         from warpspace.app.evaluation.machine_edits import library
 
-        found = {PRESENT: (f"{state.scene.title} (as it stands)", scene_of(state))}
+        found = {PRESENT: (f"{state.scene.title} (as it stands)", state.resulting_scene())}
         scenes = [(one.machine.title, one) for one in library().values()]
         for title, scene in (*scenes, *self.context.scenes.items()):
             if not any(scene is other or scene == other for _, other in found.values()):

@@ -94,7 +94,7 @@ Said = tuple[str, str, bool]
 
 def curve_html(state: AppState, key: str, said: Said | None) -> Markup:
     """Give chart, origin and editor of an error."""
-    row, function = parameter(key), edits.curve_of(state, key)
+    row, function = parameter(key), state.curve(key)
     only, excluded = key in state.exclusions.only, key in state.exclusions.excluded
     own, edited = origin_words(state, key)
     back = button("Undo the edit", f"errors:own.{key}", kind="link",
@@ -134,7 +134,7 @@ def _editor(row: Parameter, function: ErrorFunction, told: Said) -> Markup:
 
 def edit_curve(state: AppState, what: str, key: str, value: str) -> tuple[AppState, Said | None]:
     """Change kind or numbers of a curve, or go back to the scene's; say what there is to say."""
-    span, present = edits.axis_span(state, key), edits.curve_of(state, key)
+    span, present = state.axis_span(key), state.curve(key)
     said: Said | None = None
     try:
         if what == "rows":
@@ -165,14 +165,14 @@ def origin_words(state: AppState, key: str) -> tuple[str, bool]:
         words = "assumed: given without readings"
     if uncertainty is not None:
         words += f"; u = {spell(abs(uncertainty.amplitude))} {parameter(key).unit} (k = 1)"
-    before = own or Constant(edits.axis_span(state, key))
-    edited = edits.curve_of(state, key) != before
+    before = own or Constant(state.axis_span(key))
+    edited = state.curve(key) != before
     return (f"edited; before: {words} " if edited else words), edited
 
 
 def _chart(state: AppState, row: Parameter, function: ErrorFunction) -> Markup:
     unit = state.scene.machine.axes[row.axis].unit
-    at, value = sample_curve(function, edits.axis_span(state, row.key))
+    at, value = sample_curve(function, state.axis_span(row.key))
     curves = [Curve("", at, value)]
     if function.has_directions or len(function.lines) > 1:
         styles = ("thin", "dashed")

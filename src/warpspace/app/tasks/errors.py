@@ -11,11 +11,10 @@ import numpy as np
 from markupsafe import Markup
 
 from warpspace.app.browser.html import EMPTY, button, fill, join, number, slider, tag, text_box
-from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.ranges import Span, amplitude_span
+from warpspace.app.state.edits import amplitude_span
+from warpspace.app.state.leaf import Identity, Span
 from warpspace.app.state.tree import put
 from warpspace.app.state.typed_numbers import spell_typed
 from warpspace.app.tasks.context import Context
@@ -147,7 +146,7 @@ class ErrorsPart(Part):
                 continue
             self._made[key] = made
             row, share = parameter(key), min(effect / self._largest, 1.0)
-            hint = edits.curve_of(state, key).slider_words(row.axis)
+            hint = state.curve(key).slider_words(row.axis)
             pieces[f"error.{key}"] = _row(row, value, span, effect, share, hint, active=active)
             if opened:
                 pieces[f"error.{key}"] += self._curve(state, key)
@@ -165,7 +164,7 @@ class ErrorsPart(Part):
         if what in ("set", "kind", "rows", "own") and key in state.amplitudes:
             self._own.add(key)
             if what == "set":
-                return put(state, f"errors.{key}", value)
+                return put(state, f"amplitudes.{key}", value)
             state, said = edit_curve(state, what, key, value)
             self._said = {**self._said, key: said}
             return state

@@ -27,8 +27,7 @@ from warpspace.app.documents.files import (
 from warpspace.app.documents.services import CancelledError
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.state.app_state import AppState
-from warpspace.app.state.comparison import Comparison
+from warpspace.app.state.app_state import AppState, Comparison
 from warpspace.app.state.table import drawn_tables, without_table
 from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.jobs import Job, Jobs

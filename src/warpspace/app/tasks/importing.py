@@ -23,10 +23,8 @@ from warpspace.app.browser.html import (
     text_box,
 )
 from warpspace.app.documents.files import safe_file_name
-from warpspace.app.evaluation.applying import applied, with_applied
-from warpspace.app.evaluation.compare import plain_state
+from warpspace.app.evaluation.compare import applied, plain_state, with_applied
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.resulting_scene import scene_of
 from warpspace.app.state.app_state import AppState
 from warpspace.app.tasks.charts import lines_html
 from warpspace.app.tasks.context import Context
@@ -203,7 +201,7 @@ class ImportWindow(Window):
             raise
 
     def _base(self) -> Scene:
-        return scene_of(self.context.state)
+        return self.context.state.resulting_scene()
 
     def _read(self, sources: Sequence[Source]) -> Offer:
         if self._offer is not None and len(sources) > 1:

@@ -1,5 +1,6 @@
 """The task Machine: where the axes stand, and how points run while a rotary axis turns."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -10,11 +11,10 @@ from warpspace.analysis.blocks import Column, Table
 from warpspace.app.browser.html import button, choice, field, fill, join, switch, tag
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import HERE, standing
-from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.evaluation.rotation import chosen_trace, played_axis
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.look import linear_spans, quarters
-from warpspace.app.state.tree import leaves, toggled
+from warpspace.app.state.look import linear_spans
+from warpspace.app.state.tree import leaves, put, toggled
 from warpspace.app.tasks.charts import block_html
 from warpspace.app.tasks.controls import setting
 from warpspace.app.tasks.parts import Section
@@ -109,11 +109,13 @@ class RotarySection(Section):
         if what == "point" and index.isdecimal() and int(index) < len(state.scene.trace_points_mm):
             return toggled(state, "rotary.off", str(int(index)))
         if word == "quarters" and axis is not None:
-            held = state.rotary.with_held(axis, quarters(state.scene, axis))
-            return replace(state, rotary=held)
+            low, high = state.scene.machine.axes[axis].travel
+            high = min(high, low + 359.0)  # a full turn once
+            turns = range(math.ceil(low / 90.0), math.floor(high / 90.0) + 1)
+            return put(state, f"rotary.held.{axis}", ",".join(str(90 * turn) for turn in turns))
         if word == "stand":
             for turned, at in (HERE if stage is None else stage.position).items():
-                state = state.with_position(turned, float(round(at)))
+                state = put(state, f"positions.{turned}", str(round(at)))
         if word in ("play", "stop") and stage is not None:
             on = None if word == "stop" else not stage.playing
             self.context.act(lambda: stage.play(on))
@@ -162,7 +164,7 @@ def motion_of(picture: LivePicture, line: TraceLine) -> AxisMotion | None:
 
 def _of_state(state: AppState, line: TraceLine) -> AxisMotion | None:
     points = (line.trace.point_mm,)
-    return evaluate_axis_motion(replace(active_scene(state), trace_points_mm=points), line)
+    return evaluate_axis_motion(replace(state.active_scene(), trace_points_mm=points), line)
 
 
 def _motion(motion: AxisMotion, name: str) -> Markup:
@@ -179,7 +181,7 @@ def _motion(motion: AxisMotion, name: str) -> Markup:
 def _points(state: AppState) -> Markup:
     parts: list[Markup] = []
     for index, words in leaves(state)["rotary.off"].choices.items():
-        on = int(index) not in state.rotary.off
+        on = index not in state.rotary.off
         parts.append(switch(f"rotary:point.{index}", f"Trace {words}", on=on))
     parts.append(setting(state, "rotary.own_mm"))
     if len(state.positions) > 1:

@@ -30,7 +30,6 @@ from warpspace.app.browser.page import error_words
 from warpspace.app.documents.files import read_upload, upload_text
 from warpspace.app.evaluation.bench import chosen_test, plan_test
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.forms import TEST, read_form, with_form
@@ -335,7 +334,7 @@ class CalibratePart(FilesPart):
         return state
 
     def received(self, name: str, text: str) -> None:
-        scene, kind = active_scene(self.context.state), self._kind_of_next or None
+        scene, kind = self.context.state.active_scene(), self._kind_of_next or None
         self._files = (*self._files, take_file(scene, text, name, kind, self._files))
 
     # --- arrows ----------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ from markupsafe import Markup
 
 from warpspace.app.browser.html import join, tag
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.state.page_look import TASKS
+from warpspace.app.state.app_state import TASKS
 from warpspace.app.tasks.parts import Part
 
 RARE = frozenset({"volume", "gains", "line", "reach", "certify", "convert", "contributions"})

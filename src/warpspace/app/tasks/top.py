@@ -10,9 +10,7 @@ from markupsafe import Markup
 
 from warpspace.app.browser.html import EMPTY, button, join, rows, tag, text_box, upload_button
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.state.app_state import AppState
-from warpspace.app.state.ranges import Exclusions
-from warpspace.app.state.store import change_words
+from warpspace.app.state.app_state import AppState, Exclusions
 from warpspace.app.state.tree import put, toggled
 from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.files import accepted_endings
@@ -41,7 +39,7 @@ class TopPart(Part):
         history = self.context.store.history
         travel = (
             button(sign, f"page:{word.lower()}", kind="quiet", aria_label=word, data_key=word,
-                   hint=f"{word}: {change_words(what)} ({keys})")
+                   hint=f"{word}: {what} ({keys})")
             for word, sign, what, keys in (("Undo", "↶", history.undoes, "Ctrl+Z"),
                                            ("Redo", "↷", history.redoes, "Ctrl+Shift+Z")) if what
         )  # fmt: skip
@@ -255,5 +253,5 @@ class PagePart(Part):
 
     def _travel(self, done: str, travel: Callable[[], str]) -> None:
         what = travel()
-        words = f"{done}: {change_words(what)}" if what else f"Nothing to be {done.lower()}"
+        words = f"{done}: {what}" if what else f"Nothing to be {done.lower()}"
         self.context.notify(words)

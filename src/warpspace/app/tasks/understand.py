@@ -23,9 +23,8 @@ from warpspace.app.browser.html import (
 )
 from warpspace.app.evaluation.budget import Answer, answer, pick_worst, with_lever, with_picked
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.resulting_scene import active_scene
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.typed_numbers import EXAMPLE, with_typed_point
+from warpspace.app.state.tree import EXAMPLE, put
 from warpspace.app.tasks.analysis import AnalysisPart, details_html
 from warpspace.app.tasks.parts import Section
 from warpspace.app.viewport.camera import fit_camera
@@ -89,7 +88,7 @@ class WorstPart(Section):
     def take(self, state: AppState, word: str, value: str) -> AppState:
         """Ask about another point, draw a lever, or look at all of it."""
         if word == "set.at":
-            return with_typed_point(state, value)
+            return put(state, "picked", value)
         if word == "forget":
             return with_picked(state, None)
         if word == "lever" and value in state.amplitudes:
@@ -222,7 +221,7 @@ class VolumePart(Section):
         ]  # fmt: skip
         if not picture.is_difference:
             # the picture has it only where it is coloured
-            errors = evaluate_grid(active_scene(state), picture.grid, picture.view)
+            errors = evaluate_grid(state.active_scene(), picture.grid, picture.view)
             tilt = np.linalg.norm(errors.orientation_urad, axis=-1).reshape(picture.shape)
             lines += [
                 ("tilt, mean", f"{number(float(np.sum(weights * tilt)))} µrad"),

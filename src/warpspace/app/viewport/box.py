@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from viser import SceneApi
 
 from warpspace.app.browser.page import Page
-from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.state.leaf import Identity
 from warpspace.app.viewport.colours import (
     Rgb,
     colour_levels,

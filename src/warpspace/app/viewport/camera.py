@@ -7,10 +7,10 @@ import numpy as np
 from viser import ClientHandle
 
 from warpspace.app.browser.room import Room, first_room
-from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import drawn_bodies
 from warpspace.app.state.app_state import AppState
+from warpspace.app.state.leaf import Identity
 from warpspace.app.viewport.labels import axes_room_mm
 from warpspace.app.viewport.shapes import SCENE_PER_MM
 from warpspace.picture import model

@@ -10,10 +10,10 @@ from functools import lru_cache
 import numpy as np
 
 from warpspace.app.evaluation.budget import answer
-from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import tool_point
 from warpspace.app.evaluation.rotation import chosen_trace
+from warpspace.app.state.leaf import Identity
 from warpspace.field.grid import Grid
 from warpspace.geometry.colour import tick_values
 from warpspace.geometry.surfaces import corners, is_thin
