@@ -59,7 +59,8 @@ class ErrorsPart(Part):
         self._spans: dict[str, Span] = {}
         self._more: tuple[object, Markup] = (None, EMPTY)
         self._listed: object = None  # what the list was written for
-        self._made: dict[str, tuple[object, ...]] = {}  # what the rows were written for
+        self._made: Mapping[str, float] = {}  # amplitudes that the rows were written with
+        self._made_for: tuple[object, ...] = ()
 
     def depends(self, picture: LivePicture) -> tuple[object, ...]:
         state = picture.state
@@ -135,17 +136,18 @@ class ErrorsPart(Part):
 
     def _rows(self, state: AppState) -> dict[str, str]:
         pieces: dict[str, str] = {}
+        made_for = (Identity(state.scene), self._gains_for, Identity(self._spans), state.exclusions,
+                    state.page.row)  # fmt: skip
+        made = self._made if made_for == self._made_for else {}
+        self._made, self._made_for = state.amplitudes, made_for
         for key in self._order:
-            value, span = state.amplitudes[key], self._spans[key]
+            value, span, opened = state.amplitudes[key], self._spans[key], key == state.page.row
+            if value == made.get(key) and not opened:
+                continue
             if abs(value) > span.high:  # typed
                 span = self._spans[key] = amplitude_span(key, value, None)
-            effect, opened = self._effect(state, key), key == state.page.row
-            active = state.exclusions.active(key)
-            made = (value, span, effect, self._largest, active, opened, Identity(state.scene))
-            if made == self._made.get(key) and not opened:
-                continue
-            self._made[key] = made
-            row, share = parameter(key), min(effect / self._largest, 1.0)
+            effect, row = self._effect(state, key), parameter(key)
+            share, active = min(effect / self._largest, 1.0), state.exclusions.active(key)
             hint = state.curve(key).slider_words(row.axis)
             pieces[f"error.{key}"] = _row(row, value, span, effect, share, hint, active=active)
             if opened:

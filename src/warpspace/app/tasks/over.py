@@ -16,6 +16,7 @@ from warpspace.app.documents.legend import (
     place_words,
     subject_words,
 )
+from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.tasks.context import Context
@@ -107,7 +108,7 @@ def _facts(picture: LivePicture) -> dict[str, Any]:
     isolines = look.isolines and look.surface != "grid"
     bounds = [one.grid.bounds_mm for one in picture.slices]
     return {
-        "axes": list(map(_word, axis_labels(picture))),
+        "axes": _words(Identity(axis_labels(picture))),
         "triad": [
             {"name": name if name and is_linear(name) else "xyz"[k],
              "way": [float(k == i) * float(grid.ways[k]) for i in range(3)]}
@@ -136,6 +137,12 @@ def _facts(picture: LivePicture) -> dict[str, Any]:
 
 def _scene(point_mm: Array) -> list[float]:
     return [round(float(value) * SCENE_PER_MM, 4) for value in point_mm]
+
+
+@lru_cache(maxsize=32)
+def _words(labels: Identity) -> list[dict[str, Any]]:
+    """Spell labels that stay the same from picture to picture."""
+    return list(map(_word, labels.thing))
 
 
 def _word(label: Label) -> dict[str, Any]:

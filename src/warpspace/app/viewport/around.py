@@ -1,12 +1,14 @@
 """What is drawn on and around the box: axes, traces, paths, arrows, markers."""
 
+from functools import lru_cache
+
 import numpy as np
 
 from warpspace.app.evaluation.budget import answer
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.rotation import chosen_trace, points_on_traces
-from warpspace.app.viewport.colours import palette
-from warpspace.app.viewport.labels import TICK, axes, axis_labels, point_labels
+from warpspace.app.viewport.colours import Rgb, palette
+from warpspace.app.viewport.labels import TICK, Axis, axes, axis_labels, point_labels
 from warpspace.app.viewport.shapes import (
     SCENE_PER_MM,
     Shape,
@@ -50,10 +52,15 @@ def around(picture: LivePicture) -> Shapes:
 def _axes(picture: LivePicture) -> Shapes:
     if not picture.state.shown.axes or picture.state.machine.shown:
         return {}
-    tick, found = TICK * picture.size_mm, axes(picture)
-    pieces = [axis.ends_mm for axis in found]
-    pieces += [np.stack([at, at + tick * axis.out]) for axis in found for _, at in axis.ticks]
-    return {"/axes/lines": lines(np.stack(pieces), palette(picture).axis, 1.2)}
+    colour = palette(picture).axis
+    return {"/axes/lines": _axis_lines(axes(picture), TICK * picture.size_mm, colour)}
+
+
+@lru_cache(maxsize=32)
+def _axis_lines(of: tuple[Axis, ...], tick: float, rgb: Rgb) -> Shape | None:
+    pieces = [axis.ends_mm for axis in of]
+    pieces += [np.stack([at, at + tick * axis.out]) for axis in of for _, at in axis.ticks]
+    return lines(np.stack(pieces), rgb, 1.2)
 
 
 def _traces(picture: LivePicture) -> Shapes:

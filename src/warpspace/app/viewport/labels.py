@@ -39,7 +39,7 @@ class Label:
     axis: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Axis:
     """An axis beside the nominal box, numbered in positions of the machine's axis along it."""
 
@@ -100,9 +100,13 @@ def axis_labels(picture: LivePicture) -> list[Label]:
     state = picture.state
     if not state.shown.axes or state.machine.shown:  # their numbers would cover the machine
         return []
-    tick = TICK * picture.size_mm
+    return _axis_labels(axes(picture), TICK * picture.size_mm)
+
+
+@lru_cache(maxsize=32)
+def _axis_labels(of: tuple[Axis, ...], tick: float) -> list[Label]:
     found: list[Label] = []
-    for k, axis in enumerate(axes(picture)):
+    for k, axis in enumerate(of):
         found += [Label(text, at + tick * axis.out, "tick", at, k) for text, at in axis.ticks]
         middle = axis.ends_mm.mean(axis=0)
         found.append(Label(f"{axis.name} [mm]", middle + tick * axis.out, "axis", middle, k))
