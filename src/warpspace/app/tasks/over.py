@@ -16,9 +16,9 @@ from warpspace.app.documents.legend import (
     place_words,
     subject_words,
 )
-from warpspace.app.evaluation.cache import Identity
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
+from warpspace.app.state.leaf import Identity
 from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.parts import Part
 from warpspace.app.viewport.labels import Label, axis_labels, point_labels
