@@ -4,31 +4,31 @@ The changed machine lives in the state's scene; `AppState.origin` keeps the scen
 belongs to axes that stay is kept.
 """
 
+import tomllib
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from functools import cache
 from typing import Any, TypeVar
 
 import numpy as np
+import tomli_w
 
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import position_spans
 from warpspace.app.state.typed_numbers import read_typed
 from warpspace.exceptions import OptionError, UnknownNameError, WarpspaceError
-from warpspace.field.grid import Workspace, find_volume_axes
-from warpspace.machine.axes import direction_index, is_linear, parameter
+from warpspace.field.grid import find_volume_axes
+from warpspace.machine.axes import PARAMETERS, direction_index, is_linear, parameter
 from warpspace.machine.curves.curve import OWN, ErrorFunction
 from warpspace.machine.description import (
     ACROSS,
-    BODY_FRAMES,
     FIXED_FRAMES,
     ORIGIN,
     BodySource,
     Chain,
     Gantry,
     Machine,
-    build_machine,
     default_across,
     parse_chain,
 )
@@ -40,32 +40,31 @@ from warpspace.scene.save import scene_to_toml
 from warpspace.scene.starter import starter_scene
 from warpspace.units import MICROMETRE
 
-# --- A machine as tables: what one word of the editor changes is an entry of one of them ----------
+# --- A scene changed as its file: one entry, or all that says what the machine is -----------------
 
 Tables = dict[str, dict[str, Any]]
 T = TypeVar("T")
+KEYS = {"offset": "offset_mm", "rotation": "rotation_deg", "travel": "travel"}
 UNITS = {"offset": "mm", "rotation": "°", "span": "mm", "travel": "", "volume": ""}
 """Tables of numbers; without a unit it is that of the axis."""
-NOUNS = {"span": "gantry", "across": "gantry", "mesh": "body"}
+NOUNS = {"span": "gantry", "mesh": "body"}
 START_SPAN_MM = 1000.0  # of guides where no travel across says how far apart they are
 MOST_CHAIN_TEXT = 101  # characters of a chain that are read: one more than in a file
 FRAME = "F"
+SHOWN = 30  # characters of what was typed that a message repeats
 
 
 def tables_of(scene: Scene) -> Tables:
     """Give all that can be changed frame by frame."""
     machine, fixed = scene.machine, dict.fromkeys(FIXED_FRAMES, ORIGIN)
-    axes = machine.axes.values()
+    offset = {name: axis.offset_mm for name, axis in machine.axes.items()}
+    rotation = {name: axis.rotation_deg for name, axis in machine.axes.items()}
     return {
-        "offset": {axis.name: axis.offset_mm for axis in axes} | fixed | dict(machine.fixed_mm),
-        "rotation": {axis.name: axis.rotation_deg for axis in axes}
-        | fixed
-        | dict(machine.fixed_deg),
-        "travel": {axis.name: axis.travel for axis in axes},
+        "offset": {**offset, **fixed, **machine.fixed_mm},
+        "rotation": {**rotation, **fixed, **machine.fixed_deg},
+        "travel": {name: axis.travel for name, axis in machine.axes.items()},
         "volume": dict(scene.workspace.ranges),
-        "turn": {axis.name: axis.direction for axis in axes},
         "span": {name: (gantry.span_mm,) for name, gantry in machine.gantries.items()},
-        "across": {name: gantry.across for name, gantry in machine.gantries.items()},
         "mesh": own_bodies(machine),
     }
 
@@ -82,35 +81,47 @@ def edited(scene: Scene, word: str) -> tuple[Scene, tuple[str, ...]]:
     A word that is none changes nothing; what a file could not hold is refused.
     """
     what, _, rest = word.partition(" ")
-    tables, chain = tables_of(scene), scene.machine.chain
+    tables, raw, machine = tables_of(scene), _document(scene), scene.machine
+    guides, bodies = raw["machine"].setdefault("gantry", {}), dict(machine.bodies)
     match what, rest.split(" ", maxsplit=2):
         case "chain", _:
-            chain = parse_chain(rest[:MOST_CHAIN_TEXT])
+            _rearrange(raw, scene, parse_chain(rest[:MOST_CHAIN_TEXT]))
         case "left" | "right" | "side" | "remove", [axis]:
-            chain = _moved(scene.machine, what, axis)
+            _rearrange(raw, scene, _moved(machine, what, axis))
         case "turn", [axis]:
-            tables[what][axis] = -_entry(tables, what, axis)
+            _put(raw, "direction", axis, -machine.axis(axis).direction)
         case "gantry", [axis]:
-            _switch_guides(scene.machine, tables, axis)
+            if guides.pop(axis, None) is None:
+                across = default_across(machine.axis(axis).name)
+                others = [one for one in machine.axes.values() if one.is_linear]
+                spans = [
+                    one.travel[1] - one.travel[0] for one in others if ACROSS[one.index] == across
+                ]
+                guides[axis] = {"span_mm": max(spans, default=START_SPAN_MM), "across": across}
         case "across", [axis]:
-            taken = (_entry(tables, what, axis), ACROSS[direction_index(axis)])
-            tables[what][axis] = next(name for name in ACROSS if name not in taken)
+            _entry(tables, "span", axis)
+            taken = (guides[axis]["across"], ACROSS[direction_index(axis)])
+            guides[axis]["across"] = next(name for name in ACROSS if name not in taken)
         case "mesh", [frame]:
             _entry(tables, what, frame)
-            del tables[what][frame]
+            del bodies[frame]
         case "sizes", [""]:
-            return _with_machine(scene, starter_scene(chain))
+            return _with_machine(scene, starter_scene(machine.chain))
         case _, [frame, ("0" | "1" | "2") as index, typed] if what in UNITS:
             row = list(_entry(tables, what, frame))
             if int(index) >= len(row):
                 raise OptionError(f"{what} of {frame} has {len(row)} numbers")
-            unit = UNITS[what] or scene.machine.axes[frame].unit
+            unit = UNITS[what] or machine.axes[frame].unit
             row[int(index)] = read_number(f"{what} of {frame}", typed, unit)
-            tables[what][frame] = tuple(row)
+            if what == "span":
+                guides[frame]["span_mm"] = row[0]
+            elif what == "volume":
+                raw["workspace"][frame] = row[0] if row[0] == row[-1] else row
+            else:
+                _put(raw, KEYS[what], frame, row)
         case _:
             return scene, ()
-    changed = _built(scene, chain, tables)
-    return (scene, ()) if changed == scene else _with_machine(scene, changed)
+    return _read(scene, raw, replace(machine, bodies=bodies))
 
 
 def read_number(what: str, typed: str, unit: str) -> float:
@@ -125,6 +136,10 @@ def _entry(tables: Tables, what: str, frame: str) -> Any:
     if frame not in tables[what]:
         raise UnknownNameError(NOUNS.get(what, "frame"), frame, tables[what])
     return tables[what][frame]
+
+
+def _put(raw: Tables, key: str, frame: str, value: object) -> None:
+    raw["machine"].setdefault(key, {})[frame] = value
 
 
 def _moved(machine: Machine, what: str, axis: str) -> Chain:
@@ -144,105 +159,84 @@ def _moved(machine: Machine, what: str, axis: str) -> Chain:
     return Chain(tuple(reversed(places[:frame])), tuple(places[frame + 1 :]))
 
 
-def _switch_guides(machine: Machine, tables: Tables, axis: str) -> None:
-    """Let a linear axis stand on two guides, or on one again."""
-    if not machine.axis(axis).is_linear:
-        raise OptionError(f"{axis} is a rotary axis; expected a linear one for two guides")
-    if tables["span"].pop(axis, None) is None:
-        across = default_across(axis)
-        others = [one for one in machine.axes.values() if one.is_linear]
-        spans = [one.travel[1] - one.travel[0] for one in others if ACROSS[one.index] == across]
-        tables["span"][axis], tables["across"][axis] = (max(spans, default=START_SPAN_MM),), across
-
-
-def _built(scene: Scene, chain: Chain, tables: Tables) -> Scene:
-    """Give a scene the machine and working volume of tables, axes that are new their default."""
-    machine, own = scene.machine, own_bodies(scene.machine)
-    for axis in filter(is_linear, chain.axes):  # the tool moves over the workpiece as before
+def _rearrange(raw: Tables, scene: Scene, chain: Chain) -> None:
+    """Give a scene another chain; the tool moves over the workpiece as before."""
+    machine = scene.machine
+    raw["machine"]["chain"] = str(chain)
+    spanned = find_volume_axes({a: r for a, r in scene.workspace.ranges.items() if a in chain.axes})
+    for axis in filter(is_linear, chain.axes):
         carries = axis in chain.tool
-        if axis in machine.axes and carries != (axis in machine.chain.tool):
-            tables["turn"][axis] *= -1
-        elif axis not in machine.axes and not carries:
-            tables["turn"][axis] = -1
-    frames = {*chain.axes, *BODY_FRAMES}
-    kept = {
-        what: {frame: entry for frame, entry in table.items() if frame in frames}
-        for what, table in tables.items()
-    }
-    given = {name for name, axis in machine.axes.items() if axis.direction_given}
-    built = build_machine(
-        chain,
-        offset_mm=kept["offset"],
-        rotation_deg=kept["rotation"],
-        travel=kept["travel"],
-        direction={a: way for a, way in kept["turn"].items() if way != 1 or a in given},
-        gantry={axis: (span[0], kept["across"][axis]) for axis, span in kept["span"].items()},
-        name=machine.name,
-        title=machine.title,
-        body_dir=machine.body_dir,
-        source=machine.source,
-    )
-    bodies = {
-        frame: source
-        for frame, source in machine.bodies.items()
-        if frame in frames and (frame in kept["mesh"] or frame not in own)
-    }
-    volume = kept["volume"]
-    spanned = find_volume_axes(volume) if chain != machine.chain else ("", "", "")
-    for axis in chain.axes:  # of what is missing a file says no more than one in place of another
-        if axis not in volume and is_linear(axis) and spanned[direction_index(axis)]:
-            volume[axis] = (0.0, 0.0)
-    model = replace(scene.model, machine=_dressed(scene, replace(built, bodies=bodies)))
-    return replace(scene, model=model, workspace=Workspace(volume))
-
-
-# --- A scene with another machine, checked as its file would be -----------------------------------
+        if axis not in machine.axes:
+            _put(raw, "direction", axis, 1 if carries else -1)
+            if spanned[direction_index(axis)]:
+                raw["workspace"][axis] = 0.0
+        elif carries != (axis in machine.chain.tool):
+            _put(raw, "direction", axis, -machine.axes[axis].direction)
 
 
 def _with_machine(scene: Scene, other: Scene) -> tuple[Scene, tuple[str, ...]]:
     """Give a scene the machine, the working volume and the points of another one."""
-    machine, axes = other.machine, other.machine.axes
-    if not machine.body_dir:  # it stands in a scene, and comes to stand in this one
-        machine = replace(machine, name=scene.name)
-    gone = {a: at for a, at in scene.workspace.positions.items() if a not in axes}
-    errors = of_axes(scene.errors.functions, axes)
-    own = tuple(one for one in scene.model.own_component_errors if one[0] in axes)
-    held = {axis: at for axis, at in (scene.reference or {}).items() if axis in axes}
-    changed = replace(
-        scene,
-        model=replace(
-            scene.model,
-            machine=machine,
-            tool_point_mm=other.model.tool_point_mm,
-            workpiece_point_mm=other.model.workpiece_point_mm,
-            own_component_errors=own,
-        ),
-        workspace=other.workspace,
-        trace_points_mm=other.trace_points_mm,
-        errors=ErrorSet({key: one.without_axes(gone) for key, one in errors.items()}),
-        tolerances=replace(scene.tolerances, own=of_axes(scene.tolerances.own, axes)),
-        reference=held or None,
-        uncertainty=of_axes(scene.uncertainty, axes),
-        measured=of_axes(scene.measured, axes),
-    )
-    return _checked(changed), tuple(_left_out(scene, gone))
+    taken = _document(other)
+    raw = _document(scene) | {key: taken[key] for key in ("machine", "workspace", "points_mm")}
+    return _read(scene, raw, other.machine)
 
 
-def _checked(scene: Scene) -> Scene:
-    """Check a scene by writing it down and reading it again."""
-    read, machine = parse_scene(scene_to_toml(scene), scene.name, "machine"), scene.machine
-    # the text is read without its folder: what that says of meshes is true of others only
-    unread = body_notes(read.machine)
-    notes = (*(note for note in read.notes if note not in unread), *body_notes(machine))
+def _document(scene: Scene) -> Tables:
+    """Give a scene as its file would have it, the machine written out; without bodies and errors.
+
+    A ramp is spelled by the range of its axis, which may become another one.
+    """
+    model = replace(scene.model, machine=replace(scene.machine, name="", bodies={}))
+    return tomllib.loads(scene_to_toml(replace(scene, model=model, errors=ErrorSet())))
+
+
+def _read(scene: Scene, raw: Tables, like: Machine) -> tuple[Scene, tuple[str, ...]]:
+    """Read a changed document without what belongs to axes that are gone; and say what that was.
+
+    The machine is named after its frames: as the one that it is like, as that of the library with
+    the same ones, or as its scene. Bodies that were made for other frames suit it no more.
+    """
+    chain = parse_chain(raw["machine"]["chain"])
+    gone = {a: at for a, at in scene.workspace.positions.items() if a not in chain.axes}
+    raw["convention"]["reference_axis"] = "free"  # which axis that is may have changed
+    bare = parse_scene(tomli_w.dumps(_without(raw, gone)), scene.name, "machine")
+    kept = of_axes(scene.errors.functions, chain.axes)
+    errors = ErrorSet({key: one.without_axes(gone) for key, one in kept.items()})
+    own = tuple(one for one in scene.model.own_component_errors if one[0] in chain.axes)
+    main = scene.model.component_errors
+    model = replace(bare.model, component_errors=main, own_component_errors=own)
+    text = scene_to_toml(replace(bare, model=model, errors=errors))
+    read = parse_scene(text, scene.name, "machine")
+    same = _frames(like) == _frames(read.machine)
+    named = like if same else known_alike(read.machine)
+    if named is None:
+        is_own = like.chain == chain and not like.body_dir
+        named = replace(read.machine, title=like.title if is_own else f"Machine {chain}")
     machine = replace(
-        read.machine, name=machine.name, body_dir=machine.body_dir, bodies=machine.bodies
+        read.machine,
+        name=named.name if named.body_dir else scene.name,
+        title=named.title,
+        body_dir=named.body_dir,
+        bodies={frame: body for frame, body in like.bodies.items() if frame not in gone},
     )
-    return replace(read, model=replace(read.model, machine=machine), notes=notes)
+    notes = (*read.notes, *body_notes(machine))
+    read = replace(read, model=replace(read.model, machine=machine), notes=notes)
+    return (scene, ()) if read == scene else (read, tuple(_left_out(scene, gone)))
 
 
-def of_axes(table: Mapping[str, T], axes: Collection[str]) -> dict[str, T]:
-    """Keep the entries of a table of parameters that belong to some axes."""
-    return {key: value for key, value in table.items() if parameter(key).axis in axes}
+def _without(table: Tables, axes: Collection[str]) -> Tables:
+    """Leave out all that belongs to axes."""
+    kept = {
+        key: _without(value, axes) if isinstance(value, dict) else value
+        for key, value in table.items()
+        if key not in axes and (key not in PARAMETERS or PARAMETERS[key].axis not in axes)
+    }
+    return {key: value for key, value in kept.items() if value != {}}
+
+
+def _frames(machine: Machine) -> tuple[object, ...]:
+    places = [(axis.offset_mm, axis.rotation_deg) for axis in machine.axes.values()]
+    return machine.chain, places, machine.fixed_mm, machine.fixed_deg
 
 
 def known_alike(machine: Machine) -> Machine | None:
@@ -251,24 +245,9 @@ def known_alike(machine: Machine) -> Machine | None:
     return next((one for one in known if _frames(one) == _frames(machine)), None)
 
 
-def _frames(machine: Machine) -> tuple[object, ...]:
-    places = [(axis.offset_mm, axis.rotation_deg) for axis in machine.axes.values()]
-    return machine.chain, places, machine.fixed_mm, machine.fixed_deg
-
-
-def _dressed(scene: Scene, machine: Machine) -> Machine:
-    """Name a machine after its frames: that of the library with the same ones, else its scene's.
-
-    Bodies that were made for other frames suit it no more.
-    """
-    before = scene.machine
-    if _frames(before) == _frames(machine):
-        return machine
-    if known := known_alike(machine):
-        return replace(machine, name=known.name, title=known.title, body_dir=known.body_dir)
-    same_chain = machine.chain == before.chain
-    title = machine.title if same_chain and not before.body_dir else f"Machine {machine.chain}"
-    return replace(machine, name=scene.name, title=title, body_dir="")
+def of_axes(table: Mapping[str, T], axes: Collection[str]) -> dict[str, T]:
+    """Keep the entries of a table of parameters that belong to some axes."""
+    return {key: value for key, value in table.items() if parameter(key).axis in axes}
 
 
 def _left_out(scene: Scene, gone: Collection[str]) -> Iterator[str]:
@@ -287,7 +266,6 @@ def _left_out(scene: Scene, gone: Collection[str]) -> Iterator[str]:
 
 # --- The machine of a state: errors and tolerances that were changed stay, undo takes all back ----
 
-SHOWN = 30  # characters of what was typed that a message repeats
 UNCHANGED = "the machine stays as it was"
 
 
@@ -358,26 +336,28 @@ def _amplitude(state: AppState, scene: Scene, key: str) -> float:
 
 def with_own_machine(state: AppState) -> AppState:
     """Go back to machine, working volume and points of the scene as it was opened."""
-    own, scene, own_curves = state.origin, state.scene, state.own_curves
+    own, scene = state.origin, state.scene
     if own.machine == scene.machine and own.workspace == scene.workspace:
         return state
     returned = own.machine.axes.keys() - scene.machine.axes.keys()
-    functions = {
-        # curves that are the scene's own, but for the working volume, become those again
-        key: own.errors.functions[key] if own_curves.get(key) == function else function
-        for key, function in scene.errors.functions.items()
+    # curves that are the scene's own, but for the working volume, become those again
+    known, present = state.own_curves, scene.errors.functions
+    curves = {key: one for key, one in present.items() if known.get(key) != one}
+    orders = {
+        axis: (own if axis in returned else scene).model.convention(axis).name
+        for axis in own.machine.axes
     }
-    orders = {**dict(own.model.own_component_errors), **dict(scene.model.own_component_errors)}
     tolerances = {**of_axes(own.tolerances.own, returned), **state.tolerances.own}
     joined = replace(
         scene,
         model=replace(scene.model, own_component_errors=tuple(orders.items())),
-        errors=ErrorSet({**of_axes(own.errors.functions, returned), **functions}),
-        tolerances=replace(scene.tolerances, own=tolerances),
+        errors=ErrorSet({**own.errors.functions, **curves}),
+        reference=scene.reference and {**(own.reference or {}), **scene.reference},
+        tolerances=replace(state.tolerances, own=tolerances),
     )
     back, notes = _with_machine(joined, own)
-    kept = replace(state, tolerances=replace(state.tolerances, own=tolerances))
-    return with_changed_scene(kept, back).noted(*notes)
+    state = replace(state, tolerances=joined.tolerances)
+    return with_changed_scene(state, back).noted(*notes)
 
 
 # --- The two guides of a gantry: their errors, which the axis has as mean and rotation ------------
