@@ -57,18 +57,12 @@ class ErrorsPart(Part):
         self._used: tuple[str, ...] = ()
         self._largest = 1.0
         self._spans: dict[str, Span] = {}
-        self._more: tuple[object, Markup] = (None, EMPTY)
         self._listed: object = None  # what the list was written for
         self._made: Mapping[str, float] = {}  # amplitudes that the rows were written with
         self._made_for: tuple[object, ...] = ()
 
     def depends(self, picture: LivePicture) -> tuple[object, ...]:
-        state = picture.state
-        return (
-            Identity(state.amplitudes), Identity(state.exclusions), Identity(state.scene),
-            state.page.query, state.page.row, FOLDED in state.page.open, state.seen,
-            Identity(state.positions), self._sorted_for, Identity(self._said),
-        )  # fmt: skip
+        return (id(picture), self._sorted_for)
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
         state = picture.state
@@ -137,29 +131,23 @@ class ErrorsPart(Part):
     def _rows(self, state: AppState) -> dict[str, str]:
         pieces: dict[str, str] = {}
         made_for = (Identity(state.scene), self._gains_for, Identity(self._spans), state.exclusions,
-                    state.page.row)  # fmt: skip
+                    state.page.row, Identity(self._said))  # fmt: skip
         made = self._made if made_for == self._made_for else {}
         self._made, self._made_for = state.amplitudes, made_for
         for key in self._order:
-            value, span, opened = state.amplitudes[key], self._spans[key], key == state.page.row
-            if value == made.get(key) and not opened:
+            value, span = state.amplitudes[key], self._spans[key]
+            if value == made.get(key):
                 continue
             if abs(value) > span.high:  # typed
                 span = self._spans[key] = amplitude_span(key, value, None)
             effect, row = self._effect(state, key), parameter(key)
             share, active = min(effect / self._largest, 1.0), state.exclusions.active(key)
             hint = state.curve(key).slider_words(row.axis)
-            pieces[f"error.{key}"] = _row(row, value, span, effect, share, hint, active=active)
-            if opened:
-                pieces[f"error.{key}"] += self._curve(state, key)
+            html = _row(row, value, span, effect, share, hint, active=active)
+            opened = key == state.page.row
+            curve = curve_html(state, key, self._said.get(key)) if opened else EMPTY
+            pieces[f"error.{key}"] = html + curve
         return pieces
-
-    def _curve(self, state: AppState, key: str) -> Markup:
-        made = (key, state.amplitudes[key], Identity(state.scene), Identity(state.exclusions),
-                Identity(self._said))  # fmt: skip
-        if made != self._more[0]:
-            self._more = made, curve_html(state, key, self._said.get(key))
-        return self._more[1]
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
         what, _, key = word.partition(".")

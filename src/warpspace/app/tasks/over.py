@@ -92,15 +92,10 @@ class RoomPart(Part):
         return {}
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
-        room = read_room(value) if word == "size" else None
+        room, context = read_room(value) if word == "size" else None, self.context
         if room is not None:
-            self.context.act(lambda: self._fill(room))
+            context.act(lambda: context.camera.take_room(room, context.shown))
         return state
-
-    def _fill(self, room: Any) -> None:
-        picture = self.context.shown
-        if picture is not None and self.context.camera.take_room(room, picture):
-            self.context.client.flush()
 
 
 def _facts(picture: LivePicture) -> dict[str, Any]:

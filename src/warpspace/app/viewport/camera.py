@@ -145,13 +145,11 @@ class TabCamera:
         camera = self._camera
         return self._told or first_room(camera.image_width, camera.image_height)
 
-    def take_room(self, room: Room, picture: LivePicture) -> bool:
+    def take_room(self, room: Room, picture: LivePicture | None) -> None:
         """Take note of the drawing's room; a camera that nobody has moved fills it again."""
         self._told = room
-        if self._put is None or not self._put.is_near(self.remember()):
-            return False
-        self.fit(picture)
-        return True
+        if picture is not None and self._put is not None and self._put.is_near(self.remember()):
+            self.fit(picture)
 
     def place(self, picture: LivePicture) -> None:
         """Put it where it is wanted, else where all of the box is seen."""

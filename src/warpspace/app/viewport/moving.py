@@ -92,5 +92,4 @@ class MovingLayer:
         if drawn:
             with self._client.atomic():
                 self._draw_turning()
-            self._client.flush()
         self.moved()
