@@ -26,6 +26,7 @@ from warpspace.app.server.tab_keeper import NO_TABLE, kept_text, read_kept
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.table import without_table, without_words
 from warpspace.app.state.tree import put
+from warpspace.app.tasks.analysis import Answer
 from warpspace.app.tasks.conventions import with_reference
 from warpspace.app.tasks.files import without_tables
 from warpspace.app.tasks.improve import BOTH, LEFT, CompensatePart, holds_for, packed, with_box
@@ -209,7 +210,8 @@ def test_no_file_keeps_the_table_and_a_restored_tab_says_so(controller):
 
 def shown(part, state, found):
     """Give what the section says of a table that was computed."""
-    part._answer = (part.question(state), found)
+    part._asked = part.question(state)
+    part._answer = Answer(part._asked, found)
     return section(part, state)
 
 
@@ -228,8 +230,9 @@ def test_words_of_others_are_escaped(found, controller):
 
 def test_a_table_is_saved_whole_and_the_box_then_shows_before_and_after(found):
     part, state = asking()
-    assert "SINUMERIK 840D CEC" in section(part, state)
-    assert 'data-do="compensate:table"' in shown(part, state, found)
+    html = shown(part, state, found)
+    assert "SINUMERIK $AN_CEC" in html
+    assert 'data-do="compensate:table"' in html
     after = part.take(state, "table", "")
     assert after.controller is found.controller
     assert after.comparison.b is not None
@@ -245,13 +248,11 @@ def test_a_table_is_saved_whole_and_the_box_then_shows_before_and_after(found):
 
 
 def test_what_is_left_of_rounding_is_said_and_not_drawn(found):
-    part, state = asking(choice={"formats": "heidenhain", "points": "9", "resolution": "0.05"})
-    part.ask(state, part.values(state), part.scenes(state))
-    words = shown(part, state, found)  # its largest error is below the step asked for
+    # its largest error is below the step that was asked for
+    words = shown(*asking(), replace(found, resolution=0.05))
     assert "resolution of the numbers in the file" in words
     assert 'data-value="left" title="Nothing is left but rounding"' in words
-    part, state = asking()
-    assert "resolution of the numbers" not in shown(part, state, found)
+    assert "resolution of the numbers" not in shown(*asking(), found)
 
 
 @pytest.mark.parametrize(

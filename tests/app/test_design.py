@@ -59,7 +59,7 @@ def test_repair_offers_what_the_command_finds_and_nothing_that_gains_nothing():
     part = part_of(RepairPart, "repair")
     state = replace(START, forms={"repair.objective": "rms", "repair.grid": "9"})
     ran(part, state)
-    (_, found) = part._answer
+    found = part._answer.found
     said = Repair(grid=9).run(FIRST, lambda _: None)
     assert [one.adjust for one in found.repairs] == [one.adjust for one in said.repairs]
     assert part.offered(found) == [0, 1]  # of sets of one, two and three
@@ -142,13 +142,14 @@ def test_an_allocation_reaches_what_was_wanted_and_is_one_change():
     after = update(state)
     # the machines of the page are those of the allocation, and the lower end of the interval counts
     (_, shown) = estimate(sample_machines(state), after.tolerances, 40.0)
-    (_, found) = part._answer
+    found = part._answer.found
     assert shown == found.after
     assert 0.98 <= shown.low < 0.983
     assert edits.half_width_of(after, "EA0Z") == 25.0
     assert edits.half_width_of(after, "EB0Z") > 1.3 * edits.half_width_of(after, "EC0Y")
     assert f'<span class="ws-kept">{percent(shown.probability)} %</span>' in section(part, after)
-    assert "Allocated: 20 tolerances" in section(part, after)
+    assert f"{100.0 * found.after.probability:.2f} % of the machines" in section(part, after)
+    assert "Applied" in section(part, after)
     # what was changed meanwhile is not overwritten; errors are none of its inputs
     moved = put(state, "tolerances.EXX", repr(3.0))
     assert update(moved).tolerances == moved.tolerances
@@ -165,21 +166,17 @@ def test_without_tolerances_there_is_nothing_to_allocate():
 def test_tolerances_are_typed_fixed_scaled_and_reset():
     part = part_of(TolerancesPart, "allocate")
     section(part, START)  # lays out the rows
-    state = part.take(START, "fix", "EXX")
-    assert 'aria-pressed="true"' in section(part, state)
-    state = part.take(state, "width.EYX", "0")
+    state = put(START, "specification.fixed", "+EXX")
+    assert 'data-value="-EXX"' in section(part, state)
+    state = put(state, "tolerances.EYX", "0")
     scaled = part.take(state, "scale", "× 1.5")
     assert [edits.half_width_of(scaled, key) for key in KEYS] == [10.0, 0.0, 37.5]
     for _ in range(20):
         scaled = part.take(scaled, "scale", "× 1.5")
     assert edits.half_width_of(scaled, "EA0Z") == 1000.0
     assert part.take(scaled, "reset", "").tolerances == FIRST.tolerances
-    assert part.take(START, "specification.limit_um", "40").specification.limit_um == 40.0
-    for word, value in (("fix", HOSTILE), ("scale", "1e9"), ("width.EQQ", "3"), ("set.x", "3")):
-        assert part.take(START, word, value).without_notes() == START
-    noted = part.take(START, "width.EXX", HOSTILE)
-    assert noted.without_notes() == START
-    assert "expected a number" in noted.notes[0]
+    for word, value in (("scale", "1e9"), ("set.x", "3")):
+        assert part.take(START, word, value) is START
 
 
 @pytest.mark.parametrize(
@@ -224,11 +221,11 @@ def test_machines_are_compared_as_the_command_does_and_drawn():
     chosen = part.take(part.take(START, "set.add", key), "set.add", key)
     assert part.chosen(chosen) == [PRESENT, key]
     ran(part, chosen)
-    (_, found) = part._answer
+    found = part._answer.found
     plan = Concepts(limit_um=chosen.specification.limit_um, samples=SAMPLES)
     expected = compare_concepts([FIRST, OTHER], plan)
     assert [one.said for one in found.concepts] == [one.said for one in expected]
-    assert "Most of the variance" in section(part, chosen)
+    assert "matter most share of the variance" in section(part, chosen)
     part.take(chosen, "sheet", "")
     while part._jobs.busy:
         time.sleep(0.01)

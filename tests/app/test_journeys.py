@@ -56,7 +56,7 @@ def test_why_the_worst_corner_is_off_and_the_best_adjustment_in_two_actions(tab)
 def test_95_percent_within_40_um_in_three_actions_in_sight(tab):
     tab.task("Design")
     tab.says("of the machines stay within")
-    tab.type("|E| at most", "40")
+    tab.type("|E| allowed", "40")
     tab.click("Allocate tolerances")
     assert tab.actions <= 3
     tab.until(lambda: tab.state.tolerances != start_state(SCENES[0]).tolerances)

@@ -15,7 +15,7 @@ from warpspace.app.state.app_state import start_state
 from warpspace.app.state.tree import put
 from warpspace.app.tasks.analysis import AnalysisPart
 from warpspace.app.tasks.improve import BestPart
-from warpspace.app.tasks.understand import GainsPart, VolumePart, WorstPart
+from warpspace.app.tasks.understand import VolumePart, WorstPart
 from warpspace.scene.library import load_scene, scene_names
 
 LIVE = LiveModel()
@@ -119,7 +119,7 @@ def test_numbers_of_the_volume_and_gains_at_the_point_that_was_asked_about():
     for words in ("30.89 µm", "51.72 µm", "550 × 450 × 400 mm"):
         assert words in html
     entry = next(one for one in entries() if one.name == "gains")
-    part = GainsPart(context(), entry)
+    part = AnalysisPart(context(), entry)
     html_of(part, opened)
     wait(part)
     middle = html_of(part, opened)

@@ -9,12 +9,12 @@ import tomllib
 from unittest.mock import MagicMock
 
 import pytest
+from warpspace.app.state.page_look import TASKS
 
 import warpspace
 from doc_pages import DOCS, ROOT, anchors, blocks, entries, links, pages, section
 from warpspace.app.tasks.catalogue import build_parts
 from warpspace.app.tasks.parts import Section
-from warpspace.app.tasks.tasks import TASKS
 from warpspace.app.tasks.top import COMMANDS as KEYS
 from warpspace.cli.main import COMMANDS
 from warpspace.kinematics.model import convention_names

@@ -133,9 +133,11 @@ class Exact(NamedTuple):
     first_order: float  # probability on the same machines
 
     def words(self) -> str:
+        change = f"{100.0 * (self.probability - self.first_order):+.2f}"
+        beside = f"{change} % against" if float(change) else "the same as to"
         return (
             f"exact chain: {100.0 * self.probability:.2f} % of {self.machines:,} of these machines,"
-            f" {100.0 * (self.probability - self.first_order):+.2f} % against the first order"
+            f" {beside} the first order"
         )
 
 

@@ -2,11 +2,11 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from html import escape
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
-if TYPE_CHECKING:
-    from warpspace.units import Array
+from markupsafe import escape
+
+from warpspace.units import Array
 
 Form: TypeAlias = str | Callable[[Any], str]
 Role: TypeAlias = Literal["plain", "key", "set", "none"]
@@ -43,7 +43,9 @@ class Column:
             return ""
         if callable(self.form):
             return self.form(value)
-        return f"{value:{self.form}}" if self.form else str(value)
+        if self.form:
+            return f"{value:{self.form}}"
+        return value if isinstance(value, str) else str(value)
 
 
 def number_columns(
@@ -138,8 +140,8 @@ class Curve:
     """One curve of a chart."""
 
     name: str  # in the legend; a curve without one is not in it
-    x: "Array"  # [n]; in polar charts the angle in degrees
-    y: "Array"  # [n]
+    x: Array  # [n]; in polar charts the angle in degrees
+    y: Array  # [n]
     colour: int = 0  # which colour of series; the same thing has the same, whoever measured it
     style: Style = "line"  # for the model; "dots" for data, "dashed" for fits, "thin" for nominal
 
@@ -149,9 +151,9 @@ class Band:
     """What lies between two curves: scatter."""
 
     name: str
-    x: "Array"  # [n]
-    low: "Array"
-    high: "Array"
+    x: Array  # [n]
+    low: Array
+    high: Array
     colour: int = 0
 
 
@@ -177,8 +179,8 @@ class Histogram:
     subtitle: str
     x_label: str  # with unit
     y_label: str
-    edges: "Array"  # [n + 1]
-    heights: "Array"  # [n]
+    edges: Array  # [n + 1]
+    heights: Array  # [n]
     marks: tuple[tuple[str, float], ...] = ()  # word and place
     limit: float | None = None
     told: tuple[str, ...] = ()  # in words, in the chart: the first of them large
@@ -234,7 +236,7 @@ def _bars_html(bars: Bars) -> str:
     )
     return (
         f'<table class="bars"><caption>{escape(bars.title)} · {escape(bars.subtitle)}</caption>'
-        f"<thead><tr><th></th>{head}</tr></thead><tbody>{rows}</tbody></table>"
+        f"<thead><tr><td></td>{head}</tr></thead><tbody>{rows}</tbody></table>"
     )
 
 
@@ -251,6 +253,8 @@ def _bar(panel: Panel, row: int) -> str:
 
 
 def _head(column: Column) -> str:
+    if not column.heading:
+        return "<td></td>"
     kind = ' class="number"' if column.is_number else ""
     return f"<th{kind}>{escape(column.heading)}{_unit(column.unit)}</th>"
 

@@ -150,26 +150,14 @@ def slider(name: str, value: float, low: float, high: float, step: float, *,
     )  # fmt: skip
 
 
-def choice(
-    name: str,
-    value: str,
-    words: Mapping[str, str],
-    *,
-    label: str = "",
-    groups: Mapping[str, Mapping[str, str]] | None = None,
-) -> Markup:
-    """Give a list to choose from; `groups` stand below the others, each with its heading."""
-
-    def options(of: Mapping[str, str]) -> Markup:
-        return join(
-            tag("option", said, value=key, selected=key == value) for key, said in of.items()
-        )
-
-    grouped = join(tag("optgroup", options(of), label=head) for head, of in (groups or {}).items())
+def choice(name: str, value: str, words: Mapping[str, str], *, label: str = "") -> Markup:
+    """Give a list to choose from."""
+    options = join(
+        tag("option", said, value=key, selected=key == value) for key, said in words.items()
+    )
     return tag(
-        "select", options(words) + grouped, id=ident(name), class_="ws-box", data_set=name,
-        aria_label=label or None,
-    )  # fmt: skip
+        "select", options, id=ident(name), class_="ws-box", data_set=name, aria_label=label or None
+    )
 
 
 def switch(name: str, label: object, *, on: bool, hint: str = "") -> Markup:

@@ -35,7 +35,7 @@ from warpspace.app.documents.legend import (
     place_words,
     subject_words,
 )
-from warpspace.app.evaluation.budget import active_errors, answer
+from warpspace.app.evaluation.budget import answer
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import start_state
@@ -152,7 +152,7 @@ def build_offline_html(
 def _error_rows(picture: LivePicture) -> list[tuple[str, str, str]]:
     """Spell the errors that are not zero, or unlike in A and B: key, plain name, value and unit."""
     if picture.compared is not None and picture.is_difference:
-        a, b = (active_errors(side).functions for side in picture.compared.sides)
+        a, b = (side.active_scene().errors.functions for side in picture.compared.sides)
         values = {
             key: f"A {_amplitude(a.get(key))}, B {_amplitude(b.get(key))}"
             for key in {**a, **b}
@@ -165,7 +165,7 @@ def _error_rows(picture: LivePicture) -> list[tuple[str, str, str]]:
 
 
 def _amplitude(function: ErrorFunction | None) -> str:
-    return "0" if function is None else f"{function.amplitude:+g}"
+    return f"{function.amplitude:+g}" if function is not None and function.amplitude else "0"
 
 
 def point_words(picture: LivePicture) -> str:

@@ -1,26 +1,22 @@
 """Why a point is where it is: which point a click means, and what its error is made of."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.analysis.contributions import Explanation, explain
+from warpspace.analysis.contributions import Contribution, Explanation, explain
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState, Picked
-from warpspace.field.grid import Grid, seen_from_workpiece
-from warpspace.geometry.surfaces import (
-    Index,
-    deform,
-    is_thin,
-    outer_surface,
-)
+from warpspace.field.grid import seen_from_workpiece
+from warpspace.geometry.surfaces import deform, is_thin
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, nominal_point
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
-from warpspace.machine.errors import ErrorSet
 from warpspace.picture.mesh import thick_map
 from warpspace.picture.traces import is_moved
 from warpspace.units import Array
@@ -28,9 +24,10 @@ from warpspace.units import Array
 TOLERANCE_RAD = 0.0032  # how far a click may pass a trace: about seven pixels of the usual view
 BETWEEN = 5  # places looked at between two samples of a trace: one degree apart
 REACH_MM = 1e7  # rays from farther away than this come from no camera
+PARALLEL = 1e-12
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Answer:
     """A picked point explained, as it is drawn."""
 
@@ -48,6 +45,16 @@ class Answer:
         """Whether a table corrects the point that is drawn."""
         return not np.array_equal(self.drawn_um, self.explanation.error_um)
 
+    @property
+    def length_um(self) -> float:
+        """Length of the error that is explained."""
+        return float(np.linalg.norm(self.explanation.error_um))
+
+    @cached_property
+    def ranked(self) -> list[Contribution]:
+        """What it is made of, the largest part along the error first."""
+        return sorted(self.explanation.contributions, key=lambda part: -abs(part.along_um))
+
 
 def pick(picture: LivePicture, origin_mm: Array, direction: Array) -> Picked | None:
     """Find the point of a drawn trace or surface that a click means."""
@@ -58,11 +65,9 @@ def pick(picture: LivePicture, origin_mm: Array, direction: Array) -> Picked | N
     if length == 0.0:
         return None
     origin, unit = ray[:3], ray[3:] / length
-    surface = _on_surface(picture, origin, unit)
-    trace = _on_trace(picture, origin, unit) if picture.state.shown.traces else None
-    if trace is not None and (surface is None or trace[1] <= surface[1]):
-        return trace[0]
-    return None if surface is None else surface[0]
+    traces = _on_traces(picture, origin, unit) if picture.state.shown.traces else ()
+    found = [*traces, *_on_surfaces(picture, origin, unit)]
+    return min(found, key=lambda one: one[1])[0] if found else None
 
 
 def pick_worst(picture: LivePicture) -> Picked:
@@ -73,57 +78,41 @@ def pick_worst(picture: LivePicture) -> Picked:
     )
 
 
-def _on_surface(picture: LivePicture, origin: Array, unit: Array) -> tuple[Picked, float] | None:
-    """Intersect the drawn surface, or the slices; give the point and its distance, mm."""
-    drawn = [(picture.grid, picture.drawn_mm, picture.topology.surface)]
-    if picture.slices:
-        drawn = [(cut.grid, cut.drawn_mm, outer_surface(cut.grid.shape)) for cut in picture.slices]
-    solids = [
-        (grid, drawn_mm.reshape(-1, 3)[surface.nodes], surface.triangles, surface.nodes)
-        for grid, drawn_mm, surface in drawn
-    ]
-    if is_thin(picture.shape):
-        solids = [(picture.grid, *thick_map(picture))]
-    best: tuple[Picked, float] | None = None
-    for grid, points, triangles, numbers in solids:
-        hit = pick_surface(origin, unit, points, triangles)
-        if hit is not None and (best is None or hit.distance < best[1]):
-            nodes = numbers[hit.vertices]
-            best = _between_nodes(grid, nodes, hit.weights), hit.distance
-    return best
+def _on_surfaces(
+    picture: LivePicture, origin: Array, unit: Array
+) -> Iterator[tuple[Picked, float]]:
+    """Intersect the drawn surface, or the slices; give points and their distances, mm."""
+    for one in picture.slices or (picture,):
+        surface, points = one.topology.surface, one.drawn_mm.reshape(-1, 3)
+        solid = points[surface.nodes], surface.triangles, surface.nodes
+        if is_thin(one.shape):
+            solid = thick_map(one)
+        hit = pick_surface(origin, unit, *solid[:2])
+        if hit is not None:
+            nodes, grid = solid[2][hit.vertices], one.grid
+            at = {
+                name: float(np.broadcast_to(values, grid.shape).reshape(-1)[nodes] @ hit.weights)
+                for name, values in grid.coordinates.items()
+                if is_linear(name) or name in grid.axes
+            }
+            yield Picked(at), hit.distance
 
 
-def _between_nodes(grid: Grid, nodes: Index, weights: Array) -> Picked:
-    return Picked(
-        {
-            name: float(np.broadcast_to(values, grid.shape).reshape(-1)[nodes] @ weights)
-            for name, values in grid.coordinates.items()
-            if is_linear(name) or name in grid.axes
-        }
-    )
-
-
-def _on_trace(picture: LivePicture, origin: Array, unit: Array) -> tuple[Picked, float] | None:
-    """Find the nearest of the drawn traces; give the point and its distance, mm."""
-    best: tuple[Picked, float] | None = None
+def _on_traces(picture: LivePicture, origin: Array, unit: Array) -> Iterator[tuple[Picked, float]]:
+    """Look for points of the drawn traces; give them and their distances, mm."""
     for lines in picture.traces:
-        shape = lines.actual_mm.shape[:2]
         drawn = [number for number, line in enumerate(lines.each()) if is_moved(line)]
-        if not drawn:
-            continue
         dense = _denser(lines.actual_mm[drawn])
         found = pick_point(origin, unit, dense.reshape(-1, 3), TOLERANCE_RAD)
-        if found is None or (best is not None and best[1] <= found[1]):
+        if found is None:
             continue
         row, sample = divmod(found[0], dense.shape[1])
-        number = drawn[row]
-        trace = lines.group.traces[number]
+        number, shape = drawn[row], lines.actual_mm.shape[:2]
         at = {
             name: float(_denser(np.broadcast_to(values, shape)[..., None])[number, sample, 0])
             for name, values in lines.group.coordinates.items()
         }
-        best = Picked(at, lines.group.loop, trace.point_mm), found[1]
-    return best
+        yield Picked(at, lines.group.loop, lines.group.traces[number].point_mm), found[1]
 
 
 def _denser(samples: Array) -> Array:
@@ -134,14 +123,9 @@ def _denser(samples: Array) -> Array:
     return samples[:, first] * (1.0 - part) + samples[:, first + 1] * part
 
 
-def active_errors(state: AppState) -> ErrorSet:
-    """Give the error set with the amplitudes that count in a state."""
-    return ErrorSet({key: state.curve(key) for key, value in state.active.items() if value})
-
-
 def answer(state: AppState, picked: Picked, exaggeration: float) -> Answer:
     """Explain the error of a picked point."""
-    model = state.scene.model
+    scene, model = state.active_scene(), state.scene.model
     stands = {**state.scene.workspace.positions, **state.positions, **picked.at}
     at = {name: stands.get(name, 0.0) for name in model.machine.axes}
     coordinates = {name: np.asarray(value) for name, value in at.items()}
@@ -152,15 +136,15 @@ def answer(state: AppState, picked: Picked, exaggeration: float) -> Answer:
         side = "workpiece" if loop is Loop.WORKPIECE else "tool"
         pose = branch_pose(model, side, coordinates)
         point = transforms.apply(pose, np.asarray(picked.point_mm))
-    found = explain(model, active_errors(state), coordinates, state.view(loop), point)
+    found = explain(model, scene.errors, coordinates, state.view(loop), point)
     shift = np.zeros(3)
     if picked.point_mm is None:
         volume = state.scene.workspace.moved(state.positions)
         shift = seen_from_workpiece(model, coordinates, volume, point) - point
     drawn_um = found.error_um
     if state.controller is not None:
-        now, nominal = state.active_scene(), found.nominal_mm
-        drawn_um = state.controller.field(coordinates, nominal, now, loop, nominal).error_um
+        nominal = found.nominal_mm
+        drawn_um = state.controller.field(coordinates, nominal, scene, loop, nominal).error_um
     drawn = deform(found.nominal_mm + shift, drawn_um, exaggeration)
     return Answer(at, loop, found, shift, drawn, drawn_um)
 
@@ -176,13 +160,10 @@ def with_lever(state: AppState, key: str) -> AppState:
     return replace(state, lever="" if not known or key == state.lever else key)
 
 
-# --- Picking: where a ray from the eye meets a surface or passes a line ---------------------------
-
-_PARALLEL = 1e-12
+# --- Where a ray from the eye meets a surface or passes a line ------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class Hit:
+class Hit(NamedTuple):
     """Where a ray meets a surface."""
 
     vertices: NDArray[np.intp]  # [3]; vertex numbers of the triangle
@@ -194,26 +175,19 @@ class Hit:
 def pick_surface(
     origin: Array, direction: Array, vertices: Array, triangles: NDArray[np.intp]
 ) -> Hit | None:
-    """Find the first triangle, [T, 3], that a ray meets (Möller and Trumbore, all at once).
+    """Find the first triangle, [T, 3], that a ray meets.
 
     Origin and direction, [3], are in the units of the vertices, [M, 3]; None where the ray misses.
     """
     a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
-    first, second = b - a, c - a
-    across = np.cross(direction, second)
-    determinant = np.sum(first * across, axis=-1)
-    safe = np.where(np.abs(determinant) < _PARALLEL, np.inf, determinant)
-    from_a = origin - a
-    u = np.sum(from_a * across, axis=-1) / safe
-    turned = np.cross(from_a, first)
-    v = np.sum(direction * turned, axis=-1) / safe
-    distance = np.sum(second * turned, axis=-1) / safe
-    inside = (u >= 0) & (v >= 0) & (u + v <= 1) & (distance > 0) & np.isfinite(safe)
+    edges = np.stack([b - a, c - a, np.broadcast_to(-direction, a.shape)], axis=-1)
+    edges[np.abs(np.linalg.det(edges)) < PARALLEL] = np.nan
+    u, v, distance = np.linalg.solve(edges, (origin - a)[..., None])[..., 0].T
+    inside = (u >= 0) & (v >= 0) & (u + v <= 1) & (distance > 0)
     if not inside.any():
         return None
     at = int(np.argmin(np.where(inside, distance, np.inf)))
-    weights = np.array([1.0 - u[at] - v[at], u[at], v[at]])
-    return Hit(triangles[at], weights, float(distance[at]))
+    return Hit(triangles[at], np.array([1.0 - u[at] - v[at], u[at], v[at]]), float(distance[at]))
 
 
 def pick_point(
@@ -225,10 +199,9 @@ def pick_point(
     """
     if len(points) == 0:
         return None
-    unit = direction / np.linalg.norm(direction)
-    sight = points - origin
+    unit, sight = direction / np.linalg.norm(direction), points - origin
     along = sight @ unit
     aside = np.linalg.norm(sight - along[:, None] * unit, axis=-1)
-    angle = np.where(along > 0.0, np.arctan2(aside, np.maximum(along, _PARALLEL)), np.inf)
+    angle = np.where(along > 0.0, np.arctan2(aside, np.maximum(along, PARALLEL)), np.inf)
     nearest = int(np.argmin(angle))
     return (nearest, float(along[nearest])) if angle[nearest] <= tolerance else None

@@ -4,18 +4,23 @@ What only a page can do (numbers that follow a drag, a picture in the box) is a 
 the analysis' name: a subclass of `AnalysisPart` in `HOOKS`.
 """
 
+import csv
+import io
+import json
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pkgutil import resolve_name
+from typing import NamedTuple, TypeVar
 
 from markupsafe import Markup
 
-from warpspace.analysis.blocks import Bars, Block, Table
 from warpspace.analysis.catalogue import Entry, entries
 from warpspace.analysis.description import Analysis, Change, Result
 from warpspace.analysis.options import Option
-from warpspace.app.browser.html import EMPTY, button, join, tag
+from warpspace.analysis.statistics import Statistics, volume_statistics
+from warpspace.app.browser.html import EMPTY, button, join, number, rows, tag
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.browser.page import error_words
 from warpspace.app.documents.services import CancelledError
@@ -23,61 +28,85 @@ from warpspace.app.evaluation.cache import taken_turn
 from warpspace.app.evaluation.compare import with_applied, with_proposal
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.forms import read_form
+from warpspace.app.state.forms import LONGEST, read_form
 from warpspace.app.state.leaf import Identity
-from warpspace.app.tasks.cards import Card, Seen, make_cards
-from warpspace.app.tasks.charts import block_html
+from warpspace.app.tasks.charts import block_html, result_html
 from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.forms import form_html
 from warpspace.app.tasks.jobs import Job, Jobs
 from warpspace.app.tasks.parts import Section
 from warpspace.exceptions import OptionError, WarpspaceError
-from warpspace.scene.model import Scene
+from warpspace.field.grid import build_grid
+from warpspace.machine.axes import parameter
+from warpspace.picture.words import spell_at
+from warpspace.scene.model import Scene, evaluate_grid
 
 TITLES = {
     "gains": "Error gains", "line": "Along a line", "reach": "Volume within a limit",
     "certify": "Flatness, straightness, squareness", "convert": "Another convention",
     "montecarlo": "Random machines", "contributions": "Contributions of tolerances",
+    "allocate": "Tolerances", "concepts": "Machines side by side",
 }  # fmt: skip
 """What sections are called, where the name of the command does not do."""
-WIDEST = 5  # columns of a table that the column of the page has room for
 OF_STATE = frozenset({"loop", "placed"})
 """Options that are set for the whole page, in one place."""
 QUICK_S = 0.4  # what is answered within that time is answered anew with every change
+MOST_STEPS = 4  # errors that a card names one by one
+SAME = 1e-9  # µm or µrad; an error that moves by less stays
+T = TypeVar("T")
 Question = tuple[object, ...]
+
+
+class Card(NamedTuple):
+    """A scene that a result proposes, and what it changes in words."""
+
+    change: Change
+    words: Markup
+
+    def html(self, part: str, index: int, *, stale: bool) -> Markup:
+        """Say it, with buttons that preview and apply it."""
+        buttons = button("Preview", f"{part}:preview", index, disabled=stale,
+                         hint="Draw the result beside the present state")  # fmt: skip
+        buttons += button("Apply", f"{part}:apply", index, kind="main", disabled=stale,
+                          hint="Change the errors; the state before it is kept as A")  # fmt: skip
+        return tag("div", self.words + tag("div", buttons, class_="ws-actions"), class_="ws-card")
+
+
+class Answer(NamedTuple):
+    """What an analysis found."""
+
+    question: Question  # that it answers
+    found: Result
+    cards: tuple[Card, ...] = ()
+    took_s: float = 0.0
 
 
 class AnalysisPart(Section):
     """One analysis: a section of its task."""
 
-    follows = "in a pause"
     at_once = False  # whether it runs by itself as soon as it is unfolded
+    run_words, run_hint = "Run", ""
 
     def __init__(self, context: Context, entry: Entry) -> None:
         super().__init__(context)
-        self.entry, self.name = entry, entry.name
-        self.task = entry.task
+        self.entry, self.name, self.task = entry, entry.name, entry.task
         self.title = TITLES.get(entry.name) or entry.name.replace("-", " ").capitalize()
-        self.sentence = _plain(entry.sentence)
+        words = entry.sentence.replace(" of SCENE", "").replace("SCENE", "the machine")
+        self.sentence = self.sentence or words.rstrip(".")
         self.at_once = self.at_once or entry.task == "understand"
-        self._kind: type[Analysis] | None = None
-        self._answer: tuple[Question, Result] | None = None
-        self._cards: tuple[Card, ...] = ()
+        self._answer: Answer | None = None
         self._applied: Question = ()  # what is asked once a change has been applied
         self._problem: tuple[Question, str] | None = None
-        self._took_s, self._version = 0.0, 0
         self._jobs = Jobs(context, entry.name, self._again, self._fail)
         self._asked: Question = ()
-        self._scene_title = ""
-
-    # --- what a hook may say otherwise ---------------------------------------------------------
+        self._version, self._subject = 0, ""
 
     @property
     def kind(self) -> type[Analysis]:
-        """The analysis, imported when it is first unfolded."""
-        if self._kind is None:
-            self._kind = self.entry.load()
-        return self._kind
+        """The analysis, imported when it is first asked."""
+        return self.entry.load()
+
+    # --- what a hook may say otherwise ---------------------------------------------------------
 
     def options(self) -> Sequence[Option]:
         """List the options that a page asks for."""
@@ -91,18 +120,30 @@ class AnalysisPart(Section):
         """Give what the state says of options that nobody has set."""
         found = {"loop": str(state.loop), "limit_um": f"{state.specification.limit_um:g}"}
         found["placed"] = str(int(state.seen[1]))
+        if state.picked is not None:
+            found["at"] = spell_at(state.picked.at)
         return {one.name: found[one.name] for one in self.options() if one.name in found}
 
     def scenes(self, state: AppState) -> Sequence[Scene]:
         """Give what it is asked of: the machine as it is drawn."""
         return [state.active_scene()]
 
-    def ask(
-        self,
-        state: AppState,
-        values: Mapping[str, str],
-        scenes: Sequence[Scene],
-    ) -> Analysis:
+    def question(self, state: AppState) -> Question:
+        """Give all that an answer depends on; equal questions have equal answers."""
+        return (
+            Identity(state.scene), tuple(state.active.items()), tuple(state.positions.items()),
+            state.tolerances, state.placed, tuple(self.values(state).items()),
+        )  # fmt: skip
+
+    def is_ready(self, state: AppState) -> bool:
+        """Tell whether enough is chosen to run it."""
+        return True
+
+    def is_quick(self, state: AppState) -> bool:
+        """Tell whether it follows every change by itself."""
+        return self._answer.took_s < QUICK_S if self._answer else self.at_once
+
+    def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
         """Give what is run."""
         return read_form(self.kind, self.shown_options(state), values, scenes[0])
 
@@ -112,24 +153,23 @@ class AnalysisPart(Section):
 
     def headline(self, found: Result) -> Markup:
         """Say what matters most of the result: its sentences."""
-        said = (one.strip() for one in found.blocks() if isinstance(one, str))
         # which scene it is stands at the top of the page
-        words = (one.removeprefix(f"{self._scene_title} · ") for one in said)
-        return join(tag("p", one[:1].upper() + one[1:]) for one in words)
+        words = (one.removeprefix(self._subject) for one in found.blocks() if isinstance(one, str))
+        return join(map(block_html, words))
 
     def offered(self, found: Result) -> Sequence[int]:
         """List the places of the changes that are offered, in order: the best first."""
-        return range(len(self._cards))[::-1]
+        return range(len(self._answer.cards) if self._answer else 0)[::-1]
 
     def result_html(self, found: Result) -> Markup:
-        """Draw its charts and narrow tables; what is too wide for the column is folded."""
-        blocks = [one for one in found.blocks() if not isinstance(one, str)]
-        wide = [one for one in blocks if _is_wide(one)]
-        return join(block_html(one) for one in blocks if one not in wide) + details_html(wide)
+        """Draw its tables and charts."""
+        return result_html(one for one in found.blocks() if not isinstance(one, str))
 
-    def change_title(self, change: Change) -> str:
-        """Name the side of a comparison that shows a change."""
-        return f"after {self.title.lower()}: {change.words}"
+    def actions(self, found: Result, *, stale: bool) -> Markup:
+        """Give what can be done with a result beside its cards."""
+        saves = [button(f"Save {one}", f"{self.name}:save", one) for one in _endings(found)]
+        saves.append(button("Add to report", f"{self.name}:report", kind="quiet"))
+        return tag("div", join(saves), class_="ws-actions")
 
     # --- the page --------------------------------------------------------------------------------
 
@@ -140,126 +180,111 @@ class AnalysisPart(Section):
         found = self.defaults(state)
         return {**found, **set_, **{name: found[name] for name in OF_STATE & found.keys()}}
 
-    def question(self, state: AppState) -> Question:
-        """Give all that an answer depends on; equal questions have equal answers."""
-        return (
-            Identity(state.scene), tuple(state.active.items()), tuple(state.positions.items()),
-            state.tolerances, state.placed, tuple(self.values(state).items()),
-        )  # fmt: skip
-
     def concerns(self, picture: LivePicture) -> tuple[object, ...]:
-        """Follow its question and its answer."""
         return (self.question(picture.state), self._version)
 
     def body(self, picture: LivePicture) -> Markup:
-        """Write result, what to do with it, and options."""
         return self._body(picture.state)
 
     def _body(self, state: AppState) -> Markup:
-        question = self.question(state)
-        stale = self._answer is not None and self._answer[0] != question
-        quick = self._took_s < QUICK_S and (self._answer is not None or self.at_once)
-        if quick and question != self._asked and not self._jobs.busy:
+        answer = self._answer
+        question, is_ready, is_quick = (
+            self.question(state),
+            self.is_ready(state),
+            self.is_quick(state),
+        )
+        if is_quick and is_ready and question != self._asked and not self._jobs.busy:
             self._run(state)
-        parts: list[object] = [self.before_result(state)]
-        if self._problem is not None and self._problem[0] == question:
-            parts.append(tag("p", self._problem[1], class_="ws-problem", role="alert"))
-        elif self._answer is not None:
+        stale = answer is not None and answer.question != question
+        problem = self.problem_html(state)
+        parts: list[object] = [self.before_result(state), problem]
+        if answer is not None and not problem:
             if question == self._applied:
-                words = "Applied: these errors are what is shown now. Undo takes them back."
+                words = "Applied: this is what is shown now. Undo takes it back."
                 parts.append(tag("p", words, role="status"))
-            elif stale and not quick:
-                parts.append(
-                    tag("p", "Something has changed since: run it again.", class_="ws-stale")
-                )
-            found, faded = self._answer[1], stale and question != self._applied
-            cards = [
-                self._cards[index].html(self.name, index, stale=stale)
-                for index in self.offered(found)
-            ]
-            said = join((self.headline(found), *cards, self.result_html(found)))
+            elif stale and not is_quick:
+                words = "Something has changed since: run it again."
+                parts.append(tag("p", words, class_="ws-stale"))
+            found, faded = answer.found, stale and question != self._applied
+            said = join((self.headline(found), self.cards_html(question), self.result_html(found)))
             parts.append(tag("div", said, class_="ws-result" + (" stale" if faded else "")))
             parts += [tag("p", words, class_="ws-doubt") for words in found.doubts()]
             parts.append(self.actions(found, stale=stale))
-        if not quick or self._answer is None or self._jobs.html():
-            parts.append(self._run_row())
-        values = self.values(state)
-        if options := [one for one in self.shown_options(state) if one.name not in OF_STATE]:
-            form = form_html(self.name, options, values, state.scene)
-            parts.append(tag("details", tag("summary", "Options") + form, class_="ws-options",
-                             data_key=f"{self.name}.options"))  # fmt: skip
-        return join(parts)
+        bar = self._jobs.html()
+        wanted = answer is None or problem or (stale and not is_quick)
+        if wanted and is_ready and not bar:
+            words = f"{self.run_words} again" if answer else self.run_words
+            run = button(words, f"{self.name}:run", kind="" if answer else "main",
+                         hint=self.run_hint)  # fmt: skip
+            bar = tag("div", run, class_="ws-actions ws-run")
+        parts.append(bar)
+        return join((*parts, self.options_html(state)))
 
-    def _run_row(self) -> Markup:
-        words = "Run again" if self._answer else "Run"
-        run = button(words, f"{self.name}:run", kind="" if self._answer else "main")
-        return self._jobs.html() or tag("div", run, class_="ws-actions ws-run")
+    def problem_html(self, state: AppState) -> Markup:
+        """Say why there is no answer."""
+        if self._problem is None or self._problem[0] != self.question(state):
+            return EMPTY
+        return tag("p", self._problem[1], class_="ws-problem", role="alert")
 
-    def actions(self, found: Result, *, stale: bool) -> Markup:
-        """Give what can be done with a result beside its cards."""
-        saves = [
-            button(f"Save {ending}", f"{self.name}:save", ending) for ending in self.files(found)
-        ]
-        saves.append(button("Add to report", f"{self.name}:report", kind="quiet"))
-        return tag("div", join(saves), class_="ws-actions")
+    def cards_html(self, question: Question) -> Markup:
+        """Offer the changes that the result proposes."""
+        answer = self._answer
+        if answer is None:
+            return EMPTY
+        stale = answer.question != question
+        return join(
+            answer.cards[index].html(self.name, index, stale=stale)
+            for index in self.offered(answer.found)
+        )
 
-    def files(self, found: Result) -> dict[str, Callable[[], str]]:
-        """Give the files of a result that can be saved, by their ending."""
-        import json
-
-        files: dict[str, Callable[[], str]] = {}
-        table = found.file_table()
-        if table is not None:
-            files["CSV"] = partial(_csv, table)
-        files["JSON"] = lambda: json.dumps(found.as_json(), indent=2, ensure_ascii=False)
-        return files
+    def options_html(self, state: AppState, above: Markup = EMPTY) -> Markup:
+        """Fold its options."""
+        options = [one for one in self.shown_options(state) if one.name not in OF_STATE]
+        if not options:
+            return EMPTY
+        form = above + form_html(self.name, options, self.values(state), state.scene)
+        return tag("details", tag("summary", "Options") + form, class_="ws-options",
+                   data_key=f"{self.name}.options")  # fmt: skip
 
     # --- events --------------------------------------------------------------------------------
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
         """Set an option, run, cancel, or do something with the result."""
-        if word.startswith("set."):
-            return self._set(state, word.removeprefix("set."), value)
-        if word == "run":
+        name = word.removeprefix("set.")
+        if word.startswith("set.") and name in {one.name for one in self.options()}:
+            return replace(state, forms={**state.forms, f"{self.name}.{name}": value[:LONGEST]})
+        if word == "run" and self.is_ready(state):
             self._run(state)
         elif word == "cancel":
             self._jobs.cancel()
-        elif word == "save":
-            self.context.act(partial(self._save, value))
-        elif word == "report":
-            self.context.act(self._into_report)
+        elif word in ("save", "report"):
+            self.context.act(partial(self._save, value) if word == "save" else self._into_report)
         elif word in ("preview", "apply") and (change := self._change(state, value)) is not None:
+            what = self.title.lower()
             if word == "preview":
-                return with_proposal(state, change.scene, self.change_title(change))
-            found = with_applied(state, change.scene, f"before {self.title.lower()}")
+                return with_proposal(state, change.scene, f"after {what}: {change.words}")
+            found = with_applied(state, change.scene, f"before {what}")
             self._applied = self.question(found)
             return found
         return state
 
-    def _set(self, state: AppState, name: str, value: str) -> AppState:
-        from dataclasses import replace
-
-        if name not in {one.name for one in self.options()}:
-            return state
-        return replace(state, forms={**state.forms, f"{self.name}.{name}": value[:1000]})
-
     def _change(self, state: AppState, value: str) -> Change | None:
-        index = index_of(value, len(self._cards))
-        if self._answer is None or self._answer[0] != self.question(state) or index is None:
+        answer = self._answer
+        if answer is None or answer.question != self.question(state):
             return None
-        return self._cards[index].change
+        index = index_of(value, len(answer.cards))
+        return None if index is None else answer.cards[index].change
 
     def _run(self, state: AppState) -> None:
-        question, scenes, values = self.question(state), self.scenes(state), self.values(state)
-        seen, self._scene_title = Seen.of(state), state.scene.title
-        self._asked = question
+        question, scenes = self.question(state), self.scenes(state)
+        self._asked, self._subject = question, f"{state.scene.title} · "
         try:
-            asked = self.ask(state, values, scenes)
+            asked = self.ask(state, self.values(state), scenes)
         except WarpspaceError as error:
             self._fail(self.title, error)
             return
 
-        def work(job: Job) -> None:
+        def answer(job: Job) -> Answer:
             def watch(share: float) -> None:
                 job.share = share
                 if job.is_set():
@@ -269,31 +294,38 @@ class AnalysisPart(Section):
                 started = time.monotonic()
                 found = asked.run_all(scenes, watch)
                 took_s = time.monotonic() - started
-                cards = make_cards(scenes[0], found.changes(), seen)
-            if not job.is_set():
-                self.context.act(partial(self._take_answer, question, found, cards, took_s))
+                return Answer(
+                    question, found, make_cards(state, scenes[0], found.changes()), took_s
+                )
 
-        quiet_s = QUICK_S if self._answer and self._took_s < QUICK_S else 0.0
-        self._jobs.start(self.kind.doing, work, max(self._took_s, 1.0), quiet_s)
+        took_s = self._answer.took_s if self._answer else 1.0
+        self._make(self.kind.doing, took_s, answer, self._take_answer)
 
-    def _label(self, name: str) -> str:
-        return next((one.label for one in self.kind.options() if one.name == name), name)
-
-    def _take_answer(
-        self, question: Question, found: Result, cards: tuple[Card, ...], took_s: float
+    def _make(
+        self, words: str, usual_s: float, make: Callable[[Job], T], take: Callable[[T], None]
     ) -> None:
-        self._answer, self._cards = (question, found), cards
-        self._problem, self._took_s = None, took_s
+        """Make something beside the session, which then takes it."""
+
+        def work(job: Job) -> None:
+            made = make(job)
+            if not job.is_set():
+                self.context.act(partial(take, made))
+
+        quiet_s = QUICK_S if usual_s < QUICK_S else 0.0
+        self._jobs.start(words, work, max(usual_s, 1.0), quiet_s)
+
+    def _take_answer(self, answer: Answer) -> None:
+        self._answer, self._problem = answer, None
         self._again()
 
     def _fail(self, _name: str, error: Exception) -> None:
+        if isinstance(error, CancelledError):
+            return
+        words = error_words(error)
         if isinstance(error, OptionError):
-            self._refuse(self._asked, error.said(self._label))
-        elif not isinstance(error, CancelledError):
-            self._refuse(self._asked, error_words(error))
-
-    def _refuse(self, question: Question, words: str) -> None:
-        self._problem = (question, words)
+            labels = {one.name: one.label for one in self.kind.options()}
+            words = error.said(lambda name: labels.get(name, name))
+        self._problem = (self._asked, words)
         self._again()
 
     def _again(self) -> None:
@@ -301,47 +333,64 @@ class AnalysisPart(Section):
         self.context.renew(self)
 
     def _save(self, ending: str) -> None:
-        if self._answer is None or (write := self.files(self._answer[1]).get(ending)) is None:
+        found = self._answer.found if self._answer else None
+        if found is None or ending not in _endings(found):
             return
-        self.context.save_file(f"{self.name}.{ending.lower()}", write())
+        text, table = io.StringIO(), found.file_table()
+        if ending == "JSON":
+            json.dump(found.as_json(), text, indent=2, ensure_ascii=False)
+        elif table is not None:
+            csv.writer(text, lineterminator="\n").writerows(table.csv_rows())
+        self.context.save_file(f"{self.name}.{ending.lower()}", text.getvalue())
 
     def _into_report(self) -> None:
         if self._answer is not None:
-            self.context.reported.append((self.title, self._answer[1]))
+            self.context.reported.append((self.title, self._answer.found))
             self.context.notify("Added to the report", f"{self.title}; see Report at the top")
 
 
-def details_html(blocks: Iterable[Block], words: str = "Details") -> Markup:
-    """Fold what is too wide for the column."""
-    inner = join(map(block_html, blocks))
-    if not inner:
-        return EMPTY
-    wide = tag("div", inner, tabindex=0, role="group", aria_label=words)  # scrolled by keys
-    return tag("details", tag("summary", words) + wide, class_="ws-details",
-               data_key=f"details.{words}")  # fmt: skip
+def _endings(found: Result) -> tuple[str, ...]:
+    return ("JSON",) if found.file_table() is None else ("CSV", "JSON")
 
 
-def _is_wide(block: Block) -> bool:
-    if isinstance(block, Table):
-        return sum(column.shows for column in block.columns) > WIDEST
-    return isinstance(block, Bars)
+# --- What a result proposes -----------------------------------------------------------------------
 
 
-def _plain(sentence: str) -> str:
-    return sentence.replace(" of SCENE", "").replace("SCENE", "the machine").rstrip(".")
+def make_cards(state: AppState, scene: Scene, changes: Sequence[Change]) -> tuple[Card, ...]:
+    """Set each proposed scene beside the present one: errors, max and mean from and to."""
+    before = _statistics(state, scene) if changes else None
+    return tuple(Card(one, _changed(state, scene, one, before)) for one in changes)
 
 
-def _csv(table: Table) -> str:
-    import csv
-    from io import StringIO
+def _statistics(state: AppState, scene: Scene) -> Statistics | None:
+    scene = replace(scene, placed=state.placed)
+    try:
+        grid = build_grid(scene.model, scene.workspace, state.nodes)
+        return volume_statistics(evaluate_grid(scene, grid, scene.view(state.loop)), grid)
+    except WarpspaceError:
+        return None
 
-    text = StringIO()
-    csv.writer(text, lineterminator="\n").writerows(table.csv_rows())
-    return text.getvalue()
+
+def _changed(state: AppState, scene: Scene, change: Change, before: Statistics | None) -> Markup:
+    after, moved = _statistics(state, change.scene), list[tuple[float, str]]()
+    for key in {**scene.errors.functions, **change.scene.errors.functions}:
+        was, then = (one.errors.amplitude(key) for one in (scene, change.scene))
+        if abs(then - was) > SAME:
+            said = f"{key} {number(was)} → {number(then)} {parameter(key).unit}"
+            moved.append((-abs(then - was), said))
+    steps = [said for _, said in sorted(moved)] or [change.words]
+    lines = [tag("div", tag("b", said)) for said in steps[:MOST_STEPS]]
+    if (more := len(steps) - MOST_STEPS) > 0:
+        lines.append(tag("div", f"and {more} more", class_="ws-quiet"))
+    if before is not None and after is not None:
+        pairs = (("max", before.max_um, after.max_um), ("mean", before.mean_um, after.mean_um))
+        lines.append(
+            rows((name, f"{number(was)} → {number(then)} µm") for name, was, then in pairs)
+        )
+    return join(lines)
 
 
 HOOKS: dict[str, str] = {
-    "gains": "warpspace.app.tasks.understand:GainsPart",
     "calibrate": "warpspace.app.tasks.measure:CalibratePart",
     "repair": "warpspace.app.tasks.improve:RepairPart",
     "compensate": "warpspace.app.tasks.improve:CompensatePart",
@@ -353,9 +402,6 @@ HOOKS: dict[str, str] = {
 
 def sections(context: Context) -> list[Section]:
     """Build a section for each analysis that a page can ask."""
-    found: list[Section] = [
-        resolve_name(HOOKS[entry.name])(context, entry) if entry.name in HOOKS
-        else AnalysisPart(context, entry)
-        for entry in entries()
-    ]  # fmt: skip
-    return found
+    kinds = (resolve_name(HOOKS[one.name]) if one.name in HOOKS else AnalysisPart
+             for one in entries())  # fmt: skip
+    return [kind(context, one) for kind, one in zip(kinds, entries(), strict=True)]

@@ -1,5 +1,12 @@
 """The parts that a page consists of, in the order in which they are written."""
 
+from collections.abc import Iterable, Mapping
+
+from markupsafe import Markup
+
+from warpspace.app.browser.html import join, tag
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.state.app_state import TASKS
 from warpspace.app.tasks.analysis import sections
 from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.controls import ComparePart, ControlsPart
@@ -12,49 +19,76 @@ from warpspace.app.tasks.machine import PositionsSection, RotarySection
 from warpspace.app.tasks.machine_editor import EditorSection, MachinesWindow
 from warpspace.app.tasks.measure import TestsPart
 from warpspace.app.tasks.over import HeadPart, OrderPart, RoomPart
-from warpspace.app.tasks.parts import Part
-from warpspace.app.tasks.tasks import TASKS, TasksPart
+from warpspace.app.tasks.parts import Part, Section
 from warpspace.app.tasks.top import HelpWindow, PagePart, ScenesWindow, StatePart, TopPart
 from warpspace.app.tasks.understand import VolumePart, WorstPart
 
 FIRST = ("compensate", "concepts", "allocate")
 """Sections that stand first in their task, short ones before long ones."""
+RARE = frozenset({"volume", "gains", "line", "reach", "certify", "convert", "contributions"})
+"""Sections that stand under "More analyses", so that a task is calm at first sight."""
 
 
-def _place(name: str) -> int:
-    return FIRST.index(name) if name in FIRST else len(FIRST)
+class TasksPart(Part):
+    """The column at the right: five tasks, one open, each a list of sections that unfold."""
+
+    name = "tasks"
+
+    def __init__(self, context: Context, found: Iterable[Section]) -> None:
+        super().__init__(context)
+        names = {one.name: one.task for one in found}
+        names = {name: names[name] for name in (*FIRST, *names)}
+        self.sections = {task: [name for name, of in names.items() if of == task] for task in TASKS}
+        self.sections["measure"].insert(0, ImportSection.name)
+
+    def depends(self, picture: LivePicture) -> tuple[object, ...]:
+        return (picture.state.page.task,)
+
+    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
+        """Write the tabs, and an empty place for each section."""
+        task = picture.state.page.task
+        tabs = join(
+            tag(
+                "span", words, role="tab", id=f"ws-task-{name}", class_="ws-tab",
+                data_do="page:task", data_value=name, tabindex=0 if name == task else -1,
+                aria_selected=str(name == task).lower(), aria_controls="ws-task",
+            )
+            for name, words in TASKS.items()
+        )  # fmt: skip
+        names = self.sections.get(task, ())
+        places = _places(name for name in names if name not in RARE)
+        if rare := _places(name for name in names if name in RARE):
+            places += tag("details", tag("summary", "More analyses") + rare, class_="ws-more",
+                          data_key=f"more.{task}")  # fmt: skip
+        return {
+            "tasks": tag("h2", "Tasks", class_="ws-heard")
+            + tag("div", tabs, role="tablist", aria_label="Tasks", class_="ws-tabs")
+            + tag("div", places, id="ws-task", role="tabpanel", aria_labelledby=f"ws-task-{task}",
+                  data_key=f"task-{task}")
+        }  # fmt: skip
+
+
+def _places(names: Iterable[str]) -> Markup:
+    return join(tag("div", "", data_piece=f"section.{name}") for name in names)
 
 
 def build_parts(context: Context) -> list[Part]:
     """Build the parts of a page."""
-    machine = (PositionsSection, ConventionsSection, RotarySection, EditorSection)
-    found = [WorstPart(context), VolumePart(context), TestsPart(context), *sections(context),
-             *(section(context) for section in machine)]  # fmt: skip
-    tasks = TasksPart(context)
-    tasks.sections = {
-        task: tuple(part.name for part in found if part.task == task) for task in TASKS
-    }
-    for task, names in tasks.sections.items():
-        tasks.sections[task] = tuple(sorted(names, key=_place))
-    tasks.sections["measure"] = (ImportSection.name, *tasks.sections["measure"])
+    of_tasks = (WorstPart, VolumePart, TestsPart)
+    of_machine = (PositionsSection, ConventionsSection, RotarySection, EditorSection)
+    found: list[Section] = [
+        *(kind(context) for kind in of_tasks),
+        *sections(context),
+        *(kind(context) for kind in of_machine),
+    ]
+    first = (TopPart, HeadPart, OrderPart, ControlsPart, ComparePart, ErrorsPart)
+    last = (
+        BestPart, RoomPart, StatePart, PagePart, ScenesWindow, MachinesWindow, FilesWindow,
+        ImportSection, ImportWindow, ReportWindow, HelpWindow,
+    )  # fmt: skip
     return [
-        TopPart(context),
-        HeadPart(context),
-        OrderPart(context),
-        ControlsPart(context),
-        ComparePart(context),
-        ErrorsPart(context),
-        tasks,
+        *(kind(context) for kind in first),
+        TasksPart(context, found),
         *found,
-        BestPart(context),
-        RoomPart(context),
-        StatePart(context),
-        PagePart(context),
-        ScenesWindow(context),
-        MachinesWindow(context),
-        FilesWindow(context),
-        ImportSection(context),
-        ImportWindow(context),
-        ReportWindow(context),
-        HelpWindow(context),
+        *(kind(context) for kind in last),
     ]

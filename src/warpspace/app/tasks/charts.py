@@ -1,30 +1,104 @@
 """What a result says as HTML: sentences, tables, bars, and curves as SVG."""
 
 import math
-from dataclasses import dataclass
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from markupsafe import Markup
 
-from warpspace.analysis.blocks import Block, Curve, Histogram, Lines, blocks_html
-from warpspace.app.browser.html import EMPTY, fill, join, tag
+from warpspace.analysis.blocks import (
+    Bars,
+    Block,
+    Column,
+    Curve,
+    Histogram,
+    Lines,
+    Table,
+    blocks_html,
+)
+from warpspace.app.browser.html import EMPTY, fill, join, number, tag
 from warpspace.bench.base import LEAST, lay_polar
 from warpspace.geometry.colour import tick_values
-from warpspace.units import Array
+from warpspace.units import MINUS, THIN_SPACE, Array, spell_short
 
+WIDEST = 5  # columns of a table that the column of the page has room for
+MOST_BARS = 10  # that are in sight at once
 WIDE, HIGH = 320.0, 190.0
 """Size of a chart in units of its drawing."""
 LEFT, RIGHT, TOP, BOTTOM = 40.0, 8.0, 8.0, 30.0
 SERIES = 6  # colours of series in the style sheet
+ANGLES = Markup(
+    '<path class="ws-faint" d="M-1 0H1M0 -1V1"/><text x="1.02" y=".05">0°</text>'
+    '<text x="0" y="-1.03" text-anchor="middle">90°</text>'
+    '<text x="-1.02" y=".05" text-anchor="end">180°</text>'
+)
+
+
+def result_html(blocks: Iterable[Block]) -> Markup:
+    """Draw tables and charts; what is too wide for the column of the page is folded."""
+    found = [_turned(one) if isinstance(one, Table) else one for one in blocks]
+    wide = [one for one in found if isinstance(one, Bars) or _is_wide(one)]
+    shown = (_first_bars(one) if isinstance(one, Bars) else block_html(one)
+             for one in found if isinstance(one, Bars) or one not in wide)  # fmt: skip
+    return join(shown) + details_html(wide)
+
+
+def details_html(blocks: Iterable[Block], words: str = "Details") -> Markup:
+    """Fold what is too wide for the column, or rarely read."""
+    inner = join(map(block_html, blocks))
+    if not inner:
+        return EMPTY
+    wide = tag("div", inner, tabindex=0, role="group", aria_label=words)  # scrolled by keys
+    return tag("details", tag("summary", words) + wide, class_="ws-details",
+               data_key=f"details.{words}")  # fmt: skip
 
 
 def block_html(block: Block) -> Markup:
     """Say one block."""
+    if isinstance(block, str):
+        return tag("p", spelt(block))
     if isinstance(block, Lines):
         return lines_html(block)
     if isinstance(block, Histogram):
         return histogram_html(block)
-    return Markup(blocks_html([block]))  # noqa: S704 - escaped there
+    return Markup(re.sub(r">-(?=\d)", f">{MINUS}", blocks_html([block])))  # noqa: S704 - escaped
+
+
+def spelt(sentence: str) -> str:
+    """Give a sentence of a command as a page has it: true minus, thin spaces in large counts."""
+    text = re.sub(r"(?<![\w.])-(?=\d)", MINUS, sentence.strip())
+    return re.sub(r"(?<=\d),(?=\d{3}\b)", THIN_SPACE, text[:1].upper() + text[1:])
+
+
+def _is_wide(block: Block) -> bool:
+    return isinstance(block, Table) and len(block.shown) > WIDEST
+
+
+def _turned(table: Table) -> Table:
+    """Set the rows of a wide table beside each other where these are few."""
+    if not _is_wide(table) or not 0 < len(table.rows) < WIDEST:
+        return table
+    (first, *names), *lines = zip(table.shown, *table.cells(), strict=True)
+    form = "s" if all(one.is_number for one, *_ in lines) else ""
+    columns = (Column(first.heading), *(Column(name, form) for name in names))
+    lines = [(" ".join(filter(None, (one.heading, one.unit))), *cells) for one, *cells in lines]
+    return replace(table, columns=columns, rows=lines, marks=())
+
+
+def _first_bars(bars: Bars) -> Markup:
+    panel = bars.panels[0]
+    values = panel.series[0].values
+    longest = max((abs(value) for value in values if value is not None), default=0.0) or 1.0
+    lines = [
+        fill('<div class="ws-pair"><span>{words}</span><span>{value}</span></div>'
+             '<div class="ws-effect"><i style="width:{share}%"></i></div>', words=words,
+             value=number(value, 2), share=number(100.0 * abs(value) / longest))
+        for words, value in zip(bars.rows, values, strict=True) if value is not None
+    ]  # fmt: skip
+    head = tag("p", " · ".join(filter(None, (panel.title, panel.unit))), class_="ws-tiny")
+    return head + join(lines[:MOST_BARS])
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,31 +108,34 @@ class Frame:
     x: tuple[float, float]
     y: tuple[float, float]
 
-    def place(self, x: Array | np.float64, y: Array | np.float64) -> Array:
+    def place(self, x: Array | float, y: Array | float) -> Array:
         """Give points of the drawing, [..., 2]."""
         across = LEFT + (WIDE - LEFT - RIGHT) * (x - self.x[0]) / (self.x[1] - self.x[0])
         down = TOP + (HIGH - TOP - BOTTOM) * (self.y[1] - y) / (self.y[1] - self.y[0])
-        return np.stack([across, down], axis=-1)
+        return np.stack(np.broadcast_arrays(across, down), axis=-1)
+
+    def to_scale(self) -> "Frame":
+        """Widen one of the axes until a unit is as long on both."""
+        rooms = (self.x, WIDE - LEFT - RIGHT), (self.y, HIGH - TOP - BOTTOM)
+        per = max((high - low) / room for (low, high), room in rooms) / 2.0
+        x, y = (
+            ((low + high) / 2.0 - per * room, (low + high) / 2.0 + per * room)
+            for (low, high), room in rooms
+        )
+        return Frame(x, y)
 
     def axes(self, x_label: str, y_label: str) -> Markup:
         """Draw ticks with their values, and what the axes are."""
-        parts: list[Markup] = []
+        floor, middle = HIGH - BOTTOM, (TOP + HIGH - BOTTOM) / 2.0
+        parts = [_text(x_label, (LEFT + WIDE - RIGHT) / 2.0, HIGH - 4),
+                 _text(y_label, 9, middle, transform=f"rotate(-90 9 {middle:.0f})")]  # fmt: skip
         for value in tick_values(*self.x, 6.0):
-            (at, _) = self.place(np.float64(value), np.float64(self.y[0]))
-            parts.append(
-                _line(at, TOP, at, HIGH - BOTTOM) + _text(at, HIGH - BOTTOM + 11, _spell(value))
-            )
+            at = self.place(value, self.y[0])[0]
+            parts += [_line(f"M{at:.1f} {TOP}V{floor}"), _text(spell_short(value), at, floor + 11)]
         for value in tick_values(*self.y, 5.0):
-            (_, at) = self.place(np.float64(self.x[0]), np.float64(value))
-            parts.append(
-                _line(LEFT, at, WIDE - RIGHT, at) + _text(LEFT - 4, at + 3, _spell(value), "end")
-            )
-        middle = (TOP + HIGH - BOTTOM) / 2.0
-        parts.append(_text((LEFT + WIDE - RIGHT) / 2.0, HIGH - 4, x_label))
-        parts.append(
-            fill('<text x="9" y="{y}" text-anchor="middle" transform="rotate(-90 9 {y})">'
-                 "{words}</text>", y=f"{middle:.0f}", words=y_label)
-        )  # fmt: skip
+            at = self.place(self.x[0], value)[1]
+            words = _text(spell_short(value), LEFT - 4, at + 3, text_anchor="end")
+            parts += [_line(f"M{LEFT} {at:.1f}H{WIDE - RIGHT}"), words]
         return join(parts)
 
 
@@ -66,128 +143,101 @@ def lines_html(chart: Lines) -> Markup:
     """Draw curves over an abscissa, to scale, or around the angle."""
     if chart.kind == "polar":
         layout = lay_polar(chart)
-        points = [found * np.array([1.0, -1.0]) for found in layout.curves]
         rings = join(
-            fill('<circle class="{kind}" r="{r}"/>', r=f"{radius:.3f}",
-                 kind="ws-base" if value == 0 else "ws-faint")
+            tag("circle", class_="ws-faint" if value else "ws-base", r=f"{radius:.3f}")
             for value, radius in layout.rings
-        )  # fmt: skip
-        inner = fill('<path class="ws-faint" d="M-1 0H1M0 -1V1"/>') + rings + join(
-            _curve(*pair, 3) for pair in zip(chart.curves, points, strict=True)
-        ) + Markup('<text x="1.02" y=".05">0°</text>'
-                   '<text x="0" y="-1.03" text-anchor="middle">90°</text>'
-                   '<text x="-1.02" y=".05" text-anchor="end">180°</text>')  # fmt: skip
-        return _figure(
-            chart, inner, "-1.3 -1.16 2.6 2.24", f"rings {layout.ring:g} {layout.unit}", "ws-polar"
         )
+        curves = join(
+            _curve(one, found * np.array([1.0, -1.0]), 3)
+            for one, found in zip(chart.curves, layout.curves, strict=True)
+        )
+        said = f"rings {layout.ring:g} {layout.unit}"
+        return _figure(chart, ANGLES + rings + curves, "-1.3 -1.16 2.6 2.24", said, "ws-polar")
     xs = np.concatenate([curve.x for curve in chart.curves])
     ys = np.concatenate([curve.y for curve in chart.curves])
     if chart.log:
         xs, ys = xs[xs > 0], ys[ys > 0]
-    ends = Frame(_ends(xs), _ends(ys))
-    frame = _to_scale(ends) if chart.kind == "plane" else ends
-    curves = join(_curve(one, frame.place(one.x, one.y), 1) for one in chart.curves)
+    frame = Frame(_ends(xs), _ends(ys))
+    frame = frame.to_scale() if chart.kind == "plane" else frame
+    curves = join(_curve(one, frame.place(one.x, one.y)) for one in chart.curves)
     areas = [
         np.concatenate([frame.place(band.x, band.low), frame.place(band.x, band.high)[::-1]])
         for band in chart.bands
     ]
     bands = join(
-        tag("path", "", class_=f"ws-band ws-s{band.colour % SERIES}", d=_path(area, 1))
+        _line(_path(area), f"ws-band ws-s{band.colour % SERIES}")
         for band, area in zip(chart.bands, areas, strict=True)
     )
-    return _figure(
-        chart, frame.axes(chart.x_label, chart.y_label) + bands + curves, f"0 0 {WIDE:g} {HIGH:g}"
-    )
+    return _figure(chart, frame.axes(chart.x_label, chart.y_label) + bands + curves)
 
 
 def histogram_html(chart: Histogram) -> Markup:
     """Draw a distribution with its marks and its limit."""
-    top = max(float(chart.heights.max()), 1e-9) * 1.05
+    limit = math.inf if chart.limit is None else chart.limit
     last = max(float(chart.edges[-1]), chart.limit or 0.0)
-    frame = Frame((float(chart.edges[0]), last), (0.0, top))
+    frame = Frame(
+        (float(chart.edges[0]), last), (0.0, max(float(chart.heights.max()), 1e-9) * 1.05)
+    )
     bars: list[Markup] = []
     for low, high, height in zip(chart.edges[:-1], chart.edges[1:], chart.heights, strict=True):
         (x0, y0), (x1, y1) = frame.place(np.array([low, high]), np.array([height, 0.0]))
-        over = chart.limit is not None and low >= chart.limit
-        bars.append(fill('<rect class="{kind}" x="{x}" y="{y}" width="{w}" height="{h}"/>',
-                         kind="ws-over" if over else "ws-under", x=f"{x0:.1f}", y=f"{y0:.1f}",
-                         w=f"{max(x1 - x0 - 0.5, 0.5):.1f}", h=f"{y1 - y0:.1f}"))  # fmt: skip
+        bars.append(tag("rect", class_="ws-over" if low >= limit else "ws-under",
+                        x=f"{x0:.1f}", y=f"{y0:.1f}", width=f"{max(x1 - x0 - 0.5, 0.5):.1f}",
+                        height=f"{y1 - y0:.1f}"))  # fmt: skip
     if chart.limit is not None:
-        (at, _) = frame.place(np.float64(chart.limit), np.float64(0.0))
-        bars.append(tag("path", "", class_="ws-limit", d=f"M{at:.1f} {TOP}V{HIGH - BOTTOM}"))
-    said = join(tag("p", words, class_="ws-told" if index == 0 else "ws-tiny")
+        at = frame.place(chart.limit, 0.0)[0]
+        bars.append(_line(f"M{at:.1f} {TOP}V{HIGH - BOTTOM}", "ws-limit"))
+    told = join(tag("p", spelt(words), class_="ws-tiny" if index else "ws-told")
                 for index, words in enumerate(chart.told))  # fmt: skip
-    svg = _svg(
-        frame.axes(chart.x_label, chart.y_label) + join(bars), f"0 0 {WIDE:g} {HIGH:g}", chart.title
-    )
-    return tag("figure", join((said, svg, tag("figcaption", chart.subtitle, class_="ws-tiny"))))
+    svg = _svg(frame.axes(chart.x_label, chart.y_label) + join(bars), chart.title)
+    return tag("figure", told + svg + tag("figcaption", chart.subtitle, class_="ws-tiny"))
 
 
-def _figure(chart: Lines, inner: Markup, box: str, rings: str = "", kind: str = "") -> Markup:
-    named = [curve for curve in chart.curves if curve.name]
+FLAT = f"0 0 {WIDE:g} {HIGH:g}"
+
+
+def _figure(
+    chart: Lines, inner: Markup, box: str = FLAT, rings: str = "", kind: str = ""
+) -> Markup:
+    named = (curve for curve in chart.curves if curve.name)
     key = join(
         tag("span", one.name, class_=f"ws-s{one.colour % SERIES} ws-{one.style}") for one in named
     )
     note = tag("p", chart.note, class_="ws-tiny") if chart.note else EMPTY
-    return tag("figure", join((
-        tag("figcaption", chart.title), _svg(inner, box, f"{chart.title}: {chart.y_label}", kind),
-        tag("div", join((key, rings)), class_="ws-key ws-tiny"), note,
-    )))  # fmt: skip
+    svg = _svg(inner, f"{chart.title}: {chart.y_label}", box, kind)
+    key = tag("div", join((key, rings)), class_="ws-key ws-tiny")
+    return tag("figure", tag("figcaption", chart.title) + svg + key + note)
 
 
-def _svg(inner: Markup, box: str, label: str, kind: str = "") -> Markup:
+def _svg(inner: Markup, label: str, box: str = FLAT, kind: str = "") -> Markup:
     return tag("svg", inner, viewBox=box, role="img", aria_label=label, class_=kind or None)
 
 
-def _curve(curve: Curve, points: Array, digits: int) -> Markup:
-    path = (_dots if curve.style == "dots" else _path)(points, digits)
-    return tag("path", "", class_=f"ws-s{curve.colour % SERIES} ws-{curve.style}", d=path)
+def _curve(curve: Curve, points: Array, digits: int = 1) -> Markup:
+    path = _path(points, digits, dots=curve.style == "dots")
+    return _line(path, f"ws-s{curve.colour % SERIES} ws-{curve.style}")
 
 
-def _line(x0: float, y0: float, x1: float, y1: float) -> Markup:
-    return tag("path", "", class_="ws-faint", d=f"M{x0:.1f} {y0:.1f}L{x1:.1f} {y1:.1f}")
+def _line(path: str, kind: str = "ws-faint") -> Markup:
+    return tag("path", class_=kind, d=path)
 
 
-def _text(x: float, y: float, words: str, anchor: str = "middle") -> Markup:
-    return tag("text", words, x=f"{x:.1f}", y=f"{y:.1f}", text_anchor=anchor)
+def _text(words: str, x: float, y: float, text_anchor: str = "middle", **more: str) -> Markup:
+    return tag("text", words, x=f"{x:.1f}", y=f"{y:.1f}", text_anchor=text_anchor, **more)
 
 
-def _spell(value: float) -> str:
-    return f"{value:g}".replace("-", "−")
-
-
-def _path(points: Array, digits: int) -> str:
-    """Spell a line; what is no number is a gap in it."""
+def _path(points: Array, digits: int = 1, *, dots: bool = False) -> str:
+    """Spell a line with gaps where there is no number; dots are strokes without length."""
     found, joint = "", "M"
     for x, y in points.tolist():
-        if math.isnan(x) or math.isnan(y):
-            joint = "M"
-        else:
-            found, joint = f"{found}{joint}{x:.{digits}f} {y:.{digits}f}", "L"
+        known = not (math.isnan(x) or math.isnan(y))
+        if known:
+            found += f"{joint}{x:.{digits}f} {y:.{digits}f}" + ("h0" if dots else "")
+        joint = "L" if known and not dots else "M"
     return found
-
-
-def _dots(points: Array, digits: int) -> str:
-    """Spell points as strokes without length, whose round ends are dots."""
-    return "".join(f"M{x:.{digits}f} {y:.{digits}f}h0" for x, y in points.tolist())
 
 
 def _ends(values: Array) -> tuple[float, float]:
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    if high - low < LEAST:
-        middle = round((low + high) / 2.0, 6)
-        return middle - 1.0, middle + 1.0
-    room = 0.04 * (high - low)
+    room = 0.04 * (high - low) if high - low >= LEAST else 1.0
     return low - room, high + room
-
-
-def _to_scale(ends: Frame) -> Frame:
-    per_x = (ends.x[1] - ends.x[0]) / (WIDE - LEFT - RIGHT)
-    per_y = (ends.y[1] - ends.y[0]) / (HIGH - TOP - BOTTOM)
-    per = max(per_x, per_y)
-
-    def widened(pair: tuple[float, float], room: float) -> tuple[float, float]:
-        middle = (pair[0] + pair[1]) / 2.0
-        return middle - per * room / 2.0, middle + per * room / 2.0
-
-    return Frame(widened(ends.x, WIDE - LEFT - RIGHT), widened(ends.y, HIGH - TOP - BOTTOM))

@@ -6,6 +6,8 @@ from markupsafe import Markup
 
 from warpspace.analysis.options import Option
 from warpspace.app.browser.html import choice, field, join, switch, text_box
+from warpspace.app.state.app_state import AppState
+from warpspace.app.state.tree import leaves, value
 from warpspace.scene.model import Scene
 
 OWN = ""  # what stands for an option that is left to the analysis
@@ -16,32 +18,40 @@ def form_html(
     part: str, options: Sequence[Option], values: Mapping[str, str], scene: Scene
 ) -> Markup:
     """Give the controls of options; what was typed stands in them, else what they default to."""
-    return join(_control(part, one, values.get(one.name), scene) for one in options)
+    return join(_control(f"{part}:set.{one.name}", one, values.get(one.name), scene)
+                for one in options)  # fmt: skip
 
 
-def _control(part: str, one: Option, given: str | None, scene: Scene) -> Markup:
-    name, hint = f"{part}:set.{one.name}", one.about + "."
+def _control(name: str, one: Option, given: str | None, scene: Scene) -> Markup:
+    hint, default, typed = f"{one.about}.", one.default_words, one.grammar and one.grammar.metavar
     if one.kind is bool:
-        return switch(name, one.label, on=given == "1" if given is not None else bool(one.default),
-                      hint=hint)  # fmt: skip
-    default = one.default_words
-    if one.choices:
-        words = {word: one.words.get(word, word.replace("_", " ").replace("-", " "))
-                 for word in one.choices}  # fmt: skip
-        if one.default is None:
+        return switch(name, one.label, hint=hint, on=(given or str(int(one.default))) == "1")
+    if one.choices or typed == "AXIS":
+        known = one.choices or tuple(scene.machine.axes)
+        words = {
+            one_: one.words.get(one_, one_.replace("_", " ").replace("-", " ")) for one_ in known
+        }
+        if not one.default:
             words = {OWN: default or "automatic", **words}
-        chosen = (
-            given if given is not None else str(one.default if one.default is not None else OWN)
-        )
-        return field(one.label, choice(name, chosen, words), name, one.unit, hint)
-    if one.grammar is not None and one.grammar.metavar == "AXIS":
-        words = {OWN: default or "automatic", **{axis: axis for axis in scene.machine.axes}}
-        return field(one.label, choice(name, given or OWN, words), name, one.unit, hint)
-    example = "" if one.grammar is None else EXAMPLES.get(one.grammar.metavar, one.grammar.metavar)
-    held = default if one.grammar is None and not one.unset else ""
-    span = f" {one.low:g} to {one.high:g}" if one.low is not None and one.high is not None else ""
-    box = text_box(
-        name, given if given is not None else held, placeholder=default or example,
-        size="" if one.grammar else "short",
+        control = choice(name, str(one.default or OWN) if given is None else given, words)
+        return field(one.label, control, name, one.unit, hint)
+    if one.low is not None and one.high is not None:
+        hint += f" {one.low:g} to {one.high:g}"
+    held = "" if typed or one.unset else default
+    control = text_box(
+        name, held if given is None else given, size="" if typed else "short",
+        placeholder=default or EXAMPLES.get(typed or "", typed or ""),
     )  # fmt: skip
-    return field(one.label, box, name, one.unit, f"{hint}{span}")
+    return field(one.label, control, name, one.unit, hint)
+
+
+def leaf_field(state: AppState, path: str) -> Markup:
+    """Give the control of a number, text or choice of the state, which sets it by itself."""
+    leaf, held, name = leaves(state)[path], value(state, path), f"state:set.{path}"
+    if leaf.choices:
+        control = choice(name, str(held), leaf.choices)
+    elif leaf.kind == "number":
+        control = text_box(name, f"{held:g}", size="short", inputmode="decimal")
+    else:
+        control = text_box(name, held)
+    return field(leaf.label, control, name, leaf.unit, leaf.hint)

@@ -33,8 +33,8 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.forms import TEST, read_form, with_form
-from warpspace.app.tasks.analysis import AnalysisPart, Question, details_html
-from warpspace.app.tasks.charts import block_html
+from warpspace.app.tasks.analysis import AnalysisPart, Question
+from warpspace.app.tasks.charts import block_html, details_html
 from warpspace.app.tasks.context import Context
 from warpspace.app.viewport.around import residuals
 from warpspace.app.viewport.shapes import Nodes, Shapes

@@ -52,7 +52,8 @@ class HeadPart(Part):
 
 @lru_cache(maxsize=64)
 def _limit(words: str, kept: bool, limit: str) -> Markup:
-    box = text_box("state:set.specification.limit_um", limit, size="short", label="Limit")
+    box = text_box("state:set.specification.limit_um", limit, size="short", label="Limit",
+                   id="ws-limit")  # fmt: skip
     body = tag("div", join(("Limit ", box, " µm")), class_="ws-field")
     kind = "ws-kept" if kept else "ws-missed"
     return menu(words, body, key="limit", hint="Change the limit", kind=kind)

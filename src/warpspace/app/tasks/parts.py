@@ -63,22 +63,17 @@ class Section(Part):
         return self.title
 
     def is_open(self, state: AppState) -> bool:
-        """Tell whether it is unfolded."""
         return self.name in state.page.open
 
     def is_seen(self, state: AppState) -> bool:
-        """Only within its task."""
         return state.page.task == self.task
 
     def depends(self, picture: LivePicture) -> tuple[object, ...]:
-        """Folded it depends on nothing."""
         return (True, *self.concerns(picture)) if self.is_open(picture.state) else (False,)
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
-        """Write the section."""
         opened = self.is_open(picture.state)
         body = self.body(picture) if opened else EMPTY
         title = self.heading(picture) if opened else self.title
-        section = fold(self.name, title, body, opens="page:fold", open_=opened,
-                       hint=self.sentence)  # fmt: skip
+        section = fold(self.name, title, body, opens="page:fold", open_=opened, hint=self.sentence)
         return {f"section.{self.name}": section}

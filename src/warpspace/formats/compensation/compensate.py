@@ -119,8 +119,7 @@ class Compensate(Analysis):
     loop: Literal["tool", "relative"] | None = option(
         None,
         "Structural loop that is corrected",
-        unset="relative where a linear axis, or with --orientation all rotary axes, carry the"
-        " workpiece",
+        unset="relative where an axis that is corrected carries the workpiece",
     )
     placed: bool = option(
         False,
@@ -168,6 +167,7 @@ class Compensation(BeforeAfter, Result):
     # "forward" and "backward", where errors depend on the direction of travel
     directions: Mapping[str, BeforeAfter] = field(default_factory=dict[str, BeforeAfter])
     reversal: tuple[str, ...] = ()  # what of that the format has no place for, in words
+    resolution: float = 0.0  # mm or degrees; smallest step that was asked for
 
     @property
     def size(self) -> int:
@@ -344,8 +344,9 @@ def compensate(
         reversal = reversal_notes(there, back, scene.errors, scene.model.direction)
         watch()
     return Compensation(
-        own.before, own.after, grid, kind, files, points, controller, directions, reversal
-    )
+        own.before, own.after, grid, kind, files, points, controller, directions, reversal,
+        asked.resolution,
+    )  # fmt: skip
 
 
 def placed_for(kinds: Sequence[Format], scene: Scene, loop: str) -> Scene:
