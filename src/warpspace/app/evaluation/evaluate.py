@@ -4,22 +4,25 @@ Grids and first-order responses are kept, since they change only with the scene,
 rotary positions and the loop; a slider move is then one matrix-vector product.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 
 from warpspace.app.evaluation.cache import Cache
 from warpspace.app.evaluation.compare import compare_pictures
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.slices import CompensatedSource, SliceSource
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.leaf import Identity
-from warpspace.app.state.look import default_held
+from warpspace.app.state.look import default_held, slice_positions
 from warpspace.field.evaluate import ErrorBasis, ErrorField, build_basis
-from warpspace.field.grid import Grid, build_grid
+from warpspace.field.grid import Grid, build_grid, build_slice
 from warpspace.geometry.colour import ColourScale
 from warpspace.geometry.traces import TraceGroup, build_traces
 from warpspace.picture.model import (
+    Slice,
     choose_exaggeration,
     choose_scale,
     coloured_error,
@@ -55,9 +58,7 @@ class LiveModel:
     """Turns states into pictures; one for all sessions, usable from any thread."""
 
     def __init__(self) -> None:
-        self._responses: Cache[Response] = Cache(CACHE_BYTES)
-        self._compensated = CompensatedSource()
-        self._slices = SliceSource(self._compensated)
+        self._kept: Cache[Any] = Cache(CACHE_BYTES)
 
     def response(self, state: AppState) -> Response:
         """Give grid and responses of a state, kept from an earlier one where possible."""
@@ -70,7 +71,7 @@ class LiveModel:
             state.rotary.own_mm,
             tuple(state.rotary.held.items()),
         )
-        return self._responses.get(key, lambda: _build(state), lambda response: response.size)
+        return self._kept.get(key, lambda: _build(state), lambda response: response.size)
 
     def evaluate(self, state: AppState) -> LivePicture:
         """Evaluate a state."""
@@ -81,37 +82,78 @@ class LiveModel:
     def _single(self, state: AppState) -> LivePicture:
         response = self.response(state)
         amplitudes = np.fromiter(state.active.values(), float, len(state.amplitudes))
-        field = self._compensated.field(state, response.grid)
-        if field is None:
-            field = response.basis.evaluate(amplitudes, orientation=state.look.tilts)
+        field = self._field(state, response.grid, response.basis, amplitudes)
         size = picture_size_mm(state.scene, response.grid)
         factor = choose_exaggeration(state.exaggeration, None, float(field.norm_um.max()), size)
-        traces = tuple(
-            TraceLines(
-                group,
-                basis.nominal_mm,
-                (
-                    self._compensated.field(state, group)
-                    or basis.evaluate(amplitudes, orientation=False)
-                ).error_um,
-                factor,
-            )
-            for group, basis in zip(response.groups, response.trace_bases, strict=True)
-        )
-        colours = _chosen_colours(state, field, response.basis)
+        groups = zip(response.groups, response.trace_bases, strict=True)
+        common: dict[str, Any] = {
+            "view": state.view(),
+            "exaggeration": factor,
+            "component": state.component,
+            "quantity": state.look.quantity,
+            "colours": _chosen_colours(state, field, response.basis),
+        }
         return LivePicture(
-            view=state.view(),
+            **common,
             grid=response.grid,
             field=field,
-            exaggeration=factor,
-            component=state.component,
-            quantity=state.look.quantity,
-            colours=colours,
             cut=state.look.surface == "cut",
-            slices=self._slices.slices(state, amplitudes, factor, colours),
+            slices=tuple(
+                Slice(**common, grid=grid, axis=axis, position_mm=at,
+                      field=self._field(state, grid, basis, amplitudes))
+                for axis, at, grid, basis in self._slices(state)
+            ),
             state=state,
-            traces=traces,
+            traces=tuple(
+                TraceLines(group, basis.nominal_mm,
+                           self._field(state, group, basis, amplitudes).error_um, factor)
+                for group, basis in groups
+            ),
+        )  # fmt: skip
+
+    def _field(
+        self, state: AppState, of: Grid | TraceGroup, basis: ErrorBasis, amplitudes: Array
+    ) -> ErrorField:
+        """Evaluate a grid or traces: to first order, or what a table of compensation leaves.
+
+        What does not depend on the errors (what the controller adds, where the axes stand then) is
+        kept; a slider move is then one evaluation of the exact chain.
+        """
+        controller, scene = state.controller, state.scene
+        on_trace = isinstance(of, TraceGroup)
+        if controller is None:
+            return basis.evaluate(amplitudes, orientation=state.look.tilts and not on_trace)
+        loop, point_mm = (of.loop, of.nominal_mm) if on_trace else (state.loop, None)
+        held = tuple((scene.reference or {}).items()), tuple(state.positions.items())
+        key = Identity(controller), Identity(of), Identity(scene.model), held, loop, state.seen
+        now = state.active_scene()
+        kept = self._kept.get(
+            key,
+            lambda: controller.at(of.coordinates, of.nominal_mm, now, loop, point_mm),
+            lambda found: found.nbytes,
         )
+        return kept.field(now.errors)
+
+    def _slices(self, state: AppState) -> Iterator[tuple[str, float, Grid, ErrorBasis]]:
+        """Give grids and responses of slices, kept while they stay in place."""
+        scene = state.scene
+        workspace = scene.workspace.moved(state.positions)
+
+        def build(axis: str, at: float) -> tuple[Grid, ErrorBasis]:
+            grid = build_slice(scene.model, workspace, axis, at, state.nodes)
+            return grid, grid_basis(scene, grid, state.view())
+
+        if state.look.surface == "slices":
+            for axis, at in slice_positions(scene, state.look, state.machine).items():
+                place = axis, at, *state.positions.items()
+                key = Identity(scene), state.nodes, place, state.seen
+                yield (
+                    axis,
+                    at,
+                    *self._kept.get(
+                        key, partial(build, axis, at), lambda held: 2 * held[1].position.nbytes
+                    ),
+                )
 
 
 @dataclass(frozen=True)
@@ -148,13 +190,9 @@ def _chosen_colours(state: AppState, field: ErrorField, basis: ErrorBasis) -> Co
     if state.look.range_mode == "shared":
         opened = basis.evaluate(np.array([state.start[key] for key in basis.keys]))
         both = (coloured_error(field, quantity), coloured_error(opened, quantity))
-        return choose_scale([_length(error) for error in both], component, quantity)
+        lengths = [np.linalg.norm(error, axis=-1) for error in both]
+        return choose_scale(lengths, component, quantity)
     return choose_scale([values], component, quantity)
-
-
-def _length(vectors: Array) -> Array:
-    """Length of vectors, [...]."""
-    return np.linalg.norm(vectors, axis=-1)
 
 
 def _build(state: AppState) -> Response:
